@@ -1,5 +1,6 @@
-//! Writes one trampoline per OpenGL, GLX and EGL entry point of `src/interpose/symbols/names.txt`, and the hooks of the calls that
-//! come per vertex. Nothing of OpenGL is needed on the machine that builds.
+//! Writes one trampoline per OpenGL, GLX and EGL entry point of `src/interpose/symbols/names.txt`,
+//! and the hooks of the calls that come per vertex. Nothing of OpenGL is needed on the machine that
+//! builds.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -36,34 +37,44 @@ fn class(name: &str) -> u32 {
     if any(&["glPopAttrib", "glPopClientAttrib"]) {
         return OTHERWISE;
     }
-    if starts(&["glGet", "glIs", "glGen", "glAreTextures", "glFence", "glObjectLabel", "glPushAttrib"])
-        || starts(&[
-            "glHint",
-            "glPixelStore",
-            "glDebug",
-            "glPushDebug",
-            "glPopDebug",
-            "glRasterPos",
-            "glWindowPos",
-        ])
-        || starts(&[
-            "glInitNames",
-            "glPushName",
-            "glPopName",
-            "glLoadName",
-            "glSelectBuffer",
-            "glFeedbackBuffer",
-        ])
-        || starts(&[
-            "glClearColor",
-            "glClearDepth",
-            "glClearStencil",
-            "glBitmap",
-            "glLineWidth",
-            "glLineStipple",
-        ])
-        || starts(&["glPointSize", "glPixelZoom", "glPixelTransfer", "glPixelMap", "glFlush", "glFinish"])
-    {
+    if starts(&[
+        "glGet",
+        "glIs",
+        "glGen",
+        "glAreTextures",
+        "glFence",
+        "glObjectLabel",
+        "glPushAttrib",
+    ]) || starts(&[
+        "glHint",
+        "glPixelStore",
+        "glDebug",
+        "glPushDebug",
+        "glPopDebug",
+        "glRasterPos",
+        "glWindowPos",
+    ]) || starts(&[
+        "glInitNames",
+        "glPushName",
+        "glPopName",
+        "glLoadName",
+        "glSelectBuffer",
+        "glFeedbackBuffer",
+    ]) || starts(&[
+        "glClearColor",
+        "glClearDepth",
+        "glClearStencil",
+        "glBitmap",
+        "glLineWidth",
+        "glLineStipple",
+    ]) || starts(&[
+        "glPointSize",
+        "glPixelZoom",
+        "glPixelTransfer",
+        "glPixelMap",
+        "glFlush",
+        "glFinish",
+    ]) {
         return PURE;
     }
     if any(&["glMatrixMode", "glOrtho", "glFrustum"])
@@ -84,7 +95,13 @@ fn class(name: &str) -> u32 {
         return 2;
     }
     // Binding changes no texture; what is bound is asked for with the rest.
-    if starts(&["glBindTexture", "glActiveTexture", "glClientActiveTexture", "glTexEnv", "glTexGen"]) {
+    if starts(&[
+        "glBindTexture",
+        "glActiveTexture",
+        "glClientActiveTexture",
+        "glTexEnv",
+        "glTexGen",
+    ]) {
         return 2;
     }
     if starts(&[
@@ -110,7 +127,8 @@ fn class(name: &str) -> u32 {
     ]) {
         return TEXTURE;
     }
-    if starts(&["glUniform", "glProgramUniform", "glBindAttribLocation", "glBindFragDataLocation"]) {
+    if starts(&["glUniform", "glProgramUniform", "glBindAttribLocation", "glBindFragDataLocation"])
+    {
         return 64;
     }
     if starts(&[
@@ -119,10 +137,22 @@ fn class(name: &str) -> u32 {
         "glColorPointer",
         "glTexCoordPointer",
         "glVertexAttrib",
-    ]) || starts(&["glBindBuffer", "glEnableVertexAttrib", "glDisableVertexAttrib", "glEnableClientState"])
-        || starts(&["glDisableClientState", "glBindVertexArray", "glInterleavedArrays", "glEdgeFlagPointer"])
-        || starts(&["glIndexPointer", "glFogCoordPointer", "glSecondaryColorPointer", "glDeleteVertexArrays"])
-        || starts(&["glBindVertexBuffer", "glLockArrays", "glUnlockArrays"])
+    ]) || starts(&[
+        "glBindBuffer",
+        "glEnableVertexAttrib",
+        "glDisableVertexAttrib",
+        "glEnableClientState",
+    ]) || starts(&[
+        "glDisableClientState",
+        "glBindVertexArray",
+        "glInterleavedArrays",
+        "glEdgeFlagPointer",
+    ]) || starts(&[
+        "glIndexPointer",
+        "glFogCoordPointer",
+        "glSecondaryColorPointer",
+        "glDeleteVertexArrays",
+    ]) || starts(&["glBindVertexBuffer", "glLockArrays", "glUnlockArrays"])
     {
         return 128;
     }
@@ -131,10 +161,12 @@ fn class(name: &str) -> u32 {
 
 /// The class of calls that write buffers.
 const BUFFER: u32 = 32;
-/// The class of calls that may change textures: we are always told of them, because images are not read again as long as there was none.
+/// The class of calls that may change textures: we are always told of them, because images are not
+/// read again as long as there was none.
 const TEXTURE: u32 = 8;
 
-/// Calls that change much, but no texel and no parameter of a texture. What is drawn into a texture counts when the framebuffer is bound or given up.
+/// Calls that change much, but no texel and no parameter of a texture. What is drawn into a texture
+/// counts when the framebuffer is bound or given up.
 fn leaves_textures(name: &str) -> bool {
     const BEGINNINGS: &[&str] = &[
         "glEnable",
@@ -215,7 +247,8 @@ fn leaves_textures(name: &str) -> bool {
     is_other_draw(name) || BEGINNINGS.iter().chain(OF_VERTICES).any(|b| name.starts_with(b))
 }
 
-/// Calls that write buffers: we are always told of them, because geometry in buffers is not read again as long as nobody writes.
+/// Calls that write buffers: we are always told of them, because geometry in buffers is not read
+/// again as long as nobody writes.
 fn writes_buffers(name: &str) -> bool {
     const WRITES: &[&str] = &[
         "glBufferData",
@@ -389,11 +422,14 @@ fn hand_written() -> Vec<String> {
     let named = |n: &&str| n.starts_with("gl") || n.starts_with("egl");
     let functions = text.lines().filter_map(|l| {
         let l = l.trim_start();
-        let l = l.strip_prefix("pub(in crate::interpose::symbols) unsafe extern \"C\" ").unwrap_or(l);
+        let l =
+            l.strip_prefix("pub(in crate::interpose::symbols) unsafe extern \"C\" ").unwrap_or(l);
         l.strip_prefix("fn ")?.split('(').next()
     });
-    let addresses =
-        text.lines().filter_map(|l| l.strip_prefix("get_proc_address! {")).flat_map(str::split_whitespace);
+    let addresses = text
+        .lines()
+        .filter_map(|l| l.strip_prefix("get_proc_address! {"))
+        .flat_map(str::split_whitespace);
     functions.chain(addresses).filter(named).map(str::to_owned).collect()
 }
 
@@ -401,8 +437,9 @@ fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=src/interpose/symbols/names.txt");
     println!("cargo:rerun-if-changed=src/interpose/symbols/hooks.rs");
-    // Without -Bsymbolic the addresses of our own functions bind to libGL's of the same name when we are a vendor
-    // library: an endless loop of jumps. nodelete: our threads must not lose their code.
+    // Without -Bsymbolic the addresses of our own functions bind to libGL's of the same name when
+    // we are a vendor library: an endless loop of jumps. nodelete: our threads must not lose their
+    // code.
     println!("cargo:rustc-cdylib-link-arg=-Wl,-Bsymbolic");
     println!("cargo:rustc-cdylib-link-arg=-Wl,-z,nodelete");
     let text = std::fs::read_to_string("src/interpose/symbols/names.txt")
@@ -420,15 +457,16 @@ fn main() {
     }
     let mut s = String::new();
     let n = names.len();
-    writeln!(s, "/// How many entry points there are.\npub(crate) const COUNT: usize = {n};").unwrap();
+    writeln!(s, "/// How many entry points there are.\npub(crate) const COUNT: usize = {n};")
+        .unwrap();
     writeln!(s, "/// Their names, sorted.\npub(crate) static NAMES: [&CStr; COUNT] = [").unwrap();
     names.iter().for_each(|x| writeln!(s, "c\"{x}\",").unwrap());
     writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
     names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
     writeln!(s, "];\nstatic FLUSHES: [u8; COUNT] = [").unwrap();
-    names
-        .iter()
-        .for_each(|x| write!(s, "{},", u8::from(flushes(x)) + 2 * u8::from(is_other_draw(x))).unwrap());
+    names.iter().for_each(|x| {
+        write!(s, "{},", u8::from(flushes(x)) + 2 * u8::from(is_other_draw(x))).unwrap()
+    });
     writeln!(s, "];\nstatic HOOKS: [Option<Target>; COUNT] = [").unwrap();
     for x in &names {
         match hooked(x) {
@@ -439,7 +477,12 @@ fn main() {
             false => write!(s, "None,").unwrap(),
         }
     }
-    writeln!(s, "];\n/// The trampolines' addresses.\npub(super) static TRAMPOLINES: [unsafe extern \"C\" fn(); COUNT] = [").unwrap();
+    writeln!(
+        s,
+        "];\n/// The trampolines' addresses.\npub(super) static TRAMPOLINES: [unsafe \
+                 extern \"C\" fn(); COUNT] = ["
+    )
+    .unwrap();
     names.iter().for_each(|x| writeln!(s, "trampolines::{x},").unwrap());
     writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ARMED, slow, CALLS}};").unwrap();
     for (i, x) in names.iter().enumerate() {
@@ -454,18 +497,34 @@ fn main() {
                 format!("\"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", t = sym TABLE")
             }
             Kind::Watched => format!(
-                "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ARMED, c = sym CALLS, t = sym TABLE, s = sym slow"
+                "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + \
+                 {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + \
+                 {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ARMED, c = sym CALLS, \
+                 t = sym TABLE, s = sym slow"
             ),
             Kind::Always => format!("\"mov r11d, {i}\", \"jmp {{s}}\", s = sym slow"),
         };
-        writeln!(s, "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::interpose::symbols) unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}").unwrap();
+        writeln!(
+            s,
+            "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::interpose::symbols) \
+                     unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}"
+        )
+        .unwrap();
     }
-    writeln!(s, "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod hot_hooks {{ use super::current_context; use crate::capture::immediate_mode::FastPathResult; use crate::interpose::driver::found; use super::forward_plainly;").unwrap();
+    writeln!(
+        s,
+        "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod \
+                 hot_hooks {{ use super::current_context; use \
+                 crate::capture::immediate_mode::FastPathResult; use \
+                 crate::interpose::driver::found; use super::forward_plainly;"
+    )
+    .unwrap();
     for h in &hot {
         let (args, call, types) = if h.pointer {
             (format!("p: *const {}", h.c_type), "p".to_owned(), format!("*const {}", h.c_type))
         } else {
-            let each = |f: &dyn Fn(usize) -> String| (0..h.count).map(f).collect::<Vec<_>>().join(", ");
+            let each =
+                |f: &dyn Fn(usize) -> String| (0..h.count).map(f).collect::<Vec<_>>().join(", ");
             (
                 each(&|i| format!("a{i}: {}", h.c_type)),
                 each(&|i| format!("a{i}")),
@@ -475,7 +534,8 @@ fn main() {
         let index = names.binary_search(&h.name.as_str()).expect("checked above");
         let read = if h.pointer {
             format!(
-                "\n// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ *p.cast::<[{}; {}]>() }};",
+                "\n// SAFETY: the program gives {} values, as OpenGL asks.\n let v = unsafe {{ \
+                 *p.cast::<[{}; {}]>() }};",
                 h.count, h.c_type, h.count
             )
         } else {
@@ -486,16 +546,20 @@ fn main() {
         // SAFETY comments are those of the code that is written.
         writeln!(
             s,
-            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slow({args}) {{ {read} if !current_context::with({index}, |c| {body}) {{
+            "#[cold] #[inline(never)] unsafe extern \"C\" fn {name}_slow({args}) {{ {read} if \
+             !current_context::with({index}, |c| {body}) {{
                 // SAFETY: the driver's function of this name and signature.
-                let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(forward_plainly({index})) }};
+                let f: unsafe extern \"C\" fn({types}) = unsafe {{ \
+                core::mem::transmute(forward_plainly({index})) }};
                 // SAFETY: the program's own arguments.
                 unsafe {{ f({call}) }} }} }}
-            pub(in crate::interpose::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} match current_context::fast_call({index}, |c| {step}) {{
+            pub(in crate::interpose::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} \
+            match current_context::fast_call({index}, |c| {step}) {{
                 FastPathResult::Done => (),
                 FastPathResult::Driver if let Some(known) = found({index}) => {{
                     // SAFETY: as above.
-                    let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(known) }};
+                    let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(known) \
+                    }};
                     // SAFETY: as above.
                     unsafe {{ f({call}) }} }}
                 // SAFETY: as above.
@@ -503,7 +567,13 @@ fn main() {
         )
         .unwrap();
     }
-    writeln!(s, "}}\n/// Indices of the entry points that have hooks by hand.\n#[allow(non_upper_case_globals, reason = \"the names of OpenGL\")] mod at {{").unwrap();
+    writeln!(
+        s,
+        "}}\n/// Indices of the entry points that have hooks by \
+                 hand.\n#[allow(non_upper_case_globals, reason = \"the names of OpenGL\")] mod at \
+                 {{"
+    )
+    .unwrap();
     for name in &by_hand {
         let index = names.binary_search(&name.as_str()).expect("checked above");
         writeln!(s, "pub(super) const {name}: usize = {index};").unwrap();

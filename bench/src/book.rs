@@ -1,8 +1,8 @@
-//! Compiles and runs the Rust examples of the book (docs/src) and of READMEs as documentation tests, so that none can
-//! rot.
+//! Compiles and runs the Rust examples of the book (docs/src) and of READMEs as documentation
+//! tests, so that none can rot.
 //!
-//! bench does this because it may use every member, as an example may. A chapter with examples that is missing here
-//! is found by the test `the_book_is_complete`.
+//! bench does this because it may use every member, as an example may. A chapter with examples that
+//! is missing here is found by the test `the_book_is_complete`.
 
 macro_rules! chapters {
     ($($name:ident $path:literal)*) => {

@@ -1,6 +1,8 @@
-//! What speaks against a measurement: a tree that no commit has, a machine that was busy, a build that is no release.
+//! What speaks against a measurement: a tree that no commit has, a machine that was busy, a build
+//! that is no release.
 //!
-//! Reports show it beside every record, old ones too, and `bench run --record` keeps nothing that has some of it.
+//! Reports show it beside every record, old ones too, and `bench run --record` keeps nothing that
+//! has some of it.
 
 use crate::machine::Machine;
 use crate::record::Record;
@@ -10,7 +12,8 @@ use std::time::Duration;
 pub const MOST_LOAD_PER_CORE: f64 = 0.75;
 
 impl Machine {
-    /// Whether the tree had changes that no commit has. Older records say it with a `+` behind the commit.
+    /// Whether the tree had changes that no commit has. Older records say it with a `+` behind the
+    /// commit.
     pub fn is_dirty(&self) -> bool {
         self.dirty.unwrap_or(false) || self.commit.as_ref().is_some_and(|c| c.ends_with('+'))
     }
@@ -20,12 +23,14 @@ impl Machine {
         let mut doubts = Vec::new();
         match &self.commit {
             None => doubts.push(
-                "the commit is not known, so nobody can build this program again; measure inside the repository, \
+                "the commit is not known, so nobody can build this program again; measure inside \
+                 the repository, \
                  with git installed"
                     .into(),
             ),
             Some(commit) if self.is_dirty() => doubts.push(format!(
-                "the tree had uncommitted changes on top of {}, so nobody can build this program again; commit \
+                "the tree had uncommitted changes on top of {}, so nobody can build this program \
+                 again; commit \
                  them, build, and measure again",
                 commit.trim_end_matches('+')
             )),
@@ -35,15 +40,18 @@ impl Machine {
         match self.load_1_min {
             None => doubts.push("the load of the machine is not known".into()),
             Some(load) if load > most => doubts.push(format!(
-                "the load of the machine was {load:.2} when it began, above {most:.2} for {} cores; end what else \
+                "the load of the machine was {load:.2} when it began, above {most:.2} for {} \
+                 cores; end what else \
                  runs (`uptime` shows the load, `top` who makes it) and measure again",
                 self.cores
             )),
             Some(_) => {}
         }
         if !self.optimised {
-            doubts
-                .push("a debug build: its times mean nothing; build with --release and measure again".into());
+            doubts.push(
+                "a debug build: its times mean nothing; build with --release and measure again"
+                    .into(),
+            );
         }
         doubts
     }
@@ -82,13 +90,20 @@ const OWN_LOAD_FADES: Duration = Duration::from_secs(180);
 const STEP: Duration = Duration::from_secs(5);
 
 impl Gate {
-    /// Whether the `nth` experiment of a run (from 0) may be recorded. The first one meets the load as it is; before
-    /// others the gate waits until the load that the one before has made is gone.
+    /// Whether the `nth` experiment of a run (from 0) may be recorded. The first one meets the load
+    /// as it is; before others the gate waits until the load that the one before has made is gone.
     pub fn admit(&mut self, nth: usize) -> Admission {
         let mut machine = (self.state)();
         let mut waited = Duration::ZERO;
-        let busy = |m: &Machine| m.load_1_min.is_some_and(|load| load > MOST_LOAD_PER_CORE * m.cores as f64);
-        while nth > 0 && !self.insist && busy(&machine) && waited < OWN_LOAD_FADES && (self.pause)(STEP) {
+        let busy = |m: &Machine| {
+            m.load_1_min.is_some_and(|load| load > MOST_LOAD_PER_CORE * m.cores as f64)
+        };
+        while nth > 0
+            && !self.insist
+            && busy(&machine)
+            && waited < OWN_LOAD_FADES
+            && (self.pause)(STEP)
+        {
             waited += STEP;
             machine = (self.state)();
         }
@@ -144,14 +159,20 @@ mod tests {
         let (mut g, _) = gate(false, Machine { dirty: Some(true), ..quiet() }, &[0.1]);
         let Admission::Refused(why) = g.admit(0) else { panic!("kept") };
         assert_eq!(why.len(), 1);
-        assert!(why[0].contains("uncommitted changes") && why[0].contains("commit them"), "{why:?}");
+        assert!(
+            why[0].contains("uncommitted changes") && why[0].contains("commit them"),
+            "{why:?}"
+        );
     }
 
     #[test]
     fn a_tree_without_a_known_commit_and_a_debug_build_are_refused() {
         let (mut g, _) = gate(false, Machine { commit: None, optimised: false, ..quiet() }, &[0.1]);
         let Admission::Refused(why) = g.admit(0) else { panic!("kept") };
-        assert!(why[0].contains("commit is not known") && why[1].contains("debug build"), "{why:?}");
+        assert!(
+            why[0].contains("commit is not known") && why[1].contains("debug build"),
+            "{why:?}"
+        );
     }
 
     #[test]
@@ -165,11 +186,18 @@ mod tests {
             (64, 40.0, false),
         ] {
             let (mut g, _) = gate(false, Machine { cores, ..quiet() }, &[load]);
-            assert_eq!(matches!(g.admit(0), Admission::Refused(_)), refused, "{cores} cores, {load}");
+            assert_eq!(
+                matches!(g.admit(0), Admission::Refused(_)),
+                refused,
+                "{cores} cores, {load}"
+            );
         }
         let (mut g, _) = gate(false, quiet(), &[3.25]);
         let Admission::Refused(why) = g.admit(0) else { panic!("kept") };
-        assert!(why[0].contains("3.25") && why[0].contains("1.50") && why[0].contains("uptime"), "{why:?}");
+        assert!(
+            why[0].contains("3.25") && why[0].contains("1.50") && why[0].contains("uptime"),
+            "{why:?}"
+        );
     }
 
     #[test]

@@ -15,7 +15,8 @@ pub struct Machine {
     pub simd: String,
     /// Memory in GiB; 0 when the system does not say.
     pub memory_gib: f64,
-    /// Running processes averaged over the last minute at the start; `null` when the system does not say.
+    /// Running processes averaged over the last minute at the start; `null` when the system does
+    /// not say.
     pub load_1_min: Option<f64>,
     /// Kernel and its version.
     pub os: String,
@@ -23,9 +24,11 @@ pub struct Machine {
     pub date: String,
     /// Version of this program.
     pub version: String,
-    /// Commit of the working tree; `null` outside a repository. Older records have a `+` behind it for [`Machine::dirty`].
+    /// Commit of the working tree; `null` outside a repository. Older records have a `+` behind it
+    /// for [`Machine::dirty`].
     pub commit: Option<String>,
-    /// Whether files under version control had changes that no commit has, records aside; `null` outside a repository.
+    /// Whether files under version control had changes that no commit has, records aside; `null`
+    /// outside a repository.
     #[serde(default)]
     pub dirty: Option<bool>,
     /// Optimised build? Times of a debug build mean nothing.
@@ -41,13 +44,15 @@ impl Machine {
     /// Asks the system.
     pub fn describe() -> Machine {
         let read = |p: &str| std::fs::read_to_string(p).unwrap_or_default();
-        let memory_kib =
-            field(&read("/proc/meminfo"), "MemTotal").and_then(|v| leading_number(&v)).unwrap_or(0.0);
+        let memory_kib = field(&read("/proc/meminfo"), "MemTotal")
+            .and_then(|v| leading_number(&v))
+            .unwrap_or(0.0);
         let secs = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
         let git = GitState::of(Path::new("."));
         let kernel = read("/proc/sys/kernel/osrelease");
         Machine {
-            cpu: field(&read("/proc/cpuinfo"), "model name").unwrap_or_else(|| std::env::consts::ARCH.into()),
+            cpu: field(&read("/proc/cpuinfo"), "model name")
+                .unwrap_or_else(|| std::env::consts::ARCH.into()),
             cores: std::thread::available_parallelism().map_or(1, |n| n.get()),
             simd: simd_level().into(),
             memory_gib: (memory_kib / 1024.0 / 1024.0 * 10.0).round() / 10.0,
@@ -102,17 +107,24 @@ struct GitState {
 }
 
 impl GitState {
-    /// Of the repository that `dir` lies in; `None` where there is none, or no git. Records do not count as changes:
-    /// the first one of a run would make the tree of all others dirty.
+    /// Of the repository that `dir` lies in; `None` where there is none, or no git. Records do not
+    /// count as changes: the first one of a run would make the tree of all others dirty.
     fn of(dir: &Path) -> Option<GitState> {
         let git = |args: &[&str]| {
             let mut git = std::process::Command::new("git");
-            let out = git.arg("-C").arg(dir).args(args).stderr(std::process::Stdio::null()).output().ok()?;
+            let out = git
+                .arg("-C")
+                .arg(dir)
+                .args(args)
+                .stderr(std::process::Stdio::null())
+                .output()
+                .ok()?;
             out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_string())
         };
         let commit = git(&["rev-parse", "--short=12", "HEAD"])?;
         let records = ":(top,exclude)bench/runs";
-        let changed = git(&["status", "--porcelain", "--untracked-files=no", "--", ":(top)", records]);
+        let changed =
+            git(&["status", "--porcelain", "--untracked-files=no", "--", ":(top)", records]);
         // What git cannot say is not clean.
         Some(GitState { commit, dirty: changed.is_none_or(|s| !s.is_empty()) })
     }
@@ -129,7 +141,8 @@ pub fn simd_level() -> &'static str {
         if has_512 {
             return "AVX-512";
         }
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+        {
             return "AVX2";
         }
         if std::arch::is_x86_feature_detected!("sse4.2") {
@@ -147,19 +160,26 @@ pub fn simd_level() -> &'static str {
     }
 }
 
-/// Seconds since 1970 as UTC date and time; the civil-from-days arithmetic counts in 400-year eras from 1 March.
+/// Seconds since 1970 as UTC date and time; the civil-from-days arithmetic counts in 400-year eras
+/// from 1 March.
 fn iso_8601(unix_secs: u64) -> String {
     let (days, secs) = ((unix_secs / 86_400) as i64, unix_secs % 86_400);
     let shifted = days + 719_468;
     let era = shifted.div_euclid(146_097);
     let day_of_era = shifted.rem_euclid(146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let month_from_march = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
     let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
     let year = year_of_era + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", secs / 3600, secs / 60 % 60, secs % 60)
+    format!(
+        "{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z",
+        secs / 3600,
+        secs / 60 % 60,
+        secs % 60
+    )
 }
 
 #[cfg(test)]

@@ -1,15 +1,16 @@
 //! Memory that work needs at its height, counted where Rust allocates it.
 //!
-//! The whole of `bench` allocates through a counting allocator (crate peak_alloc: two atomic additions a call). The resident set, which the operating
-//! system tells, will not do: the allocator keeps freed memory back, and the second build of a run then seems to need none.
+//! The whole of `bench` allocates through a counting allocator (crate peak_alloc: two atomic
+//! additions a call). The resident set, which the operating system tells, will not do: the
+//! allocator keeps freed memory back, and the second build of a run then seems to need none.
 
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Runs `work`; returns what it returned and by how many bytes the heap was larger at its height than at the start. Other threads'
-/// memory counts too; what C libraries allocate does not.
+/// Runs `work`; returns what it returned and by how many bytes the heap was larger at its height
+/// than at the start. Other threads' memory counts too; what C libraries allocate does not.
 pub fn peak<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let start = HEAP.current_usage();
     HEAP.reset_peak_usage();

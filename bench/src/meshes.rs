@@ -1,4 +1,5 @@
-//! The meshes that experiments share: the dissertation's nested wavelet surfaces, and two of other kinds.
+//! The meshes that experiments share: the dissertation's nested wavelet surfaces, and two of other
+//! kinds.
 
 use anyhow::Context as _;
 use datasets::generate::nested_wavelet::Size;
@@ -10,15 +11,17 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Nested isosurfaces of the wavelet (dissertation section 4.3): many small triangles of the same size.
+/// Nested isosurfaces of the wavelet (dissertation section 4.3): many small triangles of the same
+/// size.
 pub fn wavelet(size: Size) -> anyhow::Result<Arc<TriMesh>> {
-    let surfaces = size
-        .generate(Default::default())
-        .with_context(|| format!("cannot make the wavelet surfaces of {} triangles", size.name()))?;
+    let surfaces = size.generate(Default::default()).with_context(|| {
+        format!("cannot make the wavelet surfaces of {} triangles", size.name())
+    })?;
     Ok(Arc::new(surfaces.mesh))
 }
 
-/// The surfaces of the smallest size from a coarser grid of `points` per axis: fewer triangles for quick runs.
+/// The surfaces of the smallest size from a coarser grid of `points` per axis: fewer triangles for
+/// quick runs.
 pub fn coarse_wavelet(points: u32) -> anyhow::Result<Arc<TriMesh>> {
     let grid = Wavelet::with_points(points).grid()?;
     let surfaces = isosurface::extract(&grid, &Size::M1.isovalues(), Default::default())
@@ -26,8 +29,8 @@ pub fn coarse_wavelet(points: u32) -> anyhow::Result<Arc<TriMesh>> {
     Ok(Arc::new(surfaces.mesh))
 }
 
-/// Pipes through a box in all directions, like a plant's piping: long thin triangles that overlap in no order, the
-/// opposite of an isosurface. Each pipe has 2 x 24 x 8 triangles.
+/// Pipes through a box in all directions, like a plant's piping: long thin triangles that overlap
+/// in no order, the opposite of an isosurface. Each pipe has 2 x 24 x 8 triangles.
 pub fn pipes(count: u32) -> Arc<TriMesh> {
     const SIDES: u32 = 24;
     const SEGMENTS: u32 = 8;
@@ -43,7 +46,8 @@ pub fn pipes(count: u32) -> Arc<TriMesh> {
             for k in 0..SIDES {
                 let (sin, cos) = (f64::from(k) / f64::from(SIDES) * TAU).sin_cos();
                 let along = (f64::from(s) / f64::from(SEGMENTS) - 0.5) * length;
-                mesh.positions.push((place + turn * DVec3::new(radius * cos, radius * sin, along)).as_vec3());
+                mesh.positions
+                    .push((place + turn * DVec3::new(radius * cos, radius * sin, along)).as_vec3());
             }
         }
         for s in 0..SEGMENTS {
@@ -57,8 +61,9 @@ pub fn pipes(count: u32) -> Arc<TriMesh> {
     Arc::new(mesh)
 }
 
-/// A closed sphere-like surface around `center`: an icosahedron whose triangles are cut in four `level` times, with
-/// vertices moved along the radius to 1 + `crumple` x (-1..1). Star-shaped: every ray from inside meets it.
+/// A closed sphere-like surface around `center`: an icosahedron whose triangles are cut in four
+/// `level` times, with vertices moved along the radius to 1 + `crumple` x (-1..1). Star-shaped:
+/// every ray from inside meets it.
 pub fn crumpled_sphere(level: u32, crumple: f64, center: DVec3) -> TriMesh {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     // Corners of three rectangles, turned so that no edge lies in an axis plane.
@@ -92,7 +97,8 @@ pub fn crumpled_sphere(level: u32, crumple: f64, center: DVec3) -> TriMesh {
     TriMesh::new(points.iter().map(place).collect(), triangles)
 }
 
-/// The 20 triples of corners at the smallest distance from one another, counter-clockwise from outside.
+/// The 20 triples of corners at the smallest distance from one another, counter-clockwise from
+/// outside.
 fn icosahedron_faces(points: &[DVec3]) -> Vec<[u32; 3]> {
     let near = |a: usize, b: usize| points[a].dot(points[b]) > 0.4;
     let mut faces = vec![];
@@ -100,7 +106,8 @@ fn icosahedron_faces(points: &[DVec3]) -> Vec<[u32; 3]> {
         for b in a + 1..points.len() {
             for c in b + 1..points.len() {
                 if near(a, b) && near(b, c) && near(c, a) {
-                    let outward = (points[b] - points[a]).cross(points[c] - points[a]).dot(points[a]) > 0.0;
+                    let outward =
+                        (points[b] - points[a]).cross(points[c] - points[a]).dot(points[a]) > 0.0;
                     let (b, c) = if outward { (b, c) } else { (c, b) };
                     faces.push([a as u32, b as u32, c as u32]);
                 }
@@ -110,13 +117,16 @@ fn icosahedron_faces(points: &[DVec3]) -> Vec<[u32; 3]> {
     faces
 }
 
-/// A globe with two poles where `meridians` triangles meet in one vertex: needles, and the hardest vertices there are.
+/// A globe with two poles where `meridians` triangles meet in one vertex: needles, and the hardest
+/// vertices there are.
 pub fn globe(meridians: u32, parallels: u32) -> TriMesh {
     let mut mesh = TriMesh::new(vec![Vec3::Z], vec![]);
     for j in 1..parallels {
         for i in 0..meridians {
-            let (theta, phi) =
-                (f64::from(j) / f64::from(parallels) * TAU / 2.0, f64::from(i) / f64::from(meridians) * TAU);
+            let (theta, phi) = (
+                f64::from(j) / f64::from(parallels) * TAU / 2.0,
+                f64::from(i) / f64::from(meridians) * TAU,
+            );
             let p = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
             mesh.positions.push(p.as_vec3());
         }
@@ -180,7 +190,8 @@ mod tests {
         let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
         for &[a, b, c] in &mesh.indices {
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                *edges.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { 100 };
+                *edges.entry((from.min(to), from.max(to))).or_default() +=
+                    if from < to { 1 } else { 100 };
             }
         }
         edges.values().all(|&n| n == 101)

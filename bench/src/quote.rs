@@ -1,6 +1,7 @@
 //! Tables and plots in documents that are quoted from the records in `bench/runs`.
 //!
-//! A document says what it quotes between two comments, and [`update`] writes what stands between them:
+//! A document says what it quotes between two comments, and [`update`] writes what stands between
+//! them:
 //!
 //! ```text
 //! <!-- record accuracy-sampling: table sampling, samples, time where quantity = antialiasing -->
@@ -9,10 +10,10 @@
 //! <!-- end record -->
 //! ```
 //!
-//! `table` names columns, and which rows (`where mode = fast | slow` takes either); `plot` names the
-//! beginning of a plot's title. The newest record of that name is taken, and what speaks against it
-//! stands below the quotation. The test `documents_quote_their_records` fails when a document and
-//! its record differ.
+//! `table` names columns, and which rows (`where mode = fast | slow` takes either); `plot` names
+//! the beginning of a plot's title. The newest record of that name is taken, and what speaks
+//! against it stands below the quotation. The test `documents_quote_their_records` fails when a
+//! document and its record differ.
 
 use crate::doubts::MOST_LOAD_PER_CORE;
 use crate::plot::Plot;
@@ -47,7 +48,8 @@ pub fn update(root: &Path) -> anyhow::Result<Vec<PathBuf>> {
             std::fs::create_dir_all(folder)
                 .with_context(|| format!("cannot make the folder `{}`", folder.display()))?;
         }
-        std::fs::write(&path, &file.text).with_context(|| format!("cannot write `{}`", path.display()))?;
+        std::fs::write(&path, &file.text)
+            .with_context(|| format!("cannot write `{}`", path.display()))?;
         written.push(file.path);
     }
     Ok(written)
@@ -123,7 +125,8 @@ fn first_line(text: &str) -> &str {
 
 /// What stands for `ID: table ...` or `ID: plot ...`, and the file of the plot.
 fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Option<Quotation>)> {
-    let (id, what) = request.split_once(':').context("a quotation is `ID: table ...` or `ID: plot ...`")?;
+    let (id, what) =
+        request.split_once(':').context("a quotation is `ID: table ...` or `ID: plot ...`")?;
     let (record, folder) = newest(root, id.trim())?;
     let levels = path.components().count().saturating_sub(1);
     let up = "../".repeat(levels);
@@ -169,13 +172,13 @@ fn doubts_in_short(record: &Record) -> String {
 /// The newest record of that name: folders of `bench/runs` begin with their dates.
 fn newest(root: &Path, id: &str) -> anyhow::Result<(Record, PathBuf)> {
     let runs = root.join("bench/runs");
-    let entries =
-        std::fs::read_dir(&runs).with_context(|| format!("cannot read the folder `{}`", runs.display()))?;
+    let entries = std::fs::read_dir(&runs)
+        .with_context(|| format!("cannot read the folder `{}`", runs.display()))?;
     let folders = entries.flatten().map(|e| e.path());
-    let folder = folders
-        .filter(|f| f.join(format!("{id}.json")).is_file())
-        .max()
-        .with_context(|| format!("`{}` has no record `{id}`: measure with --record", runs.display()))?;
+    let folder =
+        folders.filter(|f| f.join(format!("{id}.json")).is_file()).max().with_context(|| {
+            format!("`{}` has no record `{id}`: measure with --record", runs.display())
+        })?;
     Ok((Record::read(&folder.join(format!("{id}.json")))?, folder))
 }
 
@@ -207,7 +210,8 @@ fn table(record: &Record, request: &str) -> anyhow::Result<String> {
             format!("`{}` has no column `{name}`; it has: {}", record.id, names.join(", "))
         })
     };
-    let columns: Vec<&Column> = columns.split(',').map(|c| known(c.trim())).collect::<Result<_, _>>()?;
+    let columns: Vec<&Column> =
+        columns.split(',').map(|c| known(c.trim())).collect::<Result<_, _>>()?;
     let mut wanted = vec![];
     for condition in conditions.split(" and ").filter(|c| !c.trim().is_empty()) {
         let (name, value) = condition
@@ -277,7 +281,8 @@ mod tests {
             r.column("time", "ms", "median");
             r.rows.push(Row::new().with("mesh", "small").with("time", time));
             r.rows.push(Row::new().with("mesh", "large").with("time", 1e-7));
-            let mut plot = Plot::lines("time of frames", Axis::linear("n", ""), Axis::linear("t", "ms"));
+            let mut plot =
+                Plot::lines("time of frames", Axis::linear("n", ""), Axis::linear("t", "ms"));
             plot.series.push(Series::new("ours", vec![(1.0, time)]));
             r.plots.push(plot);
             r.write(&root.path().join("bench/runs").join(day)).unwrap();
@@ -290,7 +295,8 @@ mod tests {
     #[test]
     fn a_document_gets_the_rows_of_the_newest_record_and_is_then_up_to_date() {
         let root = repository(
-            "a\n<!-- record speed: table mesh, time where mesh = small -->\nold\n<!-- end record -->\nb\n",
+            "a\n<!-- record speed: table mesh, time where mesh = small -->\nold\n<!-- end record \
+             -->\nb\n",
         );
         assert_eq!(update(root.path()).unwrap(), [Path::new("docs/src/bench/page.md")]);
         let text = std::fs::read_to_string(root.path().join("docs/src/bench/page.md")).unwrap();
@@ -299,14 +305,18 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("(../../../bench/runs/2026-01-02-b/speed.csv)"), "{text}");
-        assert!(!text.contains("old") && text.starts_with("a\n") && text.ends_with("-->\nb\n"), "{text}");
+        assert!(
+            !text.contains("old") && text.starts_with("a\n") && text.ends_with("-->\nb\n"),
+            "{text}"
+        );
         assert_eq!(stale_quotations(root.path()).unwrap(), []);
     }
 
     #[test]
     fn a_condition_takes_either_of_two_values_and_no_others() {
         let root = repository(
-            "<!-- record speed: table mesh, time where mesh = small | huge -->\n<!-- end record -->\n",
+            "<!-- record speed: table mesh, time where mesh = small | huge -->\n<!-- end record \
+             -->\n",
         );
         update(root.path()).unwrap();
         let text = std::fs::read_to_string(root.path().join("docs/src/bench/page.md")).unwrap();
@@ -325,7 +335,10 @@ mod tests {
         record.machine.dirty = Some(true);
         record.machine.optimised = false;
         let all = doubts_in_short(&record);
-        assert!(all.contains("no commit") && all.contains("3.31") && all.contains("debug"), "{all}");
+        assert!(
+            all.contains("no commit") && all.contains("3.31") && all.contains("debug"),
+            "{all}"
+        );
     }
 
     #[test]
@@ -344,7 +357,8 @@ mod tests {
         assert_eq!(update(root.path()).unwrap().len(), 2);
         let text = std::fs::read_to_string(root.path().join("docs/src/bench/page.md")).unwrap();
         assert!(text.contains("![time of frames](../img/speed-time-of.svg)"), "{text}");
-        let svg = std::fs::read_to_string(root.path().join("docs/src/img/speed-time-of.svg")).unwrap();
+        let svg =
+            std::fs::read_to_string(root.path().join("docs/src/img/speed-time-of.svg")).unwrap();
         assert!(svg.contains("#ffffff") && !svg.contains("currentColor"), "{svg}");
     }
 
@@ -367,8 +381,11 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits() {
-        let cases = [(0.0, "0"), (17.0, "17"), (123.456, "123"), (1.2345, "1.23"), (0.01234, "0.0123")];
-        for (x, text) in cases.into_iter().chain([(2.5e-7, "2.5e-7"), (1234.5, "1234"), (-0.5, "-0.500")]) {
+        let cases =
+            [(0.0, "0"), (17.0, "17"), (123.456, "123"), (1.2345, "1.23"), (0.01234, "0.0123")];
+        for (x, text) in
+            cases.into_iter().chain([(2.5e-7, "2.5e-7"), (1234.5, "1234"), (-0.5, "-0.500")])
+        {
             assert_eq!(significant(x), text);
         }
     }
@@ -376,7 +393,11 @@ mod tests {
     #[test]
     fn documents_quote_their_records() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-        let paths: Vec<PathBuf> = stale_quotations(root).unwrap().into_iter().map(|f| f.path).collect();
-        assert!(paths.is_empty(), "{paths:?} differ from their records: `cargo xtask book` writes them anew");
+        let paths: Vec<PathBuf> =
+            stale_quotations(root).unwrap().into_iter().map(|f| f.path).collect();
+        assert!(
+            paths.is_empty(),
+            "{paths:?} differ from their records: `cargo xtask book` writes them anew"
+        );
     }
 }

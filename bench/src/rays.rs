@@ -1,9 +1,10 @@
 //! The ray sets that all tracers are timed on.
 //!
-//! Rays are made once, by one exact rule from one set of hits, and stored; every tracer then gets the same bits in
-//! the same order. Blocks of 16 rays as structure of arrays: 16 primary rays are a 4 x 4 block of pixels and 256
-//! are 16 x 16, because pixels go in Morton order. Hit points are computed in f64 from the triangle that was hit,
-//! so that secondary rays do not depend on the tracer that found it.
+//! Rays are made once, by one exact rule from one set of hits, and stored; every tracer then gets
+//! the same bits in the same order. Blocks of 16 rays as structure of arrays: 16 primary rays are a
+//! 4 x 4 block of pixels and 256 are 16 x 16, because pixels go in Morton order. Hit points are
+//! computed in f64 from the triangle that was hit, so that secondary rays do not depend on the
+//! tracer that found it.
 
 use glam::{DVec3, Vec3};
 use rt_core::mesh::TriMesh;
@@ -51,15 +52,16 @@ impl RaySet {
         set
     }
 
-    /// About `limit` of the rays, spread evenly: every n-th run of 1024, so that neighbours stay together. All when
-    /// there are fewer.
+    /// About `limit` of the rays, spread evenly: every n-th run of 1024, so that neighbours stay
+    /// together. All when there are fewer.
     pub fn thinned(self, limit: usize) -> RaySet {
         const RUN: usize = 64;
         let step = self.len.div_ceil(limit.max(1)).max(1);
         if step == 1 {
             return self;
         }
-        let kept: Vec<RayBlock> = self.blocks.chunks(RUN).step_by(step).flatten().copied().collect();
+        let kept: Vec<RayBlock> =
+            self.blocks.chunks(RUN).step_by(step).flatten().copied().collect();
         // The last block, which may have empty lanes, is left out unless its run is kept whole.
         let whole: Vec<RayBlock> = kept.into_iter().filter(|b| b.t_max[LANES - 1] >= 0.0).collect();
         RaySet { len: whole.len() * LANES, blocks: whole }
@@ -92,7 +94,13 @@ impl View {
     pub fn orbit(mesh: &TriMesh) -> View {
         let (center, radius) = center_and_radius(mesh);
         let distance = radius / (15f64.to_radians()).sin();
-        View::looking("orbit", center, DVec3::new(1.0, 0.7, 1.3).normalize() * distance, DVec3::ZERO, radius)
+        View::looking(
+            "orbit",
+            center,
+            DVec3::new(1.0, 0.7, 1.3).normalize() * distance,
+            DVec3::ZERO,
+            radius,
+        )
     }
 
     /// Close to the surface, so that nearly every pixel shows it.
@@ -115,9 +123,13 @@ impl View {
         self.eye + self.axes[0] * self.radius * 0.5 + self.axes[1] * self.radius * 0.7
     }
 
-    /// One ray through the centre of each of `size` x `size` pixels, in Morton order. `size` is a power of two.
+    /// One ray through the centre of each of `size` x `size` pixels, in Morton order. `size` is a
+    /// power of two.
     pub fn primary(&self, size: u32) -> RaySet {
-        assert!(size.is_power_of_two() && size <= 1 << 15, "Morton order needs a power of two, not {size}");
+        assert!(
+            size.is_power_of_two() && size <= 1 << 15,
+            "Morton order needs a power of two, not {size}"
+        );
         let [right, up, forward] = self.axes;
         RaySet::pack((0..size * size).map(|i| {
             let (x, y) = morton(i);
@@ -132,14 +144,21 @@ impl View {
 /// A point on the surface, in f64, with the geometric normal on the side the ray came from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// The point, moved off the surface by 2e-5 of the mesh's radius so that no tracer's own offset rule matters.
+    /// The point, moved off the surface by 2e-5 of the mesh's radius so that no tracer's own offset
+    /// rule matters.
     pub origin: DVec3,
     /// Unit normal.
     pub normal: DVec3,
 }
 
-/// The points that rays hit, from the triangle numbers a tracer found. Rays without a hit give none.
-pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: f64) -> Vec<SurfacePoint> {
+/// The points that rays hit, from the triangle numbers a tracer found. Rays without a hit give
+/// none.
+pub fn surface_points(
+    mesh: &TriMesh,
+    rays: &RaySet,
+    hits: &[HitBlock],
+    radius: f64,
+) -> Vec<SurfacePoint> {
     let mut points = vec![];
     for i in 0..rays.len {
         let prim = hits[i / LANES].prim[i % LANES];
@@ -158,7 +177,11 @@ pub fn surface_points(mesh: &TriMesh, rays: &RaySet, hits: &[HitBlock], radius: 
         }
         // Distance to the triangle's plane. Edge-on, where that is 0/0, the stored distance serves.
         let (height, slope) = (normal.dot(a - o), normal.dot(d));
-        let t = if slope.abs() > 1e-9 { height / slope } else { f64::from(hits[i / LANES].t[i % LANES]) };
+        let t = if slope.abs() > 1e-9 {
+            height / slope
+        } else {
+            f64::from(hits[i / LANES].t[i % LANES])
+        };
         points.push(SurfacePoint { origin: o + d * t + normal * (radius * 2e-5), normal });
     }
     points
@@ -183,7 +206,8 @@ pub fn shadow_from_light(points: &[SurfacePoint], light: DVec3) -> RaySet {
     }))
 }
 
-/// Eight cosine-weighted rays per point into the half space above it, stratified 4 x 2, without an end.
+/// Eight cosine-weighted rays per point into the half space above it, stratified 4 x 2, without an
+/// end.
 pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
     RaySet::pack(points.iter().enumerate().flat_map(|(i, p)| {
         let (tx, ty) = p.normal.any_orthonormal_pair();
@@ -199,7 +223,8 @@ pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
     }))
 }
 
-/// Rays from random places inside the mesh's bounds in random directions: no two have anything in common.
+/// Rays from random places inside the mesh's bounds in random directions: no two have anything in
+/// common.
 pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
     let bounds = mesh.bounds();
     let (lo, hi) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
@@ -284,7 +309,11 @@ mod tests {
         let ray = |i: usize| Ray64 { origin: DVec3::X * i as f64, direction: DVec3::Y, t_max: 1.0 };
         let set = RaySet::pack((0..10_000).map(ray));
         let thin = set.clone().thinned(3000);
-        assert!((2000..=4096).contains(&thin.len) && thin.len.is_multiple_of(LANES), "{}", thin.len);
+        assert!(
+            (2000..=4096).contains(&thin.len) && thin.len.is_multiple_of(LANES),
+            "{}",
+            thin.len
+        );
         assert_eq!(thin.ray(1023).0.x, 1023.0);
         assert_eq!(thin.ray(1024).0.x, 4096.0);
         assert_eq!(set.clone().thinned(10_000), set);

@@ -1,8 +1,8 @@
 //! What a measurement leaves behind: one JSON object and one CSV table.
 //!
-//! A record explains itself: every column has a unit and a meaning, the machine and the program's version are in it,
-//! and what could not be measured is named in `missing` with the cure. Reports are made from records alone, so old
-//! ones can be shown again.
+//! A record explains itself: every column has a unit and a meaning, the machine and the program's
+//! version are in it, and what could not be measured is named in `missing` with the cure. Reports
+//! are made from records alone, so old ones can be shown again.
 
 use crate::machine::Machine;
 use crate::plot::Plot;
@@ -36,7 +36,8 @@ impl Row {
     pub fn new() -> Row {
         Row::default()
     }
-    /// The row with a value more. Numbers that are not finite become null, which is what JSON has for them.
+    /// The row with a value more. Numbers that are not finite become null, which is what JSON has
+    /// for them.
     pub fn with(mut self, column: &str, value: impl Into<Value>) -> Row {
         self.0.insert(column.to_string(), value.into());
         self
@@ -90,7 +91,8 @@ pub struct Record {
     pub quick: bool,
     /// Where and when.
     pub machine: Machine,
-    /// What spoke against recording it, where the command line insisted (`--record-despite-doubts`).
+    /// What spoke against recording it, where the command line insisted
+    /// (`--record-despite-doubts`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recorded_despite: Vec<String>,
     /// Wall time of the whole experiment, data and builds included.
@@ -145,8 +147,13 @@ impl Record {
     /// Columns that rows use and nobody explained, once each: a mistake of the experiment.
     pub fn unexplained_columns(&self) -> Vec<&str> {
         let known = |k: &str| self.columns.iter().any(|c| c.name == k);
-        let mut unknown: Vec<&str> =
-            self.rows.iter().flat_map(|r| r.0.keys()).map(String::as_str).filter(|k| !known(k)).collect();
+        let mut unknown: Vec<&str> = self
+            .rows
+            .iter()
+            .flat_map(|r| r.0.keys())
+            .map(String::as_str)
+            .filter(|k| !known(k))
+            .collect();
         unknown.sort_unstable();
         unknown.dedup();
         unknown
@@ -157,15 +164,18 @@ impl Record {
         let m = &self.machine;
         let mut s = format!("# {} {}: {}\n", self.schema, self.id, one_line(&self.title));
         let form = if self.quick { "quick" } else { "full" };
-        s +=
-            &format!("# {form}, {}, {}, {} cores, {}, version {}", m.date, m.cpu, m.cores, m.simd, m.version);
+        s += &format!(
+            "# {form}, {}, {}, {} cores, {}, version {}",
+            m.date, m.cpu, m.cores, m.simd, m.version
+        );
         s += &m.commit.as_ref().map_or("\n".into(), |c| format!(", commit {c}\n"));
         s += &m.load_1_min.map_or(String::new(), |l| format!("# load {l:.2} when it began\n"));
         for doubt in self.doubts() {
             s += &format!("# in doubt: {}\n", one_line(&doubt));
         }
-        let head =
-            |c: &Column| if c.unit.is_empty() { c.name.clone() } else { format!("{} [{}]", c.name, c.unit) };
+        let head = |c: &Column| {
+            if c.unit.is_empty() { c.name.clone() } else { format!("{} [{}]", c.name, c.unit) }
+        };
         s += &self.columns.iter().map(|c| csv_field(&head(c))).collect::<Vec<_>>().join(",");
         s += "\n";
         for row in &self.rows {
@@ -180,14 +190,19 @@ impl Record {
         s
     }
 
-    /// Writes `ID.json`, `ID.csv` and `ID.PICTURE.png` into a directory, which is made when it is not there.
+    /// Writes `ID.json`, `ID.csv` and `ID.PICTURE.png` into a directory, which is made when it is
+    /// not there.
     pub fn write(&self, dir: &Path) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(dir).with_context(|| {
-            format!("cannot make the directory `{}` for records; name another with --out", dir.display())
+            format!(
+                "cannot make the directory `{}` for records; name another with --out",
+                dir.display()
+            )
         })?;
         let write = |name: String, bytes: &[u8]| {
             let path = dir.join(name);
-            std::fs::write(&path, bytes).with_context(|| format!("cannot write `{}`", path.display()))
+            std::fs::write(&path, bytes)
+                .with_context(|| format!("cannot write `{}`", path.display()))
         };
         for p in &self.pictures {
             write(self.picture_file(p), &p.png)?;
@@ -201,7 +216,8 @@ impl Record {
         Ok(dir.join(format!("{}.json", self.id)))
     }
 
-    /// Reads a record back, with the pictures beside it. A picture that is gone leaves an empty one.
+    /// Reads a record back, with the pictures beside it. A picture that is gone leaves an empty
+    /// one.
     pub fn read(path: &Path) -> anyhow::Result<Record> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read the record `{}`", path.display()))?;
@@ -209,14 +225,16 @@ impl Record {
             .with_context(|| format!("`{}` is not a record of form {SCHEMA}", path.display()))?;
         anyhow::ensure!(
             r.schema == SCHEMA,
-            "`{}` has form `{}`, this program reads `{SCHEMA}`: measure again, or use the version that wrote it ({})",
+            "`{}` has form `{}`, this program reads `{SCHEMA}`: measure again, or use the version \
+             that wrote it ({})",
             path.display(),
             r.schema,
             r.machine.version
         );
         let dir = path.parent().unwrap_or(Path::new("."));
         for i in 0..r.pictures.len() {
-            r.pictures[i].png = std::fs::read(dir.join(r.picture_file(&r.pictures[i]))).unwrap_or_default();
+            r.pictures[i].png =
+                std::fs::read(dir.join(r.picture_file(&r.pictures[i]))).unwrap_or_default();
         }
         for a in &mut r.attachments {
             a.bytes = std::fs::read(dir.join(format!("{}.{}", r.id, a.name))).unwrap_or_default();
@@ -229,13 +247,16 @@ impl Record {
     }
 }
 
-/// All records of a directory, by name. JSON of other kinds (a Chrome trace beside a record, what a program printed) is left alone; a broken
-/// record, or a file that is no JSON, is an error.
+/// All records of a directory, by name. JSON of other kinds (a Chrome trace beside a record, what a
+/// program printed) is left alone; a broken record, or a file that is no JSON, is an error.
 pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
-    let entries =
-        std::fs::read_dir(dir).with_context(|| format!("cannot read the directory `{}`", dir.display()))?;
-    let mut paths: Vec<PathBuf> =
-        entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
+    let entries = std::fs::read_dir(dir)
+        .with_context(|| format!("cannot read the directory `{}`", dir.display()))?;
+    let mut paths: Vec<PathBuf> = entries
+        .flatten()
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "json"))
+        .collect();
     paths.retain(|p| !is_of_another_kind(p));
     paths.sort();
     paths.iter().map(|p| Record::read(p)).collect()
@@ -244,7 +265,8 @@ pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
 /// Whether it is JSON that does not say of itself that it is a record.
 fn is_of_another_kind(path: &Path) -> bool {
     let text = std::fs::read(path).unwrap_or_default();
-    serde_json::from_slice::<serde_json::Value>(&text).is_ok_and(|json| json.get("schema").is_none())
+    serde_json::from_slice::<serde_json::Value>(&text)
+        .is_ok_and(|json| json.get("schema").is_none())
 }
 
 fn one_line(text: &str) -> String {
@@ -290,7 +312,11 @@ mod tests {
             series: vec![Series::new("a", vec![(1.0, 2.0), (10.0, 4.0)])],
             mark: Some(1.0),
         });
-        r.pictures.push(Picture { name: "The view".into(), caption: "c".into(), png: vec![1, 2, 3] });
+        r.pictures.push(Picture {
+            name: "The view".into(),
+            caption: "c".into(),
+            png: vec![1, 2, 3],
+        });
         let bytes = b"<svg/>".to_vec();
         r.attachments.push(Attachment { name: "chart.svg".into(), caption: "c".into(), bytes });
         r

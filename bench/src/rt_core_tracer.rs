@@ -156,7 +156,8 @@ mod tests {
     fn every_quality_agrees_with_brute_force() {
         let mesh = Arc::new(testing::mesh());
         for quality in BuildQuality::ALL {
-            let ours = RtCoreTracer::build(&mesh, &BuildOptions { quality, ..Default::default() }).unwrap();
+            let ours = RtCoreTracer::build(&mesh, &BuildOptions { quality, ..Default::default() })
+                .unwrap();
             assert!(ours.cost.bytes > 0 && ours.cost.wall_secs > 0.0);
             testing::agrees_with_brute_force(&ours.view(Mode::Coherent));
         }

@@ -1,9 +1,9 @@
 //! Timing variants against each other on a machine that others use too.
 //!
-//! Variants run in turns, one run each per round, in an order that changes from round to round, so that a slow
-//! minute of the machine falls on all of them. A ratio is taken inside each round and the median over the rounds is
-//! reported: what the neighbours do cancels (two runs of one round see nearly the same machine), which it would not
-//! in a ratio of two medians.
+//! Variants run in turns, one run each per round, in an order that changes from round to round, so
+//! that a slow minute of the machine falls on all of them. A ratio is taken inside each round and
+//! the median over the rounds is reported: what the neighbours do cancels (two runs of one round
+//! see nearly the same machine), which it would not in a ratio of two medians.
 
 use crate::clock::{self, Clock, Sample};
 use crate::stats::Summary;
@@ -11,8 +11,8 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Rounds without which nothing is called faster or slower: when both are equal, all of five rounds fall on the same
-/// side of 1 once in 16 times; of three, once in 4.
+/// Rounds without which nothing is called faster or slower: when both are equal, all of five rounds
+/// fall on the same side of 1 once in 16 times; of three, once in 4.
 pub const VERDICT_ROUNDS: usize = 5;
 
 /// How often and how long to measure.
@@ -28,7 +28,8 @@ pub struct Schedule {
     pub min_rounds: u32,
     /// Which clock comparisons are made by.
     pub clock: Clock,
-    /// Bind the calling thread to one core per round, another in the next round. Only for work on one thread.
+    /// Bind the calling thread to one core per round, another in the next round. Only for work on
+    /// one thread.
     pub pin: bool,
 }
 
@@ -45,8 +46,8 @@ impl Schedule {
         Schedule { clock: Clock::Wall, pin: false, budget_secs: 60.0, ..Schedule::one_thread() }
     }
 
-    /// Few rounds within `budget_secs`, for `--quick`: they show that everything runs, and decide nothing
-    /// ([`Ratio::verdict`]).
+    /// Few rounds within `budget_secs`, for `--quick`: they show that everything runs, and decide
+    /// nothing ([`Ratio::verdict`]).
     pub fn quick(self, budget_secs: f64) -> Schedule {
         Schedule { rounds: 3, min_rounds: 1, budget_secs, ..self }
     }
@@ -56,9 +57,9 @@ impl Schedule {
 pub struct Variant<'a> {
     /// What the rows and ratios call it.
     pub name: String,
-    /// Does the work once and returns a number that must be the same every time, such as the hits counted: a variant
-    /// that skips work is found out, and the compiler cannot remove it. With it come the times, where the work knows
-    /// them better than our clocks.
+    /// Does the work once and returns a number that must be the same every time, such as the hits
+    /// counted: a variant that skips work is found out, and the compiler cannot remove it. With it
+    /// come the times, where the work knows them better than our clocks.
     run: Box<dyn FnMut() -> (u64, Option<Sample>) + 'a>,
     /// Gives that number after the clock has stopped, where finding it is work of its own.
     check: Option<Box<dyn FnMut() -> u64 + 'a>>,
@@ -70,7 +71,8 @@ impl<'a> Variant<'a> {
         Variant { name: name.into(), run: Box::new(move || (run(), None)), check: None }
     }
 
-    /// A named closure that has another process do the work, or times a part of its own, and says what that took.
+    /// A named closure that has another process do the work, or times a part of its own, and says
+    /// what that took.
     pub fn timed(name: impl Into<String>, mut run: impl FnMut() -> Sample + 'a) -> Self {
         Variant { name: name.into(), run: Box::new(move || (0, Some(run()))), check: None }
     }
@@ -135,7 +137,8 @@ pub struct Ratio {
     pub high: f64,
     /// Number of rounds.
     pub rounds: usize,
-    /// Whether both took turns. Where they ran one after the other, what the machine did meanwhile is in the ratio.
+    /// Whether both took turns. Where they ran one after the other, what the machine did meanwhile
+    /// is in the ratio.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub in_turns: bool,
 }
@@ -163,9 +166,13 @@ pub enum Verdict {
 }
 
 impl Ratio {
-    /// The ratio of times taken in turns: `per_round` is (rival's time / our time) of each round. `None` without a
-    /// finite one.
-    pub fn of_rounds(name: impl Into<String>, rival: impl Into<String>, per_round: &[f64]) -> Option<Ratio> {
+    /// The ratio of times taken in turns: `per_round` is (rival's time / our time) of each round.
+    /// `None` without a finite one.
+    pub fn of_rounds(
+        name: impl Into<String>,
+        rival: impl Into<String>,
+        per_round: &[f64],
+    ) -> Option<Ratio> {
         let s = Summary::of(per_round)?;
         Some(Ratio {
             name: name.into(),
@@ -179,7 +186,8 @@ impl Ratio {
         })
     }
 
-    /// What the rounds decide. The only place where that is said: reports, summaries and notes ask here.
+    /// What the rounds decide. The only place where that is said: reports, summaries and notes ask
+    /// here.
     pub fn verdict(&self) -> Verdict {
         match (self.rounds >= VERDICT_ROUNDS && self.in_turns, self.low > 1.0, self.high < 1.0) {
             (false, ..) => Verdict::Open,
@@ -197,14 +205,19 @@ impl Ratio {
             Verdict::Even => "rounds on both sides of 1".into(),
             Verdict::Open => self.why_open().unwrap_or_default(),
         };
-        format!("{:.3} ({:.3} to {:.3}, {} rounds: {decides})", self.value, self.low, self.high, self.rounds)
+        format!(
+            "{:.3} ({:.3} to {:.3}, {} rounds: {decides})",
+            self.value, self.low, self.high, self.rounds
+        )
     }
 
     /// Why there is no verdict, in words; `None` where there is one.
     pub fn why_open(&self) -> Option<String> {
         match (self.in_turns, self.rounds) {
             (false, _) => Some("not in turns: decides nothing".into()),
-            (_, n) if n < VERDICT_ROUNDS => Some(format!("rounds below {VERDICT_ROUNDS} decide nothing")),
+            (_, n) if n < VERDICT_ROUNDS => {
+                Some(format!("rounds below {VERDICT_ROUNDS} decide nothing"))
+            }
             _ => None,
         }
     }
@@ -233,8 +246,12 @@ impl Timings {
     /// How much longer `rival` took than `ours`. `None` when one of them was not run.
     pub fn ratio(&self, ours: &str, rival: &str) -> Option<Ratio> {
         let (a, b) = (self.get(ours)?, self.get(rival)?);
-        let per_round: Vec<f64> =
-            a.samples.iter().zip(&b.samples).map(|(x, y)| y.by(self.clock) / x.by(self.clock)).collect();
+        let per_round: Vec<f64> = a
+            .samples
+            .iter()
+            .zip(&b.samples)
+            .map(|(x, y)| y.by(self.clock) / x.by(self.clock))
+            .collect();
         Ratio::of_rounds(ours, rival, &per_round)
     }
 }
@@ -255,7 +272,8 @@ impl std::fmt::Display for Unstable {
         let Unstable { variant, first, later } = self;
         write!(
             f,
-            "`{variant}` returned {first} in its first run and {later} in a later one: it does not do the same work \
+            "`{variant}` returned {first} in its first run and {later} in a later one: it does not \
+             do the same work \
              each time, so its times cannot be compared; make its result depend on its input alone"
         )
     }
@@ -263,9 +281,9 @@ impl std::fmt::Display for Unstable {
 
 impl std::error::Error for Unstable {}
 
-/// The order of round `round` for `n` variants: rotated, and reversed in every second round, so that each variant
-/// runs first, last, and after each of its neighbours equally often. For what cannot go through [`interleave`], such
-/// as ranks that all have to take the same turn.
+/// The order of round `round` for `n` variants: rotated, and reversed in every second round, so
+/// that each variant runs first, last, and after each of its neighbours equally often. For what
+/// cannot go through [`interleave`], such as ranks that all have to take the same turn.
 pub fn order(n: usize, round: usize) -> Vec<usize> {
     let mut o: Vec<usize> = (0..n).map(|i| (i + round / 2) % n.max(1)).collect();
     if round % 2 == 1 {
@@ -309,7 +327,9 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
     for round in 0..schedule.rounds.max(1) as usize {
         let spent_secs = start.elapsed().as_secs_f64();
         let round_secs = if round == 0 { 0.0 } else { (spent_secs - start_counted) / round as f64 };
-        if round >= schedule.min_rounds.max(1) as usize && spent_secs + round_secs > schedule.budget_secs {
+        if round >= schedule.min_rounds.max(1) as usize
+            && spent_secs + round_secs > schedule.budget_secs
+        {
             break;
         }
         cores.pin(round);
@@ -340,7 +360,8 @@ struct Cores {
 impl Cores {
     fn of_this_thread(pin: bool) -> Cores {
         let allowed = if pin { sched_getaffinity(None).ok() } else { None };
-        let ids = allowed.map_or(vec![], |set| (0..CpuSet::MAX_CPU).filter(|&c| set.is_set(c)).collect());
+        let ids =
+            allowed.map_or(vec![], |set| (0..CpuSet::MAX_CPU).filter(|&c| set.is_set(c)).collect());
         Cores { allowed, ids }
     }
 
@@ -378,7 +399,8 @@ mod tests {
 
     #[test]
     fn a_slow_round_of_the_machine_cancels_in_the_ratio() {
-        // Round 3 ran on a machine ten times as slow; a ratio of means would be off, the median of ratios is not.
+        // Round 3 ran on a machine ten times as slow; a ratio of means would be off, the median of
+        // ratios is not.
         let r = timings(&[1.0, 1.0, 10.0], &[2.0, 2.0, 20.0]).ratio("ours", "rival").unwrap();
         assert_eq!((r.value, r.spread, r.rounds), (2.0, 0.0, 3));
     }
@@ -473,10 +495,17 @@ mod tests {
     fn fewer_than_five_rounds_or_no_turns_decide_nothing() {
         let of = |n: usize, value: f64| Ratio::of_rounds("ours", "rival", &vec![value; n]).unwrap();
         for n in 1..VERDICT_ROUNDS {
-            assert_eq!((of(n, 9.0).verdict(), of(n, 0.1).verdict()), (Verdict::Open, Verdict::Open), "{n}");
+            assert_eq!(
+                (of(n, 9.0).verdict(), of(n, 0.1).verdict()),
+                (Verdict::Open, Verdict::Open),
+                "{n}"
+            );
             assert!(of(n, 9.0).why_open().unwrap().contains('5'));
         }
-        assert_eq!((of(5, 9.0).verdict(), of(5, 0.1).verdict()), (Verdict::Faster, Verdict::Slower));
+        assert_eq!(
+            (of(5, 9.0).verdict(), of(5, 0.1).verdict()),
+            (Verdict::Faster, Verdict::Slower)
+        );
         assert_eq!(of(5, 9.0).why_open(), None);
         let apart = Ratio { in_turns: false, ..of(7, 9.0) };
         assert_eq!(apart.verdict(), Verdict::Open);

@@ -45,7 +45,8 @@ impl Summary {
     }
 }
 
-/// Linear interpolation between order statistics (Hyndman and Fan 1996, definition 7). `sorted` is not empty.
+/// Linear interpolation between order statistics (Hyndman and Fan 1996, definition 7). `sorted` is
+/// not empty.
 fn quantile(sorted: &[f64], q: f64) -> f64 {
     let x = q * (sorted.len() - 1) as f64;
     let (i, f) = (x.floor() as usize, x.fract());

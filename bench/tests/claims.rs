@@ -1,5 +1,5 @@
-//! What records, reports and notes may claim: nothing that was not measured, and nothing without what speaks
-//! against it.
+//! What records, reports and notes may claim: nothing that was not measured, and nothing without
+//! what speaks against it.
 
 use bench::experiments::{self, Context};
 use bench::machine::Machine;
@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// A record of other times and places, as its file would hold it.
 fn record(machine: Value, ratios: Value) -> Record {
-    let mut value = serde_json::to_value(Record::new("fig4.7", "Build time", 4, false, Machine::describe()))
-        .expect("a record is JSON");
+    let mut value =
+        serde_json::to_value(Record::new("fig4.7", "Build time", 4, false, Machine::describe()))
+            .expect("a record is JSON");
     for (key, v) in machine.as_object().expect("fields of the machine") {
         value["machine"][key] = v.clone();
     }
@@ -38,12 +39,14 @@ fn a_report_calls_nothing_faster_after_fewer_than_five_rounds() {
 
 #[test]
 fn a_report_shows_the_load_that_the_machine_had() {
-    let machine = json!({ "load_1_min": 6.75, "cores": 2, "commit": "97db1462332d", "optimised": true });
+    let machine =
+        json!({ "load_1_min": 6.75, "cores": 2, "commit": "97db1462332d", "optimised": true });
     let page = report::page(&[record(machine, json!([]))]);
     assert!(page.contains("load 6.75 on 2 cores"), "{page}");
     // Above 0.75 a core it is not merely shown.
     assert!(page.contains("In doubt: the load"), "{page}");
-    let machine = json!({ "load_1_min": 1.49, "cores": 2, "commit": "97db1462332d", "optimised": true });
+    let machine =
+        json!({ "load_1_min": 1.49, "cores": 2, "commit": "97db1462332d", "optimised": true });
     let page = report::page(&[record(machine, json!([]))]);
     assert!(page.contains("load 1.49 on 2 cores") && !page.contains("In doubt"), "{page}");
 }
@@ -51,7 +54,8 @@ fn a_report_shows_the_load_that_the_machine_had() {
 #[test]
 fn a_report_shows_which_records_come_from_trees_with_uncommitted_changes() {
     // As records of before there was a field for it say it.
-    let machine = json!({ "load_1_min": 0.1, "cores": 2, "commit": "53342d595e91+", "optimised": true });
+    let machine =
+        json!({ "load_1_min": 0.1, "cores": 2, "commit": "53342d595e91+", "optimised": true });
     let page = report::page(&[record(machine, json!([]))]);
     assert!(page.contains("In doubt: ") && page.contains("uncommitted changes"), "{page}");
     let machine = json!({ "load_1_min": 0.1, "cores": 2, "commit": null, "optimised": true });
@@ -108,16 +112,18 @@ fn settings_of_sampling_are_timed_in_turns() {
 
 fn sources() -> Vec<(PathBuf, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/experiments");
-    let files = std::fs::read_dir(folder).expect("experiments").map(|e| e.expect("an entry").path());
+    let files =
+        std::fs::read_dir(folder).expect("experiments").map(|e| e.expect("an entry").path());
     files.map(|p| (p.clone(), std::fs::read_to_string(p).expect("source"))).collect()
 }
 
-/// A ratio that an experiment puts together itself may leave the verdict's rule out: it may only rename what
-/// `Ratio::of_rounds` made.
+/// A ratio that an experiment puts together itself may leave the verdict's rule out: it may only
+/// rename what `Ratio::of_rounds` made.
 #[test]
 fn ratios_are_formed_in_one_place() {
     for (path, text) in sources() {
-        for (at, _) in text.match_indices("Ratio {").filter(|(at, _)| !text[..*at].ends_with("-> ")) {
+        for (at, _) in text.match_indices("Ratio {").filter(|(at, _)| !text[..*at].ends_with("-> "))
+        {
             let mut open = 0;
             let end = text[at..].find(|c| {
                 open += i32::from(c == '{') - i32::from(c == '}');
@@ -149,7 +155,12 @@ fn the_book_names_every_record_in_doubt() {
             assert_eq!(why.is_empty(), r.doubts().is_empty(), "{}: {:?}", r.id, r.doubts());
             if !why.is_empty() {
                 let commit = m.commit.as_deref().unwrap_or("–").trim_end_matches('+');
-                wanted.push(format!("| {} | `{}` | {commit} | {} |", m.day(), r.id, why.join(", ")));
+                wanted.push(format!(
+                    "| {} | `{}` | {commit} | {} |",
+                    m.day(),
+                    r.id,
+                    why.join(", ")
+                ));
             }
         }
     }

@@ -88,12 +88,17 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     assert!(record["machine"]["cpu"].is_string() && record["ratios"].is_array());
 
     let rows = record["rows"].as_array().unwrap();
-    let watertight: Vec<&Value> =
-        rows.iter().filter(|r| r["tracer"] == "rt-core" && r["robustness"] == "watertight").collect();
+    let watertight: Vec<&Value> = rows
+        .iter()
+        .filter(|r| r["tracer"] == "rt-core" && r["robustness"] == "watertight")
+        .collect();
     assert!(watertight.len() >= 12, "meshes times aims, found {}", watertight.len());
     for r in watertight {
         assert_eq!(r["leaks"], 0, "{r}");
-        assert!(r["rays"].as_u64().unwrap() > 100_000 && r["seconds"].as_f64().unwrap() > 0.0, "{r}");
+        assert!(
+            r["rays"].as_u64().unwrap() > 100_000 && r["seconds"].as_f64().unwrap() > 0.0,
+            "{r}"
+        );
     }
 
     let file = |name: &str| std::fs::read_to_string(dir.path().join(name)).expect(name);
@@ -102,9 +107,13 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     assert!(file("accuracy-robust.csv").lines().count() > rows.len());
     assert!(file("index.html").contains("id=\"accuracy-robust\""));
 
-    // What spoke against it is in the record and in the report: here at least that no commit is known.
+    // What spoke against it is in the record and in the report: here at least that no commit is
+    // known.
     let despite = record["recorded_despite"].as_array().expect("what spoke against it");
-    assert!(despite.iter().any(|d| d.as_str().unwrap().contains("commit is not known")), "{despite:?}");
+    assert!(
+        despite.iter().any(|d| d.as_str().unwrap().contains("commit is not known")),
+        "{despite:?}"
+    );
     assert!(file("index.html").contains("--record-despite-doubts"));
     assert!(file("accuracy-robust.csv").contains("# in doubt: the commit is not known"));
 
@@ -112,7 +121,8 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     check_kept(repository.path(), &record);
 }
 
-/// What `--record` keeps: DATE-MACHINE with the record, and nothing of where this machine has its files.
+/// What `--record` keeps: DATE-MACHINE with the record, and nothing of where this machine has its
+/// files.
 fn check_kept(repository: &Path, record: &Value) {
     let entries = |p: &Path| -> Vec<std::path::PathBuf> {
         let mut found: Vec<_> = std::fs::read_dir(p).unwrap().map(|e| e.unwrap().path()).collect();
@@ -129,7 +139,8 @@ fn check_kept(repository: &Path, record: &Value) {
     let files = entries(&runs[0]);
     let names: Vec<&str> = files.iter().map(|f| f.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["accuracy-robust.csv", "accuracy-robust.json"]);
-    let mut places = vec![repository.to_path_buf(), std::env::temp_dir(), env!("CARGO_MANIFEST_DIR").into()];
+    let mut places =
+        vec![repository.to_path_buf(), std::env::temp_dir(), env!("CARGO_MANIFEST_DIR").into()];
     places.extend(Path::new(env!("CARGO_BIN_EXE_bench")).parent().map(Path::to_path_buf));
     places.extend(std::env::var_os("HOME").map(Into::into));
     for file in &files {
@@ -161,8 +172,10 @@ fn a_tree_with_uncommitted_changes_is_not_recorded_and_nothing_is_measured() {
     std::fs::write(repository.path().join("bench/Cargo.toml"), "# changed").unwrap();
     let reports = tempfile::tempdir().unwrap();
     let folder = reports.path().to_str().unwrap();
-    let out =
-        bench_in(repository.path(), &["run", "accuracy-robust", "--quick", "--record", "--out", folder]);
+    let out = bench_in(
+        repository.path(),
+        &["run", "accuracy-robust", "--quick", "--record", "--out", folder],
+    );
     let said = text(&out.stderr);
     assert_eq!(out.status.code(), Some(2), "{said}");
     assert!(said.contains("uncommitted changes") && said.contains("commit them"), "{said}");

@@ -23,7 +23,8 @@ fn ball() -> TriMesh {
 
 fn field() -> Dataset {
     let n = 17;
-    let mut image = ImageData::new([n; 3], DVec3::splat(-1.0), DVec3::splat(2.0 / f64::from(n - 1)));
+    let mut image =
+        ImageData::new([n; 3], DVec3::splat(-1.0), DVec3::splat(2.0 / f64::from(n - 1)));
     let at = |i: u32| 2.0 * i as f32 / (n - 1) as f32 - 1.0;
     let value = |i: u32| {
         let (x, y, z) = (at(i % n), at(i / n % n), at(i / n / n));
@@ -37,7 +38,8 @@ fn field() -> Dataset {
 
 fn files(dir: &Path) -> Vec<PathBuf> {
     let path = |name: &str| dir.join(name);
-    let (vtp, vti, obj, ply) = (path("ball.vtp"), path("field.vti"), path("ball.obj"), path("ball.ply"));
+    let (vtp, vti, obj, ply) =
+        (path("ball.vtp"), path("field.vti"), path("ball.obj"), path("ball.ply"));
     let glb = path("ball.glb");
     let poly = Dataset::PolyData(PolyData::from_trimesh(&ball()));
     write_vtk(&vtp, &poly, VtkOptions::default()).unwrap();
@@ -46,7 +48,8 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     let bare = TriMesh { scalars: None, colors: None, ..ball() };
     write_obj(&obj, &bare).unwrap();
     write_ply(&ply, &ball()).unwrap();
-    let colors = bare.positions.iter().map(|p| [0.5 + 0.5 * p.z, 0.4, 0.3, 1.0].map(|c| c.clamp(0.0, 1.0)));
+    let colors =
+        bare.positions.iter().map(|p| [0.5 + 0.5 * p.z, 0.4, 0.3, 1.0].map(|c| c.clamp(0.0, 1.0)));
     let colored = TriMesh { colors: Some(Attribute::per_vertex(colors.collect())), ..bare.clone() };
     write_glb(&glb, &colored).unwrap();
     vec![vtp, vti, obj, ply, glb]
@@ -69,7 +72,8 @@ fn files_of_several_formats_become_pictures_that_show_something() {
         assert!(object["seconds"]["render"].as_f64() > Some(0.0), "{object}");
 
         let picture = read_png(&png).unwrap();
-        let mut colors: Vec<[u32; 4]> = picture.rgba().unwrap().iter().map(|c| c.map(f32::to_bits)).collect();
+        let mut colors: Vec<[u32; 4]> =
+            picture.rgba().unwrap().iter().map(|c| c.map(f32::to_bits)).collect();
         colors.sort_unstable();
         colors.dedup();
         assert!(colors.len() > 100, "{f}: {} colours", colors.len());
@@ -96,7 +100,8 @@ fn a_bad_file_ends_with_1_and_names_itself_and_the_cure() {
 
     let vti = dir.path().join("field.vti");
     write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
-    let args = ["render", vti.to_str().unwrap(), "-o", png.to_str().unwrap(), "--color-by", "pressure"];
+    let args =
+        ["render", vti.to_str().unwrap(), "-o", png.to_str().unwrap(), "--color-by", "pressure"];
     let out = bench(&args);
     let message = String::from_utf8_lossy(&out.stderr).into_owned();
     assert_eq!(out.status.code(), Some(1));
@@ -125,7 +130,8 @@ fn unknown_effects_sizes_and_endings_end_with_2_and_say_what_there_is() {
 /// Draws the field as a volume and gives the picture's colours and the account.
 fn volume(vti: &Path, args: &[&str]) -> (Vec<[f32; 4]>, Value) {
     let png = vti.with_extension("png");
-    let always = ["render", vti.to_str().unwrap(), "-o", png.to_str().unwrap(), "--size", "48x48", "--json"];
+    let always =
+        ["render", vti.to_str().unwrap(), "-o", png.to_str().unwrap(), "--size", "48x48", "--json"];
     let out = bench(&[&always, args].concat());
     assert_eq!(out.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
     let pixels = read_png(&png).unwrap().rgba().unwrap();
@@ -144,7 +150,8 @@ fn image_data_becomes_a_volume_that_opacity_and_isovalue_change() {
     assert!(object["effects"].as_array().unwrap().contains(&"volumes".into()), "{object}");
     assert!(object["contents"][0].as_str().unwrap().contains("`distance` as a volume"), "{object}");
     assert_eq!((&object["triangles"], &object["warnings"]), (&0.into(), &serde_json::json!([])));
-    // The distance is largest in the middle, so that is what glows most; the corners of the picture show nothing.
+    // The distance is largest in the middle, so that is what glows most; the corners of the picture
+    // show nothing.
     let light = |p: [f32; 4]| p[0] + p[1] + p[2];
     let (middle, side) = (light(ramp[24 * 48 + 24]), light(ramp[24 * 48 + 8]));
     assert!(middle > 1.2 * side && side > 0.0 && light(ramp[0]) == 0.0, "{middle} {side}");
@@ -161,7 +168,10 @@ fn image_data_becomes_a_volume_that_opacity_and_isovalue_change() {
 
     // A volume alone answers to no light: that is said, not passed over.
     let (_, object) = with(&["--effects", "volumes,shadows"]);
-    assert!(object["warnings"][0].as_str().unwrap().contains("shadows changes no pixel"), "{object}");
+    assert!(
+        object["warnings"][0].as_str().unwrap().contains("shadows changes no pixel"),
+        "{object}"
+    );
 }
 
 #[test]
@@ -183,7 +193,10 @@ fn volumes_without_a_uniform_grid_are_refused_with_the_cure() {
     }
     let vti = &files[1];
     let (code, message) = refused(vti, &["--volume", "pressure"]);
-    assert!(code == Some(1) && message.contains("pressure") && message.contains("distance"), "{message}");
+    assert!(
+        code == Some(1) && message.contains("pressure") && message.contains("distance"),
+        "{message}"
+    );
     let (code, message) = refused(vti, &["--opacity", "0:0,1:1"]);
     assert!(code == Some(2) && message.contains("--effects volumes"), "{message}");
     for bad in ["1:0,0:1", "0:2", "0.5"] {
@@ -206,7 +219,11 @@ fn ctrl_c_within_a_picture_keeps_the_samples_it_has_and_ends_with_130() {
         .spawn()
         .expect("the program starts");
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
-    lines.by_ref().find(|l| l.as_ref().unwrap().starts_with("drawing")).expect("notes with -v").unwrap();
+    lines
+        .by_ref()
+        .find(|l| l.as_ref().unwrap().starts_with("drawing"))
+        .expect("notes with -v")
+        .unwrap();
     // One sample takes milliseconds and all of them minutes.
     std::thread::sleep(Duration::from_secs(3));
     let pressed = Instant::now();
@@ -215,6 +232,9 @@ fn ctrl_c_within_a_picture_keeps_the_samples_it_has_and_ends_with_130() {
     let rest: String = lines.map(|l| l.unwrap() + "\n").collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
     assert!(pressed.elapsed() < Duration::from_secs(10), "stopped after {:?}", pressed.elapsed());
-    assert!(rest.contains("of 65536 samples") && rest.contains("what was finished is kept"), "{rest}");
+    assert!(
+        rest.contains("of 65536 samples") && rest.contains("what was finished is kept"),
+        "{rest}"
+    );
     assert_eq!(read_png(&png).unwrap().width, 64);
 }

@@ -1,12 +1,14 @@
 //! Milliseconds per frame over threads, by scene, format and instruction set, with IceT's columns.
 //!
-//! Ranks are threads of this process and share its cores, so the numbers are costs of computation and copying, not of a network.
-//! Variants of one line are run frame by frame in turn, so that other load on the machine falls on all of them alike.
+//! Ranks are threads of this process and share its cores, so the numbers are costs of computation
+//! and copying, not of a network. Variants of one line are run frame by frame in turn, so that
+//! other load on the machine falls on all of them alike.
 //!
 //! `cargo bench -p composite --bench paths -- [SIZE] [RANKS…] [WORDS…]`
 use composite::{
-    Communicator, CompositeError, Compositor, DepthPixel, Frame, Image, Options, PremultipliedPixel, Rect,
-    Report, SimdLevel, Strategy, composite_shared, shared_memory_group, threads,
+    Communicator, CompositeError, Compositor, DepthPixel, Frame, Image, Options,
+    PremultipliedPixel, Rect, Report, SimdLevel, Strategy, composite_shared, shared_memory_group,
+    threads,
 };
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
@@ -26,8 +28,8 @@ struct Picture {
     bounds: Rect,
 }
 
-/// `dense`: every pixel of every rank; `discs`: a disc a rank, about two layers deep; `frag`: a sixth of their pixels, in runs of
-/// three.
+/// `dense`: every pixel of every rank; `discs`: a disc a rank, about two layers deep; `frag`: a
+/// sixth of their pixels, in runs of three.
 fn picture(scene: &str, rank: usize, ranks: usize, size: u32) -> Picture {
     let n = size as usize;
     let mut made = Picture {
@@ -54,8 +56,9 @@ fn picture(scene: &str, rank: usize, ranks: usize, size: u32) -> Picture {
             };
             if inside {
                 let at = y * n + x;
-                let depth =
-                    0.5 + 0.1 * (u * v).sin() * 0.1 + 0.3 * hash(rank as u64) as f32 / u64::MAX as f32;
+                let depth = 0.5
+                    + 0.1 * (u * v).sin() * 0.1
+                    + 0.3 * hash(rank as u64) as f32 / u64::MAX as f32;
                 made.depths[at] = depth;
                 made.colors[at] = [rank as u8, x as u8, y as u8, 255];
                 made.floats[at] = [0.1, 0.2, depth * 0.3, 0.4];
@@ -97,12 +100,14 @@ fn main() {
     let arguments = || std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let numbers: Vec<usize> = arguments().filter_map(|word| word.parse().ok()).collect();
     // Other words choose lines whose scene or variant contains them.
-    let words: Vec<String> = arguments().filter(|w| w.parse::<usize>().is_err() && w != "--bench").collect();
+    let words: Vec<String> =
+        arguments().filter(|w| w.parse::<usize>().is_err() && w != "--bench").collect();
     let size = numbers.first().copied().unwrap_or(1024) as u32;
     let counts = if numbers.len() > 1 { numbers[1..].to_vec() } else { vec![2, 4, 8] };
     let frames = 24;
     println!(
-        "{size}x{size}, {frames} frames, medians in ms; columns of rank 0: compress, blend, send, collect"
+        "{size}x{size}, {frames} frames, medians in ms; columns of rank 0: compress, blend, send, \
+         collect"
     );
     for scene in ["discs", "frag", "dense"] {
         for &ranks in &counts {
@@ -116,7 +121,11 @@ fn main() {
                 ));
             }
             for strategy in [Strategy::BinarySwap, Strategy::RadixK { k: 8 }] {
-                variants.push((format!("z {strategy:?}"), false, Options { strategy, ..base.clone() }));
+                variants.push((
+                    format!("z {strategy:?}"),
+                    false,
+                    Options { strategy, ..base.clone() },
+                ));
             }
             variants.push(("z checksums".into(), false, Options { verify: true, ..base.clone() }));
             for slice_px in [1 << 14, 1 << 18, usize::MAX] {
@@ -139,7 +148,8 @@ fn main() {
             if variants.is_empty() {
                 continue;
             }
-            let pictures: Vec<Picture> = (0..ranks).map(|rank| picture(scene, rank, ranks, size)).collect();
+            let pictures: Vec<Picture> =
+                (0..ranks).map(|rank| picture(scene, rank, ranks, size)).collect();
             let times = Mutex::new(vec![Vec::<(f64, f64, Report)>::new(); variants.len()]);
             let members: Vec<_> = shared_memory_group(ranks)
                 .into_iter()
@@ -148,7 +158,9 @@ fn main() {
             let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = pictures
                 .iter()
                 .map(|p| {
-                    Arc::new(Image::from_planes(size, size, p.colors.clone(), p.depths.clone()).unwrap())
+                    Arc::new(
+                        Image::from_planes(size, size, p.colors.clone(), p.depths.clone()).unwrap(),
+                    )
                 })
                 .collect();
             let results = threads::run(ranks, |mut comm| {
@@ -172,22 +184,36 @@ fn main() {
                                         .iter()
                                         .map(|p| f32_frame(size, p))
                                         .collect::<Result<Vec<_>, _>>()?;
-                                    f_spare = Some(composite_shared(&frames, cores, false, f_spare.take())?);
+                                    f_spare = Some(composite_shared(
+                                        &frames,
+                                        cores,
+                                        false,
+                                        f_spare.take(),
+                                    )?);
                                 } else {
-                                    let frames = pictures.iter().map(|p| z_frame(size, p)).collect::<Result<
-                                        Vec<_>,
-                                        _,
-                                    >>(
-                                    )?;
-                                    z_spare = Some(composite_shared(&frames, cores, false, z_spare.take())?);
+                                    let frames = pictures
+                                        .iter()
+                                        .map(|p| z_frame(size, p))
+                                        .collect::<Result<Vec<_>, _>>()?;
+                                    z_spare = Some(composite_shared(
+                                        &frames,
+                                        cores,
+                                        false,
+                                        z_spare.take(),
+                                    )?);
                                 }
                             }
                             Report::default()
                         } else if name == "z table" {
-                            let shared_rank = own_shared_rank
-                                .get_or_insert_with(|| members[rank].lock().unwrap().take().unwrap());
-                            let done =
-                                shared_rank.composite(&mut comm, &images[rank], picture.bounds, options)?;
+                            let shared_rank = own_shared_rank.get_or_insert_with(|| {
+                                members[rank].lock().unwrap().take().unwrap()
+                            });
+                            let done = shared_rank.composite(
+                                &mut comm,
+                                &images[rank],
+                                picture.bounds,
+                                options,
+                            )?;
                             if let Some(image) = done.image {
                                 shared_rank.recycle(image);
                             }
@@ -223,7 +249,8 @@ fn main() {
                     1e3 * median(times.iter().map(|(.., r)| column(r)).collect())
                 };
                 println!(
-                    "{scene:6} p={ranks:<3} {name:24} {:7.2} cpu {:7.2} | {:6.2} {:6.2} {:6.2} {:6.2} | {:.2} MB sent by rank 0",
+                    "{scene:6} p={ranks:<3} {name:24} {:7.2} cpu {:7.2} | {:6.2} {:6.2} {:6.2} \
+                     {:6.2} | {:.2} MB sent by rank 0",
                     1e3 * median(times.iter().map(|t| t.0).collect()),
                     median(times.iter().map(|t| t.1).collect()),
                     of(|r| r.compress_secs),
@@ -240,10 +267,12 @@ fn main() {
     }
 }
 
-/// A frame whose rendering is waiting (as for another device or other cores), in 16 tiles: rendered and then composited, and streamed.
+/// A frame whose rendering is waiting (as for another device or other cores), in 16 tiles: rendered
+/// and then composited, and streamed.
 fn streamed(ranks: usize, size: u32) {
     const RENDER: Duration = Duration::from_millis(48);
-    let pictures: Vec<Picture> = (0..ranks).map(|rank| picture("dense", rank, ranks, size)).collect();
+    let pictures: Vec<Picture> =
+        (0..ranks).map(|rank| picture("dense", rank, ranks, size)).collect();
     let times = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
     let results = threads::run(ranks, |mut comm| {
         let rank = comm.rank();
@@ -259,13 +288,19 @@ fn streamed(ranks: usize, size: u32) {
                     }
                     compositor.composite(&mut comm, &frame)?.image
                 } else {
-                    let mut stream = compositor.stream(&mut comm, (size, size), Rect::of_size(size, size))?;
+                    let mut stream =
+                        compositor.stream(&mut comm, (size, size), Rect::of_size(size, size))?;
                     for tile in 0..16 {
-                        // What compositing has cost does not delay rendering, which goes on elsewhere.
-                        std::thread::sleep((RENDER * (tile + 1) / 16).saturating_sub(begin.elapsed()));
+                        // What compositing has cost does not delay rendering, which goes on
+                        // elsewhere.
+                        std::thread::sleep(
+                            (RENDER * (tile + 1) / 16).saturating_sub(begin.elapsed()),
+                        );
                         let row = |i: u32| size * i / 16;
-                        stream
-                            .tile_done(&frame, Rect { x0: 0, y0: row(tile), x1: size, y1: row(tile + 1) })?;
+                        stream.tile_done(
+                            &frame,
+                            Rect { x0: 0, y0: row(tile), x1: size, y1: row(tile + 1) },
+                        )?;
                     }
                     stream.finish(&frame)?.image
                 };
@@ -283,7 +318,8 @@ fn streamed(ranks: usize, size: u32) {
     results.into_iter().for_each(|result| result.unwrap().unwrap());
     let [after, alone, streamed] = times.into_inner().unwrap().map(median);
     println!(
-        "stream dense p={ranks:<3} rendering {:.0} ms, compositing {alone:.1} ms; one after the other {after:.1} ms, streamed {streamed:.1} ms",
+        "stream dense p={ranks:<3} rendering {:.0} ms, compositing {alone:.1} ms; one after the \
+         other {after:.1} ms, streamed {streamed:.1} ms",
         RENDER.as_secs_f64() * 1e3
     );
 }

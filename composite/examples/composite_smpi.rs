@@ -1,11 +1,14 @@
-//! The program `composite` as a shared library, in which SimGrid's `smpirun` looks for `main`: it loads one private copy for each
-//! simulated rank. Made by `cargo build -p composite --example composite_smpi`; `composite compare --smpi` does that itself.
+//! The program `composite` as a shared library, in which SimGrid's `smpirun` looks for `main`: it
+//! loads one private copy for each simulated rank. Made by `cargo build -p composite --example
+//! composite_smpi`; `composite compare --smpi` does that itself.
 //!
-//! An example because a package has one library, which programs are linked with and which must not have a `main`.
+//! An example because a package has one library, which programs are linked with and which must not
+//! have a `main`.
 #![deny(unsafe_code)]
 #![allow(unsafe_code, reason = "the one function that SimGrid calls")]
 
-// A test harness has a `main` of its own; what the library exports is tested from outside (tests/mpi.rs).
+// A test harness has a `main` of its own; what the library exports is tested from outside
+// (tests/mpi.rs).
 #[cfg(not(test))]
 mod exported {
     use std::ffi::{CStr, OsString, c_char, c_int};
@@ -15,7 +18,8 @@ mod exported {
     ///
     /// # Safety
     /// As of every `main`: `argv` holds `argc` strings.
-    // SAFETY: SimGrid looks for this name in this library, and no other library of the process is asked for it.
+    // SAFETY: SimGrid looks for this name in this library, and no other library of the process is
+    // asked for it.
     #[unsafe(no_mangle)]
     pub(crate) unsafe extern "C" fn main(argc: c_int, argv: *const *const c_char) -> c_int {
         let argument = |i: usize| {
@@ -23,7 +27,8 @@ mod exported {
             let bytes = unsafe { CStr::from_ptr(*argv.add(i)) }.to_bytes();
             OsString::from_vec(bytes.to_vec())
         };
-        let arguments: Vec<OsString> = (0..usize::try_from(argc).unwrap_or(0)).map(argument).collect();
+        let arguments: Vec<OsString> =
+            (0..usize::try_from(argc).unwrap_or(0)).map(argument).collect();
         let status = std::panic::catch_unwind(|| composite::cli::main(arguments));
         status.map_or(101, |status| c_int::from(status as u8))
     }

@@ -1,4 +1,5 @@
-//! Messages: a rectangle of an image as a bit mask of active pixels, followed by these, row after row.
+//! Messages: a rectangle of an image as a bit mask of active pixels, followed by these, row after
+//! row.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -12,22 +13,28 @@
 //! | then | mask: for every row words of 64 pixels, lowest bit first; left out if all or no pixels are active |
 //! | then | for every row the colours of its active pixels, then (if the flag says so) their depths |
 //!
-//! All numbers are little-endian, and pixels have the bytes they have in memory; counts have 64 bits, also in arithmetic. The
-//! decoder trusts nothing: whatever passes it can be read without a further check.
+//! All numbers are little-endian, and pixels have the bytes they have in memory; counts have 64
+//! bits, also in arithmetic. The decoder trusts nothing: whatever passes it can be read without a
+//! further check.
 use crate::color::Color;
 use crate::layer::{Layer, View};
 use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::simd::compress::{append_active, append_active_scalar};
-use crate::simd::expand::{Side, SparseRow, copy_row, copy_row_scalar, merge_row, merge_row_scalar};
+use crate::simd::expand::{
+    Side, SparseRow, copy_row, copy_row_scalar, merge_row, merge_row_scalar,
+};
 use crate::simd::mask::{Counts, row_words, row_words_scalar};
-use crate::simd::opaque::{drop_full_alpha, drop_full_alpha_scalar, give_full_alpha, give_full_alpha_scalar};
+use crate::simd::opaque::{
+    drop_full_alpha, drop_full_alpha_scalar, give_full_alpha, give_full_alpha_scalar,
+};
 use crate::simd::{Kernels, at_level};
 use fearless_simd::Simd;
 
 #[cfg(not(target_endian = "little"))]
 compile_error!(
-    "messages hold pixels as they lie in memory, and this has only been done for little-endian machines"
+    "messages hold pixels as they lie in memory, and this has only been done for little-endian \
+     machines"
 );
 
 const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS03");
@@ -65,7 +72,8 @@ pub enum MessageError {
     },
     /// The sender composites something else.
     #[error(
-        "its sender composites another size, pixel format, strategy or rank order, or has other options: \
+        "its sender composites another size, pixel format, strategy or rank order, or has other \
+         options: \
          use the same on every rank"
     )]
     Fingerprint,
@@ -108,7 +116,8 @@ pub enum MessageError {
 
 /// Sum of the bytes in eight independent chains, so that a processor works on all of them at once.
 ///
-/// Every step is a bijection of the state and of the word, so a change within a single word never goes unnoticed.
+/// Every step is a bijection of the state and of the word, so a change within a single word never
+/// goes unnoticed.
 pub(crate) fn checksum(bytes: &[u8]) -> u64 {
     let (blocks, rest) = bytes.as_chunks::<64>();
     let mut chains: [u64; 8] = std::array::from_fn(|i| i as u64);
@@ -144,7 +153,8 @@ pub(crate) fn longest<P: Composite>(rect: &Rect) -> usize {
     HEADER_BYTES + rect.height() * rect.width().div_ceil(64) * 8 + rect.pixels() * P::BYTES
 }
 
-/// Whether messages of colours without depths may leave out full alphas: opaque pictures nearly always are such.
+/// Whether messages of colours without depths may leave out full alphas: opaque pictures nearly
+/// always are such.
 fn may_be_opaque<P: Composite>(depths: bool) -> bool {
     P::HAS_DEPTH && P::Color::BYTES == 4 && !depths
 }
@@ -156,8 +166,8 @@ pub(crate) fn rect_of(bytes: &[u8]) -> Option<Rect> {
 }
 
 impl Codec {
-    /// Appends the message of the pixels that `view` has in `rect` to the empty buffer `out`. Without `depths` the receiver only
-    /// gets colours.
+    /// Appends the message of the pixels that `view` has in `rect` to the empty buffer `out`.
+    /// Without `depths` the receiver only gets colours.
     pub(crate) fn encode<P: Composite>(
         &self,
         view: &View<'_, P>,
@@ -200,8 +210,9 @@ impl Codec {
         }
         let corners = |a: u32, b: u32| u64::from(a) | u64::from(b) << 32;
         let (from, to) = (corners(rect.x0, rect.y0), corners(rect.x1, rect.y1));
-        for (slot, number) in
-            [MAGIC, 0, self.fingerprint, flags, from, to, counts.active as u64].into_iter().enumerate()
+        for (slot, number) in [MAGIC, 0, self.fingerprint, flags, from, to, counts.active as u64]
+            .into_iter()
+            .enumerate()
         {
             out[8 * slot..8 * slot + 8].copy_from_slice(&number.to_le_bytes());
         }
@@ -225,7 +236,8 @@ impl Codec {
         if bytes.len() < HEADER_BYTES {
             return Err(MessageError::Length { expected: HEADER_BYTES as u64, found });
         }
-        let number = |slot: usize| bytemuck::pod_read_unaligned::<u64>(&bytes[8 * slot..8 * slot + 8]);
+        let number =
+            |slot: usize| bytemuck::pod_read_unaligned::<u64>(&bytes[8 * slot..8 * slot + 8]);
         if number(0) != MAGIC {
             return Err(MessageError::Magic);
         }
@@ -248,7 +260,11 @@ impl Codec {
         // Flags and count fit the rectangle, and the length fits them.
         let (pixels, active) = (rect.pixels() as u64, number(6));
         let sparse = active > 0 && active < pixels;
-        if flags > ALL_FLAGS || number(7) != 0 || active > pixels || (flags & HAS_MASK != 0) != sparse {
+        if flags > ALL_FLAGS
+            || number(7) != 0
+            || active > pixels
+            || (flags & HAS_MASK != 0) != sparse
+        {
             return Err(MessageError::Mask);
         }
         let has_depths = flags & HAS_DEPTHS != 0;
@@ -350,7 +366,8 @@ fn encode_rows<P: Composite>(
     let (width, words) = (rect.width(), rect.width().div_ceil(64));
     out.reserve(rect.pixels() * P::BYTES);
 
-    // As long as all is active: rows as they are. Most rectangles are either dense or not so in their first row.
+    // As long as all is active: rows as they are. Most rectangles are either dense or not so in
+    // their first row.
     let mut y = rect.y0;
     while y < rect.y1 {
         let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
@@ -393,7 +410,8 @@ fn encode_rows<P: Composite>(
                 8 => kernels.append_active::<8>(out, mask_at, colors),
                 _ => kernels.append_active::<16>(out, mask_at, colors),
             }
-            // All alphas are looked at in the end; most pictures that are not opaque show it in their first row.
+            // All alphas are looked at in the end; most pictures that are not opaque show it in
+            // their first row.
             if opaque && out.last() != Some(&255) {
                 return None;
             }
@@ -426,7 +444,13 @@ impl<'a> DecodedMessage<'a> {
         Self::open(bytes, rect, active as usize, depths && P::HAS_DEPTH, color_bytes)
     }
 
-    fn open(bytes: &'a [u8], rect: Rect, active: usize, has_depths: bool, color_bytes: usize) -> Self {
+    fn open(
+        bytes: &'a [u8],
+        rect: Rect,
+        active: usize,
+        has_depths: bool,
+        color_bytes: usize,
+    ) -> Self {
         let sparse = active > 0 && active < rect.pixels();
         let mask_bytes = if sparse { 8 * rect.width().div_ceil(64) * rect.height() } else { 0 };
         let (mask, pixels) = bytes[HEADER_BYTES..].split_at(mask_bytes);
@@ -492,7 +516,12 @@ impl<'a> DecodedMessage<'a> {
     }
 
     /// Joins its pixels to `layer`, whose bounds must hold the rectangle.
-    pub(crate) fn merge_into<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>, side: Side) {
+    pub(crate) fn merge_into<P: Composite>(
+        &self,
+        kernels: Kernels,
+        layer: &mut Layer<P>,
+        side: Side,
+    ) {
         at_level!(
             kernels,
             simd => self.for_each_row(
@@ -509,7 +538,8 @@ impl<'a> DecodedMessage<'a> {
         );
     }
 
-    /// Writes its rectangle over `layer`, whose bounds must hold it. Not for messages without depths where `layer` has some.
+    /// Writes its rectangle over `layer`, whose bounds must hold it. Not for messages without
+    /// depths where `layer` has some.
     pub(crate) fn copy_to_layer<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>) {
         let (x0, x1) = (self.rect.x0, self.rect.x1);
         at_level!(
@@ -528,7 +558,8 @@ impl<'a> DecodedMessage<'a> {
         );
     }
 
-    /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is room to work in.
+    /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is room
+    /// to work in.
     pub(crate) fn copy_to_planes<P: Composite>(
         &self,
         kernels: Kernels,

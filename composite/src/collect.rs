@@ -1,7 +1,9 @@
-//! Brings the pieces of a finished image to one rank, as they are finished, or leaves them where they are.
+//! Brings the pieces of a finished image to one rank, as they are finished, or leaves them where
+//! they are.
 //!
-//! Pieces travel as sparse messages, so background costs a bit a pixel, and depth only where it is asked for. All ranks know from
-//! the beginning which pieces there will be, so their receives are posted before anything else is done.
+//! Pieces travel as sparse messages, so background costs a bit a pixel, and depth only where it is
+//! asked for. All ranks know from the beginning which pieces there will be, so their receives are
+//! posted before anything else is done.
 use crate::codec;
 use crate::error::CompositeError;
 use crate::frame::{Image, Piece};
@@ -27,7 +29,8 @@ pub(crate) struct Collector<P: Composite> {
 }
 
 impl<P: Composite> Collector<P> {
-    /// `pieces` are all that will be handed in, by place; `spare` is an image of this size that may be written over.
+    /// `pieces` are all that will be handed in, by place; `spare` is an image of this size that may
+    /// be written over.
     pub(crate) fn new(
         exchange: &mut FrameExchange<'_>,
         size_px: (u32, u32),
@@ -37,8 +40,14 @@ impl<P: Composite> Collector<P> {
         spare: Option<Image<P>>,
     ) -> Result<Self, CompositeError> {
         let depths = depths && P::HAS_DEPTH;
-        let mut collector =
-            Self { root, depths, outstanding: Vec::new(), image: None, kept: Vec::new(), wide: Vec::new() };
+        let mut collector = Self {
+            root,
+            depths,
+            outstanding: Vec::new(),
+            image: None,
+            kept: Vec::new(),
+            wide: Vec::new(),
+        };
         if root != Some(exchange.order_index) {
             return Ok(collector);
         }
@@ -96,9 +105,11 @@ impl<P: Composite> Collector<P> {
         bytes: Vec<u8>,
     ) -> Result<(), CompositeError> {
         let begin = exchange.comm.working_secs();
-        // A rank finishes its pieces in any order, so the message itself says which one it is, if it is one of those expected.
+        // A rank finishes its pieces in any order, so the message itself says which one it is, if
+        // it is one of those expected.
         let said = codec::rect_of(&bytes);
-        let mut from_sender = self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == order_index);
+        let mut from_sender =
+            self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == order_index);
         let first = from_sender.next();
         let index = from_sender.find(|(_, piece)| Some(piece.1) == said).map(|(index, _)| index);
         let index = match first {
@@ -123,8 +134,12 @@ impl<P: Composite> Collector<P> {
         Ok(())
     }
 
-    /// Waits for what has not come; the image at the root, this rank's piece where there is no root.
-    pub(crate) fn finish(mut self, exchange: &mut FrameExchange<'_>) -> Result<Outcome<P>, CompositeError> {
+    /// Waits for what has not come; the image at the root, this rank's piece where there is no
+    /// root.
+    pub(crate) fn finish(
+        mut self,
+        exchange: &mut FrameExchange<'_>,
+    ) -> Result<Outcome<P>, CompositeError> {
         while exchange.is_receiving() {
             if let Some((order_index, _, bytes)) = exchange.next(true)? {
                 self.take(exchange, order_index, bytes)?;
@@ -138,7 +153,8 @@ impl<P: Composite> Collector<P> {
     }
 }
 
-/// An image with background wherever no piece will come; elsewhere anything, because pieces bring their background with them.
+/// An image with background wherever no piece will come; elsewhere anything, because pieces bring
+/// their background with them.
 fn blank<P: Composite>(
     (width_px, height_px): (u32, u32),
     depths: bool,
@@ -148,7 +164,9 @@ fn blank<P: Composite>(
     let pixels = Rect::of_size(width_px, height_px).pixels();
     let depth_pixels = if depths { pixels } else { 0 };
     let spare = spare.filter(|image| {
-        image.colors.len() == pixels && image.depths.len() == depth_pixels && image.width_px == width_px
+        image.colors.len() == pixels
+            && image.depths.len() == depth_pixels
+            && image.width_px == width_px
     });
     let Some(mut image) = spare else {
         let (colors, depths) = (vec![P::EMPTY.color(); pixels], vec![1.0; depth_pixels]);
@@ -157,7 +175,8 @@ fn blank<P: Composite>(
     let whole = pieces.iter().fold(Rect::EMPTY, |all, piece| all.around(&piece.1));
     let covered: usize = pieces.iter().map(|piece| piece.1.pixels()).sum();
     if covered < whole.pixels() {
-        // Pieces with gaps between them: the simple way, because no strategy makes them but for empty pictures.
+        // Pieces with gaps between them: the simple way, because no strategy makes them but for
+        // empty pictures.
         image.colors.fill(P::EMPTY.color());
         image.depths.fill(1.0);
         return image;

@@ -1,4 +1,5 @@
-//! Colours: four channels in 8 or 16 bits, half or single precision, and how one is laid over another.
+//! Colours: four channels in 8 or 16 bits, half or single precision, and how one is laid over
+//! another.
 use crate::simd::runs;
 use bytemuck::Pod;
 use fearless_simd::Simd;
@@ -7,7 +8,8 @@ use std::fmt::Debug;
 
 /// Four colour channels, red, green, blue, alpha.
 ///
-/// The methods on one colour are the reference; [`over_run`](Color::over_run) must give the same bits for many.
+/// The methods on one colour are the reference; [`over_run`](Color::over_run) must give the same
+/// bits for many.
 pub trait Color: Copy + PartialEq + Debug + Send + Sync + Pod {
     /// Bytes of one colour, in memory and in a message.
     const BYTES: usize = size_of::<Self>();
@@ -15,14 +17,16 @@ pub trait Color: Copy + PartialEq + Debug + Send + Sync + Pod {
     const TRANSPARENT: Self;
     /// Whether every bit is zero (so that `-0.0` counts as something that was drawn).
     fn is_zero(&self) -> bool;
-    /// Porter and Duff's `front over back` for premultiplied colours (SIGGRAPH 1984, table of section 4.2).
+    /// Porter and Duff's `front over back` for premultiplied colours (SIGGRAPH 1984, table of
+    /// section 4.2).
     fn over(front: Self, back: Self) -> Self;
     /// The channels as numbers, 1 for a full one.
     fn to_f32(self) -> [f32; 4];
     /// The nearest colour of this format; integer formats are clamped to 0 … 1.
     fn from_f32(channels: [f32; 4]) -> Self;
 
-    /// Lays `others` (raw colours, one for each of `held`) over or under `held`; colours with no bit set change nothing.
+    /// Lays `others` (raw colours, one for each of `held`) over or under `held`; colours with no
+    /// bit set change nothing.
     #[doc(hidden)]
     #[inline(always)]
     fn over_run<S: Simd>(_simd: S, others: &[u8], held: &mut [Self], others_in_front: bool) {
@@ -30,7 +34,8 @@ pub trait Color: Copy + PartialEq + Debug + Send + Sync + Pod {
     }
 }
 
-/// RGBA8. Blending rounds to nearest (IceT truncates, which loses faint layers); for many faint layers use one of the others.
+/// RGBA8. Blending rounds to nearest (IceT truncates, which loses faint layers); for many faint
+/// layers use one of the others.
 impl Color for [u8; 4] {
     const TRANSPARENT: Self = [0; 4];
 
@@ -62,7 +67,8 @@ impl Color for [u8; 4] {
     }
 }
 
-/// 16 bits a channel, 65535 for 1: eight bytes a pixel, and 128 faint layers keep an error of 0.13/255, and any 128 layers one below 1/255.
+/// 16 bits a channel, 65535 for 1: eight bytes a pixel, and 128 faint layers keep an error of
+/// 0.13/255, and any 128 layers one below 1/255.
 impl Color for [u16; 4] {
     const TRANSPARENT: Self = [0; 4];
 
@@ -89,7 +95,8 @@ impl Color for [u16; 4] {
     }
 }
 
-/// Half precision: eight bytes a pixel with the range of floating point; joined in single precision and rounded once.
+/// Half precision: eight bytes a pixel with the range of floating point; joined in single precision
+/// and rounded once.
 impl Color for [f16; 4] {
     const TRANSPARENT: Self = [f16::ZERO; 4];
 
@@ -167,7 +174,10 @@ mod tests {
         fn back<C: Color>(tolerance: f32) {
             for value in [0.0, 0.1, 0.5, 0.999, 1.0] {
                 let there = C::from_f32([value, 0.0, 1.0, value]).to_f32();
-                assert!((there[0] - value).abs() <= tolerance && there[2] == 1.0, "{value}: {there:?}");
+                assert!(
+                    (there[0] - value).abs() <= tolerance && there[2] == 1.0,
+                    "{value}: {there:?}"
+                );
             }
         }
         back::<[u8; 4]>(0.5 / 255.0 + 1e-6);

@@ -33,27 +33,30 @@ pub struct Options {
     pub strategy: Strategy,
     /// Where the image goes.
     pub destination: Destination,
-    /// Ranks from front to back, for premultiplied colours; each exactly once. `None` means rank 0 is in front. For images with
-    /// depth it only says who wins a tie: the last one.
+    /// Ranks from front to back, for premultiplied colours; each exactly once. `None` means rank 0
+    /// is in front. For images with depth it only says who wins a tie: the last one.
     pub order: Option<Vec<usize>>,
-    /// Whether the collected image has its depths too; they cost 4 bytes a drawn pixel on the way to the rank that collects.
+    /// Whether the collected image has its depths too; they cost 4 bytes a drawn pixel on the way
+    /// to the rank that collects.
     pub depth: bool,
-    /// Whether checksums cover the pixels of messages and not their headers only. For transports that may change bytes; it costs
-    /// about a tenth of the time of a frame between threads.
+    /// Whether checksums cover the pixels of messages and not their headers only. For transports
+    /// that may change bytes; it costs about a tenth of the time of a frame between threads.
     pub verify: bool,
-    /// Pixels of one message at most, about: direct send cuts its tiles in slices of so many, so that one is compressed while
-    /// another travels. `None` chooses.
+    /// Pixels of one message at most, about: direct send cuts its tiles in slices of so many, so
+    /// that one is compressed while another travels. `None` chooses.
     pub slice_px: Option<usize>,
-    /// Whether ranks that are processes of one machine merge the image in memory that they share, where [`Strategy::DirectSend`] or
-    /// [`Strategy::Automatic`] is asked for and the image goes to one rank. Without it, and where there is no such memory, they send messages.
+    /// Whether ranks that are processes of one machine merge the image in memory that they share,
+    /// where [`Strategy::DirectSend`] or [`Strategy::Automatic`] is asked for and the image goes to
+    /// one rank. Without it, and where there is no such memory, they send messages.
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
-    /// Longest wait for one message without a sign of life of those it depends on. A renderer that takes longer calls
-    /// [`Communicator::alive`] now and then, as for each tile.
+    /// Longest wait for one message without a sign of life of those it depends on. A renderer that
+    /// takes longer calls [`Communicator::alive`] now and then, as for each tile.
     pub timeout: Duration,
-    /// Whether all ranks meet at the end, so that success on one rank means success on all. Without it a rank that has sent its
-    /// part returns at once and hears of a fault of others only with its next frame.
+    /// Whether all ranks meet at the end, so that success on one rank means success on all. Without
+    /// it a rank that has sent its part returns at once and hears of a fault of others only with
+    /// its next frame.
     pub final_barrier: bool,
 }
 
@@ -86,15 +89,17 @@ pub struct CompositeOutput<P: PixelFormat> {
     pub report: Report,
 }
 
-/// Composites the frames of all ranks. Every rank of `comm` calls this once per frame with a frame of the same size.
+/// Composites the frames of all ranks. Every rank of `comm` calls this once per frame with a frame
+/// of the same size.
 ///
-/// The result has the bits of [`composite_serial`](crate::composite_serial) over the frames in `options.order`, whatever the
-/// strategy, the transport and the order in which messages arrive. For frame after frame a [`Compositor`] is faster: it keeps
-/// its buffers.
+/// The result has the bits of [`composite_serial`](crate::composite_serial) over the frames in
+/// `options.order`, whatever the strategy, the transport and the order in which messages arrive.
+/// For frame after frame a [`Compositor`] is faster: it keeps its buffers.
 ///
 /// # Errors
-/// [`CompositeError`]. A rank that fails aborts the communicator, so all other ranks get an error too
-/// ([`CommError::Aborted`] with the reason) instead of waiting; the communicator cannot be used afterwards.
+/// [`CompositeError`]. A rank that fails aborts the communicator, so all other ranks get an error
+/// too ([`CommError::Aborted`] with the reason) instead of waiting; the communicator cannot be used
+/// afterwards.
 pub fn composite<P: Composite>(
     comm: &mut dyn Communicator,
     frame: &Frame<'_, P>,
@@ -121,7 +126,8 @@ impl<P: Composite> Compositor<P> {
         Self { options, scratch, spare: None, network: None, node_image: None }
     }
 
-    /// The same with a network that is known, so that [`Strategy::Automatic`] need not measure it; the same on every rank.
+    /// The same with a network that is known, so that [`Strategy::Automatic`] need not measure it;
+    /// the same on every rank.
     pub fn with_network(self, network: NetworkCosts) -> Self {
         Self { network: Some(network), ..self }
     }
@@ -192,18 +198,21 @@ impl<P: Composite> Compositor<P> {
             rect
         };
         exchange.report.compress_secs += exchange.now() - begin;
-        let ranges = exchange.handshake(size_px, drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
+        let ranges =
+            exchange.handshake(size_px, drawn, frame.depth_range().unwrap_or([f32::NAN; 2]))?;
         if !P::HAS_DEPTH {
             check_order(&exchange.drawn, &ranges, &order.ranks)?;
         }
 
         // Ranks of one machine.
-        if let Some(root) =
-            order.root_index.filter(|_| shares && in_memory::is_possible::<P>(&mut exchange, size_px))
+        if let Some(root) = order
+            .root_index
+            .filter(|_| shares && in_memory::is_possible::<P>(&mut exchange, size_px))
         {
             let spare = self.spare.take();
             let view = frame.view(drawn);
-            let done = in_memory::run(&mut exchange, &view, size_px, root, options.depth, spare, kernels)?;
+            let done =
+                in_memory::run(&mut exchange, &view, size_px, root, options.depth, spare, kernels)?;
             if let Some(image) = done {
                 let report = Report {
                     strategy: Strategy::DirectSend,
@@ -230,8 +239,14 @@ impl<P: Composite> Compositor<P> {
         );
         let pieces = plan.pieces(&exchange.drawn);
         let spare = self.spare.take();
-        let mut collector =
-            Collector::new(&mut exchange, size_px, order.root_index, options.depth, &pieces, spare)?;
+        let mut collector = Collector::new(
+            &mut exchange,
+            size_px,
+            order.root_index,
+            options.depth,
+            &pieces,
+            spare,
+        )?;
         let span = exchange.begin_span();
         plan.run(&mut exchange, &frame.view(drawn), &mut collector, &mut self.scratch)?;
         exchange.end_span(span, |report| &mut report.exchange_secs);
@@ -255,8 +270,9 @@ pub(crate) fn abort_group(comm: &mut dyn Communicator, error: &CompositeError) {
     }
 }
 
-/// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes: a quarter of a megabyte.
-/// Where nothing travels by itself there are fewer and larger ones: half a megabyte costs a tenth more processor time at eight ranks than one.
+/// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes:
+/// a quarter of a megabyte. Where nothing travels by itself there are fewer and larger ones: half a
+/// megabyte costs a tenth more processor time at eight ranks than one.
 pub(crate) fn slice_px<P: PixelFormat>(comm: &dyn Communicator) -> usize {
     (if comm.is_one_node() { 4 * SLICE_BYTES } else { SLICE_BYTES }) / P::BYTES
 }
@@ -273,7 +289,8 @@ impl CompositingOrder {
         let size = comm.size();
         let order = front_to_back(options.order.as_deref(), size)?;
         let order_index_of = |rank: usize| order.iter().position(|&other| other == rank);
-        let own = order_index_of(comm.rank()).ok_or(CommError::NoSuchRank { peer: comm.rank(), size })?;
+        let own =
+            order_index_of(comm.rank()).ok_or(CommError::NoSuchRank { peer: comm.rank(), size })?;
         let root = match options.destination {
             Destination::Distributed => None,
             Destination::Rank(rank) => Some(order_index_of(rank).ok_or_else(|| {
@@ -286,7 +303,10 @@ impl CompositingOrder {
     }
 }
 
-pub(crate) fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<usize>, CompositeError> {
+pub(crate) fn front_to_back(
+    order: Option<&[usize]>,
+    size: usize,
+) -> Result<Vec<usize>, CompositeError> {
     let Some(order) = order else {
         return Ok((0..size).collect());
     };
@@ -300,12 +320,15 @@ pub(crate) fn front_to_back(order: Option<&[usize]>, size: usize) -> Result<Vec<
     )))
 }
 
-/// Ranks whose rectangles meet are one behind the other, in the order of compositing, where they say how far they reach.
+/// Ranks whose rectangles meet are one behind the other, in the order of compositing, where they
+/// say how far they reach.
 fn check_order(drawn: &[Rect], ranges: &[[f32; 2]], order: &[usize]) -> Result<(), CompositeError> {
     for behind in 0..drawn.len() {
         for front in 0..behind {
             // NaN, the range of those who say nothing, is in conflict with nobody.
-            if ranges[front][1] > ranges[behind][0] && !drawn[front].intersection(&drawn[behind]).is_empty() {
+            if ranges[front][1] > ranges[behind][0]
+                && !drawn[front].intersection(&drawn[behind]).is_empty()
+            {
                 return Err(CompositeError::Order {
                     front: order[front],
                     behind: order[behind],
@@ -318,7 +341,8 @@ fn check_order(drawn: &[Rect], ranges: &[[f32; 2]], order: &[usize]) -> Result<(
     Ok(())
 }
 
-/// Differs (but for one chance in 2^64) between ranks that do not composite the same thing in the same way.
+/// Differs (but for one chance in 2^64) between ranks that do not composite the same thing in the
+/// same way.
 pub(crate) fn fingerprint<P: PixelFormat>(
     size_px: (u32, u32),
     options: &Options,

@@ -1,9 +1,12 @@
-//! Ranks that reach into each other: every pixel is a list of transparent fragments with depths, and at most one opaque surface.
+//! Ranks that reach into each other: every pixel is a list of transparent fragments with depths,
+//! and at most one opaque surface.
 //!
-//! `over` in rank order is right only where ranks are one behind the other ([`Frame::with_depth_range`](crate::Frame::with_depth_range) checks
-//! that). Here the owner of a tile gets the fragments of all ranks, keeps those in front of the nearest opaque surface, sorts them by
-//! depth and lays them over each other once, in `f64`: opaque geometry and transparent layers of all ranks in one pass (IceT takes
-//! either depth or blending), and the same bits for every partition of the same fragments among ranks.
+//! `over` in rank order is right only where ranks are one behind the other
+//! ([`Frame::with_depth_range`](crate::Frame::with_depth_range) checks that). Here the owner of a
+//! tile gets the fragments of all ranks, keeps those in front of the nearest opaque surface, sorts
+//! them by depth and lays them over each other once, in `f64`: opaque geometry and transparent
+//! layers of all ranks in one pass (IceT takes either depth or blending), and the same bits for
+//! every partition of the same fragments among ranks.
 use crate::codec::{Codec, MessageError, checksum};
 use crate::collect::Collector;
 use crate::comm::Communicator;
@@ -39,11 +42,13 @@ pub struct DeepFrame<'a> {
 }
 
 impl<'a> DeepFrame<'a> {
-    /// Fragments pixel after pixel, in any order within a pixel; `ends[i]` is the index behind the last fragment of pixel `i`.
+    /// Fragments pixel after pixel, in any order within a pixel; `ends[i]` is the index behind the
+    /// last fragment of pixel `i`.
     ///
     /// # Errors
-    /// [`CompositeError::FrameSize`] if `ends` has another length than the image has pixels, [`CompositeError::Options`] if its
-    /// numbers decrease or do not end at the number of fragments, or if a pixel has 2^31 of them.
+    /// [`CompositeError::FrameSize`] if `ends` has another length than the image has pixels,
+    /// [`CompositeError::Options`] if its numbers decrease or do not end at the number of
+    /// fragments, or if a pixel has 2^31 of them.
     pub fn new(
         width_px: u32,
         height_px: u32,
@@ -55,7 +60,8 @@ impl<'a> DeepFrame<'a> {
         let sorted = ends.is_sorted() && ends.last().copied().unwrap_or(0) == fragments.len();
         if !sorted {
             return Err(CompositeError::Options(format!(
-                "the ends of the pixels' fragments must not decrease and must end at the number of fragments, {}",
+                "the ends of the pixels' fragments must not decrease and must end at the number of \
+                 fragments, {}",
                 fragments.len()
             )));
         }
@@ -69,12 +75,17 @@ impl<'a> DeepFrame<'a> {
         Ok(Self { width_px, height_px, fragments, ends, opaque: None })
     }
 
-    /// The same with an opaque surface at some pixels: colours (not premultiplied by anything, alpha 1) and depths in the unit of the
-    /// fragments; infinity or NaN where there is none. At equal depths a surface hides fragments, and the highest rank's surface wins.
+    /// The same with an opaque surface at some pixels: colours (not premultiplied by anything,
+    /// alpha 1) and depths in the unit of the fragments; infinity or NaN where there is none. At
+    /// equal depths a surface hides fragments, and the highest rank's surface wins.
     ///
     /// # Errors
     /// [`CompositeError::FrameSize`] if a slice has another length than the image has pixels.
-    pub fn with_opaque(self, colors: &'a [[f32; 4]], depths: &'a [f32]) -> Result<Self, CompositeError> {
+    pub fn with_opaque(
+        self,
+        colors: &'a [[f32; 4]],
+        depths: &'a [f32],
+    ) -> Result<Self, CompositeError> {
         let expected = self.ends.len() as u64;
         check_length("colour", self.width_px, self.height_px, expected, colors.len())?;
         check_length("depth", self.width_px, self.height_px, expected, depths.len())?;
@@ -83,9 +94,13 @@ impl<'a> DeepFrame<'a> {
 
     fn of_pixel(&self, index: usize) -> (&'a [Fragment], Option<Fragment>) {
         let start = if index == 0 { 0 } else { self.ends[index - 1] };
-        let surface =
-            self.opaque.map(|(colors, depths)| Fragment { color: colors[index], depth: depths[index] });
-        (&self.fragments[start..self.ends[index]], surface.filter(|surface| surface.depth < f32::INFINITY))
+        let surface = self
+            .opaque
+            .map(|(colors, depths)| Fragment { color: colors[index], depth: depths[index] });
+        (
+            &self.fragments[start..self.ends[index]],
+            surface.filter(|surface| surface.depth < f32::INFINITY),
+        )
     }
 
     /// The rectangle in which there is anything, and how many depths are not numbers.
@@ -118,8 +133,9 @@ fn check_length(
     Err(CompositeError::FrameSize { slice, width_px, height_px, expected, found })
 }
 
-/// Composites deep frames; every rank of `comm` calls this once a frame. Always by direct send; `options.order` says which of equally
-/// deep fragments is in front (the first) and which of equally deep surfaces is seen (the last). The image is premultiplied.
+/// Composites deep frames; every rank of `comm` calls this once a frame. Always by direct send;
+/// `options.order` says which of equally deep fragments is in front (the first) and which of
+/// equally deep surfaces is seen (the last). The image is premultiplied.
 ///
 /// # Errors
 /// As [`composite`](crate::composite).
@@ -144,10 +160,11 @@ fn composite_or_fail(
     let order = CompositingOrder::new(comm, options)?;
     let size_px = (frame.width_px, frame.height_px);
     let kernels = Kernels::new(options.simd);
-    let fingerprint =
-        fingerprint::<BlendedPixel>(size_px, options, &order, None) ^ u64::from_le_bytes(*b"DEEP____");
+    let fingerprint = fingerprint::<BlendedPixel>(size_px, options, &order, None)
+        ^ u64::from_le_bytes(*b"DEEP____");
     let codec = Codec { kernels, fingerprint, verify: options.verify };
-    let mut exchange = FrameExchange::new(comm, order.ranks.clone(), order.own_index, codec, options.timeout);
+    let mut exchange =
+        FrameExchange::new(comm, order.ranks.clone(), order.own_index, codec, options.timeout);
     let (drawn, nan) = frame.drawn();
     exchange.report.nan_depths = nan;
     exchange.handshake(size_px, drawn, [f32::NAN; 2])?;
@@ -161,18 +178,28 @@ fn composite_or_fail(
 
     // Who owns what, and what will come.
     let tiles = balanced(&exchange.drawn);
-    let part_of =
-        |order_index: usize, rects: &[Rect]| rects[order_index].intersection(&tiles[order.own_index]);
+    let part_of = |order_index: usize, rects: &[Rect]| {
+        rects[order_index].intersection(&tiles[order.own_index])
+    };
     let everything = exchange.drawn.clone();
     let pieces: Vec<(usize, Rect)> =
         tiles.iter().copied().enumerate().filter(|(_, tile)| !tile.is_empty()).collect();
-    let mut collector =
-        Collector::<BlendedPixel>::new(&mut exchange, size_px, order.root_index, false, &pieces, None)?;
-    for order_index in (0..exchange.num_ranks()).filter(|&order_index| order_index != order.own_index) {
+    let mut collector = Collector::<BlendedPixel>::new(
+        &mut exchange,
+        size_px,
+        order.root_index,
+        false,
+        &pieces,
+        None,
+    )?;
+    for order_index in
+        (0..exchange.num_ranks()).filter(|&order_index| order_index != order.own_index)
+    {
         let part = part_of(order_index, &everything);
         if !part.is_empty() {
-            let most =
-                totals[order_index].saturating_add(part.pixels() as u64).saturating_mul(RECORD_BYTES as u64);
+            let most = totals[order_index]
+                .saturating_add(part.pixels() as u64)
+                .saturating_mul(RECORD_BYTES as u64);
             let capacity = most.saturating_add((HEADER_BYTES + 4 * part.pixels()) as u64);
             exchange.post_bytes(
                 order_index,
@@ -203,7 +230,9 @@ fn composite_or_fail(
     let span = exchange.begin_span();
     while exchange.is_receiving_for(Tag::Exchange) {
         match exchange.next(true)? {
-            Some((order_index, true, bytes)) => collector.take(&mut exchange, order_index, bytes)?,
+            Some((order_index, true, bytes)) => {
+                collector.take(&mut exchange, order_index, bytes)?
+            }
             Some((order_index, false, bytes)) => {
                 let checked = check(&bytes, part_of(order_index, &everything), fingerprint);
                 checked.map_err(|reason| exchange.unusable(order_index, reason))?;
@@ -236,9 +265,10 @@ fn composite_or_fail(
     Ok(CompositeOutput { image, piece, report })
 }
 
-// ---- Messages -----------------------------------------------------------------------------------------------------
-// Header: magic, checksum of all behind it, fingerprint, rectangle, number of fragments, number of surfaces. Then for every pixel its
-// number of fragments, with the highest bit set if there is a surface; the fragments; the surfaces. A record is colour and depth.
+// ---- Messages -----------------------------------------------------------------------------------
+// Header: magic, checksum of all behind it, fingerprint, rectangle, number of fragments, number of
+// surfaces. Then for every pixel its number of fragments, with the highest bit set if there is a
+// surface; the fragments; the surfaces. A record is colour and depth.
 
 const MAGIC: u64 = u64::from_le_bytes(*b"COMPDEEP");
 const HEADER_BYTES: usize = 64;
@@ -255,11 +285,14 @@ fn encode(frame: &DeepFrame<'_>, part: Rect, fingerprint: u64) -> Vec<u8> {
     };
     for y in part.y0..part.y1 {
         for x in part.x0..part.x1 {
-            let (fragments, surface) = frame.of_pixel(y as usize * frame.width_px as usize + x as usize);
-            // What an opaque surface of this rank hides nobody will see; NaN is in front of nothing.
+            let (fragments, surface) =
+                frame.of_pixel(y as usize * frame.width_px as usize + x as usize);
+            // What an opaque surface of this rank hides nobody will see; NaN is in front of
+            // nothing.
             let limit = surface.map_or(f32::INFINITY, |surface| surface.depth);
-            let seen =
-                fragments.iter().filter(|f| f.depth < limit || (f.depth == limit && surface.is_none()));
+            let seen = fragments
+                .iter()
+                .filter(|f| f.depth < limit || (f.depth == limit && surface.is_none()));
             let mut count = 0;
             for fragment in seen {
                 put(&mut records, fragment);
@@ -314,8 +347,9 @@ fn check(bytes: &[u8], part: Rect, fingerprint: u64) -> Result<(), MessageError>
     if rect != part {
         return Err(MessageError::Part { found: rect, expected: part });
     }
-    let records =
-        number(5).checked_add(number(6)).and_then(|records| records.checked_mul(RECORD_BYTES as u64));
+    let records = number(5)
+        .checked_add(number(6))
+        .and_then(|records| records.checked_mul(RECORD_BYTES as u64));
     let pixels = part.pixels() as u64;
     let expected = records.and_then(|bytes| bytes.checked_add(HEADER_BYTES as u64 + 4 * pixels));
     let expected = expected.ok_or(MessageError::Mask)?;
@@ -365,8 +399,7 @@ fn fragment(bytes: &[u8; RECORD_BYTES]) -> Fragment {
     Fragment { color: [red, green, blue, alpha], depth }
 }
 
-// ---- Joining ------------------------------------------------------------------------------------------------------
-
+// ---- Joining ------------------------------------------------------------------------------------
 fn merge(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<BlendedPixel> {
     let mut layer = Layer::empty(tile, None);
     let (mut pixel, mut fragments) = (0, Vec::new());
@@ -392,7 +425,8 @@ fn merge(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<BlendedPixel> {
     layer
 }
 
-/// Fragments in front of `surface`, nearest first, and `surface` behind them. Equal depths keep their order.
+/// Fragments in front of `surface`, nearest first, and `surface` behind them. Equal depths keep
+/// their order.
 fn blend(fragments: &mut Vec<Fragment>, surface: Option<Fragment>) -> [f64; 4] {
     if let Some(surface) = surface {
         fragments.retain(|fragment| fragment.depth < surface.depth);
@@ -444,7 +478,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn message() -> (Vec<u8>, Rect) {
-        let fragments = [0.3, 0.1, 0.2].map(|depth| Fragment { color: [0.1, 0.2, 0.3, 0.5], depth });
+        let fragments =
+            [0.3, 0.1, 0.2].map(|depth| Fragment { color: [0.1, 0.2, 0.3, 0.5], depth });
         let frame = DeepFrame::new(2, 2, &fragments, &[1, 1, 3, 3]).unwrap();
         let (colors, depths) = ([[1.0; 4]; 4], [f32::INFINITY, 0.5, 0.15, f32::NAN]);
         let frame = frame.with_opaque(&colors, &depths).unwrap();

@@ -2,12 +2,14 @@
 use crate::codec::MessageError;
 use crate::comm::CommError;
 
-/// Why a composited image could not be made. After an error no rank gets an image: the communicator is aborted.
+/// Why a composited image could not be made. After an error no rank gets an image: the communicator
+/// is aborted.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
 pub enum CompositeError {
     /// A slice of a frame has the wrong length.
     #[error(
-        "the {slice} slice holds {found} values but a {width_px}x{height_px} image needs {expected}: pass one value per pixel"
+        "the {slice} slice holds {found} values but a {width_px}x{height_px} image needs \
+         {expected}: pass one value per pixel"
     )]
     FrameSize {
         /// `colour` or `depth`.
@@ -52,8 +54,10 @@ pub enum CompositeError {
     },
     /// Ranks of a blended image are not one behind the other.
     #[error(
-        "rank {front} is to be in front of rank {behind}, but reaches to depth {far_of_front}, behind its nearest {near_of_behind}: \
-         give the order from front to back in Options::order, or, if they reach into each other, use composite_deep"
+        "rank {front} is to be in front of rank {behind}, but reaches to depth {far_of_front}, \
+         behind its nearest {near_of_behind}: \
+         give the order from front to back in Options::order, or, if they reach into each other, \
+         use composite_deep"
     )]
     Order {
         /// Comes first in the order of compositing.

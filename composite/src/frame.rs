@@ -7,7 +7,8 @@ use crate::rect::Rect;
 use crate::simd::mask::{Counts, row_words, row_words_scalar};
 use crate::simd::{Kernels, at_level};
 
-/// One rank's rendered image: slices of the caller, row after row, any row order as long as all ranks use the same.
+/// One rank's rendered image: slices of the caller, row after row, any row order as long as all
+/// ranks use the same.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a, P: PixelFormat> {
     width_px: u32,
@@ -22,7 +23,8 @@ impl<'a, C: Color> Frame<'a, DepthPixel<C>>
 where
     DepthPixel<C>: PixelFormat<Color = C>,
 {
-    /// An opaque image with depth 0 (near) … 1 (background). Both slices hold `width_px * height_px` values.
+    /// An opaque image with depth 0 (near) … 1 (background). Both slices hold `width_px *
+    /// height_px` values.
     ///
     /// # Errors
     /// [`CompositeError::FrameSize`] if a slice has another length.
@@ -46,7 +48,11 @@ where
     ///
     /// # Errors
     /// [`CompositeError::FrameSize`] if the slice has another length.
-    pub fn premultiplied(width_px: u32, height_px: u32, color: &'a [C]) -> Result<Self, CompositeError> {
+    pub fn premultiplied(
+        width_px: u32,
+        height_px: u32,
+        color: &'a [C],
+    ) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
         Ok(Self { width_px, height_px, color, depth: &[], bounds: None, depth_range: None })
     }
@@ -73,15 +79,17 @@ impl Rect {
             return Ok(());
         }
         Err(CompositeError::Options(format!(
-            "bounds of columns {}..{} and rows {}..{} reach beyond an image of {}x{}: clip them to the image",
+            "bounds of columns {}..{} and rows {}..{} reach beyond an image of {}x{}: clip them to \
+             the image",
             bounds.x0, bounds.x1, bounds.y0, bounds.y1, self.x1, self.y1
         )))
     }
 }
 
 impl<'a, P: PixelFormat> Frame<'a, P> {
-    /// The same frame, of which only the pixels in `bounds` count: what the renderer knows of where it drew, so that nobody has
-    /// to look. What lies outside is background, whatever the slices hold there.
+    /// The same frame, of which only the pixels in `bounds` count: what the renderer knows of where
+    /// it drew, so that nobody has to look. What lies outside is background, whatever the slices
+    /// hold there.
     ///
     /// # Errors
     /// [`CompositeError::Options`] if `bounds` reaches beyond the image.
@@ -90,8 +98,9 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
         Ok(Self { bounds: Some(if bounds.is_empty() { Rect::EMPTY } else { bounds }), ..self })
     }
 
-    /// The same frame, with the nearest and farthest depth of what this rank drew, in any unit that all ranks share. Blended frames
-    /// that say so are checked: a rank that reaches behind the nearest of one that comes after it, where their rectangles meet, is
+    /// The same frame, with the nearest and farthest depth of what this rank drew, in any unit that
+    /// all ranks share. Blended frames that say so are checked: a rank that reaches behind the
+    /// nearest of one that comes after it, where their rectangles meet, is
     /// [`CompositeError::Order`] and not a wrong picture.
     pub fn with_depth_range(self, near_to_far: [f32; 2]) -> Self {
         Self { depth_range: Some(near_to_far), ..self }
@@ -138,7 +147,8 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
         self.bounds.is_some()
     }
 
-    /// All pixels that count: the whole image, or less if the frame is [`with_bounds`](Self::with_bounds).
+    /// All pixels that count: the whole image, or less if the frame is
+    /// [`with_bounds`](Self::with_bounds).
     pub fn bounds(&self) -> Rect {
         self.bounds.unwrap_or(Rect::of_size(self.width_px, self.height_px))
     }
@@ -174,7 +184,8 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
 }
 
 impl<P: Composite> Frame<'_, P> {
-    /// Depths that are not a number: they count as background, and [`crate::Report`] says how many there were.
+    /// Depths that are not a number: they count as background, and [`crate::Report`] says how many
+    /// there were.
     pub fn nan_depths(&self) -> u64 {
         self.drawn(Kernels::new(None)).1.nan
     }
@@ -281,7 +292,8 @@ impl<P: Composite> Image<P> {
         P::from_parts(self.colors[index], self.depths.get(index).copied().unwrap_or(1.0))
     }
 
-    /// Every bit of the image, plane after plane, for comparisons that must tell `-0.0` from `0.0` and NaN from NaN.
+    /// Every bit of the image, plane after plane, for comparisons that must tell `-0.0` from `0.0`
+    /// and NaN from NaN.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = bytemuck::cast_slice::<_, u8>(&self.colors).to_vec();
         bytes.extend_from_slice(bytemuck::cast_slice(&self.depths));
@@ -362,7 +374,10 @@ mod tests {
         let color = [[1_u8; 4]; 6];
         let frame = Frame::premultiplied(3, 2, &color).unwrap();
         let error = frame.with_bounds(Rect { x0: 1, y0: 0, x1: 4, y1: 1 }).unwrap_err().to_string();
-        assert!(error.contains("columns 1..4 and rows 0..1 reach beyond an image of 3x2"), "{error}");
+        assert!(
+            error.contains("columns 1..4 and rows 0..1 reach beyond an image of 3x2"),
+            "{error}"
+        );
         let with_bounds = frame.with_bounds(Rect { x0: 1, y0: 0, x1: 2, y1: 1 }).unwrap();
         assert_eq!(with_bounds.pixel(1).color, [1; 4]);
         assert_eq!(with_bounds.pixel(2).color, [0; 4]);

@@ -43,7 +43,8 @@ pub(crate) struct FrameExchange<'a> {
     /// What every place drew.
     pub(crate) drawn: Vec<Rect>,
     pub(crate) report: Report,
-    /// Whether depths that are not numbers are counted on the way; else they have been when the frame was looked over.
+    /// Whether depths that are not numbers are counted on the way; else they have been when the
+    /// frame was looked over.
     pub(crate) counts_nan: bool,
     /// Receives that have been posted, with what they are for.
     posted: Vec<Receive>,
@@ -88,8 +89,9 @@ impl<'a> FrameExchange<'a> {
         self.order.iter().position(|&other| other == rank).unwrap_or(rank)
     }
 
-    /// Tells all places what each drew of an image of this size, and how near and far, and finds out whether all are doing the same
-    /// thing. What is [`drawn`](Self::drawn) behind it lies within the image.
+    /// Tells all places what each drew of an image of this size, and how near and far, and finds
+    /// out whether all are doing the same thing. What is [`drawn`](Self::drawn) behind it lies
+    /// within the image.
     pub(crate) fn handshake(
         &mut self,
         (width_px, height_px): (u32, u32),
@@ -98,7 +100,8 @@ impl<'a> FrameExchange<'a> {
     ) -> Result<Vec<[f32; 2]>, CompositeError> {
         let begin = self.now();
         let mut handshake = self.codec.fingerprint.to_le_bytes().to_vec();
-        handshake.extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
+        handshake
+            .extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
         handshake.extend_from_slice(bytemuck::cast_slice(&depths));
         let answers = self.comm.all_gather(&handshake, HANDSHAKE_BYTES, self.timeout)?;
         let mut intervals = Vec::with_capacity(self.num_ranks());
@@ -112,12 +115,14 @@ impl<'a> FrameExchange<'a> {
             if answer[..8] != self.codec.fingerprint.to_le_bytes() {
                 return Err(self.unusable(order_index, MessageError::Fingerprint));
             }
-            let corner = |i: usize| bytemuck::pod_read_unaligned::<u32>(&answer[8 + 4 * i..12 + 4 * i]);
+            let corner =
+                |i: usize| bytemuck::pod_read_unaligned::<u32>(&answer[8 + 4 * i..12 + 4 * i]);
             let found = Rect { x0: corner(0), y0: corner(1), x1: corner(2), y1: corner(3) };
             if !Rect::of_size(width_px, height_px).contains(&found) {
-                return Err(
-                    self.unusable(order_index, MessageError::OutsideImage { found, width_px, height_px })
-                );
+                return Err(self.unusable(
+                    order_index,
+                    MessageError::OutsideImage { found, width_px, height_px },
+                ));
             }
             self.drawn.push(if found.is_empty() { Rect::EMPTY } else { found });
             intervals.push(bytemuck::pod_read_unaligned(&answer[24..32]));
@@ -161,19 +166,20 @@ impl<'a> FrameExchange<'a> {
         self.comm.throttle_sends(Tag::Exchange as u32, most, self.timeout);
     }
 
-    /// Counts depths of the frame in `part` that are not numbers; those of parts sent to others are counted when they are
-    /// compressed.
+    /// Counts depths of the frame in `part` that are not numbers; those of parts sent to others are
+    /// counted when they are compressed.
     pub(crate) fn count_nan<P: Composite>(&mut self, view: &View<'_, P>, part: Rect) {
         if P::HAS_DEPTH && self.counts_nan {
             for y in part.y0..part.y1 {
                 let depths = view.row(y, part.x0, part.x1).1;
-                self.report.nan_depths += depths.iter().filter(|depth| depth.is_nan()).count() as u64;
+                self.report.nan_depths +=
+                    depths.iter().filter(|depth| depth.is_nan()).count() as u64;
             }
         }
     }
 
-    /// Waits until all have come here; longer than for a message: the rank that misses one shall be the first to say so, because it
-    /// knows which.
+    /// Waits until all have come here; longer than for a message: the rank that misses one shall be
+    /// the first to say so, because it knows which.
     pub(crate) fn barrier(&mut self) -> Result<(), CompositeError> {
         Ok(self.comm.barrier(self.timeout.saturating_mul(2))?)
     }
@@ -186,9 +192,9 @@ impl<'a> FrameExchange<'a> {
             let answer = &answers[self.order[order_index]];
             let found = answer.len() as u64;
             let bytes = answer.as_slice().try_into();
-            numbers.push(u64::from_le_bytes(
-                bytes.map_err(|_| self.unusable(order_index, MessageError::Length { expected: 8, found }))?,
-            ));
+            numbers.push(u64::from_le_bytes(bytes.map_err(|_| {
+                self.unusable(order_index, MessageError::Length { expected: 8, found })
+            })?));
         }
         Ok(numbers)
     }
@@ -227,7 +233,8 @@ impl<'a> FrameExchange<'a> {
         tag: Tag,
         rect: &Rect,
     ) -> Result<(), CompositeError> {
-        // A little more than the longest honest message: one that is too long shall reach the decoder, which says what is wrong.
+        // A little more than the longest honest message: one that is too long shall reach the
+        // decoder, which says what is wrong.
         self.post_bytes(order_index, tag, codec::longest::<P>(rect) + 64)
     }
 
@@ -241,9 +248,13 @@ impl<'a> FrameExchange<'a> {
         self.posted.iter().any(|receive| receive.tag == tag as u32)
     }
 
-    /// The next message that comes, of those announced: its place, whether it is one of [`Tag::Collect`], its bytes. Without
-    /// `patience`, only one that has already come. The time goes to whoever measures the [span](Self::begin_span) around it.
-    pub(crate) fn next(&mut self, patience: bool) -> Result<Option<(usize, bool, Vec<u8>)>, CompositeError> {
+    /// The next message that comes, of those announced: its place, whether it is one of
+    /// [`Tag::Collect`], its bytes. Without `patience`, only one that has already come. The time
+    /// goes to whoever measures the [span](Self::begin_span) around it.
+    pub(crate) fn next(
+        &mut self,
+        patience: bool,
+    ) -> Result<Option<(usize, bool, Vec<u8>)>, CompositeError> {
         let arrival = if patience {
             Some(self.comm.wait_any(&mut self.posted, self.timeout)?)
         } else if self.posted.is_empty() {
@@ -257,8 +268,9 @@ impl<'a> FrameExchange<'a> {
         Ok(Some((self.order_index_of(arrival.source), is_collect, arrival.message)))
     }
 
-    /// Begins a span of which [`end_span`](Self::end_span) gives what is in no other column to `column`: waits are measured
-    /// together, because where time is simulated every look at the clock costs some.
+    /// Begins a span of which [`end_span`](Self::end_span) gives what is in no other column to
+    /// `column`: waits are measured together, because where time is simulated every look at the
+    /// clock costs some.
     pub(crate) fn begin_span(&self) -> Span {
         Span { begin: self.now(), counted: self.report.counted_secs() }
     }
@@ -283,7 +295,11 @@ impl<'a> FrameExchange<'a> {
     }
 
     pub(crate) fn unusable(&self, order_index: usize, reason: MessageError) -> CompositeError {
-        CompositeError::Message { rank: self.order[self.order_index], from: self.order[order_index], reason }
+        CompositeError::Message {
+            rank: self.order[self.order_index],
+            from: self.order[order_index],
+            reason,
+        }
     }
 }
 

@@ -1,8 +1,10 @@
 //! Ranks that are processes of one machine: no message, but memory that all of them see.
 //!
-//! Each rank lays what it drew into a room of shared memory, all meet, and then take bands of rows of the image, as long as there are any, and
-//! merge them straight from the rooms. The bands of other ranks are read by the one that collects. A pixel is copied twice, where a message is read,
-//! packed, copied by the system, read again, joined, packed and sent once more; and whoever has a processor works, wherever pixels are.
+//! Each rank lays what it drew into a room of shared memory, all meet, and then take bands of rows
+//! of the image, as long as there are any, and merge them straight from the rooms. The bands of
+//! other ranks are read by the one that collects. A pixel is copied twice, where a message is read,
+//! packed, copied by the system, read again, joined, packed and sent once more; and whoever has a
+//! processor works, wherever pixels are.
 use crate::codec::MessageError;
 use crate::comm::SharedSegments;
 use crate::error::CompositeError;
@@ -86,7 +88,8 @@ pub(crate) fn is_possible<P: Composite>(
     laid.saturating_add(image) <= MOST_BYTES && exchange.comm.shared_segments().is_some()
 }
 
-/// The image at the root, after which all have met; or nothing, if there was not enough memory, which all find alike.
+/// The image at the root, after which all have met; or nothing, if there was not enough memory,
+/// which all find alike.
 pub(crate) fn run<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     view: &View<'_, P>,
@@ -208,7 +211,10 @@ fn published_view<'a, P: Composite>(
     let planes = Planes::of::<P>(rect);
     let segment = memory.segment(rank, planes.depths.end);
     if segment.len() < planes.depths.end {
-        return Err(MessageError::Length { expected: planes.depths.end as u64, found: segment.len() as u64 });
+        return Err(MessageError::Length {
+            expected: planes.depths.end as u64,
+            found: segment.len() as u64,
+        });
     }
     Ok(View {
         bounds: *rect,
@@ -220,10 +226,16 @@ fn published_view<'a, P: Composite>(
 }
 
 /// An image whose every pixel will be written.
-fn blank<P: Composite>(width_px: u32, height_px: u32, depths: bool, spare: Option<Image<P>>) -> Image<P> {
+fn blank<P: Composite>(
+    width_px: u32,
+    height_px: u32,
+    depths: bool,
+    spare: Option<Image<P>>,
+) -> Image<P> {
     let pixels = Rect::of_size(width_px, height_px).pixels();
     let depth_pixels = if depths { pixels } else { 0 };
-    let fitting = spare.filter(|image| image.colors.len() == pixels && image.depths.len() == depth_pixels);
+    let fitting =
+        spare.filter(|image| image.colors.len() == pixels && image.depths.len() == depth_pixels);
     let (colors, depths) = match fitting {
         Some(image) => (image.colors, image.depths),
         None => (vec![P::EMPTY.color(); pixels], vec![1.0; depth_pixels]),

@@ -1,11 +1,13 @@
-//! Planes of pixels inside this crate: borrowed from a frame ([`View`]) or held while they are joined ([`Layer`]).
+//! Planes of pixels inside this crate: borrowed from a frame ([`View`]) or held while they are
+//! joined ([`Layer`]).
 use crate::pixel::{Composite, PixelFormat};
 use crate::rect::Rect;
 use crate::simd::expand::{Side, clean_run, clean_run_scalar, merge_run, merge_run_scalar};
 use crate::simd::{Kernels, at_level};
 use fearless_simd::Simd;
 
-/// Pixels of `bounds` in planes whose rows are `stride` apart and whose first value is the pixel at `origin`.
+/// Pixels of `bounds` in planes whose rows are `stride` apart and whose first value is the pixel at
+/// `origin`.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a, P: PixelFormat> {
     pub(crate) bounds: Rect,
@@ -38,7 +40,8 @@ pub(crate) struct Layer<P: PixelFormat> {
 impl<P: Composite> Layer<P> {
     /// Nothing drawn in `bounds`, in the buffers of `spare`.
     pub(crate) fn empty(bounds: Rect, spare: Option<Self>) -> Self {
-        let (mut colors, mut depths) = spare.map_or((Vec::new(), Vec::new()), |s| (s.colors, s.depths));
+        let (mut colors, mut depths) =
+            spare.map_or((Vec::new(), Vec::new()), |s| (s.colors, s.depths));
         colors.clear();
         colors.resize(bounds.pixels(), P::EMPTY.color());
         depths.clear();
@@ -47,8 +50,14 @@ impl<P: Composite> Layer<P> {
     }
 
     /// What `view` has in `bounds`, copied: cheaper than joining it to nothing.
-    pub(crate) fn copied(bounds: Rect, view: &View<'_, P>, kernels: Kernels, spare: Option<Self>) -> Self {
-        let (mut colors, mut depths) = spare.map_or((Vec::new(), Vec::new()), |s| (s.colors, s.depths));
+    pub(crate) fn copied(
+        bounds: Rect,
+        view: &View<'_, P>,
+        kernels: Kernels,
+        spare: Option<Self>,
+    ) -> Self {
+        let (mut colors, mut depths) =
+            spare.map_or((Vec::new(), Vec::new()), |s| (s.colors, s.depths));
         colors.clear();
         depths.clear();
         colors.reserve(bounds.pixels());
@@ -92,7 +101,8 @@ impl<P: Composite> Layer<P> {
 
     #[inline(always)]
     pub(crate) fn row_mut(&mut self, y: u32, x0: u32, x1: u32) -> (&mut [P::Color], &mut [f32]) {
-        let start = (y - self.bounds.y0) as usize * self.bounds.width() + (x0 - self.bounds.x0) as usize;
+        let start =
+            (y - self.bounds.y0) as usize * self.bounds.width() + (x0 - self.bounds.x0) as usize;
         let range = start..start + (x1 - x0) as usize;
         let depths = if P::HAS_DEPTH { &mut self.depths[range.clone()] } else { &mut [][..] };
         (&mut self.colors[range], depths)

@@ -1,8 +1,10 @@
-//! Sort-last compositing: every rank has rendered its part of the data, together they make one image.
+//! Sort-last compositing: every rank has rendered its part of the data, together they make one
+//! image.
 //!
-//! Slices of colour and depth, or of ordered premultiplied colour, go in; one image, or a piece of it on every rank, comes
-//! out, over any [`Communicator`]. All strategies give the same bits as [`composite_serial`]. Sections 3.2.1 and 3.3 of the
-//! thesis are about this step; IceT (Moreland, Kendall, Peterka, Huang, SC11) is the library it used.
+//! Slices of colour and depth, or of ordered premultiplied colour, go in; one image, or a piece of
+//! it on every rank, comes out, over any [`Communicator`]. All strategies give the same bits as
+//! [`composite_serial`]. Sections 3.2.1 and 3.3 of the thesis are about this step; IceT (Moreland,
+//! Kendall, Peterka, Huang, SC11) is the library it used.
 //!
 //! ```
 //! use composite::{Communicator, Frame, Options, threads};
@@ -30,7 +32,8 @@
 //! | `icet` | module `icet`: IceT over the same ranks | nothing |
 //! | `cli` (the default) | module `cli`, the program `composite` | `render`, `icet`, clap |
 //!
-//! A program that embeds the compositor wants `composite = { version = "0.1", default-features = false }`.
+//! A program that embeds the compositor wants `composite = { version = "0.1", default-features =
+//! false }`.
 #![deny(unsafe_code)]
 
 #[cfg(feature = "cli")]

@@ -1,8 +1,9 @@
 //! Joins what several places have in one rectangle, as it arrives, into the canonical grouping.
 //!
-//! For formats with depth the grouping does not matter as long as ties go to the last place, so one layer takes everything: first
-//! the place that comes first in time, then its neighbours in either direction; what comes before its neighbour has waits. For
-//! blended formats two groups are joined as soon as both are there, and layers are only made where two messages meet.
+//! For formats with depth the grouping does not matter as long as ties go to the last place, so one
+//! layer takes everything: first the place that comes first in time, then its neighbours in either
+//! direction; what comes before its neighbour has waits. For blended formats two groups are joined
+//! as soon as both are there, and layers are only made where two messages meet.
 use crate::frame_exchange::Message;
 use crate::layer::{Layer, View};
 use crate::pixel::Composite;
@@ -90,7 +91,8 @@ pub(crate) struct Merge<'a, P: Composite> {
 }
 
 enum MergeOrder<'a, P: Composite> {
-    /// Items that wait for their neighbours, by place among those expected; the layer has `first..end` of them.
+    /// Items that wait for their neighbours, by place among those expected; the layer has
+    /// `first..end` of them.
     Nearest {
         waiting: Vec<Option<MergeInput<'a, P>>>,
         order_indices: Vec<usize>,
@@ -98,7 +100,8 @@ enum MergeOrder<'a, P: Composite> {
         first: usize,
         end: usize,
     },
-    /// A heap: node 1 is the whole, nodes 2i and 2i + 1 are the halves of i, the last half of all nodes are the places.
+    /// A heap: node 1 is the whole, nodes 2i and 2i + 1 are the halves of i, the last half of all
+    /// nodes are the places.
     Tree { nodes: Vec<TreeNode<'a, P>>, folding: Folding },
 }
 
@@ -111,7 +114,8 @@ enum TreeNode<'a, P: Composite> {
 impl<'a, P: Composite> Merge<'a, P> {
     /// Of `num_ranks` places those for which `contributes` says so will come.
     pub(crate) fn new(bounds: Rect, num_ranks: usize, contributes: impl Fn(usize) -> bool) -> Self {
-        let expected: Vec<usize> = (0..num_ranks).filter(|&order_index| contributes(order_index)).collect();
+        let expected: Vec<usize> =
+            (0..num_ranks).filter(|&order_index| contributes(order_index)).collect();
         let missing = expected.len();
         if P::HAS_DEPTH {
             let waiting = (0..missing).map(|_| None).collect();
@@ -128,7 +132,8 @@ impl<'a, P: Composite> Merge<'a, P> {
             };
         }
         let folding = Folding::new(num_ranks);
-        let mut nodes: Vec<_> = (0..4 * folding.slots.max(1)).map(|_| TreeNode::Done(None)).collect();
+        let mut nodes: Vec<_> =
+            (0..4 * folding.slots.max(1)).map(|_| TreeNode::Done(None)).collect();
         for order_index in expected {
             let mut node = leaf(&folding, order_index);
             while node > 0 {
@@ -145,7 +150,12 @@ impl<'a, P: Composite> Merge<'a, P> {
     }
 
     /// Takes what `order_index` has.
-    pub(crate) fn put(&mut self, order_index: usize, item: MergeInput<'a, P>, scratch: &mut Scratch<P>) {
+    pub(crate) fn put(
+        &mut self,
+        order_index: usize,
+        item: MergeInput<'a, P>,
+        scratch: &mut Scratch<P>,
+    ) {
         self.missing = self.missing.saturating_sub(1);
         match &mut self.order {
             MergeOrder::Nearest { waiting, order_indices, layer, first, end } => {
@@ -164,7 +174,9 @@ impl<'a, P: Composite> Merge<'a, P> {
                     scratch.merge(held, item, Side::Higher);
                     *end += 1;
                 }
-                while let Some(item) = first.checked_sub(1).and_then(|before| waiting[before].take()) {
+                while let Some(item) =
+                    first.checked_sub(1).and_then(|before| waiting[before].take())
+                {
                     scratch.merge(held, item, Side::Lower);
                     *first -= 1;
                 }
@@ -189,19 +201,23 @@ impl<'a, P: Composite> Merge<'a, P> {
         }
     }
 
-    /// The layer of all, `None` if nobody contributed. To be called when [`is_complete`](Self::is_complete).
+    /// The layer of all, `None` if nobody contributed. To be called when
+    /// [`is_complete`](Self::is_complete).
     pub(crate) fn finish(self, scratch: &mut Scratch<P>) -> Option<Layer<P>> {
         match self.order {
             MergeOrder::Nearest { layer, .. } => layer,
-            MergeOrder::Tree { mut nodes, .. } => match std::mem::replace(&mut nodes[1], TreeNode::Missing) {
-                TreeNode::Done(Some(item)) => Some(scratch.layer(item, self.bounds)),
-                TreeNode::Done(None) | TreeNode::Missing => None,
-            },
+            MergeOrder::Tree { mut nodes, .. } => {
+                match std::mem::replace(&mut nodes[1], TreeNode::Missing) {
+                    TreeNode::Done(Some(item)) => Some(scratch.layer(item, self.bounds)),
+                    TreeNode::Done(None) | TreeNode::Missing => None,
+                }
+            }
         }
     }
 }
 
-/// The node of a place: two leaves for every slot, the second for the partner that is folded into it.
+/// The node of a place: two leaves for every slot, the second for the partner that is folded into
+/// it.
 fn leaf(folding: &Folding, order_index: usize) -> usize {
     let slot = folding.slot(order_index);
     2 * folding.slots + 2 * slot + usize::from(folding.leader(slot) != order_index)

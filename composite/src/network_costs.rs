@@ -1,5 +1,6 @@
-//! What a message costs: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C. Scheiman (SPAA 1995), measured once over the
-//! communicator itself, and what follows from it for each strategy.
+//! What a message costs: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C. Scheiman
+//! (SPAA 1995), measured once over the communicator itself, and what follows from it for each
+//! strategy.
 use crate::comm::{CommError, Communicator};
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
@@ -25,17 +26,21 @@ pub struct NetworkCosts {
 const PING_TAG: u32 = 11;
 const ROUNDS: usize = 8;
 const LONG_BYTES: usize = 1 << 18;
-/// Reading or writing a byte of a message on one core, about; measured on a server of 2023. Only its ratio to the network counts.
+/// Reading or writing a byte of a message on one core, about; measured on a server of 2023. Only
+/// its ratio to the network counts.
 const LOCAL_BYTE_SECS: f64 = 1.5e-10;
-/// What a rank does for each message besides its pixels (a buffer, a header, masks, asking whether it has left), about: from 16 to 128
-/// simulated ranks dense frames by direct send take 15 µs more for each rank, which is one message more to send, to receive and to collect.
+/// What a rank does for each message besides its pixels (a buffer, a header, masks, asking whether
+/// it has left), about: from 16 to 128 simulated ranks dense frames by direct send take 15 µs more
+/// for each rank, which is one message more to send, to receive and to collect.
 const LOCAL_MESSAGE_SECS: f64 = 5e-6;
 
 impl NetworkCosts {
     /// InfiniBand QDR as in the thesis' cluster: 3.2 GB/s, about a microsecond.
-    pub const QDR: Self = Self { latency_secs: 1.5e-6, overhead_secs: 0.5e-6, byte_secs: 1.0 / 3.2e9 };
+    pub const QDR: Self =
+        Self { latency_secs: 1.5e-6, overhead_secs: 0.5e-6, byte_secs: 1.0 / 3.2e9 };
 
-    /// Measures with messages between the first and the last rank; all ranks must call it, and all get the numbers of rank 0.
+    /// Measures with messages between the first and the last rank; all ranks must call it, and all
+    /// get the numbers of rank 0.
     ///
     /// # Errors
     /// As the calls of the communicator.
@@ -89,13 +94,20 @@ impl NetworkCosts {
         numbers.into_iter().map(f64::to_bits).fold(3, crate::codec::mix)
     }
 
-    /// Seconds that a frame will take about, from the rectangles that ranks drew in, as if these were dense. `root` collects.
+    /// Seconds that a frame will take about, from the rectangles that ranks drew in, as if these
+    /// were dense. `root` collects.
     ///
-    /// One exchange costs the latency, what a rank's messages cost it, and the bytes of the rank that sends or receives most;
-    /// compressing and joining is hidden behind the transfer, but for the first message of each round, and in direct send altogether,
-    /// which works slice by slice. There collecting is hidden too, but for the last of a tile's slices: the collecting rank joins nothing, so the
-    /// first slices come to it while the next are exchanged.
-    pub fn estimate_secs<P: Composite>(&self, strategy: Strategy, drawn: &[Rect], root: bool) -> f64 {
+    /// One exchange costs the latency, what a rank's messages cost it, and the bytes of the rank
+    /// that sends or receives most; compressing and joining is hidden behind the transfer, but for
+    /// the first message of each round, and in direct send altogether, which works slice by slice.
+    /// There collecting is hidden too, but for the last of a tile's slices: the collecting rank
+    /// joins nothing, so the first slices come to it while the next are exchanged.
+    pub fn estimate_secs<P: Composite>(
+        &self,
+        strategy: Strategy,
+        drawn: &[Rect],
+        root: bool,
+    ) -> f64 {
         let ranks = drawn.len();
         let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
         if ranks < 2 || whole.is_empty() {
@@ -110,11 +122,15 @@ impl NetworkCosts {
         match strategy {
             Strategy::DirectSend | Strategy::Automatic => {
                 let plan = direct_send::Plan::new::<P>(drawn, usize::MAX, root.then_some(0));
-                // Of each place what it sends and receives, and in how many messages: each pair is looked at once.
+                // Of each place what it sends and receives, and in how many messages: each pair is
+                // looked at once.
                 let mut traffic = vec![(0.0_f64, 0.0_f64, 0.0_f64); ranks];
                 for (owner, tiles) in plan.slices.iter().enumerate() {
-                    for (giver, its_rect) in drawn.iter().enumerate().filter(|(giver, _)| *giver != owner) {
-                        let given: f64 = tiles.iter().map(|tile| bytes(&its_rect.intersection(tile))).sum();
+                    for (giver, its_rect) in
+                        drawn.iter().enumerate().filter(|(giver, _)| *giver != owner)
+                    {
+                        let given: f64 =
+                            tiles.iter().map(|tile| bytes(&its_rect.intersection(tile))).sum();
                         if given > 0.0 {
                             traffic[giver].0 += given;
                             traffic[owner].1 += given;
@@ -125,11 +141,14 @@ impl NetworkCosts {
                 }
                 let worst = traffic
                     .iter()
-                    .map(|&(sent, received, messages)| self.sliced_secs(messages, f64::max(sent, received)))
+                    .map(|&(sent, received, messages)| {
+                        self.sliced_secs(messages, f64::max(sent, received))
+                    })
                     .fold(0.0, f64::max);
                 let largest = plan.slices.iter().flatten().map(Rect::pixels).max().unwrap_or(0);
                 let most_slices = (largest * P::BYTES).div_ceil(SLICE_BYTES).max(1);
-                let collect = collect(ranks - 1, whole.pixels() as f64 * (ranks - 1) as f64 / ranks as f64);
+                let collect =
+                    collect(ranks - 1, whole.pixels() as f64 * (ranks - 1) as f64 / ranks as f64);
                 worst.max(collect) + worst.min(collect) / most_slices as f64
             }
             Strategy::Tree => {
@@ -137,7 +156,10 @@ impl NetworkCosts {
                 let mut stride = 1;
                 while stride < folding.slots {
                     let of_slot = |slot| bytes(&bounds_of_slots(drawn, &folding, slot, stride));
-                    let most = (stride..folding.slots).step_by(2 * stride).map(of_slot).fold(0.0, f64::max);
+                    let most = (stride..folding.slots)
+                        .step_by(2 * stride)
+                        .map(of_slot)
+                        .fold(0.0, f64::max);
                     total += self.exchange_secs(1.0, most, most);
                     stride *= 2;
                 }
@@ -149,7 +171,8 @@ impl NetworkCosts {
                 let (mut stride, mut parts) = (1, 1);
                 while stride < folding.slots {
                     let members = k.min(folding.slots / stride);
-                    // Shares of one round are about equal: the first and the middle one stand for all.
+                    // Shares of one round are about equal: the first and the middle one stand for
+                    // all.
                     let mut most = 0.0_f64;
                     for index in [0, parts * members / 2] {
                         let part = share(&whole, index, parts * members);
@@ -178,10 +201,14 @@ impl NetworkCosts {
 
     /// The strategy of the smallest estimate.
     pub(crate) fn choose<P: Composite>(&self, drawn: &[Rect], root: bool) -> Strategy {
-        let mut best = (Strategy::DirectSend, self.estimate_secs::<P>(Strategy::DirectSend, drawn, root));
-        for strategy in
-            [Strategy::RadixK { k: 16 }, Strategy::RadixK { k: 8 }, Strategy::BinarySwap, Strategy::Tree]
-        {
+        let mut best =
+            (Strategy::DirectSend, self.estimate_secs::<P>(Strategy::DirectSend, drawn, root));
+        for strategy in [
+            Strategy::RadixK { k: 16 },
+            Strategy::RadixK { k: 8 },
+            Strategy::BinarySwap,
+            Strategy::Tree,
+        ] {
             let secs = self.estimate_secs::<P>(strategy, drawn, root);
             if secs < best.1 {
                 best = (strategy, secs);
@@ -190,14 +217,15 @@ impl NetworkCosts {
         best.0
     }
 
-    /// A round of `messages` with `bytes`, of which those of the first message are compressed before any other travels, and those of the last
-    /// joined after it (together `first_bytes`).
+    /// A round of `messages` with `bytes`, of which those of the first message are compressed
+    /// before any other travels, and those of the last joined after it (together `first_bytes`).
     fn exchange_secs(&self, messages: f64, bytes: f64, first_bytes: f64) -> f64 {
         self.sliced_secs(messages, bytes - first_bytes)
             + first_bytes * (self.byte_secs + 2.0 * LOCAL_BYTE_SECS)
     }
 
-    /// The same where one slice is compressed and joined while another travels: the slower of both counts.
+    /// The same where one slice is compressed and joined while another travels: the slower of both
+    /// counts.
     fn sliced_secs(&self, messages: f64, bytes: f64) -> f64 {
         self.latency_secs
             + messages * (self.overhead_secs + LOCAL_MESSAGE_SECS)
@@ -225,11 +253,14 @@ mod tests {
             let found = threads::run(size, |mut comm| {
                 NetworkCosts::measure(&mut comm, Duration::from_secs(20)).unwrap()
             });
-            let found: Vec<NetworkCosts> = found.into_iter().map(|network| network.unwrap()).collect();
+            let found: Vec<NetworkCosts> =
+                found.into_iter().map(|network| network.unwrap()).collect();
             assert!(found.iter().all(|network| *network == found[0]), "{found:?}");
             if size > 1 {
                 assert!(
-                    found[0].latency_secs > 0.0 && found[0].latency_secs < 1.0 && found[0].byte_secs > 0.0
+                    found[0].latency_secs > 0.0
+                        && found[0].latency_secs < 1.0
+                        && found[0].byte_secs > 0.0
                 );
             }
         }
@@ -243,15 +274,20 @@ mod tests {
         // Measured 8.1 ms against 12.6 by radix-k, which collects only when all is joined.
         let blended = NetworkCosts::QDR.choose::<PremultipliedPixel<[f32; 4]>>(&dense[..8], true);
         assert_eq!(blended, Strategy::DirectSend);
-        // 127 messages to each of 128 ranks cost more than sending a seventh of the bytes again: measured 7.6 ms against 5.9.
+        // 127 messages to each of 128 ranks cost more than sending a seventh of the bytes again:
+        // measured 7.6 ms against 5.9.
         let many = vec![Rect::of_size(1024, 1024); 128];
         assert!(matches!(NetworkCosts::QDR.choose::<P>(&many, true), Strategy::RadixK { .. }));
         // Messages count: few of them.
-        let slow_messages = NetworkCosts { overhead_secs: 1e-3, latency_secs: 2e-3, byte_secs: 1e-12 };
+        let slow_messages =
+            NetworkCosts { overhead_secs: 1e-3, latency_secs: 2e-3, byte_secs: 1e-12 };
         assert!(matches!(slow_messages.choose::<P>(&dense, true), Strategy::Tree));
         // Messages count, but so do bytes: groups.
         let both = NetworkCosts { overhead_secs: 2e-4, latency_secs: 4e-4, byte_secs: 3e-9 };
-        assert!(matches!(both.choose::<P>(&dense, true), Strategy::RadixK { .. } | Strategy::BinarySwap));
+        assert!(matches!(
+            both.choose::<P>(&dense, true),
+            Strategy::RadixK { .. } | Strategy::BinarySwap
+        ));
     }
 
     #[test]
@@ -268,7 +304,8 @@ mod tests {
             );
             assert_eq!(network.estimate_secs::<P>(strategy, &large[..1], true), 0.0);
         }
-        // The physical limit of dense images: 8 MB in over 3.2 GB/s, while colours come to the root. Simulated by SMPI it takes 3.5 ms.
+        // The physical limit of dense images: 8 MB in over 3.2 GB/s, while colours come to the
+        // root. Simulated by SMPI it takes 3.5 ms.
         let secs = network.estimate_secs::<P>(Strategy::DirectSend, &large, true);
         assert!(secs > 2.5e-3 && secs < 4.5e-3, "{secs}");
     }

@@ -1,8 +1,8 @@
 //! Pixel formats and what it means to composite two pixels.
 //!
-//! A format is a colour ([`Color`]) with or without depth; [`PixelFormat`] is its storage and wire form, [`Composite`] its
-//! operator. An *inactive* pixel is the identity of every operator **by definition** ([`combine`]), so leaving it out of a
-//! message never changes a bit of the result.
+//! A format is a colour ([`Color`]) with or without depth; [`PixelFormat`] is its storage and wire
+//! form, [`Composite`] its operator. An *inactive* pixel is the identity of every operator **by
+//! definition** ([`combine`]), so leaving it out of a message never changes a bit of the result.
 use crate::color::Color;
 use half::f16;
 use std::fmt::Debug;
@@ -33,12 +33,13 @@ pub trait PixelFormat: Copy + PartialEq + Debug + Send + Sync + 'static {
 pub trait Composite: PixelFormat {
     /// Whether something was drawn here.
     fn is_active(&self) -> bool;
-    /// Joins two *active* pixels; every rank behind `lower` comes before every rank behind `higher`. Need not be
-    /// associative: [`crate::rank_order`] fixes the grouping.
+    /// Joins two *active* pixels; every rank behind `lower` comes before every rank behind
+    /// `higher`. Need not be associative: [`crate::rank_order`] fixes the grouping.
     fn merge(lower: Self, higher: Self) -> Self;
 }
 
-/// [`Composite::merge`] with inactive pixels as identities; two inactive pixels give [`PixelFormat::EMPTY`].
+/// [`Composite::merge`] with inactive pixels as identities; two inactive pixels give
+/// [`PixelFormat::EMPTY`].
 #[inline(always)]
 pub fn combine<P: Composite>(lower: P, higher: P) -> P {
     match (lower.is_active(), higher.is_active()) {
@@ -51,8 +52,9 @@ pub fn combine<P: Composite>(lower: P, higher: P) -> P {
 
 /// Opaque colour with depth; the nearest one wins.
 ///
-/// Active iff `depth < 1`: NaN, +infinity and 1 are background, negative depths and -infinity are nearest of all, as in IceT.
-/// Equal depths (`0.0` and `-0.0` too) go to the **highest rank**, the rule of IceT's single-image strategies.
+/// Active iff `depth < 1`: NaN, +infinity and 1 are background, negative depths and -infinity are
+/// nearest of all, as in IceT. Equal depths (`0.0` and `-0.0` too) go to the **highest rank**, the
+/// rule of IceT's single-image strategies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthPixel<C> {
     /// Colour, not premultiplied by anything.
@@ -187,9 +189,10 @@ mod tests {
     #[test]
     fn inactive_pixels_change_no_bit_even_where_arithmetic_would() {
         let infinite = PremultipliedPixel { color: [f32::INFINITY, -0.0, 0.0, 1.0] };
-        for merged in
-            [combine(infinite, PremultipliedPixel::EMPTY), combine(PremultipliedPixel::EMPTY, infinite)]
-        {
+        for merged in [
+            combine(infinite, PremultipliedPixel::EMPTY),
+            combine(PremultipliedPixel::EMPTY, infinite),
+        ] {
             assert_eq!(merged.color.map(f32::to_bits), infinite.color.map(f32::to_bits));
         }
     }

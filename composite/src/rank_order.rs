@@ -1,14 +1,15 @@
 //! The one grouping in which every strategy, and the serial reference, joins the ranks.
 //!
-//! `over` in floating point or in eight bits is not associative, so "in rank order" alone leaves the result open. Here the
-//! grouping is fixed for a given number of ranks p, and it is one that tree, binary swap and radix-k can follow without extra
-//! messages:
+//! `over` in floating point or in eight bits is not associative, so "in rank order" alone leaves
+//! the result open. Here the grouping is fixed for a given number of ranks p, and it is one that
+//! tree, binary swap and radix-k can follow without extra messages:
 //!
-//! 1. *Folding.* With 2^k the largest power of two ≤ p and e = p - 2^k, ranks (0,1), (2,3) … (2e-2, 2e-1) are joined in pairs;
-//!    the others stay alone. That leaves 2^k *slots* in rank order.
+//! 1. *Folding.* With 2^k the largest power of two ≤ p and e = p - 2^k, ranks (0,1), (2,3) … (2e-2,
+//!    2e-1) are joined in pairs; the others stay alone. That leaves 2^k *slots* in rank order.
 //! 2. *Balanced tree.* Neighbouring slots are joined, then neighbouring pairs, and so on.
 //!
-//! A balanced tree also loses less precision than a chain: its rounding errors grow with log p instead of p.
+//! A balanced tree also loses less precision than a chain: its rounding errors grow with log p
+//! instead of p.
 use crate::pixel::{Composite, combine};
 
 /// Folding of `ranks` ranks into a power of two of slots.
@@ -43,7 +44,8 @@ impl Folding {
     }
 }
 
-/// Joins one pixel of every rank, in rank order, in the canonical grouping. `pixels` is used as scratch space.
+/// Joins one pixel of every rank, in rank order, in the canonical grouping. `pixels` is used as
+/// scratch space.
 pub fn reduce_ranks<P: Composite>(pixels: &mut [P]) -> P {
     let folding = Folding::new(pixels.len());
     for slot in 0..folding.slots {
@@ -56,7 +58,8 @@ pub fn reduce_ranks<P: Composite>(pixels: &mut [P]) -> P {
     reduce_slots(&mut pixels[..folding.slots])
 }
 
-/// Joins neighbouring slots as a balanced tree; the length is a power of two, or 0, which gives [`EMPTY`].
+/// Joins neighbouring slots as a balanced tree; the length is a power of two, or 0, which gives
+/// [`EMPTY`].
 ///
 /// [`EMPTY`]: crate::PixelFormat::EMPTY
 pub(crate) fn reduce_slots<P: Composite>(pixels: &mut [P]) -> P {
@@ -93,10 +96,12 @@ mod tests {
 
     #[test]
     fn five_ranks_are_joined_as_pair_then_balanced_tree() {
-        let layer =
-            |i: usize| PremultipliedPixel { color: [0.1 * i as f32, 0.3, 0.7 / (i + 1) as f32, 0.37] };
+        let layer = |i: usize| PremultipliedPixel {
+            color: [0.1 * i as f32, 0.3, 0.7 / (i + 1) as f32, 0.37],
+        };
         let mut pixels: Vec<_> = (0..5).map(layer).collect();
-        let by_hand = combine(combine(combine(layer(0), layer(1)), layer(2)), combine(layer(3), layer(4)));
+        let by_hand =
+            combine(combine(combine(layer(0), layer(1)), layer(2)), combine(layer(3), layer(4)));
         assert_eq!(reduce_ranks(&mut pixels), by_hand);
     }
 }

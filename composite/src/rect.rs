@@ -1,4 +1,5 @@
-//! Rectangles of pixels, half open: what a rank drew, the tile it owns, the part a message speaks of.
+//! Rectangles of pixels, half open: what a rank drew, the tile it owns, the part a message speaks
+//! of.
 
 /// Pixels with `x0 <= x < x1` and `y0 <= y < y1`; empty where an end is not beyond its beginning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
@@ -71,7 +72,10 @@ impl Rect {
     /// Whether every pixel of `other` is in this one.
     pub fn contains(&self, other: &Self) -> bool {
         other.is_empty()
-            || (self.x0 <= other.x0 && self.y0 <= other.y0 && self.x1 >= other.x1 && self.y1 >= other.y1)
+            || (self.x0 <= other.x0
+                && self.y0 <= other.y0
+                && self.x1 >= other.x1
+                && self.y1 >= other.y1)
     }
 }
 

@@ -1,4 +1,5 @@
-//! The serial reference: all frames in one place, one pixel after the other. Every strategy gives these bits.
+//! The serial reference: all frames in one place, one pixel after the other. Every strategy gives
+//! these bits.
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::pixel::Composite;
@@ -7,7 +8,8 @@ use crate::rank_order::reduce_ranks;
 /// Composites `frames`, in rank order, in the canonical grouping of [`crate::rank_order`].
 ///
 /// # Errors
-/// [`CompositeError::NoFrames`] for an empty slice, [`CompositeError::SizesDiffer`] if the frames are not all of one size.
+/// [`CompositeError::NoFrames`] for an empty slice, [`CompositeError::SizesDiffer`] if the frames
+/// are not all of one size.
 pub fn composite_serial<P: Composite>(frames: &[Frame<'_, P>]) -> Result<Image<P>, CompositeError> {
     let (width_px, height_px) = check_sizes(frames)?;
     let first = &frames[0];
@@ -27,7 +29,9 @@ pub fn composite_serial<P: Composite>(frames: &[Frame<'_, P>]) -> Result<Image<P
 }
 
 /// Width and height of all frames.
-pub(crate) fn check_sizes<P: Composite>(frames: &[Frame<'_, P>]) -> Result<(u32, u32), CompositeError> {
+pub(crate) fn check_sizes<P: Composite>(
+    frames: &[Frame<'_, P>],
+) -> Result<(u32, u32), CompositeError> {
     let first = frames.first().ok_or(CompositeError::NoFrames)?;
     let (width_px, height_px) = (first.width_px(), first.height_px());
     for (rank, frame) in frames.iter().enumerate() {
@@ -57,7 +61,10 @@ mod tests {
             error.to_string(),
             "rank 2 has a 2x3 image, the others 3x2: render the same size on every rank"
         );
-        assert!(matches!(composite_serial::<DepthPixel<[u8; 4]>>(&[]), Err(CompositeError::NoFrames)));
+        assert!(matches!(
+            composite_serial::<DepthPixel<[u8; 4]>>(&[]),
+            Err(CompositeError::NoFrames)
+        ));
     }
 
     #[test]

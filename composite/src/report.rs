@@ -1,6 +1,7 @@
 //! What a frame cost on one rank, in IceT's columns.
 
-/// Times and counts of one rank for one frame. Seconds are those of [`Communicator::now`](crate::Communicator::now).
+/// Times and counts of one rank for one frame. Seconds are those of
+/// [`Communicator::now`](crate::Communicator::now).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
     /// Finding active pixels and writing messages (IceT: compress).
@@ -9,7 +10,8 @@ pub struct Report {
     pub blend_secs: f64,
     /// Handing over and waiting for messages of the strategy, load imbalance included (IceT: send).
     pub exchange_secs: f64,
-    /// Bringing the pieces to one rank: encoding them, placing them and waiting for them at the end (IceT: collect).
+    /// Bringing the pieces to one rank: encoding them, placing them and waiting for them at the end
+    /// (IceT: collect).
     pub collect_secs: f64,
     /// The whole frame.
     pub total_secs: f64,

@@ -1,9 +1,10 @@
 //! Frames of several ranks in one memory: merged straight from their planes, without messages.
 //!
-//! Rows of the result are worked on by several threads; each row is read once from every frame that drew there and written once,
-//! so this costs what reading the frames costs. Messages cost that and several times more: on a node, use this; between nodes,
-//! messages ([`Compositor::composite_node`]). TOD-Tree (A. V. P. Grosset, M. Prasad, C. Christensen, A. Knoll, C. Hansen, PGV15)
-//! found the same for its mixture of OpenMP and MPI.
+//! Rows of the result are worked on by several threads; each row is read once from every frame that
+//! drew there and written once, so this costs what reading the frames costs. Messages cost that and
+//! several times more: on a node, use this; between nodes, messages
+//! ([`Compositor::composite_node`]). TOD-Tree (A. V. P. Grosset, M. Prasad, C. Christensen, A.
+//! Knoll, C. Hansen, PGV15) found the same for its mixture of OpenMP and MPI.
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::layer::View;
@@ -58,7 +59,8 @@ pub(crate) fn merge<P: Composite>(
     let (width, pixels) = (width_px as usize, frames[0].len());
     let depth = depth && P::HAS_DEPTH;
     let depth_pixels = if depth { pixels } else { 0 };
-    let spare = spare.filter(|image| image.colors.len() == pixels && image.depths.len() == depth_pixels);
+    let spare =
+        spare.filter(|image| image.colors.len() == pixels && image.depths.len() == depth_pixels);
     let (mut colors, mut depths) = match spare {
         Some(image) => (image.colors, image.depths),
         None => (vec![P::EMPTY.color(); pixels], vec![1.0; depth_pixels]),
@@ -67,7 +69,8 @@ pub(crate) fn merge<P: Composite>(
 
     // Bands of rows, in a list from which each thread takes the next.
     let band_pixels = (BAND_ROWS * width).max(1);
-    let depth_bands = depths.chunks_mut(band_pixels).map(Some).chain(std::iter::repeat_with(|| None));
+    let depth_bands =
+        depths.chunks_mut(band_pixels).map(Some).chain(std::iter::repeat_with(|| None));
     let bands = colors.chunks_mut(band_pixels).zip(depth_bands).enumerate();
     let bands = Mutex::new(bands);
     let nan_depths = Mutex::new(vec![0; frames.len()]);

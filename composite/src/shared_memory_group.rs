@@ -1,11 +1,16 @@
-//! Ranks that are threads of one process, each with its own call: frames are published to each other instead of sent.
+//! Ranks that are threads of one process, each with its own call: frames are published to each
+//! other instead of sent.
 //!
-//! Every rank lays its image on the table (an `Arc`: nothing is copied), and all wait for each other. Whoever comes last merges all of them
-//! straight from their planes, on as many threads as there are processors and no more, while the others sleep: to wake eight ranks for bands of
-//! rows on two processors cost as much as merging. The communicator is only used to wait, so lost and stalled ranks are named as with messages.
+//! Every rank lays its image on the table (an `Arc`: nothing is copied), and all wait for each
+//! other. Whoever comes last merges all of them straight from their planes, on as many threads as
+//! there are processors and no more, while the others sleep: to wake eight ranks for bands of rows
+//! on two processors cost as much as merging. The communicator is only used to wait, so lost and
+//! stalled ranks are named as with messages.
 use crate::codec::MessageError;
 use crate::comm::Communicator;
-use crate::compositor::{CompositeOutput, CompositingOrder, Destination, Options, abort_group, fingerprint};
+use crate::compositor::{
+    CompositeOutput, CompositingOrder, Destination, Options, abort_group, fingerprint,
+};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
 use crate::pixel::Composite;
@@ -47,23 +52,35 @@ pub struct SharedMemoryRank<P: Composite> {
 /// A table for `ranks` ranks; hand each seat to the thread of that rank.
 pub fn shared_memory_group<P: Composite>(ranks: usize) -> Vec<SharedMemoryRank<P>> {
     let published_frames = (0..ranks).map(|_| None).collect();
-    let state =
-        GroupState { published_frames, spare: None, merges_begun: 0, image: None, nan_depths: Vec::new() };
+    let state = GroupState {
+        published_frames,
+        spare: None,
+        merges_begun: 0,
+        image: None,
+        nan_depths: Vec::new(),
+    };
     let state = Arc::new(Mutex::new(state));
     // To ask costs reading files on some systems.
     let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let shared_rank =
-        |rank| SharedMemoryRank { rank, state: Arc::clone(&state), spare: None, frames: 0, processors };
+    let shared_rank = |rank| SharedMemoryRank {
+        rank,
+        state: Arc::clone(&state),
+        spare: None,
+        frames: 0,
+        processors,
+    };
     (0..ranks).map(shared_rank).collect()
 }
 
 impl<P: Composite> SharedMemoryRank<P> {
-    /// Composites the images of all ranks of the table, of which this rank drew `bounds` of `image`. Every rank calls this once a frame, with
-    /// a communicator of the same ranks. The bits are those of [`composite_serial`](crate::composite_serial) in the order of `options`.
+    /// Composites the images of all ranks of the table, of which this rank drew `bounds` of
+    /// `image`. Every rank calls this once a frame, with a communicator of the same ranks. The bits
+    /// are those of [`composite_serial`](crate::composite_serial) in the order of `options`.
     ///
     /// # Errors
-    /// [`CompositeError::SizesDiffer`]; [`CompositeError::Options`] for an image that is to stay distributed, which needs messages
-    /// ([`composite`](crate::composite)), or an order that is none; errors of the communicator.
+    /// [`CompositeError::SizesDiffer`]; [`CompositeError::Options`] for an image that is to stay
+    /// distributed, which needs messages ([`composite`](crate::composite)), or an order that is
+    /// none; errors of the communicator.
     pub fn composite(
         &mut self,
         comm: &mut dyn Communicator,
@@ -100,7 +117,8 @@ impl<P: Composite> SharedMemoryRank<P> {
             Destination::Rank(root) if root < ranks && comm.size() == ranks => root,
             _ => {
                 return Err(CompositeError::Options(format!(
-                    "a table of {ranks} ranks composites to one of them, over a communicator of as many ranks: use composite for \
+                    "a table of {ranks} ranks composites to one of them, over a communicator of as \
+                     many ranks: use composite for \
                      anything else"
                 )));
             }
@@ -148,7 +166,8 @@ impl<P: Composite> SharedMemoryRank<P> {
                 .collect::<Result<_, _>>()?;
             // Where others work too, a new thread may begin later than one would have been done.
             let bytes: usize = frames.iter().map(|frame| frame.bounds().pixels() * P::BYTES).sum();
-            let threads = self.processors.min(NonZeroUsize::MIN.saturating_add(bytes / WORTH_A_THREAD_BYTES));
+            let threads =
+                self.processors.min(NonZeroUsize::MIN.saturating_add(bytes / WORTH_A_THREAD_BYTES));
             let merged = merge(&frames, threads, options.depth, spare, Kernels::new(options.simd))?;
             // Images are let go before their ranks draw the next ones.
             drop(frames);
@@ -162,14 +181,16 @@ impl<P: Composite> SharedMemoryRank<P> {
         }
         let merged_secs = comm.now();
 
-        // Nobody lays down the next frame before all have come here, and nobody merges it before this one has been taken.
+        // Nobody lays down the next frame before all have come here, and nobody merges it before
+        // this one has been taken.
         comm.barrier(options.timeout)?;
         let mut state = self.state();
         let nan_depths = state.nan_depths.get(self.rank).copied().unwrap_or(0);
         let image = if self.rank == root { state.image.take() } else { None };
         drop(state);
         if self.rank == root && image.is_none() {
-            let reason = "the ranks of this table have left a frame before its end: make a new group with shared_memory_group";
+            let reason = "the ranks of this table have left a frame before its end: make a new \
+                          group with shared_memory_group";
             return Err(CompositeError::Options(reason.to_string()));
         }
         let report = Report {

@@ -1,14 +1,18 @@
-//! Compositing while the frame is still being rendered: tiles are handed in as they are finished, travel and are joined, so that a
-//! frame costs the longer of rendering and compositing and not their sum.
+//! Compositing while the frame is still being rendered: tiles are handed in as they are finished,
+//! travel and are joined, so that a frame costs the longer of rendering and compositing and not
+//! their sum.
 //!
-//! The thesis names this as not done (sections 3.3.2 and 6.1); the Distributed FrameBuffer of OSPRay (W. Usher, I. Wald,
-//! J. Amstutz, J. Günther, C. Brownlee, V. Pascucci, "Scalable Ray Tracing Using the Distributed FrameBuffer", CGF 38(3), 2019)
-//! does it with tiles of fixed size. Here the slices of direct send's tiles are the unit, known from the rectangles in which ranks
+//! The thesis names this as not done (sections 3.3.2 and 6.1); the Distributed FrameBuffer of
+//! OSPRay (W. Usher, I. Wald, J. Amstutz, J. Günther, C. Brownlee, V. Pascucci, "Scalable Ray
+//! Tracing Using the Distributed FrameBuffer", CGF 38(3), 2019) does it with tiles of fixed size.
+//! Here the slices of direct send's tiles are the unit, known from the rectangles in which ranks
 //! are going to draw, and the image has the same bits as without streaming.
 use crate::codec::Codec;
 use crate::collect::Collector;
 use crate::comm::Communicator;
-use crate::compositor::{CompositeOutput, CompositingOrder, Compositor, abort_group, fingerprint, slice_px};
+use crate::compositor::{
+    CompositeOutput, CompositingOrder, Compositor, abort_group, fingerprint, slice_px,
+};
 use crate::error::CompositeError;
 use crate::frame::Frame;
 use crate::frame_exchange::{FrameExchange, Tag};
@@ -21,7 +25,8 @@ use crate::strategies::direct_send::{Plan, TileExchange};
 
 /// A frame that is being composited while it is rendered; made by [`Compositor::stream`].
 ///
-/// Dropping it before [`finish`](Self::finish) ends the group, because other ranks wait for what will not come.
+/// Dropping it before [`finish`](Self::finish) ends the group, because other ranks wait for what
+/// will not come.
 pub struct Stream<'a, P: Composite> {
     state: Option<StreamState<'a, P>>,
 }
@@ -48,12 +53,13 @@ struct Pending {
 }
 
 impl<P: Composite> Compositor<P> {
-    /// Begins a frame of `size_px` (width, height) in which this rank is going to draw within `bounds`, before it is rendered.
-    /// Every rank of `comm` calls this, then [`Stream::tile_done`] as often as it likes, then [`Stream::finish`].
+    /// Begins a frame of `size_px` (width, height) in which this rank is going to draw within
+    /// `bounds`, before it is rendered. Every rank of `comm` calls this, then [`Stream::tile_done`]
+    /// as often as it likes, then [`Stream::finish`].
     ///
     /// # Errors
-    /// As [`Compositor::composite`]; [`CompositeError::Options`] for strategies other than direct send, which work on whole images,
-    /// and for bounds beyond the image.
+    /// As [`Compositor::composite`]; [`CompositeError::Options`] for strategies other than direct
+    /// send, which work on whole images, and for bounds beyond the image.
     pub fn stream<'a>(
         &'a mut self,
         comm: &'a mut dyn Communicator,
@@ -133,29 +139,35 @@ impl<P: Composite> Compositor<P> {
         let order = CompositingOrder::new(comm, options)?;
         if !matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic) {
             return Err(CompositeError::Options(format!(
-                "streaming with {:?}: that strategy works on whole images; use Strategy::DirectSend",
+                "streaming with {:?}: that strategy works on whole images; use \
+                 Strategy::DirectSend",
                 options.strategy
             )));
         }
         Rect::of_size(size_px.0, size_px.1).must_contain(&bounds)?;
-        // Another number than without streaming: ranks that stream and ranks that do not would wait for each other.
-        let fingerprint = fingerprint::<P>(size_px, options, &order, None) ^ u64::from_le_bytes(*b"STREAM__");
+        // Another number than without streaming: ranks that stream and ranks that do not would wait
+        // for each other.
+        let fingerprint =
+            fingerprint::<P>(size_px, options, &order, None) ^ u64::from_le_bytes(*b"STREAM__");
         let codec = Codec { kernels: self.scratch.kernels, fingerprint, verify: options.verify };
         Ok((order, codec))
     }
 }
 
 impl<P: Composite> Stream<'_, P> {
-    /// Hands in the pixels of `tile`, which are final in `frame`; the rest of the frame may still change. Every pixel once; what is
-    /// outside the bounds given at the beginning is background and is ignored. Also joins whatever has come from other ranks.
+    /// Hands in the pixels of `tile`, which are final in `frame`; the rest of the frame may still
+    /// change. Every pixel once; what is outside the bounds given at the beginning is background
+    /// and is ignored. Also joins whatever has come from other ranks.
     ///
     /// # Errors
-    /// As [`Compositor::composite`], and [`CompositeError::Stream`] for pixels handed in twice or a frame of another size.
+    /// As [`Compositor::composite`], and [`CompositeError::Stream`] for pixels handed in twice or a
+    /// frame of another size.
     pub fn tile_done(&mut self, frame: &Frame<'_, P>, tile: Rect) -> Result<(), CompositeError> {
         self.state(|state| state.tile_done(frame, tile))
     }
 
-    /// Joins whatever has come from other ranks, without waiting; returns how many slices of this rank's tile are complete.
+    /// Joins whatever has come from other ranks, without waiting; returns how many slices of this
+    /// rank's tile are complete.
     ///
     /// # Errors
     /// As [`Compositor::composite`].
@@ -219,7 +231,8 @@ impl<P: Composite> StreamState<'_, P> {
         self.check_size(frame)?;
         self.exchange.comm.alive()?;
         let mut finished = Vec::new();
-        let mut outside = tile.intersection(&self.exchange.drawn[self.exchange.order_index]).pixels();
+        let mut outside =
+            tile.intersection(&self.exchange.drawn[self.exchange.order_index]).pixels();
         for (position, pending) in self.pending.iter_mut().enumerate() {
             let pixels = pending.part.intersection(&tile).pixels();
             outside -= pixels.min(outside);
@@ -256,8 +269,13 @@ impl<P: Composite> StreamState<'_, P> {
         rest.iter().try_for_each(|pending| self.submit_part(frame, pending))
     }
 
-    /// Sends a finished part, or joins it if it is of the own tile: copied, because the renderer goes on drawing beside it.
-    fn submit_part(&mut self, frame: &Frame<'_, P>, pending: &Pending) -> Result<(), CompositeError> {
+    /// Sends a finished part, or joins it if it is of the own tile: copied, because the renderer
+    /// goes on drawing beside it.
+    fn submit_part(
+        &mut self,
+        frame: &Frame<'_, P>,
+        pending: &Pending,
+    ) -> Result<(), CompositeError> {
         let view: View<'_, P> = frame.view(pending.part);
         if pending.owner != self.exchange.order_index {
             return self.exchange.send(pending.owner, Tag::Exchange, &view, pending.part, true);
@@ -280,7 +298,8 @@ impl<P: Composite> StreamState<'_, P> {
 
     fn finish(mut self) -> Result<CompositeOutput<P>, CompositeError> {
         let span = self.exchange.begin_span();
-        let waited = self.tile_exchange.finish(&mut self.exchange, &mut self.collector, self.scratch);
+        let waited =
+            self.tile_exchange.finish(&mut self.exchange, &mut self.collector, self.scratch);
         let (mut exchange, collector) = (self.exchange, self.collector);
         exchange.end_span(span, |report| &mut report.exchange_secs);
         let span = exchange.begin_span();
@@ -301,7 +320,8 @@ impl<P: Composite> StreamState<'_, P> {
 
 fn submitted_twice(tile: &Rect) -> CompositeError {
     CompositeError::Stream(format!(
-        "pixels of the tile of columns {}..{} and rows {}..{} were handed in twice: a pixel is final only once",
+        "pixels of the tile of columns {}..{} and rows {}..{} were handed in twice: a pixel is \
+         final only once",
         tile.x0, tile.x1, tile.y0, tile.y1
     ))
 }

@@ -1,19 +1,22 @@
-//! Who owns which part of the image in direct send: rectangles of about equal work, near to what their owners drew.
+//! Who owns which part of the image in direct send: rectangles of about equal work, near to what
+//! their owners drew.
 //!
-//! The image is halved again and again, and so are the ranks: those that drew further left (or up) get
-//! the left (or upper) part, which is as large as their share of the work. Compared with bands of rows this needs fewer messages
-//! (a small object meets a few tiles and not many bands; at 127 ranks in slabs it is a few instead of all), and part of what is
-//! to be joined is already where it must go.
+//! The image is halved again and again, and so are the ranks: those that drew further left (or up)
+//! get the left (or upper) part, which is as large as their share of the work. Compared with bands
+//! of rows this needs fewer messages (a small object meets a few tiles and not many bands; at 127
+//! ranks in slabs it is a few instead of all), and part of what is to be joined is already where it
+//! must go.
 use crate::rect::Rect;
 
-/// An active pixel costs a transfer and a join, a pixel of the result only its place: their ratio, about.
+/// An active pixel costs a transfer and a join, a pixel of the result only its place: their ratio,
+/// about.
 const DRAWN_WEIGHT: u64 = 2;
 
 /// Cells of a region at most in which its work is added up: cuts are as fine as this part of it.
 const CELLS: usize = 128;
 
-/// One tile for every place; `drawn[order_index]` is the rectangle that it drew in. Tiles are disjoint and cover every `drawn`, and
-/// some may be empty.
+/// One tile for every place; `drawn[order_index]` is the rectangle that it drew in. Tiles are
+/// disjoint and cover every `drawn`, and some may be empty.
 pub(crate) fn balanced(drawn: &[Rect]) -> Vec<Rect> {
     let mut owners: Vec<Owner> =
         (0..drawn.len()).map(|order_index| Owner { order_index, share: 1 }).collect();
@@ -39,7 +42,13 @@ pub(crate) fn balanced_among(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> 
 }
 
 /// Divides `region` among `owners`; `present` are the rectangles that meet it.
-fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], tiles: &mut [Rect]) {
+fn divide(
+    region: Rect,
+    owners: &mut [Owner],
+    present: &[Rect],
+    drawn: &[Rect],
+    tiles: &mut [Rect],
+) {
     if let [owner] = *owners {
         tiles[owner.order_index] = region;
         return;
@@ -49,10 +58,12 @@ fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], 
     }
     let half = owners.len() / 2;
 
-    // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they fill up.
+    // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they
+    // fill up.
     let sort = |across_columns: bool, owners: &mut [Owner]| {
         owners.sort_unstable_by_key(|owner| {
-            let rect = if drawn[owner.order_index].is_empty() { region } else { drawn[owner.order_index] };
+            let rect =
+                if drawn[owner.order_index].is_empty() { region } else { drawn[owner.order_index] };
             let (from, to) = if across_columns { (rect.x0, rect.x1) } else { (rect.y0, rect.y1) };
             (u64::from(from) + u64::from(to), owner.order_index)
         });
@@ -63,15 +74,17 @@ fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], 
         cut(region, across_columns, present, of(&owners[..half]), of(owners))
     };
 
-    // A rectangle that a cut crosses is one message more. Rows lie in one piece in memory and columns do not, so the image is cut
-    // across its columns only where that saves many messages: below, between or beside small objects, and across slabs.
+    // A rectangle that a cut crosses is one message more. Rows lie in one piece in memory and
+    // columns do not, so the image is cut across its columns only where that saves many messages:
+    // below, between or beside small objects, and across slabs.
     let row = split(false, owners);
     let crossed_by_row = present.iter().filter(|rect| rect.y0 < row && row < rect.y1).count();
     let is_flat = region.height() < 2;
     let mut at = (row, false);
     if region.width() > 1 && (is_flat || crossed_by_row > 1) {
         let column = split(true, owners);
-        let crossed_by_column = present.iter().filter(|rect| rect.x0 < column && column < rect.x1).count();
+        let crossed_by_column =
+            present.iter().filter(|rect| rect.x0 < column && column < rect.x1).count();
         if is_flat || crossed_by_row > 2 * crossed_by_column + 1 {
             at = (column, true);
         } else {
@@ -90,8 +103,11 @@ fn divide(region: Rect, owners: &mut [Owner], present: &[Rect], drawn: &[Rect], 
             tiles[owner.order_index] = part;
             continue;
         }
-        let meeting: Vec<Rect> =
-            present.iter().map(|rect| rect.intersection(&part)).filter(|rect| !rect.is_empty()).collect();
+        let meeting: Vec<Rect> = present
+            .iter()
+            .map(|rect| rect.intersection(&part))
+            .filter(|rect| !rect.is_empty())
+            .collect();
         divide(part, its_owners, &meeting, drawn, tiles);
     }
 }
@@ -101,15 +117,19 @@ fn cut(region: Rect, across_columns: bool, present: &[Rect], share: u64, shares:
     let (start, end) = if across_columns { (region.x0, region.x1) } else { (region.y0, region.y1) };
     let own = if across_columns { region.height() } else { region.width() } as u64;
 
-    // The work of columns (or rows), in cells: what changes inside a cell counts as if at its nearer side.
+    // The work of columns (or rows), in cells: what changes inside a cell counts as if at its
+    // nearer side.
     let length = (end - start) as usize;
     let cell = length.div_ceil(CELLS).max(1);
     let cells = length.div_ceil(cell);
     let mut changes = [0_i64; CELLS + 1];
     let nearest = |at: u32| ((at - start) as usize + cell / 2) / cell;
     for rect in present {
-        let (from, to, across) =
-            if across_columns { (rect.x0, rect.x1, rect.height()) } else { (rect.y0, rect.y1, rect.width()) };
+        let (from, to, across) = if across_columns {
+            (rect.x0, rect.x1, rect.height())
+        } else {
+            (rect.y0, rect.y1, rect.width())
+        };
         let work = (DRAWN_WEIGHT * across as u64) as i64;
         changes[nearest(from).min(CELLS)] += work;
         changes[nearest(to).min(CELLS)] -= work;
@@ -202,7 +222,8 @@ mod tests {
         let drawn: Vec<Rect> =
             (0..127).map(|i| Rect { x0: 8 * i, y0: 100, x1: 8 * i + 12, y1: 900 }).collect();
         let tiles = balanced(&drawn);
-        let met = |tile: &Rect| drawn.iter().filter(|rect| !rect.intersection(tile).is_empty()).count();
+        let met =
+            |tile: &Rect| drawn.iter().filter(|rect| !rect.intersection(tile).is_empty()).count();
         let messages: usize = tiles.iter().map(met).sum();
         assert!(messages < 127 * 24, "{messages} messages");
     }
@@ -210,7 +231,8 @@ mod tests {
     #[test]
     fn ranks_own_what_is_near_to_what_they_drew() {
         // Four quadrants, one a rank, in an order that is not that of the tiles.
-        let quadrant = |x: u32, y: u32| Rect { x0: 50 * x, y0: 50 * y, x1: 50 * x + 50, y1: 50 * y + 50 };
+        let quadrant =
+            |x: u32, y: u32| Rect { x0: 50 * x, y0: 50 * y, x1: 50 * x + 50, y1: 50 * y + 50 };
         let drawn = [quadrant(1, 1), quadrant(0, 0), quadrant(0, 1), quadrant(1, 0)];
         assert_eq!(balanced(&drawn), drawn);
     }

@@ -1,8 +1,10 @@
-//! Frames to measure compositing with, made without a renderer: what each of p ranks would have drawn of its brick of a volume.
+//! Frames to measure compositing with, made without a renderer: what each of p ranks would have
+//! drawn of its brick of a volume.
 //!
-//! Three ways in which pixels are spread, after what chapter 3 of the thesis renders: solid pieces (*discs*), pieces that all cover the
-//! whole image (*dense*, the worst case of volume rendering), and the same pieces as scattered short runs (*frag*: streamlines,
-//! particles). Everything is a function of scene, moment, rank and size, so each rank makes its own frame.
+//! Three ways in which pixels are spread, after what chapter 3 of the thesis renders: solid pieces
+//! (*discs*), pieces that all cover the whole image (*dense*, the worst case of volume rendering),
+//! and the same pieces as scattered short runs (*frag*: streamlines, particles). Everything is a
+//! function of scene, moment, rank and size, so each rank makes its own frame.
 use crate::rect::Rect;
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +12,8 @@ use std::str::FromStr;
 /// How the pixels of the ranks are spread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Workload {
-    /// Every rank's brick as one solid, shaded ellipse; neighbours overlap. 1 to 4 layers where anything is drawn.
+    /// Every rank's brick as one solid, shaded ellipse; neighbours overlap. 1 to 4 layers where
+    /// anything is drawn.
     Discs,
     /// Every pixel of every rank is drawn, as a tilted plane each; planes cross.
     Dense,
@@ -123,21 +126,32 @@ fn grid(ranks: usize) -> [usize; 3] {
 }
 
 /// Brick `rank` of `ranks`, seen by a camera that goes around the cube.
-fn project(moment: u64, rank: usize, ranks: usize, width_px: f32, height_px: f32) -> ProjectedBrick {
+fn project(
+    moment: u64,
+    rank: usize,
+    ranks: usize,
+    width_px: f32,
+    height_px: f32,
+) -> ProjectedBrick {
     let [nx, ny, nz] = grid(ranks);
     let middle = |i: usize, n: usize| (i as f32 + 0.5) / n as f32 - 0.5;
-    let (x, y, z) = (middle(rank % nx, nx), middle((rank / nx) % ny, ny), middle(rank / (nx * ny), nz));
+    let (x, y, z) =
+        (middle(rank % nx, nx), middle((rank / nx) % ny, ny), middle(rank / (nx * ny), nz));
     let (sin, cos) = (0.3 + 0.37 * moment as f32).sin_cos();
     let (across, into) = (x * cos - z * sin, x * sin + z * cos);
     let widest = nx.max(nz) as f32;
     ProjectedBrick {
-        center_px: ((0.5 + 0.75 * across) * width_px, (0.5 + 0.75 * (0.9 * y - 0.3 * into)) * height_px),
+        center_px: (
+            (0.5 + 0.75 * across) * width_px,
+            (0.5 + 0.75 * (0.9 * y - 0.3 * into)) * height_px,
+        ),
         radii_px: ((0.54 * width_px / widest).max(8.0), (0.54 * height_px / ny as f32).max(8.0)),
         depth: 0.5 + 0.35 * (0.9 * into + 0.3 * y),
     }
 }
 
-/// A number that looks random (the finalizer of SplitMix64: G. Steele, D. Lea, C. Flood, OOPSLA 2014).
+/// A number that looks random (the finalizer of SplitMix64: G. Steele, D. Lea, C. Flood, OOPSLA
+/// 2014).
 fn scatter(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -146,7 +160,8 @@ fn scatter(number: u64) -> u64 {
 }
 
 impl Workload {
-    /// Draws what `rank` of `ranks` sees at `moment` (the number of a frame) into `target`, over what was there.
+    /// Draws what `rank` of `ranks` sees at `moment` (the number of a frame) into `target`, over
+    /// what was there.
     pub fn draw(self, moment: u64, rank: usize, ranks: usize, target: &mut SyntheticFrame) {
         target.colors.fill([0; 4]);
         target.depths.fill(1.0);
@@ -200,7 +215,8 @@ fn draw_disc(
     let (width, height) = (target.width_px as f32, target.height_px as f32);
     let ProjectedBrick { center_px: (cx, cy), radii_px: (rx, ry), depth } =
         project(moment, rank, ranks, width, height);
-    let clip = |from: f32, to: f32, end: u32| (from.max(0.0) as u32, (to.ceil().max(0.0) as u32).min(end));
+    let clip =
+        |from: f32, to: f32, end: u32| (from.max(0.0) as u32, (to.ceil().max(0.0) as u32).min(end));
     let (x0, x1) = clip(cx - rx, cx + rx, target.width_px);
     let (y0, y1) = clip(cy - ry, cy + ry, target.height_px);
     let bounds = Rect { x0, y0, x1, y1 };
@@ -215,7 +231,8 @@ fn draw_disc(
                 continue;
             }
             let towards = (1.0 - square).sqrt();
-            // The rank's share of depth keeps most ties out, but equal depths of symmetric bricks remain.
+            // The rank's share of depth keeps most ties out, but equal depths of symmetric bricks
+            // remain.
             target.depths[index] = (depth - 0.05 * towards + 1e-5 * rank as f32).clamp(0.01, 0.99);
             let light = 0.25 + 0.75 * towards;
             let shade = |channel: u8| (f32::from(channel) * light) as u8;
@@ -242,7 +259,10 @@ mod tests {
                             && x < drawn.bounds.x1
                             && y >= drawn.bounds.y0
                             && y < drawn.bounds.y1;
-                        assert!(*depth == 1.0 || inside, "{workload} rank {rank} of {ranks}: {x} {y}");
+                        assert!(
+                            *depth == 1.0 || inside,
+                            "{workload} rank {rank} of {ranks}: {x} {y}"
+                        );
                         assert_eq!(*depth < 1.0, drawn.colors[index][3] == 255);
                     }
                     active.push(drawn.active());

@@ -1,4 +1,5 @@
-//! Every strategy gives the bits of the serial reference: all rank counts to 17, odd sizes, depth and ordered blending.
+//! Every strategy gives the bits of the serial reference: all rank counts to 17, odd sizes, depth
+//! and ordered blending.
 use composite::{
     Communicator, Composite, CompositeError, CompositeOutput, Destination, Frame, Image, Options,
     PixelFormat, Strategy, composite_serial, threads,
@@ -31,7 +32,8 @@ impl Random {
     }
 }
 
-/// What one rank drew: about half of the image in runs, depths from a few values so that ties are common.
+/// What one rank drew: about half of the image in runs, depths from a few values so that ties are
+/// common.
 struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -39,7 +41,8 @@ struct TestFrame {
 }
 
 fn draw(rank: usize, size_px: (u32, u32)) -> TestFrame {
-    let mut random = Random(1 + rank as u64 * 7919 + u64::from(size_px.0) * 31 + u64::from(size_px.1));
+    let mut random =
+        Random(1 + rank as u64 * 7919 + u64::from(size_px.0) * 31 + u64::from(size_px.1));
     let mut drawn = TestFrame { bytes: Vec::new(), floats: Vec::new(), depth: Vec::new() };
     let mut active = random.next().is_multiple_of(2);
     let empty_rank = rank % 5 == 3;
@@ -52,7 +55,8 @@ fn draw(rank: usize, size_px: (u32, u32)) -> TestFrame {
         let on = active && !empty_rank;
         drawn.floats.push(if on { float } else { [0.0; 4] });
         drawn.bytes.push(if on { float.map(|c| (c * 255.0) as u8) } else { [0; 4] });
-        let odd = [f32::NAN, f32::INFINITY, 1.0, f32::NEG_INFINITY, -0.0, 0.0, f32::from_bits(1), -2.5];
+        let odd =
+            [f32::NAN, f32::INFINITY, 1.0, f32::NEG_INFINITY, -0.0, 0.0, f32::from_bits(1), -2.5];
         drawn.depth.push(match random.next() % 12 {
             _ if !on => 1.0,
             special @ 0..=7 => odd[special as usize],
@@ -91,8 +95,10 @@ fn over_threads<P: Composite>(frames: &[Frame<'_, P>], options: &Options) -> Ima
     for piece in results.into_iter().map(|r| r.piece.unwrap()) {
         let columns = piece.bounds.width();
         for (offset, color) in piece.colors.iter().enumerate() {
-            let (x, y) =
-                (offset % columns + piece.bounds.x0 as usize, offset / columns + piece.bounds.y0 as usize);
+            let (x, y) = (
+                offset % columns + piece.bounds.x0 as usize,
+                offset / columns + piece.bounds.y0 as usize,
+            );
             let index = y * width as usize + x;
             assert!(!covered[index], "pieces overlap at {x}, {y}");
             covered[index] = true;
@@ -165,9 +171,11 @@ fn fourteen_to_seventeen_ranks_give_the_bits_of_the_serial_reference() {
 #[test]
 fn a_chain_instead_of_the_canonical_grouping_would_be_noticed() {
     let drawn: Vec<TestFrame> = (0..9).map(|rank| draw(rank, (64, 33))).collect();
-    let frames: Vec<_> = drawn.iter().map(|d| Frame::premultiplied(64, 33, &d.floats).unwrap()).collect();
+    let frames: Vec<_> =
+        drawn.iter().map(|d| Frame::premultiplied(64, 33, &d.floats).unwrap()).collect();
     let expected = composite_serial(&frames).unwrap();
-    let expected_pixels: Vec<_> = (0..expected.colors().len()).map(|index| expected.pixel(index)).collect();
+    let expected_pixels: Vec<_> =
+        (0..expected.colors().len()).map(|index| expected.pixel(index)).collect();
     let chained: Vec<_> = (0..expected.colors().len())
         .map(|i| frames.iter().map(|frame| frame.pixel(i)).reduce(composite::combine).unwrap())
         .collect();
@@ -185,14 +193,18 @@ fn equal_depths_everywhere_give_the_highest_rank_a_thousand_times() {
     let ranks = 5;
     let colors: Vec<Vec<[u8; 4]>> = (0..ranks).map(|rank| vec![[rank as u8 + 1; 4]; 6]).collect();
     let depth = [0.5; 6];
-    let frames: Vec<_> = colors.iter().map(|c| Frame::with_depth(3, 2, c, &depth).unwrap()).collect();
-    // The group is used for frame after frame: messages of one frame must not mix with those of the next.
+    let frames: Vec<_> =
+        colors.iter().map(|c| Frame::with_depth(3, 2, c, &depth).unwrap()).collect();
+    // The group is used for frame after frame: messages of one frame must not mix with those of the
+    // next.
     for strategy in STRATEGIES {
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
             let options = Options { strategy, final_barrier: false, ..Options::default() };
             (0..1000)
-                .filter_map(|_| composite::composite(&mut comm, &frames[rank], &options).unwrap().image)
+                .filter_map(|_| {
+                    composite::composite(&mut comm, &frames[rank], &options).unwrap().image
+                })
                 .filter(|image| image.colors() == [[5; 4]; 6])
                 .count()
         });
@@ -204,7 +216,8 @@ fn equal_depths_everywhere_give_the_highest_rank_a_thousand_times() {
 fn the_order_of_ranks_is_the_order_of_layers() {
     let order = vec![3, 0, 4, 1, 2];
     let drawn: Vec<TestFrame> = (0..5).map(|rank| draw(rank + 20, (31, 5))).collect();
-    let frames: Vec<_> = drawn.iter().map(|d| Frame::premultiplied(31, 5, &d.floats).unwrap()).collect();
+    let frames: Vec<_> =
+        drawn.iter().map(|d| Frame::premultiplied(31, 5, &d.floats).unwrap()).collect();
     let sorted: Vec<_> = order.iter().map(|&rank| frames[rank]).collect();
     let expected = composite_serial(&sorted).unwrap().to_bytes();
     assert!(expected != composite_serial(&frames).unwrap().to_bytes());
@@ -252,7 +265,9 @@ fn a_single_pixel_in_the_last_corner_is_not_lost() {
     single[61 * 35 - 1] = [0.25, 0.0, 0.0, 0.5];
     for drawn_by in 0..3 {
         let frames: Vec<_> = (0..3)
-            .map(|rank| Frame::premultiplied(w, h, if rank == drawn_by { &single } else { &empty }).unwrap())
+            .map(|rank| {
+                Frame::premultiplied(w, h, if rank == drawn_by { &single } else { &empty }).unwrap()
+            })
             .collect();
         for strategy in STRATEGIES {
             let image = over_threads(&frames, &Options { strategy, ..Options::default() });

@@ -1,7 +1,8 @@
 //! Faults end in a named error on every rank, for every strategy, and never in a hang.
 use composite::comm::{Arrival, Receive};
 use composite::{
-    CommError, Communicator, CompositeError, Destination, Frame, MessageError, Options, Strategy, threads,
+    CommError, Communicator, CompositeError, Destination, Frame, MessageError, Options, Strategy,
+    threads,
 };
 use std::time::{Duration, Instant};
 
@@ -37,7 +38,12 @@ impl Communicator for Faulty {
         self.inner.size()
     }
 
-    fn send(&mut self, destination: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {
+    fn send(
+        &mut self,
+        destination: usize,
+        tag: u32,
+        mut message: Vec<u8>,
+    ) -> Result<(), CommError> {
         // Messages with pixels; the calls that all ranks take part in have tags of their own.
         self.sent += usize::from(tag < composite::comm::FIRST_RESERVED_TAG);
         if self.rank() == CULPRIT && tag < composite::comm::FIRST_RESERVED_TAG && self.sent == 1 {
@@ -60,11 +66,20 @@ impl Communicator for Faulty {
         self.inner.now()
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.inner.post_recv(source, tag, capacity)
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         self.inner.wait_any(posted, timeout)
     }
 
@@ -200,7 +215,10 @@ fn options_that_cannot_work_are_refused_with_their_cure() {
         composite::composite(&mut comm, &frame, &options).unwrap_err().to_string()
     };
     let k = refuse(Options { strategy: Strategy::RadixK { k: 3 }, ..Options::default() });
-    assert_eq!(k, "radix-k with k = 3: the fixed grouping of ranks needs a power of two, for example 8");
+    assert_eq!(
+        k,
+        "radix-k with k = 3: the fixed grouping of ranks needs a power of two, for example 8"
+    );
     let root = refuse(Options { destination: Destination::Rank(1), ..Options::default() });
     assert_eq!(root, "the image is to go to rank 1 of a group of 1 ranks");
     let order = refuse(Options { order: Some(vec![1]), ..Options::default() });

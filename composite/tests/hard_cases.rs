@@ -1,8 +1,8 @@
 //! Hard cases by name: sizes, rank counts, formats, order. All strategies, over threads.
 use composite::{
-    Communicator, Composite, CompositeError, Compositor, DeepFrame, DepthPixel, Destination, Fragment, Frame,
-    NetworkCosts, Options, PixelFormat, PremultipliedPixel, Rect, Strategy, composite_deep,
-    composite_deep_serial, composite_serial, f16, threads,
+    Communicator, Composite, CompositeError, Compositor, DeepFrame, DepthPixel, Destination,
+    Fragment, Frame, NetworkCosts, Options, PixelFormat, PremultipliedPixel, Rect, Strategy,
+    composite_deep, composite_deep_serial, composite_serial, f16, threads,
 };
 
 const STRATEGIES: [Strategy; 4] =
@@ -29,12 +29,14 @@ fn planes<C: composite::Color>(rank: usize, w: usize, h: usize) -> (Vec<C>, Vec<
     (0..w * h).map(pixel).unzip()
 }
 
-/// The same group and the same compositors for many frames: buffers of one must not show in the next.
+/// The same group and the same compositors for many frames: buffers of one must not show in the
+/// next.
 fn check_many<P: Composite + Send>(
     ranks: usize,
     sizes: &[(usize, usize)],
     frame: impl Fn(usize, usize, usize) -> (Vec<P::Color>, Vec<f32>) + Sync,
-    make: impl for<'a> Fn(u32, u32, &'a [P::Color], &'a [f32]) -> Result<Frame<'a, P>, CompositeError> + Sync,
+    make: impl for<'a> Fn(u32, u32, &'a [P::Color], &'a [f32]) -> Result<Frame<'a, P>, CompositeError>
+    + Sync,
 ) {
     let results = threads::run(ranks, |mut comm| {
         let mut compositors: Vec<Compositor<P>> = STRATEGIES
@@ -74,7 +76,9 @@ fn check_many<P: Composite + Send>(
 fn every_size_from_1x1_to_67x5_on_one_to_nine_ranks() {
     let sizes: Vec<(usize, usize)> = (1..=67).flat_map(|w| (1..=5).map(move |h| (w, h))).collect();
     for ranks in 1..=9 {
-        check_many::<DepthPixel<[u8; 4]>>(ranks, &sizes, planes, |w, h, c, d| Frame::with_depth(w, h, c, d));
+        check_many::<DepthPixel<[u8; 4]>>(ranks, &sizes, planes, |w, h, c, d| {
+            Frame::with_depth(w, h, c, d)
+        });
         // A sixth of the sizes for blending.
         let some: Vec<_> = sizes.iter().copied().skip(ranks % 6).step_by(6).collect();
         check_many::<PremultipliedPixel<[f32; 4]>>(ranks, &some, planes, |w, h, c, _| {
@@ -96,8 +100,12 @@ fn sixteen_bit_formats_give_the_bits_of_the_serial_reference() {
         check_many::<PremultipliedPixel<[u8; 4]>>(ranks, &sizes, planes, |w, h, c, _| {
             Frame::premultiplied(w, h, c)
         });
-        check_many::<DepthPixel<[u16; 4]>>(ranks, &sizes, planes, |w, h, c, d| Frame::with_depth(w, h, c, d));
-        check_many::<DepthPixel<[f16; 4]>>(ranks, &sizes, planes, |w, h, c, d| Frame::with_depth(w, h, c, d));
+        check_many::<DepthPixel<[u16; 4]>>(ranks, &sizes, planes, |w, h, c, d| {
+            Frame::with_depth(w, h, c, d)
+        });
+        check_many::<DepthPixel<[f16; 4]>>(ranks, &sizes, planes, |w, h, c, d| {
+            Frame::with_depth(w, h, c, d)
+        });
     }
 }
 
@@ -105,7 +113,9 @@ fn sixteen_bit_formats_give_the_bits_of_the_serial_reference() {
 fn odd_rank_counts_up_to_127_and_images_smaller_than_the_group() {
     for ranks in [33, 127] {
         let sizes = [(1, 1), (5, 3), (90, 40)];
-        check_many::<DepthPixel<[u8; 4]>>(ranks, &sizes, planes, |w, h, c, d| Frame::with_depth(w, h, c, d));
+        check_many::<DepthPixel<[u8; 4]>>(ranks, &sizes, planes, |w, h, c, d| {
+            Frame::with_depth(w, h, c, d)
+        });
         check_many::<PremultipliedPixel<[u8; 4]>>(ranks, &sizes, planes, |w, h, c, _| {
             Frame::premultiplied(w, h, c)
         });
@@ -122,9 +132,10 @@ fn nan_depths_are_counted_once_with_and_without_bounds_and_by_every_strategy() {
     }
     let inside = Rect { x0: 3, y0: 2, x1: 37, y1: 28 };
     let frame = Frame::with_depth(w, h, &colors, &depths).unwrap();
-    for (frame, expected) in
-        [(frame, 172), (frame.with_bounds(inside).unwrap(), frame.with_bounds(inside).unwrap().nan_depths())]
-    {
+    for (frame, expected) in [
+        (frame, 172),
+        (frame.with_bounds(inside).unwrap(), frame.with_bounds(inside).unwrap().nan_depths()),
+    ] {
         assert_eq!(frame.nan_depths(), expected);
         for strategy in STRATEGIES {
             let results = threads::run(5, |mut comm| {
@@ -172,49 +183,57 @@ fn the_automatic_strategy_is_the_same_on_every_rank_and_follows_a_given_network(
     for network in [None, Some(NetworkCosts::QDR), Some(slow_messages)] {
         let chosen = threads::run(8, |mut comm| {
             let frame = Frame::premultiplied(64, 64, &colors).unwrap();
-            let compositor = Compositor::new(Options { strategy: Strategy::Automatic, ..Options::default() });
+            let compositor =
+                Compositor::new(Options { strategy: Strategy::Automatic, ..Options::default() });
             let mut compositor = match network {
                 Some(network) => compositor.with_network(network),
                 None => compositor,
             };
             compositor.composite(&mut comm, &frame).unwrap().report.strategy
         });
-        assert!(chosen.iter().all(|strategy| strategy == &chosen[0] && *strategy != Ok(Strategy::Automatic)));
+        assert!(
+            chosen
+                .iter()
+                .all(|strategy| strategy == &chosen[0] && *strategy != Ok(Strategy::Automatic))
+        );
         if network == Some(slow_messages) {
             assert_eq!(chosen[0], Ok(Strategy::Tree));
         }
     }
 }
 
-// ---- Accuracy of formats: 128 faint layers ------------------------------------------------------------------------
-
+// ---- Accuracy of formats: 128 faint layers ------------------------------------------------------
 const LAYERS: usize = 128;
 /// Pixels of the experiment `accuracy-composite`, all with other layers.
 const PIXELS: usize = 512 * 512;
 
-/// Premultiplied colour of `layer` at pixel `k`, as in the experiment `accuracy-composite`: three channels of other shares of the
-/// opacity, all varying by a tenth from pixel to pixel and layer to layer, in golden-ratio steps.
+/// Premultiplied colour of `layer` at pixel `k`, as in the experiment `accuracy-composite`: three
+/// channels of other shares of the opacity, all varying by a tenth from pixel to pixel and layer to
+/// layer, in golden-ratio steps.
 fn layer_color(alpha: f64, layer: usize, k: usize) -> [f64; 4] {
     let vary = |step: f64| 1.0 + 0.1 * ((layer as f64 * 0.618_034 + k as f64 * step).fract() - 0.5);
     let a = alpha * vary(0.754_878);
     [a * 0.9 * vary(0.569_840), a * 0.5, a * 0.2, a]
 }
 
-/// Largest error of these layers in units of 1/255 against `exact`: what the format makes of the colours and opacities themselves
-/// counts too.
+/// Largest error of these layers in units of 1/255 against `exact`: what the format makes of the
+/// colours and opacities themselves counts too.
 fn error_of_layers<C: composite::Color>(layers: &[Vec<[f64; 4]>], exact: &[[f64; 4]]) -> f64
 where
     PremultipliedPixel<C>: Composite<Color = C>,
 {
     let stored = |color: &[f64; 4]| C::from_f32(color.map(|channel| channel as f32));
-    let layers: Vec<Vec<C>> = layers.iter().map(|layer| layer.iter().map(stored).collect()).collect();
+    let layers: Vec<Vec<C>> =
+        layers.iter().map(|layer| layer.iter().map(stored).collect()).collect();
     let width_px = exact.len() as u32;
     let frames: Vec<Frame<'_, PremultipliedPixel<C>>> =
         layers.iter().map(|colors| Frame::premultiplied(width_px, 1, colors).unwrap()).collect();
     let found = composite_serial(&frames).unwrap();
     let channels = found.colors().iter().map(|color| color.to_f32()).zip(exact);
     channels
-        .flat_map(|(found, exact)| (0..4).map(move |i| 255.0 * (f64::from(found[i]) - exact[i]).abs()))
+        .flat_map(|(found, exact)| {
+            (0..4).map(move |i| 255.0 * (f64::from(found[i]) - exact[i]).abs())
+        })
         .fold(0.0, f64::max)
 }
 
@@ -242,12 +261,15 @@ fn recorded() -> Vec<(String, f64)> {
     let text = std::fs::read_to_string(files.last().expect("a record")).expect("a record");
     let mut rows = text.lines().filter(|line| !line.starts_with('#'));
     let columns: Vec<&str> = rows.next().expect("a head").split(',').collect();
-    let at = |name: &str| columns.iter().position(|c| c.split(' ').next() == Some(name)).expect("a column");
+    let at = |name: &str| {
+        columns.iter().position(|c| c.split(' ').next() == Some(name)).expect("a column")
+    };
     let (format, error) = (at("format"), at("error"));
     let mut worst: Vec<(String, f64)> = Vec::new();
     for row in rows {
         let cells: Vec<&str> = row.split(',').collect();
-        let (name, error) = (cells[format].to_string(), cells[error].parse::<f64>().expect("a number"));
+        let (name, error) =
+            (cells[format].to_string(), cells[error].parse::<f64>().expect("a number"));
         match worst.iter_mut().find(|(known, _)| *known == name) {
             Some((_, most)) => *most = error.max(*most),
             None => worst.push((name, error)),
@@ -263,7 +285,8 @@ fn errors_of_128_faint_layers_are_those_of_the_table() {
     let mut worst = [("u8", 0.0_f64), ("u16", 0.0), ("f16", 0.0), ("f32", 0.0)];
     for alpha in [0.005, 0.02, 0.1] {
         for first in (0..PIXELS).step_by(AT_ONCE) {
-            let of_layer = |layer| (first..first + AT_ONCE).map(|k| layer_color(alpha, layer, k)).collect();
+            let of_layer =
+                |layer| (first..first + AT_ONCE).map(|k| layer_color(alpha, layer, k)).collect();
             let layers: Vec<Vec<[f64; 4]>> = (0..LAYERS).map(of_layer).collect();
             let exact = sum_of_layers(&layers);
             let errors = [
@@ -277,8 +300,10 @@ fn errors_of_128_faint_layers_are_those_of_the_table() {
     }
     let recorded = recorded();
     for (format, error) in worst {
-        let (_, most) = recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
-        // The same bits as those of the experiment; only the arithmetic of the error itself may be rounded otherwise.
+        let (_, most) =
+            recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
+        // The same bits as those of the experiment; only the arithmetic of the error itself may be
+        // rounded otherwise.
         assert!((error - most).abs() <= 1e-9 * most, "{format}: {error}, and {most} in the record");
     }
 }
@@ -305,7 +330,8 @@ fn errors_of_128_equal_white_layers_are_those_of_the_book() {
 
 #[test]
 fn the_book_quotes_the_record_of_128_faint_layers() {
-    let book = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/composite/formats.md");
+    let book =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/composite/formats.md");
     let book = std::fs::read_to_string(book).expect("the book");
     let recorded = recorded();
     for (format, row) in [
@@ -314,19 +340,24 @@ fn the_book_quotes_the_record_of_128_faint_layers() {
         ("f16", "| premultiplied RGBA `f16` |"),
         ("f32", "| premultiplied RGBA `f32` |"),
     ] {
-        let (_, most) = recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
+        let (_, most) =
+            recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
         let line = book.lines().find(|line| line.starts_with(row)).expect("its row");
         let cell = line.split('|').nth(3).expect("its error").trim();
         let quoted: f64 = cell.split(' ').next().and_then(|n| n.parse().ok()).expect("a number");
         // Two digits, rounded up.
-        assert!(quoted >= *most && quoted <= 1.05 * most, "{format}: `{cell}`, and {most} in the record");
+        assert!(
+            quoted >= *most && quoted <= 1.05 * most,
+            "{format}: `{cell}`, and {most} in the record"
+        );
     }
 }
 
 #[test]
 fn an_integer_format_errs_by_two_steps_a_layer_at_most_whatever_the_colours() {
-    // Half a step where a colour is stored, half where it is joined. What is left of the light errs by a step a layer likewise, and
-    // of these steps a layer takes no more into a colour than it takes away by its opacity: all layers together one a layer.
+    // Half a step where a colour is stored, half where it is joined. What is left of the light errs
+    // by a step a layer likewise, and of these steps a layer takes no more into a colour than it
+    // takes away by its opacity: all layers together one a layer.
     const MOST: f64 = 2.0 * LAYERS as f64;
     fn steps_of_error<C: composite::Color>(steps: f64, layers: &[Vec<[f64; 4]>]) -> f64
     where
@@ -354,15 +385,15 @@ fn an_integer_format_errs_by_two_steps_a_layer_at_most_whatever_the_colours() {
         let of_layer = |layer| (0..2000).map(|pixel| color(layer, pixel)).collect();
         let layers: Vec<Vec<[f64; 4]>> = (0..LAYERS).map(of_layer).collect();
         let worst = steps_of_error::<C>(steps, &layers);
-        // These colours are always the same. They were measured to err by 31.4 steps of 8 bits and 31.6 of 16.
+        // These colours are always the same. They were measured to err by 31.4 steps of 8 bits and
+        // 31.6 of 16.
         assert!((31.0..=32.0).contains(&worst), "{worst} steps");
     }
     check::<[u8; 4]>(255.0);
     check::<[u16; 4]>(65535.0);
 }
 
-// ---- Order and depth ----------------------------------------------------------------------------------------------
-
+// ---- Order and depth ----------------------------------------------------------------------------
 #[test]
 fn ranks_that_reach_behind_those_after_them_are_refused_where_they_meet() {
     let colors = [[0.1_f32; 4]; 100];
@@ -371,9 +402,14 @@ fn ranks_that_reach_behind_those_after_them_are_refused_where_they_meet() {
     let run = |bounds: [Rect; 2], ranges: [[f32; 2]; 2]| {
         threads::run(2, |mut comm| {
             let rank = comm.rank();
-            let frame = Frame::premultiplied(10, 10, &colors).unwrap().with_bounds(bounds[rank]).unwrap();
-            composite::composite(&mut comm, &frame.with_depth_range(ranges[rank]), &Options::default())
-                .map(|_| ())
+            let frame =
+                Frame::premultiplied(10, 10, &colors).unwrap().with_bounds(bounds[rank]).unwrap();
+            composite::composite(
+                &mut comm,
+                &frame.with_depth_range(ranges[rank]),
+                &Options::default(),
+            )
+            .map(|_| ())
         })
     };
     let whole = Rect::of_size(10, 10);
@@ -383,7 +419,8 @@ fn ranks_that_reach_behind_those_after_them_are_refused_where_they_meet() {
         let text = result.unwrap().unwrap_err().to_string();
         assert!(
             text.contains(
-                "rank 0 is to be in front of rank 1, but reaches to depth 0.75, behind its nearest 0.5"
+                "rank 0 is to be in front of rank 1, but reaches to depth 0.75, behind its nearest \
+                 0.5"
             ),
             "{text}"
         );
@@ -404,14 +441,18 @@ fn deal(ranks: usize, w: usize, h: usize) -> Vec<Dealt> {
             let v = noise(4, 5, layer, pixel);
             let alpha = 0.02 + (v % 64) as f32 / 400.0;
             let depth = (noise(6, 7, layer, pixel) << 6 | layer as u64) as f32 / (1 << 22) as f32;
-            let fragment =
-                Fragment { color: [alpha * 0.9, alpha * 0.1, alpha * (layer % 2) as f32, alpha], depth };
+            let fragment = Fragment {
+                color: [alpha * 0.9, alpha * 0.1, alpha * (layer % 2) as f32, alpha],
+                depth,
+            };
             dealt[(v >> 6) as usize % ranks].0.push(fragment);
         }
         for (rank, (fragments, ends, colors, depths)) in dealt.iter_mut().enumerate() {
             ends.push(fragments.len());
             // The same surface for every number of ranks, held by one of them.
-            if noise(8, 9, 1, pixel).is_multiple_of(3) && noise(8, 9, 2, pixel) as usize % ranks == rank {
+            if noise(8, 9, 1, pixel).is_multiple_of(3)
+                && noise(8, 9, 2, pixel) as usize % ranks == rank
+            {
                 colors[pixel] = [0.2, 0.4, 0.6, 1.0];
                 depths[pixel] = noise(8, 9, 3, pixel) as f32 / 65536.0;
             }
@@ -452,7 +493,8 @@ fn layers_of_ranks_that_reach_into_each_other_are_sorted_exactly_for_every_parti
     let flattened: Vec<Vec<[f32; 4]>> = dealt
         .iter()
         .map(|(f, ends, c, d)| {
-            let frame = DeepFrame::new(w as u32, h as u32, f, ends).unwrap().with_opaque(c, d).unwrap();
+            let frame =
+                DeepFrame::new(w as u32, h as u32, f, ends).unwrap().with_opaque(c, d).unwrap();
             composite_deep_serial(&[frame]).unwrap().iter().map(|p| p.map(|c| c as f32)).collect()
         })
         .collect();
@@ -467,5 +509,10 @@ fn deep_frames_that_contradict_themselves_are_refused() {
     assert!(matches!(DeepFrame::new(2, 1, &fragment, &[1]), Err(CompositeError::FrameSize { .. })));
     let error = DeepFrame::new(2, 1, &fragment, &[1, 0]).unwrap_err().to_string();
     assert!(error.contains("must not decrease"), "{error}");
-    assert!(DeepFrame::new(2, 1, &fragment, &[0, 1]).unwrap().with_opaque(&[[0.0; 4]; 2], &[1.0]).is_err());
+    assert!(
+        DeepFrame::new(2, 1, &fragment, &[0, 1])
+            .unwrap()
+            .with_opaque(&[[0.0; 4]; 2], &[1.0])
+            .is_err()
+    );
 }

@@ -1,8 +1,10 @@
-//! Peers whose numbers are not to be trusted: what they announce is refused by name before anything is made room for.
+//! Peers whose numbers are not to be trusted: what they announce is refused by name before anything
+//! is made room for.
 use composite::comm::{Arrival, Receive};
 use composite::{
-    CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination, Fragment, Frame,
-    MessageError, Options, PremultipliedPixel, Rect, Strategy, composite_deep, threads,
+    CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination,
+    Fragment, Frame, MessageError, Options, PremultipliedPixel, Rect, Strategy, composite_deep,
+    threads,
 };
 use proptest::prelude::*;
 use std::time::Duration;
@@ -14,7 +16,8 @@ const LIAR: usize = 1;
 const STRATEGIES: [Strategy; 4] =
     [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 4 }];
 
-/// A communicator whose rank [`LIAR`] changes what it says to all, and that counts the room that is asked for.
+/// A communicator whose rank [`LIAR`] changes what it says to all, and that counts the room that is
+/// asked for.
 struct Lying<F> {
     inner: threads::ThreadComm,
     lie: F,
@@ -41,12 +44,21 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
         self.inner.send(destination, tag, message)
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.room = self.room.saturating_add(capacity);
         self.inner.post_recv(source, tag, capacity)
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         self.inner.wait_any(posted, timeout)
     }
 
@@ -84,7 +96,8 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
 
 type Ended = (Result<(), CompositeError>, usize);
 
-/// What each of three ranks gets, and the room it asked for, when rank [`LIAR`] says `rect` in place of where it drew.
+/// What each of three ranks gets, and the room it asked for, when rank [`LIAR`] says `rect` in
+/// place of where it drew.
 fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
     let lie = move |number: usize, said: &mut Vec<u8>| {
         if number == 0 && said.len() == 32 {
@@ -96,7 +109,8 @@ fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
     let results = threads::run(3, |comm| {
         let mut comm = Lying { inner: comm, lie, gathered: 0, room: 0 };
         let (colors, depths) = ([[9_u8; 4]; PIXELS], [0.5; PIXELS]);
-        let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(WIDTH, HEIGHT, &colors, &depths).unwrap();
+        let frame =
+            Frame::<DepthPixel<[u8; 4]>>::with_depth(WIDTH, HEIGHT, &colors, &depths).unwrap();
         let result = Compositor::new(options.clone()).composite(&mut comm, &frame);
         (result.map(|_| ()), comm.room)
     });
@@ -117,7 +131,10 @@ fn check_rect(rect: [u32; 4]) {
             // Three ranks' parts, joined and collected, twice over for all the rounds there are.
             let most = 3 * 2 * (PIXELS * 8 + 4096);
             for (rank, (result, room)) in ends.iter().enumerate() {
-                assert!(*room <= most, "{strategy:?}, {rect:?}: rank {rank} made room of {room} bytes");
+                assert!(
+                    *room <= most,
+                    "{strategy:?}, {rect:?}: rank {rank} made room of {room} bytes"
+                );
                 if !reaches_beyond(rect) {
                     continue;
                 }

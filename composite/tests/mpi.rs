@@ -1,6 +1,8 @@
-//! The program over real transports: Open MPI, MPICH, SimGrid; IceT beside it; and faults that must end in bounded time.
+//! The program over real transports: Open MPI, MPICH, SimGrid; IceT beside it; and faults that must
+//! end in bounded time.
 //!
-//! These are peers (CONTRIBUTING.md): a missing one skips its tests with a note, or fails them where RTSV_REQUIRE_PEERS is set.
+//! These are peers (CONTRIBUTING.md): a missing one skips its tests with a note, or fails them
+//! where RTSV_REQUIRE_PEERS is set.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -35,10 +37,13 @@ fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> ProgramOutput {
     let mut command = Command::new("timeout");
     command.args(["--kill-after=5", &BOUND.as_secs().to_string()]);
     command.arg(env!("CARGO_BIN_EXE_composite")).args(arguments).stdin(Stdio::null());
-    for launcher in ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "COMPOSITE_MPI", "COMPOSITE_MPIRUN"] {
+    for launcher in
+        ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "COMPOSITE_MPI", "COMPOSITE_MPIRUN"]
+    {
         command.env_remove(launcher);
     }
-    // Naming the lines of a backtrace takes seconds on a busy machine, longer than the waits that are tested here.
+    // Naming the lines of a backtrace takes seconds on a busy machine, longer than the waits that
+    // are tested here.
     command.env("RUST_BACKTRACE", "0");
     command.envs(variables.iter().copied());
     let Output { status, stdout, stderr } = command.output().expect("coreutils' timeout runs");
@@ -49,22 +54,34 @@ fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> ProgramOutput {
     ProgramOutput { code: status.code(), stdout, text, took }
 }
 
-/// `composite check` in groups of `counts` ranks, all in one launch of as many as the largest needs: every strategy, scene and size, with depth and
-/// blended. With `hard`, the hard cases as well.
-fn check(counts: &[usize], hard: bool, more: &[&str], variables: &[(&str, &Path)], transport: &str) {
+/// `composite check` in groups of `counts` ranks, all in one launch of as many as the largest
+/// needs: every strategy, scene and size, with depth and blended. With `hard`, the hard cases as
+/// well.
+fn check(
+    counts: &[usize],
+    hard: bool,
+    more: &[&str],
+    variables: &[(&str, &Path)],
+    transport: &str,
+) {
     let ranks = counts.iter().max().expect("a count").to_string();
     let list = counts.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
     let mut arguments = [&["check", "--json", "-n", &ranks, "--counts", &list], more].concat();
     arguments.extend(hard.then_some("--hard"));
     let ran = run(&arguments, variables);
     assert_eq!(ran.code, Some(0), "{arguments:?}: {}", ran.text);
-    let checked: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    let checked: serde_json::Value =
+        serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
     let number = |key: &str| checked[key].as_u64().unwrap_or_else(|| panic!("{key} in {checked}"));
     assert_eq!(checked["ranks"].to_string(), ranks);
     assert!(checked["transport"].as_str().is_some_and(|t| t.contains(transport)), "{checked}");
-    // All processes of a launch share memory: they merge each frame there, and direct send is checked by messages besides. Groups of some send messages.
+    // All processes of a launch share memory: they merge each frame there, and direct send is
+    // checked by messages besides. Groups of some send messages.
     let besides = if arguments.contains(&"--mpi") { 24 } else { 0 };
-    assert_eq!((number("images"), number("images_differ")), (120 * counts.len() as u64 + besides, 0));
+    assert_eq!(
+        (number("images"), number("images_differ")),
+        (120 * counts.len() as u64 + besides, 0)
+    );
     // Equal depths alone are composited a hundred times or a thousand for each number of ranks.
     assert_eq!(number("hard_images") > 100 * counts.len() as u64, hard, "{checked}");
     assert_eq!(number("hard_images_differ"), 0);
@@ -85,8 +102,15 @@ fn open_mpi_carries_every_strategy_to_the_bits_of_the_reference() {
 #[test]
 fn open_mpi_carries_the_hard_cases_to_the_bits_of_the_reference() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
-    // Few ranks and repeats, because ranks share this machine's processors; between threads there are a thousand.
-    check(&[2, 3], true, &["--mpi", "--repeats", "100"], &[("COMPOSITE_MPIRUN", &mpirun)], "Open MPI");
+    // Few ranks and repeats, because ranks share this machine's processors; between threads there
+    // are a thousand.
+    check(
+        &[2, 3],
+        true,
+        &["--mpi", "--repeats", "100"],
+        &[("COMPOSITE_MPIRUN", &mpirun)],
+        "Open MPI",
+    );
 }
 
 #[test]
@@ -105,17 +129,25 @@ fn messages_cut_into_chunks_arrive_whole_and_in_order() {
     }
 }
 
-/// The shared library if cargo has made it with this test (`cargo test --workspace` does); else the program makes it.
+/// The shared library if cargo has made it with this test (`cargo test --workspace` does); else the
+/// program makes it.
 fn simulated_program() -> Vec<(&'static str, PathBuf)> {
     let program = Path::new(env!("CARGO_BIN_EXE_composite"));
     let folder = program.parent().expect("a program is in a folder");
-    let places = ["libcomposite_smpi.so", "examples/libcomposite_smpi.so"].map(|name| folder.join(name));
-    places.into_iter().find(|p| p.is_file()).map(|p| ("COMPOSITE_SMPI_LIBRARY", p)).into_iter().collect()
+    let places =
+        ["libcomposite_smpi.so", "examples/libcomposite_smpi.so"].map(|name| folder.join(name));
+    places
+        .into_iter()
+        .find(|p| p.is_file())
+        .map(|p| ("COMPOSITE_SMPI_LIBRARY", p))
+        .into_iter()
+        .collect()
 }
 
 #[test]
 fn the_shared_library_for_smpirun_exports_main() {
-    // `cargo test` makes it beside this test; a test that was asked for alone is not followed by it.
+    // `cargo test` makes it beside this test; a test that was asked for alone is not followed by
+    // it.
     let Some((_, library)) = simulated_program().pop() else {
         eprintln!("SKIPPED: cargo has not made the example composite_smpi");
         return;
@@ -131,13 +163,13 @@ fn simulated_ranks_carry_every_strategy_to_the_bits_of_the_reference() {
         return;
     }
     let library = simulated_program();
-    let variables: Vec<(&str, &Path)> = library.iter().map(|(name, path)| (*name, path.as_path())).collect();
+    let variables: Vec<(&str, &Path)> =
+        library.iter().map(|(name, path)| (*name, path.as_path())).collect();
     check(&[3], true, &["--smpi", "--repeats", "100"], &variables, "SMPI");
     check(&[16], false, &["--smpi"], &variables, "SMPI");
 }
 
-// ---- IceT -------------------------------------------------------------------------------------------------------
-
+// ---- IceT ---------------------------------------------------------------------------------------
 /// Runs `composite compare` and checks what it prints.
 fn compare(more: &[&str], variables: &[(&str, &Path)]) {
     let arguments = [&["compare", "--json", "--size", "200", "--frames", "2"], more].concat();
@@ -151,8 +183,14 @@ fn compare(more: &[&str], variables: &[(&str, &Path)]) {
     for row in rows {
         assert_eq!(row["pixels_differ"].as_u64(), Some(0), "{arguments:?}: {row}");
         let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
-        assert!((number("rival_ms") / number("ours_ms") - number("ratio")).abs() < 1e-9 * number("ratio"));
-        assert!(["bswap", "radix-k", "radix-kr", "tree"].contains(&row["rival"].as_str().expect("rival")));
+        assert!(
+            (number("rival_ms") / number("ours_ms") - number("ratio")).abs()
+                < 1e-9 * number("ratio")
+        );
+        assert!(
+            ["bswap", "radix-k", "radix-kr", "tree"]
+                .contains(&row["rival"].as_str().expect("rival"))
+        );
         assert!(row["ranks"].is_u64());
     }
 }
@@ -183,12 +221,26 @@ fn open_mpi_in_shared_memory_and_by_messages_gives_the_same_pixels() {
     for (more, strategy) in
         [(&[][..], "SharedMemory"), (&["--messages", "--strategy", "direct"][..], "DirectSend")]
     {
-        // Two numbers of ranks, sizes and formats make one table; in every row the pixels are those of IceT.
-        let lists =
-            ["compare", "--json", "--mpi", "--ranks", "2,3", "--size", "64,130", "--pixels", "depth,blend"];
-        let ran = run(&[&lists[..], &["--scene", "discs,dense", "--frames", "1"], more].concat(), &variables);
+        // Two numbers of ranks, sizes and formats make one table; in every row the pixels are those
+        // of IceT.
+        let lists = [
+            "compare",
+            "--json",
+            "--mpi",
+            "--ranks",
+            "2,3",
+            "--size",
+            "64,130",
+            "--pixels",
+            "depth,blend",
+        ];
+        let ran = run(
+            &[&lists[..], &["--scene", "discs,dense", "--frames", "1"], more].concat(),
+            &variables,
+        );
         assert_eq!(ran.code, Some(0), "{}", ran.text);
-        let all: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+        let all: serde_json::Value =
+            serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
         let rows = all["rows"].as_array().expect("rows");
         assert_eq!(rows.len(), 16);
         for row in rows {
@@ -222,19 +274,27 @@ fn icet_on_simulated_ranks_gives_the_same_pixels() {
 fn without_icet_compare_says_so_and_ends_with_2() {
     let ran = run(&["compare", "--threads"], &[("RTSV_ICET", Path::new("no-such-library.so"))]);
     assert_eq!(ran.code, Some(2), "{}", ran.text);
-    assert!(ran.text.contains("IceT was not found") && ran.text.contains("paraview"), "{}", ran.text);
+    assert!(
+        ran.text.contains("IceT was not found") && ran.text.contains("paraview"),
+        "{}",
+        ran.text
+    );
 }
 
 #[test]
 fn without_a_launcher_mpi_says_so_and_ends_with_2() {
     let ran = run(&["check", "--mpi"], &[("COMPOSITE_MPIRUN", Path::new("no-such-mpirun"))]);
     assert_eq!(ran.code, Some(2), "{}", ran.text);
-    assert!(ran.text.contains("no-such-mpirun") && ran.text.contains("openmpi-bin"), "{}", ran.text);
+    assert!(
+        ran.text.contains("no-such-mpirun") && ran.text.contains("openmpi-bin"),
+        "{}",
+        ran.text
+    );
 }
 
-// ---- Faults -----------------------------------------------------------------------------------------------------
-
-/// Of fault `order`, where ranks share memory. Messages tell a barrier from a meeting by their tags, and end with a timeout.
+// ---- Faults -------------------------------------------------------------------------------------
+/// Of fault `order`, where ranks share memory. Messages tell a barrier from a meeting by their
+/// tags, and end with a timeout.
 #[cfg(target_os = "linux")]
 const OUT_OF_STEP: &str = "ranks 0, 1 came to an all-gather and rank 2 to a barrier";
 #[cfg(not(target_os = "linux"))]
@@ -245,7 +305,11 @@ fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &st
     let arguments = ["check", transport, "-n", "3", "--timeout", "2", "--fault", kind];
     let ran = run(&arguments, variables);
     assert_ne!(ran.code, Some(0), "{kind}: {}", ran.text);
-    assert!(words.iter().any(|words| ran.text.contains(words)), "{kind}: none of {words:?} in\n{}", ran.text);
+    assert!(
+        words.iter().any(|words| ran.text.contains(words)),
+        "{kind}: none of {words:?} in\n{}",
+        ran.text
+    );
     assert!(ran.took < Duration::from_secs(60), "{kind} took {:?}", ran.took);
 }
 
@@ -256,7 +320,12 @@ fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
     // The launcher's words, or ours.
     fault("killed", &["signal 9", "Killed"], &variables, "--mpi");
     fault("stalled", &["message from rank 2", "rank 2 did not come"], &variables, "--mpi");
-    fault("panic", &["rank 2 ended the group: this rank panicked", "on purpose"], &variables, "--mpi");
+    fault(
+        "panic",
+        &["rank 2 ended the group: this rank panicked", "on purpose"],
+        &variables,
+        "--mpi",
+    );
     fault("size", &["another size", "unusable message"], &variables, "--mpi");
     fault("order", &[OUT_OF_STEP], &variables, "--mpi");
     fault("leaves", &["rank 2 on", "had enough"], &variables, "--mpi");
@@ -267,7 +336,8 @@ fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
 fn ranks_that_read_late_do_not_take_a_barrier_for_what_they_expect() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
     // As on a busy machine: the others read what was said at a meeting when rank 2 is long past it.
-    let late = ["check", "--mpi", "-n", "3", "--timeout", "5", "--linger-ms", "300", "--fault", "order"];
+    let late =
+        ["check", "--mpi", "-n", "3", "--timeout", "5", "--linger-ms", "300", "--fault", "order"];
     let ran = run(&late, &[("COMPOSITE_MPIRUN", &mpirun)]);
     assert_ne!(ran.code, Some(0), "{}", ran.text);
     assert!(ran.text.contains(OUT_OF_STEP), "{}", ran.text);
@@ -289,21 +359,23 @@ fn a_rank_that_works_for_longer_than_the_timeout_and_says_so_is_waited_for() {
         let Some(mpirun) = peer(variable) else { continue };
         slow("--mpi", &[("COMPOSITE_MPIRUN", &mpirun)]);
         // By messages, between machines: rank 0 waits for rank 1, which waits for rank 2.
-        let ran = launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "slow"]);
+        let ran =
+            launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "slow"]);
         assert_eq!(ran.code, Some(0), "{}", ran.text);
-        let stalled = launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "stalled"]);
+        let stalled =
+            launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "stalled"]);
         assert_ne!(stalled.code, Some(0), "{}", stalled.text);
         assert!(stalled.text.contains("rank 2"), "{}", stalled.text);
         assert!(stalled.took < Duration::from_secs(60), "{:?}", stalled.took);
     }
 }
 
-// ---- Machines ---------------------------------------------------------------------------------------------------
-
+// ---- Machines -----------------------------------------------------------------------------------
 /// Shell words that have every rank say that it is on a machine of its own.
 const APART: [&str; 1] = ["COMPOSITE_NODE=of-${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"];
 
-/// `composite check` started by a launcher with these arguments, each rank in a shell that sets (`A=b`) or unsets (`-u A`) variables.
+/// `composite check` started by a launcher with these arguments, each rank in a shell that sets
+/// (`A=b`) or unsets (`-u A`) variables.
 fn launched(
     mpirun: &Path,
     of_launcher: &[&str],
@@ -348,7 +420,8 @@ fn launched(
 /// Machines that the ranks found, and images that were composited, all of which must be right.
 fn nodes_and_images(ran: &ProgramOutput) -> (u64, u64) {
     assert_eq!(ran.code, Some(0), "{}", ran.text);
-    let checked: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    let checked: serde_json::Value =
+        serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
     assert_eq!(checked["images_differ"].as_u64(), Some(0), "{checked}");
     (checked["nodes"].as_u64().expect("nodes"), checked["images"].as_u64().expect("images"))
 }
@@ -358,7 +431,8 @@ fn ranks_of_one_machine_find_each_other_without_the_variables_of_their_launcher(
     // Merged in memory besides, which only ranks of one machine can.
     let in_memory = if cfg!(target_os = "linux") { 24 } else { 0 };
     if let Some(mpirun) = peer("RTSV_MPIRUN") {
-        let none = ["-u OMPI_COMM_WORLD_LOCAL_SIZE -u OMPI_COMM_WORLD_LOCAL_RANK -u OMPI_COMM_WORLD_RANK"];
+        let none =
+            ["-u OMPI_COMM_WORLD_LOCAL_SIZE -u OMPI_COMM_WORLD_LOCAL_RANK -u OMPI_COMM_WORLD_RANK"];
         let none = [none[0], "-u OMPI_COMM_WORLD_SIZE COMPOSITE_MPI=openmpi"];
         let ran = launched(&mpirun, &[], &["-n", "3"], &none, &[]);
         assert_eq!(nodes_and_images(&ran), (1, 120 + in_memory));
@@ -382,7 +456,8 @@ fn ranks_of_two_machines_do_not_believe_that_they_share_one() {
     }
     if let Some(mpirun) = peer("RTSV_MPIRUN") {
         // Two and one.
-        let halves = ["-u OMPI_COMM_WORLD_LOCAL_SIZE COMPOSITE_NODE=of-$((OMPI_COMM_WORLD_RANK/2))"];
+        let halves =
+            ["-u OMPI_COMM_WORLD_LOCAL_SIZE COMPOSITE_NODE=of-$((OMPI_COMM_WORLD_RANK/2))"];
         let ran = launched(&mpirun, &[], &["-n", "3"], &halves, &[]);
         assert_eq!(nodes_and_images(&ran), (2, 120));
     }
@@ -414,8 +489,7 @@ fn faults_between_threads_end_with_a_named_error_in_bounded_time() {
     fault("corrupt", &["checksum", "unusable message from rank 2"], &[], "--threads");
 }
 
-// ---- The other commands -------------------------------------------------------------------------------------------
-
+// ---- The other commands -------------------------------------------------------------------------
 #[test]
 fn doctor_names_what_there_is_and_a_cure_for_what_is_not() {
     let ran = run(&["doctor"], &[("RTSV_ICET", Path::new("no-such-library.so"))]);
@@ -436,11 +510,13 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
     };
     let out = folder.to_str().expect("a path in UTF-8");
     let demo = |more: &[&str]| {
-        let ran = run(&[&["demo", "--size", "40", "--frames", "1", "--out", out], more].concat(), &[]);
+        let ran =
+            run(&[&["demo", "--size", "40", "--frames", "1", "--out", out], more].concat(), &[]);
         (ran.code, ran.text)
     };
     let triangle = |a: &str| format!("v {a}\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 2 3 4\n");
-    // ---- Strange, and shown: more ranks than triangles, a corner that is no place, far from everything, without any size.
+    // ---- Strange, and shown: more ranks than triangles, a corner that is no place, far from
+    // everything, without any size.
     let (code, text) = demo(&["-n", "64", "--data", &file("few.obj", &triangle("0 0 0"))]);
     assert_eq!(code, Some(0), "{text}");
     assert!(!text.contains("-0.00"), "no time is less than nothing: {text}");
@@ -482,9 +558,11 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
 fn demo_draws_a_bar_for_every_rank() {
     let folder = std::env::temp_dir().join(format!("composite-demo-{}", std::process::id()));
     let out = folder.to_str().expect("a path in UTF-8");
-    let ran = run(&["demo", "-n", "5", "--size", "120", "--frames", "1", "--json", "--out", out], &[]);
+    let ran =
+        run(&["demo", "-n", "5", "--size", "120", "--frames", "1", "--json", "--out", out], &[]);
     assert_eq!(ran.code, Some(0), "{}", ran.text);
-    let shown: serde_json::Value = serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+    let shown: serde_json::Value =
+        serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
     assert_eq!(shown["ranks"].as_array().map(Vec::len), Some(5));
     let plot = std::fs::read_to_string(folder.join("composite_demo.svg")).expect("the plot");
     let png = std::fs::read(folder.join("composite_demo.png")).expect("the picture");
@@ -500,7 +578,9 @@ fn demo_of(data: &str, more: &[&str], variables: &[(&str, &Path)]) -> (Vec<u8>, 
     let name = format!("composite-demo-{}-{}", std::process::id(), more.join("").replace('-', "_"));
     let folder = std::env::temp_dir().join(name);
     let out = folder.to_str().expect("a path in UTF-8");
-    let common = ["demo", "--data", data, "--grey", "--size", "160", "--frames", "2", "--json", "--out", out];
+    let common = [
+        "demo", "--data", data, "--grey", "--size", "160", "--frames", "2", "--json", "--out", out,
+    ];
     let ran = run(&[&common, more].concat(), variables);
     assert_eq!(ran.code, Some(0), "{}", ran.text);
     let png = std::fs::read(folder.join("composite_demo.png")).expect("the picture");
@@ -539,7 +619,12 @@ fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_on
     assert!(alone == parts, "the pictures differ");
     assert!(four["transport"].as_str().is_some_and(|t| t.contains("Open MPI")), "{four}");
     let triangles = |shown: &serde_json::Value| -> Vec<u64> {
-        shown["ranks"].as_array().expect("ranks").iter().filter_map(|r| r["triangles"].as_u64()).collect()
+        shown["ranks"]
+            .as_array()
+            .expect("ranks")
+            .iter()
+            .filter_map(|r| r["triangles"].as_u64())
+            .collect()
     };
     assert_eq!(triangles(&one), [400]);
     assert_eq!(triangles(&four), [100; 4]);

@@ -1,7 +1,8 @@
-//! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the serial reference.
+//! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the
+//! serial reference.
 use composite::{
-    Color, Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame, Image,
-    Options, PremultipliedPixel, Rect, SimdLevel, composite_serial, composite_shared, f16,
+    Color, Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame,
+    Image, Options, PremultipliedPixel, Rect, SimdLevel, composite_serial, composite_shared, f16,
     shared_memory_group, threads,
 };
 use std::num::NonZeroUsize;
@@ -9,7 +10,8 @@ use std::sync::{Arc, Mutex};
 
 const SIZE: (u32, u32) = (70, 37);
 
-/// One rank's planes, and a rectangle around what it drew (odd ranks only; others leave it to be found).
+/// One rank's planes, and a rectangle around what it drew (odd ranks only; others leave it to be
+/// found).
 struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -25,8 +27,12 @@ fn draw(rank: usize) -> TestFrame {
     };
     let (x0, y0) = (random() % 40, random() % 20);
     let bounds = Rect { x0, y0, x1: x0 + random() % 31, y1: y0 + random() % 18 };
-    let mut drawn =
-        TestFrame { bytes: vec![], floats: vec![], depth: vec![], bounds: (rank % 2 == 1).then_some(bounds) };
+    let mut drawn = TestFrame {
+        bytes: vec![],
+        floats: vec![],
+        depth: vec![],
+        bounds: (rank % 2 == 1).then_some(bounds),
+    };
     for y in 0..SIZE.1 {
         for x in 0..SIZE.0 {
             let inside = bounds.x0 <= x && x < bounds.x1 && bounds.y0 <= y && y < bounds.y1;
@@ -94,7 +100,9 @@ fn over_nodes<P: Composite>(nodes: &[&[Frame<'_, P>]]) -> Vec<u8> {
 
 #[test]
 fn nodes_of_several_ranks_give_the_bits_of_all_ranks() {
-    for sizes in [vec![4], vec![2, 2], vec![1, 3, 2], vec![5, 1], vec![2; 4], vec![1; 5], vec![3, 3, 3]] {
+    for sizes in
+        [vec![4], vec![2, 2], vec![1, 3, 2], vec![5, 1], vec![2; 4], vec![1; 5], vec![3, 3, 3]]
+    {
         let drawn: Vec<TestFrame> = (0..sizes.iter().sum()).map(draw).collect();
         let (z, blended): (Vec<_>, Vec<_>) = drawn.iter().map(|d| (z(d), blended(d))).unzip();
         let (mut z_nodes, mut blended_nodes, mut first) = (Vec::new(), Vec::new(), 0);
@@ -106,19 +114,28 @@ fn nodes_of_several_ranks_give_the_bits_of_all_ranks() {
         let flat = composite_serial(&z).unwrap().to_bytes();
         assert!(over_nodes(&z_nodes) == flat, "depth, nodes of {sizes:?}");
 
-        // Blending: the reference of the nodes' references, which is that of all ranks if all numbers are powers of two.
+        // Blending: the reference of the nodes' references, which is that of all ranks if all
+        // numbers are powers of two.
         let found = over_nodes(&blended_nodes);
-        let of_nodes: Vec<_> = blended_nodes.iter().map(|node| composite_serial(node).unwrap()).collect();
+        let of_nodes: Vec<_> =
+            blended_nodes.iter().map(|node| composite_serial(node).unwrap()).collect();
         let as_frames: Vec<_> = of_nodes
             .iter()
             .map(|image| {
-                Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(SIZE.0, SIZE.1, image.colors()).unwrap()
+                Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(SIZE.0, SIZE.1, image.colors())
+                    .unwrap()
             })
             .collect();
-        assert!(found == composite_serial(&as_frames).unwrap().to_bytes(), "blended, nodes of {sizes:?}");
+        assert!(
+            found == composite_serial(&as_frames).unwrap().to_bytes(),
+            "blended, nodes of {sizes:?}"
+        );
         let equal = sizes.iter().all(|size| *size == sizes[0]);
         if equal && sizes[0].is_power_of_two() && sizes.len().is_power_of_two() {
-            assert!(found == composite_serial(&blended).unwrap().to_bytes(), "blended, nodes of {sizes:?}");
+            assert!(
+                found == composite_serial(&blended).unwrap().to_bytes(),
+                "blended, nodes of {sizes:?}"
+            );
         }
     }
 }
@@ -142,11 +159,17 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
         let frames: Vec<_> = drawn.iter().map(z).collect();
         let images: Vec<Arc<Image<DepthPixel<[u8; 4]>>>> = drawn
             .iter()
-            .map(|d| Arc::new(Image::from_planes(SIZE.0, SIZE.1, d.bytes.clone(), d.depth.clone()).unwrap()))
+            .map(|d| {
+                Arc::new(
+                    Image::from_planes(SIZE.0, SIZE.1, d.bytes.clone(), d.depth.clone()).unwrap(),
+                )
+            })
             .collect();
         let expected = composite_serial(&frames).unwrap();
-        let members: Vec<_> =
-            shared_memory_group(ranks).into_iter().map(|shared_rank| Mutex::new(Some(shared_rank))).collect();
+        let members: Vec<_> = shared_memory_group(ranks)
+            .into_iter()
+            .map(|shared_rank| Mutex::new(Some(shared_rank)))
+            .collect();
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
             let mut shared_rank = members[rank].lock().unwrap().take().unwrap();
@@ -159,7 +182,8 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
                     ..Options::default()
                 };
                 let bounds = frames[rank].bounds();
-                let done = shared_rank.composite(&mut comm, &images[rank], bounds, &options).unwrap();
+                let done =
+                    shared_rank.composite(&mut comm, &images[rank], bounds, &options).unwrap();
                 assert_eq!(done.report.nan_depths, frames[rank].nan_depths());
                 assert_eq!(done.image.is_some(), rank == root);
                 if let Some(image) = done.image {
@@ -175,10 +199,13 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
 
 #[test]
 fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
-    let image =
-        Arc::new(Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap());
-    let members: Vec<_> =
-        shared_memory_group(2).into_iter().map(|shared_rank| Mutex::new(Some(shared_rank))).collect();
+    let image = Arc::new(
+        Image::<PremultipliedPixel<[u8; 4]>>::from_planes(1, 1, vec![[1; 4]], vec![]).unwrap(),
+    );
+    let members: Vec<_> = shared_memory_group(2)
+        .into_iter()
+        .map(|shared_rank| Mutex::new(Some(shared_rank)))
+        .collect();
     let results = threads::run(2, |mut comm| {
         let mut shared_rank = members[comm.rank()].lock().unwrap().take().unwrap();
         if comm.rank() == 1 {
@@ -191,12 +218,16 @@ fn a_table_names_what_it_cannot_do_and_who_did_not_come() {
     let mut comm = threads::group(1).remove(0);
     let mut shared_rank = shared_memory_group(1).remove(0);
     let options = Options { destination: Destination::Distributed, ..Options::default() };
-    let error = shared_rank.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
+    let error =
+        shared_rank.composite(&mut comm, &image, Rect::of_size(1, 1), &options).unwrap_err();
     assert!(matches!(error, CompositeError::Options(_)));
 }
 
 /// Frames of any format: planes of random values everywhere, of which only rectangles count.
-fn random_images<P: Composite>(ranks: usize, (width, height): (u32, u32)) -> Vec<(Arc<Image<P>>, Rect)> {
+fn random_images<P: Composite>(
+    ranks: usize,
+    (width, height): (u32, u32),
+) -> Vec<(Arc<Image<P>>, Rect)> {
     let mut seed = 977_u64;
     let mut random = move |below: u32| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -236,7 +267,12 @@ fn random_images<P: Composite>(ranks: usize, (width, height): (u32, u32)) -> Vec
             let bounds = match rank % 4 {
                 0 => Rect::of_size(width, height),
                 3 if rank % 8 == 3 => Rect::EMPTY,
-                _ => Rect { x0, y0, x1: x0 + 1 + random(width - x0), y1: y0 + 1 + random(height - y0) },
+                _ => Rect {
+                    x0,
+                    y0,
+                    x1: x0 + 1 + random(width - x0),
+                    y1: y0 + 1 + random(height - y0),
+                },
             };
             let depths = if P::HAS_DEPTH { depths } else { Vec::new() };
             (Arc::new(Image::from_planes(width, height, colors, depths).unwrap()), bounds)
@@ -245,26 +281,37 @@ fn random_images<P: Composite>(ranks: usize, (width, height): (u32, u32)) -> Vec
 }
 
 fn check_levels<P: Composite>(frame: impl for<'a> Fn(&'a Image<P>) -> Frame<'a, P> + Sync) {
-    for (ranks, size) in [(3, (64, 5)), (9, (200, 19)), (70, (331, 7)), (5, (63, 3)), (6, (1, 40))] {
+    for (ranks, size) in [(3, (64, 5)), (9, (200, 19)), (70, (331, 7)), (5, (63, 3)), (6, (1, 40))]
+    {
         let images = random_images::<P>(ranks, size);
         let order: Vec<usize> = (0..ranks).map(|place| (place * 2 + 1) % ranks).collect();
         let order = if ranks % 2 == 1 { order } else { (0..ranks).rev().collect() };
-        let in_order: Vec<Frame<'_, P>> =
-            order.iter().map(|&rank| frame(&images[rank].0).with_bounds(images[rank].1).unwrap()).collect();
+        let in_order: Vec<Frame<'_, P>> = order
+            .iter()
+            .map(|&rank| frame(&images[rank].0).with_bounds(images[rank].1).unwrap())
+            .collect();
         let expected = composite_serial(&in_order).unwrap();
-        let members: Vec<_> =
-            shared_memory_group(ranks).into_iter().map(|shared_rank| Mutex::new(Some(shared_rank))).collect();
+        let members: Vec<_> = shared_memory_group(ranks)
+            .into_iter()
+            .map(|shared_rank| Mutex::new(Some(shared_rank)))
+            .collect();
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
             let mut shared_rank = members[rank].lock().unwrap().take().unwrap();
             for level in SimdLevel::available() {
-                let options = Options { order: Some(order.clone()), simd: Some(level), ..Options::default() };
-                let done =
-                    shared_rank.composite(&mut comm, &images[rank].0, images[rank].1, &options).unwrap();
+                let options =
+                    Options { order: Some(order.clone()), simd: Some(level), ..Options::default() };
+                let done = shared_rank
+                    .composite(&mut comm, &images[rank].0, images[rank].1, &options)
+                    .unwrap();
                 let nan = frame(&images[rank].0).with_bounds(images[rank].1).unwrap().nan_depths();
                 assert_eq!(done.report.nan_depths, nan, "{level:?}, rank {rank} of {ranks}");
                 if let Some(image) = done.image {
-                    assert!(image.to_bytes() == expected.to_bytes(), "{}, {level:?}, {ranks} ranks", P::NAME);
+                    assert!(
+                        image.to_bytes() == expected.to_bytes(),
+                        "{}, {level:?}, {ranks} ranks",
+                        P::NAME
+                    );
                     shared_rank.recycle(image);
                 }
             }

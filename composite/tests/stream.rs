@@ -1,7 +1,8 @@
-//! Tiles handed in while rendering goes on: the same bits, overlap that can be seen in the order of events, and named errors.
+//! Tiles handed in while rendering goes on: the same bits, overlap that can be seen in the order of
+//! events, and named errors.
 use composite::{
-    Communicator, CompositeError, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, Rect, Strategy,
-    composite_serial, threads,
+    Communicator, CompositeError, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, Rect,
+    Strategy, composite_serial, threads,
 };
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
@@ -70,8 +71,10 @@ fn a_streamed_frame_has_the_bits_of_the_serial_reference_whatever_the_order_of_t
             drawn.iter().map(|(c, d)| Frame::with_depth(W, H, c, d).unwrap()).collect();
         let blended: Vec<Frame<'_, PremultipliedPixel<[u8; 4]>>> =
             drawn.iter().map(|(c, _)| Frame::premultiplied(W, H, c).unwrap()).collect();
-        let expected =
-            (composite_serial(&z).unwrap().to_bytes(), composite_serial(&blended).unwrap().to_bytes());
+        let expected = (
+            composite_serial(&z).unwrap().to_bytes(),
+            composite_serial(&blended).unwrap().to_bytes(),
+        );
         let results = threads::run(ranks, |mut comm| {
             let rank = comm.rank();
             let options = Options { slice_px: Some(500), ..Options::default() };
@@ -86,11 +89,15 @@ fn a_streamed_frame_has_the_bits_of_the_serial_reference_whatever_the_order_of_t
                     // Some tiles are left to the end.
                     if index >= skipped {
                         stream
-                            .tile_done(&Frame::with_depth(W, H, &planes.0, &planes.1).unwrap(), tile)
+                            .tile_done(
+                                &Frame::with_depth(W, H, &planes.0, &planes.1).unwrap(),
+                                tile,
+                            )
                             .unwrap();
                     }
                 }
-                let done = stream.finish(&Frame::with_depth(W, H, &planes.0, &planes.1).unwrap()).unwrap();
+                let done =
+                    stream.finish(&Frame::with_depth(W, H, &planes.0, &planes.1).unwrap()).unwrap();
                 images.push(done.image.map(|image| image.to_bytes()));
                 let mut stream = blender.stream(&mut comm, (W, H), bounds_of(rank)).unwrap();
                 let frame = Frame::premultiplied(W, H, &planes.0).unwrap();
@@ -109,7 +116,8 @@ fn a_streamed_frame_has_the_bits_of_the_serial_reference_whatever_the_order_of_t
     }
 }
 
-/// Rank 1 renders its last tile only after rank 0 has completed slices: without overlap both would wait for each other.
+/// Rank 1 renders its last tile only after rank 0 has completed slices: without overlap both would
+/// wait for each other.
 #[test]
 fn slices_are_complete_at_their_owner_before_the_sender_has_rendered_its_last_tile() {
     let (tell, told) = mpsc::channel::<()>();

@@ -1,5 +1,6 @@
-//! Writes the middle slices of a flow's fields as PNG, grey from the field's smallest to its largest value, magenta where
-//! there is none: `cargo run --release -p datasets --example flow_slices -- helium-plume small DIRECTORY`.
+//! Writes the middle slices of a flow's fields as PNG, grey from the field's smallest to its
+//! largest value, magenta where there is none: `cargo run --release -p datasets --example
+//! flow_slices -- helium-plume small DIRECTORY`.
 
 use datasets::catalogue::flows::find;
 use datasets::generate::flow::{Fields, Flow};
@@ -12,7 +13,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [name, size, directory] = arguments.as_slice() else {
         return Err("usage: flow_slices NAME SIZE DIRECTORY".into());
     };
-    let text = |a: &std::ffi::OsString| a.to_str().map(str::to_string).ok_or(format!("{a:?} is not UTF-8"));
+    let text = |a: &std::ffi::OsString| {
+        a.to_str().map(str::to_string).ok_or(format!("{a:?} is not UTF-8"))
+    };
     let (name, size) = (&text(name)?, &text(size)?);
     let mut out = std::io::stdout().lock();
     let start = std::time::Instant::now();

@@ -1,11 +1,14 @@
 //! From the two OpenFOAM cases of `datasets/openfoam` to files for schlieren pictures:
 //!
-//! * `openfoam_slice slice internal.vtu cone20_mach3/slice.vts`: the cells that foamToVTK writes as a lattice, density and
-//!   temperature only, compressed;
-//! * `openfoam_slice revolve slice.vts 128 cone.vti`, `openfoam_slice extrude slice.vts 128 wedge.vti`: the whole flow.
+//! * `openfoam_slice slice internal.vtu cone20_mach3/slice.vts`: the cells that foamToVTK writes as
+//!   a lattice, density and temperature only, compressed;
+//! * `openfoam_slice revolve slice.vts 128 cone.vti`, `openfoam_slice extrude slice.vts 128
+//!   wedge.vti`: the whole flow.
 
 use datasets::generate::swept_slice::{Slice, Sweep};
-use datasets::model::{Attributes, DataArray, Dataset, Points, StructuredGrid, UnstructuredGrid, Values};
+use datasets::model::{
+    Attributes, DataArray, Dataset, Points, StructuredGrid, UnstructuredGrid, Values,
+};
 use datasets::read::open;
 use datasets::write::{VtkOptions, write_vtk};
 use glam::{DVec2, UVec3};
@@ -20,8 +23,10 @@ const TOP_M: f64 = 0.060;
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
-    let text = |a| <&str>::try_from(a).map_err(|e| format!("argument {a:?} is no text ({e}): use UTF-8"));
-    let arguments: Vec<&str> = arguments.iter().map(|a| text(a.as_os_str())).collect::<Result<_, _>>()?;
+    let text =
+        |a| <&str>::try_from(a).map_err(|e| format!("argument {a:?} is no text ({e}): use UTF-8"));
+    let arguments: Vec<&str> =
+        arguments.iter().map(|a| text(a.as_os_str())).collect::<Result<_, _>>()?;
     let options = VtkOptions { compress: true, ..Default::default() };
     match arguments.as_slice() {
         ["slice", from, to] => {
@@ -33,12 +38,15 @@ fn main() -> Result<(), Failure> {
         [how @ ("revolve" | "extrude"), from, points, to] => {
             let slice = Slice::from_dataset(&dataset(from)?)?;
             let n: u32 = points.parse()?;
-            let sweep = if *how == "revolve" { Sweep::Revolve } else { Sweep::Extrude { span_m: 0.05 } };
+            let sweep =
+                if *how == "revolve" { Sweep::Revolve } else { Sweep::Extrude { span_m: 0.05 } };
             write_vtk(to, &slice.flow(sweep, UVec3::splat(n))?.into_dataset(), options)?;
         }
         _ => {
             return Err(
-                "usage: openfoam_slice slice IN.vtu OUT.vts | revolve|extrude IN.vts POINTS OUT.vti".into()
+                "usage: openfoam_slice slice IN.vtu OUT.vts | revolve|extrude IN.vts POINTS \
+                 OUT.vti"
+                    .into(),
             );
         }
     }
@@ -49,10 +57,12 @@ fn dataset(path: &str) -> Result<Dataset, Failure> {
     Ok(open(path)?.dataset()?.clone())
 }
 
-/// blockMesh numbers cells by block, then across, x fastest. Cells are checked to be where that puts them.
+/// blockMesh numbers cells by block, then across, x fastest. Cells are checked to be where that
+/// puts them.
 fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
     let nx: usize = BLOCKS.iter().sum();
-    // A plane mesh has two layers of points at constant z; an axisymmetric one is a wedge, whose points have their radius.
+    // A plane mesh has two layers of points at constant z; an axisymmetric one is a wedge, whose
+    // points have their radius.
     let depth = cells.points.get(0).z.abs();
     let plane = (0..cells.points.len()).all(|p| (cells.points.get(p).z.abs() - depth).abs() < 1e-7);
     let middle = |c: usize| {
@@ -64,7 +74,8 @@ fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
             .sum();
         sum / ids.len() as f64
     };
-    // The body's height: from the lowest cells above the afterbody, whose middle is half a cell above it.
+    // The body's height: from the lowest cells above the afterbody, whose middle is half a cell
+    // above it.
     let flat = middle(ACROSS * (BLOCKS[0] + BLOCKS[1])).y;
     let half_cell = (TOP_M - flat) / (2 * ACROSS - 1) as f64;
     let height = flat - half_cell;
@@ -74,7 +85,8 @@ fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
             first += BLOCKS[block];
             block += 1;
         }
-        let x = X_M[block] + (X_M[block + 1] - X_M[block]) * (i - first) as f64 / BLOCKS[block] as f64;
+        let x =
+            X_M[block] + (X_M[block + 1] - X_M[block]) * (i - first) as f64 / BLOCKS[block] as f64;
         let low = height * (x / X_M[2]).clamp(0.0, 1.0);
         [x as f32, (low + (TOP_M - low) * j as f64 / ACROSS as f64) as f32, 0.0]
     };
@@ -84,9 +96,11 @@ fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
         for j in 0..ACROSS {
             for i in first..first + n {
                 order[j * nx + i] = cell;
-                let corners = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].map(|(i, j)| point(i, j));
+                let corners =
+                    [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].map(|(i, j)| point(i, j));
                 let expected =
-                    corners.map(|p| DVec2::new(p[0] as f64, p[1] as f64)).iter().sum::<DVec2>() / 4.0;
+                    corners.map(|p| DVec2::new(p[0] as f64, p[1] as f64)).iter().sum::<DVec2>()
+                        / 4.0;
                 // Collapsed cells at the axis have their mean elsewhere.
                 let tolerance = if j == 0 { 2e-4 } else { 1e-5 };
                 if middle(cell).distance(expected) > tolerance {

@@ -3,15 +3,17 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes a file under a temporary name beside `path` and renames it, so that neither a crash nor a second process
-/// leaves or sees half a file. `write` gets a buffered writer.
+/// Writes a file under a temporary name beside `path` and renames it, so that neither a crash nor a
+/// second process leaves or sees half a file. `write` gets a buffered writer.
 pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let name =
-        path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
-    // The process id keeps two processes that write the same file apart; the last one to finish wins.
+    let name = path
+        .file_name()
+        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
+    // The process id keeps two processes that write the same file apart; the last one to finish
+    // wins.
     let mut temporary_name = name.to_os_string();
     temporary_name.push(format!(".{}.partial", std::process::id()));
     let temporary = path.with_file_name(temporary_name);
@@ -22,7 +24,8 @@ pub(crate) fn write_atomically(
         std::fs::rename(&temporary, path)
     })();
     if result.is_err() {
-        // The first error is the one to report; a leftover that cannot be removed changes nothing about it.
+        // The first error is the one to report; a leftover that cannot be removed changes nothing
+        // about it.
         let _ = std::fs::remove_file(&temporary);
     }
     result

@@ -1,8 +1,9 @@
 //! Generated meshes kept on disk, so that a benchmark of 300 million triangles generates them once.
 //!
-//! The directory is `RTSV_CACHE`, else `rtsv` in the user's cache directory (`XDG_CACHE_HOME`, else `~/.cache`). Files may be
-//! deleted at any time. A file that is damaged, of another version or of another machine's byte order is regenerated, and the
-//! caller is told so; a full disk costs the cache, not the mesh.
+//! The directory is `RTSV_CACHE`, else `rtsv` in the user's cache directory (`XDG_CACHE_HOME`, else
+//! `~/.cache`). Files may be deleted at any time. A file that is damaged, of another version or of
+//! another machine's byte order is regenerated, and the caller is told so; a full disk costs the
+//! cache, not the mesh.
 //!
 //! ```
 //! use datasets::cache::{MeshCache, Origin};
@@ -70,13 +71,16 @@ impl MeshCache {
         MeshCache { directory: directory.into() }
     }
 
-    /// The user's cache, as the module's documentation says. `None` when the environment names no place for it (neither
-    /// `RTSV_CACHE` nor `XDG_CACHE_HOME` nor `HOME` is set).
+    /// The user's cache, as the module's documentation says. `None` when the environment names no
+    /// place for it (neither `RTSV_CACHE` nor `XDG_CACHE_HOME` nor `HOME` is set).
     pub fn from_environment() -> Option<Self> {
         // Empty variables count as unset, as the XDG specification wants.
-        let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+        let variable =
+            |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
         variable("RTSV_CACHE")
-            .or_else(|| variable("XDG_CACHE_HOME").filter(|p| p.is_absolute()).map(|p| p.join("rtsv")))
+            .or_else(|| {
+                variable("XDG_CACHE_HOME").filter(|p| p.is_absolute()).map(|p| p.join("rtsv"))
+            })
             .or_else(|| variable("HOME").map(|p| p.join(".cache").join("rtsv")))
             .map(MeshCache::at)
     }
@@ -91,12 +95,18 @@ impl MeshCache {
         self.directory.join(format!("{readable}-{:08x}-v{}.mesh", crc.sum(), format::VERSION))
     }
 
-    /// The mesh of `key`: read when it is there and whole, else generated and stored. `key` must name everything that the
-    /// mesh depends on (generator, parameters, attributes).
-    pub fn mesh<E>(&self, key: &str, generate: impl FnOnce() -> Result<TriMesh, E>) -> Result<CachedMesh, E> {
+    /// The mesh of `key`: read when it is there and whole, else generated and stored. `key` must
+    /// name everything that the mesh depends on (generator, parameters, attributes).
+    pub fn mesh<E>(
+        &self,
+        key: &str,
+        generate: impl FnOnce() -> Result<TriMesh, E>,
+    ) -> Result<CachedMesh, E> {
         let path = self.path(key);
         let origin = match read(&path, key) {
-            Ok(Some(mesh)) => return Ok(CachedMesh { mesh, origin: Origin::Read, not_stored: None }),
+            Ok(Some(mesh)) => {
+                return Ok(CachedMesh { mesh, origin: Origin::Read, not_stored: None });
+            }
             Ok(None) => Origin::Generated,
             Err(reason) => Origin::Regenerated(format!("{}: {reason}", path.display())),
         };
@@ -130,7 +140,8 @@ mod tests {
     fn full_mesh() -> TriMesh {
         let mut m = closed_wavelet(15, 150.0).unwrap();
         m.origin = DVec3::new(1e7, -2.5, 0.1);
-        m.scalars = Some(Attribute::per_vertex((0..m.positions.len()).map(|i| i as f32 * 0.5).collect()));
+        m.scalars =
+            Some(Attribute::per_vertex((0..m.positions.len()).map(|i| i as f32 * 0.5).collect()));
         m.colors = Some(Attribute::per_face(vec![[0.1, 0.2, 0.3, 1.0]; m.num_triangles()]));
         m.texcoords = Some(vec![Vec2::new(0.25, 0.5); m.positions.len()]);
         m
@@ -176,7 +187,9 @@ mod tests {
         };
         let mut damaged: Vec<Vec<u8>> =
             [0, 5, 60, whole.len() / 2, whole.len() - 1].map(|n| whole[..n].to_vec()).into();
-        damaged.extend((0..120).chain([whole.len() / 3, whole.len() / 2, whole.len() - 1]).map(flipped));
+        damaged.extend(
+            (0..120).chain([whole.len() / 3, whole.len() / 2, whole.len() - 1]).map(flipped),
+        );
         damaged.push([&whole[..], &[0]].concat());
         for (i, bytes) in damaged.iter().enumerate() {
             std::fs::write(&path, bytes).unwrap();

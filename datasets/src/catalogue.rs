@@ -1,5 +1,5 @@
-//! Data sets by name: what there is, in which sizes, from which views, and which figure of the thesis it stands for.
-//! Meshes and lines are here, flows in [`flows`].
+//! Data sets by name: what there is, in which sizes, from which views, and which figure of the
+//! thesis it stands for. Meshes and lines are here, flows in [`flows`].
 //!
 //! ```
 //! use datasets::catalogue::{Data, find};
@@ -50,8 +50,9 @@ pub struct EntrySize {
     pub name: &'static str,
     /// The generator's parameter: points per axis, lines, subdivision level…
     pub parameter: u32,
-    /// Number of triangles, or of tube segments for lines: exact for the wavelet and the shapes, measured and rounded
-    /// elsewhere, and extrapolated for the `thesis` sizes of mixing-layer and plasma.
+    /// Number of triangles, or of tube segments for lines: exact for the wavelet and the shapes,
+    /// measured and rounded elsewhere, and extrapolated for the `thesis` sizes of mixing-layer and
+    /// plasma.
     pub elements: u64,
 }
 
@@ -131,7 +132,8 @@ const fn size(name: &'static str, parameter: u32, elements: u64) -> EntrySize {
 static ENTRIES: [Entry; 9] = [
     Entry {
         name: "wavelet",
-        description: "nested isosurfaces of VTK's wavelet (vtkRTAnalyticSource, 201³ points), counts as in VTK",
+        description: "nested isosurfaces of VTK's wavelet (vtkRTAnalyticSource, 201³ points), \
+                      counts as in VTK",
         thesis: "figures 3.5 and 3.6, chapter 3's scaling series; 16M in table 4.1",
         sizes: &[
             size("1M", 0, 1_002_484),
@@ -172,7 +174,11 @@ static ENTRIES: [Entry; 9] = [
         name: "plasma-tubes",
         description: "magnetic field lines of the current sheet",
         thesis: "the streamtubes of VPIC, table 4.1",
-        sizes: &[size("small", 100, 30_000), size("medium", 1000, 300_000), size("large", 10_000, 3_000_000)],
+        sizes: &[
+            size("small", 100, 30_000),
+            size("medium", 1000, 300_000),
+            size("large", 10_000, 3_000_000),
+        ],
         source: Source::PlasmaTubes,
     },
     Entry {
@@ -190,7 +196,11 @@ static ENTRIES: [Entry; 9] = [
         name: "impact",
         description: "a ball has hit a plate: crater, rim and some hundred separate ejecta",
         thesis: "the fracture data of chapter 4",
-        sizes: &[size("small", 128, 86_000), size("medium", 512, 1_500_000), size("large", 1024, 6_070_000)],
+        sizes: &[
+            size("small", 128, 86_000),
+            size("medium", 512, 1_500_000),
+            size("large", 1024, 6_070_000),
+        ],
         source: Source::Impact,
     },
     Entry {
@@ -204,14 +214,23 @@ static ENTRIES: [Entry; 9] = [
         name: "torus",
         description: "a ring with a hole",
         thesis: "none (tests)",
-        sizes: &[size("small", 32, 1024), size("medium", 256, 65_536), size("large", 2048, 4_194_304)],
+        sizes: &[
+            size("small", 32, 1024),
+            size("medium", 256, 65_536),
+            size("large", 2048, 4_194_304),
+        ],
         source: Source::Torus,
     },
     Entry {
         name: "closed-wavelet",
-        description: "an isosurface of the wavelet closed at the border: a solid with handles and cavities",
+        description: "an isosurface of the wavelet closed at the border: a solid with handles and \
+                      cavities",
         thesis: "none (tests of refraction and shadows)",
-        sizes: &[size("small", 31, 15_000), size("medium", 101, 174_000), size("large", 201, 702_000)],
+        sizes: &[
+            size("small", 31, 15_000),
+            size("medium", 101, 174_000),
+            size("large", 201, 702_000),
+        ],
         source: Source::ClosedWavelet,
     },
 ];
@@ -245,7 +264,8 @@ impl Entry {
         matches!(self.source, Source::PlasmaTubes | Source::Star)
     }
 
-    /// Generates the data set. `options` adds normals and scalars to isosurfaces; other shapes have what they have.
+    /// Generates the data set. `options` adds normals and scalars to isosurfaces; other shapes have
+    /// what they have.
     pub fn generate(
         &self,
         size: &str,
@@ -272,7 +292,9 @@ impl Entry {
                 let plasma = Plasma::new(parameter, SEED);
                 surface(plasma.surface(options, watch(plasma.dims().z))?)
             }
-            Source::PlasmaTubes => Data::Lines(Plasma::new(16, SEED).streamtubes(parameter as usize)),
+            Source::PlasmaTubes => {
+                Data::Lines(Plasma::new(16, SEED).streamtubes(parameter as usize))
+            }
             Source::Star => Data::Lines(StarField::new(SEED).lines(parameter as usize)),
             Source::Impact => {
                 let impact = Impact::new(parameter, 400, SEED);
@@ -280,7 +302,9 @@ impl Entry {
             }
             Source::Icosphere => Data::Mesh(shapes::icosphere(parameter)),
             Source::Torus => Data::Mesh(shapes::torus(0.35, parameter, parameter / 2)),
-            Source::ClosedWavelet => Data::Mesh(shapes::closed_wavelet(parameter, 157.0909652709961)?),
+            Source::ClosedWavelet => {
+                Data::Mesh(shapes::closed_wavelet(parameter, 157.0909652709961)?)
+            }
         };
         // Half a data set would look like a whole one.
         if stopped.get() { Err(CatalogueError::Stopped { name: self.name }) } else { Ok(data) }
@@ -299,7 +323,8 @@ impl Entry {
             return Err(CatalogueError::NotAMesh { name: self.name });
         }
         let with = |on: bool, what: &'static str| if on { what } else { "" };
-        let attributes = [with(options.normals, "+normals"), with(options.scalars, "+scalars")].concat();
+        let attributes =
+            [with(options.normals, "+normals"), with(options.scalars, "+scalars")].concat();
         let key = format!("{} {} {}{attributes}", self.name, found.name, found.parameter);
         cache.mesh(&key, || match self.generate(size, options, progress)? {
             Data::Mesh(mesh) => Ok(mesh),
@@ -310,7 +335,8 @@ impl Entry {
     /// The views that the data set is known by; the first is the whole.
     pub fn views(&self) -> Vec<View> {
         match self.source {
-            // ParaView's first camera for the wavelet, raised by 20 degrees as in the measurements with VTK.
+            // ParaView's first camera for the wavelet, raised by 20 degrees as in the measurements
+            // with VTK.
             Source::Wavelet => {
                 let (s, c) = 20f64.to_radians().sin_cos();
                 vec![
@@ -337,14 +363,24 @@ mod tests {
     fn names_are_unique_and_every_smallest_size_generates_about_what_it_says() {
         for (i, e) in entries().iter().enumerate() {
             assert!(entries()[..i].iter().all(|o| o.name != e.name), "{} twice", e.name);
-            assert!(e.sizes.windows(2).all(|w| w[0].elements < w[1].elements), "{}: sizes ascend", e.name);
+            assert!(
+                e.sizes.windows(2).all(|w| w[0].elements < w[1].elements),
+                "{}: sizes ascend",
+                e.name
+            );
             let size = e.sizes[0];
             let made = match e.generate(size.name, Options::default(), &mut |_, _| true).unwrap() {
                 Data::Mesh(m) => m.num_triangles(),
                 Data::Lines(l) => l.num_segments(),
             };
             let ratio = made as f64 / size.elements as f64;
-            assert!((0.9..1.1).contains(&ratio), "{} {}: {made}, said {}", e.name, size.name, size.elements);
+            assert!(
+                (0.9..1.1).contains(&ratio),
+                "{} {}: {made}, said {}",
+                e.name,
+                size.name,
+                size.elements
+            );
             assert_eq!(
                 e.is_lines(),
                 find(e.name).unwrap().name.contains("tubes") || e.name.contains("lines")
@@ -355,16 +391,22 @@ mod tests {
     #[test]
     fn views_look_at_the_data() {
         for e in entries() {
-            let bounds = match e.generate(e.sizes[0].name, Options::default(), &mut |_, _| true).unwrap() {
-                Data::Mesh(m) => m.bounds(),
-                Data::Lines(l) => rt_core::math::Aabb::from_points(&l.points),
-            };
+            let bounds =
+                match e.generate(e.sizes[0].name, Options::default(), &mut |_, _| true).unwrap() {
+                    Data::Mesh(m) => m.bounds(),
+                    Data::Lines(l) => rt_core::math::Aabb::from_points(&l.points),
+                };
             let near = bounds.radius() as f64;
             let views = e.views();
             assert!(!views.is_empty(), "{}", e.name);
             for v in views {
                 let to_center = bounds.center().as_dvec3() - v.target;
-                assert!(to_center.length() < 0.6 * near, "{} {}: looks past the data", e.name, v.name);
+                assert!(
+                    to_center.length() < 0.6 * near,
+                    "{} {}: looks past the data",
+                    e.name,
+                    v.name
+                );
                 assert!(
                     (v.target - v.eye).cross(v.up).length() > 0.1,
                     "{} {}: up is along the view",

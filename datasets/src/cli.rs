@@ -1,9 +1,12 @@
 //! The conventions that all command-line programs here share, written once.
 //!
-//! * Results go to stdout (as text, or as JSON with `--json`); progress, notes and errors go to stderr.
-//! * Progress bars appear only on a terminal, and never with `--quiet`; they make way for whatever else is printed.
+//! * Results go to stdout (as text, or as JSON with `--json`); progress, notes and errors go to
+//!   stderr.
+//! * Progress bars appear only on a terminal, and never with `--quiet`; they make way for whatever
+//!   else is printed.
 //! * Exit codes are those of [`Status`]: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
-//! * Ctrl-C asks the program to stop at the next good place and keep what is finished; a second one ends it at once.
+//! * Ctrl-C asks the program to stop at the next good place and keep what is finished; a second one
+//!   ends it at once.
 //! * A closed pipe (`program | head`) is success.
 //! * Errors print the whole chain of causes and, where there is one, the cure ([`CureExt`]).
 //!
@@ -93,7 +96,8 @@ impl CommonArgs {
         Ok(())
     }
 
-    /// A note for the person in front of the terminal, with `level` 0 for all but `--quiet`, 1 from `-v`, 2 from `-vv`.
+    /// A note for the person in front of the terminal, with `level` 0 for all but `--quiet`, 1 from
+    /// `-v`, 2 from `-vv`.
     pub fn note(&self, level: u8, text: impl Display) {
         if !self.quiet && self.verbose >= level {
             to_stderr(format_args!("{text}"));
@@ -105,14 +109,16 @@ impl CommonArgs {
         to_stderr(format_args!("warning: {text}"));
     }
 
-    /// A progress bar on stderr over `total` steps of `what`; invisible with `--quiet` or when stderr is no terminal
-    /// ([`ProgressBar::is_hidden`]). Dropping it removes it from the screen. One at a time: notes, warnings and results
-    /// are printed above the one made last.
+    /// A progress bar on stderr over `total` steps of `what`; invisible with `--quiet` or when
+    /// stderr is no terminal ([`ProgressBar::is_hidden`]). Dropping it removes it from the screen.
+    /// One at a time: notes, warnings and results are printed above the one made last.
     pub fn progress(&self, total: u64, what: &str) -> ProgressBar {
         let visible = !self.quiet && io::stderr().is_terminal();
-        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target =
+            if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let template = "{wide_bar} {percent:>3} % {elapsed} eta {eta}  {msg}";
-        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style =
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::with_draw_target(Some(total), target).with_style(style);
         bar.set_message(what.to_string());
         let bar = bar.with_finish(indicatif::ProgressFinish::AndClear);
@@ -127,8 +133,9 @@ impl CommonArgs {
     }
 }
 
-/// Runs a program: prints its error, if any, and turns the outcome into the exit code. Parse arguments *inside* `work`
-/// with [`clap::Parser::try_parse`], so that wrong usage ends up here as well.
+/// Runs a program: prints its error, if any, and turns the outcome into the exit code. Parse
+/// arguments *inside* `work` with [`clap::Parser::try_parse`], so that wrong usage ends up here as
+/// well.
 pub fn run_main<S: Into<Status>>(work: impl FnOnce() -> anyhow::Result<S>) -> ExitCode {
     status_of(work().map(Into::into)).into()
 }
@@ -140,8 +147,8 @@ pub fn status_of(outcome: anyhow::Result<Status>) -> Status {
         Err(error) => error,
     };
     if let Some(usage) = error.downcast_ref::<clap::Error>() {
-        // `--help` and `--version` are such errors, too: clap knows where they are printed. When even that fails there
-        // is nobody left to tell.
+        // `--help` and `--version` are such errors, too: clap knows where they are printed. When
+        // even that fails there is nobody left to tell.
         let _ = usage.print();
         return if usage.use_stderr() { Status::Usage } else { Status::Success };
     }
@@ -216,17 +223,21 @@ pub struct Interrupted;
 pub struct Cancel(&'static Arc<AtomicBool>);
 
 impl Cancel {
-    /// Installs the Ctrl-C handler (once a process; later calls give the same flag). The second Ctrl-C ends the program.
+    /// Installs the Ctrl-C handler (once a process; later calls give the same flag). The second
+    /// Ctrl-C ends the program.
     pub fn on_ctrl_c() -> anyhow::Result<Cancel> {
         static CANCELLED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
         static INSTALLED: OnceLock<Result<(), String>> = OnceLock::new();
         let flag = CANCELLED.get_or_init(Arc::default);
-        // A second Ctrl-C means now: the only place that leaves without returning to the main function.
+        // A second Ctrl-C means now: the only place that leaves without returning to the main
+        // function.
         let handler = || {
             if flag.swap(true, Ordering::SeqCst) {
                 std::process::exit(Status::Interrupted as i32);
             }
-            to_stderr(format_args!("stopping at the next good place; Ctrl-C again ends the program at once"));
+            to_stderr(format_args!(
+                "stopping at the next good place; Ctrl-C again ends the program at once"
+            ));
         };
         INSTALLED
             .get_or_init(|| ctrlc::set_handler(handler).map_err(|e| e.to_string()))
@@ -311,7 +322,10 @@ mod tests {
         assert_eq!(Status::Interrupted as u8, 130);
         assert_eq!(status_of(Ok(Status::Interrupted)), Status::Interrupted);
         assert_eq!(status_of(failure(anyhow!("no"))), Status::Failure);
-        assert_eq!(status_of(failure(UsageError("width is 0; give at least 1".into()))), Status::Usage);
+        assert_eq!(
+            status_of(failure(UsageError("width is 0; give at least 1".into()))),
+            Status::Usage
+        );
         assert_eq!(status_of(failure(Interrupted)), Status::Interrupted);
         let wrapped = Err(Interrupted).context("while rendering");
         assert_eq!(status_of(wrapped), Status::Interrupted);
@@ -350,7 +364,8 @@ mod tests {
         let e = Err::<(), _>(io::Error::other("disk full"))
             .context("out.png: cannot write")
             .cure("free some space");
-        let expected = "error: out.png: cannot write\n  because: disk full\n  cure: free some space";
+        let expected =
+            "error: out.png: cannot write\n  because: disk full\n  cure: free some space";
         assert_eq!(report(&e.unwrap_err()), expected);
         let outer = Err::<(), _>(anyhow!("inner")).cure("do this").context("outer").unwrap_err();
         assert_eq!(report(&outer), "error: outer\n  because: inner\n  cure: do this");

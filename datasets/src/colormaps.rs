@@ -6,7 +6,8 @@
 //! | `cool-warm` | deviations from a middle | K. Moreland, "Diverging Color Maps for Scientific Visualization" (2009); computed from the paper's formula, tables CC0 |
 //! | `grey` | printing, schlieren | equal steps of sRGB |
 //!
-//! The rainbow is absent on purpose: its lightness goes up and down, which shows edges where the data have none.
+//! The rainbow is absent on purpose: its lightness goes up and down, which shows edges where the
+//! data have none.
 
 use rt_core::colormap::{ColorMap, Rgba, srgb_to_linear};
 
@@ -31,14 +32,19 @@ pub fn by_name(name: &str, range: [f32; 2]) -> Option<ColorMap> {
 
 /// Dark blue over green to yellow; lightness rises evenly.
 pub fn viridis(range: [f32; 2]) -> ColorMap {
-    let code =
-        |i: usize| u8::from_str_radix(&VIRIDIS[2 * i..2 * i + 2], 16).unwrap_or_default() as f32 / 255.0;
-    ColorMap::new((0..256).map(|i| opaque([code(3 * i), code(3 * i + 1), code(3 * i + 2)])).collect(), range)
+    let code = |i: usize| {
+        u8::from_str_radix(&VIRIDIS[2 * i..2 * i + 2], 16).unwrap_or_default() as f32 / 255.0
+    };
+    ColorMap::new(
+        (0..256).map(|i| opaque([code(3 * i), code(3 * i + 1), code(3 * i + 2)])).collect(),
+        range,
+    )
 }
 
 /// Blue over light grey to red; the middle of `range` is neutral.
 pub fn cool_warm(range: [f32; 2]) -> ColorMap {
-    let ends = [[59.0, 76.0, 192.0], [180.0, 4.0, 38.0]].map(|c| msh_from_srgb(c.map(|v| v / 255.0)));
+    let ends =
+        [[59.0, 76.0, 192.0], [180.0, 4.0, 38.0]].map(|c| msh_from_srgb(c.map(|v| v / 255.0)));
     ColorMap::new(
         (0..257).map(|i| opaque(diverging(ends, i as f64 / 256.0).map(|v| v as f32))).collect(),
         range,
@@ -55,10 +61,11 @@ fn opaque(srgb: [f32; 3]) -> Rgba {
     [r, g, b, 1.0]
 }
 
-// Moreland's Msh space: polar coordinates of CIELAB. M is the magnitude, s the angle from the lightness axis
-// (saturation), h the hue.
+// Moreland's Msh space: polar coordinates of CIELAB. M is the magnitude, s the angle from the
+// lightness axis (saturation), h the hue.
 
-/// Between two saturated ends, through an unsaturated middle of magnitude 88 (Moreland 2009, figure 6).
+/// Between two saturated ends, through an unsaturated middle of magnitude 88 (Moreland 2009, figure
+/// 6).
 fn diverging([a, b]: [[f64; 3]; 2], t: f64) -> [f64; 3] {
     let middle = a[0].max(b[0]).max(88.0);
     let (from, to, t) = if t < 0.5 {
@@ -110,8 +117,8 @@ fn srgb_from_msh([m, s, h]: [f64; 3]) -> [f64; 3] {
     linear.map(|v| rt_core::colormap::linear_to_srgb(v.clamp(0.0, 1.0) as f32) as f64)
 }
 
-/// 256 colours as sRGB bytes in hexadecimal. Source: Matplotlib's `viridis` (bids.github.io/colormap), rounded to 8 bits.
-/// Licence: CC0 1.0.
+/// 256 colours as sRGB bytes in hexadecimal. Source: Matplotlib's `viridis`
+/// (bids.github.io/colormap), rounded to 8 bits. Licence: CC0 1.0.
 const VIRIDIS: &str = "\
     44015444025645045745055946075a46085c460a5d460b5e470d60470e61471063471164471365481467481668481769\
     48186a481a6c481b6d481c6e481d6f481f70482071482173482374482475482576482677482878482979472a7a472c7a\
@@ -156,7 +163,10 @@ mod tests {
         ] {
             let found = bytes(map.lookup(t));
             for c in 0..3 {
-                assert!((found[c] - expected[c]).abs() < 0.6, "{t}: {found:?}, expected {expected:?}");
+                assert!(
+                    (found[c] - expected[c]).abs() < 0.6,
+                    "{t}: {found:?}, expected {expected:?}"
+                );
             }
         }
     }
@@ -177,7 +187,11 @@ mod tests {
             let map = by_name(name, [0.0, 1.0]).unwrap();
             let luminance = |c: &Rgba| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
             // The table's rounding to 8 bits may take back half a code (0.002 in bright green).
-            let falls = map.colors.windows(2).filter(|w| luminance(&w[1]) < luminance(&w[0]) - 2e-3).count();
+            let falls = map
+                .colors
+                .windows(2)
+                .filter(|w| luminance(&w[1]) < luminance(&w[0]) - 2e-3)
+                .count();
             assert_eq!(falls, 0, "{name}");
         }
     }

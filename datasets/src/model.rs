@@ -1,8 +1,10 @@
-//! The data sets that files hold: VTK's five kinds and collections of them, with named arrays of any scalar type.
+//! The data sets that files hold: VTK's five kinds and collections of them, with named arrays of
+//! any scalar type.
 //!
-//! Readers return a [`Dataset`] with the types the file has; nothing is converted before it is asked for:
-//! [`Dataset::to_trimesh`] (outer surface), [`Dataset::to_lines`] (for tubes), [`Dataset::to_points`] (for spheres),
-//! [`Dataset::to_grid`] (for volumes). What a conversion has to leave out is counted in a [`SurfaceReport`].
+//! Readers return a [`Dataset`] with the types the file has; nothing is converted before it is
+//! asked for: [`Dataset::to_trimesh`] (outer surface), [`Dataset::to_lines`] (for tubes),
+//! [`Dataset::to_points`] (for spheres), [`Dataset::to_grid`] (for volumes). What a conversion has
+//! to leave out is counted in a [`SurfaceReport`].
 
 pub mod array;
 mod boundary_faces;
@@ -109,7 +111,8 @@ impl Points {
             Points::F64(v) => DVec3::from(v[i]),
         }
     }
-    /// Points from a three-component array: single precision stays single, everything else becomes double.
+    /// Points from a three-component array: single precision stays single, everything else becomes
+    /// double.
     pub fn from_array(array: DataArray) -> Result<Self, ModelError> {
         if array.components != 3 {
             return Err(ModelError::Inconsistent {
@@ -121,7 +124,9 @@ impl Points {
         Ok(match array.values {
             Values::F32(v) => Points::F32(v.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()),
             other => Points::F64(
-                (0..other.len() / 3).map(|i| std::array::from_fn(|c| other.get_f64(3 * i + c))).collect(),
+                (0..other.len() / 3)
+                    .map(|i| std::array::from_fn(|c| other.get_f64(3 * i + c)))
+                    .collect(),
             ),
         })
     }
@@ -146,7 +151,8 @@ impl Points {
     }
 }
 
-/// Vertices, lines, polygons and strips over shared points. Cell data is ordered verts, lines, polys, strips.
+/// Vertices, lines, polygons and strips over shared points. Cell data is ordered verts, lines,
+/// polys, strips.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PolyData {
     /// Point coordinates.
@@ -174,7 +180,8 @@ pub struct UnstructuredGrid {
     pub types: Vec<u8>,
     /// For polyhedra (type 42): faces of all polyhedra, as point ids.
     pub polyhedron_faces: Cells,
-    /// For each cell, which entries of `polyhedron_faces` are its faces; empty when there are no polyhedra.
+    /// For each cell, which entries of `polyhedron_faces` are its faces; empty when there are no
+    /// polyhedra.
     pub faces_of_cell: Vec<std::ops::Range<usize>>,
     /// Arrays.
     pub attributes: Attributes,
@@ -256,7 +263,8 @@ pub fn lattice_counts(dims: [usize; 3]) -> Option<(u64, u64)> {
     if points == 0 {
         return Some((0, 0)); // an axis without points leaves no cells either
     }
-    // An axis with one point has one layer of (flat) cells. No product overflows: each is at most that of the points.
+    // An axis with one point has one layer of (flat) cells. No product overflows: each is at most
+    // that of the points.
     let cells = dims.iter().map(|&d| if d == 1 { 1 } else { d as u64 - 1 }).product();
     Some((points, cells))
 }
@@ -269,12 +277,19 @@ impl ImageData {
     /// A lattice of `dims` points from index 0, without rotation.
     pub fn new(dims: [u32; 3], origin: DVec3, spacing: DVec3) -> Self {
         let extent = std::array::from_fn(|i| if i % 2 == 0 { 0 } else { dims[i / 2] as i32 - 1 });
-        ImageData { extent, origin, spacing, direction: DMat3::IDENTITY, attributes: Attributes::default() }
+        ImageData {
+            extent,
+            origin,
+            spacing,
+            direction: DMat3::IDENTITY,
+            attributes: Attributes::default(),
+        }
     }
     /// Position of the point with index (i,j,k), which counts from the start of the extent.
     pub fn point(&self, i: usize, j: usize, k: usize) -> DVec3 {
         let e = self.extent;
-        let index = DVec3::new(e[0] as f64 + i as f64, e[2] as f64 + j as f64, e[4] as f64 + k as f64);
+        let index =
+            DVec3::new(e[0] as f64 + i as f64, e[2] as f64 + j as f64, e[4] as f64 + k as f64);
         self.origin + self.direction * (self.spacing * index)
     }
 }
@@ -343,8 +358,8 @@ impl Dataset {
         }
     }
 
-    /// Checks that every array has as many values as the geometry has points or cells.
-    /// Readers call this, so a data set from a file is consistent; so do the conversions and the writers.
+    /// Checks that every array has as many values as the geometry has points or cells. Readers call
+    /// this, so a data set from a file is consistent; so do the conversions and the writers.
     pub fn check(&self) -> Result<(), ModelError> {
         if let Dataset::MultiBlock(blocks) = self {
             return blocks.iter().try_for_each(|b| b.data.check());
@@ -352,13 +367,23 @@ impl Dataset {
         let (points, cells) = self.counts();
         let same = |field: String, expected: u64, found: usize| {
             let found = found as u64;
-            if expected == found { Ok(()) } else { Err(ModelError::Inconsistent { field, expected, found }) }
+            if expected == found {
+                Ok(())
+            } else {
+                Err(ModelError::Inconsistent { field, expected, found })
+            }
         };
         match self {
-            Dataset::StructuredGrid(d) => same("points of the lattice".into(), points, d.points.len())?,
+            Dataset::StructuredGrid(d) => {
+                same("points of the lattice".into(), points, d.points.len())?
+            }
             Dataset::RectilinearGrid(d) => {
                 for (a, n) in extent_dims(d.extent).into_iter().enumerate() {
-                    same(format!("{} coordinates", ["x", "y", "z"][a]), n as u64, d.coordinates[a].len())?;
+                    same(
+                        format!("{} coordinates", ["x", "y", "z"][a]),
+                        n as u64,
+                        d.coordinates[a].len(),
+                    )?;
                 }
             }
             Dataset::UnstructuredGrid(d) => {
@@ -384,7 +409,11 @@ impl Dataset {
             for array in arrays {
                 same(format!("tuples of the {what} array `{}`", array.name), n, array.tuples())?;
                 let whole = (array.tuples() as u64).saturating_mul(array.components as u64);
-                same(format!("values of the {what} array `{}`", array.name), whole, array.values.len())?;
+                same(
+                    format!("values of the {what} array `{}`", array.name),
+                    whole,
+                    array.values.len(),
+                )?;
             }
         }
         Ok(())

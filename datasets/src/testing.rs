@@ -17,7 +17,8 @@ pub(crate) fn with_threads<T: Send>(threads: usize, f: impl FnOnce() -> T + Send
     ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool").install(f)
 }
 
-/// How often each directed edge occurs; a closed, consistently oriented surface has each edge once per direction.
+/// How often each directed edge occurs; a closed, consistently oriented surface has each edge once
+/// per direction.
 pub(crate) fn open_or_flipped_edges(indices: &[[u32; 3]]) -> usize {
     let mut balance: HashMap<(u32, u32), (u32, u32)> = HashMap::new();
     for t in indices {
@@ -30,7 +31,8 @@ pub(crate) fn open_or_flipped_edges(indices: &[[u32; 3]]) -> usize {
     balance.values().filter(|&&uses| uses != (1, 1)).count()
 }
 
-/// Volume enclosed by a closed mesh; positive when triangles are counter-clockwise seen from outside.
+/// Volume enclosed by a closed mesh; positive when triangles are counter-clockwise seen from
+/// outside.
 pub(crate) fn volume(mesh: &rt_core::mesh::TriMesh) -> f64 {
     let t = (0..mesh.num_triangles()).map(|i| mesh.triangle(i).map(|p| p.as_dvec3()));
     t.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
@@ -50,7 +52,8 @@ pub(crate) fn pieces(indices: &[[u32; 3]]) -> usize {
         for e in 0..2 {
             let (a, b) = (root(&mut parent, t[e]), root(&mut parent, t[e + 1]));
             if a != b {
-                // Towards the smaller id: ids grow along the surface, so that chains stay short enough for tests.
+                // Towards the smaller id: ids grow along the surface, so that chains stay short
+                // enough for tests.
                 parent.insert(a.max(b), a.min(b));
             }
         }

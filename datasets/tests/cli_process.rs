@@ -23,7 +23,10 @@ fn child() {
             common.result(&"ready", || "ready")?;
             let started = Instant::now();
             while mode == "deaf" || !cancel.is_set() {
-                anyhow::ensure!(started.elapsed() < Duration::from_secs(60), "nobody pressed Ctrl-C");
+                anyhow::ensure!(
+                    started.elapsed() < Duration::from_secs(60),
+                    "nobody pressed Ctrl-C"
+                );
                 std::thread::sleep(Duration::from_millis(5));
             }
             common.result(&"kept", || "kept")?;
@@ -46,7 +49,9 @@ fn start(mode: &str) -> Child {
 }
 
 fn interrupt(child: &Child) {
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
 }
 
 /// Waits for a line of the child; the test harness prints lines of its own before.

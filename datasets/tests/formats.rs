@@ -42,7 +42,8 @@ fn poly(o: LoadedFile) -> PolyData {
     }
 }
 
-/// Volume inside a closed mesh by the divergence theorem: positive when all triangles face outwards.
+/// Volume inside a closed mesh by the divergence theorem: positive when all triangles face
+/// outwards.
 fn volume(m: &TriMesh) -> f64 {
     (0..m.num_triangles())
         .map(|i| m.triangle(i).map(|p| p.as_dvec3()))
@@ -81,23 +82,32 @@ fn plot3d_layouts_are_told_apart_by_size() {
 fn check_block(g: &StructuredGrid, d: [u32; 3], b: usize, iblank: bool) {
     let n = (d[0] * d[1] * d[2]) as usize;
     assert_eq!(g.points.len(), n);
-    let last = DVec3::new(f64::from(d[0] - 1), f64::from(d[1] - 1), f64::from(d[2] - 1)) + 10.0 * b as f64;
+    let last =
+        DVec3::new(f64::from(d[0] - 1), f64::from(d[1] - 1), f64::from(d[2] - 1)) + 10.0 * b as f64;
     assert_eq!(g.points.get(n - 1), last, "x runs fastest");
     let density = g.attributes.point_array("Density").unwrap();
     assert_eq!((density.get(0, 0), density.get(n - 1, 0)), (0.0, (n - 1) as f64));
     let momentum = g.attributes.point_array("Momentum").unwrap();
-    assert_eq!((0..3).map(|c| momentum.get(1, c)).collect::<Vec<_>>(), [1, 2, 3].map(|k| (k * n + 1) as f64));
+    assert_eq!(
+        (0..3).map(|c| momentum.get(1, c)).collect::<Vec<_>>(),
+        [1, 2, 3].map(|k| (k * n + 1) as f64)
+    );
     assert_eq!(g.attributes.point_array("StagnationEnergy").unwrap().get(0, 0), 4.0 * n as f64);
     assert!((g.attributes.field_array("Mach").unwrap().get(0, 0) - 2.95).abs() < 1e-6);
     let (_, report) = Dataset::StructuredGrid(g.clone()).to_trimesh(Some("Density")).unwrap();
-    assert_eq!(report.ghost_cells, usize::from(iblank), "the cell at the blanked corner is left out");
+    assert_eq!(
+        report.ghost_cells,
+        usize::from(iblank),
+        "the cell at the blanked corner is left out"
+    );
 }
 
 #[test]
 fn plot3d_padding_at_the_end_is_no_fault() {
     let (grid, mut q) = sample_files::plot3d(&[[4, 3, 2]], false, false, true, false);
     q.resize(q.len() + 484, 0);
-    let o = plot3d::read_from_bytes("a".as_ref(), &grid, Some(&q), &Plot3dOptions::default()).unwrap();
+    let o =
+        plot3d::read_from_bytes("a".as_ref(), &grid, Some(&q), &Plot3dOptions::default()).unwrap();
     assert!(o.dataset().unwrap().attributes().unwrap().point_array("Density").is_some());
 }
 
@@ -111,11 +121,13 @@ fn plot3d_solution_of_another_grid_is_refused() {
     assert!(e.contains("[4, 2, 3]") && e.contains("[4, 3, 2]"), "{e}");
 }
 
-/// The real data set, on machines that have it: `RTSV_BLUNT_FIN` names bluntfinxyz.bin with bluntfinq.bin beside it.
+/// The real data set, on machines that have it: `RTSV_BLUNT_FIN` names bluntfinxyz.bin with
+/// bluntfinq.bin beside it.
 #[test]
 fn blunt_fin_has_its_known_free_stream_and_shock() {
     let Some(path) = std::env::var_os("RTSV_BLUNT_FIN") else {
-        let reason = "skipped: blunt_fin_has_its_known_free_stream_and_shock needs RTSV_BLUNT_FIN to name bluntfinxyz.bin";
+        let reason = "skipped: blunt_fin_has_its_known_free_stream_and_shock needs RTSV_BLUNT_FIN \
+                      to name bluntfinxyz.bin";
         writeln!(std::io::stderr(), "{reason}").unwrap();
         return;
     };
@@ -162,9 +174,12 @@ fn detached_headers_find_their_data() {
     let mut data = vec![9; 5];
     data.extend(sample_files::shorts());
     std::fs::write(dir.path().join("values.raw"), &data).unwrap();
-    let nhdr = "NRRD0001\ntype: int16\ndimension: 3\nsizes: 3 2 2\nendian: big\nencoding: raw\nbyte skip: 5\ndata file: values.raw\n";
-    let mhd = "NDims = 3\nDimSize = 3 2 2\nElementType = MET_SHORT\nElementByteOrderMSB = True\nHeaderSize = -1\nElementDataFile = values.raw\n";
-    let toml = "dims = [3, 2, 2]\ntype = \"i16\"\nendian = \"big\"\nskip_bytes = 5\nspacing = [1.0, 2.0, 3.0]\nname = \"ct\"\n";
+    let nhdr = "NRRD0001\ntype: int16\ndimension: 3\nsizes: 3 2 2\nendian: big\nencoding: \
+                raw\nbyte skip: 5\ndata file: values.raw\n";
+    let mhd = "NDims = 3\nDimSize = 3 2 2\nElementType = MET_SHORT\nElementByteOrderMSB = \
+               True\nHeaderSize = -1\nElementDataFile = values.raw\n";
+    let toml = "dims = [3, 2, 2]\ntype = \"i16\"\nendian = \"big\"\nskip_bytes = 5\nspacing = \
+                [1.0, 2.0, 3.0]\nname = \"ct\"\n";
     for (name, text) in [("a.nhdr", nhdr), ("a.mhd", mhd), ("values.toml", toml)] {
         std::fs::write(dir.path().join(name), text).unwrap();
         let d = image(open(dir.path().join(name)).unwrap());
@@ -174,7 +189,10 @@ fn detached_headers_find_their_data() {
             "{name}"
         );
     }
-    assert_eq!(image(open(dir.path().join("values.raw")).unwrap()).spacing, DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(
+        image(open(dir.path().join("values.raw")).unwrap()).spacing,
+        DVec3::new(1.0, 2.0, 3.0)
+    );
     std::fs::write(
         dir.path().join("values.toml"),
         "dims = [3, 2, 2]\ntype = \"i16\"\nendianness = \"big\"\n",
@@ -208,7 +226,10 @@ fn ply_properties_arrive_as_arrays() {
     let o = opened("a.ply", sample_files::PLY_TEXT.as_bytes());
     assert!(o.warnings.iter().any(|w| w.contains("edge")), "{:?}", o.warnings);
     let d = poly(o);
-    assert_eq!(d.attributes.point_array("quality").unwrap().values, Values::F32(vec![0.5, 0.25, 1.0, 2.0]));
+    assert_eq!(
+        d.attributes.point_array("quality").unwrap().values,
+        Values::F32(vec![0.5, 0.25, 1.0, 2.0])
+    );
     assert_eq!(d.attributes.cell_array("part").unwrap().values, Values::I32(vec![7, 8]));
     let (mesh, _) = Dataset::PolyData(d).to_trimesh(Some("RGB")).unwrap();
     assert_eq!(mesh.num_triangles(), 3);
@@ -223,19 +244,23 @@ fn ply_properties_arrive_as_arrays() {
 #[test]
 fn obj_concave_faces_materials_and_far_coordinates() {
     let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("m.mtl"), "newmtl red\nKd 1 0 0\nd 0.5\nNs 98\nNi 1.33\n").unwrap();
-    let obj =
-        sample_files::OBJ.replace("none.mtl", "m.mtl").replace("v 2 2 0 0 0 1", "v 6000002.001 2 0 0 0 1");
+    std::fs::write(dir.path().join("m.mtl"), "newmtl red\nKd 1 0 0\nd 0.5\nNs 98\nNi 1.33\n")
+        .unwrap();
+    let obj = sample_files::OBJ
+        .replace("none.mtl", "m.mtl")
+        .replace("v 2 2 0 0 0 1", "v 6000002.001 2 0 0 0 1");
     std::fs::write(dir.path().join("a.obj"), obj).unwrap();
     let s = scene(open(dir.path().join("a.obj")).unwrap());
     let m = &s.materials[s.meshes[0].material.unwrap()];
     assert_eq!((m.base_color, m.ior), ([1.0, 0.0, 0.0, 0.5], 1.33));
     assert!((m.roughness - 0.02f32.powf(0.25)).abs() < 1e-6);
 
-    // The five corners make an arrow head, whose inner corner a fan would cover from outside: area 3.
+    // The five corners make an arrow head, whose inner corner a fan would cover from outside: area
+    // 3.
     let o = opened("b.obj", sample_files::OBJ.as_bytes());
     assert!(
-        o.warnings.iter().any(|w| w.contains("none.mtl")) && o.warnings.iter().any(|w| w.contains("lines")),
+        o.warnings.iter().any(|w| w.contains("none.mtl"))
+            && o.warnings.iter().any(|w| w.contains("lines")),
         "{:?}",
         o.warnings
     );
@@ -245,7 +270,10 @@ fn obj_concave_faces_materials_and_far_coordinates() {
         .map(|i| mesh.triangle(i))
         .map(|[a, b, c]| 0.5 * (b - a).cross(c - a).z)
         .collect();
-    assert!(areas.iter().all(|&a| a >= 0.0) && (areas.iter().sum::<f32>() - 2.5).abs() < 1e-6, "{areas:?}");
+    assert!(
+        areas.iter().all(|&a| a >= 0.0) && (areas.iter().sum::<f32>() - 2.5).abs() < 1e-6,
+        "{areas:?}"
+    );
     assert!(mesh.normals.is_some() && mesh.texcoords.is_some() && mesh.colors.is_some());
 
     // Millimetres at six thousand kilometres.
@@ -268,7 +296,10 @@ fn gltf_transforms_turn_mirrored_triangles_back() {
         };
         assert_eq!(world(0)[0], DVec3::new(10.0, 0.0, 0.0));
         let [a, b, c] = world(1);
-        assert!([a, b, c].contains(&DVec3::new(8.0, 0.0, 0.0)), "scaled by -2, then moved: {a} {b} {c}");
+        assert!(
+            [a, b, c].contains(&DVec3::new(8.0, 0.0, 0.0)),
+            "scaled by -2, then moved: {a} {b} {c}"
+        );
         assert!((b - a).cross(c - a).z > 0.0, "still seen from +z");
         assert_eq!(s.meshes[0].mesh.colors.as_ref().unwrap().values[1], [0.0, 1.0, 0.0, 1.0]);
     }
@@ -282,9 +313,11 @@ fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> Loaded
     floats(&[0.0, 1.0, 1.0, 1.0, 1.0, 0.0]);
     floats(&[1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
     std::fs::write(dir.join("a.bin"), &bytes).unwrap();
-    for (name, texel) in
-        [("color", [255, 0, 0, 100]), ("rough", [10, 20, 30, 255]), ("normal", [128, 128, 255, 255])]
-    {
+    for (name, texel) in [
+        ("color", [255, 0, 0, 100]),
+        ("rough", [10, 20, 30, 255]),
+        ("normal", [128, 128, 255, 255]),
+    ] {
         ::image::RgbaImage::from_pixel(2, 1, ::image::Rgba(texel))
             .save(dir.join(name).with_extension("png"))
             .unwrap();
@@ -320,7 +353,10 @@ fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> Loaded
 fn gltf_materials_have_all_their_pictures_and_samplers() {
     use rt_core::texture::{Filter, Wrap};
     let dir = tempfile::tempdir().unwrap();
-    let o = gltf_with_pictures(dir.path(), serde_json::json!({"alphaMode": "MASK", "alphaCutoff": 0.25}));
+    let o = gltf_with_pictures(
+        dir.path(),
+        serde_json::json!({"alphaMode": "MASK", "alphaCutoff": 0.25}),
+    );
     let warnings = o.warnings.clone();
     let s = scene(o);
     let m = &s.materials[0];
@@ -342,7 +378,10 @@ fn gltf_materials_have_all_their_pictures_and_samplers() {
     let told = |what: &str| warnings.iter().any(|w| w.contains(what));
     assert!(warnings.len() == 2 && told("gone.png") && told("KHR_materials_sheen"), "{warnings:?}");
     // The mirror turns tangents and the sense of their frame.
-    assert_eq!(s.meshes[0].mesh.tangents.as_ref().unwrap()[0], glam::Vec4::new(-1.0, 0.0, 0.0, -1.0));
+    assert_eq!(
+        s.meshes[0].mesh.tangents.as_ref().unwrap()[0],
+        glam::Vec4::new(-1.0, 0.0, 0.0, -1.0)
+    );
     let o = gltf_with_pictures(dir.path(), serde_json::json!({}));
     assert_eq!(scene(o).materials[0].alpha, AlphaMode::Opaque);
 }
@@ -394,7 +433,10 @@ fn bad_cells_are_counted_not_lost() {
 fn missing_arrays_and_components_are_named() {
     let d = Dataset::ImageData(sample_files::image());
     let e = d.to_trimesh(Some("pressure")).unwrap_err().to_string();
-    assert!(e.contains("`pressure`") && e.contains("`p` (points)") && e.contains("`c` (cells)"), "{e}");
+    assert!(
+        e.contains("`pressure`") && e.contains("`p` (points)") && e.contains("`c` (cells)"),
+        "{e}"
+    );
     let e = d.to_grid("v:7").unwrap_err().to_string();
     assert!(e.contains("`v` has 3 components"), "{e}");
     let grid = d.to_grid("v:y").unwrap();
@@ -414,8 +456,12 @@ fn axes_that_run_backwards_are_turned_round() {
 
 #[test]
 fn uneven_steps_do_not_become_a_uniform_grid() {
-    let e = Dataset::RectilinearGrid(sample_files::rectilinear()).to_grid("p").unwrap_err().to_string();
-    assert!(e.contains("along x are not equal (first at index 1)") && e.contains("resample"), "{e}");
+    let e =
+        Dataset::RectilinearGrid(sample_files::rectilinear()).to_grid("p").unwrap_err().to_string();
+    assert!(
+        e.contains("along x are not equal (first at index 1)") && e.contains("resample"),
+        "{e}"
+    );
 }
 
 #[test]
@@ -459,7 +505,9 @@ fn far_meshes_survive_ply_and_vtp() {
         .unwrap_err()
         .to_string();
     assert!(e.contains("`scalars`") && e.contains("base64") && !text.exists(), "{e}");
-    assert!(write_obj(dir.path().join("a.obj"), &mesh).unwrap_err().to_string().contains("PLY or VTP"));
+    assert!(
+        write_obj(dir.path().join("a.obj"), &mesh).unwrap_err().to_string().contains("PLY or VTP")
+    );
 }
 
 #[test]
@@ -497,7 +545,8 @@ fn legacy_binary_and_text_mean_what_they_say() {
     let d = poly(opened("b.vtk", &sample_files::legacy_binary()));
     assert_eq!(d.polys.get(1), [0, 2, 3]);
     assert_eq!(d.attributes.point_array("temp").unwrap().values, Values::I16(vec![1, -2, 300, 4]));
-    let Dataset::UnstructuredGrid(g) = data(opened("a.vtk", sample_files::LEGACY_GRID.as_bytes())) else {
+    let Dataset::UnstructuredGrid(g) = data(opened("a.vtk", sample_files::LEGACY_GRID.as_bytes()))
+    else {
         panic!()
     };
     assert_eq!((g.types.as_slice(), g.cells.get(1)), (&[10u8, 5][..], &[1u32, 2, 4][..]));

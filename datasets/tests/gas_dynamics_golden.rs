@@ -1,5 +1,5 @@
-//! Wedge and cone shocks against a table computed with another program (f64, gamma = 1.4); its wedges agree with the
-//! figures of NACA 1135.
+//! Wedge and cone shocks against a table computed with another program (f64, gamma = 1.4); its
+//! wedges agree with the figures of NACA 1135.
 
 use datasets::generate::gas_dynamics::taylor_maccoll::cone_flow;
 use datasets::generate::gas_dynamics::theta_beta_m::{Branch, oblique_shock};
@@ -25,7 +25,11 @@ fn every_row_of_the_golden_table() {
                 (c.shock_rad, c.jump, 1e-6)
             }
         };
-        assert!((shock.to_degrees() - number(3)).abs() < tolerance, "{row}: {}", shock.to_degrees());
+        assert!(
+            (shock.to_degrees() - number(3)).abs() < tolerance,
+            "{row}: {}",
+            shock.to_degrees()
+        );
         assert!((jump.density - number(4)).abs() < tolerance, "{row}: {}", jump.density);
         assert!((jump.pressure - number(5)).abs() < tolerance, "{row}: {}", jump.pressure);
     }

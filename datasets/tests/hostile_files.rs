@@ -1,4 +1,5 @@
-//! Truncated and damaged files: never a panic, never memory that the bytes cannot justify, always an error with a cure.
+//! Truncated and damaged files: never a panic, never memory that the bytes cannot justify, always
+//! an error with a cure.
 
 mod sample_files;
 
@@ -47,7 +48,8 @@ fn use_all(opened: &LoadedFile) {
     }
 }
 
-/// The most address space this process ever had, where the system tells. Memory that is asked for but never touched counts.
+/// The most address space this process ever had, where the system tells. Memory that is asked for
+/// but never touched counts.
 fn peak_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmPeak:"))?;
@@ -121,7 +123,9 @@ fn apply(bytes: &mut Vec<u8>, d: &Damage) {
             bytes.iter_mut().skip(start).zip(new).for_each(|(b, n)| *b = *n);
         }
         Damage::Number(at, new) => {
-            let Some(start) = (place(*at)..len).find(|&i| bytes[i].is_ascii_digit()) else { return };
+            let Some(start) = (place(*at)..len).find(|&i| bytes[i].is_ascii_digit()) else {
+                return;
+            };
             let end = (start..len).find(|&i| !bytes[i].is_ascii_digit()).unwrap_or(len);
             bytes.splice(start..end, new.bytes());
         }
@@ -163,7 +167,8 @@ fn every_truncation_is_survived() {
     assert_memory_is_bounded();
 }
 
-/// Cases per run: enough to find a new fault in days of CI, quick enough for every change. `PROPTEST_CASES` overrides.
+/// Cases per run: enough to find a new fault in days of CI, quick enough for every change.
+/// `PROPTEST_CASES` overrides.
 fn cases() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1500)
 }
@@ -198,11 +203,23 @@ fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
     );
     refused(
         "a.vtk",
-        b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 6148914691236517206 double\n0 0 0",
+        b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 6148914691236517206 \
+          double\n0 0 0",
         &["truncated"],
     );
-    refused("a.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z\nend_header\n", &["18446744073709551615"]);
-    refused("a.nrrd", b"NRRD0004\ntype: float\ndimension: 3\nsizes: 2000000000 2000000000 2000000000\nendian: little\nencoding: raw\n\n0", &["size of the volume"]);
+    refused(
+        "a.ply",
+        b"ply\nformat binary_little_endian 1.0\nelement vertex \
+                       18446744073709551615\nproperty float x\nproperty float y\nproperty float \
+                       z\nend_header\n",
+        &["18446744073709551615"],
+    );
+    refused(
+        "a.nrrd",
+        b"NRRD0004\ntype: float\ndimension: 3\nsizes: 2000000000 2000000000 \
+                        2000000000\nendian: little\nencoding: raw\n\n0",
+        &["size of the volume"],
+    );
     refused("a.nrrd", &sample_files::nrrd("gzip", sample_files::gzip(&[0; 4])), &["unpack"]);
     refused("a_4096x4096x4096_float64.raw", &[0; 64], &["68719476736", "64 bytes"]);
     let mut stl = vec![0u8; 84];
@@ -213,7 +230,8 @@ fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
     refused("a.glb", &glb, &["at byte 8", "5 bytes"]);
     let normal = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//6148914691236517207\n";
     refused("a.obj", normal, &["in line 5", "6148914691236517207"]);
-    // A megabyte of zeros packs into a kilobyte; a header that asks for a terabyte does not become one.
+    // A megabyte of zeros packs into a kilobyte; a header that asks for a terabyte does not become
+    // one.
     let bomb = sample_files::raw_appended("vtkZLibDataCompressor", sample_files::zlib);
     let at = bomb.windows(4).position(|w| w == [20, 0, 0, 0]).unwrap();
     let mut bomb = bomb;
@@ -223,14 +241,20 @@ fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
 
 #[test]
 fn huge_extent_without_arrays_makes_a_box_not_an_avalanche() {
-    let file = b"<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 2000000000 0 2000000000 0 2000000000\"><Piece Extent=\"0 2000000000 0 2000000000 0 2000000000\"/></ImageData></VTKFile>";
+    let file = b"<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 2000000000 0 2000000000 0 \
+                 2000000000\"><Piece Extent=\"0 2000000000 0 2000000000 0 \
+                 2000000000\"/></ImageData></VTKFile>";
     // 8e27 points do not fit in 64 bits; counts saturate and the surface is not built.
     let opened = read_and_use("a.vti", file).unwrap();
     let (mesh, _) = opened.dataset().unwrap().to_trimesh(None).unwrap();
     assert!(mesh.num_triangles() <= 12);
     let small = String::from_utf8_lossy(file).replace("2000000000", "2000000");
-    let (mesh, _) =
-        read_and_use("a.vti", small.as_bytes()).unwrap().dataset().unwrap().to_trimesh(None).unwrap();
+    let (mesh, _) = read_and_use("a.vti", small.as_bytes())
+        .unwrap()
+        .dataset()
+        .unwrap()
+        .to_trimesh(None)
+        .unwrap();
     assert_eq!(mesh.num_triangles(), 12);
     assert_memory_is_bounded();
 }
@@ -241,15 +265,18 @@ fn files_that_name_themselves_end_with_an_error() {
     for (name, text) in [
         (
             "loop.pvd",
-            "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"loop.pvd\"/></Collection></VTKFile>",
+            "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" \
+             file=\"loop.pvd\"/></Collection></VTKFile>",
         ),
         (
             "loop.pvtp",
-            "<VTKFile type=\"PPolyData\"><PPolyData><Piece Source=\"loop.pvtp\"/></PPolyData></VTKFile>",
+            "<VTKFile type=\"PPolyData\"><PPolyData><Piece \
+             Source=\"loop.pvtp\"/></PPolyData></VTKFile>",
         ),
         (
             "loop.vtm",
-            "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet file=\"loop.vtm\"/></vtkMultiBlockDataSet></VTKFile>",
+            "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet \
+             file=\"loop.vtm\"/></vtkMultiBlockDataSet></VTKFile>",
         ),
     ] {
         let path = dir.path().join(name);
@@ -261,8 +288,11 @@ fn files_that_name_themselves_end_with_an_error() {
 
 #[test]
 fn deep_nesting_does_not_overflow_the_stack() {
-    let deep =
-        format!("<VTKFile type=\"PolyData\">{}{}</VTKFile>", "<a>".repeat(100_000), "</a>".repeat(100_000));
+    let deep = format!(
+        "<VTKFile type=\"PolyData\">{}{}</VTKFile>",
+        "<a>".repeat(100_000),
+        "</a>".repeat(100_000)
+    );
     let _ = read_and_use("a.vtp", deep.as_bytes());
     let json = format!("{{\"asset\":{}{}}}", "[".repeat(100_000), "]".repeat(100_000));
     let _ = read_and_use("a.gltf", json.as_bytes());

@@ -1,4 +1,5 @@
-//! Isosurfaces against the real `vtkFlyingEdges3D`: counts, vertex positions, normals and enclosed volume.
+//! Isosurfaces against the real `vtkFlyingEdges3D`: counts, vertex positions, normals and enclosed
+//! volume.
 
 mod peer;
 
@@ -6,8 +7,9 @@ use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{Options, count_triangles, extract};
 use rt_core::mesh::TriMesh;
 
-/// Contours a wavelet of `argv[1]` points at each further argument; prints triangles and points of each. The last
-/// surface's points, then normals, go to the file `argv[2]`; its signed volume is printed last.
+/// Contours a wavelet of `argv[1]` points at each further argument; prints triangles and points of
+/// each. The last surface's points, then normals, go to the file `argv[2]`; its signed volume is
+/// printed last.
 const SCRIPT: &str = r#"
 import sys, numpy
 from vtkmodules.vtkImagingCore import vtkRTAnalyticSource
@@ -50,7 +52,19 @@ fn volume(mesh: &TriMesh) -> f64 {
 fn counts_points_normals_and_orientation_are_vtks() {
     let Some(python) = peer::python_with_vtk("isosurface_vs_vtk") else { return };
     let file = tempfile::NamedTempFile::new().unwrap();
-    let isos = ["60", "100", "115", "130", "150", "157.0909652709961", "170", "190", "200", "250", "133.37"];
+    let isos = [
+        "60",
+        "100",
+        "115",
+        "130",
+        "150",
+        "157.0909652709961",
+        "170",
+        "190",
+        "200",
+        "250",
+        "133.37",
+    ];
     let path = file.path().display().to_string();
     let args: Vec<&str> = ["67", &path].into_iter().chain(isos).collect();
     let printed = peer::run(&python, SCRIPT, &args);
@@ -63,14 +77,22 @@ fn counts_points_normals_and_orientation_are_vtks() {
         assert_eq!(format!("{n} {points}"), lines.next().unwrap(), "triangles and points at {iso}");
     }
 
-    let mesh = extract(&grid, &values[10..], Options { normals: true, ..Default::default() }).unwrap().mesh;
+    let mesh = extract(&grid, &values[10..], Options { normals: true, ..Default::default() })
+        .unwrap()
+        .mesh;
     let bytes = std::fs::read(file.path()).unwrap();
-    let floats: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    let floats: Vec<f32> =
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
     let (p, n) = floats.split_at(floats.len() / 2);
-    let theirs = p.chunks(3).zip(n.chunks(3)).map(|(p, n)| [p[0], p[1], p[2], n[0], n[1], n[2]]).collect();
+    let theirs =
+        p.chunks(3).zip(n.chunks(3)).map(|(p, n)| [p[0], p[1], p[2], n[0], n[1], n[2]]).collect();
     let normals = mesh.normals.as_ref().unwrap();
-    let ours =
-        mesh.positions.iter().zip(&normals.values).map(|(p, n)| [p.x, p.y, p.z, n.x, n.y, n.z]).collect();
+    let ours = mesh
+        .positions
+        .iter()
+        .zip(&normals.values)
+        .map(|(p, n)| [p.x, p.y, p.z, n.x, n.y, n.z])
+        .collect();
     let (mut worst_position, mut worst_normal) = (0f32, 0f32);
     for (a, b) in sorted(ours).iter().zip(&sorted(theirs)) {
         for c in 0..3 {
@@ -78,11 +100,13 @@ fn counts_points_normals_and_orientation_are_vtks() {
             worst_normal = worst_normal.max((a[c + 3] - b[c + 3]).abs());
         }
     }
-    // Coordinates are at most 33: a few units in the last place (2e-6 there). VTK's gradients are f32, too.
+    // Coordinates are at most 33: a few units in the last place (2e-6 there). VTK's gradients are
+    // f32, too.
     assert!(worst_position < 1e-5, "positions differ by {worst_position}");
     assert!(worst_normal < 1e-4, "normals differ by {worst_normal}");
 
-    // The diagonals differ, so the volume does a little; its sign is the orientation of the triangles.
+    // The diagonals differ, so the volume does a little; its sign is the orientation of the
+    // triangles.
     let theirs: f64 = lines.next().unwrap().parse().unwrap();
     let ours = volume(&mesh);
     assert!((ours / theirs - 1.0).abs() < 1e-3, "volume {ours} against VTK's {theirs}");

@@ -1,4 +1,5 @@
-//! The committed OpenFOAM results against the exact solutions: shock angles within 0.3 degrees, densities within 2 %.
+//! The committed OpenFOAM results against the exact solutions: shock angles within 0.3 degrees,
+//! densities within 2 %.
 
 use datasets::generate::gas_dynamics::taylor_maccoll::cone_flow;
 use datasets::generate::gas_dynamics::theta_beta_m::{Branch, oblique_shock};
@@ -10,18 +11,21 @@ fn slice(case: &str) -> Slice {
     Slice::from_dataset(open(path).unwrap().dataset().unwrap()).unwrap()
 }
 
-/// Slope of the line through the points where the density, going inwards, passes the middle of the jump; in degrees.
+/// Slope of the line through the points where the density, going inwards, passes the middle of the
+/// jump; in degrees.
 fn shock_angle_degrees(slice: &Slice, free: f64, ratio: f64) -> f64 {
     let middle = free * 0.5 * (1.0 + ratio);
     let mut points = Vec::new();
     for line in 0..slice.lines() {
         let cells = slice.line("density", line).unwrap();
         let x = cells[0].0[0];
-        // Away from the apex, where the shock has fewer cells than it is thick, and before the shoulder.
+        // Away from the apex, where the shock has fewer cells than it is thick, and before the
+        // shoulder.
         if !(0.015..0.048).contains(&x) {
             continue;
         }
-        let outer = cells.windows(2).rev().find(|w| w[0].1 > middle && w[1].1 <= middle).expect("a shock");
+        let outer =
+            cells.windows(2).rev().find(|w| w[0].1 > middle && w[1].1 <= middle).expect("a shock");
         let t = (outer[0].1 - middle) / (outer[0].1 - outer[1].1);
         points.push([x, outer[0].0[1] + t * (outer[1].0[1] - outer[0].0[1])]);
     }
@@ -33,7 +37,8 @@ fn shock_angle_degrees(slice: &Slice, free: f64, ratio: f64) -> f64 {
     (covariance / variance).atan().to_degrees()
 }
 
-/// Density of a cell near the surface at x, over the first cell's, and the angle at which that cell is seen from the apex.
+/// Density of a cell near the surface at x, over the first cell's, and the angle at which that cell
+/// is seen from the apex.
 fn surface_density(slice: &Slice, x: f64) -> (f64, f64) {
     let free = slice.line("density", 0).unwrap()[60].1;
     let line = (0..slice.lines()).find(|&l| slice.line("density", l).unwrap()[0].0[0] > x).unwrap();
@@ -49,7 +54,11 @@ fn wedge_has_the_shock_of_theta_beta_m() {
     let free = slice.line("density", 0).unwrap()[60].1;
     assert!((free - 0.52256).abs() < 1e-4, "{free}");
     let found = shock_angle_degrees(&slice, free, exact.jump.density);
-    assert!((found - exact.shock_rad.to_degrees()).abs() < 0.3, "{found} {}", exact.shock_rad.to_degrees());
+    assert!(
+        (found - exact.shock_rad.to_degrees()).abs() < 0.3,
+        "{found} {}",
+        exact.shock_rad.to_degrees()
+    );
     let (density, _) = surface_density(&slice, 0.04);
     assert!((density / exact.jump.density - 1.0).abs() < 0.02, "{density} {}", exact.jump.density);
 }
@@ -60,7 +69,11 @@ fn cone_has_the_shock_of_taylor_and_maccoll() {
     let exact = cone_flow(1.4, 3.0, 20f64.to_radians()).unwrap();
     let free = slice.line("density", 0).unwrap()[60].1;
     let found = shock_angle_degrees(&slice, free, exact.jump.density);
-    assert!((found - exact.shock_rad.to_degrees()).abs() < 0.3, "{found} {}", exact.shock_rad.to_degrees());
+    assert!(
+        (found - exact.shock_rad.to_degrees()).abs() < 0.3,
+        "{found} {}",
+        exact.shock_rad.to_degrees()
+    );
     let (density, angle) = surface_density(&slice, 0.04);
     let expected = exact.state(angle).density;
     assert!(
@@ -75,7 +88,8 @@ fn revolved_cone_keeps_its_shock_and_its_hole() {
     let flow = slice.flow(Sweep::Revolve, glam::UVec3::splat(48)).unwrap();
     let rho = flow.grid("density").unwrap();
     let exact = cone_flow(1.4, 3.0, 20f64.to_radians()).unwrap();
-    // In the plane x = 40 mm: free stream outside the shock, compressed inside, nothing in the cone.
+    // In the plane x = 40 mm: free stream outside the shock, compressed inside, nothing in the
+    // cone.
     let i = ((0.04 - flow.origin_m.x) / flow.spacing_m.x).round() as u32;
     let x = flow.position_m(i, 0, 0).x;
     for jk in 0..48 * 48 {

@@ -21,7 +21,8 @@ fn text(bytes: &[u8]) -> String {
 fn json(dir: &Path, args: &[&str]) -> Value {
     let out = datasets(dir, &[&["--json", "--quiet"], args].concat());
     assert_eq!(out.status.code(), Some(0), "{args:?}: {}", text(&out.stderr));
-    serde_json::from_slice(&out.stdout).unwrap_or_else(|e| panic!("{args:?}: {e}: {}", text(&out.stdout)))
+    serde_json::from_slice(&out.stdout)
+        .unwrap_or_else(|e| panic!("{args:?}: {e}: {}", text(&out.stdout)))
 }
 
 fn arrays(info: &Value) -> Vec<&str> {
@@ -67,8 +68,10 @@ fn a_flow_keeps_its_fields_and_has_an_isosurface() {
     let density = &info["parts"][0]["arrays"][0];
     let [low, high] = [0, 1].map(|i| density["range"][i].as_f64().unwrap());
     let middle = format!("{}", 0.5 * (low + high));
-    let shock =
-        json(dir.path(), &["convert", "wedge.vti", "shock.ply", "--isovalue", &middle, "--array", "density"]);
+    let shock = json(
+        dir.path(),
+        &["convert", "wedge.vti", "shock.ply", "--isovalue", &middle, "--array", "density"],
+    );
     assert!(shock["cells"].as_u64() > Some(0), "{shock}");
     let outside = format!("{}", high + 1.0);
     let out = datasets(dir.path(), &["convert", "wedge.vti", "none.ply", "--isovalue", &outside]);
@@ -116,11 +119,16 @@ fn a_missing_file_ends_with_1_and_is_named() {
 #[test]
 fn help_has_examples_and_completions_are_printed() {
     let dir = tempfile::tempdir().unwrap();
-    for args in [&["--help"][..], &["make", "--help"], &["info", "--help"], &["convert", "--help"]] {
+    for args in [&["--help"][..], &["make", "--help"], &["info", "--help"], &["convert", "--help"]]
+    {
         let out = datasets(dir.path(), args);
         assert_eq!(out.status.code(), Some(0), "{args:?}");
         assert!(text(&out.stdout).contains("Examples:"), "{args:?}");
     }
     let out = datasets(dir.path(), &["completions", "bash"]);
-    assert!(out.status.success() && text(&out.stdout).contains("datasets"), "{}", text(&out.stdout));
+    assert!(
+        out.status.success() && text(&out.stdout).contains("datasets"),
+        "{}",
+        text(&out.stdout)
+    );
 }

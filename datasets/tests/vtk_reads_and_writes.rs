@@ -20,7 +20,10 @@ fn weighted(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Equal but for the rounding of a sum in another order.
 fn assert_close(found: f64, expected: f64, scale: f64, what: &str) {
-    assert!((found - expected).abs() <= 1e-9 * scale.max(1.0), "{what}: found {found}, VTK has {expected}");
+    assert!(
+        (found - expected).abs() <= 1e-9 * scale.max(1.0),
+        "{what}: found {found}, VTK has {expected}"
+    );
 }
 
 fn same_type(kind: ScalarType, vtk: &str) -> bool {
@@ -68,9 +71,9 @@ fn compare(file: &str, opened: &LoadedFile, expected: &Value) {
             assert_eq!(serde_json::json!(found.1), *text, "{file} {key}");
             continue;
         }
-        let x = ours
-            .get(key)
-            .unwrap_or_else(|| panic!("{file}: array {key} is missing; there are {:?}", ours.keys()));
+        let x = ours.get(key).unwrap_or_else(|| {
+            panic!("{file}: array {key} is missing; there are {:?}", ours.keys())
+        });
         assert_eq!(x.components as u64, e["components"].as_u64().unwrap(), "{file} {key}");
         assert_eq!(x.values.len() as u64, e["values"].as_u64().unwrap(), "{file} {key}");
         assert!(
@@ -81,7 +84,12 @@ fn compare(file: &str, opened: &LoadedFile, expected: &Value) {
         );
         let values = || (0..x.values.len()).map(|i| x.values.get_f64(i));
         let scale = values().map(f64::abs).sum::<f64>() * 97.0;
-        assert_close(values().sum(), e["sum"].as_f64().unwrap(), scale, &format!("{file} {key} sum"));
+        assert_close(
+            values().sum(),
+            e["sum"].as_f64().unwrap(),
+            scale,
+            &format!("{file} {key} sum"),
+        );
         assert_close(
             weighted(values()),
             e["weighted"].as_f64().unwrap(),
@@ -116,15 +124,22 @@ fn compare(file: &str, opened: &LoadedFile, expected: &Value) {
             .sum();
         let expected = expected["surface_area"].as_f64().unwrap();
         // f32 positions.
-        assert!((area - expected).abs() < 2e-5 * expected, "{file}: area {area}, VTK has {expected}");
+        assert!(
+            (area - expected).abs() < 2e-5 * expected,
+            "{file}: area {area}, VTK has {expected}"
+        );
     }
 }
 
 fn coordinates(data: &Dataset) -> Vec<[f64; 3]> {
     match data {
         Dataset::PolyData(d) => (0..d.points.len()).map(|i| d.points.get(i).to_array()).collect(),
-        Dataset::UnstructuredGrid(d) => (0..d.points.len()).map(|i| d.points.get(i).to_array()).collect(),
-        Dataset::StructuredGrid(d) => (0..d.points.len()).map(|i| d.points.get(i).to_array()).collect(),
+        Dataset::UnstructuredGrid(d) => {
+            (0..d.points.len()).map(|i| d.points.get(i).to_array()).collect()
+        }
+        Dataset::StructuredGrid(d) => {
+            (0..d.points.len()).map(|i| d.points.get(i).to_array()).collect()
+        }
         Dataset::ImageData(d) => lattice(d.dims(), |i, j, k| d.point(i, j, k).to_array()),
         Dataset::RectilinearGrid(d) => {
             let [x, y, z] = &d.coordinates;
@@ -159,7 +174,10 @@ fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
             Err(e) => {
                 // LZMA is refused, by name and with the cure.
                 let text = e.to_string();
-                assert!(file.contains("lzma") && matches!(e, ReadError::Unsupported { .. }), "{text}");
+                assert!(
+                    file.contains("lzma") && matches!(e, ReadError::Unsupported { .. }),
+                    "{text}"
+                );
                 assert!(
                     text.contains("LZMA") && text.contains("ZLib") && text.contains(file.as_str()),
                     "{text}"
@@ -168,7 +186,10 @@ fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
             }
         }
     }
-    println!("VTK {}: {read} files read as VTK reads them, {refused} LZMA files refused", all["vtk"]);
+    println!(
+        "VTK {}: {read} files read as VTK reads them, {refused} LZMA files refused",
+        all["vtk"]
+    );
     assert!(read > 150 && refused > 0, "{read} {refused}");
     check_series_and_blocks(dir.path());
 }

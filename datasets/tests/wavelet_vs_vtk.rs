@@ -5,7 +5,8 @@ mod peer;
 use datasets::generate::wavelet::Wavelet;
 use glam::{DVec3, IVec3};
 
-/// Writes RTData of a source with the given extent, centre, maximum, deviation, frequencies and magnitudes.
+/// Writes RTData of a source with the given extent, centre, maximum, deviation, frequencies and
+/// magnitudes.
 const SCRIPT: &str = r#"
 import sys
 from vtkmodules.vtkImagingCore import vtkRTAnalyticSource

@@ -1,4 +1,5 @@
-//! Frames that come again: the picture is shown once more without rays as long as nothing has changed, and never longer.
+//! Frames that come again: the picture is shown once more without rays as long as nothing has
+//! changed, and never longer.
 
 mod common;
 
@@ -32,7 +33,12 @@ fn frames(group: &str) -> Option<(Frames, Frames, Report)> {
     assert_eq!(native.len(), ours.len());
     for (case, (a, b)) in native.iter().zip(&ours).enumerate() {
         for frame in 0..2 {
-            assert_agrees(&format!("case {case} of {group}, frame {}", frame + 2), &a[frame], &b[frame], 4.0);
+            assert_agrees(
+                &format!("case {case} of {group}, frame {}", frame + 2),
+                &a[frame],
+                &b[frame],
+                4.0,
+            );
         }
     }
     Some((native, ours, report))

@@ -46,15 +46,26 @@ fn said_of(code: &str) -> String {
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("lib.rs");
-    let module = |name: &str| format!("#[path = {:?}]\nmod {name};\n", sources.join(format!("{name}.rs")));
+    let module =
+        |name: &str| format!("#[path = {:?}]\nmod {name};\n", sources.join(format!("{name}.rs")));
     let safe = format!(
-        "mod safe {{\n#![forbid(unsafe_code)]\nuse crate::interpose::client_memory::*;\nuse std::borrow::Cow;\n{code}\n}}\n"
+        "mod safe {{\n#![forbid(unsafe_code)]\nuse crate::interpose::client_memory::*;\nuse \
+         std::borrow::Cow;\n{code}\n}}\n"
     );
     let text = [REST, &module("enums"), &module("client_memory"), &safe].concat();
     std::fs::write(&file, text).expect("written");
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut command = Command::new(rustc);
-    command.args(["--edition", "2024", "--crate-type", "lib", "--emit", "metadata", "--cap-lints", "warn"]);
+    command.args([
+        "--edition",
+        "2024",
+        "--crate-type",
+        "lib",
+        "--emit",
+        "metadata",
+        "--cap-lints",
+        "warn",
+    ]);
     command.args(["-A", "warnings", "--out-dir"]).arg(folder.path()).arg(&file);
     let output = command.output().expect("the compiler starts");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -84,7 +84,8 @@ fn explain_says_what_was_traced_what_was_not_and_what_to_do() {
     ] {
         assert!(text.contains(part), "{part}:\n{text}");
     }
-    let json: Report = serde_json::from_str(&out(&gluray(&["explain", "--json"], home.path()))).unwrap();
+    let json: Report =
+        serde_json::from_str(&out(&gluray(&["explain", "--json"], home.path()))).unwrap();
     assert_eq!(json, report());
     std::fs::write(&last, "{").unwrap();
     let broken = gluray(&["explain"], home.path());
@@ -100,7 +101,8 @@ fn a_run_becomes_a_chart_and_a_trace() {
     let home = tempfile::tempdir().unwrap();
     let at = |name: &str| home.path().join(name).to_str().unwrap().to_owned();
     std::fs::write(at("r.json"), serde_json::to_vec(&report()).unwrap()).unwrap();
-    let done = gluray(&["timeline", &at("r.json"), "-o", &at("a.svg"), "-o", &at("a.json")], home.path());
+    let done =
+        gluray(&["timeline", &at("r.json"), "-o", &at("a.svg"), "-o", &at("a.json")], home.path());
     assert!(done.status.success(), "{}", err(&done));
     let svg = std::fs::read_to_string(at("a.svg")).unwrap();
     assert!(svg.contains("best build 40.0 ms") && svg.contains("gmsh, mode match"), "{svg}");
@@ -108,10 +110,20 @@ fn a_run_becomes_a_chart_and_a_trace() {
     let events = trace["traceEvents"].as_array().unwrap();
     assert_eq!(events.iter().filter(|e| e["ph"] == "X").count(), 3);
     let wrong = gluray(&["timeline", &at("r.json"), "-o", &at("a.png")], home.path());
-    assert!(wrong.status.code() == Some(2) && err(&wrong).contains(".svg or .json"), "{}", err(&wrong));
-    let empty =
-        gluray(&["timeline", &at("r.json"), "-o", &at("a.svg"), "--from", "7", "--to", "7"], home.path());
-    assert!(empty.status.code() == Some(2) && err(&empty).contains("0.0 to 50.0 ms"), "{}", err(&empty));
+    assert!(
+        wrong.status.code() == Some(2) && err(&wrong).contains(".svg or .json"),
+        "{}",
+        err(&wrong)
+    );
+    let empty = gluray(
+        &["timeline", &at("r.json"), "-o", &at("a.svg"), "--from", "7", "--to", "7"],
+        home.path(),
+    );
+    assert!(
+        empty.status.code() == Some(2) && err(&empty).contains("0.0 to 50.0 ms"),
+        "{}",
+        err(&empty)
+    );
 }
 
 #[test]
@@ -138,7 +150,9 @@ fn scenes_become_files_that_other_programs_read() {
         let done = gluray(&["export", &at("s.gluray"), "-o", &at(file)], home.path());
         assert!(done.status.success(), "{file}: {}", err(&done));
         let mesh = match datasets::read::open(at(file)).unwrap().content {
-            datasets::read::Content::Scene(s) => s.meshes.iter().map(|m| m.mesh.num_triangles()).sum(),
+            datasets::read::Content::Scene(s) => {
+                s.meshes.iter().map(|m| m.mesh.num_triangles()).sum()
+            }
             datasets::read::Content::Data(d) => {
                 let datasets::model::Dataset::PolyData(p) = &d else { panic!("{file}") };
                 assert!(p.attributes.point_array("Normals").is_some(), "{file}");
@@ -153,7 +167,11 @@ fn scenes_become_files_that_other_programs_read() {
     for (arguments, code, text) in [
         (vec!["export", &at("s.gluray")], 2, "give -o FILE"),
         (vec!["export", &at("s.gluray"), "-o", "a.png"], 2, ".ply, .glb, .vtp, .obj"),
-        (vec!["export", &at("s.gluray"), "--object", "cc", "-o", &at("b.ply")], 2, "there is no object `cc`"),
+        (
+            vec!["export", &at("s.gluray"), "--object", "cc", "-o", &at("b.ply")],
+            2,
+            "there is no object `cc`",
+        ),
         (vec!["export", "-o", &at("b.ply")], 1, "no program has written one"),
         (vec!["export", &at("a.ply"), "-o", &at("b.ply")], 1, "is no scene of gluray"),
     ] {
@@ -232,7 +250,12 @@ fn a_term_ends_the_program_and_the_report_is_written() {
     let home = tempfile::tempdir().expect("a folder");
     let report = home.path().join("r.json");
     let mut command = Command::new(env!("CARGO_BIN_EXE_gluray"));
-    command.args(["run", "--report"]).arg(&report).args(["--", "sh", "-c", "echo started; exec sleep 600"]);
+    command.args(["run", "--report"]).arg(&report).args([
+        "--",
+        "sh",
+        "-c",
+        "echo started; exec sleep 600",
+    ]);
     command.env("XDG_STATE_HOME", home.path()).env("XDG_CONFIG_HOME", home.path());
     command.env("XDG_RUNTIME_DIR", home.path()).stdout(std::process::Stdio::piped());
     let mut child = command.spawn().expect("the program starts");
@@ -254,9 +277,14 @@ fn run_refuses_variables_of_ours_that_are_no_text_by_name() {
     use std::os::unix::ffi::OsStrExt;
     let no_text = std::ffi::OsStr::from_bytes(b"3f2a.mirror=0.5\xff");
     let mut command = Command::new(env!("CARGO_BIN_EXE_gluray"));
-    command.args(["run", "--set", "objects.3f2a.mirror=0.3", "--", "true"]).env("GLURAY_OBJECTS", no_text);
+    command
+        .args(["run", "--set", "objects.3f2a.mirror=0.3", "--", "true"])
+        .env("GLURAY_OBJECTS", no_text);
     let output = command.output().expect("the program starts");
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let said = err(&output);
-    assert!(said.contains("`GLURAY_OBJECTS` is not UTF-8") && said.contains("set it to text"), "{said}");
+    assert!(
+        said.contains("`GLURAY_OBJECTS` is not UTF-8") && said.contains("set it to text"),
+        "{said}"
+    );
 }

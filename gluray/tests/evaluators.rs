@@ -1,11 +1,14 @@
-//! Surfaces and curves of OpenGL's evaluators, one small program each: the driver's picture, and traced where it can be.
+//! Surfaces and curves of OpenGL's evaluators, one small program each: the driver's picture, and
+//! traced where it can be.
 
 mod common;
 
 use common::cases::{Expected, check};
 
 fn draws(case: &str, traced: bool, options: &[&str]) {
-    let Some(m) = check("evaluators.py", case, &Expected { traced, exit: 0 }, options) else { return };
+    let Some(m) = check("evaluators.py", case, &Expected { traced, exit: 0 }, options) else {
+        return;
+    };
     assert!(m.raw <= 0.2 && m.tolerant <= 0.02, "{case}: {m:?}");
 }
 

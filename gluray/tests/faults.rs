@@ -1,4 +1,5 @@
-//! A fault of ours at every function that programs can call: the program gets the driver's picture, and its errors.
+//! A fault of ours at every function that programs can call: the program gets the driver's picture,
+//! and its errors.
 
 mod common;
 
@@ -22,7 +23,8 @@ struct Seen {
 const HOOKS: &str = include_str!("programs/hooks.txt");
 /// What is not taken apart: told of when nothing is open, drawn or flushed, and looked up.
 const OTHERS: [&str; 4] = ["glRotatef", "glTexImage2D", "glScissor", "glReadPixels"];
-/// Later calls: in the middle of primitives, of lists, and when there is a frame's worth to be handed over.
+/// Later calls: in the middle of primitives, of lists, and when there is a frame's worth to be
+/// handed over.
 const LATER: [&str; 13] = [
     "glVertex3f:2",
     "glVertex3f:77",
@@ -53,7 +55,10 @@ fn off(a: &str, b: &str) -> usize {
     };
     let (a, b) = (colors(a), colors(b));
     assert_eq!(a.len(), b.len());
-    a.chunks_exact(4).zip(b.chunks_exact(4)).filter(|(p, q)| (0..3).any(|k| p[k].abs_diff(q[k]) > 8)).count()
+    a.chunks_exact(4)
+        .zip(b.chunks_exact(4))
+        .filter(|(p, q)| (0..3).any(|k| p[k].abs_diff(q[k]) > 8))
+        .count()
 }
 
 #[test]
@@ -63,15 +68,17 @@ fn a_fault_in_any_function_that_programs_call_leaves_them_the_drivers_pictures_a
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/faults.py");
     let place = folder();
     let places: Vec<&str> = HOOKS.lines().chain(OTHERS).chain(LATER).collect();
-    let run = |through: Option<&[&str]>, places: &[&str]| -> (BTreeMap<String, Seen>, Vec<String>) {
-        std::fs::write(place.path().join("list"), places.join("\n")).expect("written");
-        let run = Run { x: &x, folder: place.path(), through, environment: &[] };
-        let (output, report) = run.faulty_program(&python, &[script.to_str().expect("UTF-8"), "list", "out"]);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && said.is_empty(), "{}: {said}", output.status);
-        let text = std::fs::read_to_string(place.path().join("out")).expect("what was seen");
-        (serde_json::from_str(&text).expect("JSON"), report.faults)
-    };
+    let run =
+        |through: Option<&[&str]>, places: &[&str]| -> (BTreeMap<String, Seen>, Vec<String>) {
+            std::fs::write(place.path().join("list"), places.join("\n")).expect("written");
+            let run = Run { x: &x, folder: place.path(), through, environment: &[] };
+            let (output, report) =
+                run.faulty_program(&python, &[script.to_str().expect("UTF-8"), "list", "out"]);
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success() && said.is_empty(), "{}: {said}", output.status);
+            let text = std::fs::read_to_string(place.path().join("out")).expect("what was seen");
+            (serde_json::from_str(&text).expect("JSON"), report.faults)
+        };
     let (native, _) = run(None, &places);
     let (preloaded, others): (Vec<&str>, Vec<&str>) =
         places.iter().copied().partition(|p| PRELOADED.contains(p));
@@ -94,7 +101,8 @@ fn a_fault_in_any_function_that_programs_call_leaves_them_the_drivers_pictures_a
         if !logged || first > SILHOUETTES || a.next != b.next || a.errors != b.errors {
             let next = off(&a.next, &b.next);
             wrong.push(format!(
-                "{name}: logged {logged}, {first} pixels of that frame, {next} of the next, errors {:?} and {:?}",
+                "{name}: logged {logged}, {first} pixels of that frame, {next} of the next, errors \
+                 {:?} and {:?}",
                 a.errors, b.errors
             ));
         }
@@ -111,7 +119,8 @@ fn a_shader_that_the_driver_refuses_costs_no_draw_and_is_named() {
     for case in ["plain", "lists_over_several_frames"] {
         let picture = |through, environment: &[(&str, &str)]| {
             let run = Run { x: &x, folder: place.path(), through, environment };
-            let (output, report) = run.program(&python, &[script.to_str().expect("UTF-8"), case, "out"]);
+            let (output, report) =
+                run.program(&python, &[script.to_str().expect("UTF-8"), case, "out"]);
             assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
             (std::fs::read(place.path().join("out")).expect("a picture"), report)
         };
@@ -121,7 +130,12 @@ fn a_shader_that_the_driver_refuses_costs_no_draw_and_is_named() {
         assert_eq!(report.traced_draws, 0, "{case}: nothing is swallowed");
         let passed = report.passed_reasons.get("the driver refuses our shader or its textures");
         assert!(passed.is_some_and(|n| *n > 0), "{case}: {:?}", report.passed_reasons);
-        let told = |p: &String| p.contains("refuses our shader") && p.contains("GLURAY_INJECT_FAULT");
-        assert!(report.problems.iter().any(told), "{case}: in the driver's words: {:?}", report.problems);
+        let told =
+            |p: &String| p.contains("refuses our shader") && p.contains("GLURAY_INJECT_FAULT");
+        assert!(
+            report.problems.iter().any(told),
+            "{case}: in the driver's words: {:?}",
+            report.problems
+        );
     }
 }

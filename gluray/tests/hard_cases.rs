@@ -101,14 +101,16 @@ fn of_layers_in_one_plane_the_last_is_seen() {
     check("layers_in_one_plane", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
 }
 
-/// A square of 128 x 128 pixels with something large on it and, where `small` says so, a triangle of three to six pixels a side.
+/// A square of 128 x 128 pixels with something large on it and, where `small` says so, a triangle
+/// of three to six pixels a side.
 fn planted(small: Option<usize>) -> (Picture, Vec<f32>) {
     const SIZE: usize = 128;
     let (mut pixels, mut depth) = (vec![[20, 20, 40]; SIZE * SIZE], vec![1.0; SIZE * SIZE]);
     for y in 0..SIZE {
         for x in 0..SIZE {
             if x > 10 && y > 10 && x + y < 120 {
-                (pixels[y * SIZE + x], depth[y * SIZE + x]) = ([200, 120, 60], 0.5 + 0.001 * x as f32);
+                (pixels[y * SIZE + x], depth[y * SIZE + x]) =
+                    ([200, 120, 60], 0.5 + 0.001 * x as f32);
             }
             if small.is_some_and(|n| x >= 100 && y >= 100 && x + y < 200 + n) {
                 (pixels[y * SIZE + x], depth[y * SIZE + x]) = ([60, 200, 90], 0.25);
@@ -127,8 +129,14 @@ fn a_lost_small_triangle_and_an_added_one_are_found() {
         assert!(m.raw <= 0.5 && m.overlap >= 0.995, "too small for shares of the picture: {m:?}");
         assert!(!wrong_beyond_edges(&with, &without).is_empty(), "lost, {side} pixels a side");
         assert!(!wrong_beyond_edges(&without, &with).is_empty(), "added, {side} pixels a side");
-        assert!(!depths_beyond_edges(128, &near, &far, 1e-6).is_empty(), "lost, {side} pixels a side");
-        assert!(!depths_beyond_edges(128, &far, &near, 1e-6).is_empty(), "added, {side} pixels a side");
+        assert!(
+            !depths_beyond_edges(128, &near, &far, 1e-6).is_empty(),
+            "lost, {side} pixels a side"
+        );
+        assert!(
+            !depths_beyond_edges(128, &far, &near, 1e-6).is_empty(),
+            "added, {side} pixels a side"
+        );
     }
     assert!(wrong_beyond_edges(&without, &planted(None).0).is_empty());
 }

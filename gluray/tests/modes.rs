@@ -1,4 +1,5 @@
-//! What the modes beyond `match` change about a picture, by programs whose right pictures are known.
+//! What the modes beyond `match` change about a picture, by programs whose right pictures are
+//! known.
 
 mod common;
 
@@ -8,7 +9,8 @@ use std::path::Path;
 
 const SIZE: usize = 128;
 
-/// A case of `hard_cases.py` with options of `gluray run`; `None` without the peers. Rows from the bottom up.
+/// A case of `hard_cases.py` with options of `gluray run`; `None` without the peers. Rows from the
+/// bottom up.
 fn draw(case: &str, through: Option<&[&str]>) -> Option<(Picture, Report)> {
     let python = peer("RTSV_SYSTEM_PYTHON")?;
     let x = Xvfb::start()?;
@@ -19,7 +21,8 @@ fn draw(case: &str, through: Option<&[&str]>) -> Option<(Picture, Report)> {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{case}: {text}");
     let bytes = std::fs::read(place.path().join("out")).expect("a picture");
-    let pixels = bytes[8..8 + 4 * SIZE * SIZE].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+    let pixels =
+        bytes[8..8 + 4 * SIZE * SIZE].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
     Some((Picture { width: SIZE, height: SIZE, pixels }, report))
 }
 
@@ -38,7 +41,8 @@ fn redness(p: &Picture, part: [usize; 4]) -> f64 {
     r - b
 }
 
-/// The floor in front of the box, and far to the left of it; the floor to the box' right, where its shadow falls.
+/// The floor in front of the box, and far to the left of it; the floor to the box' right, where its
+/// shadow falls.
 const FRONT: [usize; 4] = [58, 37, 12, 9];
 const AWAY: [usize; 4] = [8, 8, 10, 6];
 const SHADOW: [usize; 4] = [82, 51, 8, 4];
@@ -54,7 +58,11 @@ fn path_mode_has_shadows_and_light_from_wall_to_wall_and_is_deterministic() {
     let (again, _) = draw("box_on_floor", Some(&options)).expect("it ran before");
     assert!(picture.pixels == again.pixels, "equal runs give equal pictures");
     let (plain, _) = draw("box_on_floor", Some(&["--mode", "phong"])).expect("it ran before");
-    assert!(rays(&report, "path") > 10_000 && rays(&report, "shadow") > 10_000, "{:?}", report.rays);
+    assert!(
+        rays(&report, "path") > 10_000 && rays(&report, "shadow") > 10_000,
+        "{:?}",
+        report.rays
+    );
     assert!(mean(&picture, SHADOW)[1] < mean(&plain, SHADOW)[1] - 40.0, "a shadow");
     let near = redness(&picture, FRONT);
     assert!(near > redness(&plain, FRONT) + 4.0, "the box colours the floor before it: {near}");
@@ -82,7 +90,10 @@ fn fog_takes_the_same_share_of_path_traced_colours_as_of_others() {
         let (with, without) = (mean(&picture, part), mean(&clear, part));
         for k in 0..3 {
             let expected = without[k] * (1.0 - share) + FOG[k] * share;
-            assert!((with[k] - expected).abs() < 4.0, "{part:?}: {with:?} of {without:?} by {share}");
+            assert!(
+                (with[k] - expected).abs() < 4.0,
+                "{part:?}: {with:?} of {without:?} by {share}"
+            );
         }
     }
 }
@@ -101,7 +112,8 @@ fn mirrors_are_seen_and_cost_rays_only_where_they_are_asked_for() {
     let (picture, report) = draw("box_on_floor", Some(&dull)).expect("it ran before");
     assert_eq!(rays(&report, "reflection"), 0, "no rays for a surface that reflects nothing");
     assert!(picture.pixels == plain.pixels);
-    let off = ["--mode", "rich", "--set", "material.mirror=0.6", "--set", "effects.reflections=false"];
+    let off =
+        ["--mode", "rich", "--set", "material.mirror=0.6", "--set", "effects.reflections=false"];
     let (picture, report) = draw("box_on_floor", Some(&off)).expect("it ran before");
     assert_eq!(rays(&report, "reflection"), 0);
     assert!(picture.pixels == plain.pixels);
@@ -110,7 +122,8 @@ fn mirrors_are_seen_and_cost_rays_only_where_they_are_asked_for() {
 #[test]
 fn glass_bends_light_in_rich_and_in_path() {
     for mode in ["rich", "path"] {
-        let options = ["--mode", mode, "--set", "material.surface=glass", "--set", "lights.sky=0.6"];
+        let options =
+            ["--mode", mode, "--set", "material.surface=glass", "--set", "lights.sky=0.6"];
         let Some((picture, report)) = draw("box_on_floor", Some(&options)) else { return };
         let kind = if mode == "path" { "path" } else { "refraction" };
         assert!(rays(&report, kind) > 1000, "{mode}: {:?}", report.rays);
@@ -129,11 +142,18 @@ fn translucent_surfaces_are_sorted_by_rays() {
     // Half red over half green over (0.1, 0.1, 0.2).
     let [r, g, b] = mean(&rich, center);
     let expected = [0.5 + 0.25 * 0.1, 0.25 + 0.25 * 0.1, 0.25 * 0.2].map(|v| v * 255.0);
-    assert!((r - expected[0]).abs() < 3.0 && (g - expected[1]).abs() < 3.0 && (b - expected[2]).abs() < 3.0);
+    assert!(
+        (r - expected[0]).abs() < 3.0
+            && (g - expected[1]).abs() < 3.0
+            && (b - expected[2]).abs() < 3.0
+    );
     assert!(rays(&report, "transparency") > 1000 && report.traced_draws == 2, "{report:?}");
     let (matched, report) =
         draw("sheets_blended_in_the_wrong_order", Some(&["--mode", "match"])).expect("it ran");
-    assert!(matched.pixels == native.pixels && report.traced_draws == 0, "match is the driver's picture");
+    assert!(
+        matched.pixels == native.pixels && report.traced_draws == 0,
+        "match is the driver's picture"
+    );
 }
 
 /// Pixels with a channel off by more than 8.
@@ -149,7 +169,9 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
     let Some((native, _)) = draw("samples_of_silhouettes", None) else { return };
     // How much there is to be wrong: pixels that are not like the one beside them or the one above.
     let unlike = |i: usize| {
-        [1, native.width].iter().any(|far| native.pixels.get(i + far).is_some_and(|p| *p != native.pixels[i]))
+        [1, native.width]
+            .iter()
+            .any(|far| native.pixels.get(i + far).is_some_and(|p| *p != native.pixels[i]))
     };
     let mixed = (0..native.pixels.len()).filter(|i| unlike(*i)).count();
     assert!(mixed > 300, "{mixed} pixels on silhouettes");
@@ -167,7 +189,10 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
         let different = off(&native, &ours);
         println!("{mode} {more}: {different} of {mixed}");
         assert!(different * 50 <= mixed, "{mode} {more}: {different} of {mixed} pixels");
-        assert!(report.traced_draws == 14 && report.problems.is_empty(), "{mode} {more}: {report:?}");
+        assert!(
+            report.traced_draws == 14 && report.problems.is_empty(),
+            "{mode} {more}: {report:?}"
+        );
     }
     // More rays than samples smooth silhouettes by themselves.
     let options = ["--mode", "rich", PLAIN[0], PLAIN[1], PLAIN[2], PLAIN[3], "--set", "samples=64"];
@@ -175,15 +200,22 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
     let total = |p: &Picture| p.pixels.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
     let ratio = total(&ours) / total(&native);
     println!("rich samples=64: {ratio} of the light, {} of {mixed} pixels", off(&native, &ours));
-    assert!((ratio - 1.0).abs() < 0.005 && report.problems.is_empty(), "{ratio}, {:?}", report.problems);
+    assert!(
+        (ratio - 1.0).abs() < 0.005 && report.problems.is_empty(),
+        "{ratio}, {:?}",
+        report.problems
+    );
     assert!(off(&native, &ours) * 4 > mixed, "sixty-four rays see more than four samples");
 }
 
 #[test]
 fn a_lens_blurs_what_is_out_of_focus_and_is_refused_by_name_without_perspective() {
-    let options =
-        |aperture| ["--mode", "rich", "--set", "samples=16", "--set", aperture, "--set", "effects.focus=1"];
-    let Some((sharp, _)) = draw("box_on_floor", Some(&options("effects.aperture_radius=0"))) else { return };
+    let options = |aperture| {
+        ["--mode", "rich", "--set", "samples=16", "--set", aperture, "--set", "effects.focus=1"]
+    };
+    let Some((sharp, _)) = draw("box_on_floor", Some(&options("effects.aperture_radius=0"))) else {
+        return;
+    };
     let (blurred, report) =
         draw("box_on_floor", Some(&options("effects.aperture_radius=0.05"))).expect("it ran");
     let steepest = |p: &Picture| {
@@ -210,7 +242,8 @@ fn a_lens_blurs_what_is_out_of_focus_and_is_refused_by_name_without_perspective(
 fn a_setting_that_changes_nothing_in_the_mode_is_told_by_name() {
     let options = ["--mode", "match", "--set", "material.mirror=0.5"];
     let Some((_, report)) = draw("plain", Some(&options)) else { return };
-    let told = report.problems.iter().any(|p| p.contains("`material.mirror`") && p.contains("rich, path"));
+    let told =
+        report.problems.iter().any(|p| p.contains("`material.mirror`") && p.contains("rich, path"));
     assert!(told, "{:?}", report.problems);
 }
 
@@ -229,14 +262,16 @@ fn enhance_darkens_corners_of_any_shader_that_is_a_matrix() {
         "only darker"
     );
     assert!(native.pixels[0] == picture.pixels[0], "the background stays");
-    let (matched, report) = draw("shader_of_ones_own", Some(&["--mode", "match"])).expect("it ran before");
+    let (matched, report) =
+        draw("shader_of_ones_own", Some(&["--mode", "match"])).expect("it ran before");
     assert!(matched.pixels == native.pixels && report.traced_draws == 0);
 }
 
 #[test]
 fn a_shader_that_bends_positions_is_the_drivers_and_named() {
     let Some((native, _)) = draw("shader_that_bends", None) else { return };
-    let (picture, report) = draw("shader_that_bends", Some(&["--mode", "enhance"])).expect("it ran before");
+    let (picture, report) =
+        draw("shader_that_bends", Some(&["--mode", "enhance"])).expect("it ran before");
     assert!(picture.pixels == native.pixels);
     let reasons: Vec<&String> = report.passed_reasons.keys().collect();
     assert_eq!(reasons, ["a vertex shader that is no matrix times a position"]);
@@ -250,8 +285,10 @@ fn a_fault_of_ours_leaves_the_program_the_drivers_picture_and_is_logged() {
     let place = folder();
     let picture = |through, environment: &[(&str, &str)]| {
         let run = Run { x: &x, folder: place.path(), through, environment };
-        let (output, report) = run
-            .faulty_program(&python, &[script.to_str().expect("UTF-8"), "lists_over_several_frames", "out"]);
+        let (output, report) = run.faulty_program(
+            &python,
+            &[script.to_str().expect("UTF-8"), "lists_over_several_frames", "out"],
+        );
         assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
         (std::fs::read(place.path().join("out")).expect("a picture"), report)
     };
@@ -261,7 +298,8 @@ fn a_fault_of_ours_leaves_the_program_the_drivers_picture_and_is_logged() {
     assert!(report.faults[0].contains("GLURAY_INJECT_FAULT"), "{:?}", report.faults);
     assert!(
         native == ours,
-        "lists compiled before the fault, and the colour that was set before it, are the driver's now"
+        "lists compiled before the fault, and the colour that was set before it, are the driver's \
+         now"
     );
 }
 

@@ -19,7 +19,9 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
     let p = Panel::start();
     let fake = Fake::start("gmsh", p.endpoint(), scenes.path());
     let id = p.until("a program", |list| list.len() == 1)[0]["id"].clone();
-    let change = |set: serde_json::Value| p.ask("POST", "change", &json!({"id": id, "set": set}).to_string());
+    let change = |set: serde_json::Value| {
+        p.ask("POST", "change", &json!({"id": id, "set": set}).to_string())
+    };
     assert_eq!(
         change(
             json!({"mode": "rich", "effects.ambient_occlusion_samples": 16, "objects.3f2a0000.mirror": 0.5})
@@ -44,11 +46,16 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
 
     let refused = change(json!({"samples": 0, "mode": "phong"}));
     assert_eq!(refused.status, 422);
-    assert!(refused.body.contains("`samples` is 0; give a whole number from 1 to 4096"), "{}", refused.body);
+    assert!(
+        refused.body.contains("`samples` is 0; give a whole number from 1 to 4096"),
+        "{}",
+        refused.body
+    );
     assert_eq!(fake.settings().mode, Mode::Rich, "all or nothing");
     let toml = p.ask("GET", &format!("toml?id={id}"), "");
     assert!(
-        toml.body.contains("[program.gmsh]") && toml.body.contains("ambient_occlusion_samples = 16"),
+        toml.body.contains("[program.gmsh]")
+            && toml.body.contains("ambient_occlusion_samples = 16"),
         "{}",
         toml.body
     );
@@ -57,7 +64,8 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
     let list = p.until("exported", |list| !list[0]["exported"].is_null());
     let file = list[0]["exported"]["Ok"].as_str().expect("a file").to_owned();
     let ply = scenes.path().join("a.ply");
-    let written = Command::new(PROGRAM).args(["export", &file, "-q", "-o"]).arg(&ply).output().unwrap();
+    let written =
+        Command::new(PROGRAM).args(["export", &file, "-q", "-o"]).arg(&ply).output().unwrap();
     assert!(written.status.success(), "{written:?}");
     let read = datasets::read::open(&ply).unwrap();
     let triangles = match read.content {
@@ -78,7 +86,10 @@ fn strangers_other_hosts_and_other_sites_are_told_nothing() {
     let port = p.address.split(':').next_back().unwrap();
     assert_eq!(p.ask("GET", "state", "").status, 200);
     assert_eq!(p.ask_with("GET", "state", &format!("Host: localhost:{port}\r\n"), "").status, 200);
-    assert_eq!(p.ask_with("GET", "state", &format!("{own}Origin: http://{}\r\n", p.address), "").status, 200);
+    assert_eq!(
+        p.ask_with("GET", "state", &format!("{own}Origin: http://{}\r\n", p.address), "").status,
+        200
+    );
     for head in [
         String::new(),
         format!("Host: evil.example:{port}\r\n"),
@@ -147,7 +158,8 @@ fn who_does_not_know_the_token_is_no_program() {
     let settings = serde_json::to_value(gluray::config::Settings::default()).unwrap();
     let hello = |version: u32, token: &str| {
         let hello = json!({"program": "x", "process": 1, "settings": settings});
-        json!({"type": "hello", "version": version, "token": token, "hello": hello}).to_string() + "\n"
+        json!({"type": "hello", "version": version, "token": token, "hello": hello}).to_string()
+            + "\n"
     };
     let right = p.endpoint().secret.token().to_owned();
     for words in [
@@ -160,7 +172,8 @@ fn who_does_not_know_the_token_is_no_program() {
     ] {
         assert!(is_shown_the_door(&p, words.as_bytes()), "{words:.100}");
     }
-    // The same words with the right token are a program: the test would notice a panel that lets nobody in.
+    // The same words with the right token are a program: the test would notice a panel that lets
+    // nobody in.
     let mut stream = TcpStream::connect(p.endpoint().address).unwrap();
     stream.write_all(hello(1, &right).as_bytes()).unwrap();
     p.until("a program", |list| list.len() == 1);
@@ -179,8 +192,10 @@ fn whatever_comes_to_the_link_or_the_page_changes_nothing() {
         "(GET|POST) /[ -~]{0,60} HTTP/1.1\r\n([A-Za-z-]{1,12}: [ -~]{0,20}\r\n){0,4}\r\n[ -~]{0,40}"
             .prop_map(String::into_bytes),
     ];
-    let mut runner =
-        TestRunner::new(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) });
+    let mut runner = TestRunner::new(ProptestConfig {
+        failure_persistence: None,
+        ..ProptestConfig::with_cases(40)
+    });
     runner
         .run(&bytes, |bytes| {
             prop_assert!(is_shown_the_door(&p, &bytes));

@@ -1,6 +1,7 @@
 //! The panel's page in a real browser, with a program that speaks the link.
 //!
-//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes, unless RTSV_REQUIRE_PEERS is set.
+//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes,
+//! unless RTSV_REQUIRE_PEERS is set.
 #![cfg(feature = "panel")]
 
 #[path = "../../schlieren/tests/serving/browser.rs"]
@@ -17,7 +18,11 @@ use std::io::Write as _;
 fn look(b: &mut Browser, name: &str) {
     let picture = b.screenshot();
     if let Some(folder) = std::env::var_os("RTSV_SCREENSHOTS") {
-        std::fs::write(std::path::PathBuf::from(folder).join(format!("panel-{name}.png")), &picture).unwrap();
+        std::fs::write(
+            std::path::PathBuf::from(folder).join(format!("panel-{name}.png")),
+            &picture,
+        )
+        .unwrap();
     }
     assert!(picture.len() > 10_000, "a picture with something on it");
 }
@@ -25,7 +30,11 @@ fn look(b: &mut Browser, name: &str) {
 /// Sets a control as a person would.
 fn set(b: &mut Browser, path: &str, value: &str) {
     b.evaluate(&format!(
-        "(() => {{ const e = document.querySelector('[data-path=\"{path}\"] input:not([type=range]), [data-path=\"{path}\"] select'); if (e.type === 'checkbox') {{ if (String(e.checked) !== '{value}') e.click(); return; }} e.value = '{value}'; e.dispatchEvent(new Event('input', {{ bubbles: true }})); e.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
+        "(() => {{ const e = document.querySelector('[data-path=\"{path}\"] \
+         input:not([type=range]), [data-path=\"{path}\"] select'); if (e.type === 'checkbox') {{ \
+         if (String(e.checked) !== '{value}') e.click(); return; }} e.value = '{value}'; \
+         e.dispatchEvent(new Event('input', {{ bubbles: true }})); e.dispatchEvent(new \
+         Event('change', {{ bubbles: true }})); }})()"
     ));
 }
 
@@ -38,7 +47,10 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     let program = match chromium() {
         Ok(program) => program,
         Err(why) => {
-            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none(), "Chromium is required: {why}");
+            assert!(
+                std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
+                "Chromium is required: {why}"
+            );
             // Not `eprintln!`: libtest swallows that.
             let _ = writeln!(std::io::stderr(), "skipped: {why}");
             return;
@@ -47,19 +59,25 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     let scenes = tempfile::tempdir().unwrap();
     let p = Panel::start();
     let mut b = Browser::open(&program, &p.url());
-    b.wait_for("document.readyState === 'complete' && document.body.innerText.includes('No program yet')");
+    b.wait_for(
+        "document.readyState === 'complete' && document.body.innerText.includes('No program yet')",
+    );
 
     // A program starts later and appears by itself, with its numbers.
     let gmsh = Fake::start("gmsh", p.endpoint(), scenes.path());
-    b.wait_for("document.querySelectorAll('nav button').length === 1 && document.querySelector('nav button').innerText.startsWith('gmsh')");
+    b.wait_for(
+        "document.querySelectorAll('nav button').length === 1 && \
+                document.querySelector('nav button').innerText.startsWith('gmsh')",
+    );
     b.wait_for("Number(document.getElementById('times').dataset.frames) > 8");
     for word in ["frames per second", "1024 × 1024", "match", "1.40 M"] {
         assert!(text(&mut b, "numbers").contains(word), "{word}: {}", text(&mut b, "numbers"));
     }
     assert!(text(&mut b, "reasons").contains("lines and points"));
     assert!(
-        b.evaluate("document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('idle')")
-            == true,
+        b.evaluate(
+            "document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('idle')"
+        ) == true,
         "no shadows in mode match, and the page shows it"
     );
     let before = text(&mut b, "rays-legend");
@@ -80,11 +98,16 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
             && s.lights.added == 0.7
             && s.material.mirror == Some(0.25)
     });
-    b.wait_for("document.getElementById('rays-legend').innerText.includes('ambient occlusion') && document.getElementById('numbers').innerText.includes('rich')");
+    b.wait_for(
+        "document.getElementById('rays-legend').innerText.includes('ambient occlusion') && \
+                document.getElementById('numbers').innerText.includes('rich')",
+    );
     b.wait_for("document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('changed') && !document.querySelector('[data-path=\"effects.shadows\"]').classList.contains('idle')");
     assert!(
-        b.evaluate("document.querySelector('[data-path=\"effects.ambient_occlusion_samples\"] input').value")
-            == "64"
+        b.evaluate(
+            "document.querySelector('[data-path=\"effects.ambient_occlusion_samples\"] \
+                    input').value"
+        ) == "64"
     );
     // So that the charts have something to show.
     b.wait_for("Number(document.getElementById('times').dataset.frames) > 30");
@@ -102,7 +125,9 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     set(&mut b, &format!("objects.{key}.color"), "#ff8000");
     gmsh.until(|s| {
         s.material_of(&key).surface == Some(Surface::Glass)
-            && s.material_of(&key).color.is_some_and(|c| c[0] == 1.0 && (c[1] - 0.502).abs() < 0.001)
+            && s.material_of(&key)
+                .color
+                .is_some_and(|c| c[0] == 1.0 && (c[1] - 0.502).abs() < 0.001)
     });
     assert_eq!(gmsh.settings().material_of("other").surface, None);
     b.wait_for("document.querySelectorAll('.object.changed').length === 1");
@@ -116,7 +141,10 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
 
     // Nonsense is answered on the page and changes nothing.
     set(&mut b, "samples", "0");
-    b.wait_for("document.getElementById('message').innerText.includes('`samples` is 0; give a whole number from 1 to 4096')");
+    b.wait_for(
+        "document.getElementById('message').innerText.includes('`samples` is 0; give a \
+                whole number from 1 to 4096')",
+    );
     assert_eq!(gmsh.settings().samples, 1);
     set(&mut b, "samples", "2");
     gmsh.until(|s| s.samples == 2);
@@ -132,15 +160,22 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
         .unwrap()
         .to_owned();
     assert!(
-        toml.contains("[program.gmsh]") && toml.contains("mode = \"rich\"") && toml.contains("samples = 2"),
+        toml.contains("[program.gmsh]")
+            && toml.contains("mode = \"rich\"")
+            && toml.contains("samples = 2"),
         "{toml}"
     );
 
-    // A second program has settings of its own; the first one's end is seen, and switching off is one click.
+    // A second program has settings of its own; the first one's end is seen, and switching off is
+    // one click.
     let octave = Fake::start("octave", p.endpoint(), scenes.path());
     b.wait_for("document.querySelectorAll('nav button').length === 2");
     b.evaluate("document.querySelectorAll('nav button')[1].click()");
-    b.wait_for("document.querySelector('nav button[aria-selected=true]').innerText.startsWith('octave') && document.querySelector('[data-path=mode] select').value === 'match'");
+    b.wait_for(
+        "document.querySelector('nav \
+                button[aria-selected=true]').innerText.startsWith('octave') && \
+                document.querySelector('[data-path=mode] select').value === 'match'",
+    );
     set(&mut b, "enabled", "false");
     octave.until(|s| !s.enabled);
     assert!(gmsh.settings().enabled && gmsh.settings().mode == Mode::Rich);

@@ -1,4 +1,5 @@
-//! The panel with a real OpenGL program: glxgears under Xvfb, switched off and on while it runs, its scene taken out.
+//! The panel with a real OpenGL program: glxgears under Xvfb, switched off and on while it runs,
+//! its scene taken out.
 #![cfg(feature = "panel")]
 
 mod common;
@@ -34,12 +35,14 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
         .spawn()
         .expect("gluray runs");
     let change = |set: Value, reset: Value| {
-        let answer = p.ask("POST", "change", &json!({"id": 1, "set": set, "reset": reset}).to_string());
+        let answer =
+            p.ask("POST", "change", &json!({"id": 1, "set": set, "reset": reset}).to_string());
         assert_eq!(answer.status, 200, "{answer:?}");
     };
 
     // It appears by itself, with its objects and what it costs.
-    let list = p.until("glxgears", |list| newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0)));
+    let list =
+        p.until("glxgears", |list| newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0)));
     assert_eq!(list[0]["program"], "glxgears");
     assert!(
         list[0]["objects"].as_array().unwrap().iter().any(|o| o["triangles"].as_u64() > Some(50)),
@@ -50,7 +53,8 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
     // Off and on, live.
     change(json!({"enabled": false}), json!([]));
     p.until("off", |list| {
-        newest(list).is_some_and(|f| f["traced"] == 0 && f["reasons"]["tracing is off"].as_u64() > Some(0))
+        newest(list)
+            .is_some_and(|f| f["traced"] == 0 && f["reasons"]["tracing is off"].as_u64() > Some(0))
     });
     change(json!({}), json!(["enabled"]));
     p.until("on again", |list| {
@@ -68,7 +72,8 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
         .output()
         .unwrap();
     assert!(done.status.success(), "{done:?}");
-    let (mesh, _) = datasets::read::open(&vtp).unwrap().dataset().unwrap().to_trimesh(None).unwrap();
+    let (mesh, _) =
+        datasets::read::open(&vtp).unwrap().dataset().unwrap().to_trimesh(None).unwrap();
     let bounds = mesh.bounds();
     let size = (bounds.max - bounds.min).max_element();
     assert!(
@@ -83,7 +88,10 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
     run.wait().unwrap();
     p.until("ended", |list| list[0]["running"] == false);
     let r: Report = serde_json::from_slice(&std::fs::read(&report).unwrap()).unwrap();
-    assert!(r.traced_draws > 0 && r.passed_reasons["tracing is off"] > 0 && r.faults.is_empty(), "{r:?}");
+    assert!(
+        r.traced_draws > 0 && r.passed_reasons["tracing is off"] > 0 && r.faults.is_empty(),
+        "{r:?}"
+    );
     for phase in ["capture", "trace", "present", "fast build"] {
         assert!(r.timeline.iter().any(|s| s.phase == phase && s.ms >= 0.0), "no span of {phase}");
     }

@@ -1,4 +1,5 @@
-//! Conformance tests of others (piglit) in `match` mode: what passes natively passes through us, and is traced where it draws filled primitives.
+//! Conformance tests of others (piglit) in `match` mode: what passes natively passes through us,
+//! and is traced where it draws filled primitives.
 
 mod common;
 
@@ -82,7 +83,11 @@ fn verdict(x: &Xvfb, piglit: &Path, line: &str, through: Option<&[&str]>) -> (St
     let run = Run { x, folder: place.path(), through, environment: &environment };
     let (output, report) = run.program(&piglit.join(words[0]), &words[1..]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let last = text.lines().rev().find_map(|l| l.strip_prefix("PIGLIT: {\"result\": \"")).map(str::to_owned);
+    let last = text
+        .lines()
+        .rev()
+        .find_map(|l| l.strip_prefix("PIGLIT: {\"result\": \""))
+        .map(str::to_owned);
     (last.unwrap_or_default().split('"').next().unwrap_or_default().to_owned(), report)
 }
 

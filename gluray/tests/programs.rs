@@ -14,9 +14,12 @@ fn bumpy_sphere(n: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut points = Vec::new();
     for j in 0..n {
         for i in 0..n {
-            let (u, v) = (angle(i, 0.0, std::f64::consts::TAU), angle(j, 0.02, std::f64::consts::PI - 0.02));
+            let (u, v) =
+                (angle(i, 0.0, std::f64::consts::TAU), angle(j, 0.02, std::f64::consts::PI - 0.02));
             let r = 1.0 + 0.15 * (9.0 * u).sin() * (7.0 * v).sin();
-            points.push([r * v.sin() * u.cos(), r * v.sin() * u.sin(), r * v.cos()].map(|x| x as f32));
+            points.push(
+                [r * v.sin() * u.cos(), r * v.sin() * u.sin(), r * v.cos()].map(|x| x as f32),
+            );
         }
     }
     let mut triangles = Vec::new();
@@ -46,7 +49,9 @@ fn write_off(file: &Path) {
     let (points, triangles) = bumpy_sphere(81);
     let mut text = format!("OFF\n{} {} 0\n", points.len(), triangles.len());
     points.iter().for_each(|p| writeln!(text, "{} {} {}", p[0], p[1], p[2]).expect("a String"));
-    triangles.iter().for_each(|t| writeln!(text, "3 {} {} {}", t[0], t[1], t[2]).expect("a String"));
+    triangles
+        .iter()
+        .for_each(|t| writeln!(text, "3 {} {} {}", t[0], t[1], t[2]).expect("a String"));
     std::fs::write(file, text).expect("a temporary file");
 }
 
@@ -67,11 +72,17 @@ fn both(
     let run = |through: Option<&[&str]>| {
         let place = folder();
         prepare(place.path());
-        let environment = [("HOME", place.path().to_str().expect("UTF-8")), ("QT_QPA_PLATFORM", "xcb")];
+        let environment =
+            [("HOME", place.path().to_str().expect("UTF-8")), ("QT_QPA_PLATFORM", "xcb")];
         let run = Run { x: &x, folder: place.path(), through, environment: &environment };
         let (output, report) = run.program(program, arguments);
         let file = place.path().join(picture);
-        assert!(file.is_file(), "{}: {}", program.display(), String::from_utf8_lossy(&output.stderr));
+        assert!(
+            file.is_file(),
+            "{}: {}",
+            program.display(),
+            String::from_utf8_lossy(&output.stderr)
+        );
         (Picture::read(&file), report)
     };
     let (native, _) = run(None);
@@ -94,8 +105,9 @@ fn both(
 struct Share {
     /// Of its draws.
     draws: f64,
-    /// Pixels of traced surfaces, by the pixels that are not background in all frames. Surfaces that are behind others in one go
-    /// count once, so that more than 1 says that something is drawn over what was traced.
+    /// Pixels of traced surfaces, by the pixels that are not background in all frames. Surfaces
+    /// that are behind others in one go count once, so that more than 1 says that something is
+    /// drawn over what was traced.
     pixels: f64,
 }
 
@@ -109,7 +121,8 @@ const ALL: Share = share(0.99, 0.99);
 
 impl Share {
     fn of(native: &Picture, report: &Report) -> Share {
-        let seen = native.pixels.iter().filter(|p| (0..3).any(|k| p[k].abs_diff(native.pixels[0][k]) > 2));
+        let seen =
+            native.pixels.iter().filter(|p| (0..3).any(|k| p[k].abs_diff(native.pixels[0][k]) > 2));
         let draws = (report.traced_draws + report.passed_draws).max(1);
         let pixels = seen.count() as f64 * report.frames.max(1) as f64;
         Share {
@@ -134,8 +147,10 @@ fn program(variable: &str) -> Option<PathBuf> {
 #[test]
 fn gmsh_draws_the_drivers_picture() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
-    let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=768; General.GraphicsHeight=768; General.MenuWidth=0;\nGeneral.Trackball=0; \
-                 General.RotationX=-60; General.RotationZ=30;\nMesh.SurfaceFaces=1; Mesh.SurfaceEdges=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
+    let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=768; General.GraphicsHeight=768; \
+                 General.MenuWidth=0;\nGeneral.Trackball=0; \
+                 General.RotationX=-60; General.RotationZ=30;\nMesh.SurfaceFaces=1; \
+                 Mesh.SurfaceEdges=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
     let prepare = |f: &Path| {
         write_stl(&f.join("s.stl"));
         std::fs::write(f.join("s.geo"), lines).expect("a temporary file");
@@ -149,14 +164,18 @@ fn gmsh_draws_the_drivers_picture() {
 #[test]
 fn geomview_draws_the_drivers_picture() {
     let Some(geomview) = program("RTSV_GEOMVIEW") else { return };
-    let lines = "(load s.off)\n(window c0 {size 768 768})\n(bbox-draw g1 no)\n(backcolor c0 0.1 0.1 0.2)\n(normalization g1 none)\n\
-                 (merge-ap g1 { shading smooth -edge })\n(look g1)\n(redraw c0)\n(snapshot c0 out.ppm ppmscreen 768 768)\n(exit)\n";
+    let lines = "(load s.off)\n(window c0 {size 768 768})\n(bbox-draw g1 no)\n(backcolor c0 0.1 \
+                 0.1 0.2)\n(normalization g1 none)\n\
+                 (merge-ap g1 { shading smooth -edge })\n(look g1)\n(redraw c0)\n(snapshot c0 \
+                 out.ppm ppmscreen 768 768)\n(exit)\n";
     let prepare = |f: &Path| {
         write_off(&f.join("s.off"));
         std::fs::write(f.join("s.gcl"), lines).expect("a temporary file");
     };
-    // 0.916 of what its last picture covers, over eight frames; the number of frames is the machine's.
-    if let Some((m, _)) = both(&geomview, &["-nopanels", "-c", "s.gcl"], "out.ppm", share(0.99, 0.8), prepare)
+    // 0.916 of what its last picture covers, over eight frames; the number of frames is the
+    // machine's.
+    if let Some((m, _)) =
+        both(&geomview, &["-nopanels", "-c", "s.gcl"], "out.ppm", share(0.99, 0.8), prepare)
     {
         m.assert_filled("geomview");
     }
@@ -165,7 +184,8 @@ fn geomview_draws_the_drivers_picture() {
 #[test]
 fn openscad_draws_the_drivers_picture() {
     let Some(openscad) = program("RTSV_OPENSCAD") else { return };
-    let scene = "$fn=32;\ndifference(){ sphere(r=20); cylinder(r=8,h=50,center=true); }\ntranslate([30,0,0]) cube([10,20,30],center=true);\n";
+    let scene = "$fn=32;\ndifference(){ sphere(r=20); cylinder(r=8,h=50,center=true); \
+                 }\ntranslate([30,0,0]) cube([10,20,30],center=true);\n";
     let prepare = |f: &Path| std::fs::write(f.join("s.scad"), scene).expect("a temporary file");
     let arguments =
         ["-o", "out.png", "--imgsize=768,768", "--render", "--camera=0,0,0,60,0,30,150", "s.scad"];
@@ -188,7 +208,8 @@ fn octave_draws_the_drivers_picture() {
 #[test]
 fn pymol_without_shaders_draws_the_drivers_picture() {
     let Some(pymol) = program("RTSV_PYMOL") else { return };
-    let lines = "set internal_gui, 0\nfragment trp\nviewport 768,768\nhide everything\nshow sticks\nshow spheres\nset use_shaders, 0\n\
+    let lines = "set internal_gui, 0\nfragment trp\nviewport 768,768\nhide everything\nshow \
+                 sticks\nshow spheres\nset use_shaders, 0\n\
                  bg_color white\norient\npng out.png, ray=0\nquit\n";
     let prepare = |f: &Path| std::fs::write(f.join("s.pml"), lines).expect("a temporary file");
     // As much as one of its three frames.
@@ -209,7 +230,9 @@ fn paraview_draws_the_drivers_picture() {
 
 #[test]
 fn vtk_in_python_draws_the_drivers_picture() {
-    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else {
+        return;
+    };
     let file = script("vtk_scene.py");
     if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", share(0.66, 0.93), |_| ()) {
         m.assert_filled("python vtk");
@@ -218,28 +241,43 @@ fn vtk_in_python_draws_the_drivers_picture() {
 
 #[test]
 fn vtk_leaves_blending_on_and_is_opaque_all_the_same() {
-    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else {
+        return;
+    };
     let Some(x) = Xvfb::start() else { return };
     let place = folder();
     let home = [("HOME", place.path().to_str().expect("UTF-8"))];
-    let run = Run { x: &x, folder: place.path(), through: Some(&["--mode", "rich"]), environment: &home };
+    let run =
+        Run { x: &x, folder: place.path(), through: Some(&["--mode", "rich"]), environment: &home };
     let (_, report) = run.program(&python, &[script("vtk_scene.py").as_str()]);
     assert!(report.traced_draws > 0, "{report:?}");
-    assert_eq!(report.rays.get("transparency"), None, "nothing here lets light through: {:?}", report.rays);
+    assert_eq!(
+        report.rays.get("transparency"),
+        None,
+        "nothing here lets light through: {:?}",
+        report.rays
+    );
 }
 
 /// What VTK's depth peeling became: one pass for the driver, the rest in one go.
 fn assert_peeled(report: &Report) {
     assert!(report.flushes.get("depth peeling").is_some_and(|n| *n > 0), "{report:?}");
-    assert_eq!(report.passed_reasons.get("translucent surfaces that VTK peels"), None, "{report:?}");
+    assert_eq!(
+        report.passed_reasons.get("translucent surfaces that VTK peels"),
+        None,
+        "{report:?}"
+    );
     assert_eq!(report.problems, Vec::<String>::new());
 }
 
 #[test]
 fn translucent_surfaces_that_vtk_peels_are_traced_in_one_go_and_are_the_drivers_picture() {
-    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else {
+        return;
+    };
     let file = script("vtk_translucent.py");
-    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", share(0.33, 0.99), |_| ()) {
+    if let Some((m, report)) = both(&python, &[file.as_str()], "out.png", share(0.33, 0.99), |_| ())
+    {
         m.assert_filled("translucent surfaces in VTK");
         assert_peeled(&report);
     }
@@ -250,7 +288,9 @@ fn paraviews_translucent_contours_are_traced_in_one_go_and_are_the_drivers_pictu
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
     let file = script("paraview_translucent.py");
     // As in `paraview_draws_the_drivers_picture`.
-    if let Some((m, report)) = both(&pvbatch, &[file.as_str()], "out.png", share(0.41, 0.72), |_| ()) {
+    if let Some((m, report)) =
+        both(&pvbatch, &[file.as_str()], "out.png", share(0.41, 0.72), |_| ())
+    {
         m.assert_filled("translucent contours in ParaView");
         assert_peeled(&report);
     }
@@ -258,14 +298,20 @@ fn paraviews_translucent_contours_are_traced_in_one_go_and_are_the_drivers_pictu
 
 #[test]
 fn lines_among_translucent_surfaces_leave_the_whole_peeling_to_the_driver() {
-    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else { return };
+    let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else {
+        return;
+    };
     let file = script("vtk_translucent.py");
     // One draw of each frame; what is peeled is passed.
-    if let Some((m, report)) = both(&python, &[file.as_str(), "lines"], "out.png", share(0.02, 0.13), |_| ())
+    if let Some((m, report)) =
+        both(&python, &[file.as_str(), "lines"], "out.png", share(0.02, 0.13), |_| ())
     {
         m.assert_filled("lines among translucent surfaces");
         assert_eq!(report.flushes.get("depth peeling"), None, "{report:?}");
-        assert!(report.passed_reasons.contains_key("translucent surfaces that VTK peels"), "{report:?}");
+        assert!(
+            report.passed_reasons.contains_key("translucent surfaces that VTK peels"),
+            "{report:?}"
+        );
     }
 }
 
@@ -288,7 +334,8 @@ fn share_of_scene(kind: &[&str]) -> Share {
         // Shadow maps themselves are the driver's; in a second frame so are the surfaces.
         ["shadows"] => share(0.25, 0.99),
         ["shadows", "0", "2"] => share(0.16, 0.49),
-        // A third of the draws are lines; what is not recognised is VTK's own pass over the picture.
+        // A third of the draws are lines; what is not recognised is VTK's own pass over the
+        // picture.
         ["moved_back"] => share(0.66, 0.99),
         ["moved_back", "4"] => share(0.61, 3.9),
         ["translucent_moved_back"] => share(0.61, 0.9),
@@ -301,10 +348,13 @@ fn share_of_scene(kind: &[&str]) -> Share {
     }
 }
 
-/// Draws scenes of `wheel_scene.py` in today's VTK and, where `old` says so, in Debian's, natively and through us. Each has to be the driver's picture,
-/// and `least` of its draws of surfaces in each frame traced.
+/// Draws scenes of `wheel_scene.py` in today's VTK and, where `old` says so, in Debian's, natively
+/// and through us. Each has to be the driver's picture, and `least` of its draws of surfaces in
+/// each frame traced.
 fn scenes(kinds: &[&[&str]], old: bool, least: u64) -> Vec<Report> {
-    let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return Vec::new() };
+    let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else {
+        return Vec::new();
+    };
     let older = program("RTSV_SYSTEM_PYTHON").filter(|_| old && program("RTSV_PVBATCH").is_some());
     let file = script("wheel_scene.py");
     let mut reports = Vec::new();
@@ -312,7 +362,9 @@ fn scenes(kinds: &[&[&str]], old: bool, least: u64) -> Vec<Report> {
         for kind in kinds {
             let arguments = [&[file.as_str()], *kind].concat();
             let share = share_of_scene(kind);
-            let Some((m, report)) = both(python, &arguments, "out.png", share, |_| ()) else { continue };
+            let Some((m, report)) = both(python, &arguments, "out.png", share, |_| ()) else {
+                continue;
+            };
             m.assert_filled(&format!("{kind:?} in {}", python.display()));
             assert!(report.traced_draws >= least, "{kind:?}: {report:?}");
             assert_eq!(report.problems, Vec::<String>::new());
@@ -336,7 +388,11 @@ fn colours_of_cells_are_the_drivers() {
 fn translucent_layers_that_vtk_sums_up_are_the_drivers() {
     for report in scenes(&[&["translucent"]], true, 6) {
         assert!(report.flushes.contains_key("translucent sums"), "{report:?}");
-        assert_eq!(report.passed_reasons.get("translucent surfaces that VTK sums up"), None, "{report:?}");
+        assert_eq!(
+            report.passed_reasons.get("translucent surfaces that VTK sums up"),
+            None,
+            "{report:?}"
+        );
     }
 }
 
@@ -377,7 +433,8 @@ fn colours_of_blocks_are_over_others_and_over_back_faces() {
 fn a_surface_with_a_scripts_own_shader_is_the_drivers() {
     // One of the four surfaces is as VTK has it.
     for report in scenes(&[&["replaced"]], true, 1) {
-        let passed = report.passed_reasons.get("a surface of VTK's with a statement that is not known");
+        let passed =
+            report.passed_reasons.get("a surface of VTK's with a statement that is not known");
         assert!(passed.is_some_and(|n| *n >= 3), "{report:?}");
     }
 }
@@ -389,15 +446,22 @@ fn lines_along_edges_of_cells_are_the_drivers() {
 
 #[test]
 fn surfaces_that_are_moved_back_for_lines_are_the_drivers() {
-    for report in scenes(&[&["moved_back"], &["moved_back", "4"], &["translucent_moved_back"]], true, 8) {
-        assert_eq!(report.passed_reasons.get("polygon offset of OpenGL's and of VTK's"), None, "{report:?}");
+    for report in
+        scenes(&[&["moved_back"], &["moved_back", "4"], &["translucent_moved_back"]], true, 8)
+    {
+        assert_eq!(
+            report.passed_reasons.get("polygon offset of OpenGL's and of VTK's"),
+            None,
+            "{report:?}"
+        );
     }
 }
 
 /// All surfaces of scenes with pictures are traced in both VTKs.
 fn pictures(kinds: &[&[&str]], least: u64) {
     for report in scenes(kinds, true, least) {
-        let passed: Vec<_> = report.passed_reasons.keys().filter(|why| why.contains("picture")).collect();
+        let passed: Vec<_> =
+            report.passed_reasons.keys().filter(|why| why.contains("picture")).collect();
         assert!(passed.is_empty(), "{report:?}");
     }
 }
@@ -434,10 +498,13 @@ fn slices_of_images_are_pictures_on_planes() {
 
 #[test]
 fn surfaces_that_are_drawn_again_with_shadow_maps_are_the_drivers_and_named() {
-    // The first frame is known by its shadow maps when surfaces are traced already; in the second they are the driver's.
+    // The first frame is known by its shadow maps when surfaces are traced already; in the second
+    // they are the driver's.
     for report in scenes(&[&["shadows"], &["shadows", "0", "2"]], false, 4) {
         assert!(report.passed_reasons.contains_key("a shadow map"), "{report:?}");
-        let again = report.passed_reasons.contains_key("surfaces that VTK draws again with its shadow maps");
+        let again = report
+            .passed_reasons
+            .contains_key("surfaces that VTK draws again with its shadow maps");
         assert_eq!(again, report.frames > 1, "{report:?}");
     }
 }
@@ -471,7 +538,8 @@ fn modes_beyond_match_keep_clipping_planes_and_say_what_paths_leave_out() {
 fn passing_everything_changes_no_pixel() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
     let Some(x) = Xvfb::start() else { return };
-    let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=400; General.GraphicsHeight=400; General.MenuWidth=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
+    let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=400; General.GraphicsHeight=400; \
+                 General.MenuWidth=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
     let picture = |through: Option<&[&str]>| {
         let place = folder();
         write_stl(&place.path().join("s.stl"));

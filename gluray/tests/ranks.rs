@@ -1,4 +1,5 @@
-//! Ray-parallel mode in real programs: the same picture whatever the number of processes, and also when helpers go.
+//! Ray-parallel mode in real programs: the same picture whatever the number of processes, and also
+//! when helpers go.
 
 mod common;
 
@@ -49,7 +50,10 @@ fn a_program_draws_the_same_bits_on_any_number_of_ranks() {
             for r in &report.ranks {
                 assert!(r.pictures > 0 && r.trace_ms > 0.0, "{mode}: {r:?}");
                 assert!(r.rays > 1000 && r.builds > 0, "{mode}: {r:?}");
-                assert!(r.rank == 0 || (r.sent_bytes > 10_000 && r.received_bytes > 10_000), "{mode}: {r:?}");
+                assert!(
+                    r.rank == 0 || (r.sent_bytes > 10_000 && r.received_bytes > 10_000),
+                    "{mode}: {r:?}"
+                );
             }
         }
     }
@@ -84,7 +88,11 @@ fn helpers_that_go_or_lie_or_are_not_there_cost_no_pixel_and_are_named() {
     let lost = report.ranks.iter().filter(|r| r.lost.is_some()).count();
     assert_eq!(lost, 2, "{:?}", report.ranks);
     for words in ["no helper at", "helper rank 1 was lost", "helper rank 2 was lost"] {
-        assert!(report.problems.iter().any(|p| p.contains(words)), "{words}: {:?}", report.problems);
+        assert!(
+            report.problems.iter().any(|p| p.contains(words)),
+            "{words}: {:?}",
+            report.problems
+        );
     }
 }
 

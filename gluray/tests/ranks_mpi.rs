@@ -1,4 +1,5 @@
-//! Helpers that are an MPI job, of Open MPI and of MPICH: the same picture, also when the job is killed. The program is no rank of it.
+//! Helpers that are an MPI job, of Open MPI and of MPICH: the same picture, also when the job is
+//! killed. The program is no rank of it.
 
 mod common;
 
@@ -31,11 +32,22 @@ impl Job {
         let first = place.join("rays");
         let sockets = vec![first.clone(), place.join("rays.1"), place.join("rays.2")];
         let launcher = Command::new(mpirun)
-            .args(["-n", "3", env!("CARGO_BIN_EXE_gluray"), "--quiet", "serve-rays", "--mpi", "--socket"])
+            .args([
+                "-n",
+                "3",
+                env!("CARGO_BIN_EXE_gluray"),
+                "--quiet",
+                "serve-rays",
+                "--mpi",
+                "--socket",
+            ])
             .arg(&first)
             // What Open MPI needs in a container and with more ranks than cores; others ignore it.
             .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
-            .envs([("OMPI_MCA_rmaps_base_oversubscribe", "1"), ("OMPI_MCA_mpi_yield_when_idle", "1")])
+            .envs([
+                ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+                ("OMPI_MCA_mpi_yield_when_idle", "1"),
+            ])
             .envs([("OMPI_MCA_hwloc_base_binding_policy", "none"), ("OMPI_MCA_btl", "self,vader")])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -60,7 +72,9 @@ impl Job {
         let socket = self.sockets[0].as_os_str().as_encoded_bytes().to_vec();
         let mut pids = Vec::new();
         for entry in std::fs::read_dir("/proc").expect("Linux").flatten() {
-            let Some(pid) = entry.file_name().to_str().and_then(|n| n.parse::<i32>().ok()) else { continue };
+            let Some(pid) = entry.file_name().to_str().and_then(|n| n.parse::<i32>().ok()) else {
+                continue;
+            };
             let line = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
             let arguments: Vec<&[u8]> = line.split(|b| *b == 0).collect();
             let is_gluray = arguments.first().is_some_and(|a| a.ends_with(b"gluray"));
@@ -73,7 +87,8 @@ impl Job {
 }
 
 fn signal(pid: i32, name: &str) {
-    let sent = Command::new("kill").args(["-s", name, &pid.to_string()]).status().expect("kill runs");
+    let sent =
+        Command::new("kill").args(["-s", name, &pid.to_string()]).status().expect("kill runs");
     assert!(sent.success());
 }
 

@@ -1,4 +1,5 @@
-//! xscreensaver's hacks, a zoo of fixed function: each draws the driver's picture, by rays or through us.
+//! xscreensaver's hacks, a zoo of fixed function: each draws the driver's picture, by rays or
+//! through us.
 
 mod common;
 
@@ -7,7 +8,8 @@ use common::{Picture, Run, Xvfb, folder, peer};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Name, frame that is looked at, and whether rays have to draw some of it. What is drawn by the driver alone has to be the same to the bit.
+/// Name, frame that is looked at, and whether rays have to draw some of it. What is drawn by the
+/// driver alone has to be the same to the bit.
 const HACKS: &[(&str, &str, bool)] = &[
     // Lists with names from glGenLists and state between their primitives.
     ("gears", "3", true),
@@ -41,7 +43,10 @@ fn clock(place: &Path) -> PathBuf {
 
 #[test]
 fn screensavers_draw_the_drivers_pictures() {
-    let (Some(gears), Some(_)) = (peer("RTSV_XSCREENSAVER"), peer("RTSV_XSCREENSAVER_EXTRA")) else { return };
+    let (Some(gears), Some(_)) = (peer("RTSV_XSCREENSAVER"), peer("RTSV_XSCREENSAVER_EXTRA"))
+    else {
+        return;
+    };
     let Some(x) = Xvfb::start() else { return };
     let place = folder();
     let clock = clock(place.path());
@@ -65,7 +70,8 @@ fn screensavers_draw_the_drivers_pictures() {
         let good = m.raw <= 0.2 && m.tolerant <= 0.02 && m.interior <= 1.0 && m.interior_p99 <= 4.0;
         let same = native.pixels == ours.pixels;
         if !good || (report.traced_draws > 0) != *traced || !(same || *traced) {
-            faults.push(format!("{name}: {m:?}, {} draws traced, same: {same}", report.traced_draws));
+            faults
+                .push(format!("{name}: {m:?}, {} draws traced, same: {same}", report.traced_draws));
         }
     }
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));

@@ -30,7 +30,8 @@ static WRITTEN: LazyLock<Vec<Written>> = LazyLock::new(|| {
     let today = peer("RTSV_PYTHON").map(|python| (python, None));
     let system = peer("RTSV_SYSTEM_PYTHON");
     // ParaView's VTK is the system Python's; 9.1 lies in a folder of its own.
-    let debian = system.clone().filter(|_| peer("RTSV_PVBATCH").is_some()).map(|python| (python, None));
+    let debian =
+        system.clone().filter(|_| peer("RTSV_PVBATCH").is_some()).map(|python| (python, None));
     let before = system.and_then(|python| Some((python, Some(peer("RTSV_VTK91")?))));
     let all = [today, debian, before].into_iter().flatten();
     all.map(|(python, unpacked)| write(&x, &python, unpacked)).collect()
@@ -40,7 +41,11 @@ fn write(x: &Xvfb, python: &Path, unpacked: Option<PathBuf>) -> Written {
     let place = folder();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/shader_sources.py");
     let mut command = Command::new(python);
-    command.arg(script).arg(place.path()).env("DISPLAY", &x.display).env("LIBGL_ALWAYS_SOFTWARE", "1");
+    command
+        .arg(script)
+        .arg(place.path())
+        .env("DISPLAY", &x.display)
+        .env("LIBGL_ALWAYS_SOFTWARE", "1");
     if let Some(at) = unpacked {
         let libraries = format!("usr/lib/{}-linux-gnu", std::env::consts::ARCH);
         command
@@ -54,10 +59,13 @@ fn write(x: &Xvfb, python: &Path, unpacked: Option<PathBuf>) -> Written {
         .unwrap_or_else(|e| panic!("{} did not end well ({e}): {said}", python.display()));
     let mut programs: Vec<Program> = std::fs::read_dir(place.path())
         .expect("a folder")
-        .filter_map(|entry| entry.ok()?.file_name().to_str()?.strip_suffix(".frag").map(str::to_owned))
+        .filter_map(|entry| {
+            entry.ok()?.file_name().to_str()?.strip_suffix(".frag").map(str::to_owned)
+        })
         .map(|name| {
             let text = |ending: &str| {
-                std::fs::read_to_string(place.path().join(format!("{name}.{ending}"))).expect("a shader")
+                std::fs::read_to_string(place.path().join(format!("{name}.{ending}")))
+                    .expect("a shader")
             };
             let shaders = ["vert", "geom", "frag"].map(text);
             Program { name, shaders }
@@ -93,7 +101,13 @@ fn sources_that_vtk_writes_for_surfaces_are_known_in_every_version() {
         let old = version.starts_with("9.1.") || version.starts_with("9.2.");
         for p in programs.iter().filter(|p| !p.name.starts_with("replaced-")) {
             let passed = old && OLD_AND_PASSED.contains(&p.scene());
-            assert_eq!(p.recognised().is_err(), passed, "{} of VTK {version}: {:?}", p.name, p.recognised());
+            assert_eq!(
+                p.recognised().is_err(),
+                passed,
+                "{} of VTK {version}: {:?}",
+                p.name,
+                p.recognised()
+            );
         }
     }
 }
@@ -127,14 +141,19 @@ fn no_line_of_vtks_sources_may_move_come_twice_or_be_put_behind_a_condition() {
         for p in programs.iter().filter(|p| p.recognised().is_ok()) {
             let [vertex, geometry, fragment] = &p.shaders;
             let lines: Vec<&str> = fragment.lines().collect();
-            let known = |lines: &[&str]| gluray::recognise(vertex, geometry, &lines.join("\n")).is_ok();
+            let known =
+                |lines: &[&str]| gluray::recognise(vertex, geometry, &lines.join("\n")).is_ok();
             let of_main = lines_of_main(&lines);
             for pair in of_main.windows(2) {
                 let (a, b) = (pair[0], pair[1]);
                 let what = || format!("{} of VTK {version}: {} | {}", p.name, lines[a], lines[b]);
                 let mut changed = lines.clone();
                 changed.swap(a, b);
-                assert!(!known(&changed) || lines[a].trim() == lines[b].trim(), "swapped: {}", what());
+                assert!(
+                    !known(&changed) || lines[a].trim() == lines[b].trim(),
+                    "swapped: {}",
+                    what()
+                );
                 let hidden = format!("#if 0\n{}\n#endif", lines[a]);
                 let mut changed = lines.clone();
                 changed[a] = &hidden;

@@ -14,8 +14,12 @@ fn a_child_that_outlives_the_run_finds_its_vendor_of_egl() {
     let place = folder();
     let runtime = place.path().join("runtime");
     let environment = [("XDG_RUNTIME_DIR", runtime.to_str().expect("UTF-8"))];
-    let run =
-        Run { x: &x, folder: place.path(), through: Some(&["--via", "vendor"]), environment: &environment };
+    let run = Run {
+        x: &x,
+        folder: place.path(),
+        through: Some(&["--via", "vendor"]),
+        environment: &environment,
+    };
     let (output, _) = run.program(&python, &[script.to_str().expect("UTF-8"), "found"]);
     assert!(output.status.success(), "{output:?}");
     // The run is over, and only now the child looks for a vendor.

@@ -1,4 +1,5 @@
-//! Programs with several threads: each has its own context or none, and sees what others write to textures.
+//! Programs with several threads: each has its own context or none, and sees what others write to
+//! textures.
 
 mod common;
 
@@ -7,7 +8,8 @@ use common::{Run, Xvfb, folder, peer};
 use gluray::report::Report;
 use std::path::Path;
 
-/// Draws a case natively and through us; asserts that pictures agree and that nothing was said. `None` without the peers.
+/// Draws a case natively and through us; asserts that pictures agree and that nothing was said.
+/// `None` without the peers.
 fn draw(case: &str) -> Option<Report> {
     let python = peer("RTSV_SYSTEM_PYTHON")?;
     let x = Xvfb::start()?;

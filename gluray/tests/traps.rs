@@ -1,4 +1,5 @@
-//! What programs of all kinds turned out to do, one small program each: the driver's picture, and traced where it can be.
+//! What programs of all kinds turned out to do, one small program each: the driver's picture, and
+//! traced where it can be.
 
 mod common;
 

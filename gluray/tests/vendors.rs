@@ -18,8 +18,10 @@ fn build(place: &Path) {
     }
     let files = place.join("egl_vendor.d");
     std::fs::create_dir(&files).expect("a folder");
-    let libraries =
-        [("10_fake.json", place.join("libEGL_fake.so.0")), ("50_mesa.json", "libEGL_mesa.so.0".into())];
+    let libraries = [
+        ("10_fake.json", place.join("libEGL_fake.so.0")),
+        ("50_mesa.json", "libEGL_mesa.so.0".into()),
+    ];
     for (name, library) in libraries {
         let json = serde_json::json!({ "file_format_version": "1.0.0", "ICD": { "library_path": library } });
         std::fs::write(files.join(name), json.to_string()).expect("a file");
@@ -49,8 +51,11 @@ fn notes(python: &Path, script: &str, variables: &[(&str, &str)]) -> Option<Stri
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let picture = Picture::read(&place.path().join("out.png"));
         // Displays may be asked for again.
-        let mut lines: Vec<String> =
-            std::fs::read_to_string(notes).unwrap_or_default().lines().map(|l| format!("{l}\n")).collect();
+        let mut lines: Vec<String> = std::fs::read_to_string(notes)
+            .unwrap_or_default()
+            .lines()
+            .map(|l| format!("{l}\n"))
+            .collect();
         lines.dedup();
         (picture, report, lines.concat())
     };
@@ -64,12 +69,15 @@ fn notes(python: &Path, script: &str, variables: &[(&str, &str)]) -> Option<Stri
 
 #[test]
 fn the_glx_vendor_is_the_one_that_glvnd_would_have_taken() {
-    let (Some(python), Some(_)) = (peer("RTSV_SYSTEM_PYTHON"), peer("RTSV_PVBATCH")) else { return };
+    let (Some(python), Some(_)) = (peer("RTSV_SYSTEM_PYTHON"), peer("RTSV_PVBATCH")) else {
+        return;
+    };
     let by = |variables: &[(&str, &str)]| notes(&python, "vtk_scene.py", variables);
     let Some(named) = by(&[("__GLX_VENDOR_LIBRARY_NAME", "fake")]) else { return };
     assert_eq!(named, "glx\n");
     // That of the screen goes before that of all screens, which is not there at all.
-    let forced = [("__GLX_FORCE_VENDOR_LIBRARY_0", "fake"), ("__GLX_VENDOR_LIBRARY_NAME", "nobody")];
+    let forced =
+        [("__GLX_FORCE_VENDOR_LIBRARY_0", "fake"), ("__GLX_VENDOR_LIBRARY_NAME", "nobody")];
     assert_eq!(by(&forced).as_deref(), Some("glx\n"));
     assert_eq!(by(&[]).as_deref(), Some(""), "the X server names Mesa");
 }

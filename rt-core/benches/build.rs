@@ -1,6 +1,8 @@
-//! Building the acceleration structure: every preset, on all threads. `cargo bench -p rt-core --bench build`
+//! Building the acceleration structure: every preset, on all threads. `cargo bench -p rt-core
+//! --bench build`
 //!
-//! For watching a change while working on it; comparisons with other ray tracers, with rounds in turns, are bench's experiments.
+//! For watching a change while working on it; comparisons with other ray tracers, with rounds in
+//! turns, are bench's experiments.
 
 mod common;
 
@@ -47,7 +49,8 @@ fn refit(c: &mut Criterion) {
     group.finish();
 }
 
-/// Worlds of many geometries: a thousand small ones, each less than a task of its own, and the same beside a large one.
+/// Worlds of many geometries: a thousand small ones, each less than a task of its own, and the same
+/// beside a large one.
 fn many(c: &mut Criterion) {
     let small: Vec<Arc<TriMesh>> = (0..1000).map(|k| Arc::new(common::bumpy(k))).collect();
     let mut with_large = small.clone();

@@ -1,4 +1,5 @@
-//! Whole frames on one thread: what a picture costs beyond its rays, and what each effect adds. `cargo bench -p rt-core --bench frame`
+//! Whole frames on one thread: what a picture costs beyond its rays, and what each effect adds.
+//! `cargo bench -p rt-core --bench frame`
 
 mod common;
 
@@ -28,7 +29,8 @@ fn frame(c: &mut Criterion) {
         change(&mut s);
         s
     };
-    let mapped = ColorMap::new(vec![[0.0, 0.0, 1.0, 1.0], [1.0; 4], [1.0, 0.0, 0.0, 1.0]], [0.2, 1.2]);
+    let mapped =
+        ColorMap::new(vec![[0.0, 0.0, 1.0, 1.0], [1.0; 4], [1.0, 0.0, 0.0, 1.0]], [0.2, 1.2]);
     let mut by_scalars = plain.clone();
     by_scalars.materials[0] = plain.materials[0].clone().colored_by_scalars(mapped);
     let mut lamp = plain.clone();
@@ -68,7 +70,8 @@ fn frame(c: &mut Criterion) {
         group.bench_function(name, |b| {
             one.install(|| {
                 b.iter(|| {
-                    let output = renderer.render(scene, &common::camera(), &options).expect("a sound scene");
+                    let output =
+                        renderer.render(scene, &common::camera(), &options).expect("a sound scene");
                     renderer.recycle(output.frame);
                 });
             });
@@ -81,7 +84,8 @@ fn frame(c: &mut Criterion) {
 fn beside_a_pane(opacity: f32) -> Scene {
     let mut b = SceneBuilder::new();
     b.mesh(common::shells(), Material::matte([0.6, 0.7, 0.8]));
-    let corners = vec![Vec3::new(1.2, 1.2, 0.0), Vec3::new(1.4, 1.2, 0.0), Vec3::new(1.2, 1.4, 0.0)];
+    let corners =
+        vec![Vec3::new(1.2, 1.2, 0.0), Vec3::new(1.4, 1.2, 0.0), Vec3::new(1.2, 1.4, 0.0)];
     let pane = TriMesh::new(corners, vec![[0, 1, 2]]);
     b.mesh(pane, Material::matte([1.0; 3]).with_opacity(opacity));
     b.light(Light::point(DVec3::new(4.0, 5.0, 3.0)));

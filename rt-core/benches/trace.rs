@@ -1,4 +1,5 @@
-//! Rays without a picture, on one thread: primary rays, shadow rays to a point, ambient occlusion. `cargo bench -p rt-core --bench trace`
+//! Rays without a picture, on one thread: primary rays, shadow rays to a point, ambient occlusion.
+//! `cargo bench -p rt-core --bench trace`
 
 mod common;
 
@@ -29,8 +30,9 @@ fn trace(c: &mut Criterion) {
             let (x, y) = orthonormal_basis(*n);
             let (p, n) = (*p, *n);
             (0..8).map(move |k| {
-                let d =
-                    cosine_hemisphere(Sampler::new(Sampling::Sobol, 0, i as u32, 0, 0).square_of(0, k, 8));
+                let d = cosine_hemisphere(
+                    Sampler::new(Sampling::Sobol, 0, i as u32, 0, 0).square_of(0, k, 8),
+                );
                 Ray::new(p, x * d.x + y * d.y + n * d.z)
             })
         };
@@ -60,7 +62,9 @@ fn trace(c: &mut Criterion) {
         });
         group.throughput(Throughput::Elements(8 * points.len() as u64));
         group.bench_function("ambient occlusion, streams", |b| {
-            b.iter(|| world.occluded_incoherent(black_box(&occlusion), &mut masks).expect("one each"));
+            b.iter(|| {
+                world.occluded_incoherent(black_box(&occlusion), &mut masks).expect("one each")
+            });
         });
         group.finish();
     }

@@ -1,6 +1,7 @@
 //! What each effect costs: one scene, drawn with one effect more each time.
 //!
-//! `cargo run --release -p rt-core --example effects_cost -- [pixels per side, default 512] [rounds, default 3]`
+//! `cargo run --release -p rt-core --example effects_cost -- [pixels per side, default 512]
+//! [rounds, default 3]`
 
 use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::Camera;
@@ -24,7 +25,9 @@ fn bumpy_sphere() -> TriMesh {
             let (st, ct) = (std::f32::consts::PI * i as f32 / n as f32).sin_cos();
             let (sp, cp) = (std::f32::consts::TAU * j as f32 / m as f32).sin_cos();
             let d = Vec3::new(st * cp, st * sp, ct);
-            positions.push(d * (1.0 + 0.05 * (17.0 * d.x).sin() * (13.0 * d.y).sin() * (19.0 * d.z).sin()));
+            positions.push(
+                d * (1.0 + 0.05 * (17.0 * d.x).sin() * (13.0 * d.y).sin() * (19.0 * d.z).sin()),
+            );
         }
     }
     let at = |i: usize, j: usize| (i * m + j % m) as u32;
@@ -59,14 +62,23 @@ fn main() {
     let number = |a: std::ffi::OsString| a.to_str().and_then(|a| a.parse::<u32>().ok());
     let mut arguments = std::env::args_os().skip(1).map(|a| number(a).expect("a whole number"));
     let (n, rounds) = (arguments.next().unwrap_or(512), arguments.next().unwrap_or(3));
-    let world = World::from_mesh(bumpy_sphere(), &BuildOptions::default()).expect("the mesh is sound");
-    let camera =
-        Camera::perspective(DVec3::new(3.2, 0.5, 0.7), DVec3::ZERO, DVec3::Z, 0.6, 1.0, [0.1, 100.0])
-            .expect("the camera is sound");
+    let world =
+        World::from_mesh(bumpy_sphere(), &BuildOptions::default()).expect("the mesh is sound");
+    let camera = Camera::perspective(
+        DVec3::new(3.2, 0.5, 0.7),
+        DVec3::ZERO,
+        DVec3::Z,
+        0.6,
+        1.0,
+        [0.1, 100.0],
+    )
+    .expect("the camera is sound");
 
-    // Tracing alone: the same camera rays in blocks of 4 x 4 pixels, 32 x 32 pixels at a time, one thread.
+    // Tracing alone: the same camera rays in blocks of 4 x 4 pixels, 32 x 32 pixels at a time, one
+    // thread.
     let (eye, corner) = camera.world_ray([-1.0, 1.0]);
-    let (right, down) = (camera.world_ray([1.0, 1.0]).1 - corner, camera.world_ray([-1.0, -1.0]).1 - corner);
+    let (right, down) =
+        (camera.world_ray([1.0, 1.0]).1 - corner, camera.world_ray([-1.0, -1.0]).1 - corner);
     let mut blocks = Vec::new();
     for tile in 0..(n / 32) * (n / 32) {
         for slot in 0..1024 {
@@ -89,7 +101,11 @@ fn main() {
         1 << 20,
         rayon::current_num_threads()
     );
-    println!("{:32} {:9.2}  (one thread)", "camera rays without a picture", alone.as_secs_f64() * 1e3);
+    println!(
+        "{:32} {:9.2}  (one thread)",
+        "camera rays without a picture",
+        alone.as_secs_f64() * 1e3
+    );
 
     let mut scene = Scene::new(world);
     let shiny = |mirror| {
@@ -111,7 +127,11 @@ fn main() {
         println!("{name:32} {ms:9.2}  {rays:10} rays  {:6.2} Mrays/s", rays as f64 / ms / 1e3);
     };
     let options = RenderOptions::new(n, n);
-    row("depth and ids", &scene, RenderOptions { layers: Layers::DEPTH | Layers::IDS, ..options.clone() });
+    row(
+        "depth and ids",
+        &scene,
+        RenderOptions { layers: Layers::DEPTH | Layers::IDS, ..options.clone() },
+    );
     row("headlight, matte", &scene, options.clone());
     scene.materials[0] = shiny(0.0);
     row("+ highlight", &scene, options.clone());
@@ -121,7 +141,11 @@ fn main() {
         RenderOptions { layers: Layers::COLOR | Layers::DEPTH | Layers::IDS, ..options.clone() },
     );
     scene.lights = vec![Light::point(DVec3::new(3.0, 2.0, 4.0)), Light::ambient([0.3; 3])];
-    row("point light, no shadows", &scene, RenderOptions { effects: Some(Effects::NONE), ..options.clone() });
+    row(
+        "point light, no shadows",
+        &scene,
+        RenderOptions { effects: Some(Effects::NONE), ..options.clone() },
+    );
     row("+ shadows", &scene, options.clone());
     scene.lights[0] = scene.lights[0].with_size(0.5).expect("a light with a size");
     row("+ soft shadows, 4 rays", &scene, options.clone());
@@ -134,5 +158,9 @@ fn main() {
     scene.materials[0] = Material::dielectric(1.5);
     row("glass instead", &scene, options.clone());
     scene.materials[0] = Material::matte([0.7; 3]);
-    row("path tracing, 4 samples", &scene, RenderOptions { path_tracing: true, samples: 4, ..options });
+    row(
+        "path tracing, 4 samples",
+        &scene,
+        RenderOptions { path_tracing: true, samples: 4, ..options },
+    );
 }

@@ -1,9 +1,10 @@
 //! Cameras: any OpenGL projection · view matrix in f64, with an optional thin lens.
 //!
-//! A pixel's ray needs only three rows of the matrix. With `clip = M (world, 1)`, a perspective ray is `eye + t D(x, y)` where `D`
-//! solves *clip x, y, w of a direction = (x, y, 1)*, so `t` is clip w (for the usual matrices: eye depth) and the near and far
-//! rows never enter: a far/near ratio of 1e9 costs the rays no accuracy. A parallel ray uses rows x, y, z in the same way, with
-//! `t` in clip z. Pixel centres are OpenGL's; **row 0 is the top row**.
+//! A pixel's ray needs only three rows of the matrix. With `clip = M (world, 1)`, a perspective ray
+//! is `eye + t D(x, y)` where `D` solves *clip x, y, w of a direction = (x, y, 1)*, so `t` is clip
+//! w (for the usual matrices: eye depth) and the near and far rows never enter: a far/near ratio of
+//! 1e9 costs the rays no accuracy. A parallel ray uses rows x, y, z in the same way, with `t` in
+//! clip z. Pixel centres are OpenGL's; **row 0 is the top row**.
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
@@ -29,7 +30,9 @@ pub enum CameraError {
     },
     /// The matrix maps the picture plane onto a line or a point.
     #[error(
-        "camera matrix is singular (rows x, y and {third} have determinant {determinant}); check that eye and target differ, that up is not along the view, and that the picture has an extent"
+        "camera matrix is singular (rows x, y and {third} have determinant {determinant}); check \
+         that eye and target differ, that up is not along the view, and that the picture has an \
+         extent"
     )]
     Singular {
         /// "w" for perspective, "z" for parallel projection.
@@ -49,7 +52,8 @@ pub enum CameraError {
     },
     /// A lens on a parallel projection or a panorama.
     #[error(
-        "a thin lens needs a perspective camera; this one is a parallel projection or a panorama: leave the lens out"
+        "a thin lens needs a perspective camera; this one is a parallel projection or a panorama: \
+         leave the lens out"
     )]
     LensOnParallel,
 }
@@ -62,12 +66,14 @@ pub(crate) enum Projection {
         /// World position.
         eye: DVec3,
     },
-    /// All rays have this direction, scaled to one unit of clip z (before division by the constant w).
+    /// All rays have this direction, scaled to one unit of clip z (before division by the constant
+    /// w).
     Parallel {
         /// World direction.
         dir: DVec3,
     },
-    /// All rays start at the eye and go all around: longitude over the width, latitude over the height.
+    /// All rays start at the eye and go all around: longitude over the width, latitude over the
+    /// height.
     Omnidirectional {
         /// World position.
         eye: DVec3,
@@ -91,7 +97,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// From OpenGL's `projection * view` (clip from world): perspective or parallel, off-axis, tiled, any.
+    /// From OpenGL's `projection * view` (clip from world): perspective or parallel, off-axis,
+    /// tiled, any.
     ///
     /// ```
     /// use rt_core::{camera::Camera, glam::{DMat4, DVec3, dmat4, dvec4}};
@@ -110,12 +117,16 @@ impl Camera {
         let rows = [m.row(0), m.row(1), m.row(2), m.row(3)];
         let parallel = rows[3].truncate() == DVec3::ZERO;
         let (third, name) = if parallel { (rows[2], "z") } else { (rows[3], "w") };
-        let a = DMat3::from_cols(rows[0].truncate(), rows[1].truncate(), third.truncate()).transpose();
+        let a =
+            DMat3::from_cols(rows[0].truncate(), rows[1].truncate(), third.truncate()).transpose();
         let determinant = a.determinant();
-        // Relative to the rows' lengths (Hadamard's bound), so that the unit of length does not matter.
-        let bound = rows[0].truncate().length() * rows[1].truncate().length() * third.truncate().length();
-        let usable =
-            determinant.is_finite() && determinant.abs() > 1e-14 * bound && (!parallel || rows[3].w != 0.0);
+        // Relative to the rows' lengths (Hadamard's bound), so that the unit of length does not
+        // matter.
+        let bound =
+            rows[0].truncate().length() * rows[1].truncate().length() * third.truncate().length();
+        let usable = determinant.is_finite()
+            && determinant.abs() > 1e-14 * bound
+            && (!parallel || rows[3].w != 0.0);
         if !usable {
             return Err(CameraError::Singular { third: name, determinant });
         }
@@ -136,7 +147,8 @@ impl Camera {
         })
     }
 
-    /// A symmetric perspective camera (gluPerspective · gluLookAt). `fov_y_rad` is the full vertical angle, `aspect` width / height.
+    /// A symmetric perspective camera (gluPerspective · gluLookAt). `fov_y_rad` is the full
+    /// vertical angle, `aspect` width / height.
     pub fn perspective(
         eye: DVec3,
         target: DVec3,
@@ -202,29 +214,42 @@ impl Camera {
         Camera::from_matrix(projection * view(eye, target, up)?)
     }
 
-    /// A camera that sees all around: an equirectangular panorama with `target` in its middle. `region` is the part of the panorama that fills the picture,
-    /// from the lower left (`[[0, 0], [1, 1]]` for all of it). Window depth is 1 - 1 / (1 + distance), nothing is cut by near and far planes, and
-    /// [`Camera::clip_from_world`] is that of a right angle ahead.
+    /// A camera that sees all around: an equirectangular panorama with `target` in its middle.
+    /// `region` is the part of the panorama that fills the picture, from the lower left (`[[0, 0],
+    /// [1, 1]]` for all of it). Window depth is 1 - 1 / (1 + distance), nothing is cut by near and
+    /// far planes, and [`Camera::clip_from_world`] is that of a right angle ahead.
     pub fn omnidirectional(
         eye: DVec3,
         target: DVec3,
         up: DVec3,
         region: [[f64; 2]; 2],
     ) -> Result<Camera, CameraError> {
-        let ahead =
-            Camera::perspective(eye, target, up, std::f64::consts::FRAC_PI_2, 1.0, [1.0, f64::INFINITY])?;
+        let ahead = Camera::perspective(
+            eye,
+            target,
+            up,
+            std::f64::consts::FRAC_PI_2,
+            1.0,
+            [1.0, f64::INFINITY],
+        )?;
         for (field, low, high) in
             [("region.x", region[0][0], region[1][0]), ("region.y", region[0][1], region[1][1])]
         {
             in_range(field, low, low.is_finite(), "finite")?;
-            in_range(field, high, high.is_finite() && high != low, "finite, and the two ends must differ")?;
+            in_range(
+                field,
+                high,
+                high.is_finite() && high != low,
+                "finite, and the two ends must differ",
+            )?;
         }
         let region = region.map(|corner| corner.map(|v| 2.0 * v - 1.0));
         let projection = Projection::Omnidirectional { eye, axes: ahead.world_from_view(), region };
         Ok(Camera { projection, near_far_clipping: false, ..ahead })
     }
 
-    /// The same camera with a lens. Refused for parallel projections and lenses without a positive focus distance.
+    /// The same camera with a lens. Refused for parallel projections and lenses without a positive
+    /// focus distance.
     pub fn with_lens(self, lens: ThinLens) -> Result<Camera, CameraError> {
         if !matches!(self.projection, Projection::Perspective { .. }) {
             return Err(CameraError::LensOnParallel);
@@ -235,7 +260,8 @@ impl Camera {
         Ok(Camera { lens: Some(lens), ..self })
     }
 
-    /// The same camera with OpenGL's glDepthRange (default 0 to 1): window depth of the near and the far plane.
+    /// The same camera with OpenGL's glDepthRange (default 0 to 1): window depth of the near and
+    /// the far plane.
     pub fn with_depth_range(self, depth_range: [f64; 2]) -> Camera {
         Camera { depth_range, ..self }
     }
@@ -249,7 +275,8 @@ impl Camera {
         Ok(())
     }
 
-    /// Whether surfaces before the near plane and behind the far plane are cut away, as OpenGL does (default: yes).
+    /// Whether surfaces before the near plane and behind the far plane are cut away, as OpenGL does
+    /// (default: yes).
     pub fn with_near_far_clipping(self, near_far_clipping: bool) -> Camera {
         Camera { near_far_clipping, ..self }
     }
@@ -282,7 +309,8 @@ impl Camera {
         }
     }
 
-    /// Right, up and backward as unit columns: world from OpenGL's eye space, without the eye's position.
+    /// Right, up and backward as unit columns: world from OpenGL's eye space, without the eye's
+    /// position.
     pub fn world_from_view(&self) -> DMat3 {
         let back = -self.forward();
         let x = self.inverse.x_axis;
@@ -290,8 +318,8 @@ impl Camera {
         DMat3::from_cols(right, back.cross(right), back)
     }
 
-    /// OpenGL's window depth of a world point: 0 (near) to 1 (far) unless the depth range says otherwise. One f64 evaluation of
-    /// matrix rows z and w; round it to f32 for a depth buffer.
+    /// OpenGL's window depth of a world point: 0 (near) to 1 (far) unless the depth range says
+    /// otherwise. One f64 evaluation of matrix rows z and w; round it to f32 for a depth buffer.
     #[inline(always)]
     pub fn window_depth(&self, world: DVec3) -> f64 {
         let (z, w) = (self.clip_from_world.row(2), self.clip_from_world.row(3));
@@ -316,14 +344,16 @@ impl Camera {
         self.depth_range[1]
     }
 
-    /// NDC of the point (`x`, `y`) of a picture of `size` pixels; pixel centres are at +0.5, y grows downwards.
+    /// NDC of the point (`x`, `y`) of a picture of `size` pixels; pixel centres are at +0.5, y
+    /// grows downwards.
     #[inline]
     pub fn ndc_of_pixel(x: f64, y: f64, size: [u32; 2]) -> [f64; 2] {
         [2.0 * x / size[0] as f64 - 1.0, 1.0 - 2.0 * y / size[1] as f64]
     }
 
-    /// The world ray through NDC (`x`, `y`) as origin and direction, in the parametrization of the module's text: clip w for
-    /// perspective, clip z + w over w (0 at the near plane, 2 at the far plane) for parallel projections.
+    /// The world ray through NDC (`x`, `y`) as origin and direction, in the parametrization of the
+    /// module's text: clip w for perspective, clip z + w over w (0 at the near plane, 2 at the far
+    /// plane) for parallel projections.
     #[inline]
     pub fn world_ray(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
         match self.projection {
@@ -333,7 +363,14 @@ impl Camera {
                 let (longitude, latitude) =
                     (at(x, 0) * std::f64::consts::PI, at(y, 1) * std::f64::consts::FRAC_PI_2);
                 let level = latitude.cos();
-                (eye, axes * DVec3::new(level * longitude.sin(), latitude.sin(), -level * longitude.cos()))
+                (
+                    eye,
+                    axes * DVec3::new(
+                        level * longitude.sin(),
+                        latitude.sin(),
+                        -level * longitude.cos(),
+                    ),
+                )
             }
             Projection::Parallel { dir } => {
                 let m = &self.clip_from_world;
@@ -344,11 +381,16 @@ impl Camera {
         }
     }
 
-    /// Ray parameters of the near and far planes along [`Camera::world_ray`]; everything in front of the eye without clipping.
+    /// Ray parameters of the near and far planes along [`Camera::world_ray`]; everything in front
+    /// of the eye without clipping.
     pub(crate) fn near_far(&self, origin: DVec3, dir: DVec3) -> [f64; 2] {
         let parallel = matches!(self.projection, Projection::Parallel { .. });
         if !self.near_far_clipping {
-            return if parallel { [f64::NEG_INFINITY, f64::INFINITY] } else { [0.0, f64::INFINITY] };
+            return if parallel {
+                [f64::NEG_INFINITY, f64::INFINITY]
+            } else {
+                [0.0, f64::INFINITY]
+            };
         }
         if parallel {
             return [0.0, 2.0];
@@ -370,7 +412,12 @@ fn refine(a: DMat3, inverse: DMat3, rhs: DVec3) -> DVec3 {
     x + inverse * (rhs - a * x)
 }
 
-fn in_range(field: &'static str, value: f64, ok: bool, rule: &'static str) -> Result<(), CameraError> {
+fn in_range(
+    field: &'static str,
+    value: f64,
+    ok: bool,
+    rule: &'static str,
+) -> Result<(), CameraError> {
     if ok { Ok(()) } else { Err(CameraError::OutOfRange { field, value, rule }) }
 }
 

@@ -1,5 +1,5 @@
-//! One-dimensional lookup from scalar to colour (thesis section 3.2.5): scalars are interpolated first and mapped then, so a
-//! colour map stays sharp inside large triangles.
+//! One-dimensional lookup from scalar to colour (thesis section 3.2.5): scalars are interpolated
+//! first and mapped then, so a colour map stays sharp inside large triangles.
 
 use crate::ray::LANES;
 use crate::simd::vectors::Row;
@@ -33,8 +33,11 @@ impl ColorMap {
         if self.colors.is_empty() {
             return Err(("color map", "without colours".into(), "one with at least one colour"));
         }
-        let broken =
-            self.colors.iter().chain([&self.nan_color]).position(|c| !c.iter().all(|v| v.is_finite()));
+        let broken = self
+            .colors
+            .iter()
+            .chain([&self.nan_color])
+            .position(|c| !c.iter().all(|v| v.is_finite()));
         if let Some(i) = broken {
             let (field, c) = match self.colors.get(i) {
                 Some(c) => ("color map", c),
@@ -100,7 +103,8 @@ impl ColorMap {
         for c in 0..4 {
             let (p, q) = (f32x16::from_slice(simd, &low[c]), f32x16::from_slice(simd, &high[c]));
             let mixed = p + (q - p) * f;
-            let color = if known.all_true() { mixed } else { known.select(mixed, v(self.nan_color[c])) };
+            let color =
+                if known.all_true() { mixed } else { known.select(mixed, v(self.nan_color[c])) };
             color.store_slice(&mut out[c]);
         }
     }

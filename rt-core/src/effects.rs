@@ -1,7 +1,9 @@
-//! What a picture needs beyond primary rays and local lighting, as a set that the scene fills in by itself.
+//! What a picture needs beyond primary rays and local lighting, as a set that the scene fills in by
+//! itself.
 //!
-//! The renderer runs one pass per effect over a tile of rays, and a pass outside the set is not entered at all: an unused effect
-//! costs one test per tile, and its ray counter in [`crate::ray_stats::RayStats`] stays 0.
+//! The renderer runs one pass per effect over a tile of rays, and a pass outside the set is not
+//! entered at all: an unused effect costs one test per tile, and its ray counter in
+//! [`crate::ray_stats::RayStats`] stays 0.
 
 use crate::camera::Camera;
 use crate::scene::Scene;
@@ -32,7 +34,8 @@ impl Effects {
     pub const DEPTH_OF_FIELD: Effects = Effects(1 << 7);
     /// Direct volume rendering.
     pub const VOLUMES: Effects = Effects(1 << 8);
-    /// Light over any number of bounces (replaces ambient occlusion and ambient light by what they stand for).
+    /// Light over any number of bounces (replaces ambient occlusion and ambient light by what they
+    /// stand for).
     pub const PATH_TRACING: Effects = Effects(1 << 9);
 
     /// Every effect with the name used in reports and on command lines.
@@ -49,8 +52,9 @@ impl Effects {
         (Effects::PATH_TRACING, "path tracing"),
     ];
 
-    /// The effects without which `scene` would look different: read from its lights, materials, attributes and volumes. The lens
-    /// belongs to the camera ([`Effects::required_by_camera`]), and path tracing is a choice of the render options.
+    /// The effects without which `scene` would look different: read from its lights, materials,
+    /// attributes and volumes. The lens belongs to the camera ([`Effects::required_by_camera`]),
+    /// and path tracing is a choice of the render options.
     pub fn required_by(scene: &Scene) -> Effects {
         crate::scene::requirements(scene)
     }

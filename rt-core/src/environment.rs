@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// Radiance from infinitely far away, by direction. It lights surfaces (dimmed by ambient occlusion), and is what reflected,
-/// refracted and path-traced rays see when they leave the scene.
+/// Radiance from infinitely far away, by direction. It lights surfaces (dimmed by ambient
+/// occlusion), and is what reflected, refracted and path-traced rays see when they leave the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Environment {
     /// The same from everywhere, linear RGB.
@@ -43,7 +43,8 @@ impl Environment {
             }
             Environment::Image { image, up, scale } => {
                 let (e, n) = crate::math::orthonormal_basis(*up);
-                // Half a texel from the poles, so that a repeating texture does not mix top and bottom there.
+                // Half a texel from the poles, so that a repeating texture does not mix top and
+                // bottom there.
                 let margin = 0.5 / image.size()[1] as f32;
                 let height = 0.5 + d.dot(*up).clamp(-1.0, 1.0).asin() / PI;
                 let around = 0.5 + d.dot(n).atan2(d.dot(e)) / (2.0 * PI);
@@ -64,8 +65,8 @@ impl Environment {
     }
 }
 
-/// Lengths of `up` that count as 1: an f32 vector that was normalised is within 1e-7, and one written
-/// with four digits within 1e-4. The radiance is off by no more.
+/// Lengths of `up` that count as 1: an f32 vector that was normalised is within 1e-7, and one
+/// written with four digits within 1e-4. The radiance is off by no more.
 const UNIT: std::ops::RangeInclusive<f32> = 0.999..=1.001;
 
 impl Environment {
@@ -164,9 +165,10 @@ pub enum Background {
     Environment,
 }
 
-/// Cosine-weighted mean of an environment over the hemisphere around a normal, as nine spherical harmonics (Ramamoorthi and
-/// Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001): exact for constant and gradient environments,
-/// within a few per cent of the mean for pictures.
+/// Cosine-weighted mean of an environment over the hemisphere around a normal, as nine spherical
+/// harmonics (Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment
+/// Maps", 2001): exact for constant and gradient environments, within a few per cent of the mean
+/// for pictures.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct IrradianceCoefficients {
     pub(crate) coefficients: [Vec3; 9],
@@ -174,7 +176,10 @@ pub(crate) struct IrradianceCoefficients {
 
 impl IrradianceCoefficients {
     /// Projects `environment`, adding the isotropic radiance `ambient`. `None` when both are black.
-    pub(crate) fn new(environment: Option<&Environment>, ambient: Vec3) -> Option<IrradianceCoefficients> {
+    pub(crate) fn new(
+        environment: Option<&Environment>,
+        ambient: Vec3,
+    ) -> Option<IrradianceCoefficients> {
         let mut c = [Vec3::ZERO; 9];
         match environment {
             Some(Environment::Constant(v)) => c[0] = (*v).into(),
@@ -208,7 +213,8 @@ impl IrradianceCoefficients {
     }
 }
 
-/// Numerical projection over 64 x 128 directions of equal solid angle per row; each basis polynomial is convolved with cos/π.
+/// Numerical projection over 64 x 128 directions of equal solid angle per row; each basis
+/// polynomial is convolved with cos/π.
 fn project(environment: &Environment) -> [Vec3; 9] {
     const ROWS: usize = 64;
     let mut c = [Vec3::ZERO; 9];
@@ -230,7 +236,8 @@ fn project(environment: &Environment) -> [Vec3; 9] {
                 d.x * d.z,
                 d.x * d.x - d.y * d.y,
             ];
-            // 1 / mean square of each polynomial over the sphere, times the cosine lobe's factor (1, 2/3, 1/4).
+            // 1 / mean square of each polynomial over the sphere, times the cosine lobe's factor
+            // (1, 2/3, 1/4).
             let norm = [1.0, 3.0, 3.0, 3.0, 15.0, 15.0, 1.25, 15.0, 3.75];
             for k in 0..9 {
                 let lobe = [1.0, 2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 0.25, 0.25, 0.25, 0.25, 0.25][k];

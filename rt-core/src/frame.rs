@@ -59,8 +59,9 @@ impl BitOr for Layers {
 
 /// A picture. A layer that was not asked for is empty.
 ///
-/// `depth`, `distance`, `normal`, `instance` and `primitive` belong to the ray through the pixel's centre, whatever the number of
-/// samples and the lens: averaging them over a silhouette would make values that are on no surface.
+/// `depth`, `distance`, `normal`, `instance` and `primitive` belong to the ray through the pixel's
+/// centre, whatever the number of samples and the lens: averaging them over a silhouette would make
+/// values that are on no surface.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Frame {
     /// Pixels per row.
@@ -69,12 +70,15 @@ pub struct Frame {
     pub height: u32,
     /// Linear RGBA, colour premultiplied by alpha (coverage times opacity); mean over the samples.
     pub color: Vec<[f32; 4]>,
-    /// OpenGL window depth of the surface at the pixel centre: 0 at the near plane to 1 at the far plane (or the camera's depth
-    /// range), within 4 ulp of the matrix product evaluated at the exact intersection; the far value where nothing is hit.
+    /// OpenGL window depth of the surface at the pixel centre: 0 at the near plane to 1 at the far
+    /// plane (or the camera's depth range), within 4 ulp of the matrix product evaluated at the
+    /// exact intersection; the far value where nothing is hit.
     pub depth: Vec<f32>,
-    /// Euclidean distance from the eye (parallel projection: from the near plane), world units; infinite where nothing is hit.
+    /// Euclidean distance from the eye (parallel projection: from the near plane), world units;
+    /// infinite where nothing is hit.
     pub distance: Vec<f32>,
-    /// Unit shading normal in world axes, turned as the material's sides say; zero where nothing is hit.
+    /// Unit shading normal in world axes, turned as the material's sides say; zero where nothing is
+    /// hit.
     pub normal: Vec<[f32; 3]>,
     /// Index of the instance; `u32::MAX` where nothing is hit.
     pub instance: Vec<u32>,
@@ -145,7 +149,11 @@ impl Frame {
             let unit = "linear, premultiplied";
             for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
                 let unit = if c == 3 { "coverage 0..1" } else { unit };
-                out.push(Plane { name, unit, values: component(self.color.iter().map(|p| p[c]).collect()) });
+                out.push(Plane {
+                    name,
+                    unit,
+                    values: component(self.color.iter().map(|p| p[c]).collect()),
+                });
             }
         }
         for (name, unit, values) in [
@@ -172,7 +180,8 @@ impl Frame {
         out
     }
 
-    /// 8-bit RGBA, not premultiplied (as PNG wants it), times `exposure` before encoding. Values are clamped to 0..=1; NaN becomes 0.
+    /// 8-bit RGBA, not premultiplied (as PNG wants it), times `exposure` before encoding. Values
+    /// are clamped to 0..=1; NaN becomes 0.
     pub fn to_rgba8(&self, encoding: Encoding, exposure: f32) -> Vec<u8> {
         let mut out = Vec::with_capacity(self.color.len() * 4);
         for &[r, g, b, a] in &self.color {

@@ -2,7 +2,8 @@
 
 use glam::{DVec3, UVec3, Vec3};
 
-/// A scalar on the points of a uniform grid, x fastest. World position of point (i,j,k) is `origin + spacing * (i,j,k)`.
+/// A scalar on the points of a uniform grid, x fastest. World position of point (i,j,k) is `origin
+/// + spacing * (i,j,k)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Points per axis, each at least 1.
@@ -42,7 +43,12 @@ pub enum GridError {
 
 impl Grid {
     /// A checked grid.
-    pub fn new(dims: UVec3, origin: DVec3, spacing: DVec3, values: Vec<f32>) -> Result<Self, GridError> {
+    pub fn new(
+        dims: UVec3,
+        origin: DVec3,
+        spacing: DVec3,
+        values: Vec<f32>,
+    ) -> Result<Self, GridError> {
         let expected = dims.x as u64 * dims.y as u64 * dims.z as u64;
         if expected != values.len() as u64 || expected == 0 {
             return Err(GridError::Length { dims, expected, found: values.len() });
@@ -111,7 +117,8 @@ impl Grid {
         Vec3::new(gx, gy, gz) / self.spacing.as_vec3()
     }
 
-    /// The eight corner values of the cell whose lowest point is `c`, x fastest. An axis with one point repeats it.
+    /// The eight corner values of the cell whose lowest point is `c`, x fastest. An axis with one
+    /// point repeats it.
     #[inline]
     pub fn corners(&self, c: UVec3) -> [f32; 8] {
         let step = UVec3::ONE.min(self.dims - UVec3::ONE);
@@ -130,7 +137,8 @@ impl Grid {
         ]
     }
 
-    /// Cell and position inside it (0..=1) of the continuous index `p`, clamped to the grid. NaN goes to 0.
+    /// Cell and position inside it (0..=1) of the continuous index `p`, clamped to the grid. NaN
+    /// goes to 0.
     #[inline]
     pub fn cell_of(&self, p: Vec3) -> (UVec3, Vec3) {
         let last = (self.dims - UVec3::ONE).as_vec3();

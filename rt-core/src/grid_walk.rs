@@ -1,9 +1,11 @@
-//! Walking a ray through the cells of a uniform grid, such that everyone who walks any part of the grid sees the same cells.
+//! Walking a ray through the cells of a uniform grid, such that everyone who walks any part of the
+//! grid sees the same cells.
 //!
-//! The ray parameter at which a grid plane is crossed is a pure function of the ray and the plane's number, and which of several planes
-//! crossed at the same parameter comes first is fixed (x before y before z). Hence blocks of cells that are walked separately
-//! agree on the sequence of cells and on the parameters between them to the last bit: what leaves one block enters the next. (Amanatides and Woo 1987
-//! add increments instead; their sums differ between blocks.)
+//! The ray parameter at which a grid plane is crossed is a pure function of the ray and the plane's
+//! number, and which of several planes crossed at the same parameter comes first is fixed (x before
+//! y before z). Hence blocks of cells that are walked separately agree on the sequence of cells and
+//! on the parameters between them to the last bit: what leaves one block enters the next.
+//! (Amanatides and Woo 1987 add increments instead; their sums differ between blocks.)
 
 use glam::DVec3;
 
@@ -36,7 +38,8 @@ impl IndexRay {
         IndexRay { o: (o / spacing).to_array(), d: d.to_array(), inverse: d.recip().to_array() }
     }
 
-    /// When the plane number `i` across `axis` is crossed. Not for axes the ray does not move along.
+    /// When the plane number `i` across `axis` is crossed. Not for axes the ray does not move
+    /// along.
     #[inline]
     fn plane(&self, axis: usize, i: i64) -> f64 {
         (i as f64 - self.o[axis]) * self.inverse[axis]
@@ -48,8 +51,8 @@ impl IndexRay {
         std::array::from_fn(|a| self.o[a] + t * self.d[a])
     }
 
-    /// Entry and exit position of a crossing inside its cell, 0..=1. The coordinate across a face is exactly 0 or 1, and the others
-    /// are the same numbers for both cells of the face.
+    /// Entry and exit position of a crossing inside its cell, 0..=1. The coordinate across a face
+    /// is exactly 0 or 1, and the others are the same numbers for both cells of the face.
     #[inline]
     pub(crate) fn fractions(&self, c: &Crossing, size: i64) -> ([f64; 3], [f64; 3]) {
         let scale = 1.0 / size as f64;
@@ -67,9 +70,10 @@ impl IndexRay {
         (p, q)
     }
 
-    /// Visits the cells of `lo..hi` that the ray meets within `[t_min, t_max]`, in order, until `visit` returns false.
-    /// Cells are `size` grid cells wide (`lo` must be a multiple of it; `hi` may cut the last one short). `last` is the number of cells of
-    /// the whole grid per axis: a ray that runs exactly in the grid's last plane belongs to the cell before it.
+    /// Visits the cells of `lo..hi` that the ray meets within `[t_min, t_max]`, in order, until
+    /// `visit` returns false. Cells are `size` grid cells wide (`lo` must be a multiple of it; `hi`
+    /// may cut the last one short). `last` is the number of cells of the whole grid per axis: a ray
+    /// that runs exactly in the grid's last plane belongs to the cell before it.
     #[inline]
     pub(crate) fn walk(
         &self,
@@ -81,8 +85,8 @@ impl IndexRay {
         t_max: f64,
         mut visit: impl FnMut(&Crossing) -> bool,
     ) {
-        // Where the ray enters and leaves the box, and through which face: of planes crossed at once, the last is the entry, the
-        // first the exit.
+        // Where the ray enters and leaves the box, and through which face: of planes crossed at
+        // once, the last is the entry, the first the exit.
         let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut entry, mut exit) = (0, 0);
         for a in 0..3 {
@@ -122,8 +126,9 @@ impl IndexRay {
         let mut plane = [0i64; 3];
         let mut next = [f64::INFINITY; 3];
         for a in 0..3 {
-            let guess =
-                (self.o[a] + start * self.d[a]).floor().clamp(lo[a] as f64, (hi[a] - 1) as f64) as i64;
+            let guess = (self.o[a] + start * self.d[a])
+                .floor()
+                .clamp(lo[a] as f64, (hi[a] - 1) as f64) as i64;
             let mut c = guess.div_euclid(size) * size;
             let end = |c: i64| (c + size).min(hi[a]);
             if self.d[a] > 0.0 {
@@ -160,8 +165,13 @@ impl IndexRay {
         }
 
         // From face to face.
-        let mut crossing =
-            Crossing { cell, t0: start, t1: start, entry: (!starts_inside).then_some(entry), exit: None };
+        let mut crossing = Crossing {
+            cell,
+            t0: start,
+            t1: start,
+            entry: (!starts_inside).then_some(entry),
+            exit: None,
+        };
         loop {
             let a = if next[0] <= next[1] && next[0] <= next[2] {
                 0
@@ -245,7 +255,8 @@ mod tests {
                     // Blocks of unequal size.
                     let (mut lo, mut hi) = ([0; 3], [0; 3]);
                     for a in 0..3 {
-                        (lo[a], hi[a]) = if b >> a & 1 == 0 { (0, 3 + a as i64) } else { (3 + a as i64, 8) };
+                        (lo[a], hi[a]) =
+                            if b >> a & 1 == 0 { (0, 3 + a as i64) } else { (3 + a as i64, 8) };
                     }
                     parts.extend(collect(ray, lo, hi, 1, t_min));
                 }

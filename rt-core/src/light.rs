@@ -1,8 +1,9 @@
 //! Lights.
 //!
-//! **Unit.** As in OpenGL and VTK, a light of colour 1 that falls straight onto a matte white surface makes it 1: its irradiance is
-//! π times its colour. The path tracer uses the same unit, so both integrators agree on direct light. An ambient light or an
-//! environment of radiance 1 makes an unoccluded white surface 1.
+//! **Unit.** As in OpenGL and VTK, a light of colour 1 that falls straight onto a matte white
+//! surface makes it 1: its irradiance is π times its colour. The path tracer uses the same unit, so
+//! both integrators agree on direct light. An ambient light or an environment of radiance 1 makes
+//! an unoccluded white surface 1.
 
 use crate::camera::Camera;
 use glam::{DMat3, DVec3, Vec3};
@@ -13,7 +14,8 @@ pub enum LightFrame {
     /// World space.
     #[default]
     World,
-    /// OpenGL's eye space (x right, y up, z towards the viewer; the eye at the origin): the light moves with the camera.
+    /// OpenGL's eye space (x right, y up, z towards the viewer; the eye at the origin): the light
+    /// moves with the camera.
     Camera,
 }
 
@@ -44,13 +46,14 @@ pub enum LightKind {
         direction: DVec3,
         /// Half angle of the cone, radians; dark outside.
         cutoff_rad: f64,
-        /// Light falls off inside the cone as the cosine to the axis to this power (GL_SPOT_EXPONENT).
+        /// Light falls off inside the cone as the cosine to the axis to this power
+        /// (GL_SPOT_EXPONENT).
         exponent: f64,
         /// Radius of the disk the light comes from, world units; 0 for sharp shadows.
         radius: f64,
     },
-    /// A cone of light with a soft rim: full inside of the inner angle, none outside of the outer, and between them linear in the cosine
-    /// to the axis (OSPRay's and ANARI's spot light).
+    /// A cone of light with a soft rim: full inside of the inner angle, none outside of the outer,
+    /// and between them linear in the cosine to the axis (OSPRay's and ANARI's spot light).
     Cone {
         /// Tip of the cone.
         position: DVec3,
@@ -70,7 +73,8 @@ pub enum LightKind {
         /// Radius, world units.
         radius: f64,
     },
-    /// A flat ring or disk that shines to one side with the cosine to its normal, within a cone with a soft rim (ANARI's ring light).
+    /// A flat ring or disk that shines to one side with the cosine to its normal, within a cone
+    /// with a soft rim (ANARI's ring light).
     Ring {
         /// Centre.
         position: DVec3,
@@ -89,7 +93,8 @@ pub enum LightKind {
     Quad {
         /// A corner.
         corner: DVec3,
-        /// From there to the neighbouring corners, world units. It shines to the side of edge 1 × edge 2.
+        /// From there to the neighbouring corners, world units. It shines to the side of edge 1 ×
+        /// edge 2.
         edges: [DVec3; 2],
         /// It shines to the other side as well.
         both_sides: bool,
@@ -105,10 +110,12 @@ pub struct Light {
     pub frame: LightFrame,
     /// Linear RGB; see the module's text for the unit.
     pub color: [f32; 3],
-    /// Colour of Phong highlights where it differs from `color` (GL_SPECULAR, vtkLight's specular colour).
+    /// Colour of Phong highlights where it differs from `color` (GL_SPECULAR, vtkLight's specular
+    /// colour).
     pub highlight_color: Option<[f32; 3]>,
-    /// Divisor c + l·d + q·d² over distance d (GL's attenuation); `[1, 0, 0]` for none, `[0, 0, 1]` for physical lights, whose
-    /// colour is then that at distance 1. Ignored by directional and ambient light.
+    /// Divisor c + l·d + q·d² over distance d (GL's attenuation); `[1, 0, 0]` for none, `[0, 0, 1]`
+    /// for physical lights, whose colour is then that at distance 1. Ignored by directional and
+    /// ambient light.
     pub attenuation: [f32; 3],
     /// Whether surfaces block it. Light that goes along the camera rays (from a point at the eye of
     /// a perspective, or parallel to a parallel projection's rays) gets no shadow rays from what
@@ -124,12 +131,16 @@ pub enum LightSizeError {
     Ambient,
     /// It comes from the tip.
     #[error(
-        "a cone light has no size: its light comes from its tip; take LightKind::Ring for a disk that shines within a cone, \
+        "a cone light has no size: its light comes from its tip; take LightKind::Ring for a disk \
+         that shines within a cone, \
          or LightKind::Spot, which has a radius"
     )]
     Cone,
     /// Its edges have no length that could be changed.
-    #[error("a quadrangle light whose edges are zero, NaN or infinite cannot be given a size; give it edges")]
+    #[error(
+        "a quadrangle light whose edges are zero, NaN or infinite cannot be given a size; give it \
+         edges"
+    )]
     Quad,
 }
 
@@ -170,13 +181,15 @@ impl Light {
         Light::new(LightKind::Disk { position, direction, radius })
     }
 
-    /// White light along the viewing direction (VTK's headlight, GL_LIGHT0's default): moves with the camera, casts no shadows.
+    /// White light along the viewing direction (VTK's headlight, GL_LIGHT0's default): moves with
+    /// the camera, casts no shadows.
     pub fn headlight() -> Light {
         let kind = LightKind::Directional { to_light: DVec3::Z, angular_radius_rad: 0.0 };
         Light { frame: LightFrame::Camera, shadows: false, ..Light::new(kind) }
     }
 
-    /// White light from the parallelogram at `corner` with these edges, to the side of edge 1 × edge 2; colour as at distance 1 straight ahead.
+    /// White light from the parallelogram at `corner` with these edges, to the side of edge 1 ×
+    /// edge 2; colour as at distance 1 straight ahead.
     pub fn quad(corner: DVec3, edges: [DVec3; 2]) -> Light {
         let kind = LightKind::Quad { corner, edges, both_sides: false };
         Light { attenuation: [0.0, 0.0, 1.0], ..Light::new(kind) }
@@ -188,12 +201,13 @@ impl Light {
         Light { color, ..self }
     }
 
-    /// The same light with a size, [`Light::size`]: the radius in world units, for directional light the angular radius in radians, and
-    /// for a quadrangle half of its longer edge. The holes of rings and the shorter edges of quadrangles grow with it; a quadrangle's
-    /// middle stays.
+    /// The same light with a size, [`Light::size`]: the radius in world units, for directional
+    /// light the angular radius in radians, and for a quadrangle half of its longer edge. The holes
+    /// of rings and the shorter edges of quadrangles grow with it; a quadrangle's middle stays.
     ///
     /// # Errors
-    /// Ambient light and cones have no size, and a quadrangle without edges has none that could grow.
+    /// Ambient light and cones have no size, and a quadrangle without edges has none that could
+    /// grow.
     pub fn with_size(mut self, size: f64) -> Result<Light, LightSizeError> {
         match &mut self.kind {
             LightKind::Directional { angular_radius_rad: r, .. }
@@ -271,7 +285,9 @@ impl Light {
         if camera.eye().is_some() {
             return self.is_at_eye();
         }
-        let LightKind::Directional { to_light, angular_radius_rad } = self.kind else { return false };
+        let LightKind::Directional { to_light, angular_radius_rad } = self.kind else {
+            return false;
+        };
         if self.frame == LightFrame::World || angular_radius_rad > 0.0 {
             return false;
         }
@@ -356,7 +372,12 @@ pub(crate) enum ResolvedLightKind {
 impl ResolvedLight {
     /// `light` for `camera`, whose rays go through a lens or a pinhole, in a render space with
     /// origin `origin`. `None` for ambient light, which has no place.
-    pub(crate) fn new(light: &Light, camera: &Camera, lens: bool, origin: DVec3) -> Option<ResolvedLight> {
+    pub(crate) fn new(
+        light: &Light,
+        camera: &Camera,
+        lens: bool,
+        origin: DVec3,
+    ) -> Option<ResolvedLight> {
         let world_from_view: DMat3 = camera.world_from_view();
         let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
         let vector = |v: DVec3| {
@@ -372,19 +393,25 @@ impl ResolvedLight {
             LightKind::Directional { to_light, .. } => {
                 ResolvedLightKind::Directional { to_light: vector(to_light) }
             }
-            LightKind::Point { position, .. } => ResolvedLightKind::Point { position: point(position) },
-            LightKind::Spot { position, direction, cutoff_rad, exponent, .. } => ResolvedLightKind::Spot {
-                position: point(position),
-                direction: vector(direction),
-                cos_cutoff: cutoff_rad.cos() as f32,
-                exponent: exponent as f32,
-            },
-            LightKind::Cone { position, direction, inner_rad, outer_rad } => ResolvedLightKind::Cone {
-                position: point(position),
-                direction: vector(direction),
-                cos_inner: inner_rad.cos() as f32,
-                cos_outer: outer_rad.cos() as f32,
-            },
+            LightKind::Point { position, .. } => {
+                ResolvedLightKind::Point { position: point(position) }
+            }
+            LightKind::Spot { position, direction, cutoff_rad, exponent, .. } => {
+                ResolvedLightKind::Spot {
+                    position: point(position),
+                    direction: vector(direction),
+                    cos_cutoff: cutoff_rad.cos() as f32,
+                    exponent: exponent as f32,
+                }
+            }
+            LightKind::Cone { position, direction, inner_rad, outer_rad } => {
+                ResolvedLightKind::Cone {
+                    position: point(position),
+                    direction: vector(direction),
+                    cos_inner: inner_rad.cos() as f32,
+                    cos_outer: outer_rad.cos() as f32,
+                }
+            }
             LightKind::Disk { position, direction, .. } => {
                 ResolvedLightKind::Disk { position: point(position), direction: vector(direction) }
             }
@@ -398,8 +425,9 @@ impl ResolvedLight {
                 }
             }
             LightKind::Quad { corner, edges: [a, b], both_sides } => {
-                let turned =
-                    |v: DVec3| if light.frame == LightFrame::Camera { world_from_view * v } else { v };
+                let turned = |v: DVec3| {
+                    if light.frame == LightFrame::Camera { world_from_view * v } else { v }
+                };
                 ResolvedLightKind::Quad {
                     position: point(corner + 0.5 * (a + b)),
                     edges: [a, b].map(|e| (0.5 * turned(e)).as_vec3()),
@@ -414,7 +442,8 @@ impl ResolvedLight {
             kind,
             color: light.color.into(),
             highlight: light.highlight_color.unwrap_or(light.color).into(),
-            attenuation: (!directional && light.attenuation != [1.0, 0.0, 0.0]).then_some(light.attenuation),
+            attenuation: (!directional && light.attenuation != [1.0, 0.0, 0.0])
+                .then_some(light.attenuation),
             size: light.size() as f32,
             shadows: light.casts_shadows(),
             follows_camera_rays: !lens && light.follows_rays_of(camera),

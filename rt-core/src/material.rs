@@ -9,13 +9,14 @@ use std::sync::Arc;
 /// Where a surface's colour comes from.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum ColorSource {
-    /// The geometry's own colours where it has any (per vertex, per triangle, per primitive), else [`Material::color`].
+    /// The geometry's own colours where it has any (per vertex, per triangle, per primitive), else
+    /// [`Material::color`].
     #[default]
     Attribute,
     /// [`Material::color`] even on geometry with colours.
     Constant,
-    /// The geometry's scalars, interpolated first and mapped then (thesis section 3.2.5), so that the map stays sharp inside
-    /// large triangles.
+    /// The geometry's scalars, interpolated first and mapped then (thesis section 3.2.5), so that
+    /// the map stays sharp inside large triangles.
     Scalars(Arc<ColorMap>),
     /// A texture by the mesh's texture coordinates, times [`Material::color`].
     Texture(Arc<Texture>),
@@ -39,8 +40,9 @@ pub enum PbrForm {
     /// glTF 2.0, appendix B: the matte layer gets what the coat lets through at the viewing angle.
     #[default]
     Gltf,
-    /// VTK 9's shader: the matte layer gets 1 - F at the half vector, F with the metal's colour in it; shadowing and masking take α =
-    /// roughness where the distribution takes α = roughness²; reflectance at grazing angles is min(1, 49.5·F₀).
+    /// VTK 9's shader: the matte layer gets 1 - F at the half vector, F with the metal's colour in
+    /// it; shadowing and masking take α = roughness where the distribution takes α = roughness²;
+    /// reflectance at grazing angles is min(1, 49.5·F₀).
     Vtk,
 }
 
@@ -51,7 +53,8 @@ pub enum SurfaceModel {
     Unlit,
     /// Ideal diffuse.
     Matte,
-    /// OpenGL's and VTK's model: coefficients times the colour, plus a highlight, plus an optional mirror.
+    /// OpenGL's and VTK's model: coefficients times the colour, plus a highlight, plus an optional
+    /// mirror.
     Phong {
         /// Times colour times ambient light.
         ambient: f32,
@@ -75,7 +78,8 @@ pub enum SurfaceModel {
     Dielectric {
         /// Refractive index inside over outside.
         ior: f32,
-        /// Absorption per world unit inside, by channel: transmittance over length s is exp(-absorption s).
+        /// Absorption per world unit inside, by channel: transmittance over length s is
+        /// exp(-absorption s).
         absorption: [f32; 3],
     },
     /// Base colour, metallic, roughness (glTF 2.0's metallic-roughness model).
@@ -84,7 +88,8 @@ pub enum SurfaceModel {
         metallic: f32,
         /// 0 mirror to 1 dull (GGX α = roughness²).
         roughness: f32,
-        /// Reflectance at normal incidence of the dielectric part; 0.04 for common plastics, 0 for none (sends no rays).
+        /// Reflectance at normal incidence of the dielectric part; 0.04 for common plastics, 0 for
+        /// none (sends no rays).
         specular: f32,
         /// Formula for lights; rays to other surfaces follow glTF's.
         form: PbrForm,
@@ -94,7 +99,8 @@ pub enum SurfaceModel {
 /// Which sides of a surface are drawn and lit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// Both; the normal is turned to the viewer by the geometry's orientation (GL_LIGHT_MODEL_TWO_SIDE).
+    /// Both; the normal is turned to the viewer by the geometry's orientation
+    /// (GL_LIGHT_MODEL_TWO_SIDE).
     #[default]
     Both,
     /// Both; the shading normal is turned to the viewer by its own direction (VTK).
@@ -189,7 +195,10 @@ impl Material {
 
     /// Metallic-roughness.
     pub fn pbr(color: [f32; 3], metallic: f32, roughness: f32) -> Material {
-        Material::new(SurfaceModel::Pbr { metallic, roughness, specular: 0.04, form: PbrForm::Gltf }, color)
+        Material::new(
+            SurfaceModel::Pbr { metallic, roughness, specular: 0.04, form: PbrForm::Gltf },
+            color,
+        )
     }
 
     /// The same material with another opacity.
@@ -238,7 +247,9 @@ impl Material {
         match self.model {
             SurfaceModel::Phong { mirror, .. } if mirror > 0.0 => Some(0.0),
             SurfaceModel::Metal { roughness } => Some(roughness),
-            SurfaceModel::Pbr { metallic, roughness, specular, .. } if metallic > 0.0 || specular > 0.0 => {
+            SurfaceModel::Pbr { metallic, roughness, specular, .. }
+                if metallic > 0.0 || specular > 0.0 =>
+            {
                 Some(roughness)
             }
             _ => None,
@@ -248,7 +259,11 @@ impl Material {
     /// Checks the numbers; the error names the field.
     pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
         let unit = |field, v: f32| {
-            if (0.0..=1.0).contains(&v) { Ok(()) } else { Err((field, v.to_string(), "between 0 and 1")) }
+            if (0.0..=1.0).contains(&v) {
+                Ok(())
+            } else {
+                Err((field, v.to_string(), "between 0 and 1"))
+            }
         };
         let light = |field, v: [f32; 3]| {
             if v.iter().all(|x| x.is_finite() && *x >= 0.0) {

@@ -16,7 +16,8 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that contains nothing; growing it by a point gives that point.
-    pub const EMPTY: Aabb = Aabb { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) };
+    pub const EMPTY: Aabb =
+        Aabb { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) };
 
     /// A box from two corners.
     pub fn new(min: Vec3, max: Vec3) -> Self {
@@ -82,7 +83,8 @@ impl Aabb {
     }
 }
 
-/// Bound on the relative error of `n` chained `f32` roundings: n·u/(1−n·u), u = 2⁻²⁴ (Higham 2002, eq. 3.1).
+/// Bound on the relative error of `n` chained `f32` roundings: n·u/(1−n·u), u = 2⁻²⁴ (Higham 2002,
+/// eq. 3.1).
 pub const fn gamma(n: u32) -> f32 {
     let nu = n as f64 * (f32::EPSILON as f64 * 0.5);
     (nu / (1.0 - nu)) as f32
@@ -96,14 +98,17 @@ pub fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     a.mul_add(b, -cd) + err
 }
 
-/// Two unit vectors that complete the unit vector `n` to a right-handed basis, without a singular direction
-/// (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017).
+/// Two unit vectors that complete the unit vector `n` to a right-handed basis, without a singular
+/// direction (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017).
 #[inline]
 pub fn orthonormal_basis(n: Vec3) -> (Vec3, Vec3) {
     let sign = 1f32.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
-    (Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y))
+    (
+        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vec3::new(b, sign + n.y * n.y * a, -n.y),
+    )
 }
 
 /// `p` (f64) split into the nearest f32 point and nothing else: a helper that names the rounding.

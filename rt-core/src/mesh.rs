@@ -33,8 +33,8 @@ impl<T> Attribute<T> {
     }
 }
 
-/// Indexed triangles. World position of vertex i is `origin + positions[i]` (f64 sum), so data with large
-/// coordinates keeps its precision: see [`TriMesh::from_f64_positions`].
+/// Indexed triangles. World position of vertex i is `origin + positions[i]` (f64 sum), so data with
+/// large coordinates keeps its precision: see [`TriMesh::from_f64_positions`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriMesh {
     /// World position of the mesh's coordinate origin.
@@ -47,12 +47,14 @@ pub struct TriMesh {
     pub normals: Option<Attribute<Vec3>>,
     /// Linear RGBA in 0..=1; replaces the material's base colour, alpha multiplies its opacity.
     pub colors: Option<Attribute<[f32; 4]>>,
-    /// Scalars that the material's [`crate::colormap::ColorMap`] turns into colour after interpolation (thesis section 3.2.5).
+    /// Scalars that the material's [`crate::colormap::ColorMap`] turns into colour after
+    /// interpolation (thesis section 3.2.5).
     pub scalars: Option<Attribute<f32>>,
     /// Texture coordinates, one per vertex.
     pub texcoords: Option<Vec<Vec2>>,
-    /// Tangents, one per vertex: the direction in which the first texture coordinate grows, and 1 or -1 for a second one that makes a right-handed or
-    /// left-handed frame with it and the normal. For normal maps; without them they come from the texture coordinates.
+    /// Tangents, one per vertex: the direction in which the first texture coordinate grows, and 1
+    /// or -1 for a second one that makes a right-handed or left-handed frame with it and the
+    /// normal. For normal maps; without them they come from the texture coordinates.
     pub tangents: Option<Vec<Vec4>>,
 }
 
@@ -83,7 +85,8 @@ pub enum MeshError {
     },
 }
 
-/// What [`TriMesh::validate`] found. Triangles named here are left out when building; the rest is rendered.
+/// What [`TriMesh::validate`] found. Triangles named here are left out when building; the rest is
+/// rendered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct MeshReport {
     /// Triangles in the mesh.
@@ -109,8 +112,9 @@ impl TriMesh {
         TriMesh { positions, indices, ..Default::default() }
     }
 
-    /// A mesh from f64 positions: `origin` becomes the centre of their bounds, rounded so that it is exact in f32
-    /// steps, and positions are stored relative to it. Keeps sub-millimetre detail in planet-sized coordinates.
+    /// A mesh from f64 positions: `origin` becomes the centre of their bounds, rounded so that it
+    /// is exact in f32 steps, and positions are stored relative to it. Keeps sub-millimetre detail
+    /// in planet-sized coordinates.
     pub fn from_f64_positions(positions: &[DVec3], indices: Vec<[u32; 3]>) -> Self {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in positions.iter().filter(|p| p.is_finite()) {
@@ -118,9 +122,11 @@ impl TriMesh {
             hi = hi.max(*p);
         }
         let center = 0.5 * lo + 0.5 * hi;
-        // Coordinates that straddle zero lose nothing in f32: keep the origin at 0 so that they are not changed.
+        // Coordinates that straddle zero lose nothing in f32: keep the origin at 0 so that they are
+        // not changed.
         let far = center.abs().max_element() > (hi - lo).max_element();
-        let origin = if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
+        let origin =
+            if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
         let positions = positions.iter().map(|p| (*p - origin).as_vec3()).collect();
         TriMesh { origin, positions, indices, ..Default::default() }
     }
@@ -135,14 +141,16 @@ impl TriMesh {
         Aabb::from_points(self.positions.iter().filter(|p| p.is_finite()))
     }
 
-    /// The corners of triangle `i`, relative to `origin`. Panics when `i` or one of its indices is out of range.
+    /// The corners of triangle `i`, relative to `origin`. Panics when `i` or one of its indices is
+    /// out of range.
     #[inline]
     pub fn triangle(&self, i: usize) -> [Vec3; 3] {
         self.indices[i].map(|k| self.positions[k as usize])
     }
 
-    /// The triangles `kept` with their vertices and attributes, relative to the same origin; and of each vertex its number here, in ascending
-    /// order. Triangles that name vertices past the end stay unusable. Panics when this mesh has no such triangle.
+    /// The triangles `kept` with their vertices and attributes, relative to the same origin; and of
+    /// each vertex its number here, in ascending order. Triangles that name vertices past the end
+    /// stay unusable. Panics when this mesh has no such triangle.
     pub fn part(&self, kept: &[u32]) -> (TriMesh, Vec<u32>) {
         let mut vertices: Vec<u32> = kept.iter().flat_map(|&t| self.indices[t as usize]).collect();
         vertices.sort_unstable();
@@ -157,8 +165,14 @@ impl TriMesh {
             normals: self.normals.as_ref().map(|n| attribute_part(n, &vertices, kept)),
             colors: self.colors.as_ref().map(|c| attribute_part(c, &vertices, kept)),
             scalars: self.scalars.as_ref().map(|s| attribute_part(s, &vertices, kept)),
-            texcoords: self.texcoords.as_ref().map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
-            tangents: self.tangents.as_ref().map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
+            texcoords: self
+                .texcoords
+                .as_ref()
+                .map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
+            tangents: self
+                .tangents
+                .as_ref()
+                .map(|t| vertices.iter().map(|i| t[of_vertices(i)]).collect()),
         };
         (part, vertices)
     }
@@ -199,7 +213,12 @@ impl TriMesh {
         ];
         for (field, found) in vectors {
             if let Some(found) = found.filter(|n| *n != v) {
-                return Err(MeshError::AttributeLength { field, per: "vertex", expected: v, found });
+                return Err(MeshError::AttributeLength {
+                    field,
+                    per: "vertex",
+                    expected: v,
+                    found,
+                });
             }
         }
         Ok(())
@@ -208,7 +227,9 @@ impl TriMesh {
     /// True when triangle `i` can be built: indices in range, all coordinates finite.
     #[inline]
     pub fn is_renderable(&self, i: usize) -> bool {
-        self.indices[i].iter().all(|&k| self.positions.get(k as usize).is_some_and(|p| p.is_finite()))
+        self.indices[i]
+            .iter()
+            .all(|&k| self.positions.get(k as usize).is_some_and(|p| p.is_finite()))
     }
 
     /// Counts the triangles that will be left out or can never be hit.

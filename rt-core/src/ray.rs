@@ -1,6 +1,7 @@
 //! Rays, hits, and their blocks of 16.
 //!
-//! All coordinates here are in *render space*: world coordinates minus [`crate::bvh::World::origin`], in f32.
+//! All coordinates here are in *render space*: world coordinates minus
+//! [`crate::bvh::World::origin`], in f32.
 
 use glam::Vec3;
 
@@ -10,7 +11,8 @@ pub const NO_HIT: u32 = u32::MAX;
 /// Lanes of a [`RayBlock`].
 pub const LANES: usize = 16;
 
-/// A ray. Hits are reported for `t_min <= t < t_max`; `dir` need not have unit length, and `t` is in units of it.
+/// A ray. Hits are reported for `t_min <= t < t_max`; `dir` need not have unit length, and `t` is
+/// in units of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Start point.
@@ -34,16 +36,20 @@ impl Ray {
         Ray { t_max, ..self }
     }
 
-    /// The point at parameter `t`. Off the surface by the rounding of `t`: to start a secondary ray, take the point
-    /// and its error bound from the hit primitive instead.
+    /// The point at parameter `t`. Off the surface by the rounding of `t`: to start a secondary
+    /// ray, take the point and its error bound from the hit primitive instead.
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + self.dir * t
     }
 
-    /// False when a ray can hit nothing or has NaN in it; such rays are answered "no hit" without traversal.
+    /// False when a ray can hit nothing or has NaN in it; such rays are answered "no hit" without
+    /// traversal.
     #[inline]
     pub fn is_valid(&self) -> bool {
-        self.origin.is_finite() && self.dir.is_finite() && self.dir != Vec3::ZERO && self.t_min < self.t_max
+        self.origin.is_finite()
+            && self.dir.is_finite()
+            && self.dir != Vec3::ZERO
+            && self.t_min < self.t_max
     }
 }
 
@@ -56,13 +62,15 @@ pub struct Hit {
     pub u: f32,
     /// Second surface coordinate: on triangles the weight of the third vertex.
     pub v: f32,
-    /// Primitive within the geometry: the index into `TriMesh::indices`, a sphere, a tube segment, a cell.
+    /// Primitive within the geometry: the index into `TriMesh::indices`, a sphere, a tube segment,
+    /// a cell.
     pub prim: u32,
     /// Index of the instance in the world.
     pub instance: u32,
 }
 
-/// Sixteen rays, one array per component (structure of arrays). A lane with `t_max < t_min` is inactive.
+/// Sixteen rays, one array per component (structure of arrays). A lane with `t_max < t_min` is
+/// inactive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 #[allow(missing_docs, reason = "the names are those of Ray")]
@@ -161,7 +169,8 @@ impl HitBlock {
     /// Puts a hit, or a miss, into lane `lane`.
     #[inline]
     pub fn set(&mut self, lane: usize, hit: Option<Hit>) {
-        let h = hit.unwrap_or(Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NO_HIT, instance: NO_HIT });
+        let h =
+            hit.unwrap_or(Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NO_HIT, instance: NO_HIT });
         self.t[lane] = h.t;
         self.u[lane] = h.u;
         self.v[lane] = h.v;

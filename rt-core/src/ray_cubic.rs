@@ -1,14 +1,19 @@
-//! The trilinear interpolant of a cell along a straight line is a cubic; its Bernstein form and its first root.
+//! The trilinear interpolant of a cell along a straight line is a cubic; its Bernstein form and its
+//! first root.
 //!
-//! Parker, Shirley, Livnat, Hansen and Sloan ("Interactive Ray Tracing for Isosurface Rendering", Visualization 1998) expand it into monomials
-//! and solve in closed form; Marmitt, Kleer, Wald, Friedrich and Slusallek ("Fast and Accurate Ray-Voxel Intersection", VMV 2004) isolate
-//! the roots between its extrema and refine, because the closed form misses. Here the coefficients are Bernstein ones, obtained by blossoming:
-//! all are averages of interpolated values, so their signs are right, and equal signs prove that there is no root.
+//! Parker, Shirley, Livnat, Hansen and Sloan ("Interactive Ray Tracing for Isosurface Rendering",
+//! Visualization 1998) expand it into monomials and solve in closed form; Marmitt, Kleer, Wald,
+//! Friedrich and Slusallek ("Fast and Accurate Ray-Voxel Intersection", VMV 2004) isolate the roots
+//! between its extrema and refine, because the closed form misses. Here the coefficients are
+//! Bernstein ones, obtained by blossoming: all are averages of interpolated values, so their signs
+//! are right, and equal signs prove that there is no root.
 
-/// Trilinear values at the eight corners of the box from `p` to `q` inside a cell (0..=1 per axis), x fastest.
+/// Trilinear values at the eight corners of the box from `p` to `q` inside a cell (0..=1 per axis),
+/// x fastest.
 #[inline]
 fn resample(v: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 8] {
-    // (1−f)·a + f·b gives a and b exactly at 0 and 1, so a point on a face has the same value from both cells.
+    // (1−f)·a + f·b gives a and b exactly at 0 and 1, so a point on a face has the same value from
+    // both cells.
     let mix = |a: f64, b: f64, f: f64| (1.0 - f) * a + f * b;
     let mut r = *v;
     for (axis, step) in [(0usize, 1usize), (1, 2), (2, 4)] {
@@ -23,8 +28,8 @@ fn resample(v: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 8] {
     r
 }
 
-/// Bernstein coefficients on 0..=1 of the interpolant from `p` to `q`: the blossom of a trilinear function, averaged over which
-/// coordinates are taken from `q`.
+/// Bernstein coefficients on 0..=1 of the interpolant from `p` to `q`: the blossom of a trilinear
+/// function, averaged over which coordinates are taken from `q`.
 #[inline]
 pub(crate) fn along(corners: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 4] {
     let r = resample(corners, p, q);
@@ -63,16 +68,18 @@ pub(crate) fn split(b: &[f64; 4], u: f64) -> ([f64; 4], [f64; 4]) {
 
 /// The smallest u in 0..=1 where the cubic changes between "below" (< 0) and "not below" (≥ 0).
 ///
-/// When the first and the last coefficient differ in this sense there always is one; so two cells that agree on the value at their common
-/// face cannot both miss a surface that passes between them.
+/// When the first and the last coefficient differ in this sense there always is one; so two cells
+/// that agree on the value at their common face cannot both miss a surface that passes between
+/// them.
 #[inline]
 pub(crate) fn first_change(b: &[f64; 4]) -> Option<f64> {
     let below = b.map(|x| x < 0.0);
     if below[0] == below[1] && below[1] == below[2] && below[2] == below[3] {
         return None; // a Bernstein polynomial stays within its coefficients
     }
-    let changes =
-        (below[0] != below[1]) as u32 + (below[1] != below[2]) as u32 + (below[2] != below[3]) as u32;
+    let changes = (below[0] != below[1]) as u32
+        + (below[1] != below[2]) as u32
+        + (below[2] != below[3]) as u32;
     if changes == 1 {
         return Some(refine(b, 0.0, 1.0)); // Descartes: exactly one root
     }
@@ -98,7 +105,8 @@ pub(crate) fn first_change(b: &[f64; 4]) -> Option<f64> {
     None
 }
 
-/// The change between `lo` and `hi`, whose values differ in sign, by Newton's method kept inside the shrinking bracket.
+/// The change between `lo` and `hi`, whose values differ in sign, by Newton's method kept inside
+/// the shrinking bracket.
 #[inline]
 fn refine(b: &[f64; 4], mut lo: f64, mut hi: f64) -> f64 {
     let lo_below = evaluate(b, lo) < 0.0;
@@ -141,7 +149,11 @@ mod tests {
     /// Trilinear interpolation written out as a sum over corners.
     fn trilinear(v: &[f64; 8], p: [f64; 3]) -> f64 {
         (0..8)
-            .map(|i| v[i] * (0..3).map(|a| if i >> a & 1 == 1 { p[a] } else { 1.0 - p[a] }).product::<f64>())
+            .map(|i| {
+                v[i] * (0..3)
+                    .map(|a| if i >> a & 1 == 1 { p[a] } else { 1.0 - p[a] })
+                    .product::<f64>()
+            })
             .sum()
     }
 
@@ -175,11 +187,13 @@ mod tests {
             }
             let steps = 2000;
             let below0 = b[0] < 0.0;
-            let scan = (1..=steps).find(|&k| (evaluate(&b, k as f64 / steps as f64) < 0.0) != below0);
+            let scan =
+                (1..=steps).find(|&k| (evaluate(&b, k as f64 / steps as f64) < 0.0) != below0);
             let root = first_change(&b);
             if let Some(k) = scan {
                 let u = root.unwrap_or_else(|| panic!("{b:?}: missed the change before {k}"));
-                // The scan may step over a close pair of roots before the one it found, never the other way round.
+                // The scan may step over a close pair of roots before the one it found, never the
+                // other way round.
                 assert!(u <= k as f64 / steps as f64 + 1e-12, "{b:?}");
                 assert!(evaluate(&b, u).abs() < 1e-12, "{b:?} at {u}: {}", evaluate(&b, u));
                 found += 1;

@@ -3,13 +3,14 @@
 use crate::effects::Effects;
 use std::ops::AddAssign;
 
-/// How many rays were traced, by kind, and how often each effect did something. All zero for a kind the frame did not need.
+/// How many rays were traced, by kind, and how often each effect did something. All zero for a kind
+/// the frame did not need.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RayStats {
     /// Rays from the camera that can hit something (lanes outside the picture are not counted).
     pub primary: u64,
-    /// Rays between surfaces and lights; each further layer of a transparent blocker counts again, unless something opaque is in the
-    /// way.
+    /// Rays between surfaces and lights; each further layer of a transparent blocker counts again,
+    /// unless something opaque is in the way.
     pub shadow: u64,
     /// Rays of ambient occlusion.
     pub ambient_occlusion: u64,
@@ -27,8 +28,9 @@ pub struct RayStats {
     pub shadow_blocked: u64,
     /// Ambient occlusion rays that found something.
     pub ambient_occlusion_blocked: u64,
-    /// Shadow and ambient occlusion rays that nothing opaque ended, as often as it was asked which surface that lets light through
-    /// comes next. All others only needed to know whether anything is in their way.
+    /// Shadow and ambient occlusion rays that nothing opaque ended, as often as it was asked which
+    /// surface that lets light through comes next. All others only needed to know whether anything
+    /// is in their way.
     pub light_closest: u64,
     /// Surfaces that were looked up because light may pass through them.
     pub light_lookups: u64,
@@ -37,7 +39,8 @@ pub struct RayStats {
     /// Rays left out because less than `min_contribution` of what they would have met reaches the
     /// pixel; paths never are.
     pub cut_at_min_contribution: u64,
-    /// Hits on surfaces with opacity below 1 that were drawn opaque because transparency was left out.
+    /// Hits on surfaces with opacity below 1 that were drawn opaque because transparency was left
+    /// out.
     pub opacity_ignored: u64,
 }
 
@@ -53,8 +56,8 @@ impl RayStats {
             + self.path
     }
 
-    /// How often `effect` (one of [`Effects::ALL`]) changed what a ray sees. 0 means that no pixel differs because of it.
-    /// `None` where that is not counted (the lens moves every ray).
+    /// How often `effect` (one of [`Effects::ALL`]) changed what a ray sees. 0 means that no pixel
+    /// differs because of it. `None` where that is not counted (the lens moves every ray).
     pub fn times_effective(&self, effect: Effects) -> Option<u64> {
         if effect == Effects::SHADOWS || effect == Effects::SOFT_SHADOWS {
             Some(self.shadow_blocked)

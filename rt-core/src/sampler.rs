@@ -1,9 +1,11 @@
-//! Sample points in the unit square: the same for the same seed, pixel, sample and dimension on any number of threads.
+//! Sample points in the unit square: the same for the same seed, pixel, sample and dimension on any
+//! number of threads.
 //!
-//! [`Sampling::Sobol`] is the (0,2)-sequence made of Sobol's first two dimensions, shuffled and Owen-scrambled per pixel and per
-//! dimension by hashing (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020). Every aligned run of 2^k points has one point
-//! in each of the 2^k elementary intervals, so k can grow without starting again. [`Sampling::Random`] has independent points: the
-//! baseline that the accuracy experiments compare with.
+//! [`Sampling::Sobol`] is the (0,2)-sequence made of Sobol's first two dimensions, shuffled and
+//! Owen-scrambled per pixel and per dimension by hashing (Burley, "Practical Hash-based Owen
+//! Scrambling", JCGT 2020). Every aligned run of 2^k points has one point in each of the 2^k
+//! elementary intervals, so k can grow without starting again. [`Sampling::Random`] has independent
+//! points: the baseline that the accuracy experiments compare with.
 
 use crate::ray::LANES;
 use crate::simd::vectors::Row;
@@ -53,7 +55,8 @@ impl Sampler {
         self.point(self.index, dimension)
     }
 
-    /// Point `k` of `count` in dimension `dimension`: the points of all k and all samples together are one sequence.
+    /// Point `k` of `count` in dimension `dimension`: the points of all k and all samples together
+    /// are one sequence.
     #[inline]
     pub fn square_of(&self, dimension: u32, k: u32, count: u32) -> [f32; 2] {
         self.point(self.index.wrapping_mul(count).wrapping_add(k), dimension)
@@ -83,13 +86,21 @@ impl SamplerBlock {
 
     /// Lane `lane` is to have [`Sampler::square_of`]`(dimension, k, count)`.
     #[inline]
-    pub(crate) fn set(&mut self, lane: usize, sampler: &Sampler, dimension: u32, k: u32, count: u32) {
+    pub(crate) fn set(
+        &mut self,
+        lane: usize,
+        sampler: &Sampler,
+        dimension: u32,
+        k: u32,
+        count: u32,
+    ) {
         self.pixel[lane] = sampler.pixel;
         self.index[lane] = sampler.index.wrapping_mul(count).wrapping_add(k);
         self.dimension[lane] = dimension;
     }
 
-    /// All lanes are to have [`Sampler::square`]`(dimension)` of sample `index`, each of its own pixel.
+    /// All lanes are to have [`Sampler::square`]`(dimension)` of sample `index`, each of its own
+    /// pixel.
     #[inline(never)]
     pub(crate) fn set_pixels<S: Simd>(
         &mut self,
@@ -120,13 +131,21 @@ impl SamplerBlock {
                 match self.kind {
                     Sampling::Sobol => {
                         for lane in 0..LANES {
-                            let p = sobol_point(self.pixel[lane], self.index[lane], self.dimension[lane]);
+                            let p = sobol_point(
+                                self.pixel[lane],
+                                self.index[lane],
+                                self.dimension[lane],
+                            );
                             (out[0][lane], out[1][lane]) = (p[0], p[1]);
                         }
                     }
                     Sampling::Random => {
                         for lane in 0..LANES {
-                            let p = random_point(self.pixel[lane], self.index[lane], self.dimension[lane]);
+                            let p = random_point(
+                                self.pixel[lane],
+                                self.index[lane],
+                                self.dimension[lane],
+                            );
                             (out[0][lane], out[1][lane]) = (p[0], p[1]);
                         }
                     }
@@ -183,8 +202,9 @@ fn to_unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Sobol's second dimension as a 32-bit fraction. Its generator matrix is Pascal's triangle mod 2, which by Lucas' theorem is a
-/// Kronecker power: five masked shifts do the work of 32 conditional exclusive-ors.
+/// Sobol's second dimension as a 32-bit fraction. Its generator matrix is Pascal's triangle mod 2,
+/// which by Lucas' theorem is a Kronecker power: five masked shifts do the work of 32 conditional
+/// exclusive-ors.
 #[inline(always)]
 fn sobol_second(i: u32) -> u32 {
     let mut v = i;
@@ -196,8 +216,8 @@ fn sobol_second(i: u32) -> u32 {
     v.reverse_bits()
 }
 
-/// Nested uniform scrambling: each bit is flipped by a hash of the bits above it (Laine and Karras 2011, with Burley's constants,
-/// on reversed bits).
+/// Nested uniform scrambling: each bit is flipped by a hash of the bits above it (Laine and Karras
+/// 2011, with Burley's constants, on reversed bits).
 #[inline(always)]
 fn owen_scramble(v: u32, seed: u32) -> u32 {
     let mut x = v.reverse_bits().wrapping_add(seed);
@@ -208,7 +228,8 @@ fn owen_scramble(v: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// 32 bits to 32 well-mixed bits, one to one (the "lowbias32" constants of Wellons' hash prospector).
+/// 32 bits to 32 well-mixed bits, one to one (the "lowbias32" constants of Wellons' hash
+/// prospector).
 #[inline(always)]
 pub(crate) fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
@@ -225,11 +246,13 @@ pub fn cosine_hemisphere([a, b]: [f32; 2]) -> glam::Vec3 {
     glam::Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
 }
 
-/// Uniform point in the unit disk: the concentric map of Shirley and Chiu (1997), which keeps neighbours together.
+/// Uniform point in the unit disk: the concentric map of Shirley and Chiu (1997), which keeps
+/// neighbours together.
 #[inline]
 pub fn unit_disk([a, b]: [f32; 2]) -> [f32; 2] {
     let (x, y) = (2.0 * a - 1.0, 2.0 * b - 1.0);
-    // Angles are counted from the nearer axis, x or y. No branches, so that loops over this become vector code.
+    // Angles are counted from the nearer axis, x or y. No branches, so that loops over this become
+    // vector code.
     let near_x = x.abs() > y.abs();
     let (r, across) = if near_x { (x, y) } else { (y, x) };
     let ratio = across / if r == 0.0 { 1.0 } else { r };
@@ -237,12 +260,14 @@ pub fn unit_disk([a, b]: [f32; 2]) -> [f32; 2] {
     if near_x { [r * cos, r * sin] } else { [r * sin, r * cos] }
 }
 
-/// Sine and cosine of angles within ±π/4 to 1·10⁻⁷, with the same bits on every platform (polynomials of Moshier's Cephes library, sinf.c).
+/// Sine and cosine of angles within ±π/4 to 1·10⁻⁷, with the same bits on every platform
+/// (polynomials of Moshier's Cephes library, sinf.c).
 #[inline(always)]
 fn sin_cos_to_45_degrees(x: f32) -> (f32, f32) {
     let z = x * x;
     let sin = x + x * z * (-0.166_666_55 + z * (0.008_332_161 + z * -0.000_195_152_96));
-    let cos = 1.0 - 0.5 * z + z * z * (0.041_666_646 + z * (-0.001_388_731_6 + z * 0.000_024_433_157));
+    let cos =
+        1.0 - 0.5 * z + z * z * (0.041_666_646 + z * (-0.001_388_731_6 + z * 0.000_024_433_157));
     (sin, cos)
 }
 
@@ -278,8 +303,10 @@ mod tests {
                 for lane in 0..LANES as u32 {
                     block.set(lane as usize, &one(lane), lane % 4, 2 * lane, 9);
                 }
-                let pixels =
-                    (&std::array::from_fn(|l| 7 * l as u32), &std::array::from_fn(|l| 100 + l as u32));
+                let pixels = (
+                    &std::array::from_fn(|l| 7 * l as u32),
+                    &std::array::from_fn(|l| 100 + l as u32),
+                );
                 let mut same_sample = SamplerBlock::new(kind);
                 let level = SimdLevel::resolve(level).expect("a level of this machine");
                 let (squares, domes, camera) = fearless_simd::dispatch!(level, simd => {
@@ -292,7 +319,8 @@ mod tests {
                     let d = cosine_hemisphere(p);
                     assert_eq!([squares[0][lane], squares[1][lane]], p);
                     assert_eq!([domes[0][lane], domes[1][lane], domes[2][lane]], d.to_array());
-                    let c = Sampler::new(kind, 12 << 33, pixels.0[lane], pixels.1[lane], 3).square(1);
+                    let c =
+                        Sampler::new(kind, 12 << 33, pixels.0[lane], pixels.1[lane], 3).square(1);
                     assert_eq!([camera[0][lane], camera[1][lane]], c);
                 }
             }
@@ -306,7 +334,8 @@ mod tests {
             let x = (k as f32 / 50_000.0 - 1.0) * FRAC_PI_4 as f32;
             let (sin, cos) = sin_cos_to_45_degrees(x);
             assert!(
-                (sin as f64 - (x as f64).sin()).abs() < 1e-7 && (cos as f64 - (x as f64).cos()).abs() < 1e-7,
+                (sin as f64 - (x as f64).sin()).abs() < 1e-7
+                    && (cos as f64 - (x as f64).cos()).abs() < 1e-7,
                 "{x}"
             );
         }
@@ -319,7 +348,8 @@ mod tests {
 
     #[test]
     fn every_elementary_interval_has_one_point() {
-        // The (0,2) property after scrambling: 64 points, all 7 ways to cut the square into 64 boxes.
+        // The (0,2) property after scrambling: 64 points, all 7 ways to cut the square into 64
+        // boxes.
         for pixel in 0..20 {
             for start in [0, 64, 640] {
                 let pts: Vec<[f32; 2]> = (0..64)
@@ -330,7 +360,10 @@ mod tests {
                     let mut seen = [false; 64];
                     for p in &pts {
                         let cell = (p[0] * nx as f32) as usize * ny + (p[1] * ny as f32) as usize;
-                        assert!(!std::mem::replace(&mut seen[cell], true), "two points in one {nx}x{ny} box");
+                        assert!(
+                            !std::mem::replace(&mut seen[cell], true),
+                            "two points in one {nx}x{ny} box"
+                        );
                     }
                 }
             }
@@ -367,7 +400,9 @@ mod tests {
     fn cosine_hemisphere_has_mean_cosine_two_thirds() {
         let n = 1 << 12;
         let mean = (0..n)
-            .map(|i| cosine_hemisphere(Sampler::new(Sampling::Sobol, 0, 0, 0, i).square(0)).z as f64)
+            .map(|i| {
+                cosine_hemisphere(Sampler::new(Sampling::Sobol, 0, 0, 0, i).square(0)).z as f64
+            })
             .sum::<f64>()
             / n as f64;
         assert!((mean - 2.0 / 3.0).abs() < 2e-3, "{mean}");

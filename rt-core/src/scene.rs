@@ -49,7 +49,8 @@ impl Appearance {
         Appearance { material, ..Appearance::default() }
     }
 
-    /// Colours in place of the mesh's own (linear RGBA): recolouring needs no new acceleration structure.
+    /// Colours in place of the mesh's own (linear RGBA): recolouring needs no new acceleration
+    /// structure.
     #[must_use]
     pub fn with_colors(mut self, colors: impl Into<Arc<Attribute<[f32; 4]>>>) -> Appearance {
         let colors = colors.into();
@@ -90,7 +91,8 @@ pub struct AmbientOcclusion {
 pub struct VolumeInstance {
     /// The medium.
     pub volume: Arc<Volume>,
-    /// Object to world. Extinction is per object-space length: a volume scaled up is thicker, not denser.
+    /// Object to world. Extinction is per object-space length: a volume scaled up is thicker, not
+    /// denser.
     pub world_from_object: DAffine3,
 }
 
@@ -120,7 +122,8 @@ impl ColorSummary {
     }
 }
 
-/// Everything that is drawn. Materials, lights and appearances may change between frames; the world is built once.
+/// Everything that is drawn. Materials, lights and appearances may change between frames; the world
+/// is built once.
 #[derive(Clone)]
 pub struct Scene {
     /// Geometry.
@@ -137,7 +140,8 @@ pub struct Scene {
     pub background: Background,
     /// Ambient occlusion; `None` for none.
     pub ambient_occlusion: Option<AmbientOcclusion>,
-    /// Direct volume rendering, in front of, between and behind surfaces. Volumes cast no shadows and have no depth.
+    /// Direct volume rendering, in front of, between and behind surfaces. Volumes cast no shadows
+    /// and have no depth.
     pub volumes: Vec<VolumeInstance>,
     geometry_colors: Vec<ColorSummary>,
 }
@@ -168,7 +172,8 @@ pub enum SceneError {
     },
     /// [`Scene::world`] was replaced by one with other geometries.
     #[error(
-        "the scene was made of a world with {expected} geometries and now has one with {found}; make a new scene of \
+        "the scene was made of a world with {expected} geometries and now has one with {found}; \
+         make a new scene of \
          the new world with Scene::new"
     )]
     OtherWorld {
@@ -213,8 +218,12 @@ impl Scene {
             .geometries()
             .par_iter()
             .map(|g| match g {
-                Geometry::Mesh(m) => m.colors.as_ref().map_or_else(ColorSummary::default, ColorSummary::of),
-                Geometry::Shape(s) => ColorSummary { transparent: s.has_transparency(), unusable: None },
+                Geometry::Mesh(m) => {
+                    m.colors.as_ref().map_or_else(ColorSummary::default, ColorSummary::of)
+                }
+                Geometry::Shape(s) => {
+                    ColorSummary { transparent: s.has_transparency(), unusable: None }
+                }
             })
             .collect();
         Scene {
@@ -230,13 +239,18 @@ impl Scene {
         }
     }
 
-    /// Requests in the scene that cannot change a pixel, in words: ambient occlusion without ambient light, colour maps without
-    /// scalars, textures without coordinates, colours that a material does not look at, attenuation of light from infinitely far. They
-    /// are part of every render report.
+    /// Requests in the scene that cannot change a pixel, in words: ambient occlusion without
+    /// ambient light, colour maps without scalars, textures without coordinates, colours that a
+    /// material does not look at, attenuation of light from infinitely far. They are part of every
+    /// render report.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         if self.ambient_occlusion.is_some() && !self.has_ambient() {
-            out.push("ambient occlusion changes no pixel: the scene has no ambient light and no environment to dim".into());
+            out.push(
+                "ambient occlusion changes no pixel: the scene has no ambient light and no \
+                      environment to dim"
+                    .into(),
+            );
         }
         for (i, l) in self.lights.iter().enumerate() {
             let kind = match l.kind {
@@ -245,7 +259,9 @@ impl Scene {
                 _ => continue,
             };
             if l.attenuation != [1.0, 0.0, 0.0] {
-                out.push(format!("light {i} is {kind}, without a distance: its attenuation changes nothing"));
+                out.push(format!(
+                    "light {i} is {kind}, without a distance: its attenuation changes nothing"
+                ));
             }
         }
         // Of each material, what was said already.
@@ -265,7 +281,10 @@ impl Scene {
             }
         }
         if self.background == Background::Environment && self.environment.is_none() {
-            out.push("background is the environment, but the scene has none: it stays transparent".into());
+            out.push(
+                "background is the environment, but the scene has none: it stays transparent"
+                    .into(),
+            );
         }
         out
     }
@@ -295,7 +314,8 @@ fn unused(
     let by_attribute = material.color_source == ColorSource::Attribute;
     [
         (by_scalars && no_scalars).then(|| ("maps scalars to colours", constant("has none"))),
-        (by_texture && no_coordinates).then(|| ("has a texture", constant("has no texture coordinates"))),
+        (by_texture && no_coordinates)
+            .then(|| ("has a texture", constant("has no texture coordinates"))),
         no_maps.map(|what| ("has maps", format!("lacks {what}"))),
         (!by_attribute && look.colors.is_some())
             .then(|| ("takes its colour from elsewhere", of_its_own("colours"))),
@@ -358,7 +378,8 @@ impl SceneBuilder {
         self.instance(g, DAffine3::IDENTITY, Appearance::new(m))
     }
 
-    /// Adds a shape (spheres, tubes, isosurface, own geometry) at its place. Returns the index of the instance.
+    /// Adds a shape (spheres, tubes, isosurface, own geometry) at its place. Returns the index of
+    /// the instance.
     pub fn shape(&mut self, shape: Arc<dyn Shape>, material: Material) -> usize {
         let (g, m) = (self.geometry(Geometry::Shape(shape)), self.material(material));
         self.instance(g, DAffine3::IDENTITY, Appearance::new(m))
@@ -371,7 +392,8 @@ impl SceneBuilder {
 
     /// Adds a volume at its place.
     pub fn volume(&mut self, volume: impl Into<Arc<Volume>>) {
-        self.volumes.push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
+        self.volumes
+            .push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
     }
 
     /// Builds the world and checks everything.

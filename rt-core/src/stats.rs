@@ -1,4 +1,5 @@
-//! Work counters inside the traversal loops, compiled out unless the feature `stats` is on. Counted per thread.
+//! Work counters inside the traversal loops, compiled out unless the feature `stats` is on. Counted
+//! per thread.
 
 /// What is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -7,7 +8,8 @@ pub enum Counter {
     Nodes,
     /// Leaves entered.
     Leaves,
-    /// Primitive tests (one per SIMD operation: up to four triangles of a leaf for a single ray, sixteen rays for a packet).
+    /// Primitive tests (one per SIMD operation: up to four triangles of a leaf for a single ray,
+    /// sixteen rays for a packet).
     Primitives,
     /// Box tests of one child against one group of a packet.
     GroupBoxes,
@@ -32,7 +34,8 @@ pub(crate) fn count(what: Counter, n: u64) {
     let _ = (what, n);
 }
 
-/// Takes this thread's counters and sets them to zero, in the order of [`Counter`]. All zero without the feature `stats`.
+/// Takes this thread's counters and sets them to zero, in the order of [`Counter`]. All zero
+/// without the feature `stats`.
 pub fn take() -> [u64; KINDS] {
     #[cfg(feature = "stats")]
     return COUNTERS.with(|c| std::array::from_fn(|i| c[i].take()));

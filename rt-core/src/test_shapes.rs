@@ -50,7 +50,8 @@ pub(crate) fn noise_soup(n: usize, seed: u64) -> TriMesh {
     mesh
 }
 
-/// A closed unit sphere: an icosahedron subdivided `level` times, turned so that no edge lies in an axis plane.
+/// A closed unit sphere: an icosahedron subdivided `level` times, turned so that no edge lies in an
+/// axis plane.
 pub(crate) fn sphere(level: u32) -> TriMesh {
     let p = (1.0 + 5f64.sqrt()) / 2.0;
     let mut v: Vec<glam::DVec3> = Vec::new();

@@ -15,7 +15,8 @@ pub enum Wrap {
     Mirror,
 }
 
-/// How texels are combined. There are no reduced levels: take several samples per pixel where a texture is seen from afar.
+/// How texels are combined. There are no reduced levels: take several samples per pixel where a
+/// texture is seen from afar.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Filter {
     /// The texel the point lies in.
@@ -58,7 +59,8 @@ impl TexelSummary {
     fn of(texels: &[[f32; 4]]) -> TexelSummary {
         #[cfg(test)]
         SCANS.set(SCANS.get() + 1);
-        let mut summary = TexelSummary { transparent: false, black: true, unusable: None, negative: None };
+        let mut summary =
+            TexelSummary { transparent: false, black: true, unusable: None, negative: None };
         for (i, t) in texels.iter().enumerate() {
             summary.transparent |= t[3] < 1.0;
             summary.black &= t[..3] == [0.0; 3];
@@ -78,7 +80,8 @@ impl TexelSummary {
 pub enum TextureError {
     /// Number of texels and size do not fit.
     #[error(
-        "texture of {width} x {height} texels needs {expected} values, found {found}; give 4 per texel (RGBA), at least one texel"
+        "texture of {width} x {height} texels needs {expected} values, found {found}; give 4 per \
+         texel (RGBA), at least one texel"
     )]
     Length {
         /// Texels per row.
@@ -94,13 +97,25 @@ pub enum TextureError {
 
 impl Texture {
     /// From linear RGBA texels, row 0 at texture coordinate v = 0 (OpenGL's order).
-    pub fn from_linear(width: usize, height: usize, texels: Vec<[f32; 4]>) -> Result<Texture, TextureError> {
+    pub fn from_linear(
+        width: usize,
+        height: usize,
+        texels: Vec<[f32; 4]>,
+    ) -> Result<Texture, TextureError> {
         if texels.is_empty() || width.checked_mul(height) != Some(texels.len()) {
-            let (expected, found) = (width.saturating_mul(height).saturating_mul(4), texels.len() * 4);
+            let (expected, found) =
+                (width.saturating_mul(height).saturating_mul(4), texels.len() * 4);
             return Err(TextureError::Length { width, height, expected, found });
         }
         let summary = TexelSummary::of(&texels);
-        Ok(Texture { width, height, texels, summary, wrap: [Wrap::Repeat; 2], filter: Filter::Bilinear })
+        Ok(Texture {
+            width,
+            height,
+            texels,
+            summary,
+            wrap: [Wrap::Repeat; 2],
+            filter: Filter::Bilinear,
+        })
     }
 
     /// From sRGB-encoded 8-bit RGBA, row 0 at v = 0; alpha is linear.
@@ -113,7 +128,12 @@ impl Texture {
         let texels = rgba
             .chunks_exact(4)
             .map(|c| {
-                [decode[c[0] as usize], decode[c[1] as usize], decode[c[2] as usize], c[3] as f32 / 255.0]
+                [
+                    decode[c[0] as usize],
+                    decode[c[1] as usize],
+                    decode[c[2] as usize],
+                    c[3] as f32 / 255.0,
+                ]
             })
             .collect();
         Texture::from_linear(width, height, texels)
@@ -167,8 +187,12 @@ impl Texture {
                 let (x0, y0) = (x.floor(), y.floor());
                 let (fx, fy) = (x - x0, y - y0);
                 let (i, j) = (x0 as i64, y0 as i64);
-                let t =
-                    [self.texel(i, j), self.texel(i + 1, j), self.texel(i, j + 1), self.texel(i + 1, j + 1)];
+                let t = [
+                    self.texel(i, j),
+                    self.texel(i + 1, j),
+                    self.texel(i, j + 1),
+                    self.texel(i + 1, j + 1),
+                ];
                 std::array::from_fn(|c| {
                     let low = t[0][c] + (t[1][c] - t[0][c]) * fx;
                     let high = t[2][c] + (t[3][c] - t[2][c]) * fx;
@@ -192,7 +216,8 @@ impl Texture {
             };
             k as usize
         };
-        self.texels[place(j, self.height, self.wrap[1]) * self.width + place(i, self.width, self.wrap[0])]
+        self.texels
+            [place(j, self.height, self.wrap[1]) * self.width + place(i, self.width, self.wrap[0])]
     }
 }
 
@@ -218,7 +243,8 @@ mod tests {
         assert!(!opaque.has_transparency() && !opaque.is_black());
         let mut looked_through = Texture::from_srgb8(1, 2, &[0, 0, 0, 255, 0, 0, 0, 254]).unwrap();
         assert!(looked_through.has_transparency() && looked_through.is_black());
-        // What can change does not touch the texels; what replaces the texture brings its own answers.
+        // What can change does not touch the texels; what replaces the texture brings its own
+        // answers.
         (looked_through.wrap, looked_through.filter) = ([Wrap::Clamp; 2], Filter::Nearest);
         assert!(looked_through.clone().has_transparency() && looked_through.is_black());
         looked_through = opaque;

@@ -1,9 +1,12 @@
-//! What a scalar looks like inside a volume: colour and extinction, and their exact integrals over a linear stretch of scalars.
+//! What a scalar looks like inside a volume: colour and extinction, and their exact integrals over
+//! a linear stretch of scalars.
 //!
-//! Extinction σ is piecewise linear in the scalar, colour follows a [`ColorMap`]; so ∫σ ds and ∫σ·colour ds are piecewise polynomials, which are
-//! kept as running sums at the knots. The mean over a stretch s₀..s₁ is then a difference of two look-ups (Engel, Kraus and Ertl 2001, "High-quality
-//! pre-integrated volume rendering", section 4.2, whose approximation also leaves out attenuation within the stretch, but without their table: a peak of any
-//! narrowness counts with its full area).
+//! Extinction σ is piecewise linear in the scalar, colour follows a [`ColorMap`]; so ∫σ ds and
+//! ∫σ·colour ds are piecewise polynomials, which are kept as running sums at the knots. The mean
+//! over a stretch s₀..s₁ is then a difference of two look-ups (Engel, Kraus and Ertl 2001,
+//! "High-quality pre-integrated volume rendering", section 4.2, whose approximation also leaves out
+//! attenuation within the stretch, but without their table: a peak of any narrowness counts with
+//! its full area).
 
 use crate::colormap::ColorMap;
 
@@ -13,8 +16,8 @@ pub struct TransferFunction {
     colors: ColorMap,
     extinction: Vec<[f32; 2]>,
     intervals: Vec<Interval>,
-    /// For evenly spaced scalars from `buckets.lo`: the piece to begin looking at, and how many buckets before this one have
-    /// any extinction.
+    /// For evenly spaced scalars from `buckets.lo`: the piece to begin looking at, and how many
+    /// buckets before this one have any extinction.
     buckets: Buckets,
 }
 
@@ -75,14 +78,16 @@ struct Buckets {
 }
 
 const BUCKETS: usize = 1024;
-/// Parts of one interval of a logarithmic colour map or of an opacity ramp, which are not linear in what is stored.
+/// Parts of one interval of a logarithmic colour map or of an opacity ramp, which are not linear in
+/// what is stored.
 const CURVED_PARTS: usize = 16;
 /// Opacity 1 would be infinite extinction; a millionth of the light passes instead.
 const MAX_OPACITY: f32 = 0.999_999;
 
 impl TransferFunction {
-    /// `extinction` holds [scalar, extinction per world unit] in order of scalar, linear between (two points with the same scalar make a
-    /// step) and constant outside. The alpha of `colors` is not used.
+    /// `extinction` holds [scalar, extinction per world unit] in order of scalar, linear between
+    /// (two points with the same scalar make a step) and constant outside. The alpha of `colors` is
+    /// not used.
     pub fn new(colors: ColorMap, extinction: Vec<[f32; 2]>) -> Result<Self, TransferFunctionError> {
         check_points(
             &extinction,
@@ -90,7 +95,11 @@ impl TransferFunction {
             "extinction must be finite and not negative",
         )?;
         let sound = ColorMap { range: [1.0; 2], ..colors.clone() }.check();
-        sound.map_err(|(field, value, rule)| TransferFunctionError::Colors { field, value, rule })?;
+        sound.map_err(|(field, value, rule)| TransferFunctionError::Colors {
+            field,
+            value,
+            rule,
+        })?;
         let range_ok = colors.range.iter().all(|r| r.is_finite() && (!colors.log || *r > 0.0));
         if !range_ok {
             return Err(TransferFunctionError::ColorRange(colors.range));
@@ -100,8 +109,9 @@ impl TransferFunction {
         Ok(TransferFunction { colors, extinction, intervals, buckets })
     }
 
-    /// `opacity` holds [scalar, opacity of a slab `unit_distance` thick], 0..=1, linear between, as ParaView's and VTK's opacity functions with
-    /// their "scalar opacity unit distance". Opacity 1 lets a millionth pass.
+    /// `opacity` holds [scalar, opacity of a slab `unit_distance` thick], 0..=1, linear between, as
+    /// ParaView's and VTK's opacity functions with their "scalar opacity unit distance". Opacity 1
+    /// lets a millionth pass.
     pub fn from_opacity(
         colors: ColorMap,
         opacity: &[[f32; 2]],
@@ -131,12 +141,14 @@ impl TransferFunction {
         &self.colors
     }
 
-    /// Extinction per world unit at `scalar`, straight from the control points. The value after a step counts.
+    /// Extinction per world unit at `scalar`, straight from the control points. The value after a
+    /// step counts.
     pub fn extinction(&self, scalar: f64) -> f64 {
         extinction_at(&self.extinction, scalar)
     }
 
-    /// Whether there is any extinction for scalars in `lo..=hi`; may say so when there is none within a thousandth of the range.
+    /// Whether there is any extinction for scalars in `lo..=hi`; may say so when there is none
+    /// within a thousandth of the range.
     #[inline]
     pub(crate) fn is_clear(&self, lo: f64, hi: f64) -> bool {
         let b = &self.buckets;
@@ -155,7 +167,8 @@ impl TransferFunction {
         for c in 0..3 {
             let [c0, c1] = p.color[c];
             // (e₀ + e₁x)(c₀ + c₁x) integrated.
-            r[c + 1] += x * (e0 * c0 + x * (0.5 * (e0 * c1 + e1 * c0) + x * (e1 * c1) * (1.0 / 3.0)));
+            r[c + 1] +=
+                x * (e0 * c0 + x * (0.5 * (e0 * c1 + e1 * c0) + x * (e1 * c1) * (1.0 / 3.0)));
         }
         r
     }
@@ -199,7 +212,8 @@ impl TransferFunction {
 impl Buckets {
     #[inline]
     fn index(&self, s: f64) -> usize {
-        // `as` saturates: below the first bucket is 0. Bucket 0 and the last one stand for everything outside.
+        // `as` saturates: below the first bucket is 0. Bucket 0 and the last one stand for
+        // everything outside.
         (((s - self.lo) * self.per_scalar) as usize).min(BUCKETS - 1)
     }
 }
@@ -214,10 +228,18 @@ fn check_points(
     }
     for (index, &point) in points.iter().enumerate() {
         if !point[0].is_finite() {
-            return Err(TransferFunctionError::Point { index, point, rule: "its scalar must be finite" });
+            return Err(TransferFunctionError::Point {
+                index,
+                point,
+                rule: "its scalar must be finite",
+            });
         }
         if index > 0 && point[0] < points[index - 1][0] {
-            return Err(TransferFunctionError::Point { index, point, rule: "scalars must not decrease" });
+            return Err(TransferFunctionError::Point {
+                index,
+                point,
+                rule: "scalars must not decrease",
+            });
         }
         if !ok(point[1]) {
             return Err(TransferFunctionError::Point { index, point, rule });
@@ -251,22 +273,27 @@ fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
     knots.sort_by(f64::total_cmp);
     knots.dedup();
     let largest = knots[0].abs().max(knots[knots.len() - 1].abs());
-    let span = (knots[knots.len() - 1] - knots[0]).max(1e-5 * largest).max(f64::from(f32::MIN_POSITIVE));
+    let span =
+        (knots[knots.len() - 1] - knots[0]).max(1e-5 * largest).max(f64::from(f32::MIN_POSITIVE));
     // Constant pieces on either side, wide enough for f32 scalars to be far inside.
     let mut all = vec![knots[0] - span];
     all.extend(&knots);
 
-    // Limits from inside each piece, so that steps are steps: a colour map of zero width is one, too.
+    // Limits from inside each piece, so that steps are steps: a colour map of zero width is one,
+    // too.
     let color_at = |s: f32| -> [f64; 3] {
         let c = colors.lookup(s);
         [c[0], c[1], c[2]].map(f64::from)
     };
     let left_limit = |s: f64| -> f64 {
         let before = extinction.partition_point(|p| f64::from(p[0]) < s);
-        match (before.checked_sub(1).map(|i| extinction[i].map(f64::from)), extinction.get(before)) {
+        match (before.checked_sub(1).map(|i| extinction[i].map(f64::from)), extinction.get(before))
+        {
             (None, Some(b)) => f64::from(b[1]),
             (Some(a), None) => a[1],
-            (Some(a), Some(b)) => a[1] + (f64::from(b[1]) - a[1]) * (s - a[0]) / (f64::from(b[0]) - a[0]),
+            (Some(a), Some(b)) => {
+                a[1] + (f64::from(b[1]) - a[1]) * (s - a[0]) / (f64::from(b[0]) - a[0])
+            }
             (None, None) => 0.0,
         }
     };
@@ -281,7 +308,8 @@ fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
             None => (sigma0, sigma0),
         };
         let color1 = end.map(|e| color_at((e as f32).next_down()));
-        let color0 = if i == 0 { color1 } else { None }.unwrap_or_else(|| color_at((s as f32).next_up()));
+        let color0 =
+            if i == 0 { color1 } else { None }.unwrap_or_else(|| color_at((s as f32).next_up()));
         let color1 = color1.unwrap_or(color0);
         let width = end.map_or(1.0, |e| e - s);
         let interval = Interval {
@@ -317,12 +345,14 @@ fn buckets(intervals: &[Interval]) -> Buckets {
     for i in 0..BUCKETS {
         let (from, to) = (lo + i as f64 / per_scalar, lo + (i + 1) as f64 / per_scalar);
         // One piece early: rounding in `index` may put a scalar of the bucket before into this one.
-        while interval + 1 < intervals.len() && intervals[interval + 1].s < from - 0.5 / per_scalar {
+        while interval + 1 < intervals.len() && intervals[interval + 1].s < from - 0.5 / per_scalar
+        {
             interval += 1;
         }
         b.first_piece.push(interval as u32);
-        let occupied =
-            (interval..intervals.len()).take_while(|&k| intervals[k].s <= to + 0.5 / per_scalar).any(|k| {
+        let occupied = (interval..intervals.len())
+            .take_while(|&k| intervals[k].s <= to + 0.5 / per_scalar)
+            .any(|k| {
                 let p = &intervals[k];
                 let end = intervals.get(k + 1).map_or(p.s, |n| n.s);
                 p.sigma[0] > 0.0 || p.sigma[0] + p.sigma[1] * (end - p.s) > 0.0
@@ -337,7 +367,10 @@ mod tests {
     use super::*;
 
     fn map() -> ColorMap {
-        ColorMap::new(vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.5, 0.0, 1.0], [1.0, 1.0, 1.0, 1.0]], [-1.0, 3.0])
+        ColorMap::new(
+            vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.5, 0.0, 1.0], [1.0, 1.0, 1.0, 1.0]],
+            [-1.0, 3.0],
+        )
     }
 
     #[test]
@@ -346,7 +379,9 @@ mod tests {
         let peak = vec![[0.0, 0.0], [1.999, 0.0], [2.0, 100.0], [2.001, 0.0]];
         for points in [step, peak, vec![[0.0, 1.5]], vec![[-1.0, 0.0], [3.0, 4.0]]] {
             let tf = TransferFunction::new(map(), points).unwrap();
-            for (a, b) in [(-5.0, 5.0), (0.4, 0.6), (1.99, 2.5), (-9.0, -8.0), (6.0, 40.0), (0.1, 0.2)] {
+            for (a, b) in
+                [(-5.0, 5.0), (0.4, 0.6), (1.99, 2.5), (-9.0, -8.0), (6.0, 40.0), (0.1, 0.2)]
+            {
                 let (n, mut sums) = (200_000, [0.0; 4]);
                 for i in 0..n {
                     let s = a + (b - a) * (i as f64 + 0.5) / n as f64;
@@ -359,7 +394,10 @@ mod tests {
                 let (ia, ib) = (tf.integral(a), tf.integral(b));
                 for k in 0..4 {
                     let (exact, sum) = (ib[k] - ia[k], sums[k] * (b - a) / n as f64);
-                    assert!((exact - sum).abs() < 2e-4 * (b - a).max(1.0), "{a}..{b} [{k}]: {exact} {sum}");
+                    assert!(
+                        (exact - sum).abs() < 2e-4 * (b - a).max(1.0),
+                        "{a}..{b} [{k}]: {exact} {sum}"
+                    );
                 }
             }
             for i in 0..4000 {
@@ -367,7 +405,10 @@ mod tests {
                 let (sigma, c) = tf.sample(s);
                 assert!((sigma - tf.extinction(s)).abs() < 1e-9 * sigma.max(1.0), "{s}");
                 let exact = tf.colors.lookup(s as f32);
-                assert!((0..3).all(|k| (c[k] - f64::from(exact[k])).abs() < 1e-5), "{s}: {c:?} {exact:?}");
+                assert!(
+                    (0..3).all(|k| (c[k] - f64::from(exact[k])).abs() < 1e-5),
+                    "{s}: {c:?} {exact:?}"
+                );
                 if tf.is_clear(s, s + 0.01) {
                     assert!(
                         tf.extinction(s) == 0.0
@@ -389,7 +430,9 @@ mod tests {
 
     #[test]
     fn opacity_per_unit_distance_is_kept() {
-        let tf = TransferFunction::from_opacity(map(), &[[0.0, 0.0], [1.0, 0.75], [2.0, 1.0]], 10.0).unwrap();
+        let tf =
+            TransferFunction::from_opacity(map(), &[[0.0, 0.0], [1.0, 0.75], [2.0, 1.0]], 10.0)
+                .unwrap();
         for (s, a) in [(0.0, 0.0), (0.5, 0.375), (1.0, 0.75), (0.3, 0.225)] {
             let slab = 1.0 - (-10.0 * tf.extinction(s)).exp();
             assert!((slab - a).abs() < 1e-3, "{s}: {slab}");
@@ -399,7 +442,8 @@ mod tests {
 
     #[test]
     fn bad_points_are_named() {
-        let new = |p: &[[f32; 2]]| TransferFunction::new(map(), p.to_vec()).unwrap_err().to_string();
+        let new =
+            |p: &[[f32; 2]]| TransferFunction::new(map(), p.to_vec()).unwrap_err().to_string();
         assert!(new(&[]).contains("at least one"));
         assert!(new(&[[0.0, -1.0]]).contains("point 0"));
         assert!(new(&[[1.0, 0.0], [0.0, 0.0]]).contains("decrease"));

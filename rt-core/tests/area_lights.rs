@@ -11,7 +11,8 @@ use rt_core::scene::{SceneBuilder, SceneError};
 use scenes_common::*;
 use std::f64::consts::PI;
 
-/// What a white matte floor becomes at the origin under `lights`, with this many shadow rays a light.
+/// What a white matte floor becomes at the origin under `lights`, with this many shadow rays a
+/// light.
 fn floor_under(light: Light, rays: u32) -> f64 {
     let mut options = RenderOptions::new(8, 8);
     options.light_rays = rays;
@@ -20,8 +21,8 @@ fn floor_under(light: Light, rays: u32) -> f64 {
     mean_red(&draw(&s, &top_camera(9.0, 0.001), options))
 }
 
-/// Irradiance over π at the origin with normal z from a polygon of radiance 1 (Lambert 1760: half the sum over the edges of angle times the normal of the
-/// plane through edge and point).
+/// Irradiance over π at the origin with normal z from a polygon of radiance 1 (Lambert 1760: half
+/// the sum over the edges of angle times the normal of the plane through edge and point).
 fn polygon(corners: &[DVec3]) -> f64 {
     let n = corners.len();
     let edge = |i: usize| {
@@ -115,7 +116,8 @@ fn panoramas_see_all_around() {
         .map(|(i, (d, _))| (sphere((eye + *d * 4.0).as_vec3(), 1.0, 32), Material::unlit(color(i))))
         .collect();
     let s = scene(parts, vec![]);
-    let whole = Camera::omnidirectional(eye, eye - DVec3::Y, DVec3::Z, [[0.0; 2], [1.0; 2]]).unwrap();
+    let whole =
+        Camera::omnidirectional(eye, eye - DVec3::Y, DVec3::Z, [[0.0; 2], [1.0; 2]]).unwrap();
     let (w, h) = (64, 32);
     let mut options = RenderOptions::new(w, h);
     options.layers = Layers::COLOR | Layers::DISTANCE | Layers::DEPTH;
@@ -123,10 +125,17 @@ fn panoramas_see_all_around() {
     for (i, (_, [x, y])) in around.iter().enumerate() {
         let column = ((x * f64::from(w)) as u32).min(w - 1);
         let row = (((1.0 - y) * f64::from(h)) as u32).min(h - 1);
-        assert_eq!(out.color_at(column, row)[..3], color(i), "ball {i} in column {column}, row {row}");
+        assert_eq!(
+            out.color_at(column, row)[..3],
+            color(i),
+            "ball {i} in column {column}, row {row}"
+        );
         let at = (row * w + column) as usize;
         assert!((out.distance[at] - 3.0).abs() < 0.05, "ball {i}: {}", out.distance[at]);
-        assert!((f64::from(out.depth[at]) - (1.0 - 1.0 / (1.0 + f64::from(out.distance[at])))).abs() < 1e-6);
+        assert!(
+            (f64::from(out.depth[at]) - (1.0 - 1.0 / (1.0 + f64::from(out.distance[at])))).abs()
+                < 1e-6
+        );
     }
     // A ball of angular radius asin(1/4) covers its solid angle.
     let (fine_w, fine_h) = (512, 256);
@@ -140,9 +149,14 @@ fn panoramas_see_all_around() {
     let expected = 6.0 * 2.0 * PI * (1.0 - (1.0f64 / 4.0).asin().cos());
     assert!((covered - expected).abs() < 0.02 * expected, "{covered} sr instead of {expected}");
     // A part of it is that part, with bounces and samples too.
-    let part = Camera::omnidirectional(eye, eye - DVec3::Y, DVec3::Z, [[0.5, 0.25], [1.0, 0.75]]).unwrap();
-    let crop =
-        draw(&s, &part, RenderOptions { layers: Layers::COLOR, ..RenderOptions::new(w / 2, h / 2) }).frame;
+    let part =
+        Camera::omnidirectional(eye, eye - DVec3::Y, DVec3::Z, [[0.5, 0.25], [1.0, 0.75]]).unwrap();
+    let crop = draw(
+        &s,
+        &part,
+        RenderOptions { layers: Layers::COLOR, ..RenderOptions::new(w / 2, h / 2) },
+    )
+    .frame;
     for y in 0..h / 2 {
         for x in 0..w / 2 {
             assert_eq!(crop.color_at(x, y), out.color_at(x + w / 2, y + h / 4), "{x}, {y}");
@@ -151,6 +165,8 @@ fn panoramas_see_all_around() {
     let lens = ThinLens { aperture_radius: 0.1, focus_distance: 1.0 };
     assert_eq!(whole.with_lens(lens), Err(CameraError::LensOnParallel));
     assert!(Camera::omnidirectional(eye, eye, DVec3::Z, [[0.0; 2], [1.0; 2]]).is_err());
-    assert!(Camera::omnidirectional(eye, eye + DVec3::X, DVec3::Z, [[0.0; 2], [0.0, 1.0]]).is_err());
+    assert!(
+        Camera::omnidirectional(eye, eye + DVec3::X, DVec3::Z, [[0.0; 2], [0.0, 1.0]]).is_err()
+    );
     assert!(whole.eye() == Some(eye) && (whole.forward() + DVec3::Y).length() < 1e-12);
 }

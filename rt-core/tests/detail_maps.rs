@@ -1,4 +1,5 @@
-//! Normal, roughness, metalness, occlusion and emission textures against materials without them and closed forms.
+//! Normal, roughness, metalness, occlusion and emission textures against materials without them and
+//! closed forms.
 
 mod scenes_common;
 use rt_core::camera::Camera;
@@ -7,7 +8,9 @@ use rt_core::frame::Layers;
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use rt_core::light::Light;
 use rt_core::material::{Material, Sides, SurfaceModel};
-use rt_core::material_maps::{BsdfParameters, MapConvention, MaterialEvalContext, MaterialMaps, TextureMaps};
+use rt_core::material_maps::{
+    BsdfParameters, MapConvention, MaterialEvalContext, MaterialMaps, TextureMaps,
+};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
 use rt_core::scene::{Appearance, SceneBuilder};
@@ -39,9 +42,15 @@ fn tangents(mesh: TriMesh, t: Vec4) -> TriMesh {
 
 /// The middle pixel, once by local light alone and once with a shadow pass; both must agree.
 fn middle(mesh: &TriMesh, material: &Material, lights: &[Light], from: f64) -> [f32; 4] {
-    let camera =
-        Camera::orthographic(DVec3::new(0.0, 0.0, from), DVec3::ZERO, DVec3::Y, 0.001, 1.0, [0.0, 20.0])
-            .unwrap();
+    let camera = Camera::orthographic(
+        DVec3::new(0.0, 0.0, from),
+        DVec3::ZERO,
+        DVec3::Y,
+        0.001,
+        1.0,
+        [0.0, 20.0],
+    )
+    .unwrap();
     let with = |shadows: bool| {
         let lights = lights.iter().map(|l| Light { shadows, ..*l }).collect();
         let s = scene(vec![(mesh.clone(), material.clone())], lights);
@@ -50,7 +59,10 @@ fn middle(mesh: &TriMesh, material: &Material, lights: &[Light], from: f64) -> [
     };
     let (local, general) = (with(false), with(true));
     for c in 0..4 {
-        assert!((local[c] - general[c]).abs() < 1e-6, "{local:?} by local light, {general:?} with shadows");
+        assert!(
+            (local[c] - general[c]).abs() < 1e-6,
+            "{local:?} by local light, {general:?} with shadows"
+        );
     }
     local
 }
@@ -65,17 +77,26 @@ fn normal_maps_bend_along_the_texture_coordinates() {
     let to_light = Vec3::new(0.5, -0.3, 0.9).normalize();
     let light = [Light::directional(to_light.as_dvec3())];
     let maps = TextureMaps { normal: bend(n), ..TextureMaps::new(MapConvention::Gltf) };
-    let m =
-        Material::matte([1.0; 3]).with_sides(Sides::Both).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
+    let m = Material::matte([1.0; 3])
+        .with_sides(Sides::Both)
+        .with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
     let (right_handed, left_handed) = (sheet(1.0), sheet(-1.0));
     close(middle(&right_handed, &m, &light, 5.0)[0], n.dot(to_light), "u along x, v along y");
     let mirrored = Vec3::new(n.x, -n.y, n.z);
     close(middle(&left_handed, &m, &light, 5.0)[0], mirrored.dot(to_light), "v against y");
-    // Files of glTF count v downwards, and mean by green the upper edge of the picture all the same.
-    let from_top =
-        TextureMaps { normal: bend(n), rows_from_top: true, ..TextureMaps::new(MapConvention::Gltf) };
+    // Files of glTF count v downwards, and mean by green the upper edge of the picture all the
+    // same.
+    let from_top = TextureMaps {
+        normal: bend(n),
+        rows_from_top: true,
+        ..TextureMaps::new(MapConvention::Gltf)
+    };
     let down = Material::matte([1.0; 3]).with_maps(Arc::new(from_top) as Arc<dyn MaterialMaps>);
-    close(middle(&left_handed, &down, &light, 5.0)[0], n.dot(to_light), "v against y, rows from the top");
+    close(
+        middle(&left_handed, &down, &light, 5.0)[0],
+        n.dot(to_light),
+        "v against y, rows from the top",
+    );
     let own = tangents(sheet(-1.0), Vec4::new(1.0, 0.0, 0.0, 1.0));
     close(middle(&own, &down, &light, 5.0)[0], n.dot(to_light), "tangents say it themselves");
     // From behind the whole frame is turned over.
@@ -105,7 +126,8 @@ fn vtk_turns_the_normal_before_it_bends_it_and_needs_tangents() {
     assert!(warnings.iter().any(|w| w.contains("lacks tangents")), "{warnings:?}");
 }
 
-/// A mirror bent so far that it would reflect what is below it: it sees along itself instead, and is not black.
+/// A mirror bent so far that it would reflect what is below it: it sees along itself instead, and
+/// is not black.
 #[test]
 fn steep_normal_maps_leave_no_black_points() {
     let n = Vec3::new(0.8, 0.0, 0.6);
@@ -129,7 +151,8 @@ fn scale_flattens_or_steepens_a_normal_map() {
     let n = Vec3::new(0.6, 0.0, 0.8);
     // Steeper ones are bent less: see `steep_normal_maps_leave_no_black_points`.
     for normal_scale in [0.0, 0.5, 1.2] {
-        let maps = TextureMaps { normal: bend(n), normal_scale, ..TextureMaps::new(MapConvention::Gltf) };
+        let maps =
+            TextureMaps { normal: bend(n), normal_scale, ..TextureMaps::new(MapConvention::Gltf) };
         let m = Material::matte([1.0; 3]).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
         let expected = Vec3::new(0.6 * normal_scale, 0.0, 0.8).normalize().z;
         close(middle(&sheet(1.0), &m, &[Light::directional(DVec3::Z)], 5.0)[0], expected, "scaled");
@@ -161,8 +184,10 @@ fn bent_normals_turn_with_their_instance() {
 #[test]
 fn roughness_and_metalness_maps_are_the_material_with_those_numbers() {
     let lights = [Light::directional(DVec3::new(0.3, 0.2, 1.0)), Light::ambient([0.4; 3])];
-    let maps =
-        TextureMaps { metallic_roughness: texel([0.9, 0.5, 0.25]), ..TextureMaps::new(MapConvention::Gltf) };
+    let maps = TextureMaps {
+        metallic_roughness: texel([0.9, 0.5, 0.25]),
+        ..TextureMaps::new(MapConvention::Gltf)
+    };
     let base = Material::pbr([0.8, 0.4, 0.2], 0.8, 0.6);
     let mapped = base.clone().with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
     let plain = Material::pbr([0.8, 0.4, 0.2], 0.8 * 0.25, 0.6 * 0.5);
@@ -176,7 +201,11 @@ fn roughness_and_metalness_maps_are_the_material_with_those_numbers() {
             let sphere = (sphere(Vec3::new(0.0, 0.0, 0.4), 0.3, 16), Material::matte([0.9; 3]));
             draw(&scene(vec![(mesh.clone(), m.clone()), sphere], lights.to_vec()), &camera, options)
         };
-        assert_eq!(difference(&picture(&mapped), &picture(&plain)), 0.0, "path tracing {path_tracing}");
+        assert_eq!(
+            difference(&picture(&mapped), &picture(&plain)),
+            0.0,
+            "path tracing {path_tracing}"
+        );
         assert!(difference(&picture(&mapped), &picture(&base)) > 0.05, "they do something");
     }
 }
@@ -205,11 +234,16 @@ fn occlusion_dims_ambient_light_for_gltf_and_lamps_too_for_vtk() {
 fn a_map_that_makes_part_of_a_surface_a_mirror_sends_mirror_rays_there() {
     let mut texture = Texture::from_linear(2, 1, vec![[1.0, 0.0, 1.0, 1.0], [1.0; 4]]).unwrap();
     texture.filter = Filter::Nearest;
-    let maps =
-        TextureMaps { metallic_roughness: Some(texture.into()), ..TextureMaps::new(MapConvention::Gltf) };
+    let maps = TextureMaps {
+        metallic_roughness: Some(texture.into()),
+        ..TextureMaps::new(MapConvention::Gltf)
+    };
     let m = Material::pbr([1.0; 3], 1.0, 0.8).with_maps(Arc::new(maps) as Arc<dyn MaterialMaps>);
-    let s = scene(vec![(sheet(1.0), m), (floor(2.0, 3.0), Material::unlit([0.25, 0.5, 1.0]))], vec![]);
-    assert!(Effects::required_by(&s).contains(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION)));
+    let s =
+        scene(vec![(sheet(1.0), m), (floor(2.0, 3.0), Material::unlit([0.25, 0.5, 1.0]))], vec![]);
+    assert!(
+        Effects::required_by(&s).contains(Effects::REFLECTION.union(Effects::GLOSSY_REFLECTION))
+    );
     let eye = Camera::orthographic(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0, 1.0, [0.0, 3.0]).unwrap();
     let mut options = RenderOptions::new(8, 8);
     options.samples = 16;
@@ -234,16 +268,21 @@ impl MaterialMaps for Checked {
 #[test]
 fn detail_of_a_program_s_own_cannot_put_nan_into_a_picture() {
     let mut b = SceneBuilder::new();
-    let m =
-        b.material(Material { model: SurfaceModel::Metal { roughness: 0.5 }, ..Material::matte([0.5; 3]) });
-    let detailed =
-        b.material(Material::pbr([0.5; 3], 0.5, 0.5).with_maps(Arc::new(Checked) as Arc<dyn MaterialMaps>));
+    let m = b.material(Material {
+        model: SurfaceModel::Metal { roughness: 0.5 },
+        ..Material::matte([0.5; 3])
+    });
+    let detailed = b.material(
+        Material::pbr([0.5; 3], 0.5, 0.5).with_maps(Arc::new(Checked) as Arc<dyn MaterialMaps>),
+    );
     let spheres =
-        rt_core::shapes::Spheres::new(vec![Vec3::ZERO], rt_core::shapes::Radii::Common(0.4)).unwrap();
+        rt_core::shapes::Spheres::new(vec![Vec3::ZERO], rt_core::shapes::Radii::Common(0.4))
+            .unwrap();
     let g = b.geometry(rt_core::bvh::Geometry::Shape(Arc::new(spheres)));
     b.instance(g, DAffine3::IDENTITY, Appearance::new(detailed));
     let normals = Some(Attribute::per_face(vec![Vec3::Z; 2]));
-    let plate = b.geometry(rt_core::bvh::Geometry::Mesh(Arc::new(TriMesh { normals, ..floor(-0.5, 2.0) })));
+    let plate =
+        b.geometry(rt_core::bvh::Geometry::Mesh(Arc::new(TriMesh { normals, ..floor(-0.5, 2.0) })));
     b.instance(plate, DAffine3::IDENTITY, Appearance::new(detailed));
     b.instance(g, DAffine3::from_translation(DVec3::new(3.0, 0.0, 0.0)), Appearance::new(m));
     let s = b.build().unwrap();

@@ -1,4 +1,5 @@
-//! Shadows, ambient occlusion, reflection, refraction and transparency: closed forms, and counters that stay at zero.
+//! Shadows, ambient occlusion, reflection, refraction and transparency: closed forms, and counters
+//! that stay at zero.
 
 mod scenes_common;
 use rt_core::effects::Effects;
@@ -22,11 +23,15 @@ fn options(n: u32) -> RenderOptions {
 #[test]
 fn shadow_of_a_square_is_where_geometry_says() {
     // A 2 x 2 square at height 1 under a point light at height 2: a shadow of 4 x 4.
-    for light in
-        [Light::point(DVec3::new(0.0, 0.0, 2.0)), Light::spot(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, 1.5)]
-    {
+    for light in [
+        Light::point(DVec3::new(0.0, 0.0, 2.0)),
+        Light::spot(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, 1.5),
+    ] {
         let mut s = scene(
-            vec![(floor(0.0, 10.0), Material::matte([1.0; 3])), (floor(1.0, 1.0), Material::matte([1.0; 3]))],
+            vec![
+                (floor(0.0, 10.0), Material::matte([1.0; 3])),
+                (floor(1.0, 1.0), Material::matte([1.0; 3])),
+            ],
             vec![light],
         );
         // Seen from below the square's height: near plane at height 0.5.
@@ -58,7 +63,10 @@ fn shadow_of_a_square_is_where_geometry_says() {
 
 #[test]
 fn headlight_sends_no_shadow_rays() {
-    let s = scene(vec![(sphere(Vec3::ZERO, 1.0, 16), Material::matte([1.0; 3]))], vec![Light::headlight()]);
+    let s = scene(
+        vec![(sphere(Vec3::ZERO, 1.0, 16), Material::matte([1.0; 3]))],
+        vec![Light::headlight()],
+    );
     let o = draw(&s, &camera(DVec3::new(4.0, 0.0, 0.0), 0.6), options(32));
     let r = o.report.rays;
     assert_eq!(
@@ -77,7 +85,8 @@ fn headlight_sends_no_shadow_rays() {
 
 #[test]
 fn soft_light_has_a_penumbra_of_the_right_width() {
-    // A half plane x < 0 at height 1, a disk light of radius 0.5 at height 2: the penumbra on the floor is |x| < 0.5.
+    // A half plane x < 0 at height 1, a disk light of radius 0.5 at height 2: the penumbra on the
+    // floor is |x| < 0.5.
     let blocker = quad(Vec3::new(-10.0, 0.0, 1.0), Vec3::X * 10.0, Vec3::Y * 20.0);
     let light = Light::point(DVec3::new(0.0, 0.0, 2.0)).with_size(0.5).unwrap();
     let s = scene(
@@ -107,13 +116,17 @@ fn soft_light_has_a_penumbra_of_the_right_width() {
     let middle = 0.5 * (row(15) + row(16));
     assert!((middle / full(16) - 0.5).abs() < 0.03, "{middle}");
     let hard = draw(&s, &c, RenderOptions { effects: Some(Effects::SHADOWS), ..options(32) });
-    assert!(hard.frame.color.iter().all(|p| p[0] == 0.0 || p[0] > 0.8), "hard shadows have two values");
+    assert!(
+        hard.frame.color.iter().all(|p| p[0] == 0.0 || p[0] > 0.8),
+        "hard shadows have two values"
+    );
     assert!(hard.report.left_out.contains(Effects::SOFT_SHADOWS));
 }
 
 #[test]
 fn shadow_rays_find_no_false_blockers_at_any_scale_or_offset() {
-    // A convex body lit from the eye's side: every lit point must be lit, at sizes 1e-15 to 1e15 and far from the origin.
+    // A convex body lit from the eye's side: every lit point must be lit, at sizes 1e-15 to 1e15
+    // and far from the origin.
     for (scale, offset) in
         [(1.0, 0.0), (1e-15, 0.0), (1e15, 0.0), (1e-3, 1.0), (1.0, 1000.0), (1.0, -12345.678)]
     {
@@ -139,8 +152,13 @@ fn shadow_rays_find_no_false_blockers_at_any_scale_or_offset() {
             )
             .unwrap();
             let with = draw(&s, &camera, options(96));
-            let without = draw(&s, &camera, RenderOptions { effects: Some(Effects::NONE), ..options(96) });
-            assert!(with.report.rays.shadow > 2000, "scale {scale} offset {offset}: {:?}", with.report.rays);
+            let without =
+                draw(&s, &camera, RenderOptions { effects: Some(Effects::NONE), ..options(96) });
+            assert!(
+                with.report.rays.shadow > 2000,
+                "scale {scale} offset {offset}: {:?}",
+                with.report.rays
+            );
             assert_eq!(with.report.rays.shadow_blocked, 0, "scale {scale} offset {offset}");
             // The loops without and with rays take the normal in f32 and in f64.
             assert!(difference(&with, &without) < 1e-6);
@@ -171,9 +189,11 @@ fn ambient_occlusion_of_a_plane_is_none() {
 
 #[test]
 fn ambient_occlusion_next_to_a_wall_is_its_form_factor() {
-    // Wall x = 0 of height 1 and (nearly) infinite width: a floor point at distance a sees it with (1 - a/sqrt(a²+1))/2.
+    // Wall x = 0 of height 1 and (nearly) infinite width: a floor point at distance a sees it with
+    // (1 - a/sqrt(a²+1))/2.
     let wall = quad(Vec3::new(0.0, 0.0, 0.5), Vec3::Y * 2000.0, Vec3::Z * 0.5);
-    let parts = vec![(floor(0.0, 3000.0), Material::matte([1.0; 3])), (wall, Material::matte([1.0; 3]))];
+    let parts =
+        vec![(floor(0.0, 3000.0), Material::matte([1.0; 3])), (wall, Material::matte([1.0; 3]))];
     let s = ambient_scene(parts.clone(), f64::INFINITY, 1024);
     let o = draw(&s, &top_camera(5.0, 4.0), options(16));
     for x in [8, 9, 11, 15] {
@@ -189,11 +209,15 @@ fn ambient_occlusion_next_to_a_wall_is_its_form_factor() {
 
 #[test]
 fn ambient_occlusion_sees_opacity() {
-    // A ceiling of opacity 0.25 over everything: a quarter of the light is gone; an invisible one takes nothing.
+    // A ceiling of opacity 0.25 over everything: a quarter of the light is gone; an invisible one
+    // takes nothing.
     for (opacity, expected) in [(0.25f32, 0.75f32), (0.0, 1.0)] {
         let ceiling = (floor(0.01, 1000.0), Material::matte([1.0; 3]).with_opacity(opacity));
-        let s =
-            ambient_scene(vec![(floor(0.0, 1000.0), Material::matte([1.0; 3])), ceiling], f64::INFINITY, 64);
+        let s = ambient_scene(
+            vec![(floor(0.0, 1000.0), Material::matte([1.0; 3])), ceiling],
+            f64::INFINITY,
+            64,
+        );
         // Seen from between floor and ceiling.
         let c = rt_core::camera::Camera::orthographic(
             DVec3::new(0.0, 0.0, 0.005),
@@ -231,7 +255,8 @@ fn mirror_shows_the_environment_in_the_mirror_direction() {
     s.environment = Some(Environment::Gradient { bottom: [0.0; 3], top: [1.0; 3], up: Vec3::Z });
     let c = camera(DVec3::new(-3.0, 0.0, 3.0), 0.2);
     let o = draw(&s, &c, options(33));
-    // 45 degrees: the mirrored ray climbs with sin 45°, radiance 0.5 + 0.5 sin 45°; Schlick's white metal reflects all.
+    // 45 degrees: the mirrored ray climbs with sin 45°, radiance 0.5 + 0.5 sin 45°; Schlick's white
+    // metal reflects all.
     let expected = 0.5 + 0.5 * std::f32::consts::FRAC_1_SQRT_2;
     assert!((o.frame.color_at(16, 16)[0] - expected).abs() < 1e-4);
     assert_eq!(o.report.rays.reflection, 33 * 33);
@@ -250,12 +275,20 @@ fn no_reflection_rays_at_specular_zero() {
     let c = camera(DVec3::new(4.0, 0.0, 1.0), 0.6);
     let body = || sphere(Vec3::ZERO, 1.0, 12);
     let dull = Material {
-        model: SurfaceModel::Pbr { metallic: 0.0, roughness: 0.5, specular: 0.0, form: PbrForm::Gltf },
+        model: SurfaceModel::Pbr {
+            metallic: 0.0,
+            roughness: 0.5,
+            specular: 0.0,
+            form: PbrForm::Gltf,
+        },
         ..Material::matte([0.5; 3])
     };
-    for (m, reflects) in
-        [(phong(0.0), false), (phong(0.3), true), (dull, false), (Material::pbr([0.5; 3], 0.0, 0.5), true)]
-    {
+    for (m, reflects) in [
+        (phong(0.0), false),
+        (phong(0.3), true),
+        (dull, false),
+        (Material::pbr([0.5; 3], 0.0, 0.5), true),
+    ] {
         let mut s = scene(vec![(body(), m)], vec![Light::headlight()]);
         s.environment = Some(Environment::Constant([0.2; 3]));
         assert_eq!(draw(&s, &c, options(16)).report.rays.reflection > 0, reflects);
@@ -286,16 +319,20 @@ fn rays_of_mirrors_that_are_left_out_are_counted_and_cost_at_most_their_share() 
 
 #[test]
 fn refracted_ray_leaves_where_snell_says() {
-    // A slab 0 <= z <= 1 of index 1.5 over a floor at z = -1e-3 striped in x: a 45° ray enters at x = 0 and arrives shifted.
+    // A slab 0 <= z <= 1 of index 1.5 over a floor at z = -1e-3 striped in x: a 45° ray enters at x
+    // = 0 and arrives shifted.
     let slab_top = floor(1.0, 100.0);
     let mut bottom = floor(0.0, 100.0);
     bottom.indices.iter_mut().for_each(|t| t.swap(0, 1));
     let mut ground = quad(Vec3::new(0.0, 0.0, -0.001), Vec3::X * 100.0, Vec3::Y * 100.0);
-    ground.colors =
-        Some(Attribute::per_vertex(ground.positions.iter().map(|p| [p.x + 200.0, 0.0, 0.0, 1.0]).collect()));
+    ground.colors = Some(Attribute::per_vertex(
+        ground.positions.iter().map(|p| [p.x + 200.0, 0.0, 0.0, 1.0]).collect(),
+    ));
     let glass = Material::dielectric(1.5);
-    let s =
-        scene(vec![(slab_top, glass.clone()), (bottom, glass), (ground, Material::unlit([1.0; 3]))], vec![]);
+    let s = scene(
+        vec![(slab_top, glass.clone()), (bottom, glass), (ground, Material::unlit([1.0; 3]))],
+        vec![],
+    );
     // A thin parallel beam at 45° that meets the top at x = 0.
     let c = rt_core::camera::Camera::orthographic(
         DVec3::new(-4.0, 0.0, 5.0),
@@ -327,12 +364,14 @@ fn total_internal_reflection_turns_the_ray_back() {
     let mut face = floor(1.0, 100.0);
     face.colors = None;
     let ground = floor(0.0, 100.0);
-    let s = scene(vec![(face, Material::dielectric(1.5)), (ground, Material::unlit([0.7; 3]))], vec![]);
+    let s =
+        scene(vec![(face, Material::dielectric(1.5)), (ground, Material::unlit([0.7; 3]))], vec![]);
     let c = camera(DVec3::new(0.0, 0.0, 0.5), 0.1);
     let _ = c;
     let dir = DVec3::new(60f64.to_radians().sin(), 0.0, 60f64.to_radians().cos());
     let eye = DVec3::new(0.0, 0.0, 0.5);
-    let c = rt_core::camera::Camera::perspective(eye, eye + dir, DVec3::Z, 0.05, 1.0, [1e-3, 1e3]).unwrap();
+    let c = rt_core::camera::Camera::perspective(eye, eye + dir, DVec3::Z, 0.05, 1.0, [1e-3, 1e3])
+        .unwrap();
     let o = draw(&s, &c, options(8));
     assert!(o.frame.color.iter().all(|p| p[0] == 0.7), "{:?}", o.frame.color_at(4, 4));
     assert_eq!(o.report.rays.refraction, 0);
@@ -354,8 +393,11 @@ fn glass_absorbs_by_beer_and_lambert() {
         vec![(top, glass.clone()), (bottom, glass), (floor(-1.0, 50.0), Material::unlit([1.0; 3]))],
         vec![],
     );
-    let o =
-        draw(&s, &top_camera(5.0, 0.001), RenderOptions { effects: Some(Effects::REFRACTION), ..options(4) });
+    let o = draw(
+        &s,
+        &top_camera(5.0, 0.001),
+        RenderOptions { effects: Some(Effects::REFRACTION), ..options(4) },
+    );
     let p = o.frame.color_at(1, 1);
     for c in 0..3 {
         let expected = 0.96f32 * 0.96 * (-2.0 * sigma[c]).exp();
@@ -368,12 +410,15 @@ fn glass_absorbs_by_beer_and_lambert() {
 #[test]
 fn opacity_layers_compose_with_over_in_order() {
     // Red 0.5 over green 0.25 over blue 1.
-    let layers = [(3.0, [1.0, 0.0, 0.0], 0.5), (2.0, [0.0, 1.0, 0.0], 0.25), (1.0, [0.0, 0.0, 1.0], 1.0)];
+    let layers =
+        [(3.0, [1.0, 0.0, 0.0], 0.5), (2.0, [0.0, 1.0, 0.0], 0.25), (1.0, [0.0, 0.0, 1.0], 1.0)];
     let order = [[0, 1, 2], [2, 1, 0], [1, 2, 0]];
     for o in order {
         let parts = o
             .iter()
-            .map(|&k| (floor(layers[k].0, 5.0), Material::unlit(layers[k].1).with_opacity(layers[k].2)))
+            .map(|&k| {
+                (floor(layers[k].0, 5.0), Material::unlit(layers[k].1).with_opacity(layers[k].2))
+            })
             .collect();
         let out = draw(&scene(parts, vec![]), &top_camera(5.0, 4.0), options(16));
         assert!(
@@ -399,7 +444,8 @@ fn alpha_of_transparent_pixels_is_coverage_and_color_is_premultiplied() {
 
 #[test]
 fn shared_edges_and_vertices_are_met_once() {
-    // A grid of transparent squares whose edges and vertices lie exactly on pixel centres: each layer counts once.
+    // A grid of transparent squares whose edges and vertices lie exactly on pixel centres: each
+    // layer counts once.
     let n = 16;
     let mut mesh = rt_core::mesh::TriMesh::default();
     for j in 0..=n {
@@ -432,21 +478,31 @@ fn shared_edges_and_vertices_are_met_once() {
 #[test]
 fn coplanar_layers_are_one_surface_of_the_lowest_id() {
     let m = |c| Material::unlit(c).with_opacity(0.5);
-    let s = scene(vec![(floor(0.0, 3.0), m([1.0, 0.0, 0.0])), (floor(0.0, 3.0), m([0.0, 1.0, 0.0]))], vec![]);
+    let s = scene(
+        vec![(floor(0.0, 3.0), m([1.0, 0.0, 0.0])), (floor(0.0, 3.0), m([0.0, 1.0, 0.0]))],
+        vec![],
+    );
     let o = draw(&s, &top_camera(5.0, 4.0), options(16));
-    assert!(o.frame.color.iter().all(|p| *p == [0.5, 0.0, 0.0, 0.5]), "{:?}", o.frame.color_at(5, 5));
+    assert!(
+        o.frame.color.iter().all(|p| *p == [0.5, 0.0, 0.0, 0.5]),
+        "{:?}",
+        o.frame.color_at(5, 5)
+    );
 }
 
 #[test]
 fn shapes_with_alpha_in_their_colours_are_looked_through() {
-    // Two spheres one behind the other, the front one red and half transparent; and the same through cylinders and tubes.
+    // Two spheres one behind the other, the front one red and half transparent; and the same
+    // through cylinders and tubes.
     let colors = |alpha: f32| vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, alpha]];
     let centers = vec![Vec3::ZERO, Vec3::new(0.0, 0.0, 2.0)];
     let ends = || vec![Vec3::new(-1.0, 0.0, 2.0), Vec3::new(1.0, 0.0, 2.0)];
     for alpha in [1.0, 0.5] {
         let red = vec![[1.0, 0.0, 0.0, alpha]; 2];
-        let spheres = Spheres::new(centers.clone(), Radii::Common(0.5)).unwrap().with_colors(colors(alpha));
-        let cylinder = Cylinders::new(ends(), Radii::Common(0.5), false).unwrap().with_colors(red.clone());
+        let spheres =
+            Spheres::new(centers.clone(), Radii::Common(0.5)).unwrap().with_colors(colors(alpha));
+        let cylinder =
+            Cylinders::new(ends(), Radii::Common(0.5), false).unwrap().with_colors(red.clone());
         let tube = Tubes::new(ends(), &[0, 2], Radii::Common(0.5)).unwrap().with_colors(red);
         let shapes: [(Arc<dyn Shape>, bool); 3] = [
             (Arc::new(spheres.unwrap()), false),
@@ -460,7 +516,11 @@ fn shapes_with_alpha_in_their_colours_are_looked_through() {
                 b.mesh(floor(0.0, 3.0), Material::unlit([0.0, 0.0, 1.0]));
             }
             let s = b.build().unwrap();
-            assert_eq!(Effects::required_by(&s).contains(Effects::TRANSPARENCY), alpha < 1.0, "shape {k}");
+            assert_eq!(
+                Effects::required_by(&s).contains(Effects::TRANSPARENCY),
+                alpha < 1.0,
+                "shape {k}"
+            );
             let o = draw(&s, &top_camera(5.0, 4.0), options(9));
             // Rays meet the red one on their way in and on their way out.
             let red = if alpha < 1.0 { 0.75 } else { 1.0 };
@@ -497,8 +557,10 @@ fn culled_sides_let_rays_pass() {
 #[test]
 fn transparent_blocker_dims_light_by_its_opacity() {
     let glassy = (floor(1.0, 1.0), Material::matte([1.0; 3]).with_opacity(0.75));
-    let s =
-        scene(vec![(floor(0.0, 5.0), Material::matte([1.0; 3])), glassy], vec![Light::directional(DVec3::Z)]);
+    let s = scene(
+        vec![(floor(0.0, 5.0), Material::matte([1.0; 3])), glassy],
+        vec![Light::directional(DVec3::Z)],
+    );
     let c = rt_core::camera::Camera::orthographic(
         DVec3::new(0.0, 0.0, 0.5),
         DVec3::ZERO,
@@ -522,9 +584,15 @@ fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
             (floor(-1.0, 4.0), Material::pbr([0.8, 0.7, 0.6], 0.0, 0.4)),
             (sphere(Vec3::new(0.0, 0.9, 0.0), 0.7, 16), Material::dielectric(1.5)),
             (sphere(Vec3::new(0.0, -0.9, 0.0), 0.7, 16), Material::metal([0.9, 0.6, 0.3], 0.0)),
-            (sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16), Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6)),
+            (
+                sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16),
+                Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6),
+            ),
         ],
-        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4).unwrap(), Light::ambient([0.2; 3])],
+        vec![
+            Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4).unwrap(),
+            Light::ambient([0.2; 3]),
+        ],
     );
     s.ambient_occlusion = Some(AmbientOcclusion { distance: 2.0, rays: 4 });
     s.background = Background::Constant([0.5, 0.6, 0.7, 1.0]);
@@ -544,7 +612,10 @@ fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
         }
         let o = draw(&s, &c, RenderOptions { effects: Some(asked), ..options(48) });
         assert!(difference(&full, &o) > 0.01, "{name} changes nothing");
-        assert!(o.report.warnings.iter().any(|w| w.starts_with(name) && w.contains("left out")), "{name}");
+        assert!(
+            o.report.warnings.iter().any(|w| w.starts_with(name) && w.contains("left out")),
+            "{name}"
+        );
         let r = o.report.rays;
         let count = match *name {
             "shadows" => r.shadow,
@@ -565,16 +636,28 @@ fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
 #[test]
 fn every_effect_asked_for_in_vain_is_reported_by_name() {
     let s = scene(vec![(floor(0.0, 3.0), Material::matte([1.0; 3]))], vec![Light::headlight()]);
-    let every = Effects::ALL.iter().fold(Effects::NONE, |a, (e, _)| a | *e).without(Effects::PATH_TRACING);
+    let every =
+        Effects::ALL.iter().fold(Effects::NONE, |a, (e, _)| a | *e).without(Effects::PATH_TRACING);
     let plain = draw(&s, &top_camera(5.0, 4.0), options(8));
     let o = draw(&s, &top_camera(5.0, 4.0), RenderOptions { effects: Some(every), ..options(8) });
     assert_eq!(difference(&plain, &o), 0.0);
     for name in every.names() {
-        assert!(o.report.warnings.iter().any(|w| w.starts_with(name)), "{name}: {:?}", o.report.warnings);
+        assert!(
+            o.report.warnings.iter().any(|w| w.starts_with(name)),
+            "{name}: {:?}",
+            o.report.warnings
+        );
     }
     // Asked for, needed, but without a blocker in view.
-    let s = scene(vec![(floor(0.0, 3.0), Material::matte([1.0; 3]))], vec![Light::directional(DVec3::Z)]);
-    let o = draw(&s, &top_camera(5.0, 4.0), RenderOptions { effects: Some(Effects::SHADOWS), ..options(8) });
+    let s = scene(
+        vec![(floor(0.0, 3.0), Material::matte([1.0; 3]))],
+        vec![Light::directional(DVec3::Z)],
+    );
+    let o = draw(
+        &s,
+        &top_camera(5.0, 4.0),
+        RenderOptions { effects: Some(Effects::SHADOWS), ..options(8) },
+    );
     assert!(
         o.report.warnings.iter().any(|w| w.starts_with("shadows changed no pixel")),
         "{:?}",
@@ -585,7 +668,11 @@ fn every_effect_asked_for_in_vain_is_reported_by_name() {
 #[test]
 fn effect_left_out_is_reported_and_opaque() {
     let s = scene(vec![(floor(0.0, 3.0), Material::unlit([1.0; 3]).with_opacity(0.5))], vec![]);
-    let o = draw(&s, &top_camera(5.0, 4.0), RenderOptions { effects: Some(Effects::NONE), ..options(8) });
+    let o = draw(
+        &s,
+        &top_camera(5.0, 4.0),
+        RenderOptions { effects: Some(Effects::NONE), ..options(8) },
+    );
     assert_eq!(o.frame.color_at(4, 4), [1.0; 4]);
     assert!(
         o.report.warnings.iter().any(|w| w.starts_with("transparency left out")),

@@ -14,7 +14,8 @@ use rt_core::scene::{Appearance, SceneBuilder};
 use rt_core::texture::{Filter, Texture};
 use scenes_common::*;
 
-/// Colour of the middle pixel of the floor z = 0 seen from straight above (parallel), where x = y = 0.
+/// Colour of the middle pixel of the floor z = 0 seen from straight above (parallel), where x = y =
+/// 0.
 fn middle(mesh: TriMesh, material: Material, lights: Vec<Light>) -> [f32; 4] {
     draw(&scene(vec![(mesh, material)], lights), &top_camera(5.0, 0.001), RenderOptions::new(1, 1))
         .frame
@@ -28,8 +29,10 @@ fn close(a: f32, b: f32, what: &str) {
 #[test]
 fn phong_highlights_are_opengl_s_and_vtk_s() {
     let to_light = DVec3::new(1.0, 0.0, 2.0).normalize();
-    let light =
-        Light { highlight_color: Some([0.5; 3]), ..Light::directional(to_light).with_color([0.8; 3]) };
+    let light = Light {
+        highlight_color: Some([0.5; 3]),
+        ..Light::directional(to_light).with_color([0.8; 3])
+    };
     let cos = to_light.z as f32;
     // View is +z. Half vector of view and light; mirrored light against view.
     let half = (to_light + DVec3::Z).normalize().z as f32;
@@ -46,7 +49,8 @@ fn phong_highlights_are_opengl_s_and_vtk_s() {
             };
             let m = Material { model, ..Material::matte([0.5; 3]) };
             let found = middle(floor(0.0, 1.0), m, vec![light, Light::ambient([0.25; 3])])[0];
-            let expected = 0.3 * 0.5 * 0.25 + 0.6 * 0.5 * 0.8 * cos + 0.9 * 0.5 * base.powf(shininess);
+            let expected =
+                0.3 * 0.5 * 0.25 + 0.6 * 0.5 * 0.8 * cos + 0.9 * 0.5 * base.powf(shininess);
             close(found, expected, &format!("{highlight:?} {shininess}"));
         }
     }
@@ -75,7 +79,11 @@ fn attenuation_and_spots_follow_opengl() {
     close(spot(0.6, 4.0), 0.75f32.powi(2), "cos 30° to the 4th");
     // A disk shines with the cosine to its normal.
     let disk = Light::disk(at, axis, 1e-6);
-    close(middle(floor(0.0, 1.0), Material::matte([1.0; 3]), vec![disk])[0], 0.75f32.sqrt(), "disk");
+    close(
+        middle(floor(0.0, 1.0), Material::matte([1.0; 3]), vec![disk])[0],
+        0.75f32.sqrt(),
+        "disk",
+    );
 }
 
 #[test]
@@ -109,7 +117,8 @@ fn environment_lights_by_its_cosine_weighted_mean() {
 
 #[test]
 fn scalars_are_interpolated_first_and_mapped_then() {
-    // A map that is black but for a narrow white band in the middle: colours mapped at the vertices would be black everywhere.
+    // A map that is black but for a narrow white band in the middle: colours mapped at the vertices
+    // would be black everywhere.
     let mut colors = vec![[0.0, 0.0, 0.0, 1.0]; 101];
     colors[50] = [1.0; 4];
     let mut mesh = floor(0.0, 1.0);
@@ -131,7 +140,8 @@ fn scalars_are_interpolated_first_and_mapped_then() {
 #[test]
 fn colour_sources_of_meshes() {
     let mut mesh = floor(0.0, 1.0);
-    // The camera looks at x = 0 +- nothing: the middle of the square lies on the diagonal of both triangles.
+    // The camera looks at x = 0 +- nothing: the middle of the square lies on the diagonal of both
+    // triangles.
     mesh.colors = Some(Attribute::per_vertex(
         mesh.positions.iter().map(|p| [p.x + 0.5, 0.5 * p.y, 0.25, 1.0]).collect(),
     ));
@@ -164,7 +174,11 @@ fn colour_sources_of_meshes() {
     t.filter = Filter::Nearest;
     let m = Material::unlit([1.0, 0.5, 0.0]).textured(t);
     let o = draw(&scene(vec![(mesh, m)], vec![]), &top_camera(5.0, 2.0), RenderOptions::new(2, 2));
-    assert_eq!(o.frame.color_at(0, 1), [0.1, 0.05, 0.0, 1.0], "row 0 of the texture is at the bottom");
+    assert_eq!(
+        o.frame.color_at(0, 1),
+        [0.1, 0.05, 0.0, 1.0],
+        "row 0 of the texture is at the bottom"
+    );
     assert_eq!(o.frame.color_at(1, 0), [0.4, 0.2, 0.0, 1.0]);
     let p = o.frame.color_at(1, 1);
     assert!(
@@ -186,13 +200,17 @@ fn recolouring_needs_no_new_world() {
         draw(s, &top_camera(5.0, 1.0), RenderOptions::new(2, 2)).frame.color_at(0, 0)
     };
     assert_eq!(look(&s), [0.75, 0.75, 1.0, 1.0]);
-    s.appearances[0] = Appearance::new(m).with_colors(Attribute::per_face(vec![[0.0, 1.0, 0.0, 1.0]; 2]));
+    s.appearances[0] =
+        Appearance::new(m).with_colors(Attribute::per_face(vec![[0.0, 1.0, 0.0, 1.0]; 2]));
     assert_eq!(look(&s), [0.0, 1.0, 0.0, 1.0]);
     s.appearances[0] = Appearance::new(m).with_colors(Attribute::per_face(vec![[0.0; 4]; 3]));
     let e = rt_core::render::render(&s, &top_camera(5.0, 1.0), &RenderOptions::new(2, 2))
         .unwrap_err()
         .to_string();
-    assert!(e.contains("appearance 0") && e.contains("colors") && e.contains('3') && e.contains('2'), "{e}");
+    assert!(
+        e.contains("appearance 0") && e.contains("colors") && e.contains('3') && e.contains('2'),
+        "{e}"
+    );
 }
 
 #[test]
@@ -201,13 +219,15 @@ fn sides_choose_the_normal_and_what_is_dark() {
     let mut back = floor(0.0, 1.0);
     back.indices.iter_mut().for_each(|t| t.swap(0, 1));
     let lit = |mesh: &TriMesh, sides| {
-        middle(mesh.clone(), Material::matte([1.0; 3]).with_sides(sides), vec![Light::headlight()])[0]
+        middle(mesh.clone(), Material::matte([1.0; 3]).with_sides(sides), vec![Light::headlight()])
+            [0]
     };
     assert_eq!(
         (lit(&back, Sides::Both), lit(&back, Sides::BothByNormal), lit(&back, Sides::LitOutside)),
         (1.0, 1.0, 0.0)
     );
-    // Shading normals that disagree with the winding: geometry decides for Both, the normal itself for BothByNormal.
+    // Shading normals that disagree with the winding: geometry decides for Both, the normal itself
+    // for BothByNormal.
     back.normals = Some(Attribute::per_vertex(vec![Vec3::Z; 4]));
     assert_eq!(
         (lit(&back, Sides::Both), lit(&back, Sides::BothByNormal), lit(&back, Sides::LitOutside)),
@@ -219,7 +239,8 @@ fn sides_choose_the_normal_and_what_is_dark() {
 
 #[test]
 fn normals_of_squeezed_and_mirrored_instances() {
-    // A unit sphere squeezed to an ellipsoid: normals must be those of the ellipsoid, outward also when mirrored.
+    // A unit sphere squeezed to an ellipsoid: normals must be those of the ellipsoid, outward also
+    // when mirrored.
     for scale in [DVec3::new(2.0, 1.0, 0.5), DVec3::new(-2.0, 1.0, 0.5)] {
         let mut b = SceneBuilder::new();
         let g = b.geometry(Geometry::Mesh(sphere(Vec3::ZERO, 1.0, 64).into()));
@@ -273,20 +294,25 @@ fn normals_of_squeezed_and_mirrored_instances() {
 fn backgrounds_fill_what_is_uncovered() {
     let mut s = scene(vec![], vec![]);
     let c = top_camera(5.0, 1.0);
-    let look = |s: &rt_core::scene::Scene, y| draw(s, &c, RenderOptions::new(4, 4)).frame.color_at(1, y);
+    let look =
+        |s: &rt_core::scene::Scene, y| draw(s, &c, RenderOptions::new(4, 4)).frame.color_at(1, y);
     s.background = Background::Constant([0.5, 1.0, 0.0, 0.5]);
     assert_eq!(look(&s, 0), [0.25, 0.5, 0.0, 0.5]);
     s.background = Background::Gradient { bottom: [0.0; 3], top: [1.0; 3] };
     assert_eq!((look(&s, 0)[0], look(&s, 3)[0]), (0.875, 0.125));
     s.background = Background::Environment;
     let o = draw(&s, &c, RenderOptions::new(4, 4));
-    assert!(o.frame.color_at(0, 0)[3] == 0.0 && o.report.warnings.iter().any(|w| w.contains("background")));
+    assert!(
+        o.frame.color_at(0, 0)[3] == 0.0
+            && o.report.warnings.iter().any(|w| w.contains("background"))
+    );
     s.environment = Some(Environment::Constant([0.3; 3]));
     assert_eq!(look(&s, 2), [0.3, 0.3, 0.3, 1.0]);
 }
 
 #[test]
 fn emission_needs_no_light() {
-    let p = middle(floor(0.0, 1.0), Material::matte([1.0; 3]).with_emission([0.1, 0.2, 3.0]), vec![]);
+    let p =
+        middle(floor(0.0, 1.0), Material::matte([1.0; 3]).with_emission([0.1, 0.2, 3.0]), vec![]);
     assert_eq!(p, [0.1, 0.2, 3.0, 1.0]);
 }

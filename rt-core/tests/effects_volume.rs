@@ -15,7 +15,8 @@ use scenes_common::*;
 
 /// White fog in a box of 4 x 4 x `height`: half of the light passes one unit of length.
 fn fog(origin: DVec3, height: f64) -> Volume {
-    let grid = Grid::new(UVec3::splat(2), origin, DVec3::new(4.0, 4.0, height), vec![0.5; 8]).unwrap();
+    let grid =
+        Grid::new(UVec3::splat(2), origin, DVec3::new(4.0, 4.0, height), vec![0.5; 8]).unwrap();
     let white = ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]);
     Volume::new(
         grid.into(),
@@ -31,7 +32,8 @@ fn fog_in_front_of_behind_and_between_surfaces() {
     for (z, opacity, expected) in [
         (-1.0, 1.0, [0.75, 1.0]),
         (1.0, 1.0, [0.5, 1.0]),
-        // 0.5 fog, then half of the floor (black), then half of the rest of the fog, and nothing behind.
+        // 0.5 fog, then half of the floor (black), then half of the rest of the fog, and nothing
+        // behind.
         (1.0, 0.5, [0.5 + 0.25 * 0.5, 0.5 + 0.25 + 0.25 * 0.5]),
         (3.0, 1.0, [0.0, 1.0]),
     ] {
@@ -40,7 +42,10 @@ fn fog_in_front_of_behind_and_between_surfaces() {
         b.volume(fog(DVec3::new(-2.0, -2.0, 0.0), 2.0));
         let o = draw(&b.build().unwrap(), &top_camera(6.0, 2.0), RenderOptions::new(8, 8));
         let p = o.frame.color_at(4, 4);
-        assert!((p[0] - expected[0]).abs() < 1e-3 && (p[3] - expected[1]).abs() < 1e-3, "z = {z}: {p:?}");
+        assert!(
+            (p[0] - expected[0]).abs() < 1e-3 && (p[3] - expected[1]).abs() < 1e-3,
+            "z = {z}: {p:?}"
+        );
         assert!(o.report.effects.contains(Effects::VOLUMES));
         assert_eq!(o.report.rays.volume > 0, z < 2.0);
     }
@@ -52,11 +57,21 @@ fn volume_alone_is_drawn_at_any_offset() {
         let mut b = SceneBuilder::new();
         b.volume(fog(DVec3::new(offset - 2.0, -2.0, 0.0), 2.0));
         let at = DVec3::X * offset;
-        let c =
-            rt_core::camera::Camera::perspective(at + DVec3::Z * 9.0, at, DVec3::Y, 0.1, 1.0, [0.1, 100.0])
-                .unwrap();
+        let c = rt_core::camera::Camera::perspective(
+            at + DVec3::Z * 9.0,
+            at,
+            DVec3::Y,
+            0.1,
+            1.0,
+            [0.1, 100.0],
+        )
+        .unwrap();
         let o = draw(&b.build().unwrap(), &c, RenderOptions::new(8, 8));
-        assert!(o.frame.color.iter().all(|p| (p[3] - 0.75).abs() < 3e-3), "{:?}", o.frame.color_at(4, 4));
+        assert!(
+            o.frame.color.iter().all(|p| (p[3] - 0.75).abs() < 3e-3),
+            "{:?}",
+            o.frame.color_at(4, 4)
+        );
     }
 }
 

@@ -68,7 +68,11 @@ fn light_along_the_camera_rays_sends_no_shadow_rays_from_what_they_meet_first() 
         let o = draw(&square_above_floor(light), &camera, RenderOptions::new(32, 32));
         let r = o.report.rays;
         assert_eq!(r.total(), r.primary);
-        assert!(o.report.effects.is_empty() && o.report.warnings.is_empty(), "{:?}", o.report.warnings);
+        assert!(
+            o.report.effects.is_empty() && o.report.warnings.is_empty(),
+            "{:?}",
+            o.report.warnings
+        );
         assert!(o.frame.color.iter().all(|p| p[0] > 0.0), "no shadow can be seen");
         // Asked for by name, it is said that they do nothing.
         let asked = RenderOptions { effects: Some(Effects::SHADOWS), ..RenderOptions::new(32, 32) };
@@ -86,13 +90,21 @@ fn light_along_the_camera_rays_sends_no_shadow_rays_from_what_they_meet_first() 
 fn in_world(light: Light) -> Light {
     let kind = match light.kind {
         // The camera looks along -z with y up: its axes are the world's.
-        LightKind::Point { position, radius } => LightKind::Point { position: EYE + position, radius },
+        LightKind::Point { position, radius } => {
+            LightKind::Point { position: EYE + position, radius }
+        }
         other => other,
     };
     Light { kind, frame: LightFrame::World, ..light }
 }
 
-fn compare(what: &str, make: impl Fn(Light) -> Scene, camera: &Camera, options: &RenderOptions, shows: bool) {
+fn compare(
+    what: &str,
+    make: impl Fn(Light) -> Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+    shows: bool,
+) {
     let mut blocked = 0;
     for light in [at_eye(), along_view()] {
         let draw = |light| -> RenderOutput { draw(&make(light), camera, options.clone()) };

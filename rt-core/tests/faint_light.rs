@@ -20,7 +20,8 @@ const EMITTED: f64 = 1e4;
 fn furnace(albedo: f32, samples: u32, seed: u64) -> (f64, u64) {
     let m = Material::matte([albedo; 3]).with_emission([EMITTED as f32; 3]);
     let s = scene(vec![(sphere(Vec3::ZERO, 1.0, 12), Material { flat: true, ..m })], vec![]);
-    let c = Camera::perspective(DVec3::new(0.3, 0.1, 0.0), DVec3::X, DVec3::Z, 1.0, 1.0, [1e-3, 10.0]);
+    let c =
+        Camera::perspective(DVec3::new(0.3, 0.1, 0.0), DVec3::X, DVec3::Z, 1.0, 1.0, [1e-3, 10.0]);
     let options = RenderOptions { path_tracing: true, samples, seed, ..RenderOptions::new(8, 8) };
     let o = draw(&s, &c.unwrap(), options);
     assert!(o.report.warnings.is_empty(), "{:?}", o.report.warnings);
@@ -32,7 +33,10 @@ fn the_path_tracer_is_unbiased_in_a_furnace_of_albedo_0_999() {
     let (mean, bounces) = furnace(0.999, 64, 0);
     // The sum over a geometrically distributed number of bounces has a standard deviation of its
     // mean: 5 standard errors of 4096 paths.
-    assert!((mean - 1.0).abs() < 5.0 / 4096f64.sqrt(), "{mean} of the closed form, {bounces} bounces");
+    assert!(
+        (mean - 1.0).abs() < 5.0 / 4096f64.sqrt(),
+        "{mean} of the closed form, {bounces} bounces"
+    );
 }
 
 #[test]
@@ -51,7 +55,10 @@ fn light_through_many_layers_is_not_dropped() {
     for path_tracing in [false, true] {
         let mut parts = vec![(floor(0.0, 10.0), Material::matte([1.0; 3]))];
         for k in 0..9 {
-            parts.push((floor(2.0 + 0.1 * k as f32, 10.0), Material::matte([0.0; 3]).with_opacity(0.6)));
+            parts.push((
+                floor(2.0 + 0.1 * k as f32, 10.0),
+                Material::matte([0.0; 3]).with_opacity(0.6),
+            ));
         }
         let light = Light::point(DVec3::new(0.0, 0.0, 5.0)).with_color([1e4; 3]);
         let s = scene(parts, vec![light]);
@@ -59,7 +66,10 @@ fn light_through_many_layers_is_not_dropped() {
         let o = draw(&s, &top_camera(1.0, 0.01), options);
         let expected = 1e4 * 0.4f64.powi(9);
         let found = o.frame.color_at(2, 2)[0] as f64;
-        assert!((found / expected - 1.0).abs() < 1e-4, "paths {path_tracing}: {found}, expected {expected}");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-4,
+            "paths {path_tracing}: {found}, expected {expected}"
+        );
     }
 }
 
@@ -82,7 +92,10 @@ fn reflectors_whose_rays_are_left_out_are_not_black() {
         // A second body needs the other kind of reflection rays.
         let beside = Material::metal([0.8; 3], if own == gloss { 0.0 } else { 0.4 });
         let mut s = scene(
-            vec![(sphere(Vec3::ZERO, 1.0, 12), material), (quad(Vec3::X * 9.0, Vec3::Y, Vec3::Z), beside)],
+            vec![
+                (sphere(Vec3::ZERO, 1.0, 12), material),
+                (quad(Vec3::X * 9.0, Vec3::Y, Vec3::Z), beside),
+            ],
             vec![],
         );
         s.environment = Some(Environment::Constant([1.0; 3]));
@@ -92,11 +105,17 @@ fn reflectors_whose_rays_are_left_out_are_not_black() {
             o.frame.color_at(4, 4)[0]
         };
         assert!(Effects::required_by(&s).contains(own | other), "{name}");
-        for (which, effects) in
-            [("all", None), ("its own", Some(own)), ("the other", Some(other)), ("none", Some(Effects::NONE))]
-        {
+        for (which, effects) in [
+            ("all", None),
+            ("its own", Some(own)),
+            ("the other", Some(other)),
+            ("none", Some(Effects::NONE)),
+        ] {
             let found = at(effects);
-            assert!((0.7..=1.0).contains(&found), "{name} with {which} of the reflections: {found}");
+            assert!(
+                (0.7..=1.0).contains(&found),
+                "{name} with {which} of the reflections: {found}"
+            );
         }
     }
 }

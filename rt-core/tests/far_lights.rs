@@ -81,9 +81,14 @@ fn expect_contact_shadow(what: &str, scene: &Scene, camera: &Camera, dir: DVec3)
         }
     }
     let rays = o.report.rays;
-    assert_eq!(wrong, 0, "{what}: pixels wrong of {}; {} rays, {} blocked", PIXELS * PIXELS, rays.shadow, {
-        rays.shadow_blocked
-    });
+    assert_eq!(
+        wrong,
+        0,
+        "{what}: pixels wrong of {}; {} rays, {} blocked",
+        PIXELS * PIXELS,
+        rays.shadow,
+        { rays.shadow_blocked }
+    );
 }
 
 #[test]
@@ -193,8 +198,14 @@ fn flat_lights_are_not_hidden_by_their_own_plane_however_flat_they_fall() {
                 // As wide as a ring's cone may be: light as flat as here is within it.
                 LightKind::Ring { position, direction, inner_radius, radius, .. } => {
                     let (inner_rad, outer_rad) = (FRAC_PI_2, FRAC_PI_2);
-                    let kind =
-                        LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad };
+                    let kind = LightKind::Ring {
+                        position,
+                        direction,
+                        inner_radius,
+                        radius,
+                        inner_rad,
+                        outer_rad,
+                    };
                     Light { kind, ..light }
                 }
                 _ => continue,
@@ -265,12 +276,17 @@ fn moved(light: Light, turn: DMat3, scale: f64) -> Light {
             exponent,
             radius: radius * scale,
         },
-        LightKind::Cone { position, direction, inner_rad, outer_rad } => {
-            LightKind::Cone { position: place(position), direction: turn * direction, inner_rad, outer_rad }
-        }
-        LightKind::Disk { position, direction, radius } => {
-            LightKind::Disk { position: place(position), direction: turn * direction, radius: radius * scale }
-        }
+        LightKind::Cone { position, direction, inner_rad, outer_rad } => LightKind::Cone {
+            position: place(position),
+            direction: turn * direction,
+            inner_rad,
+            outer_rad,
+        },
+        LightKind::Disk { position, direction, radius } => LightKind::Disk {
+            position: place(position),
+            direction: turn * direction,
+            radius: radius * scale,
+        },
         LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad } => {
             LightKind::Ring {
                 position: place(position),

@@ -32,11 +32,18 @@ fn busy_scene() -> Scene {
             (floor(-1.0, 4.0), Material::pbr([0.8, 0.7, 0.6], 0.0, 0.4)),
             (sphere(Vec3::new(0.0, 0.9, 0.0), 0.7, 16), Material::dielectric(1.5)),
             (sphere(Vec3::new(0.0, -0.9, 0.0), 0.7, 16), Material::metal([0.9, 0.6, 0.3], 0.3)),
-            (sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16), Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6)),
+            (
+                sphere(Vec3::new(1.2, 0.0, 0.0), 0.5, 16),
+                Material::matte([0.3, 0.5, 0.9]).with_opacity(0.6),
+            ),
         ],
-        vec![Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4).unwrap(), Light::ambient([0.2; 3])],
+        vec![
+            Light::point(DVec3::new(3.0, 2.0, 4.0)).with_size(0.4).unwrap(),
+            Light::ambient([0.2; 3]),
+        ],
     );
-    s.environment = Some(Environment::Gradient { bottom: [0.1; 3], top: [0.5, 0.6, 0.8], up: Vec3::Z });
+    s.environment =
+        Some(Environment::Gradient { bottom: [0.1; 3], top: [0.5, 0.6, 0.8], up: Vec3::Z });
     s.ambient_occlusion = Some(AmbientOcclusion { distance: 2.0, rays: 4 });
     s
 }
@@ -45,7 +52,8 @@ fn busy_scene() -> Scene {
 
 #[test]
 fn window_depth_is_the_matrix_product_at_the_exact_intersection() {
-    // A tilted plane whose intersection with every pixel ray is known in closed form, seen through hard matrices.
+    // A tilted plane whose intersection with every pixel ray is known in closed form, seen through
+    // hard matrices.
     let n = DVec3::new(0.3, -0.2, 1.0);
     let corner = |x: f64, y: f64| Vec3::new(x as f32, y as f32, -(n.x * x + n.y * y) as f32);
     let p = [corner(-64.0, -64.0), corner(64.0, -64.0), corner(64.0, 64.0), corner(-64.0, 64.0)];
@@ -59,7 +67,8 @@ fn window_depth_is_the_matrix_product_at_the_exact_intersection() {
     let eye = DVec3::new(2.0, 1.0, 7.0);
     let perspective =
         |near, far| Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.9, 1.0, [near, far]).unwrap();
-    // Off-axis: shear of the window (glFrustum with unequal sides), here by composing with a clip-space shift.
+    // Off-axis: shear of the window (glFrustum with unequal sides), here by composing with a
+    // clip-space shift.
     let shift = DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::Z, DVec4::new(0.0, 0.0, 0.0, 1.0));
     let mut off_axis = shift;
     off_axis.z_axis = DVec4::new(0.3, -0.2, 1.0, 0.0);
@@ -86,7 +95,11 @@ fn window_depth_is_the_matrix_product_at_the_exact_intersection() {
                 let (a, m) = exact(o.frame.primitive[i] as usize);
                 let world = origin + dir * (m.dot(a - origin) / m.dot(dir));
                 let expected = c.window_depth(world) as f32;
-                assert!(ulps(o.frame.depth[i], expected) <= 4, "camera {k}: {} {expected}", o.frame.depth[i]);
+                assert!(
+                    ulps(o.frame.depth[i], expected) <= 4,
+                    "camera {k}: {} {expected}",
+                    o.frame.depth[i]
+                );
                 let distance = (world - origin).length() as f32;
                 assert!(
                     ulps(o.frame.distance[i], distance) <= 4,
@@ -102,8 +115,10 @@ fn window_depth_is_the_matrix_product_at_the_exact_intersection() {
 #[test]
 fn pixel_centres_are_opengl_s_and_row_zero_is_the_top() {
     // A square covering exactly the upper left quarter of the picture.
-    let s =
-        scene(vec![(quad(Vec3::new(-1.0, 1.0, 0.0), Vec3::X, Vec3::Y), Material::unlit([1.0; 3]))], vec![]);
+    let s = scene(
+        vec![(quad(Vec3::new(-1.0, 1.0, 0.0), Vec3::X, Vec3::Y), Material::unlit([1.0; 3]))],
+        vec![],
+    );
     let o = draw(&s, &top_camera(5.0, 4.0), RenderOptions::new(8, 8));
     for y in 0..8 {
         for x in 0..8 {
@@ -116,12 +131,16 @@ fn pixel_centres_are_opengl_s_and_row_zero_is_the_top() {
 fn near_and_far_planes_clip_as_opengl_does() {
     let s = scene(vec![(floor(0.0, 10.0), Material::unlit([1.0; 3]))], vec![]);
     let c = |near, far| {
-        Camera::perspective(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, 0.5, 1.0, [near, far]).unwrap()
+        Camera::perspective(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, 0.5, 1.0, [near, far])
+            .unwrap()
     };
     let hit = |c: Camera| draw(&s, &c, RenderOptions::new(4, 4)).frame.color_at(2, 2)[3] == 1.0;
     assert!(hit(c(4.9, 5.1)));
     assert!(!hit(c(5.1, 9.0)) && !hit(c(1.0, 4.9)));
-    assert!(hit(c(5.1, 9.0).with_near_far_clipping(false)) && hit(c(1.0, 4.9).with_near_far_clipping(false)));
+    assert!(
+        hit(c(5.1, 9.0).with_near_far_clipping(false))
+            && hit(c(1.0, 4.9).with_near_far_clipping(false))
+    );
 }
 
 #[test]
@@ -129,24 +148,43 @@ fn far_away_cameras_and_huge_offsets_see_the_same_picture() {
     // The same body near zero, and 10^7 away with a mesh origin: ids must agree pixel by pixel.
     let offset = DVec3::new(1e7, -2e7, 3e6);
     let near = draw(
-        &scene(vec![(sphere(Vec3::ZERO, 1.0, 24), Material::matte([1.0; 3]))], vec![Light::headlight()]),
-        &Camera::perspective(DVec3::new(4.0, 1.0, 2.0), DVec3::ZERO, DVec3::Z, 0.6, 1.0, [0.1, 10.0])
-            .unwrap(),
+        &scene(
+            vec![(sphere(Vec3::ZERO, 1.0, 24), Material::matte([1.0; 3]))],
+            vec![Light::headlight()],
+        ),
+        &Camera::perspective(
+            DVec3::new(4.0, 1.0, 2.0),
+            DVec3::ZERO,
+            DVec3::Z,
+            0.6,
+            1.0,
+            [0.1, 10.0],
+        )
+        .unwrap(),
         all_layers(64),
     );
     let mut mesh = sphere(Vec3::ZERO, 1.0, 24);
     mesh.origin = offset;
     let far = draw(
         &scene(vec![(mesh.clone(), Material::matte([1.0; 3]))], vec![Light::headlight()]),
-        &Camera::perspective(offset + DVec3::new(4.0, 1.0, 2.0), offset, DVec3::Z, 0.6, 1.0, [0.1, 10.0])
-            .unwrap(),
+        &Camera::perspective(
+            offset + DVec3::new(4.0, 1.0, 2.0),
+            offset,
+            DVec3::Z,
+            0.6,
+            1.0,
+            [0.1, 10.0],
+        )
+        .unwrap(),
         all_layers(64),
     );
-    let differ = near.frame.primitive.iter().zip(&far.frame.primitive).filter(|(a, b)| a != b).count();
+    let differ =
+        near.frame.primitive.iter().zip(&far.frame.primitive).filter(|(a, b)| a != b).count();
     assert!(differ <= 4, "{differ} pixels see another triangle");
     // From 10^6 radii through a telescope.
     let telescope = |c: DVec3| {
-        Camera::perspective(c + DVec3::new(1e6, 0.0, 0.0), c, DVec3::Z, 4e-6, 1.0, [1e5, 1e7]).unwrap()
+        Camera::perspective(c + DVec3::new(1e6, 0.0, 0.0), c, DVec3::Z, 4e-6, 1.0, [1e5, 1e7])
+            .unwrap()
     };
     let o = draw(
         &scene(vec![(mesh, Material::matte([1.0; 3]))], vec![Light::headlight()]),
@@ -187,10 +225,16 @@ fn unusable_cameras_are_refused_by_name() {
     let p = |eye: DVec3, up: DVec3, fov, near| {
         Camera::perspective(eye, DVec3::ZERO, up, fov, 1.0, [near, 10.0]).unwrap_err()
     };
-    assert!(matches!(p(DVec3::NAN, DVec3::Y, 0.5, 1.0), CameraError::NotFinite { field: "eye", .. }));
+    assert!(matches!(
+        p(DVec3::NAN, DVec3::Y, 0.5, 1.0),
+        CameraError::NotFinite { field: "eye", .. }
+    ));
     assert!(matches!(p(DVec3::ZERO, DVec3::Y, 0.5, 1.0), CameraError::OutOfRange { .. }));
     assert!(matches!(p(DVec3::Z, DVec3::Z, 0.5, 1.0), CameraError::OutOfRange { .. }));
-    assert!(matches!(p(DVec3::Z, DVec3::Y, 4.0, 1.0), CameraError::OutOfRange { field: "fov_y_rad", .. }));
+    assert!(matches!(
+        p(DVec3::Z, DVec3::Y, 4.0, 1.0),
+        CameraError::OutOfRange { field: "fov_y_rad", .. }
+    ));
     let text = p(DVec3::Z, DVec3::Y, 0.5, -1.0).to_string();
     assert!(text.contains("near") && text.contains("-1") && text.contains("positive"), "{text}");
     let lens = rt_core::camera::ThinLens { aperture_radius: 1.0, focus_distance: 1.0 };
@@ -211,9 +255,13 @@ fn empty_scene_is_background_only() {
 
 #[test]
 fn camera_inside_a_closed_body_sees_its_inside_everywhere() {
-    let s = scene(vec![(sphere(Vec3::ZERO, 1.0, 16), Material::matte([1.0; 3]))], vec![Light::headlight()]);
+    let s = scene(
+        vec![(sphere(Vec3::ZERO, 1.0, 16), Material::matte([1.0; 3]))],
+        vec![Light::headlight()],
+    );
     let c =
-        Camera::perspective(DVec3::new(0.1, 0.2, 0.3), DVec3::X, DVec3::Z, 2.5, 1.0, [1e-4, 10.0]).unwrap();
+        Camera::perspective(DVec3::new(0.1, 0.2, 0.3), DVec3::X, DVec3::Z, 2.5, 1.0, [1e-4, 10.0])
+            .unwrap();
     let o = draw(&s, &c, RenderOptions::new(64, 64));
     assert!(o.frame.color.iter().all(|p| p[3] == 1.0 && p[0] > 0.0));
 }
@@ -245,7 +293,9 @@ fn wrong_options_and_scenes_are_refused_by_name() {
     assert!(text.contains("material 0") && text.contains("ior") && text.contains("NaN"), "{text}");
     let mut s = busy_scene();
     s.appearances[1].material = 99;
-    assert!(render(&s, &c, &RenderOptions::new(5, 5)).unwrap_err().to_string().contains("material 99"));
+    assert!(
+        render(&s, &c, &RenderOptions::new(5, 5)).unwrap_err().to_string().contains("material 99")
+    );
 }
 
 // ---- Layers
@@ -254,7 +304,11 @@ fn wrong_options_and_scenes_are_refused_by_name() {
 fn only_the_layers_asked_for_are_computed() {
     let s = busy_scene();
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
-    let o = draw(&s, &c, RenderOptions { layers: Layers::DEPTH | Layers::IDS, ..RenderOptions::new(40, 40) });
+    let o = draw(
+        &s,
+        &c,
+        RenderOptions { layers: Layers::DEPTH | Layers::IDS, ..RenderOptions::new(40, 40) },
+    );
     assert!(
         o.frame.color.is_empty()
             && o.frame.normal.is_empty()
@@ -274,7 +328,11 @@ fn layers_do_not_depend_on_samples_or_colour() {
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
     let one = draw(&s, &c, all_layers(40));
     let many = draw(&s, &c, RenderOptions { samples: 4, ..all_layers(40) });
-    let bare = draw(&s, &c, RenderOptions { layers: Layers::ALL.without(Layers::COLOR), ..all_layers(40) });
+    let bare = draw(
+        &s,
+        &c,
+        RenderOptions { layers: Layers::ALL.without(Layers::COLOR), ..all_layers(40) },
+    );
     for other in [&many, &bare] {
         assert_eq!(one.frame.depth, other.frame.depth);
         assert_eq!(one.frame.instance, other.frame.instance);
@@ -309,14 +367,16 @@ fn cost_layer_adds_up_to_the_rays_counted() {
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
     let o = draw(&s, &c, all_layers(32));
     let sum: f64 = o.frame.cost.iter().map(|c| *c as f64).sum();
-    // Further layers behind transparent blockers of shadow rays are counted as rays, but not per pixel.
+    // Further layers behind transparent blockers of shadow rays are counted as rays, but not per
+    // pixel.
     let total = o.report.rays.total() as f64;
     assert!(sum <= total && sum > 0.8 * total, "{sum} of {total}");
 }
 
 #[test]
 fn eight_bit_conversion_is_not_premultiplied_and_encodes() {
-    let s = scene(vec![(floor(0.0, 3.0), Material::unlit([0.5, 1.0, 2.0]).with_opacity(0.5))], vec![]);
+    let s =
+        scene(vec![(floor(0.0, 3.0), Material::unlit([0.5, 1.0, 2.0]).with_opacity(0.5))], vec![]);
     let o = draw(&s, &top_camera(5.0, 4.0), RenderOptions::new(4, 4));
     assert_eq!(o.frame.to_rgba8(Encoding::Direct, 1.0)[..4], [128, 255, 255, 128]);
     assert_eq!(o.frame.to_rgba8(Encoding::Srgb, 1.0)[0], 188);
@@ -376,19 +436,26 @@ fn stops_by_error_time_and_cancel() {
     let o = render(&s, &c, &RenderOptions { max_error_levels: Some(4.0), ..base.clone() }).unwrap();
     assert_eq!(o.report.stopped, StopReason::Error);
     assert!(o.report.error_levels.unwrap() <= 4.0 && o.report.samples >= 4);
-    let o = render(&s, &c, &RenderOptions { time_limit: Some(Duration::ZERO), ..base.clone() }).unwrap();
+    let o = render(&s, &c, &RenderOptions { time_limit: Some(Duration::ZERO), ..base.clone() })
+        .unwrap();
     assert_eq!((o.report.stopped, o.report.samples), (StopReason::Time, 1));
     assert!(o.frame.color.iter().any(|p| p[3] > 0.0), "the first sample is always finished");
-    let o = render(&s, &c, &RenderOptions { cancel: Some(Arc::new(AtomicBool::new(true))), ..base }).unwrap();
+    let o =
+        render(&s, &c, &RenderOptions { cancel: Some(Arc::new(AtomicBool::new(true))), ..base })
+            .unwrap();
     assert_eq!((o.report.stopped, o.report.samples), (StopReason::Cancelled, 0));
 }
 
 #[test]
 fn error_estimate_is_about_the_true_error() {
-    // Independent samples: the estimate must be within a factor of 1.5 of the distance to a picture of many samples.
+    // Independent samples: the estimate must be within a factor of 1.5 of the distance to a picture
+    // of many samples.
     let s = busy_scene();
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
-    let base = RenderOptions { sampling: rt_core::sampler::Sampling::Random, ..RenderOptions::new(32, 32) };
+    let base = RenderOptions {
+        sampling: rt_core::sampler::Sampling::Random,
+        ..RenderOptions::new(32, 32)
+    };
     let truth = draw(&s, &c, RenderOptions { samples: 128, seed: 77, ..base.clone() });
     let o = draw(&s, &c, RenderOptions { samples: 16, ..base });
     let luminance = |p: &[f32; 4]| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
@@ -414,7 +481,10 @@ fn renderer_draws_the_same_in_used_memory() {
         all_layers(50),
         RenderOptions { samples: 2, ..all_layers(50) },
         RenderOptions::new(50, 50),
-        RenderOptions { effects: Some(rt_core::effects::Effects::NONE), ..RenderOptions::new(50, 50) },
+        RenderOptions {
+            effects: Some(rt_core::effects::Effects::NONE),
+            ..RenderOptions::new(50, 50)
+        },
         all_layers(70),
     ] {
         let first = renderer.render(&s, &other, &options).unwrap();
@@ -438,7 +508,11 @@ fn asynchronous_renderer_is_one_frame_behind() {
             match k {
                 0 => assert!(got.is_none()),
                 _ => {
-                    assert_eq!(got.unwrap().frame, draw(&s, &eye(k - 1), options.clone()).frame, "frame {k}")
+                    assert_eq!(
+                        got.unwrap().frame,
+                        draw(&s, &eye(k - 1), options.clone()).frame,
+                        "frame {k}"
+                    )
                 }
             }
         }
@@ -486,7 +560,13 @@ impl rt_core::shapes::Shape for Explosive {
     ) -> rt_core::shapes::ShapeSurface {
         let point = ray.at(hit.t);
         assert!(point.x < 0.4 || point.y < 0.4, "the bug at {point}");
-        rt_core::shapes::ShapeSurface { point, point_error: 1e-6, normal: Vec3::Z, scalar: None, color: None }
+        rt_core::shapes::ShapeSurface {
+            point,
+            point_error: 1e-6,
+            normal: Vec3::Z,
+            scalar: None,
+            color: None,
+        }
     }
 }
 

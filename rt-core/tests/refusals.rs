@@ -1,4 +1,5 @@
-//! What cannot be drawn is refused, and what changes nothing is said, by name, with the value and a cure.
+//! What cannot be drawn is refused, and what changes nothing is said, by name, with the value and a
+//! cure.
 
 use rt_core::bvh::{BuildError, BuildOptions, Geometry, World};
 use rt_core::camera::Camera;
@@ -32,7 +33,8 @@ fn plain() -> Scene {
 }
 
 fn camera() -> Camera {
-    Camera::orthographic(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, 2.0, 1.0, [0.1, 10.0]).unwrap()
+    Camera::orthographic(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, 2.0, 1.0, [0.1, 10.0])
+        .unwrap()
 }
 
 /// The scene is refused by name in the check and so in every frame.
@@ -43,7 +45,10 @@ fn refused(change: impl FnOnce(&mut Scene), what: &str, field: &str, value: &str
     let error = scene.check().expect_err("it cannot be drawn");
     let words = error.to_string();
     assert!(
-        words.contains(what) && words.contains(field) && words.contains(value) && words.contains("must be"),
+        words.contains(what)
+            && words.contains(field)
+            && words.contains(value)
+            && words.contains("must be"),
         "{words}"
     );
     assert!(render(&scene, &camera(), &RenderOptions::new(4, 4)).is_err(), "{words}");
@@ -58,14 +63,21 @@ fn an_environment_that_no_light_can_come_from_is_refused() {
     for bad in [f32::NAN, f32::INFINITY, -0.5] {
         let value = format!("{bad:?}");
         let radiance = [0.5, bad, 0.5];
-        refused(|s| s.environment = Some(Environment::Constant(radiance)), "environment", "radiance", &value);
+        refused(
+            |s| s.environment = Some(Environment::Constant(radiance)),
+            "environment",
+            "radiance",
+            &value,
+        );
         for top_is_bad in [false, true] {
-            let [bottom, top] = if top_is_bad { [[0.1; 3], radiance] } else { [radiance, [0.1; 3]] };
+            let [bottom, top] =
+                if top_is_bad { [[0.1; 3], radiance] } else { [radiance, [0.1; 3]] };
             let field = if top_is_bad { "top" } else { "bottom" };
             let sky = Environment::Gradient { bottom, top, up: Vec3::Z };
             refused(|s| s.environment = Some(sky), "environment", field, &value);
         }
-        let image_of = |scale| Environment::Image { image: image(|_| [0.5; 4]), up: Vec3::Y, scale };
+        let image_of =
+            |scale| Environment::Image { image: image(|_| [0.5; 4]), up: Vec3::Y, scale };
         let shown = bad.to_string();
         refused(|s| s.environment = Some(image_of(bad)), "environment", "scale", &shown);
         let broken = image(|i| if i == 7 { [0.5, 0.5, bad, 1.0] } else { [0.5; 4] });
@@ -76,7 +88,13 @@ fn an_environment_that_no_light_can_come_from_is_refused() {
 
 #[test]
 fn an_up_that_is_not_of_unit_length_is_refused() {
-    for up in [Vec3::ZERO, Vec3::Z * 2.0, Vec3::new(0.0, f32::NAN, 1.0), Vec3::X * 0.99, Vec3::splat(1e30)] {
+    for up in [
+        Vec3::ZERO,
+        Vec3::Z * 2.0,
+        Vec3::new(0.0, f32::NAN, 1.0),
+        Vec3::X * 0.99,
+        Vec3::splat(1e30),
+    ] {
         let sky = Environment::Gradient { bottom: [0.0; 3], top: [1.0; 3], up };
         refused(|s| s.environment = Some(sky), "environment", "up", &up.x.to_string());
         let sky = Environment::Image { image: image(|_| [0.5; 4]), up, scale: 1.0 };
@@ -84,8 +102,9 @@ fn an_up_that_is_not_of_unit_length_is_refused() {
     }
 }
 
-/// The axes around `up` are made from `up` itself, so nothing can be parallel to it: along every axis, and close to every axis, all directions
-/// have a finite radiance, the poles have the picture's ends, and turning around `up` sees every column.
+/// The axes around `up` are made from `up` itself, so nothing can be parallel to it: along every
+/// axis, and close to every axis, all directions have a finite radiance, the poles have the
+/// picture's ends, and turning around `up` sees every column.
 #[test]
 fn an_environment_may_stand_along_any_axis() {
     let picture = image(|i| [[0.25, 0.5, 1.0][i / 4], (i % 4) as f32, 0.0, 1.0]);
@@ -117,8 +136,18 @@ fn an_environment_may_stand_along_any_axis() {
 #[test]
 fn a_background_that_is_no_color_is_refused() {
     let nan = f32::NAN;
-    refused(|s| s.background = Background::Constant([0.0, nan, 0.0, 1.0]), "background", "color", "NaN");
-    refused(|s| s.background = Background::Constant([0.0, 0.0, 0.0, 1.5]), "background", "alpha", "1.5");
+    refused(
+        |s| s.background = Background::Constant([0.0, nan, 0.0, 1.0]),
+        "background",
+        "color",
+        "NaN",
+    );
+    refused(
+        |s| s.background = Background::Constant([0.0, 0.0, 0.0, 1.5]),
+        "background",
+        "alpha",
+        "1.5",
+    );
     let (bottom, top) = ([0.0; 3], [f32::INFINITY; 3]);
     refused(|s| s.background = Background::Gradient { bottom, top }, "background", "top", "inf");
 }
@@ -129,14 +158,20 @@ fn colors_that_are_nan_are_refused_wherever_they_come_from() {
     let with = |m: Material| move |s: &mut Scene| s.materials[0] = m;
     let broken = image(|i| if i == 5 { [0.5, 0.5, 0.5, f32::INFINITY] } else { [0.5; 4] });
     refused(with(Material::matte([1.0; 3]).textured(broken)), "material 0", "texture", "(1, 1)");
-    let map = |colors| Material::matte([1.0; 3]).colored_by_scalars(ColorMap::new(colors, [0.0, 1.0]));
+    let map =
+        |colors| Material::matte([1.0; 3]).colored_by_scalars(ColorMap::new(colors, [0.0, 1.0]));
     refused(with(map(vec![[1.0; 4], [0.0, nan, 0.0, 1.0]])), "material 0", "color map", "place 1");
     let mut empty = ColorMap::new(vec![], [0.0, 1.0]);
     empty.colors.clear();
     let by_empty = Material::matte([1.0; 3]).colored_by_scalars(empty);
     refused(with(by_empty), "material 0", "color map", "without colours");
     let log = ColorMap { log: true, ..ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]) };
-    refused(with(Material::matte([1.0; 3]).colored_by_scalars(log)), "material 0", "range", "[0.0, 1.0]");
+    refused(
+        with(Material::matte([1.0; 3]).colored_by_scalars(log)),
+        "material 0",
+        "range",
+        "[0.0, 1.0]",
+    );
     let own = || Attribute::per_vertex(vec![[1.0; 4], [1.0; 4], [1.0, nan, 1.0, 1.0], [1.0; 4]]);
     let look = Appearance::new(0).with_colors(own());
     refused(|s| s.appearances[0] = look, "appearance 0", "colors", "place 2");
@@ -175,8 +210,10 @@ fn attributes_of_shapes_must_fit_and_worlds_cannot_be_swapped() {
     b.shape(balls(), Material::matte([1.0; 3]));
     let mut scene = b.build().unwrap();
     for n in [1, 3] {
-        scene.appearances[0] = Appearance::new(0).with_colors(Attribute::per_vertex(vec![[1.0; 4]; n]));
-        let expected = SceneError::AttributeLength { appearance: 0, field: "colors", expected: 2, found: n };
+        scene.appearances[0] =
+            Appearance::new(0).with_colors(Attribute::per_vertex(vec![[1.0; 4]; n]));
+        let expected =
+            SceneError::AttributeLength { appearance: 0, field: "colors", expected: 2, found: n };
         assert_eq!(scene.check(), Err(expected));
     }
     scene.appearances[0] = Appearance::new(0).with_colors(Attribute::per_vertex(vec![[1.0; 4]; 2]));
@@ -200,7 +237,8 @@ fn a_camera_whose_depth_range_is_nan_is_refused() {
 
 #[test]
 fn an_instruction_set_that_the_machine_lacks_is_refused_by_name() {
-    let all = [SimdLevel::Sse2, SimdLevel::Sse42, SimdLevel::Avx2, SimdLevel::Avx512, SimdLevel::Neon];
+    let all =
+        [SimdLevel::Sse2, SimdLevel::Sse42, SimdLevel::Avx2, SimdLevel::Avx512, SimdLevel::Neon];
     let available = SimdLevel::available();
     let mut lacking = 0;
     for level in all {
@@ -250,16 +288,24 @@ fn a_size_that_a_light_cannot_have_is_refused() {
     ] {
         assert_eq!(light.with_size(0.25).unwrap().size(), 0.25, "{light:?}");
     }
-    let LightKind::Quad { corner, edges, .. } = quad.with_size(0.25).unwrap().kind else { panic!() };
+    let LightKind::Quad { corner, edges, .. } = quad.with_size(0.25).unwrap().kind else {
+        panic!()
+    };
     assert_eq!(edges, [DVec3::X * 0.5, DVec3::Y * 0.125]);
-    assert_eq!(corner + 0.5 * (edges[0] + edges[1]), place + DVec3::new(1.0, 0.25, 0.0), "the middle");
+    assert_eq!(
+        corner + 0.5 * (edges[0] + edges[1]),
+        place + DVec3::new(1.0, 0.25, 0.0),
+        "the middle"
+    );
 }
 
 #[test]
 fn a_light_of_highlights_alone_casts_shadows() {
     // A plate above a floor; light straight down gives only highlights.
-    let light =
-        Light { highlight_color: Some([1.0; 3]), ..Light::directional(DVec3::Z).with_color([0.0; 3]) };
+    let light = Light {
+        highlight_color: Some([1.0; 3]),
+        ..Light::directional(DVec3::Z).with_color([0.0; 3])
+    };
     let draw = |light: Light| {
         let mut b = SceneBuilder::new();
         b.mesh(square(0.0, 3.0), Material::phong([0.0; 3], 1.0, 1.0));
@@ -301,8 +347,12 @@ fn what_changes_no_pixel_is_said_by_name() {
     let colors = Attribute::per_vertex(vec![[1.0; 4]; 4]);
     scene.appearances[0] =
         Appearance::new(0).with_colors(colors).with_scalars(Attribute::per_vertex(vec![0.0; 4]));
-    assert_eq!(warned(&scene, &options, &["material 0 maps no scalars, but instance 0 has scalars"]), 1);
-    scene.materials[0] = Material::matte([1.0; 3]).colored_by_scalars(ColorMap::new(vec![], [0.0, 1.0]));
+    assert_eq!(
+        warned(&scene, &options, &["material 0 maps no scalars, but instance 0 has scalars"]),
+        1
+    );
+    scene.materials[0] =
+        Material::matte([1.0; 3]).colored_by_scalars(ColorMap::new(vec![], [0.0, 1.0]));
     assert_eq!(warned(&scene, &options, &["instance 0 has colours of its own"]), 1);
     // Pictures on a shape.
     let mut b = SceneBuilder::new();
@@ -310,7 +360,11 @@ fn what_changes_no_pixel_is_said_by_name() {
     b.shape(Arc::new(balls), Material::matte([1.0; 3]).textured(image(|_| [0.5; 4])));
     b.light(Light::directional(DVec3::Z));
     let scene = b.build().unwrap();
-    warned(&scene, &options, &["material 0 has a texture, but instance 0 has no texture coordinates"]);
+    warned(
+        &scene,
+        &options,
+        &["material 0 has a texture, but instance 0 has no texture coordinates"],
+    );
     // Limits that cannot be reached.
     let o = RenderOptions { depth_min_opacity: 0.5, ..options.clone() };
     warned(&plain(), &o, &["depth_min_opacity 0.5 changes nothing"]);

@@ -23,9 +23,10 @@ fn path(n: u32, samples: u32) -> RenderOptions {
 
 #[test]
 fn white_furnace_returns_what_it_gets() {
-    // In a uniform environment of radiance 1, a body that absorbs nothing is invisible. Convex bodies: one bounce suffices.
-    // Tolerances: matte and mirrors are exact per sample up to rounding; glass needs many bounces, where roulette adds noise;
-    // single-scattering microfacets lose the light that would scatter twice (below 2 % at roughness 0.3).
+    // In a uniform environment of radiance 1, a body that absorbs nothing is invisible. Convex
+    // bodies: one bounce suffices. Tolerances: matte and mirrors are exact per sample up to
+    // rounding; glass needs many bounces, where roulette adds noise; single-scattering microfacets
+    // lose the light that would scatter twice (below 2 % at roughness 0.3).
     for (name, m, low, high) in [
         ("matte", Material::matte([1.0; 3]), 0.99999, 1.00001),
         ("mirror", Material::metal([1.0; 3], 0.0), 0.99999, 1.00001),
@@ -33,7 +34,8 @@ fn white_furnace_returns_what_it_gets() {
         ("rough metal", Material::metal([1.0; 3], 0.3), 0.98, 1.00001),
         ("pbr", Material::pbr([1.0; 3], 0.0, 0.3), 0.96, 1.01),
     ] {
-        let mut s = scene(vec![(sphere(Vec3::ZERO, 1.0, 32), Material { flat: true, ..m })], vec![]);
+        let mut s =
+            scene(vec![(sphere(Vec3::ZERO, 1.0, 32), Material { flat: true, ..m })], vec![]);
         s.environment = Some(Environment::Constant([1.0; 3]));
         s.background = Background::Environment;
         let o = draw(&s, &camera(DVec3::new(4.0, 0.0, 1.0), 0.4), path(24, 64));
@@ -44,7 +46,8 @@ fn white_furnace_returns_what_it_gets() {
 
 #[test]
 fn closed_furnace_sums_the_geometric_series() {
-    // Inside a closed matte body of albedo a that emits 1 - a everywhere, radiance is (1-a)/(1-a) = 1 from every point.
+    // Inside a closed matte body of albedo a that emits 1 - a everywhere, radiance is (1-a)/(1-a) =
+    // 1 from every point.
     for albedo in [0.3f32, 0.8] {
         let m = Material::matte([albedo; 3]).with_emission([1.0 - albedo; 3]);
         let s = scene(vec![(sphere(Vec3::ZERO, 1.0, 12), Material { flat: true, ..m })], vec![]);
@@ -85,7 +88,10 @@ fn path_tracer_agrees_with_local_shading_on_direct_light() {
 fn colour_bleeds_only_with_path_tracing() {
     let wall = quad(Vec3::new(0.0, 0.0, 1.0), Vec3::Y * 2.0, Vec3::Z);
     let s = scene(
-        vec![(floor(0.0, 2.0), Material::matte([1.0; 3])), (wall, Material::matte([1.0, 0.0, 0.0]))],
+        vec![
+            (floor(0.0, 2.0), Material::matte([1.0; 3])),
+            (wall, Material::matte([1.0, 0.0, 0.0])),
+        ],
         vec![Light::directional(DVec3::new(0.5, 0.0, 1.0))],
     );
     let c = rt_core::camera::Camera::orthographic(
@@ -115,17 +121,26 @@ fn opacity_by_chance_has_the_mean_of_opacity_by_layers() {
     let c = top_camera(5.0, 2.0);
     let o = draw(&s, &c, path(16, 256));
     // 65536 independent choices of variance 0.3 * 0.7 * 0.8².
-    assert!((mean_red(&o) - 0.44).abs() < 5.0 * (0.1344f64 / 65536.0).sqrt() + 1e-4, "{}", mean_red(&o));
+    assert!(
+        (mean_red(&o) - 0.44).abs() < 5.0 * (0.1344f64 / 65536.0).sqrt() + 1e-4,
+        "{}",
+        mean_red(&o)
+    );
 }
 
 #[test]
 fn ambient_occlusion_equals_the_path_tracer_s_first_bounce() {
     // A black-walled corner: what is not blocked sees the ambient light, in both integrators.
     let wall = quad(Vec3::new(0.0, 0.0, 1.0), Vec3::Y * 50.0, Vec3::Z);
-    let parts =
-        || vec![(floor(0.0, 50.0), Material::matte([0.5; 3])), (wall.clone(), Material::matte([0.0; 3]))];
+    let parts = || {
+        vec![
+            (floor(0.0, 50.0), Material::matte([0.5; 3])),
+            (wall.clone(), Material::matte([0.0; 3])),
+        ]
+    };
     let mut s = scene(parts(), vec![Light::ambient([1.0; 3])]);
-    s.ambient_occlusion = Some(rt_core::scene::AmbientOcclusion { distance: f64::INFINITY, rays: 256 });
+    s.ambient_occlusion =
+        Some(rt_core::scene::AmbientOcclusion { distance: f64::INFINITY, rays: 256 });
     let c = rt_core::camera::Camera::orthographic(
         DVec3::new(0.5, 0.0, 4.0),
         DVec3::new(0.5, 0.0, 0.0),
@@ -170,7 +185,8 @@ fn russian_roulette_and_bounces_do_not_change_the_mean_of_glass() {
         RenderOptions { min_contribution: 0.0, max_bounces: Some(12), ..RenderOptions::new(8, 8) },
     );
     let traced = draw(&s, &c, path(8, 2048));
-    // Rows of reflections between the faces: T² a / (1 - R² a²) with R = 0.04, T = 0.96, a = e^-0.3; the rest is lost to the sky.
+    // Rows of reflections between the faces: T² a / (1 - R² a²) with R = 0.04, T = 0.96, a =
+    // e^-0.3; the rest is lost to the sky.
     let a = (-0.3f64).exp();
     let expected = 0.96 * 0.96 * a / (1.0 - 0.0016 * a * a);
     assert!((mean_red(&whitted) - expected).abs() < 1e-4, "{} {expected}", mean_red(&whitted));
@@ -179,7 +195,8 @@ fn russian_roulette_and_bounces_do_not_change_the_mean_of_glass() {
 
 #[test]
 fn thin_lens_is_sharp_at_the_focus_distance_only() {
-    // Edge of a half plane at distance d from a lens of radius r focused at f: its image is blurred over r |d - f| / f each side.
+    // Edge of a half plane at distance d from a lens of radius r focused at f: its image is blurred
+    // over r |d - f| / f each side.
     let (r, f) = (0.2, 4.0);
     let c = rt_core::camera::Camera::perspective(
         DVec3::new(0.0, 0.0, 4.0),
@@ -194,7 +211,10 @@ fn thin_lens_is_sharp_at_the_focus_distance_only() {
     .unwrap();
     for (z, blur) in [(0.0f32, 0.0), (2.0, r * 0.5), (-4.0, r)] {
         let s = scene(
-            vec![(quad(Vec3::new(-50.0, 0.0, z), Vec3::X * 50.0, Vec3::Y * 50.0), Material::unlit([1.0; 3]))],
+            vec![(
+                quad(Vec3::new(-50.0, 0.0, z), Vec3::X * 50.0, Vec3::Y * 50.0),
+                Material::unlit([1.0; 3]),
+            )],
             vec![],
         );
         let o = draw(&s, &c, RenderOptions { samples: 256, ..RenderOptions::new(64, 64) });
@@ -219,7 +239,10 @@ fn thin_lens_is_sharp_at_the_focus_distance_only() {
 fn several_samples_average_over_the_pixel() {
     // An edge at a quarter of a pixel: coverage 0.25 where one sample says 0.
     let s = scene(
-        vec![(quad(Vec3::new(-4.75, 0.0, 0.0), Vec3::X * 5.0, Vec3::Y * 50.0), Material::unlit([1.0; 3]))],
+        vec![(
+            quad(Vec3::new(-4.75, 0.0, 0.0), Vec3::X * 5.0, Vec3::Y * 50.0),
+            Material::unlit([1.0; 3]),
+        )],
         vec![],
     );
     let c = top_camera(5.0, 8.0);
@@ -230,7 +253,8 @@ fn several_samples_average_over_the_pixel() {
 
 #[test]
 fn low_discrepancy_samples_converge_faster_than_random_ones() {
-    // Soft shadow: root mean square error against 4096 random samples per pixel, at 16 and 256 rays.
+    // Soft shadow: root mean square error against 4096 random samples per pixel, at 16 and 256
+    // rays.
     let blocker = quad(Vec3::new(-10.0, 0.0, 1.0), Vec3::X * 10.0, Vec3::Y * 20.0);
     let s = scene(
         vec![(floor(0.0, 30.0), Material::matte([1.0; 3])), (blocker, Material::matte([1.0; 3]))],
@@ -251,13 +275,19 @@ fn low_discrepancy_samples_converge_faster_than_random_ones() {
     let truth = shot(Sampling::Sobol, 16384, 99);
     let error = |sampling, n| {
         let o = shot(sampling, n, 1);
-        let sum: f64 =
-            truth.frame.color.iter().zip(&o.frame.color).map(|(a, b)| ((a[0] - b[0]) as f64).powi(2)).sum();
+        let sum: f64 = truth
+            .frame
+            .color
+            .iter()
+            .zip(&o.frame.color)
+            .map(|(a, b)| ((a[0] - b[0]) as f64).powi(2))
+            .sum();
         (sum / 256.0).sqrt()
     };
     let (r16, r256) = (error(Sampling::Random, 16), error(Sampling::Random, 256));
     let (s16, s256) = (error(Sampling::Sobol, 16), error(Sampling::Sobol, 256));
-    // Random: 1/sqrt(16) = 0.25 (0.18 to 0.35 for 256 pixels). Sobol: near n^-3/4 behind an edge, 0.125.
+    // Random: 1/sqrt(16) = 0.25 (0.18 to 0.35 for 256 pixels). Sobol: near n^-3/4 behind an edge,
+    // 0.125.
     assert!(r256 / r16 > 0.18 && r256 / r16 < 0.35, "random {r16} {r256}");
     assert!(s256 / s16 < 0.18, "sobol {s16} {s256}");
     assert!(s256 < 0.4 * r256, "{s256} {r256}");

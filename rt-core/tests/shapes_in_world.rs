@@ -21,9 +21,11 @@ fn hits_through_the_world_are_those_of_trying_every_primitive() {
     let mut rng = Random::new(1);
     let points: Vec<Vec3> = (0..200).map(|_| 4.0 * rng.cube()).collect();
     let n = 17u32;
-    let ball: Vec<f32> =
-        (0..n * n * n).map(|i| (UVec3::new(i % n, i / n % n, i / n / n).as_vec3() - 8.0).length()).collect();
-    let grid = Arc::new(Grid::new(UVec3::splat(n), DVec3::splat(-4.0), DVec3::splat(0.5), ball).unwrap());
+    let ball: Vec<f32> = (0..n * n * n)
+        .map(|i| (UVec3::new(i % n, i / n % n, i / n / n).as_vec3() - 8.0).length())
+        .collect();
+    let grid =
+        Arc::new(Grid::new(UVec3::splat(n), DVec3::splat(-4.0), DVec3::splat(0.5), ball).unwrap());
     let shapes: [Arc<dyn Shape>; 3] = [
         Arc::new(Spheres::new(points.clone(), Radii::Common(0.3)).unwrap()),
         Arc::new(Tubes::new(points, &[0, 50, 120, 200], Radii::Common(0.1)).unwrap()),
@@ -65,8 +67,9 @@ fn hits_through_the_world_are_those_of_trying_every_primitive() {
 #[test]
 fn no_ray_leaves_a_closed_isosurface_through_the_world() {
     let n = 33u32;
-    let ball: Vec<f32> =
-        (0..n * n * n).map(|i| (UVec3::new(i % n, i / n % n, i / n / n).as_vec3() - 16.0).length()).collect();
+    let ball: Vec<f32> = (0..n * n * n)
+        .map(|i| (UVec3::new(i % n, i / n % n, i / n / n).as_vec3() - 16.0).length())
+        .collect();
     let origin = DVec3::new(1e6, -3e5, 7.0);
     let grid = Arc::new(Grid::new(UVec3::splat(n), origin, DVec3::splat(0.01), ball).unwrap());
     let world = world_of(

@@ -33,7 +33,8 @@ fn noise(n: u32, seed: u64) -> Arc<Grid> {
 }
 
 fn surface_of(g: &Arc<Grid>, isovalues: &[f32], brick_cells: u32) -> Isosurface {
-    Isosurface::new(g.clone(), isovalues, &IsosurfaceOptions { brick_cells, ..Default::default() }).unwrap()
+    Isosurface::new(g.clone(), isovalues, &IsosurfaceOptions { brick_cells, ..Default::default() })
+        .unwrap()
 }
 
 /// Trilinear value in f64, as a sum over corners.
@@ -77,8 +78,13 @@ fn no_ray_leaves_a_closed_surface_unseen() {
     let middle = Vec3::splat(8.0);
     let mut leaks = 0;
     for k in 0..30_000 {
-        // From inside, on or off the lattice, at lattice points, edges, faces, anywhere; also along axes and diagonals in grid planes.
-        let origin = if k % 2 == 0 { middle + (2.0 * rng.cube()).round() } else { middle + 2.0 * rng.cube() };
+        // From inside, on or off the lattice, at lattice points, edges, faces, anywhere; also along
+        // axes and diagonals in grid planes.
+        let origin = if k % 2 == 0 {
+            middle + (2.0 * rng.cube()).round()
+        } else {
+            middle + 2.0 * rng.cube()
+        };
         let mut target = lattice(&mut rng);
         match k % 5 {
             1 => target.x += rng.unit(),
@@ -110,8 +116,9 @@ fn no_ray_leaves_a_closed_surface_unseen() {
 
 #[test]
 fn parity_of_crossings_in_noise() {
-    // Every cell of white noise has a surface, with saddles and tunnels: the number of crossings from an outside point must be even
-    // when the other end is outside too, and odd when it is inside.
+    // Every cell of white noise has a surface, with saddles and tunnels: the number of crossings
+    // from an outside point must be even when the other end is outside too, and odd when it is
+    // inside.
     let n = 9;
     let (g, mut rng, mut total) = (noise(n, 3), Random::new(8), 0);
     for bricks in [1, 3, 4] {
@@ -137,7 +144,8 @@ fn parity_of_crossings_in_noise() {
             if at_end.abs() < 1e-5 {
                 continue; // f32 `at` may be on the other side
             }
-            // Pairs nearer than one ulp of t come out as one; they have to be rare, and here they must not occur.
+            // Pairs nearer than one ulp of t come out as one; they have to be rare, and here they
+            // must not occur.
             let odd = all.len() % 2 == 1;
             assert_eq!(odd, at_end < 0.0, "bricks {bricks} ray {k} {ray:?}: {all:?}");
             total += all.len();
@@ -152,7 +160,8 @@ fn brick_size_does_not_change_a_bit() {
     let surfaces = [1, 2, 3, 8, 255].map(|b| surface_of(&g, &[-0.2, 0.3], b));
     let mut rng = Random::new(6);
     for k in 0..2000 {
-        let target = if k % 2 == 0 { (4.0 + 3.0 * rng.cube()).round() } else { 4.0 + 3.0 * rng.cube() };
+        let target =
+            if k % 2 == 0 { (4.0 + 3.0 * rng.cube()).round() } else { 4.0 + 3.0 * rng.cube() };
         let origin = target + 20.0 * if k % 3 == 0 { Vec3::X } else { rng.unit_vector() };
         let ray = Ray::new(origin, target - origin);
         let hits: Vec<_> = surfaces.iter().map(|s| closest(s, &ray).map(|(_, h)| h)).collect();
@@ -201,7 +210,8 @@ fn agrees_with_a_fine_scan_at_all_scales() {
             match (hit, found) {
                 (Some((_, hit)), Some(t)) => {
                     let error = (f64::from(hit.t) - t).abs();
-                    // A tangential pair may lie between two steps of the scan: then the hit is earlier and on the surface.
+                    // A tangential pair may lie between two steps of the scan: then the hit is
+                    // earlier and on the surface.
                     let on = f(f64::from(hit.t)).abs() < 1e-5 && f64::from(hit.t) < t;
                     assert!(error < 1e-7 * t + 1e-6 * step || on, "{spacing} {k}: {} {t}", hit.t);
                     hits += 1;
@@ -224,11 +234,13 @@ fn planes_at_grid_points_are_hit_once_and_exactly() {
         for brick in [1, 2, 4] {
             let s = surface_of(&g, &[2.0], brick);
             let h = spacing as f32;
-            for (y, z) in [(0.0, 0.0), (-0.0, 5.0), (1.0, 2.0), (2.5, 2.0), (5.0, 5.0), (1.3, 4.9)] {
+            for (y, z) in [(0.0, 0.0), (-0.0, 5.0), (1.0, 2.0), (2.5, 2.0), (5.0, 5.0), (1.3, 4.9)]
+            {
                 for zero in [0.0f32, -0.0] {
                     let up = Ray::new(Vec3::new(-h, y * h, z * h), Vec3::new(h, zero, zero));
                     assert_eq!(crossings(&s, &up), [3.0], "brick {brick} at {y} {z}");
-                    let down = Ray::new(Vec3::new(7.0 * h, y * h, z * h), Vec3::new(-h, zero, zero));
+                    let down =
+                        Ray::new(Vec3::new(7.0 * h, y * h, z * h), Vec3::new(-h, zero, zero));
                     assert_eq!(crossings(&s, &down), [5.0]);
                 }
             }
@@ -302,8 +314,14 @@ fn nan_and_infinite_values_empty_their_cells_and_are_counted() {
     g.values[b] = f32::INFINITY;
     let s = surface_of(&g.into(), &[3.5], 4);
     assert_eq!((s.report().cells_non_finite, s.report().cells), (9, 343));
-    assert!(closest(&s, &Ray::new(Vec3::new(-1.0, 2.5, 2.5), Vec3::X)).is_none(), "through the hole");
-    assert!(closest(&s, &Ray::new(Vec3::new(-1.0, 1.5, 2.5), Vec3::X)).is_some(), "beside the hole");
+    assert!(
+        closest(&s, &Ray::new(Vec3::new(-1.0, 2.5, 2.5), Vec3::X)).is_none(),
+        "through the hole"
+    );
+    assert!(
+        closest(&s, &Ray::new(Vec3::new(-1.0, 1.5, 2.5), Vec3::X)).is_some(),
+        "beside the hole"
+    );
     let all = grid(4, DVec3::ONE, |_| f32::NAN);
     let s = surface_of(&all, &[0.0], 4);
     assert_eq!((s.num_primitives(), s.report().cells_non_finite), (0, 27));
@@ -325,7 +343,8 @@ fn secondary_rays_from_the_surface_do_not_hit_it_again() {
             let surf = s.surface(prim, &h, &ray);
             let out = (surf.normal + 0.99 * rng.unit_vector()).normalize();
             if out.dot(surf.normal) > 1e-2 {
-                // Grid values are f32: the "plane" itself is uneven by an ulp of its values, 5e-7 of a cell.
+                // Grid values are f32: the "plane" itself is uneven by an ulp of its values, 5e-7
+                // of a cell.
                 let start = surf.point + surf.normal * (2.0 * surf.point_error + 1e-6 * spacing);
                 assert!(closest(&s, &Ray::new(start, out)).is_none(), "spacing {spacing}");
                 tested += 1;
@@ -339,7 +358,8 @@ fn secondary_rays_from_the_surface_do_not_hit_it_again() {
 fn smooth_normals_follow_central_differences() {
     let g = ball(17);
     let options = IsosurfaceOptions { normals: IsosurfaceNormals::Smooth, ..Default::default() };
-    let (smooth, exact) = (Isosurface::new(g.clone(), &[5.3], &options).unwrap(), surface_of(&g, &[5.3], 4));
+    let (smooth, exact) =
+        (Isosurface::new(g.clone(), &[5.3], &options).unwrap(), surface_of(&g, &[5.3], 4));
     let mut rng = Random::new(13);
     let (mut worst_smooth, mut worst_exact) = (1f32, 1f32);
     for _ in 0..500 {
@@ -353,9 +373,11 @@ fn smooth_normals_follow_central_differences() {
 
 #[test]
 fn useless_input_is_refused_with_the_cure() {
-    let flat = Arc::new(Grid::new(UVec3::new(4, 4, 1), DVec3::ZERO, DVec3::ONE, vec![0.0; 16]).unwrap());
+    let flat =
+        Arc::new(Grid::new(UVec3::new(4, 4, 1), DVec3::ZERO, DVec3::ONE, vec![0.0; 16]).unwrap());
     let make = |g: &Arc<Grid>, iso: &[f32], brick_cells| {
-        Isosurface::new(g.clone(), iso, &IsosurfaceOptions { brick_cells, ..Default::default() }).unwrap_err()
+        Isosurface::new(g.clone(), iso, &IsosurfaceOptions { brick_cells, ..Default::default() })
+            .unwrap_err()
     };
     assert!(matches!(make(&flat, &[0.0], 4), ShapeError::NoCells { .. }));
     let g = ball(3);

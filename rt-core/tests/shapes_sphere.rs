@@ -11,12 +11,14 @@ fn one(center: Vec3, radius: f32) -> Spheres {
     Spheres::new(vec![center], Radii::Common(radius)).unwrap()
 }
 
-/// (relative error of t against the distance travelled, distance of the surface point from the sphere) of an aimed ray.
+/// (relative error of t against the distance travelled, distance of the surface point from the
+/// sphere) of an aimed ray.
 fn error_of(center: Vec3, r: f32, origin: Vec3, dir: Vec3) -> Option<(f64, f64)> {
     let s = one(center, r);
     let ray = Ray::new(origin, dir);
     let hit = s.closest(0, &ray)?;
-    // The oracle: closest approach in f64, then the half chord. (Independent of the product-of-roots form.)
+    // The oracle: closest approach in f64, then the half chord. (Independent of the
+    // product-of-roots form.)
     let (o, d, c) = (origin.as_dvec3(), dir.as_dvec3(), center.as_dvec3());
     let len = d.length();
     let along = (c - o).dot(d) / len;
@@ -42,7 +44,8 @@ fn scales_offsets_and_directions_of_any_length() {
                     let origin = center + scale * 5.0 * rng.unit_vector();
                     let target = center + 0.9 * scale * rng.unit_vector();
                     let dir = (target - origin).normalize() * length;
-                    let (err, _) = error_of(center, scale, origin, dir).expect("aimed inside the sphere");
+                    let (err, _) =
+                        error_of(center, scale, origin, dir).expect("aimed inside the sphere");
                     worst = worst.max(err);
                 }
             }
@@ -53,14 +56,16 @@ fn scales_offsets_and_directions_of_any_length() {
 
 #[test]
 fn small_and_far_without_cancellation() {
-    // A radius of 1e-4 at a distance of 1000: with r² − |oc|² + b² in f32 all digits are gone (squares differ by 1e-14 relative).
+    // A radius of 1e-4 at a distance of 1000: with r² − |oc|² + b² in f32 all digits are gone
+    // (squares differ by 1e-14 relative).
     let (mut rng, mut hits) = (Random::new(5), 0);
     let s = one(Vec3::ZERO, 1e-4);
     for _ in 0..1000 {
         let origin = 1000.0 * rng.unit_vector();
         let dir = 1.5e-4 * rng.unit_vector() - origin;
         let d = dir.as_dvec3();
-        let distance = (origin.as_dvec3() - d * origin.as_dvec3().dot(d) / d.length_squared()).length();
+        let distance =
+            (origin.as_dvec3() - d * origin.as_dvec3().dot(d) / d.length_squared()).length();
         let hit = s.closest(0, &Ray::new(origin, dir));
         if (distance - f64::from(1e-4f32)).abs() > 1e-12 {
             assert_eq!(hit.is_some(), distance < f64::from(1e-4f32), "distance {distance}");
@@ -126,7 +131,10 @@ fn secondary_rays_from_the_surface_do_not_hit_it_again() {
             // Twice: once for the point's error, once for the rounding of the sum.
             let start = surf.point + surf.normal * (2.0 * surf.point_error);
             if out.normalize().dot(surf.normal) > 1e-3 {
-                assert!(s.closest(0, &Ray::new(start, out)).is_none(), "r {radius} offset {offset}");
+                assert!(
+                    s.closest(0, &Ray::new(start, out)).is_none(),
+                    "r {radius} offset {offset}"
+                );
             }
         }
     }
@@ -136,7 +144,15 @@ fn secondary_rays_from_the_surface_do_not_hit_it_again() {
 fn nan_negative_and_zero_radii_are_left_out_and_counted() {
     let inf = f32::INFINITY;
     let s = Spheres::new(
-        vec![Vec3::ZERO, Vec3::NAN, Vec3::splat(inf), Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::splat(3e38)],
+        vec![
+            Vec3::ZERO,
+            Vec3::NAN,
+            Vec3::splat(inf),
+            Vec3::ZERO,
+            Vec3::ZERO,
+            Vec3::ZERO,
+            Vec3::splat(3e38),
+        ],
         Radii::Each(vec![1.0, 1.0, 1.0, f32::NAN, -1.0, 0.0, 3e38]),
     )
     .unwrap();
@@ -166,7 +182,13 @@ fn wrong_lengths_are_named() {
     let e = Spheres::new(vec![Vec3::ZERO; 3], Radii::Each(vec![1.0])).unwrap_err();
     assert_eq!(
         e,
-        ShapeError::Length { shape: "spheres", field: "radii", per: "sphere", expected: 3, found: 1 }
+        ShapeError::Length {
+            shape: "spheres",
+            field: "radii",
+            per: "sphere",
+            expected: 3,
+            found: 1
+        }
     );
     assert!(e.to_string().contains("3 in all"));
     assert!(one(Vec3::ZERO, 1.0).with_scalars(vec![]).is_err());

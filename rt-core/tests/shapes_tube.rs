@@ -1,4 +1,5 @@
-//! Tubes and cylinders against a slow reference that knows no quadratic: the union of all spheres along the axis.
+//! Tubes and cylinders against a slow reference that knows no quadratic: the union of all spheres
+//! along the axis.
 
 mod shapes_common;
 
@@ -7,8 +8,8 @@ use rt_core::ray::Ray;
 use rt_core::shapes::{Cylinders, Radii, Shape, ShapeError, Tubes};
 use shapes_common::{Random, closest};
 
-/// Distance of `p` to the union of the spheres around a + w·(b−a) of radius ra + w·(rb−ra), 0 ≤ w ≤ 1: a convex function of w,
-/// minimised by ternary search.
+/// Distance of `p` to the union of the spheres around a + w·(b−a) of radius ra + w·(rb−ra), 0 ≤ w ≤
+/// 1: a convex function of w, minimised by ternary search.
 fn distance(p: DVec3, a: DVec3, b: DVec3, ra: f64, rb: f64) -> f64 {
     let f = |w: f64| (p - a - w * (b - a)).length() - (ra + w * (rb - ra));
     let (mut lo, mut hi) = (0.0, 1.0);
@@ -19,8 +20,9 @@ fn distance(p: DVec3, a: DVec3, b: DVec3, ra: f64, rb: f64) -> f64 {
     f(0.0).min(f(1.0)).min(f(0.5 * (lo + hi)))
 }
 
-/// Entry and exit by search along the ray in [t0, t1] (the distance to a convex body is convex along a line); `None` also when the
-/// ray comes nearer than `graze` to touching, where the reference cannot decide.
+/// Entry and exit by search along the ray in [t0, t1] (the distance to a convex body is convex
+/// along a line); `None` also when the ray comes nearer than `graze` to touching, where the
+/// reference cannot decide.
 enum Reference {
     Miss,
     Grazing,
@@ -96,15 +98,20 @@ fn rounded_cones_agree_with_the_union_of_spheres() {
                 let expected = if near >= 0.0 { near } else { far };
                 let Some(hit) = hit else { panic!("case {case}: missed {near}..{far}") };
                 let error = (f64::from(hit.t) - expected).abs();
-                // The search is good to the square root of f64's resolution at its bend; at grazing exits the depth decides.
+                // The search is good to the square root of f64's resolution at its bend; at grazing
+                // exits the depth decides.
                 assert!(
                     error <= 1e-6 * expected.abs() + 1e-7 * size / d.length(),
                     "case {case}: {} {expected}",
                     hit.t
                 );
                 let s = tubes.surface(0, &hit, &ray);
-                let off = distance(s.point.as_dvec3(), a.as_dvec3(), b.as_dvec3(), ra.into(), rb.into());
-                assert!(off.abs() <= f64::from(s.point_error) + 1e-9 * size, "case {case}: off by {off}");
+                let off =
+                    distance(s.point.as_dvec3(), a.as_dvec3(), b.as_dvec3(), ra.into(), rb.into());
+                assert!(
+                    off.abs() <= f64::from(s.point_error) + 1e-9 * size,
+                    "case {case}: off by {off}"
+                );
                 let h = 1e-5 * size;
                 let slope = |n: DVec3| {
                     let at = |k: f64| {
@@ -119,7 +126,10 @@ fn rounded_cones_agree_with_the_union_of_spheres() {
                     (at(1.0) - at(-1.0)) / (2.0 * h)
                 };
                 if ra.min(rb) > 1e-3 * size as f32 {
-                    assert!(slope(s.normal.as_dvec3()) > 0.99, "case {case}: normal is not the gradient");
+                    assert!(
+                        slope(s.normal.as_dvec3()) > 0.99,
+                        "case {case}: normal is not the gradient"
+                    );
                 }
                 hits += 1;
             }
@@ -142,7 +152,8 @@ fn radius_of_a_millionth_of_the_length() {
     for _ in 0..20_000 {
         let on_axis = a + (b - a) * f64::from(rng.range(0.01, 0.99));
         let origin = (on_axis + 2.0 * rng.unit_vector().as_dvec3()).as_vec3();
-        let dir = (on_axis + 1.5 * f64::from(r) * rng.cube().as_dvec3() - origin.as_dvec3()).as_vec3();
+        let dir =
+            (on_axis + 1.5 * f64::from(r) * rng.cube().as_dvec3() - origin.as_dvec3()).as_vec3();
         // Distance of the two lines in f64, from the rounded ray.
         let (o, d) = (origin.as_dvec3(), dir.as_dvec3());
         let n = d.cross(e).normalize();
@@ -164,7 +175,9 @@ fn radius_of_a_millionth_of_the_length() {
 
 #[test]
 fn rays_along_the_axis_hit_the_round_end() {
-    for (ra, rb, expected) in [(1.0f32, 1.0f32, 4.0f32), (0.5, 1.0, 4.5), (0.0, 1.0, 5.0), (1.0, 0.0, 4.0)] {
+    for (ra, rb, expected) in
+        [(1.0f32, 1.0f32, 4.0f32), (0.5, 1.0, 4.5), (0.0, 1.0, 5.0), (1.0, 0.0, 4.0)]
+    {
         let tubes = segment(Vec3::ZERO, Vec3::new(0.0, 0.0, 10.0), ra, rb);
         for zero in [0.0f32, -0.0] {
             let ray = Ray::new(Vec3::new(zero, 0.0, -5.0), Vec3::new(-zero, zero, 1.0));
@@ -173,8 +186,14 @@ fn rays_along_the_axis_hit_the_round_end() {
     }
     // From inside, along and across.
     let tubes = segment(Vec3::ZERO, Vec3::new(0.0, 0.0, 10.0), 1.0, 1.0);
-    assert_eq!(tubes.closest(0, &Ray::new(Vec3::new(0.0, 0.0, 4.0), Vec3::Z)).map(|h| h.t), Some(7.0));
-    assert_eq!(tubes.closest(0, &Ray::new(Vec3::new(0.5, 0.0, 4.0), Vec3::X)).map(|h| h.t), Some(0.5));
+    assert_eq!(
+        tubes.closest(0, &Ray::new(Vec3::new(0.0, 0.0, 4.0), Vec3::Z)).map(|h| h.t),
+        Some(7.0)
+    );
+    assert_eq!(
+        tubes.closest(0, &Ray::new(Vec3::new(0.5, 0.0, 4.0), Vec3::X)).map(|h| h.t),
+        Some(0.5)
+    );
     // Exactly on the lateral surface, parallel to the axis.
     let ray = Ray::new(Vec3::new(1.0, 0.0, -5.0), Vec3::Z);
     assert!(tubes.closest(0, &ray).is_some_and(|h| (4.0..=6.0).contains(&h.t)));
@@ -184,8 +203,9 @@ fn rays_along_the_axis_hit_the_round_end() {
 #[test]
 fn t_min_is_inclusive_and_t_max_exclusive() {
     let tubes = segment(Vec3::new(-5.0, 0.0, 10.0), Vec3::new(5.0, 0.0, 10.0), 1.0, 1.0);
-    let at =
-        |t_min, t_max| tubes.closest(0, &Ray { t_min, t_max, ..Ray::new(Vec3::ZERO, Vec3::Z) }).map(|h| h.t);
+    let at = |t_min, t_max| {
+        tubes.closest(0, &Ray { t_min, t_max, ..Ray::new(Vec3::ZERO, Vec3::Z) }).map(|h| h.t)
+    };
     assert_eq!(at(0.0, f32::INFINITY), Some(9.0));
     assert_eq!(at(9.0, 9f32.next_up()), Some(9.0));
     assert_eq!(at(0.0, 9.0), None);
@@ -193,7 +213,8 @@ fn t_min_is_inclusive_and_t_max_exclusive() {
     assert_eq!(at(9f32.next_up(), 11.0), None);
 }
 
-/// A random walk with bends of every sharpness, varying radii, a repeated point and a swallowed one.
+/// A random walk with bends of every sharpness, varying radii, a repeated point and a swallowed
+/// one.
 fn walk(rng: &mut Random, points: usize, step: f32) -> (Vec<Vec3>, Vec<f32>) {
     let (mut p, mut heading) = (Vec3::ZERO, rng.unit_vector());
     let (mut ps, mut rs) = (vec![p], vec![0.3]);
@@ -218,7 +239,15 @@ fn joints_have_no_gap_and_the_nearest_surface_is_the_union() {
         let tubes = Tubes::new(ps.clone(), &[0, ps.len() as u32], Radii::Each(rs.clone())).unwrap();
         let union = |p: DVec3| {
             (0..ps.len() - 1)
-                .map(|i| distance(p, ps[i].as_dvec3(), ps[i + 1].as_dvec3(), rs[i].into(), rs[i + 1].into()))
+                .map(|i| {
+                    distance(
+                        p,
+                        ps[i].as_dvec3(),
+                        ps[i + 1].as_dvec3(),
+                        rs[i].into(),
+                        rs[i + 1].into(),
+                    )
+                })
                 .fold(f64::INFINITY, f64::min)
         };
         for k in 0..150 {
@@ -283,7 +312,8 @@ fn a_transparent_polyline_shows_one_entry_and_one_exit_per_passage() {
                     _ => merged.push(s),
                 }
             }
-            // Passages within 1e-4 of merging, or between far segments of a walk that crosses itself, are not the subject.
+            // Passages within 1e-4 of merging, or between far segments of a walk that crosses
+            // itself, are not the subject.
             unclear |= merged.windows(2).any(|w| w[1].0 - w[0].1 < 1e-4);
             let crosses_itself = (0..ps.len() - 1).any(|j| {
                 (j + 2..ps.len() - 1)
@@ -299,7 +329,11 @@ fn a_transparent_polyline_shows_one_entry_and_one_exit_per_passage() {
                 r.t_min = h.t.next_up();
             }
             let expected: Vec<f64> = merged.iter().flat_map(|s| [s.0, s.1]).collect();
-            assert_eq!(found.len(), expected.len(), "round {round} ray {k}: {found:?} {expected:?}");
+            assert_eq!(
+                found.len(),
+                expected.len(),
+                "round {round} ray {k}: {found:?} {expected:?}"
+            );
             for (f, e) in found.iter().zip(&expected) {
                 assert!((f - e).abs() < 1e-5, "{f} {e}");
             }
@@ -312,8 +346,10 @@ fn a_transparent_polyline_shows_one_entry_and_one_exit_per_passage() {
 #[test]
 fn scalars_run_along_the_axis_and_are_continuous_at_joints() {
     let ps = vec![Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(8.0, 2.0, 0.0)];
-    let tubes =
-        Tubes::new(ps, &[0, 3], Radii::Common(0.5)).unwrap().with_scalars(vec![0.0, 1.0, 3.0]).unwrap();
+    let tubes = Tubes::new(ps, &[0, 3], Radii::Common(0.5))
+        .unwrap()
+        .with_scalars(vec![0.0, 1.0, 3.0])
+        .unwrap();
     let scalar_at = |x: f32| {
         let ray = Ray::new(Vec3::new(x, 0.0, -5.0), Vec3::Z);
         let (prim, hit) = closest(&tubes, &ray).unwrap();
@@ -353,7 +389,10 @@ fn offsets_that_do_not_fit_are_named() {
     assert!(new(&[0, 2, 4]).is_ok());
     assert_eq!(new(&[0, 2]).unwrap_err(), ShapeError::Offsets { index: 1, value: 2, points: 4 });
     assert_eq!(new(&[1, 4]).unwrap_err(), ShapeError::Offsets { index: 0, value: 1, points: 4 });
-    assert_eq!(new(&[0, 3, 2, 4]).unwrap_err(), ShapeError::Offsets { index: 2, value: 2, points: 4 });
+    assert_eq!(
+        new(&[0, 3, 2, 4]).unwrap_err(),
+        ShapeError::Offsets { index: 2, value: 2, points: 4 }
+    );
     assert!(new(&[]).is_err());
     assert!(Tubes::new(vec![], &[], Radii::Common(1.0)).is_ok());
     assert!(Tubes::new(vec![], &[0], Radii::Common(1.0)).is_ok());
@@ -393,7 +432,10 @@ fn cylinders_side_caps_and_open_ends() {
     let slanted = ray([0.0, 0.0, -1.0], [0.5, 0.0, 1.0]);
     assert_eq!((t(&capped, slanted), t(&open, slanted)), (Some(1.0), Some(2.0)));
     let s = open.surface(0, &open.closest(0, &slanted).unwrap(), &slanted);
-    assert!((s.point - Vec3::new(1.0, 0.0, 1.0)).length() < 1e-6 && (s.normal - Vec3::X).length() < 1e-6);
+    assert!(
+        (s.point - Vec3::new(1.0, 0.0, 1.0)).length() < 1e-6
+            && (s.normal - Vec3::X).length() < 1e-6
+    );
     // Exactly at the mantle's edge and at the axis-parallel mantle line.
     assert_eq!(t(&capped, ray([-5.0, 0.0, 4.0], [1.0, 0.0, 0.0])), Some(4.0));
     assert!(t(&capped, ray([1.0, 0.0, -1.0], [0.0, 0.0, 1.0])).is_some());
@@ -411,7 +453,8 @@ fn cones_agree_with_their_implicit_equation() {
         let origin = scale * 4.0 * rng.unit_vector();
         let target = a.lerp(b, rng.unit()) + 0.3 * ra * rng.cube();
         let ray = Ray::new(origin, target - origin);
-        // Positive outside; the solid is convex, the function is not a distance but has the right sign.
+        // Positive outside; the solid is convex, the function is not a distance but has the right
+        // sign.
         let (da, db) = (a.as_dvec3(), b.as_dvec3());
         let e = (db - da).normalize();
         let len = (db - da).length();

@@ -17,8 +17,13 @@ const INF: f32 = f32::INFINITY;
 
 fn grid(n: u32, spacing: f64, f: impl Fn(Vec3) -> f32) -> Grid {
     let at = |i: u32| Vec3::new((i % n) as f32, (i / n % n) as f32, (i / n / n) as f32);
-    Grid::new(UVec3::splat(n), DVec3::ZERO, DVec3::splat(spacing), (0..n * n * n).map(|i| f(at(i))).collect())
-        .unwrap()
+    Grid::new(
+        UVec3::splat(n),
+        DVec3::ZERO,
+        DVec3::splat(spacing),
+        (0..n * n * n).map(|i| f(at(i))).collect(),
+    )
+    .unwrap()
 }
 
 fn single(color: [f32; 3]) -> ColorMap {
@@ -27,7 +32,12 @@ fn single(color: [f32; 3]) -> ColorMap {
 
 fn rainbow() -> ColorMap {
     ColorMap::new(
-        vec![[0.0, 0.1, 1.0, 1.0], [0.0, 1.0, 0.2, 1.0], [1.0, 0.9, 0.0, 1.0], [1.0, 0.0, 0.1, 1.0]],
+        vec![
+            [0.0, 0.1, 1.0, 1.0],
+            [0.0, 1.0, 0.2, 1.0],
+            [1.0, 0.9, 0.0, 1.0],
+            [1.0, 0.0, 0.1, 1.0],
+        ],
         [-1.0, 1.0],
     )
 }
@@ -53,16 +63,17 @@ fn worst(a: [f32; 4], b: [f64; 4]) -> f64 {
 fn fields() -> [Grid; 2] {
     let mut rng = Random::new(1);
     let noise: Vec<f32> = (0..12 * 12 * 12).map(|_| rng.range(-1.0, 1.0)).collect();
-    let smooth = |p: Vec3| (p.x * 0.9).sin() * (p.y * 0.7 + 0.3).cos() * (0.4 + 0.6 * (p.z * 0.5).sin());
+    let smooth =
+        |p: Vec3| (p.x * 0.9).sin() * (p.y * 0.7 + 0.3).cos() * (0.4 + 0.6 * (p.z * 0.5).sin());
     [grid(12, 1.0, smooth), grid(12, 1.0, |p| noise[(p.x + 12.0 * (p.y + 12.0 * p.z)) as usize])]
 }
 
 fn transfers() -> Vec<Vec<[f32; 2]>> {
     vec![
-        vec![[-1.0, 0.0], [1.0, 0.5]],                                      // ramp
+        vec![[-1.0, 0.0], [1.0, 0.5]], // ramp
         vec![[-1.0, 0.0], [0.1, 0.0], [0.1, 2.0], [0.4, 2.0], [0.4, 0.05]], // steps
-        vec![[0.0, 0.0], [0.29, 0.0], [0.3, 30.0], [0.31, 0.0]],            // thin shell
-        vec![[-1.0, 5.0], [0.0, 0.0], [1.0, 5.0]],                          // dense
+        vec![[0.0, 0.0], [0.29, 0.0], [0.3, 30.0], [0.31, 0.0]], // thin shell
+        vec![[-1.0, 5.0], [0.0, 0.0], [1.0, 5.0]], // dense
     ]
 }
 
@@ -87,11 +98,17 @@ fn rays(rng: &mut Random, n: usize) -> Vec<Ray> {
 fn a_homogeneous_medium_follows_beer_and_lambert_at_all_scales() {
     for spacing in [1e-6f64, 1e-3, 1.0, 1e3, 1e6] {
         let sigma = (0.3 / spacing) as f32;
-        let v = volume(grid(9, spacing, |_| 0.5), single([0.2, 0.5, 1.0]), &[[0.0, sigma], [1.0, sigma]]);
+        let v = volume(
+            grid(9, spacing, |_| 0.5),
+            single([0.2, 0.5, 1.0]),
+            &[[0.0, sigma], [1.0, sigma]],
+        );
         let h = spacing as f32;
-        for (dir, path) in
-            [(Vec3::X, 8.0), (Vec3::new(0.0, -0.0, -4.0), 8.0), (Vec3::new(1.0, 1.0, 0.0), 8.0 * 2f64.sqrt())]
-        {
+        for (dir, path) in [
+            (Vec3::X, 8.0),
+            (Vec3::new(0.0, -0.0, -4.0), 8.0),
+            (Vec3::new(1.0, 1.0, 0.0), 8.0 * 2f64.sqrt()),
+        ] {
             let ray = Ray::new(h * (Vec3::splat(4.0) - 10.0 * dir), h * dir);
             let s = v.integrate(&ray, 0.0, INF, &tolerance(0.01));
             let alpha = 1.0 - (-0.3 * path).exp();
@@ -138,9 +155,13 @@ fn errors_stay_below_the_tolerance() {
                     error = error.max(worst(s.rgba, *exact));
                     count += s.samples;
                 }
-                // The reference's own error: its steps are 1/2000 voxel, worst at steps of the transfer function.
+                // The reference's own error: its steps are 1/2000 voxel, worst at steps of the
+                // transfer function.
                 let allowed = f64::from(levels) / 255.0 + 2e-4;
-                assert!(error <= allowed, "field {f} transfer {k} levels {levels}: {error} > {allowed}");
+                assert!(
+                    error <= allowed,
+                    "field {f} transfer {k} levels {levels}: {error} > {allowed}"
+                );
                 println!(
                     "field {f} tf {k}: {levels} levels, worst {:.4} levels, {} samples/ray",
                     error * 255.0,
@@ -148,7 +169,10 @@ fn errors_stay_below_the_tolerance() {
                 );
                 samples.push(count);
             }
-            assert!(samples[3] > samples[0], "a tighter tolerance must take more samples: {samples:?}");
+            assert!(
+                samples[3] > samples[0],
+                "a tighter tolerance must take more samples: {samples:?}"
+            );
         }
     }
 }
@@ -161,7 +185,9 @@ fn fixed_steps_converge_to_the_reference_and_miss_thin_shells_when_coarse() {
     let ramp = volume(smooth.clone(), rainbow(), &transfers()[0]);
     let error = |v: &Volume, q: &VolumeQuality| {
         rays.iter()
-            .map(|r| worst(v.integrate(r, 0.0, INF, q).rgba, integrate_reference(v, r, 0.0, INF, 0.001)))
+            .map(|r| {
+                worst(v.integrate(r, 0.0, INF, q).rgba, integrate_reference(v, r, 0.0, INF, 0.001))
+            })
             .fold(0.0, f64::max)
     };
     let (coarse, fine) = (
@@ -187,7 +213,11 @@ fn pieces_compose_to_the_whole_with_surfaces_between() {
             let cut = rng.range(15.0, 25.0) / length;
             let (a, b) = (v.integrate(&ray, 0.0, cut, &q), v.integrate(&ray, cut, INF, &q));
             let both = over(&a, &b);
-            assert!(worst(both, whole.rgba.map(f64::from)) < 0.6 / 255.0, "{both:?} {:?}", whole.rgba);
+            assert!(
+                worst(both, whole.rgba.map(f64::from)) < 0.6 / 255.0,
+                "{both:?} {:?}",
+                whole.rgba
+            );
             // The ray's own range counts, too.
             let limited = v.integrate(&ray.with_t_max(cut), 0.0, INF, &q);
             assert_eq!(limited, a);
@@ -205,20 +235,29 @@ fn empty_space_costs_no_samples_and_opaque_media_end_the_ray() {
     let r = v.report();
     assert!(r.macrocells == 125 && r.macrocells_clear > 60, "{r:?}");
     let q = VolumeQuality::default();
-    assert_eq!(v.integrate(&Ray::new(Vec3::new(-5.0, 3.0, 3.0), Vec3::X), 0.0, INF, &q), VolumeSample::CLEAR);
+    assert_eq!(
+        v.integrate(&Ray::new(Vec3::new(-5.0, 3.0, 3.0), Vec3::X), 0.0, INF, &q),
+        VolumeSample::CLEAR
+    );
     let through = v.integrate(&Ray::new(Vec3::new(-5.0, 20.2, 20.3), Vec3::X), 0.0, INF, &q);
     assert!(through.samples > 0 && through.rgba[3] > 0.3);
     let dense = volume(g, rainbow(), &[[0.0, 0.0], [0.2, 50.0]]);
     let stopped = dense.integrate(&Ray::new(Vec3::new(-5.0, 20.2, 20.3), Vec3::X), 0.0, INF, &q);
     assert!(stopped.rgba[3] > 0.999 && stopped.rgba[3] < 1.0, "{stopped:?} {through:?}");
-    assert!(stopped.depth > 17.0 && stopped.depth < 18.5, "in front of the ball: {}", stopped.depth);
+    assert!(
+        stopped.depth > 17.0 && stopped.depth < 18.5,
+        "in front of the ball: {}",
+        stopped.depth
+    );
 }
 
 #[test]
 fn another_transfer_function_makes_other_blocks_empty() {
     let mut v = volume(grid(17, 1.0, |p| p.x), rainbow(), &[[12.0, 0.0], [13.0, 1.0]]);
     assert_eq!(v.report().macrocells_clear, 4);
-    v.set_transfer_function(TransferFunction::new(rainbow(), vec![[0.0, 1.0], [1.0, 0.0]]).unwrap());
+    v.set_transfer_function(
+        TransferFunction::new(rainbow(), vec![[0.0, 1.0], [1.0, 0.0]]).unwrap(),
+    );
     assert_eq!(v.report().macrocells_clear, 4);
     let s = v.integrate(&Ray::new(Vec3::new(-1.0, 3.0, 3.0), Vec3::X), 0.0, INF, &tolerance(0.1));
     assert!((f64::from(s.rgba[3]) - (1.0 - (-0.5f64).exp())).abs() < 1e-4);
@@ -262,7 +301,9 @@ fn rays_that_miss_or_make_no_sense_are_clear() {
     }
     // A tolerance of zero or NaN is the tightest there is, not an endless loop.
     for levels in [0.0, -1.0, f32::NAN] {
-        assert!((v.integrate(&ray, 0.0, INF, &tolerance(levels)).rgba[3] - 0.981_684_4).abs() < 1e-6);
+        assert!(
+            (v.integrate(&ray, 0.0, INF, &tolerance(levels)).rgba[3] - 0.981_684_4).abs() < 1e-6
+        );
     }
 }
 
@@ -358,7 +399,8 @@ fn a_highlight_is_added_and_flat_places_keep_only_ambient_light_when_shading_nev
         Volume::new(g.into(), tf, options).unwrap()
     };
     let brightness = |v: &Volume, dir: Vec3| {
-        let s = v.integrate(&Ray::new(Vec3::splat(4.0) - 10.0 * dir, dir), 0.0, INF, &tolerance(0.1));
+        let s =
+            v.integrate(&Ray::new(Vec3::splat(4.0) - 10.0 * dir, dir), 0.0, INF, &tolerance(0.1));
         s.rgba[0] / s.rgba[3]
     };
     let ramp = make(grid(9, 1.0, |p| p.x));
@@ -372,7 +414,8 @@ fn a_highlight_is_added_and_flat_places_keep_only_ambient_light_when_shading_nev
 #[test]
 fn nearest_values_are_boxes_around_points_cut_at_the_bounds() {
     let tf = TransferFunction::new(single([1.0; 3]), vec![[0.0, 0.0], [1.0, 1.0]]).unwrap();
-    let options = VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
+    let options =
+        VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
     // Values 0, 1, 0.25 along x: half a box, a box, half a box.
     let g = Grid::new(
         UVec3::new(3, 3, 3),
@@ -381,14 +424,16 @@ fn nearest_values_are_boxes_around_points_cut_at_the_bounds() {
         (0..27).map(|i| [0.0, 1.0, 0.25][i % 3]).collect(),
     );
     let v = Volume::new(g.unwrap().into(), tf, options).unwrap();
-    let along =
-        |y: f32| v.integrate(&Ray::new(Vec3::new(-1.0, y, 1.5), Vec3::X), 0.0, INF, &tolerance(0.1)).rgba[3];
+    let along = |y: f32| {
+        v.integrate(&Ray::new(Vec3::new(-1.0, y, 1.5), Vec3::X), 0.0, INF, &tolerance(0.1)).rgba[3]
+    };
     for y in [0.0, 0.9, 2.3, 4.0] {
         assert!((along(y) - (1.0 - (-(2.0f32 + 0.25)).exp())).abs() < 1e-5, "{y}: {}", along(y));
     }
     assert_eq!(along(4.1), 0.0, "beyond the bounds");
-    let across =
-        v.integrate(&Ray::new(Vec3::new(3.5, -9.0, 1.0), Vec3::Y), 0.0, INF, &tolerance(0.1)).rgba[3];
+    let across = v
+        .integrate(&Ray::new(Vec3::new(3.5, -9.0, 1.0), Vec3::Y), 0.0, INF, &tolerance(0.1))
+        .rgba[3];
     assert!((across - (1.0 - (-1.0f32).exp())).abs() < 1e-5, "{across}");
 }
 
@@ -401,9 +446,12 @@ fn useless_input_is_refused_with_the_cure() {
         Err(VolumeError::NoCells { .. })
     ));
     let shading = Some(VolumeShading { ambient: 2.0, diffuse: 0.5, ..VolumeShading::default() });
-    let e =
-        Volume::new(grid(3, 1.0, |_| 0.0).into(), tf, VolumeOptions { shading, ..VolumeOptions::default() })
-            .unwrap_err();
+    let e = Volume::new(
+        grid(3, 1.0, |_| 0.0).into(),
+        tf,
+        VolumeOptions { shading, ..VolumeOptions::default() },
+    )
+    .unwrap_err();
     assert!(e.to_string().contains("ambient is 2"));
 }
 

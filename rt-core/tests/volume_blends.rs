@@ -1,4 +1,5 @@
-//! Volumes that are no medium, and media that depend on gradients, against sums over many small steps.
+//! Volumes that are no medium, and media that depend on gradients, against sums over many small
+//! steps.
 
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3, Vec3};
@@ -6,8 +7,8 @@ use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Blend, GradientOpacity, Interpolation, Volume, VolumeLight, VolumeOptions, VolumeQuality, VolumeSample,
-    VolumeShading, integrate_overlapping,
+    Blend, GradientOpacity, Interpolation, Volume, VolumeLight, VolumeOptions, VolumeQuality,
+    VolumeSample, VolumeShading, integrate_overlapping,
 };
 use std::sync::Arc;
 
@@ -21,7 +22,9 @@ fn grid() -> Arc<Grid> {
         0.5 + 0.5 * (0.7 * p.x).sin() * (0.5 * p.y + 0.3 * p.z).cos()
     };
     let spacing = DVec3::new(1.0, 0.5, 2.0);
-    Grid::new(UVec3::splat(N), DVec3::ZERO, spacing, (0..N * N * N).map(value).collect()).unwrap().into()
+    Grid::new(UVec3::splat(N), DVec3::ZERO, spacing, (0..N * N * N).map(value).collect())
+        .unwrap()
+        .into()
 }
 
 /// Colours from blue to red, and a weight that grows with the scalar.
@@ -57,7 +60,11 @@ fn scalars(v: &Volume, ray: &Ray) -> (Vec<f32>, f64) {
 
 fn close(found: VolumeSample, expected: [f64; 4], by: f64, what: &str) {
     for (c, e) in expected.iter().enumerate() {
-        assert!((f64::from(found.rgba[c]) - e).abs() < by, "{what}: {:?}, not {expected:?}", found.rgba);
+        assert!(
+            (f64::from(found.rgba[c]) - e).abs() < by,
+            "{what}: {:?}, not {expected:?}",
+            found.rgba
+        );
     }
 }
 
@@ -92,7 +99,10 @@ fn projections_agree_with_many_small_steps() {
 #[test]
 fn surfaces_of_given_values_lie_one_behind_the_other() {
     let values = [0.35, 0.6, 0.8];
-    let v = volume(VolumeOptions { blend: Blend::Isosurfaces(values.into()), ..VolumeOptions::default() });
+    let v = volume(VolumeOptions {
+        blend: Blend::Isosurfaces(values.into()),
+        ..VolumeOptions::default()
+    });
     let mut met = 0;
     for ray in rays() {
         let (along, _) = scalars(&v, &ray);
@@ -131,12 +141,16 @@ fn a_surface_in_front_of_a_projection_ends_it() {
 #[test]
 fn the_nearest_points_value_can_be_projected() {
     let interpolation = Interpolation::Nearest;
-    let v = volume(VolumeOptions { blend: Blend::Maximum, interpolation, ..VolumeOptions::default() });
+    let v =
+        volume(VolumeOptions { blend: Blend::Maximum, interpolation, ..VolumeOptions::default() });
     // Along the points of one row.
     let ray = Ray::new(Vec3::new(-1.0, 1.5, 8.0), Vec3::X);
     let largest = (0..N).map(|i| v.grid().at(i, 3, 4)).fold(f32::NEG_INFINITY, f32::max);
     let expected = v.transfer_function().extinction(largest.into());
-    assert!((f64::from(v.integrate(&ray, 0.0, f32::INFINITY, &QUALITY).rgba[3]) - expected).abs() < 1e-6);
+    assert!(
+        (f64::from(v.integrate(&ray, 0.0, f32::INFINITY, &QUALITY).rgba[3]) - expected).abs()
+            < 1e-6
+    );
 }
 
 /// The gradient of this grid is the same everywhere.
@@ -144,14 +158,16 @@ fn ramp(options: VolumeOptions) -> Volume {
     let values = (0..8 * 8 * 8).map(|i| 0.1 * (i % 8) as f32).collect();
     let grid = Grid::new(UVec3::splat(8), DVec3::ZERO, DVec3::splat(2.0), values).unwrap();
     let white = ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]);
-    Volume::new(grid.into(), TransferFunction::new(white, vec![[0.0, 0.2]]).unwrap(), options).unwrap()
+    Volume::new(grid.into(), TransferFunction::new(white, vec![[0.0, 0.2]]).unwrap(), options)
+        .unwrap()
 }
 
 #[test]
 fn gradient_opacity_scales_the_extinction() {
     let ray = Ray::new(Vec3::new(3.0, -1.0, 4.0), Vec3::Y);
     // 0.05 per world unit, a quarter of the steepest.
-    for (factors, expected) in [(vec![0.0, 1.0], 0.25f64), (vec![1.0, 0.0], 0.75), (vec![0.5], 0.5)] {
+    for (factors, expected) in [(vec![0.0, 1.0], 0.25f64), (vec![1.0, 0.0], 0.75), (vec![0.5], 0.5)]
+    {
         let gradient_opacity = Some(GradientOpacity { factors: factors.into(), steepest: 0.2 });
         let v = ramp(VolumeOptions { gradient_opacity, ..VolumeOptions::default() });
         let opacity = 1.0 - (-0.2 * expected * 14.0).exp();
@@ -187,20 +203,28 @@ fn projections_and_media_are_put_one_behind_the_other() {
         projection.integrate(&ray, 0.0, f32::INFINITY, &QUALITY),
         medium.integrate(&behind, 0.0, f32::INFINITY, &QUALITY),
     ];
-    let both = integrate_overlapping(&[(&medium, behind), (&projection, ray)], 0.0, f32::INFINITY, &QUALITY);
+    let both = integrate_overlapping(
+        &[(&medium, behind), (&projection, ray)],
+        0.0,
+        f32::INFINITY,
+        &QUALITY,
+    );
     let through = 1.0 - front.rgba[3];
-    let expected: [f64; 4] = std::array::from_fn(|c| f64::from(front.rgba[c] + through * back.rgba[c]));
+    let expected: [f64; 4] =
+        std::array::from_fn(|c| f64::from(front.rgba[c] + through * back.rgba[c]));
     close(both, expected, 1e-6, "two volumes");
 }
 
 #[test]
 fn bad_options_are_named() {
-    let fault = |options: VolumeOptions| Volume::new(grid(), transfer(), options).unwrap_err().to_string();
+    let fault =
+        |options: VolumeOptions| Volume::new(grid(), transfer(), options).unwrap_err().to_string();
     let lights = vec![VolumeLight { direction: Some(Vec3::ZERO), color: [1.0; 3] }];
     assert!(fault(VolumeOptions { lights, ..VolumeOptions::default() }).contains("lights"));
     let gradient_opacity = Some(GradientOpacity { factors: Vec::new().into(), steepest: 1.0 });
     assert!(
-        fault(VolumeOptions { gradient_opacity, ..VolumeOptions::default() }).contains("gradient opacity")
+        fault(VolumeOptions { gradient_opacity, ..VolumeOptions::default() })
+            .contains("gradient opacity")
     );
     let blend = Blend::Isosurfaces([f32::NAN].into());
     assert!(fault(VolumeOptions { blend, ..VolumeOptions::default() }).contains("isosurface"));

@@ -1,12 +1,13 @@
-//! Rays carried from brick to brick of a volume collect what they collect in the whole, bit for bit.
+//! Rays carried from brick to brick of a volume collect what they collect in the whole, bit for
+//! bit.
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3, Vec3};
 use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Brick, Interpolation, PartialIntegral, RaySegments, Volume, VolumeOptions, VolumeQuality, VolumeSample,
-    VolumeShading,
+    Brick, Interpolation, PartialIntegral, RaySegments, Volume, VolumeOptions, VolumeQuality,
+    VolumeSample, VolumeShading,
 };
 
 const DIMS: UVec3 = UVec3::new(41, 37, 29);
@@ -17,7 +18,8 @@ fn volume(options: VolumeOptions) -> Volume {
     let value = |k: u32| {
         let (x, y, z) = (k % DIMS.x, k / DIMS.x % DIMS.y, k / DIMS.x / DIMS.y);
         let at = Vec3::new(x as f32, y as f32, z as f32) * 0.3;
-        let v = if x < 12 && y < 15 { 0.0 } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * at.z.sin() };
+        let v =
+            if x < 12 && y < 15 { 0.0 } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * at.z.sin() };
         if k == 20_000 { f32::NAN } else { v }
     };
     let values = (0..DIMS.element_product()).map(value).collect();
@@ -78,7 +80,8 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
     let (mut met, mut through_three) = (0, 0);
     for interpolation in [Interpolation::Linear, Interpolation::Nearest] {
         for shading in [None, Some(shading)] {
-            let whole = volume(VolumeOptions { shading, interpolation, ..VolumeOptions::default() });
+            let whole =
+                volume(VolumeOptions { shading, interpolation, ..VolumeOptions::default() });
             let bricks = bricks(whole.blocks());
             let parts: Vec<Volume> = bricks.iter().map(|b| whole.part(*b)).collect();
             let most = parts.iter().map(|p| p.grid().values.len()).max().unwrap();

@@ -1,4 +1,5 @@
-//! Frames whose rays are answered by several holders of parts of the scene have the bits of frames in one piece.
+//! Frames whose rays are answered by several holders of parts of the scene have the bits of frames
+//! in one piece.
 
 use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
@@ -24,7 +25,9 @@ fn plate(shift: DVec3, cells: u32) -> TriMesh {
         let (x, y) = (i as f32 / cells as f32 * 4.0 - 2.0, j as f32 / cells as f32 * 4.0 - 2.0);
         Vec3::new(x, y, 0.4 * (3.0 * x).sin() * (2.5 * y).cos())
     };
-    let grid = |f: &dyn Fn(u32, u32) -> Vec3| -> Vec<Vec3> { (0..n * n).map(|k| f(k % n, k / n)).collect() };
+    let grid = |f: &dyn Fn(u32, u32) -> Vec3| -> Vec<Vec3> {
+        (0..n * n).map(|k| f(k % n, k / n)).collect()
+    };
     let mut mesh = TriMesh::new(grid(&at), vec![]);
     mesh.origin = shift;
     for j in 0..cells {
@@ -35,7 +38,9 @@ fn plate(shift: DVec3, cells: u32) -> TriMesh {
     }
     let up = |i: u32, j: u32| (at(i, j) * Vec3::new(0.3, 0.3, 0.0) + Vec3::Z).normalize();
     mesh.normals = Some(Attribute::per_vertex(grid(&up)));
-    let colors = (0..mesh.indices.len()).map(|k| [0.3 + 0.7 * (k % 7) as f32 / 7.0, 0.8, 0.5, 1.0]).collect();
+    let colors = (0..mesh.indices.len())
+        .map(|k| [0.3 + 0.7 * (k % 7) as f32 / 7.0, 0.8, 0.5, 1.0])
+        .collect();
     mesh.colors = Some(Attribute::per_face(colors));
     mesh
 }
@@ -59,17 +64,28 @@ struct Case {
 
 fn camera(shift: DVec3) -> Camera {
     let eye = shift + DVec3::new(2.5, -4.0, 3.0);
-    Camera::perspective(eye, shift + DVec3::new(0.0, 0.0, 0.3), DVec3::Z, 0.8, 1.25, [0.1, 100.0]).unwrap()
+    Camera::perspective(eye, shift + DVec3::new(0.0, 0.0, 0.3), DVec3::Z, 0.8, 1.25, [0.1, 100.0])
+        .unwrap()
 }
 
-fn scene(shift: DVec3, plate_is: Material, balls_are: Material, lights: &[Light], ao: Option<f64>) -> Scene {
+fn scene(
+    shift: DVec3,
+    plate_is: Material,
+    balls_are: Material,
+    lights: &[Light],
+    ao: Option<f64>,
+) -> Scene {
     let mut b = SceneBuilder::new();
     b.mesh(plate(shift, 40), plate_is);
     let m = b.material(balls_are);
     let g = b.geometry(rt_core::bvh::Geometry::Shape(Arc::new(spheres())));
     for k in 0..2 {
         let turned = DAffine3::from_rotation_z(1.0 + 2.0 * k as f64);
-        b.instance(g, DAffine3::from_translation(shift) * turned, rt_core::scene::Appearance::new(m));
+        b.instance(
+            g,
+            DAffine3::from_translation(shift) * turned,
+            rt_core::scene::Appearance::new(m),
+        );
     }
     for l in lights {
         b.light(*l);
@@ -99,13 +115,25 @@ fn cases() -> Vec<Case> {
         },
         Case {
             name: "headlight, nine samples",
-            scene: scene(zero, matte(), matte(), &[Light::headlight(), lamp.without_shadows()], None),
+            scene: scene(
+                zero,
+                matte(),
+                matte(),
+                &[Light::headlight(), lamp.without_shadows()],
+                None,
+            ),
             camera: camera(zero),
             options: RenderOptions { samples: 9, ..options() },
         },
         Case {
             name: "hard and soft shadows, ambient occlusion",
-            scene: scene(zero, matte(), matte(), &[lamp, sun.with_size(0.05).unwrap(), ambient], Some(0.6)),
+            scene: scene(
+                zero,
+                matte(),
+                matte(),
+                &[lamp, sun.with_size(0.05).unwrap(), ambient],
+                Some(0.6),
+            ),
             camera: camera(zero),
             options: options(),
         },
@@ -136,14 +164,21 @@ fn cases() -> Vec<Case> {
         Case {
             name: "transparent layers, several samples through a lens",
             scene: scene(zero, matte().with_opacity(0.6), matte(), &[lamp, ambient], None),
-            camera: camera(zero).with_lens(ThinLens { aperture_radius: 0.05, focus_distance: 5.0 }).unwrap(),
+            camera: camera(zero)
+                .with_lens(ThinLens { aperture_radius: 0.05, focus_distance: 5.0 })
+                .unwrap(),
             options: RenderOptions { samples: 3, ..options() },
         },
         Case {
             name: "path tracing",
             scene: scene(zero, matte(), Material::metal([0.9; 3], 0.0), &[sun], None),
             camera: camera(zero),
-            options: RenderOptions { path_tracing: true, samples: 3, max_bounces: Some(5), ..options() },
+            options: RenderOptions {
+                path_tracing: true,
+                samples: 3,
+                max_bounces: Some(5),
+                ..options()
+            },
         },
     ];
     let path = out.last_mut().unwrap();
@@ -193,7 +228,11 @@ fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
 }
 
 /// What light rays meet: no holder is asked where something opaque is.
-fn light_hits(holders: &[Holder<'_>], scene: &Scene, rays: &[rt_core::ray::Ray]) -> Vec<Option<ShadingHit>> {
+fn light_hits(
+    holders: &[Holder<'_>],
+    scene: &Scene,
+    rays: &[rt_core::ray::Ray],
+) -> Vec<Option<ShadingHit>> {
     let mut best = vec![None; rays.len()];
     let mut met = Vec::new();
     for h in holders {
@@ -201,7 +240,11 @@ fn light_hits(holders: &[Holder<'_>], scene: &Scene, rays: &[rt_core::ray::Ray])
         for (b, m) in best.iter_mut().zip(&met) {
             // What is blocked has no primitive.
             let in_whole = |m: ShadingHit| {
-                if m.is_blocked() { ShadingHit::from_words(&m.to_words()) } else { h.in_whole(scene, m) }
+                if m.is_blocked() {
+                    ShadingHit::from_words(&m.to_words())
+                } else {
+                    h.in_whole(scene, m)
+                }
             };
             nearer(b, m.map(in_whole));
         }
@@ -346,7 +389,12 @@ fn frames_answered_by_parts_have_the_bits_of_frames_in_one_piece() {
             let joined = in_parts(&case, parts, seed);
             for ((layer, a), (_, b)) in bits(&whole).into_iter().zip(bits(&joined)) {
                 let differ = a.iter().zip(&b).filter(|(a, b)| a != b).count();
-                assert_eq!((a.len(), differ), (b.len(), 0), "{}, {parts} parts: {layer}", case.name);
+                assert_eq!(
+                    (a.len(), differ),
+                    (b.len(), 0),
+                    "{}, {parts} parts: {layer}",
+                    case.name
+                );
             }
         }
     }
@@ -354,7 +402,8 @@ fn frames_answered_by_parts_have_the_bits_of_frames_in_one_piece() {
 
 #[test]
 fn a_part_alone_without_the_choices_of_the_whole_would_be_noticed() {
-    // Built as a world of its own, a part far from the origin gets another local space: hits differ in their last bits.
+    // Built as a world of its own, a part far from the origin gets another local space: hits differ
+    // in their last bits.
     let mesh = plate(DVec3::ZERO, 24);
     let moved = TriMesh {
         positions: mesh.positions.iter().map(|p| *p + Vec3::new(900.0, 10.0, -3.0)).collect(),
@@ -374,7 +423,8 @@ fn a_part_alone_without_the_choices_of_the_whole_would_be_noticed() {
     .unwrap();
     let (mut differ, mut met) = (0, 0);
     for k in 0..400 {
-        let target = DVec3::new(900.0 - 1.9 + 0.004 * k as f64, 10.0 - 1.99 + 0.0099 * k as f64, -3.0);
+        let target =
+            DVec3::new(900.0 - 1.9 + 0.004 * k as f64, 10.0 - 1.99 + 0.0099 * k as f64, -3.0);
         let from = target + DVec3::new(0.3, 0.2, 5.0);
         let t = |w: &World| {
             let (ray, moved) = w.ray_from_world(from, target - from);

@@ -1,6 +1,8 @@
-//! Ray-steps and photons per second of one core, in CPU time of the thread: other programs on the machine disturb it least.
+//! Ray-steps and photons per second of one core, in CPU time of the thread: other programs on the
+//! machine disturb it least.
 //!
-//! `cargo bench -p schlieren`: elements are ray-steps (march) or photons (line of sight); two cores do twice as much.
+//! `cargo bench -p schlieren`: elements are ray-steps (march) or photons (line of sight); two cores
+//! do twice as much.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
@@ -16,7 +18,8 @@ fn thread_cpu() -> Duration {
     Duration::new(t.tv_sec as u64, t.tv_nsec as u32)
 }
 
-/// Rays over the middle of the picture in tiles of 4x4: a packet each, as a renderer would send them.
+/// Rays over the middle of the picture in tiles of 4x4: a packet each, as a renderer would send
+/// them.
 fn starts(width: usize, rows: usize) -> Vec<Start> {
     let mut out = Vec::with_capacity(width * rows);
     for tile in 0..width * rows / 16 {
@@ -24,7 +27,10 @@ fn starts(width: usize, rows: usize) -> Vec<Start> {
         for i in 0..16 {
             let at = |block: usize, i: usize| ((block * 4 + i) as f32 + 0.5) / width as f32;
             let middle = 0.5 * rows as f32 / width as f32;
-            out.push(Start { position_m: [at(bx, i % 4) - 0.5, at(by, i / 4) - middle], tilt_rad: [0.0; 2] });
+            out.push(Start {
+                position_m: [at(bx, i % 4) - 0.5, at(by, i / 4) - middle],
+                tilt_rad: [0.0; 2],
+            });
         }
     }
     out
@@ -33,16 +39,18 @@ fn starts(width: usize, rows: usize) -> Vec<Start> {
 fn speed(c: &mut Criterion) {
     let n = 256;
     let blob = |p: DVec3| 1e-5 * (-p.length_squared() / (2.0 * 0.0144)).exp();
-    let field =
-        Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, blob).expect("a field");
-    let oblique =
-        View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).expect("a view");
+    let field = Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, blob)
+        .expect("a field");
+    let oblique = View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO)
+        .expect("a view");
     for (name, view) in [("axis", View::along(Axis::Z, DVec3::ZERO)), ("0.6 rad", oblique)] {
         let rays = starts(256, 16);
         let mut exits = vec![Exit::UNDISTURBED; rays.len()];
         let mut group = c.benchmark_group(format!("march 256^3, {name}"));
         group.sample_size(10);
-        for interpolant in [Interpolant::Trilinear, Interpolant::TrilinearGradient, Interpolant::BSpline] {
+        for interpolant in
+            [Interpolant::Trilinear, Interpolant::TrilinearGradient, Interpolant::BSpline]
+        {
             for opd in [false, true] {
                 let paths = Deviational::new(
                     &field,

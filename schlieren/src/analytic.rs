@@ -14,7 +14,8 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
-    /// Optical path difference of a straight ray along z through (x, y), between -half and half, divided by n0. The error is of order amplitude^2.
+    /// Optical path difference of a straight ray along z through (x, y), between -half and half,
+    /// divided by n0. The error is of order amplitude^2.
     pub fn path_difference_m(&self, x: f64, y: f64, half_m: f64) -> f64 {
         let s = self.sigma_m;
         self.amplitude
@@ -30,7 +31,8 @@ impl Gaussian {
         [-x / self.sigma_m.powi(2) * path, -y / self.sigma_m.powi(2) * path]
     }
 
-    /// Change of the deflection with the ray's place, along and across x: d u_x/dx, d u_x/dy, d u_y/dy.
+    /// Change of the deflection with the ray's place, along and across x: d u_x/dx, d u_x/dy, d
+    /// u_y/dy.
     pub fn jacobian_per_m(&self, x: f64, y: f64, half_m: f64) -> [f64; 3] {
         let path = self.path_difference_m(x, y, half_m);
         let s2 = self.sigma_m.powi(2);
@@ -65,7 +67,8 @@ impl Luneburg {
     }
 }
 
-/// Maxwell's fish-eye, n = 2 / (1 + r^2): rays are circles, and light from any point meets at the opposite one. eps is n - 1.
+/// Maxwell's fish-eye, n = 2 / (1 + r^2): rays are circles, and light from any point meets at the
+/// opposite one. eps is n - 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FishEye;
 
@@ -86,7 +89,10 @@ pub struct Selfoc {
 impl Medium for Selfoc {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
         let g2 = self.gradient_per_m.powi(2);
-        squared(1.0 - g2 * (at_m.x * at_m.x + at_m.y * at_m.y), DVec3::new(at_m.x, at_m.y, 0.0) * -g2)
+        squared(
+            1.0 - g2 * (at_m.x * at_m.x + at_m.y * at_m.y),
+            DVec3::new(at_m.x, at_m.y, 0.0) * -g2,
+        )
     }
 }
 
@@ -137,7 +143,8 @@ impl Kepler {
     }
 }
 
-/// eps and its gradient from n^2 and half the gradient of n^2, without the cancellation of sqrt(1 + x) - 1.
+/// eps and its gradient from n^2 and half the gradient of n^2, without the cancellation of sqrt(1 +
+/// x) - 1.
 fn squared(n2: f64, half_gradient: DVec3) -> (f64, DVec3) {
     let n = n2.sqrt();
     ((n2 - 1.0) / (n + 1.0), half_gradient / n)

@@ -61,8 +61,13 @@ const DIFFERENCES: [(usize, usize, &[Part]); 12] = {
 };
 
 /// Coefficients of the difference of an order.
-const COEFFICIENTS: [&[f64]; 5] =
-    [&[1.0], &[-1.0, 1.0], &[1.0, -2.0, 1.0], &[-1.0, 3.0, -3.0, 1.0], &[1.0, -4.0, 6.0, -4.0, 1.0]];
+const COEFFICIENTS: [&[f64]; 5] = [
+    &[1.0],
+    &[-1.0, 1.0],
+    &[1.0, -2.0, 1.0],
+    &[-1.0, 3.0, -3.0, 1.0],
+    &[1.0, -4.0, 6.0, -4.0, 1.0],
+];
 
 /// Squares of derivatives along a row of nodes: of order 1 to 4, and those of order 2 along the
 /// axes.
@@ -130,7 +135,12 @@ impl Row {
                 let factor = part.times * per_m[0].powi(2 * part.along_x as i32);
                 add_squares(&mut self.squares[order - 1], &self.difference, part.along_x, factor);
                 if order == 2 && part.times == 1.0 {
-                    add_squares(&mut self.squares[ALONG_AXES], &self.difference, part.along_x, factor);
+                    add_squares(
+                        &mut self.squares[ALONG_AXES],
+                        &self.difference,
+                        part.along_x,
+                        factor,
+                    );
                 }
             }
         }
@@ -193,16 +203,23 @@ mod tests {
         let of = |f: fn(DVec3) -> f64| {
             let (dims, spacing) = ([9, 8, 7], [0.25, 0.5, 0.125]);
             // Powers of two: f32 holds the values exactly.
-            DerivativeBounds::of(&Field::from_fn(dims, spacing, DVec3::ZERO, 1.0, |p| f(p) / 4096.0).unwrap())
+            DerivativeBounds::of(
+                &Field::from_fn(dims, spacing, DVec3::ZERO, 1.0, |p| f(p) / 4096.0).unwrap(),
+            )
         };
         let near = |a: f64, b: f64| (a * 4096.0 - b).abs() < 1e-6 * b.max(1.0);
         let r = of(|p| p.x * p.y);
-        assert!(near(r.second, 2f64.sqrt()) && near(r.second_along_axes, 0.0) && near(r.third, 0.0), "{r:?}");
+        assert!(
+            near(r.second, 2f64.sqrt()) && near(r.second_along_axes, 0.0) && near(r.third, 0.0),
+            "{r:?}"
+        );
         let r = of(|p| 3.0 * p.y * p.z + p.x * p.x);
         assert!(near(r.second, 22f64.sqrt()) && near(r.second_along_axes, 2.0), "{r:?}");
         let r = of(|p| p.x * p.y * p.z);
         assert!(near(r.third, 6f64.sqrt()) && near(r.fourth, 0.0), "{r:?}");
-        for f in [|p: DVec3| p.x * p.x * p.z, |p: DVec3| p.y * p.y * p.x, |p: DVec3| p.z * p.z * p.y] {
+        for f in
+            [|p: DVec3| p.x * p.x * p.z, |p: DVec3| p.y * p.y * p.x, |p: DVec3| p.z * p.z * p.y]
+        {
             assert!(near(of(f).third, 12f64.sqrt()), "{:?}", of(f));
         }
         let r = of(|p| p.z.powi(4));
@@ -217,9 +234,14 @@ mod tests {
     #[test]
     fn lattices_of_two_nodes_along_an_axis_have_no_more_than_a_slope_there() {
         for dims in [[2, 9, 9], [9, 2, 9], [9, 9, 2], [2, 2, 2]] {
-            let f = Field::from_fn(dims, [1.0; 3], DVec3::ZERO, 1.0, |p| (p.x + p.y * p.z) / 4096.0).unwrap();
+            let f =
+                Field::from_fn(dims, [1.0; 3], DVec3::ZERO, 1.0, |p| (p.x + p.y * p.z) / 4096.0)
+                    .unwrap();
             let r = DerivativeBounds::of(&f);
-            assert!(r.gradient >= 1.0 / 4096.0 && (r.second * 4096.0 - 2f64.sqrt()).abs() < 1e-6, "{r:?}");
+            assert!(
+                r.gradient >= 1.0 / 4096.0 && (r.second * 4096.0 - 2f64.sqrt()).abs() < 1e-6,
+                "{r:?}"
+            );
             assert!(r.third * 4096.0 < 1e-6, "{r:?}");
         }
     }

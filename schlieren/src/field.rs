@@ -15,7 +15,8 @@ pub enum Node {
     Solid = 2,
 }
 
-/// A uniform lattice of eps, x fastest. Nodes are points: the field reaches from the first to the last of them and no further.
+/// A uniform lattice of eps, x fastest. Nodes are points: the field reaches from the first to the
+/// last of them and no further.
 #[derive(Debug, Clone)]
 pub struct Field {
     dims: [usize; 3],
@@ -32,7 +33,8 @@ pub struct Field {
 pub enum FieldError {
     /// Fewer than two nodes along an axis: light would have no way through.
     #[error(
-        "the field has {nodes} node(s) along {axis}; it needs at least 2. Repeat a two-dimensional flow over its span to give it depth"
+        "the field has {nodes} node(s) along {axis}; it needs at least 2. Repeat a two-dimensional \
+         flow over its span to give it depth"
     )]
     TooFew {
         /// x, y or z.
@@ -42,11 +44,13 @@ pub enum FieldError {
     },
     /// More nodes than can be addressed.
     #[error(
-        "the field's {0}x{1}x{2} nodes are more than the 2^31 this program can address; resample it coarser or cut it"
+        "the field's {0}x{1}x{2} nodes are more than the 2^31 this program can address; resample \
+         it coarser or cut it"
     )]
     TooMany(usize, usize, usize),
     /// An array has the wrong length.
-    #[error("{what} has {got} values, and the lattice {0}x{1}x{2} has {wanted} nodes", dims[0], dims[1], dims[2])]
+    #[error("{what} has {got} values, and the lattice {0}x{1}x{2} has {wanted} \
+             nodes", dims[0], dims[1], dims[2])]
     Length {
         /// Which array.
         what: &'static str,
@@ -72,7 +76,8 @@ pub enum FieldError {
     #[error("reference index n0 is {0}; it must be a positive number, about 1 for gases")]
     Reference(f64),
     /// An eps of -1 or less: no medium has an index of zero or below.
-    #[error("eps is {eps} at node ({0}, {1}, {2}); eps = n/n0 - 1 is above -1. Check the units of the density", at[0], at[1], at[2])]
+    #[error("eps is {eps} at node ({0}, {1}, {2}); eps = n/n0 - 1 is above -1. Check the units of \
+             the density", at[0], at[1], at[2])]
     Impossible {
         /// The value.
         eps: f32,
@@ -85,10 +90,12 @@ pub enum FieldError {
 }
 
 impl Field {
-    /// A field from eps = n/n0 - 1 at the nodes, x fastest, and what the nodes are (all gas when `None`).
+    /// A field from eps = n/n0 - 1 at the nodes, x fastest, and what the nodes are (all gas when
+    /// `None`).
     ///
-    /// Values that are not finite become [`Node::Blank`] and are counted ([`Field::not_finite`]). Nodes that are not gas get values continued smoothly from the gas around
-    /// them, so that no interpolant rings at their edge; what they were does not matter.
+    /// Values that are not finite become [`Node::Blank`] and are counted ([`Field::not_finite`]).
+    /// Nodes that are not gas get values continued smoothly from the gas around them, so that no
+    /// interpolant rings at their edge; what they were does not matter.
     ///
     /// # Errors
     /// If sizes do not match, or a number is impossible.
@@ -183,8 +190,11 @@ impl Field {
 
     /// From the first to the last node.
     pub fn size_m(&self) -> DVec3 {
-        let cells =
-            DVec3::new((self.dims[0] - 1) as f64, (self.dims[1] - 1) as f64, (self.dims[2] - 1) as f64);
+        let cells = DVec3::new(
+            (self.dims[0] - 1) as f64,
+            (self.dims[1] - 1) as f64,
+            (self.dims[2] - 1) as f64,
+        );
         cells * DVec3::from(self.spacing_m)
     }
 
@@ -193,7 +203,8 @@ impl Field {
         self.origin_m + 0.5 * self.size_m()
     }
 
-    /// eps = n/n0 - 1 at the nodes, x fastest. Finite everywhere: nodes that are not gas hold continued values.
+    /// eps = n/n0 - 1 at the nodes, x fastest. Finite everywhere: nodes that are not gas hold
+    /// continued values.
     pub fn eps(&self) -> &[f32] {
         &self.eps
     }
@@ -254,7 +265,8 @@ pub(crate) fn check_lattice(
     }
 }
 
-/// Gives nodes that are not gas the mean of their known neighbours, from the gas inwards layer by layer.
+/// Gives nodes that are not gas the mean of their known neighbours, from the gas inwards layer by
+/// layer.
 pub(crate) fn fill(dims: [usize; 3], eps: &mut [f32], nodes: &[Node]) {
     let [nx, ny, nz] = dims;
     let stride = [1, nx, nx * ny];
@@ -285,7 +297,8 @@ pub(crate) fn fill(dims: [usize; 3], eps: &mut [f32], nodes: &[Node]) {
             eps[i] = v;
             known[i] = true;
         }
-        let mut next: Vec<usize> = layer.iter().flat_map(|&i| neighbours(i)).filter(|&j| !known[j]).collect();
+        let mut next: Vec<usize> =
+            layer.iter().flat_map(|&i| neighbours(i)).filter(|&j| !known[j]).collect();
         next.sort_unstable();
         next.dedup();
         layer = next;
@@ -345,7 +358,8 @@ mod tests {
         assert!(err([4, 4, 4], [1.0; 3], ok([4, 4, 4]), 0.0).contains("n0 is 0"));
         assert!(err([4, 4, 4], [1.0; 3], vec![-1.0; 64], 1.0).contains("-1"));
         assert!(err([4, 4, 4], [1.0; 3], vec![f32::NAN; 64], 1.0).contains("no gas"));
-        let huge = Field::new([usize::MAX / 2, 4, 4], [1.0; 3], DVec3::ZERO, vec![], 1.0, None).unwrap_err();
+        let huge = Field::new([usize::MAX / 2, 4, 4], [1.0; 3], DVec3::ZERO, vec![], 1.0, None)
+            .unwrap_err();
         assert!(matches!(huge, FieldError::TooMany(..)));
     }
 }

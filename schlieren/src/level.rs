@@ -1,9 +1,10 @@
 //! Which instruction sets the kernels are compiled for.
 
-/// Calls a kernel with the token of a level. Kernels open the instruction set themselves (`Simd::vectorize`).
+/// Calls a kernel with the token of a level. Kernels open the instruction set themselves
+/// (`Simd::vectorize`).
 ///
-/// Unlike fearless_simd's own `dispatch!`, machines with SSE4.2 but no AVX2 use the SSE2 kernels: they are a quarter of what there is to compile, for
-/// processors from before 2013.
+/// Unlike fearless_simd's own `dispatch!`, machines with SSE4.2 but no AVX2 use the SSE2 kernels:
+/// they are a quarter of what there is to compile, for processors from before 2013.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! at_level {

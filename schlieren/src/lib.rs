@@ -1,9 +1,10 @@
 //! Physically based schlieren, shadowgraph and interferometry from flow data.
 //!
-//! Lengths are metres, angles radians, all in `f64` where the user meets them. What is stored of the gas is not its index of refraction n but the
-//! small number eps = n/n0 - 1 ([`field::Field`]), and what is computed of a ray is not where it goes but how far it strays from
-//! the straight ray through the reference medium ([`path::Exit`]). Both keep their relative accuracy in `f32` however weak
-//! the gas is.
+//! Lengths are metres, angles radians, all in `f64` where the user meets them. What is stored of
+//! the gas is not its index of refraction n but the small number eps = n/n0 - 1 ([`field::Field`]),
+//! and what is computed of a ray is not where it goes but how far it strays from the straight ray
+//! through the reference medium ([`path::Exit`]). Both keep their relative accuracy in `f32`
+//! however weak the gas is.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|

@@ -1,10 +1,15 @@
-//! Measuring in pictures: where the outermost shock stands and at which angle, as with a ruler on a photograph.
+//! Measuring in pictures: where the outermost shock stands and at which angle, as with a ruler on a
+//! photograph.
 //!
-//! A shock is a thin line in a schlieren picture, saturated more often than not: behind a customary slit of 1 mm a shock of a tenth of a bar over a span of 10 cm
-//! bends light ten times farther than from black to white. Then there is no brightest or darkest pixel but a band of them, as wide as the shock is
-//! strong, and the place to look at is its outer edge, where brightness changes most ([`Mark::Edge`]). A shock that is drawn over several pixels and does not saturate
-//! stands where its band is strongest ([`Mark::Band`]). Either way the search goes along rows or columns from the undisturbed stream inwards, takes the first place whose mark is at least
-//! half the largest of its line (four fifths for bands, whose flanks are long), and in it the centre, to parts of a pixel.
+//! A shock is a thin line in a schlieren picture, saturated more often than not: behind a customary
+//! slit of 1 mm a shock of a tenth of a bar over a span of 10 cm bends light ten times farther than
+//! from black to white. Then there is no brightest or darkest pixel but a band of them, as wide as
+//! the shock is strong, and the place to look at is its outer edge, where brightness changes most
+//! ([`Mark::Edge`]). A shock that is drawn over several pixels and does not saturate stands where
+//! its band is strongest ([`Mark::Band`]). Either way the search goes along rows or columns from
+//! the undisturbed stream inwards, takes the first place whose mark is at least half the largest of
+//! its line (four fifths for bands, whose flanks are long), and in it the centre, to parts of a
+//! pixel.
 
 use crate::film::Framing;
 use crate::render::RenderOutput;
@@ -57,7 +62,8 @@ pub struct Line {
 }
 
 impl Photograph {
-    /// Of a picture that was rendered with [`crate::render::Layers::map`], which tells bodies from dark shocks. `None` without.
+    /// Of a picture that was rendered with [`crate::render::Layers::map`], which tells bodies from
+    /// dark shocks. `None` without.
     pub fn of(rendered: &RenderOutput) -> Option<Photograph> {
         let map = rendered.map.as_ref()?;
         Some(Photograph {
@@ -67,19 +73,25 @@ impl Photograph {
         })
     }
 
-    /// The outermost strong mark on each line of search, at most one point a line, along right and up in metres. Pixels that are `margin_px` or less from a dark one
-    /// along that line do not count, nor do lines whose largest mark is below `least`.
+    /// The outermost strong mark on each line of search, at most one point a line, along right and
+    /// up in metres. Pixels that are `margin_px` or less from a dark one along that line do not
+    /// count, nor do lines whose largest mark is below `least`.
     pub fn fronts_m(&self, from: From, mark: Mark, least: f32, margin_px: usize) -> Vec<[f64; 2]> {
         let [width, height] = [self.framing.width as usize, self.framing.height as usize];
         let [lines, length] = if from == From::Left { [height, width] } else { [width, height] };
-        let pixel =
-            |line: usize, i: usize| if from == From::Left { i + line * width } else { line + i * width };
+        let pixel = |line: usize, i: usize| {
+            if from == From::Left { i + line * width } else { line + i * width }
+        };
         let near_dark = |line: usize, i: usize| {
-            (i.saturating_sub(margin_px)..(i + margin_px + 1).min(length)).any(|k| !self.lit[pixel(line, k)])
+            (i.saturating_sub(margin_px)..(i + margin_px + 1).min(length))
+                .any(|k| !self.lit[pixel(line, k)])
         };
         // Edges lie between pixels, bands in their centres.
-        let (count, offset, share) =
-            if mark == Mark::Edge { (length.saturating_sub(1), 1.0, 0.5) } else { (length, 0.5, 0.8) };
+        let (count, offset, share) = if mark == Mark::Edge {
+            (length.saturating_sub(1), 1.0, 0.5)
+        } else {
+            (length, 0.5, 0.8)
+        };
         let mut points = Vec::new();
         for line in 0..lines {
             let strength = |i: usize| {
@@ -109,13 +121,15 @@ impl Photograph {
     }
 }
 
-/// The line through points of which up to a quarter or so may be anything: the median of all pairs' slopes (Theil 1950, Sen 1968), then least squares of distances over the
-/// points within three robust standard deviations of that. `None` for fewer than three points.
+/// The line through points of which up to a quarter or so may be anything: the median of all pairs'
+/// slopes (Theil 1950, Sen 1968), then least squares of distances over the points within three
+/// robust standard deviations of that. `None` for fewer than three points.
 pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
     if points_m.len() < 3 {
         return None;
     }
-    // Slopes against the axis along which the points are spread: between their quartiles, which no outliers reach.
+    // Slopes against the axis along which the points are spread: between their quartiles, which no
+    // outliers reach.
     let spread = |c: usize| {
         let mut v: Vec<f64> = points_m.iter().map(|p| p[c]).collect();
         v.sort_unstable_by(f64::total_cmp);
@@ -125,7 +139,9 @@ pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
     let b = 1 - a;
     let mut slopes = Vec::with_capacity(points_m.len() * points_m.len() / 2);
     for (i, p) in points_m.iter().enumerate() {
-        slopes.extend(points_m[..i].iter().filter(|q| q[a] != p[a]).map(|q| (p[b] - q[b]) / (p[a] - q[a])));
+        slopes.extend(
+            points_m[..i].iter().filter(|q| q[a] != p[a]).map(|q| (p[b] - q[b]) / (p[a] - q[a])),
+        );
     }
     let slope = median(&mut slopes)?;
     let offset = |p: &[f64; 2]| p[b] - slope * p[a];
@@ -136,8 +152,9 @@ pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
     let kept: Vec<&[f64; 2]> = points_m.iter().filter(|p| off(p) <= reach).collect();
     let n = kept.len() as f64;
     let mean = [0, 1].map(|c| kept.iter().map(|p| p[c]).sum::<f64>() / n);
-    let moment =
-        |c: usize, d: usize| kept.iter().map(|p| (p[c] - mean[c]) * (p[d] - mean[d])).sum::<f64>() / n;
+    let moment = |c: usize, d: usize| {
+        kept.iter().map(|p| (p[c] - mean[c]) * (p[d] - mean[d])).sum::<f64>() / n
+    };
     let [xx, xy, yy] = [moment(0, 0), moment(0, 1), moment(1, 1)];
     // The direction of the larger principal axis, and the variance along the smaller.
     let angle_rad = 0.5 * (2.0 * xy).atan2(xx - yy);
@@ -170,7 +187,9 @@ mod tests {
                     [0.2 + s * cos - wiggle * sin, -0.1 + s * sin + wiggle * cos]
                 })
                 .collect();
-            points.extend((0..20).map(|i| [0.2 + 4e-3 * f64::from(i), 0.3 - 1e-3 * f64::from(i * i % 31)]));
+            points.extend(
+                (0..20).map(|i| [0.2 + 4e-3 * f64::from(i), 0.3 - 1e-3 * f64::from(i * i % 31)]),
+            );
             let line = fitted_line(&points).unwrap();
             assert!((line.angle_rad.to_degrees() - degrees).abs() < 0.05, "{degrees}: {line:?}");
             assert!((80..=104).contains(&line.points) && line.rms_m < 3e-5, "{degrees}: {line:?}");
@@ -180,14 +199,15 @@ mod tests {
 
     #[test]
     fn a_band_is_found_by_its_outer_edge_and_a_body_is_none() {
-        // A bright band 5 pixels wide that climbs 1 in 2, and below it a dark body whose edge is stronger.
+        // A bright band 5 pixels wide that climbs 1 in 2, and below it a dark body whose edge is
+        // stronger.
         let framing = Framing { width: 60, height: 50, pixel_m: 1e-3, center_m: [0.1, 0.2] };
         let edge = |i: usize| 10.0 + 0.5 * (i as f64 + 0.5);
         let mut p = Photograph { framing, brightness: vec![], lit: vec![] };
         for j in 0..50 {
             for i in 0..60 {
-                let covered =
-                    (j as f64 + 1.0 - edge(i)).clamp(0.0, 1.0) - (j as f64 - 4.0 - edge(i)).clamp(0.0, 1.0);
+                let covered = (j as f64 + 1.0 - edge(i)).clamp(0.0, 1.0)
+                    - (j as f64 - 4.0 - edge(i)).clamp(0.0, 1.0);
                 let body = j as f64 > edge(i) + 12.0;
                 p.brightness.push(if body { 0.0 } else { 0.5 + 0.3 * covered as f32 });
                 p.lit.push(!body);

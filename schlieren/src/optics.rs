@@ -1,4 +1,5 @@
-//! The optical bench: light source, collimator, test section, schlieren lens, cut-off plane, lens onto the film.
+//! The optical bench: light source, collimator, test section, schlieren lens, cut-off plane, lens
+//! onto the film.
 //!
 //! ```text
 //!  source      collimator     test section      schlieren lens     cut-off plane      film
@@ -6,14 +7,18 @@
 //!    size w                  z = 0                                 image w f2/f1      focused on z = focus_m
 //! ```
 //!
-//! A point of the source makes one parallel beam: its *tilt* is its distance from the axis over the collimator's focal length. The schlieren lens
-//! collects every direction in one point of the cut-off plane, at `f2 (tilt + deflection)`; so a deflection ε shifts the whole image of the source
-//! by `f2 ε` (Settles, *Schlieren and Shadowgraph Techniques*, 2001, chapter 3). The thesis' free factor k of equation 5.12 is not free: it is
-//! [`Optics::sensitivity_per_rad`], `f2/a` with a the height of the source image above the cut-off.
+//! A point of the source makes one parallel beam: its *tilt* is its distance from the axis over the
+//! collimator's focal length. The schlieren lens collects every direction in one point of the
+//! cut-off plane, at `f2 (tilt + deflection)`; so a deflection ε shifts the whole image of the
+//! source by `f2 ε` (Settles, *Schlieren and Shadowgraph Techniques*, 2001, chapter 3). The thesis'
+//! free factor k of equation 5.12 is not free: it is [`Optics::sensitivity_per_rad`], `f2/a` with a
+//! the height of the source image above the cut-off.
 //!
-//! A film that is focused on the plane z = `focus_m` (along the direction of light, 0 through the middle of the field) sees each ray where its
-//! last straight piece, prolonged in both directions, crosses that plane. Focused into the middle, the displacement is nearly zero and the picture is a
-//! schlieren picture; focused away from it, it becomes a shadowgraph as well. All film coordinates are in object space: metres in the test section.
+//! A film that is focused on the plane z = `focus_m` (along the direction of light, 0 through the
+//! middle of the field) sees each ray where its last straight piece, prolonged in both directions,
+//! crosses that plane. Focused into the middle, the displacement is nearly zero and the picture is
+//! a schlieren picture; focused away from it, it becomes a shadowgraph as well. All film
+//! coordinates are in object space: metres in the test section.
 
 use crate::path::{Exit, Start};
 
@@ -22,12 +27,14 @@ pub type Across = [f32; 2];
 
 /// The light source, as its shape in the collimator's focal plane.
 ///
-/// Coordinates are those of its image in the cut-off plane: a point of the source at +x makes the beam that travels towards +x.
+/// Coordinates are those of its image in the cut-off plane: a point of the source at +x makes the
+/// beam that travels towards +x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SourceShape {
     /// No extent.
     Point,
-    /// A rectangle, the customary slit, whose width lies along `angle_deg` (counter-clockwise from the picture's right).
+    /// A rectangle, the customary slit, whose width lies along `angle_deg` (counter-clockwise from
+    /// the picture's right).
     Slit {
         /// Along `angle_deg`: across the knife's edge when the knife has the same angle.
         width_m: f64,
@@ -52,7 +59,8 @@ pub struct Optics {
     pub collimator_focal_length_m: f64,
     /// f2: from the schlieren lens to the cut-off plane.
     pub schlieren_focal_length_m: f64,
-    /// Plane that the film is focused on: distance from the middle of the field along the light. Positive is behind the flow.
+    /// Plane that the film is focused on: distance from the middle of the field along the light.
+    /// Positive is behind the flow.
     pub focus_m: f64,
 }
 
@@ -76,7 +84,8 @@ pub enum SourceImage {
 }
 
 impl Optics {
-    /// What is drawn when nothing else is said: a slit of 1 mm by 5 mm, mirrors of 1.5 m, focused into the middle.
+    /// What is drawn when nothing else is said: a slit of 1 mm by 5 mm, mirrors of 1.5 m, focused
+    /// into the middle.
     pub const CUSTOMARY: Optics = Optics {
         source: SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 0.0 },
         collimator_focal_length_m: 1.5,
@@ -102,8 +111,9 @@ impl Optics {
         }
     }
 
-    /// How much the relative intensity changes per radian of deflection across a knife: k = f2/a of equation 5.12, with `a` the height of the
-    /// source image that the knife leaves open. The thesis divides by e there; Settles' equation 3.7 has a.
+    /// How much the relative intensity changes per radian of deflection across a knife: k = f2/a of
+    /// equation 5.12, with `a` the height of the source image that the knife leaves open. The
+    /// thesis divides by e there; Settles' equation 3.7 has a.
     pub fn sensitivity_per_rad(&self, open_height_m: f64) -> f64 {
         self.schlieren_focal_length_m / open_height_m
     }
@@ -113,7 +123,8 @@ impl Optics {
         image_point_m.map(|c| (f64::from(c) / self.schlieren_focal_length_m) as f32)
     }
 
-    /// Where a photon crosses the cut-off plane: its source point's image, shifted by its deflection.
+    /// Where a photon crosses the cut-off plane: its source point's image, shifted by its
+    /// deflection.
     #[inline]
     pub fn cutoff_point_m(&self, image_point_m: Across, exit: &Exit) -> Across {
         let f2 = self.schlieren_focal_length_m as f32;
@@ -122,8 +133,10 @@ impl Optics {
 
     /// How far from its start the film sees the photon, in metres in the plane of focus.
     ///
-    /// The last straight piece passes `displacement` beside the undisturbed ray at depth `exit_depth`, at the angle `deflection` to it; prolonged to the
-    /// plane of focus it is off by the lever times the tangent. A tilted beam's undisturbed ray crosses that plane at `tilt focus` from the start.
+    /// The last straight piece passes `displacement` beside the undisturbed ray at depth
+    /// `exit_depth`, at the angle `deflection` to it; prolonged to the plane of focus it is off by
+    /// the lever times the tangent. A tilted beam's undisturbed ray crosses that plane at `tilt
+    /// focus` from the start.
     #[inline]
     pub fn film_shift_m(&self, start: &Start, exit: &Exit) -> Across {
         let focus = self.focus_m as f32;
@@ -132,15 +145,17 @@ impl Optics {
         // Deflections are sines (see `Exit`).
         let per_cos = 1.0 / (1.0 - (dx * dx + dy * dy)).max(f32::MIN_POSITIVE).sqrt();
         [0, 1].map(|i| {
-            start.tilt_rad[i] * focus + (exit.displacement_m[i] + exit.deflection_rad[i] * per_cos * lever)
+            start.tilt_rad[i] * focus
+                + (exit.displacement_m[i] + exit.deflection_rad[i] * per_cos * lever)
         })
     }
 
-    /// Optical path difference that the film sees: between this ray and the undisturbed one *of the same beam that ends in the same point of the film*.
-    /// `n0` is the reference index.
+    /// Optical path difference that the film sees: between this ray and the undisturbed one *of the
+    /// same beam that ends in the same point of the film*. `n0` is the reference index.
     ///
-    /// The undisturbed wave front is a plane across the beam, so where in it the ray ends does not matter. The straight piece from the exit
-    /// to the plane of focus is longer by the factor `sec θ - 1 = s²/(c (1 + c))`, s and c the sine and cosine of the deflection.
+    /// The undisturbed wave front is a plane across the beam, so where in it the ray ends does not
+    /// matter. The straight piece from the exit to the plane of focus is longer by the factor `sec
+    /// θ - 1 = s²/(c (1 + c))`, s and c the sine and cosine of the deflection.
     #[inline]
     pub fn film_path_difference_m(&self, exit: &Exit, n0: f32) -> f32 {
         let lever = self.focus_m as f32 - exit.exit_depth_m;
@@ -181,7 +196,8 @@ impl SourceImage {
         let SourceImage::Rectangle { half_m, axis } = *self else { return [0.0; 2] };
         let along = (axis[0] * direction[0] + axis[1] * direction[1]).abs();
         let across = (axis[0] * direction[1] - axis[1] * direction[0]).abs();
-        // sin and cos of 90° are not exactly 0 and 1 in floating point; a side seen end on has no length.
+        // sin and cos of 90° are not exactly 0 and 1 in floating point; a side seen end on has no
+        // length.
         let clean = |v: f64| if v < 1e-12 { 0.0 } else { v };
         [half_m[0] * clean(along), half_m[1] * clean(across)]
     }
@@ -193,7 +209,14 @@ mod tests {
     use crate::path::Status;
 
     fn exit(deflection_rad: Across, displacement_m: Across, exit_depth_m: f32, opd_m: f32) -> Exit {
-        Exit { deflection_rad, displacement_m, exit_depth_m, opd_m, transmission: 1.0, status: Status::Free }
+        Exit {
+            deflection_rad,
+            displacement_m,
+            exit_depth_m,
+            opd_m,
+            transmission: 1.0,
+            status: Status::Free,
+        }
     }
 
     fn bench(focus_m: f64) -> Optics {
@@ -202,7 +225,8 @@ mod tests {
 
     #[test]
     fn a_prism_focused_into_its_middle_moves_nothing() {
-        // A kink at depth 0, left at depth 0.5: displaced there by 0.5 θ, but the prolonged ray comes from the start's place.
+        // A kink at depth 0, left at depth 0.5: displaced there by 0.5 θ, but the prolonged ray
+        // comes from the start's place.
         let e = exit([1e-3, -2e-3], [0.5e-3, -1e-3], 0.5, 0.0);
         let s = Start { position_m: [0.1, 0.2], tilt_rad: [0.0; 2] };
         let at = |focus| bench(focus).film_shift_m(&s, &e);

@@ -1,4 +1,5 @@
-//! Pictures into files: PNG for eyes, OpenEXR with every layer and every parameter, NumPy for the deflection map.
+//! Pictures into files: PNG for eyes, OpenEXR with every layer and every parameter, NumPy for the
+//! deflection map.
 
 use crate::render::RenderOutput;
 use crate::scene::{Scene, SceneError};
@@ -51,7 +52,8 @@ pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, Outp
 /// | `emission.Y` | | of the camera's way, 1 is undisturbed light without a cut-off, when it has `media.emission` |
 /// | `rotation.Y` | rad | of the plane of polarisation, when it has `media.rotation` |
 ///
-/// and as metadata every value of the effective scene under its TOML path, the scene as a whole, and what was done.
+/// and as metadata every value of the effective scene under its TOML path, the scene as a whole,
+/// and what was done.
 pub fn write_exr(
     path: &Path,
     rendered: &RenderOutput,
@@ -114,7 +116,11 @@ fn add_pixels(p: &mut Picture, rendered: &RenderOutput) -> Result<(), OutputErro
 }
 
 /// Every parameter and what was done.
-pub fn metadata(rendered: &RenderOutput, scene: &Scene, elapsed_secs: f64) -> Result<Metadata, OutputError> {
+pub fn metadata(
+    rendered: &RenderOutput,
+    scene: &Scene,
+    elapsed_secs: f64,
+) -> Result<Metadata, OutputError> {
     let mut m = image_io::metadata_of_this_run("schlieren", env!("CARGO_PKG_VERSION"));
     // OpenEXR's own attribute of that name is not for free use.
     if let Some(program) = m.remove(keys::SOFTWARE) {
@@ -163,7 +169,8 @@ fn flatten(path: &str, value: &toml::Value, out: &mut Metadata) {
     }
 }
 
-/// Writes the deflection map as a NumPy array of shape (height, width, 2), little-endian f32, in rad along the picture's right and up; row 0 is the top.
+/// Writes the deflection map as a NumPy array of shape (height, width, 2), little-endian f32, in
+/// rad along the picture's right and up; row 0 is the top.
 pub fn write_npy(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError> {
     let map = rendered.map.as_ref().ok_or(OutputError::NoMap)?;
     let shape = format!("({}, {}, 2)", rendered.framing.height, rendered.framing.width);
@@ -171,7 +178,8 @@ pub fn write_npy(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError
     write_whole(path, &bytes).map_err(|source| OutputError::Io { path: path.into(), source })
 }
 
-/// NumPy's format, version 1.0: magic, length, a Python dictionary padded so that the data begin at a multiple of 64, the data.
+/// NumPy's format, version 1.0: magic, length, a Python dictionary padded so that the data begin at
+/// a multiple of 64, the data.
 fn npy(shape: &str, values: &[f32]) -> Vec<u8> {
     const PREAMBLE: usize = 10;
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
@@ -211,7 +219,9 @@ mod tests {
         let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
         assert_eq!((10 + length) % 64, 0);
         let header = std::str::from_utf8(&bytes[10..10 + length]).unwrap();
-        assert!(header.starts_with("{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 2), }"));
+        assert!(
+            header.starts_with("{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 2), }")
+        );
         assert!(header.ends_with('\n'));
         assert_eq!(bytes.len(), 10 + length + 16);
         assert_eq!(bytes[10 + length + 4..][..4], (-2.0f32).to_le_bytes());

@@ -1,34 +1,42 @@
-//! The boundary between optics and field: a photon goes in undisturbed and comes out with its deviation.
+//! The boundary between optics and field: a photon goes in undisturbed and comes out with its
+//! deviation.
 //!
-//! Optics makes [`Start`]s, one of the implementations of [`LightPaths`] (line of sight, a march on the CPU, the GPU) turns them into [`Exit`]s, and optics
-//! takes them on to the cut-off and the film. Nothing here is the difference of two large numbers.
+//! Optics makes [`Start`]s, one of the implementations of [`LightPaths`] (line of sight, a march on
+//! the CPU, the GPU) turns them into [`Exit`]s, and optics takes them on to the cut-off and the
+//! film. Nothing here is the difference of two large numbers.
 
 use crate::view::View;
 
 /// The undisturbed ray of one photon.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Start {
-    /// Where the undisturbed ray crosses the plane through the view's centre perpendicular to `forward`: along `right` and `up`, from the centre.
+    /// Where the undisturbed ray crosses the plane through the view's centre perpendicular to
+    /// `forward`: along `right` and `up`, from the centre.
     pub position_m: [f32; 2],
-    /// Slopes of the photon's parallel beam: its direction is `forward + tilt[0] right + tilt[1] up`, normalised. Zero on the optical axis; other
-    /// values come from the extent of the light source.
+    /// Slopes of the photon's parallel beam: its direction is `forward + tilt[0] right + tilt[1]
+    /// up`, normalised. Zero on the optical axis; other values come from the extent of the light
+    /// source.
     pub tilt_rad: [f32; 2],
 }
 
 /// The same photon behind the test section, as deviations from its undisturbed ray.
 ///
-/// Directions are given in the photon's own frame: the view's frame turned by the smallest rotation that takes `forward` to the photon's direction. For
-/// tilts below 1e-3 rad its `right` and `up` equal the view's within 5e-7.
+/// Directions are given in the photon's own frame: the view's frame turned by the smallest rotation
+/// that takes `forward` to the photon's direction. For tilts below 1e-3 rad its `right` and `up`
+/// equal the view's within 5e-7.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exit {
-    /// Deflection along right and up: the components of the unit direction in the reference medium (sines; they equal the angles within
-    /// 2e-5 relative below 0.01 rad). The light leaves through a surface normal to the undisturbed ray, as through the window of a test section.
+    /// Deflection along right and up: the components of the unit direction in the reference medium
+    /// (sines; they equal the angles within 2e-5 relative below 0.01 rad). The light leaves through
+    /// a surface normal to the undisturbed ray, as through the window of a test section.
     pub deflection_rad: [f32; 2],
     /// Displacement along right and up in the plane at `exit_depth_m`.
     pub displacement_m: [f32; 2],
-    /// Distance along the undisturbed ray, from where it crosses the centre plane to where it left the field.
+    /// Distance along the undisturbed ray, from where it crosses the centre plane to where it left
+    /// the field.
     pub exit_depth_m: f32,
-    /// Optical path minus that of the undisturbed ray in the reference medium, between the same planes. NaN when it was not asked for.
+    /// Optical path minus that of the undisturbed ray in the reference medium, between the same
+    /// planes. NaN when it was not asked for.
     pub opd_m: f32,
     /// 1 free; 0 blocked; between when absorption or an analyser dims the light ([`crate::media`]).
     pub transmission: f32,
@@ -56,9 +64,11 @@ pub enum Status {
     Free,
     /// Stopped by a solid body.
     Blocked,
-    /// Went through cells without data (and was stopped there, or not, as the march was told; see `transmission`).
+    /// Went through cells without data (and was stopped there, or not, as the march was told; see
+    /// `transmission`).
     Masked,
-    /// Was bent so far that it left sideways or backwards; its deflection and displacement are those where it left, and it does not reach the film.
+    /// Was bent so far that it left sideways or backwards; its deflection and displacement are
+    /// those where it left, and it does not reach the film.
     Turned,
 }
 
@@ -119,7 +129,12 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
         (**self).skip_report()
     }
 
-    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+    fn trace_with_jacobians(
+        &self,
+        starts: &[Start],
+        exits: &mut [Exit],
+        jacobians: &mut [Jacobian],
+    ) {
         (**self).trace_with_jacobians(starts, exits, jacobians);
     }
 
@@ -130,8 +145,9 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
 
 /// Something that takes light through the test section.
 pub trait LightPaths: Sync {
-    /// Traces each start to the exit of the same number, on the calling thread. Neighbouring starts should be neighbours in the picture: rays are taken in
-    /// packets, and those that look at the same nodes are faster. No exit depends on it.
+    /// Traces each start to the exit of the same number, on the calling thread. Neighbouring starts
+    /// should be neighbours in the picture: rays are taken in packets, and those that look at the
+    /// same nodes are faster. No exit depends on it.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -143,7 +159,8 @@ pub trait LightPaths: Sync {
     /// What [`Exit`] will hold.
     fn wanted(&self) -> PathQuantities;
 
-    /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences: half a voxel or so.
+    /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences: half a
+    /// voxel or so.
     fn difference_step_m(&self) -> f64;
 
     /// What failed on the way and was made up for, with its cause, for who looks at the result.
@@ -156,16 +173,22 @@ pub trait LightPaths: Sync {
         None
     }
 
-    /// [`LightPaths::trace`], and how each exit changes with its start. This implementation takes central differences of four more rays each;
-    /// implementations with smooth fields do better.
+    /// [`LightPaths::trace`], and how each exit changes with its start. This implementation takes
+    /// central differences of four more rays each; implementations with smooth fields do better.
     ///
     /// # Panics
     /// If the slices differ in length.
-    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+    fn trace_with_jacobians(
+        &self,
+        starts: &[Start],
+        exits: &mut [Exit],
+        jacobians: &mut [Jacobian],
+    ) {
         assert_eq!(starts.len(), jacobians.len(), "one Jacobian per start");
         self.trace(starts, exits);
         let step_m = self.difference_step_m() as f32;
-        let mut sides = [vec![Exit::UNDISTURBED; starts.len()], vec![Exit::UNDISTURBED; starts.len()]];
+        let mut sides =
+            [vec![Exit::UNDISTURBED; starts.len()], vec![Exit::UNDISTURBED; starts.len()]];
         let mut moved = starts.to_vec();
         for axis in 0..2 {
             for (side, sign) in sides.iter_mut().zip([1.0, -1.0]) {
@@ -190,7 +213,8 @@ pub trait LightPaths: Sync {
         }
     }
 
-    /// [`LightPaths::trace`] on all threads of the current rayon pool. The result does not depend on their number.
+    /// [`LightPaths::trace`] on all threads of the current rayon pool. The result does not depend
+    /// on their number.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -199,6 +223,9 @@ pub trait LightPaths: Sync {
         assert_eq!(starts.len(), exits.len(), "one exit per start");
         // A multiple of every packet size; a few milliseconds of work.
         const CHUNK: usize = 1024;
-        starts.par_chunks(CHUNK).zip(exits.par_chunks_mut(CHUNK)).for_each(|(s, e)| self.trace(s, e));
+        starts
+            .par_chunks(CHUNK)
+            .zip(exits.par_chunks_mut(CHUNK))
+            .for_each(|(s, e)| self.trace(s, e));
     }
 }

@@ -1,9 +1,10 @@
-//! From a tolerance in radians to a march: mode, interpolant and step, with the bound that chose them and the error that was measured.
+//! From a tolerance in radians to a march: mode, interpolant and step, with the bound that chose
+//! them and the error that was measured.
 //!
 //! The errors add up. What follows bounds each from the lattice alone, in one pass over it
-//! ([`DerivativeBounds`]), with G the largest gradient, H the largest second derivative, T the largest
-//! third and F the largest fourth along an axis (all per metre, mixed ones too), L the longest way
-//! through the field, h the spacing, theta = G L the largest deflection:
+//! ([`DerivativeBounds`]), with G the largest gradient, H the largest second derivative, T the
+//! largest third and F the largest fourth along an axis (all per metre, mixed ones too), L the
+//! longest way through the field, h the spacing, theta = G L the largest deflection:
 //!
 //! * **Bending** (line of sight leaves it out): a ray strays by at most G s²/2 after a way s, so
 //!   its gradient is off by H times that: `H G L³ / 6`. The way itself is longer by theta²/2 at
@@ -21,9 +22,10 @@
 //! An error of the gradient moves the ray, and from there on its gradient is another: errors of
 //! steps and interpolants grow by at most `cosh(√H L)` (Gronwall).
 //!
-//! All are worst cases of worst points added up along the whole path: real errors are ten to a thousand times smaller. So the plan then traces a few hundred rays
-//! twice, as planned and with everything refined, and reports that difference as the achieved
-//! error; and once more through coarser lattices, to know what the field's own lattice leaves open.
+//! All are worst cases of worst points added up along the whole path: real errors are ten to a
+//! thousand times smaller. So the plan then traces a few hundred rays twice, as planned and with
+//! everything refined, and reports that difference as the achieved error; and once more through
+//! coarser lattices, to know what the field's own lattice leaves open.
 
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate};
@@ -52,8 +54,8 @@ pub enum Mode {
 /// What a user asks for. What is `None` is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Request {
-    /// Largest error of the deflection that is fine. Zero and below: as accurate as can be. A lattice that is itself coarser than this sets the steps
-    /// instead.
+    /// Largest error of the deflection that is fine. Zero and below: as accurate as can be. A
+    /// lattice that is itself coarser than this sets the steps instead.
     pub tolerance_rad: f64,
     /// Direction of the light, which sets the longest way through the field. `None`: any.
     pub direction: Option<DVec3>,
@@ -125,7 +127,8 @@ pub struct MeasuredError {
     pub rms_rad: f64,
     /// How well the field itself is resolved: the error that its lattice leaves open, estimated
     /// from the largest changes of deflection when half the nodes along each axis are left out, and
-    /// half of those (Richardson's extrapolation). Infinite when the field has too few nodes to tell.
+    /// half of those (Richardson's extrapolation). Infinite when the field has too few nodes to
+    /// tell.
     pub resolution_rad: f64,
     /// Rays compared.
     pub rays: usize,
@@ -135,7 +138,8 @@ pub struct MeasuredError {
 const SHORTEST_STEP: f64 = 0.125;
 
 impl Plan {
-    /// Chooses the cheapest march whose bounds are within the tolerance; if none is, the most accurate.
+    /// Chooses the cheapest march whose bounds are within the tolerance; if none is, the most
+    /// accurate.
     pub fn new(field: &Field, request: Request) -> Plan {
         let derivative_bounds = DerivativeBounds::of(field);
         Self::from_derivative_bounds(field, request, derivative_bounds)
@@ -155,7 +159,8 @@ impl Plan {
         // Beyond e^50 it is infinite for all purposes, and still a number.
         let growth = (r.second.sqrt() * length_m).min(50.0).cosh();
 
-        let bending_rad = r.second * r.gradient * length_m.powi(3) / 6.0 + deflection_rad.powi(3) / 2.0;
+        let bending_rad =
+            r.second * r.gradient * length_m.powi(3) / 6.0 + deflection_rad.powi(3) / 2.0;
         let bending_path_m = deflection_rad.powi(2) * length_m / 3.0;
         let edges_rad = r.gradient_on_faces * box_path.edges_m(h_m);
         let steps_rad = |voxels: f64| {
@@ -165,16 +170,20 @@ impl Plan {
             let per_m = match i {
                 Interpolant::BSpline => h_m.powi(3) / 24.0 * r.fourth,
                 Interpolant::TrilinearGradient => h_m.powi(2) / 6.0 * r.third,
-                Interpolant::Trilinear => h_m / 2.0 * r.second_along_axes + h_m.powi(2) / 8.0 * r.third,
+                Interpolant::Trilinear => {
+                    h_m / 2.0 * r.second_along_axes + h_m.powi(2) / 8.0 * r.third
+                }
             };
             growth * length_m * per_m
         };
         // A quarter of the tolerance while the interpolant's bound leaves it; where the lattice
         // itself is off by more, a third of that bound, which is the same number where the two
         // cases meet. Shorter steps would only cost time. Zero asks for all there is.
-        let share = |i| if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(i) / 3.0) } else { 0.0 };
+        let share =
+            |i| if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(i) / 3.0) } else { 0.0 };
 
-        // Strong index: deflections for which "paraxial" is a courtesy, or an index far from the reference's.
+        // Strong index: deflections for which "paraxial" is a courtesy, or an index far from the
+        // reference's.
         let strong = r.eps > 0.05 || deflection_rad > 0.5 && r.eps > 0.01;
         // What projections have instead of steps.
         let projected_rad = if box_path.oblique { steps_rad(1.0) } else { 0.0 };
@@ -190,7 +199,8 @@ impl Plan {
             Mode::Paraxial
         });
 
-        // The cheapest interpolant that is good enough. Line of sight is as fast with the spline as without.
+        // The cheapest interpolant that is good enough. Line of sight is as fast with the spline as
+        // without.
         let interpolant = request.interpolant.unwrap_or(
             if mode == Mode::Paraxial && of_interpolant(Interpolant::Trilinear) <= 0.5 * tolerance {
                 Interpolant::Trilinear
@@ -203,7 +213,8 @@ impl Plan {
         let of_step = |voxels: f64| match mode {
             Mode::LineOfSight => projected_rad,
             Mode::Paraxial => steps_rad(voxels),
-            // Fourth order: the constant of PEFRL is about 1/5000 (Omelyan 2002, table 2), times a fifth derivative that a spline does not have.
+            // Fourth order: the constant of PEFRL is about 1/5000 (Omelyan 2002, table 2), times a
+            // fifth derivative that a spline does not have.
             Mode::Full => growth * length_m * (voxels * h_m).powi(3) / 200.0 * r.fourth,
         };
         // Paths are summed up at the same places: eps there is off by its second derivative along
@@ -216,12 +227,15 @@ impl Plan {
                     0.0
                 }
             }
-            Mode::Paraxial => length_m * (voxels * h_m).powi(2) / 24.0 * (r.second + r.gradient.powi(2)),
+            Mode::Paraxial => {
+                length_m * (voxels * h_m).powi(2) / 24.0 * (r.second + r.gradient.powi(2))
+            }
             Mode::Full => 0.0,
         };
         let share_rad = share(interpolant);
         let good_enough = |voxels: f64| {
-            let path_is = !request.wanted.opd || path_of_step_m(voxels) <= 0.25 * tolerance * length_m;
+            let path_is =
+                !request.wanted.opd || path_of_step_m(voxels) <= 0.25 * tolerance * length_m;
             of_step(voxels) <= share_rad && (path_is || share_rad > tolerance)
         };
         let step_voxels = request.step_voxels.unwrap_or_else(|| {
@@ -275,21 +289,31 @@ impl Plan {
                 Box::new(Deviational::with_cache(field, view, self.interpolant, options, cache))
             }
             Mode::Full => {
-                let options =
-                    FullOptions { step_voxels: self.step_voxels, wanted, blank, ..FullOptions::default() };
+                let options = FullOptions {
+                    step_voxels: self.step_voxels,
+                    wanted,
+                    blank,
+                    ..FullOptions::default()
+                };
                 Box::new(FullSpline { field, spline: cache.spline(field), view, options })
             }
         }
     }
 
-    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter steps, splines, bending, nothing
-    /// left out), and compares.
+    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter
+    /// steps, splines, bending, nothing left out), and compares.
     pub fn measure(&self, field: &Field, view: View, rays: usize) -> MeasuredError {
         self.measure_with(field, view, rays, &FieldCache::default())
     }
 
     /// [`Plan::measure`] with what was prepared for this field before.
-    pub fn measure_with(&self, field: &Field, view: View, rays: usize, cache: &FieldCache) -> MeasuredError {
+    pub fn measure_with(
+        &self,
+        field: &Field,
+        view: View,
+        rays: usize,
+        cache: &FieldCache,
+    ) -> MeasuredError {
         let starts = sample_starts(field, &view, rays.max(1));
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
         self.paths_with(field, view, cache).trace_parallel(&starts, &mut planned);
@@ -308,13 +332,14 @@ impl Plan {
             fine.paths(lattice, view).trace_parallel(&starts, &mut exits);
             exits
         };
-        let resolution_rad = coarsened(field, &|| cache.spline(field)).map_or(f64::INFINITY, |coarse| {
-            let of_coarse = through(&coarse);
-            let change = compare(&of_coarse, &refined).0;
-            let coarser = coarsened(&coarse, &|| Arc::new(BSpline::new(&coarse)));
-            let before = coarser.map(|c| compare(&through(&c), &of_coarse).0);
-            extrapolated_error(change, before)
-        });
+        let resolution_rad =
+            coarsened(field, &|| cache.spline(field)).map_or(f64::INFINITY, |coarse| {
+                let of_coarse = through(&coarse);
+                let change = compare(&of_coarse, &refined).0;
+                let coarser = coarsened(&coarse, &|| Arc::new(BSpline::new(&coarse)));
+                let before = coarser.map(|c| compare(&through(&c), &of_coarse).0);
+                extrapolated_error(change, before)
+            });
         MeasuredError { max_rad, rms_rad, resolution_rad, rays }
     }
 }
@@ -324,7 +349,8 @@ fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
     let (mut max, mut sum, mut rays) = (0.0f64, 0.0, 0);
     for (a, b) in a.iter().zip(b) {
         if a.status == Status::Free && b.status == Status::Free {
-            let d: [f64; 2] = [0, 1].map(|c| f64::from(a.deflection_rad[c]) - f64::from(b.deflection_rad[c]));
+            let d: [f64; 2] =
+                [0, 1].map(|c| f64::from(a.deflection_rad[c]) - f64::from(b.deflection_rad[c]));
             let d = d[0].hypot(d[1]);
             max = max.max(d);
             sum += d * d;
@@ -334,7 +360,8 @@ fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
     (max, if rays > 0 { (sum / rays as f64).sqrt() } else { 0.0 }, rays)
 }
 
-/// Starts spread evenly over the picture of the field (the R2 sequence of Roberts 2018: the plane's golden ratio).
+/// Starts spread evenly over the picture of the field (the R2 sequence of Roberts 2018: the plane's
+/// golden ratio).
 fn sample_starts(field: &Field, view: &View, rays: usize) -> Vec<Start> {
     let half = [view.right, view.up].map(|axis| 0.5 * (field.size_m() * axis.abs()).element_sum());
     let offset = [view.right, view.up].map(|axis| (field.centre_m() - view.centre_m).dot(axis));

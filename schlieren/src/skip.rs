@@ -1,7 +1,9 @@
-//! Where the gas is so even that light goes straight: bricks with a bound on the deflection that leaving them out can cost.
+//! Where the gas is so even that light goes straight: bricks with a bound on the deflection that
+//! leaving them out can cost.
 //!
-//! Replaces the dissertation's octree of step lengths (section 5.3.2), whose threshold had no unit. A brick knows the largest |grad eps| of the
-//! interpolant in and around it; times the chord that is the largest angle, in radians, by which a ray can be deflected there. Rays add up what they
+//! Replaces the dissertation's octree of step lengths (section 5.3.2), whose threshold had no unit.
+//! A brick knows the largest |grad eps| of the interpolant in and around it; times the chord that
+//! is the largest angle, in radians, by which a ray can be deflected there. Rays add up what they
 //! leave out, and stop leaving out when the sum would pass the tolerance.
 
 use crate::field::Field;
@@ -34,24 +36,30 @@ pub struct Bricks {
 }
 
 impl Bricks {
-    /// Bounds for the B-spline through a field. They hold for the trilinear interpolants too: those stay between the nodes' values and differences.
+    /// Bounds for the B-spline through a field. They hold for the trilinear interpolants too: those
+    /// stay between the nodes' values and differences.
     pub fn new(field: &Field, spline: &BSpline) -> Bricks {
         let start = Instant::now();
         let [nx, ny, nz] = field.dims();
         let dims = field.dims().map(|n| (n - 1).div_ceil(EDGE));
         let (coefficients, [sy, sz]) = spline.coefficients();
         let rcp_h = field.spacing_m().map(|h| 1.0 / h);
-        // The B-spline is a convex combination of coefficients, and its derivative along an axis one of their differences: bounds on those
-        // are bounds on it. A brick's cells i..i+8 use coefficients i-1..=i+10, the same numbers plus one in the padded array.
+        // The B-spline is a convex combination of coefficients, and its derivative along an axis
+        // one of their differences: bounds on those are bounds on it. A brick's cells i..i+8 use
+        // coefficients i-1..=i+10, the same numbers plus one in the padded array.
         let own: Vec<Brick> = (0..dims[0] * dims[1] * dims[2])
             .into_par_iter()
             .map(|b| {
-                let first =
-                    [b % dims[0] * EDGE, b / dims[0] % dims[1] * EDGE, b / (dims[0] * dims[1]) * EDGE];
+                let first = [
+                    b % dims[0] * EDGE,
+                    b / dims[0] % dims[1] * EDGE,
+                    b / (dims[0] * dims[1]) * EDGE,
+                ];
                 let size = [nx, ny, nz];
                 let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
                 let mut steepest = [0.0f32; 3];
-                let end: [usize; 3] = std::array::from_fn(|c| (first[c] + EDGE + 2).min(size[c] + 1));
+                let end: [usize; 3] =
+                    std::array::from_fn(|c| (first[c] + EDGE + 2).min(size[c] + 1));
                 for k in first[2]..=end[2] {
                     for j in first[1]..=end[1] {
                         for i in first[0]..=end[0] {
@@ -61,7 +69,8 @@ impl Bricks {
                             hi = hi.max(v);
                             for (c, stride) in [1, sy, sz].into_iter().enumerate() {
                                 if [i, j, k][c] < end[c] {
-                                    steepest[c] = steepest[c].max((coefficients[o + stride] - v).abs());
+                                    steepest[c] =
+                                        steepest[c].max((coefficients[o + stride] - v).abs());
                                 }
                             }
                         }
@@ -76,11 +85,13 @@ impl Bricks {
                         for o in range.clone() {
                             values = (values.0.min(field.eps()[o]), values.1.max(field.eps()[o]));
                         }
-                        has_nodes |= field.nodes().is_some_and(|n| n[range].iter().any(|k| *k as u8 != 0));
+                        has_nodes |=
+                            field.nodes().is_some_and(|n| n[range].iter().any(|k| *k as u8 != 0));
                     }
                 }
                 let (lo, hi) = (lo.min(values.0), hi.max(values.1));
-                let squared: f64 = (0..3).map(|c| (f64::from(steepest[c]) * rcp_h[c]).powi(2)).sum();
+                let squared: f64 =
+                    (0..3).map(|c| (f64::from(steepest[c]) * rcp_h[c]).powi(2)).sum();
                 Brick {
                     max_gradient_per_m: squared.sqrt() as f32,
                     mean_eps: 0.5 * (lo + hi),
@@ -90,7 +101,8 @@ impl Bricks {
             })
             .collect();
 
-        // A ray looks up the brick in the middle of a stride, which is at most a brick long: its neighbours bound the rest.
+        // A ray looks up the brick in the middle of a stride, which is at most a brick long: its
+        // neighbours bound the rest.
         let bricks = (0..own.len())
             .into_par_iter()
             .map(|b| {

@@ -1,7 +1,9 @@
 //! Colours of light: what a film sees of several wavelengths.
 //!
-//! With one wavelength (or white light whose dispersion does not matter) pictures are grey, or have the colours of the filter. With several, each is traced
-//! by itself through its own indices, and the film adds up the wavelengths' colours; dispersion appears as coloured edges, and interference as Newton's colours.
+//! With one wavelength (or white light whose dispersion does not matter) pictures are grey, or have
+//! the colours of the filter. With several, each is traced by itself through its own indices, and
+//! the film adds up the wavelengths' colours; dispersion appears as coloured edges, and
+//! interference as Newton's colours.
 
 use crate::cutoff::Rgb;
 
@@ -14,8 +16,9 @@ pub struct Line {
     pub weight: f64,
 }
 
-/// The CIE 1931 colour matching functions by the piecewise Gaussians of Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE XYZ color
-/// matching functions" (JCGT 2013, equation 4 and table 1).
+/// The CIE 1931 colour matching functions by the piecewise Gaussians of Wyman, Sloan and Shirley,
+/// "Simple analytic approximations to the CIE XYZ color matching functions" (JCGT 2013, equation 4
+/// and table 1).
 pub fn xyz(wavelength_nm: f64) -> [f64; 3] {
     let lobe = |scale: f64, mean: f64, below: f64, above: f64| {
         let t = (wavelength_nm - mean) * if wavelength_nm < mean { below } else { above };
@@ -29,10 +32,12 @@ pub fn xyz(wavelength_nm: f64) -> [f64; 3] {
     ]
 }
 
-/// The colours (linear sRGB) that the lines leave on the film, such that all together are white, (1, 1, 1). A pure spectral colour lies outside what sRGB can
-/// show; its negative parts are cut off before balancing.
+/// The colours (linear sRGB) that the lines leave on the film, such that all together are white,
+/// (1, 1, 1). A pure spectral colour lies outside what sRGB can show; its negative parts are cut
+/// off before balancing.
 ///
-/// Where the lines together have nothing of a channel (two red lasers) no balance can make them white, and that channel stays dark.
+/// Where the lines together have nothing of a channel (two red lasers) no balance can make them
+/// white, and that channel stays dark.
 pub fn film_colors(lines: &[Line]) -> Vec<Rgb> {
     let rgb = |line: &Line| {
         let [x, y, z] = xyz(line.wavelength_nm);
@@ -52,8 +57,8 @@ pub fn film_colors(lines: &[Line]) -> Vec<Rgb> {
     colors.iter().map(|v| [0, 1, 2].map(|c| (v[c] * balance[c]) as f32)).collect()
 }
 
-/// How much of a filter's red, green and blue a wavelength meets: adds up to 1, so a grey filter is grey to all. Blue below 450 nm, green
-/// at 540, red above 620, linear between.
+/// How much of a filter's red, green and blue a wavelength meets: adds up to 1, so a grey filter is
+/// grey to all. Blue below 450 nm, green at 540, red above 620, linear between.
 pub fn filter_band(wavelength_nm: f64) -> Rgb {
     let ramp = |from: f64, to: f64| ((wavelength_nm - from) / (to - from)).clamp(0.0, 1.0);
     let (green_up, red_up) = (ramp(450.0, 540.0), ramp(540.0, 620.0));
@@ -65,7 +70,9 @@ mod tests {
     use super::*;
 
     fn lines(nm: &[f64]) -> Vec<Line> {
-        nm.iter().map(|&wavelength_nm| Line { wavelength_nm, weight: 1.0 / nm.len() as f64 }).collect()
+        nm.iter()
+            .map(|&wavelength_nm| Line { wavelength_nm, weight: 1.0 / nm.len() as f64 })
+            .collect()
     }
 
     #[test]
@@ -97,7 +104,9 @@ mod tests {
     fn grey_filters_are_grey_to_every_wavelength() {
         for nm in 300..900 {
             let sum: f32 = filter_band(f64::from(nm)).iter().sum();
-            assert!((sum - 1.0).abs() < 1e-6 && filter_band(f64::from(nm)).iter().all(|v| *v >= 0.0));
+            assert!(
+                (sum - 1.0).abs() < 1e-6 && filter_band(f64::from(nm)).iter().all(|v| *v >= 0.0)
+            );
         }
     }
 }

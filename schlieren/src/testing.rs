@@ -96,29 +96,51 @@ pub(crate) fn exposure<'a>(technique: &'a Technique, paths: &'a dyn LightPaths) 
     }
 }
 
-fn photons<const C: usize>(t: &Technique, p: &ClosedForm, framing: Framing, samples: u32) -> Vec<[f32; C]> {
+fn photons<const C: usize>(
+    t: &Technique,
+    p: &ClosedForm,
+    framing: Framing,
+    samples: u32,
+) -> Vec<[f32; C]> {
     let film = Film::<C>::new(framing, true);
     let cancel = AtomicBool::new(false);
     let films = [film];
-    let done = expose(&exposure(t, p), &films, 0..samples, false, &cancel, &|_| {}).expect("not cancelled");
+    let done = expose(&exposure(t, p), &films, 0..samples, false, &cancel, &|_| {})
+        .expect("not cancelled");
     assert_eq!(done.tally.not_a_number, 0);
     films[0].developed(f64::from(samples))
 }
 
 /// Grey levels by photons.
-pub(crate) fn expose_grey(t: &Technique, p: &ClosedForm, framing: Framing, samples: u32) -> Vec<f32> {
+pub(crate) fn expose_grey(
+    t: &Technique,
+    p: &ClosedForm,
+    framing: Framing,
+    samples: u32,
+) -> Vec<f32> {
     photons::<1>(t, p, framing, samples).into_iter().flatten().collect()
 }
 
 /// Colours by photons.
-pub(crate) fn expose_rgb(t: &Technique, p: &ClosedForm, framing: Framing, samples: u32) -> Vec<[f32; 3]> {
+pub(crate) fn expose_rgb(
+    t: &Technique,
+    p: &ClosedForm,
+    framing: Framing,
+    samples: u32,
+) -> Vec<[f32; 3]> {
     photons::<3>(t, p, framing, samples)
 }
 
 /// Grey levels by beams.
-pub(crate) fn beams_grey(t: &Technique, p: &ClosedForm, framing: Framing, per_side: u32) -> Vec<f32> {
+pub(crate) fn beams_grey(
+    t: &Technique,
+    p: &ClosedForm,
+    framing: Framing,
+    per_side: u32,
+) -> Vec<f32> {
     let film = Film::<1>::new(framing, false);
-    expose_beams(&exposure(t, p), &film, per_side, &AtomicBool::new(false), &|_| {}).expect("not cancelled");
+    expose_beams(&exposure(t, p), &film, per_side, &AtomicBool::new(false), &|_| {})
+        .expect("not cancelled");
     film.developed(1.0).into_iter().flatten().collect()
 }
 
@@ -136,16 +158,22 @@ pub(crate) fn within<T: Send + 'static>(
     });
     match told.recv_timeout(limit) {
         Ok(done) => done,
-        Err(std::sync::mpsc::RecvTimeoutError::Timeout) => panic!("{what}: not done within {limit:?}"),
+        Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {
+            panic!("{what}: not done within {limit:?}")
+        }
         Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => {
             std::panic::resume_unwind(worker.join().err().unwrap_or_else(|| Box::new("no panic")))
         }
     }
 }
 
-/// Does `job` 0 on a pool, and while that is under way 48 more, which come from outside as those of another picture do; with as
-/// many fresh `jobs` as there are delays between. A worker that waits inside rayon takes what comes late before it goes on.
-pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(threads: usize, jobs: impl Fn() -> J) {
+/// Does `job` 0 on a pool, and while that is under way 48 more, which come from outside as those of
+/// another picture do; with as many fresh `jobs` as there are delays between. A worker that waits
+/// inside rayon takes what comes late before it goes on.
+pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(
+    threads: usize,
+    jobs: impl Fn() -> J,
+) {
     const JOBS: usize = 49;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     for delay_us in [100, 300, 1000, 2000, 3000, 5000, 8000, 12_000, 20_000, 30_000] {

@@ -4,9 +4,10 @@ use glam::DVec3;
 
 /// An orthonormal, right-handed frame: `right x up = forward`.
 ///
-/// `forward` is the direction in which the light travels, from the source towards the film. The picture is what a camera on the film's side sees when it
-/// looks at the test section, against the light: `right` and `up` are right and up in the picture, and nothing is mirrored. (Someone at the light
-/// source would see left and right exchanged.)
+/// `forward` is the direction in which the light travels, from the source towards the film. The
+/// picture is what a camera on the film's side sees when it looks at the test section, against the
+/// light: `right` and `up` are right and up in the picture, and nothing is mirrored. (Someone at
+/// the light source would see left and right exchanged.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Right in the picture.
@@ -19,7 +20,8 @@ pub struct View {
     pub centre_m: DVec3,
 }
 
-/// A view along a coordinate axis in which the picture's axes are the field's, increasing to the right and upwards.
+/// A view along a coordinate axis in which the picture's axes are the field's, increasing to the
+/// right and upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axis {
     /// y to the right, z up; light travels along +x.
@@ -34,11 +36,15 @@ pub enum Axis {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ViewError {
     /// The light's direction is zero or not finite.
-    #[error("direction of light ({0}, {1}, {2}) is not a direction; give three finite numbers, not all zero")]
+    #[error(
+        "direction of light ({0}, {1}, {2}) is not a direction; give three finite numbers, not all \
+         zero"
+    )]
     Direction(f64, f64, f64),
     /// An angle is not finite, or an elevation beyond the poles.
     #[error(
-        "azimuth {azimuth_deg} and elevation {elevation_deg} degrees do not make a view; elevations are between -90 and 90"
+        "azimuth {azimuth_deg} and elevation {elevation_deg} degrees do not make a view; \
+         elevations are between -90 and 90"
     )]
     Angles {
         /// As given.
@@ -59,14 +65,15 @@ impl View {
         View { right, up, forward: right.cross(up), centre_m }
     }
 
-    /// Light travelling in direction `forward`, with the picture turned so that `up_hint` points up in it. Where `up_hint` is (nearly) along the
-    /// light, y is up.
+    /// Light travelling in direction `forward`, with the picture turned so that `up_hint` points up
+    /// in it. Where `up_hint` is (nearly) along the light, y is up.
     ///
     /// # Errors
     /// If `forward` is zero or not finite.
     pub fn new(forward: DVec3, up_hint: DVec3, centre_m: DVec3) -> Result<View, ViewError> {
         let wrong = ViewError::Direction(forward.x, forward.y, forward.z);
-        // Divided by the largest component first: directions of any length, 1e-200 or 1e200, are fine.
+        // Divided by the largest component first: directions of any length, 1e-200 or 1e200, are
+        // fine.
         let largest = forward.abs().max_element();
         if !forward.is_finite() || largest == 0.0 {
             return Err(wrong);
@@ -84,13 +91,18 @@ impl View {
         Ok(View { right, up: forward.cross(right), forward, centre_m })
     }
 
-    /// Light travelling towards an azimuth (from +x towards +y) and an elevation (above the x-y plane), with z up in the picture. (0, 0) is
-    /// [`Axis::X`], (-90, 0) is [`Axis::Y`], and at the poles (`elevation_deg` = 90 and azimuth -90: [`Axis::Z`]) the picture is the limit of
-    /// the ones below.
+    /// Light travelling towards an azimuth (from +x towards +y) and an elevation (above the x-y
+    /// plane), with z up in the picture. (0, 0) is [`Axis::X`], (-90, 0) is [`Axis::Y`], and at the
+    /// poles (`elevation_deg` = 90 and azimuth -90: [`Axis::Z`]) the picture is the limit of the
+    /// ones below.
     ///
     /// # Errors
     /// If an angle is not finite or the elevation is beyond the poles.
-    pub fn from_angles_deg(azimuth_deg: f64, elevation_deg: f64, centre_m: DVec3) -> Result<View, ViewError> {
+    pub fn from_angles_deg(
+        azimuth_deg: f64,
+        elevation_deg: f64,
+        centre_m: DVec3,
+    ) -> Result<View, ViewError> {
         if !azimuth_deg.is_finite() || !(-90.0..=90.0).contains(&elevation_deg) {
             return Err(ViewError::Angles { azimuth_deg, elevation_deg });
         }
@@ -101,8 +113,9 @@ impl View {
         Ok(View { right, up: forward.cross(right), forward, centre_m })
     }
 
-    /// The direction and the transverse axes of a beam with the given slopes: the view's frame turned by the smallest rotation that takes `forward` to
-    /// the beam. Returned as right, up, direction.
+    /// The direction and the transverse axes of a beam with the given slopes: the view's frame
+    /// turned by the smallest rotation that takes `forward` to the beam. Returned as right, up,
+    /// direction.
     pub fn beam(&self, tilt_rad: [f32; 2]) -> [DVec3; 3] {
         if tilt_rad == [0.0; 2] {
             return [self.right, self.up, self.forward];
@@ -140,7 +153,8 @@ mod tests {
         }
     }
 
-    /// A camera on the film's side looks along -forward. Something at its right hand must be at the picture's right.
+    /// A camera on the film's side looks along -forward. Something at its right hand must be at the
+    /// picture's right.
     #[test]
     fn pictures_are_not_mirrored_seen_from_the_film() {
         for axis in [Axis::X, Axis::Y, Axis::Z] {
@@ -165,7 +179,9 @@ mod tests {
     fn any_direction_makes_a_frame() {
         for a in -12..12 {
             for e in -6..=6 {
-                let v = View::from_angles_deg(f64::from(a) * 17.0, f64::from(e) * 15.0, DVec3::ZERO).unwrap();
+                let v =
+                    View::from_angles_deg(f64::from(a) * 17.0, f64::from(e) * 15.0, DVec3::ZERO)
+                        .unwrap();
                 assert_frame(&v);
                 assert_frame(&View::new(v.forward * 7.0, DVec3::Z, DVec3::ZERO).unwrap());
                 let [right, up, direction] = v.beam([1e-3, -2e-3]);

@@ -1,4 +1,5 @@
-//! The march from face to face: against closed forms, against itself, and against the adaptive one, which sees no kinks.
+//! The march from face to face: against closed forms, against itself, and against the adaptive one,
+//! which sees no kinks.
 
 mod common;
 
@@ -27,7 +28,8 @@ fn noise(dims: [usize; 3]) -> Field {
     .unwrap()
 }
 
-/// Lines from side to side of the cube: oblique, along an axis, in a plane of nodes, along the diagonal.
+/// Lines from side to side of the cube: oblique, along an axis, in a plane of nodes, along the
+/// diagonal.
 fn lines() -> Vec<(DVec3, DVec3, f64)> {
     let through = |from: DVec3, to: DVec3| (from, (to - from).normalize(), (to - from).length());
     vec![
@@ -38,11 +40,17 @@ fn lines() -> Vec<(DVec3, DVec3, f64)> {
     ]
 }
 
-fn all_points(cells: &CellExact, medium: &impl Medium, line: (DVec3, DVec3, f64)) -> [LineIntegrals; 3] {
-    [Points::Two, Points::Three, Points::Five].map(|p| cells.line_of_sight(medium, line.0, line.1, line.2, p))
+fn all_points(
+    cells: &CellExact,
+    medium: &impl Medium,
+    line: (DVec3, DVec3, f64),
+) -> [LineIntegrals; 3] {
+    [Points::Two, Points::Three, Points::Five]
+        .map(|p| cells.line_of_sight(medium, line.0, line.1, line.2, p))
 }
 
-/// A trilinear function is a cubic polynomial along a line, and its gradient a quadratic one: two points are exact.
+/// A trilinear function is a cubic polynomial along a line, and its gradient a quadratic one: two
+/// points are exact.
 #[test]
 fn two_points_integrate_trilinear_cells_to_rounding() {
     let field = noise([13, 9, 11]);
@@ -56,10 +64,15 @@ fn two_points_integrate_trilinear_cells_to_rounding() {
             assert!((two.slope - other.slope).length() < 1e-14 * scale, "{two:?} {other:?}");
             assert!((two.path_m - other.path_m).abs() < 1e-15 * 1e-5 * 10.0);
         }
-        // eps is continuous: the integral of its derivative along the line is what it gained. Rays in a plane of nodes have no slope across it, but one along it.
+        // eps is continuous: the integral of its derivative along the line is what it gained. Rays
+        // in a plane of nodes have no slope across it, but one along it.
         let end = line.0 + line.1 * line.2;
         let gained = medium.sample(end).0 - medium.sample(line.0).0;
-        assert!((two.slope.dot(line.1) - gained).abs() < 1e-14 * scale, "{} {gained}", two.slope.dot(line.1));
+        assert!(
+            (two.slope.dot(line.1) - gained).abs() < 1e-14 * scale,
+            "{} {gained}",
+            two.slope.dot(line.1)
+        );
 
         let medium = InterpolatedMedium::new(&field, &gradients);
         let [two, _, five] = all_points(&cells, &medium, line);
@@ -80,12 +93,18 @@ fn five_points_integrate_splines_to_rounding() {
         assert!(off(&five) < 1e-14, "{:e}", off(&five));
         // Along an axis it is a cubic polynomial, along other lines not.
         if line.1.abs().max_element() < 0.99 {
-            assert!(off(&two) > off(&three) && off(&three) > off(&five), "{:e} {:e}", off(&two), off(&three));
+            assert!(
+                off(&two) > off(&three) && off(&three) > off(&five),
+                "{:e} {:e}",
+                off(&two),
+                off(&three)
+            );
         }
     }
 }
 
-/// Of the blob itself: OPD = A s √(2π) erf(h/(s√2)) exp(-b²/2s²), and its slope. Halving the cells divides the error by 2⁶.
+/// Of the blob itself: OPD = A s √(2π) erf(h/(s√2)) exp(-b²/2s²), and its slope. Halving the cells
+/// divides the error by 2⁶.
 #[test]
 fn straight_lines_through_a_gaussian_are_the_closed_form() {
     let g = Gaussian { amplitude: 1e-4, sigma_m: 0.12 };
@@ -97,12 +116,14 @@ fn straight_lines_through_a_gaussian_are_the_closed_form() {
         assert_eq!(s.pieces as usize, n - 1);
         ((s.slope - slope).length() / slope.length()).max((s.path_m - path_m).abs() / path_m)
     };
-    // Errors of the rule cancel but for those at the ends, where the blob has nearly vanished: at first they fall even faster.
+    // Errors of the rule cancel but for those at the ends, where the blob has nearly vanished: at
+    // first they fall even faster.
     let errors = [5, 9, 17, 33].map(error);
     assert!(errors[0] / errors[1] > 64.0, "{errors:?}");
     assert!(errors[1..].windows(2).all(|e| e[0] / e[1] > 48.0), "{errors:?}");
     assert!(error(65) < 1e-12);
-    // Through the spline of it the interpolant's own error is left (`interpolation_errors_are_those_on_record`: 7.5e-6 for ten voxels' sigma, and 14 here).
+    // Through the spline of it the interpolant's own error is left
+    // (`interpolation_errors_are_those_on_record`: 7.5e-6 for ten voxels' sigma, and 14 here).
     let field = blob(121, g.amplitude, g.sigma_m);
     let (cells, spline) = (CellExact::new(&field), BSpline::new(&field));
     let s = cells.line_of_sight(
@@ -119,7 +140,8 @@ fn straight_lines_through_a_gaussian_are_the_closed_form() {
     );
 }
 
-/// The whole integral of motion, bent: a quarter turn of a Luneburg lens ends in one point; order 6.
+/// The whole integral of motion, bent: a quarter turn of a Luneburg lens ends in one point; order
+/// 6.
 #[test]
 fn bent_rays_are_the_closed_form_at_order_six() {
     let error = |n: usize| {
@@ -142,7 +164,8 @@ fn relative(a: DVec3, b: DVec3, scale: f64) -> f64 {
     (a - b).length() / scale
 }
 
-/// What a march from face to face gives a ray of an oblique view through the unit cube, and what an adaptive one does.
+/// What a march from face to face gives a ray of an oblique view through the unit cube, and what an
+/// adaptive one does.
 struct Both {
     u: DVec3,
     adaptive: DVec3,
@@ -150,16 +173,27 @@ struct Both {
     estimate: f64,
 }
 
-fn both<I: Interpolate>(field: &Field, i: &I, tolerance: f64, longest_step_m: f64, steps: u32) -> Vec<Both> {
+fn both<I: Interpolate>(
+    field: &Field,
+    i: &I,
+    tolerance: f64,
+    longest_step_m: f64,
+    steps: u32,
+) -> Vec<Both> {
     let medium = InterpolatedMedium::new(field, i);
     let cells = CellExact::new(field);
     let view = oblique();
     let adaptive = DormandPrince { tolerance, longest_step_m };
     let one = |s: &schlieren::path::Start| {
         let [x, y] = s.position_m.map(f64::from);
-        let begin = Ray::inside(&medium, view.right * x + view.up * y - view.forward * 0.35, view.forward);
+        let begin =
+            Ray::inside(&medium, view.right * x + view.up * y - view.forward * 0.35, view.forward);
         let run = adaptive.run(&medium, &begin, 0.7).unwrap();
-        Both { u: cells.run(&medium, &begin, 0.7, steps).u, adaptive: run.ray.u, estimate: run.error }
+        Both {
+            u: cells.run(&medium, &begin, 0.7, steps).u,
+            adaptive: run.ray.u,
+            estimate: run.error,
+        }
     };
     grid(4, 0.5).iter().map(one).collect()
 }
@@ -180,7 +214,8 @@ fn agrees_with_the_adaptive_march_where_the_interpolant_is_smooth() {
     assert!(worst < 2e-10, "{worst:e}");
 }
 
-/// Steps of four voxels over a trilinear field: the adaptive march is content, its estimate small, and it is wrong by many times that.
+/// Steps of four voxels over a trilinear field: the adaptive march is content, its estimate small,
+/// and it is wrong by many times that.
 #[test]
 fn adaptive_estimates_are_fooled_by_kinks() {
     let field = cube(33, lopsided);
@@ -191,14 +226,16 @@ fn adaptive_estimates_are_fooled_by_kinks() {
         let fooled = rays.iter().filter(|r| (r.adaptive - r.u).length() > 2.0 * r.estimate).count();
         assert!(2 * fooled >= rays.len(), "tolerance {tolerance:e}: {fooled} of {}", rays.len());
     }
-    // What settles who is right: the adaptive march with steps of a hundredth of a voxel comes to the same.
+    // What settles who is right: the adaptive march with steps of a hundredth of a voxel comes to
+    // the same.
     let rays = both(&field, &trilinear, 1e-15, 0.01 * voxel_m, 1);
     let scale = rays.iter().map(|r| r.u.length()).fold(0.0, f64::max);
     let worst = rays.iter().map(|r| relative(r.adaptive, r.u, scale)).fold(0.0, f64::max);
     assert!(worst < 2e-4, "{worst:e}");
 }
 
-/// A ridge of a trilinear eps along the ray draws it in from both sides: the march must come to its end there too.
+/// A ridge of a trilinear eps along the ray draws it in from both sides: the march must come to its
+/// end there too.
 #[test]
 fn a_ray_on_a_ridge_does_not_stand_still() {
     for strength in [1e-5, 0.05] {

@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 use schlieren::analytic::{FishEye, Kepler, Linear, LinearSquare, Luneburg, Selfoc};
-use schlieren::march::{DormandPrince, Euler, Integrator, Medium, Pefrl, Ray, RungeKutta4, Sharma, Verlet};
+use schlieren::march::{
+    DormandPrince, Euler, Integrator, Medium, Pefrl, Ray, RungeKutta4, Sharma, Verlet,
+};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Enters the Luneburg lens along z at height b. On its surface n = 1, so nothing jumps.
@@ -42,7 +44,8 @@ fn luneburg_brings_all_parallel_rays_to_one_point_with_one_path() {
         let end = Pefrl.run(&Luneburg, &start, FRAC_PI_2, 1000);
         assert!((end.position_m() - DVec3::Z).length() < 1e-11, "b = {b}");
         assert!((end.w() - DVec3::new(-b, 0.0, (1.0 - b * b).sqrt())).length() < 1e-11, "b = {b}");
-        // From the plane z = -1 the optical path is 1 + pi/2 for every b: the free part before the lens plus the path inside.
+        // From the plane z = -1 the optical path is 1 + pi/2 for every b: the free part before the
+        // lens plus the path inside.
         let free = 1.0 + start.start_m.z;
         let path = free + end.tau_m + end.excess_m;
         assert!((path - (1.0 + FRAC_PI_2)).abs() < 1e-11, "b = {b}: {path}");
@@ -74,7 +77,8 @@ fn selfoc_keeps_its_pitch_for_five_periods() {
     let g = 0.3;
     let fibre = Selfoc { gradient_per_m: g };
     let (x0, slope) = (0.2, 0.05);
-    let start = Ray::inside(&fibre, DVec3::new(x0, 0.0, 0.0), DVec3::new(slope, 0.0, 1.0).normalize());
+    let start =
+        Ray::inside(&fibre, DVec3::new(x0, 0.0, 0.0), DVec3::new(slope, 0.0, 1.0).normalize());
     let w = start.w();
     for (steps, tolerance, end) in [
         (4096, 3e-5, Verlet.run(&fibre, &start, 5.0 * TAU / g, 4096)),
@@ -123,8 +127,9 @@ fn kepler_hyperbolas_turn_by_two_arctangents() {
     // |w| = 1 at infinity; from far away the bend outside is k / far.
     let start = Ray::new(DVec3::new(b, 0.0, -far), DVec3::Z);
     let start = Ray { u: DVec3::Z * medium.sample(start.start_m).0, ..start };
-    let run =
-        DormandPrince { tolerance: 1e-13, longest_step_m: far }.run(&medium, &start, 2.0 * far).unwrap();
+    let run = DormandPrince { tolerance: 1e-13, longest_step_m: far }
+        .run(&medium, &start, 2.0 * far)
+        .unwrap();
     let w = run.ray.w();
     let turned = f64::atan2(-w.x, w.z);
     // Half of sin(angle) k/far on each side is still to come.
@@ -139,13 +144,17 @@ fn kepler_hyperbolas_turn_by_two_arctangents() {
     assert!((l - l0).length() < 1e-8 * l0.length().max(1.0), "{l} {l0}");
 }
 
-/// n(r): |x cross w| is constant, and the symplectic integrators keep it to rounding however long their steps are.
+/// n(r): |x cross w| is constant, and the symplectic integrators keep it to rounding however long
+/// their steps are.
 #[test]
 fn bouguer_is_kept_by_symplectic_integrators_at_any_step() {
-    let start = Ray::inside(&FishEye, DVec3::new(0.5, 0.1, 0.2), DVec3::new(0.3, 0.8, 0.4).normalize());
+    let start =
+        Ray::inside(&FishEye, DVec3::new(0.5, 0.1, 0.2), DVec3::new(0.3, 0.8, 0.4).normalize());
     let invariant = |r: &Ray| r.position_m().cross(r.w());
     for steps in [50, 500] {
-        for end in [Verlet.run(&FishEye, &start, 6.0, steps), Pefrl.run(&FishEye, &start, 6.0, steps)] {
+        for end in
+            [Verlet.run(&FishEye, &start, 6.0, steps), Pefrl.run(&FishEye, &start, 6.0, steps)]
+        {
             assert!((invariant(&end) - invariant(&start)).length() < 1e-13);
         }
     }
@@ -153,7 +162,8 @@ fn bouguer_is_kept_by_symplectic_integrators_at_any_step() {
     assert!((invariant(&rk) - invariant(&start)).length() > 1e-9);
 }
 
-/// n(y): the components of w along the layers are constant (Snell), also through a jump that a step cannot resolve.
+/// n(y): the components of w along the layers are constant (Snell), also through a jump that a step
+/// cannot resolve.
 #[test]
 fn snell_invariants_are_exact_in_layers() {
     struct Layers;
@@ -164,7 +174,8 @@ fn snell_invariants_are_exact_in_layers() {
             (0.2 * t, DVec3::Y * (0.2 * (1.0 - t * t) / 1e-3))
         }
     }
-    let start = Ray::inside(&Layers, DVec3::new(0.0, -0.5, 0.0), DVec3::new(0.3, 0.8, 0.1).normalize());
+    let start =
+        Ray::inside(&Layers, DVec3::new(0.0, -0.5, 0.0), DVec3::new(0.3, 0.8, 0.1).normalize());
     let end = Pefrl.run(&Layers, &start, 1.5, 20_000);
     assert!(end.position_m().y > 0.1);
     assert!((end.w().x - start.w().x).abs() < 1e-14 && (end.w().z - start.w().z).abs() < 1e-14);
@@ -175,11 +186,14 @@ fn snell_invariants_are_exact_in_layers() {
 
 #[test]
 fn total_reflection_turns_back_at_the_angle_of_incidence() {
-    // n falls from 1 to sqrt(1 - 0.8) over 1 m: a ray at 60 degrees from the normal cannot reach the end.
+    // n falls from 1 to sqrt(1 - 0.8) over 1 m: a ray at 60 degrees from the normal cannot reach
+    // the end.
     let medium = LinearSquare { slope_per_m: -0.4 };
     let start = Ray::new(DVec3::ZERO, DVec3::new(f64::sin(PI / 3.0), f64::cos(PI / 3.0), 0.0));
     let end = Verlet
-        .run_until(&medium, &start, 1e-3, 100_000, |r| if r.tau_m > 0.1 { -r.position_m().y } else { -1.0 })
+        .run_until(&medium, &start, 1e-3, 100_000, |r| {
+            if r.tau_m > 0.1 { -r.position_m().y } else { -1.0 }
+        })
         .unwrap();
     assert!(
         (end.w() - DVec3::new(f64::sin(PI / 3.0), -f64::cos(PI / 3.0), 0.0)).length() < 1e-12,

@@ -24,11 +24,13 @@ fn flow(path: &Path) {
 /// The same with so many nodes.
 fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
     let spacing_m = 0.1 / f64::from(n - 1);
-    let mut image = ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(spacing_m));
+    let mut image =
+        ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(spacing_m));
     let at = |i: u32, n: u32| (f64::from(i) - 0.5 * f64::from(n - 1)) * spacing_m;
     let blob = |i: u32| {
         let (x, y, z) = (at(i % nx, nx), at(i / nx % n, n), at(i / nx / n, n));
-        1.2 - 0.3 * (-((x - 0.03).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
+        1.2 - 0.3
+            * (-((x - 0.03).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
     };
     let values: Vec<f32> = (0..nx * n * n).map(|i| blob(i) as f32).collect();
     let constant = |v: f32| Values::F32(vec![v; values.len()]);
@@ -41,7 +43,8 @@ fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
     (soot[0], soot[1]) = (f32::NAN, -1.0);
     image.attributes.point.push(DataArray::new("soot", 1, Values::F32(soot)));
     image.attributes.point.push(DataArray::new("rho", 1, Values::F32(values)));
-    write_vtk(path, &Dataset::ImageData(image), VtkOptions::default()).expect("the flow is written");
+    write_vtk(path, &Dataset::ImageData(image), VtkOptions::default())
+        .expect("the flow is written");
 }
 
 /// Shape and values of a NumPy file.
@@ -51,7 +54,13 @@ fn npy(path: &Path) -> (String, Vec<f32>) {
     let header = text(&bytes[10..end]);
     let shape = header.split_once("'shape': ").expect("a shape").1;
     let shape = shape.split_once(')').expect("its end").0.to_string() + ")";
-    (shape, bytes[end..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    (
+        shape,
+        bytes[end..]
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect(),
+    )
 }
 
 #[test]
@@ -59,7 +68,8 @@ fn the_contract_png_exr_npy_and_json() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));
-    let (file, png, exr, map) = (path("flow.vti"), path("out.png"), path("out.exr"), path("out.npy"));
+    let (file, png, exr, map) =
+        (path("flow.vti"), path("out.png"), path("out.exr"), path("out.npy"));
     let out = schlieren(&[
         "render",
         &file,
@@ -89,7 +99,8 @@ fn the_contract_png_exr_npy_and_json() {
     assert_eq!(object["size"], serde_json::json!([80, 40]));
     assert!(object["deflection_error_rad"].as_f64().is_some_and(|e| e < 1e-7), "{object}");
 
-    // The map: (height, width, 2), row 0 at the top, centred; the larger side, 0.2 m, fills the 80 pixels.
+    // The map: (height, width, 2), row 0 at the top, centred; the larger side, 0.2 m, fills the 80
+    // pixels.
     let (shape, values) = npy(Path::new(&map));
     assert_eq!(shape, "(40, 80, 2)");
     assert_eq!(values.len(), 40 * 80 * 2);
@@ -146,9 +157,11 @@ fn temperature_pressure_and_species_are_the_same_air() {
     let state = map("b.npy", &["--temperature", "T", "--pressure", "p"]);
     let species = map("c.npy", &["--density", "rho", "--species", "Y=He"]);
     let largest = density.iter().fold(0.0f32, |m, v| m.max(v.abs()));
-    let differ =
-        |a: &[f32], b: &[f32]| a.iter().zip(b).fold(0.0f32, |m, (a, b)| m.max((a - b).abs())) / largest;
-    // The density at 293.15 K and 101325 Pa is 1.204, not the 1.2 that T was made from; and Ciddor's air is not ideal.
+    let differ = |a: &[f32], b: &[f32]| {
+        a.iter().zip(b).fold(0.0f32, |m, (a, b)| m.max((a - b).abs())) / largest
+    };
+    // The density at 293.15 K and 101325 Pa is 1.204, not the 1.2 that T was made from; and
+    // Ciddor's air is not ideal.
     assert!(differ(&density, &state) < 0.01, "{}", differ(&density, &state));
     assert!(differ(&density, &species) < 1e-5, "no helium changes nothing");
 }
@@ -164,13 +177,22 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
         (&["--density", "rho"][..], "no output"),
         (&["--density", "rho", "-o", "x.jpg"], ".png"),
         (&["-o", &png], "density"),
-        (&["--density", "rho", "--temperature", "T", "--pressure", "p", "-o", &png], "alternatives"),
+        (
+            &["--density", "rho", "--temperature", "T", "--pressure", "p", "-o", &png],
+            "alternatives",
+        ),
         (&["--density", "rho", "--device", "abacus", "-o", &png], "auto"),
         (&["--density", "rho", "--technique", "magic", "-o", &png], "shadowgraph"),
         (&["--density", "rho", "--fringe-spacing", "1mm", "-o", &png], "--fringe-spacing"),
-        (&["--density", "rho", "--technique", "bos", "--cutoff-angle", "3", "-o", &png], "--cutoff-angle"),
+        (
+            &["--density", "rho", "--technique", "bos", "--cutoff-angle", "3", "-o", &png],
+            "--cutoff-angle",
+        ),
         (&["--density", "rho", "--technique", "slice", "--samples", "3", "-o", &png], "sampling"),
-        (&["--density", "rho", "--cutoff", "circle", "--cutoff-open", "0.5", "-o", &png], "--cutoff-open"),
+        (
+            &["--density", "rho", "--cutoff", "circle", "--cutoff-open", "0.5", "-o", &png],
+            "--cutoff-open",
+        ),
         (&["--density", "rho", "--focal-length", "3m", "-o", &png], "schlieren_m"),
         (&["--density", "rho", "--noise-free", "--samples", "3", "-o", &png], "--samples"),
         (&["--density", "rho", "--view", "30,95", "-o", &png], "AZIMUTH"),
@@ -193,7 +215,11 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
     }
     let o = schlieren(&["render", file, "--density", "nothing", "-o", &png]);
     assert_eq!(o.status.code(), Some(1));
-    assert!(text(&o.stderr).contains("nothing") && text(&o.stderr).contains("rho"), "{}", text(&o.stderr));
+    assert!(
+        text(&o.stderr).contains("nothing") && text(&o.stderr).contains("rho"),
+        "{}",
+        text(&o.stderr)
+    );
 }
 
 #[test]
@@ -201,10 +227,20 @@ fn a_printed_scene_draws_the_same_picture() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));
-    let options =
-        ["--density", "rho", "--size", "40x20", "--technique", "interferogram", "--fringe-spacing", "10mm"];
+    let options = [
+        "--density",
+        "rho",
+        "--size",
+        "40x20",
+        "--technique",
+        "interferogram",
+        "--fringe-spacing",
+        "10mm",
+    ];
     let (file, a, b, toml) = (path("flow.vti"), path("a.png"), path("b.png"), path("scene.toml"));
-    let o = schlieren(&[&["render", &file, "-o", &a, "--print-scene", "--quiet"], &options[..]].concat());
+    let o = schlieren(
+        &[&["render", &file, "-o", &a, "--print-scene", "--quiet"], &options[..]].concat(),
+    );
     assert_eq!(o.status.code(), Some(0), "{}", text(&o.stderr));
     assert!(text(&o.stdout).contains("fringe_spacing_m = 0.01"), "{}", text(&o.stdout));
     std::fs::write(&toml, &o.stdout).unwrap();
@@ -226,11 +262,15 @@ fn sweeps_number_their_pictures_and_probes_print_numbers() {
     let (file, png) = (path("flow.vti"), path("turn.png"));
     let base = ["--density", "rho", "--size", "40x20", "--quiet"];
     let o = schlieren(
-        &[&["sweep", &file, "--set", "technique.cutoff.angle_deg=0.0,90.0", "-o", &png, "--json"], &base[..]]
-            .concat(),
+        &[
+            &["sweep", &file, "--set", "technique.cutoff.angle_deg=0.0,90.0", "-o", &png, "--json"],
+            &base[..],
+        ]
+        .concat(),
     );
     assert_eq!(o.status.code(), Some(0), "{}", text(&o.stderr));
-    let lines: Vec<Value> = text(&o.stdout).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let lines: Vec<Value> =
+        text(&o.stdout).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     assert_eq!(lines.len(), 2);
     assert_eq!(lines[1]["swept"]["technique.cutoff.angle_deg"], 90.0);
     let bytes = ["turn-0000.png", "turn-0001.png"].map(|n| std::fs::read(path(n)).unwrap());
@@ -253,7 +293,8 @@ fn gas_is_left_out_within_a_bound_that_is_reported() {
     let (file, png, scene) = (path("flow.vti"), path("a.png"), path("scene.toml"));
     std::fs::write(
         &scene,
-        "[flow]\nfile = \"flow.vti\"\ndensity = \"rho\"\n[film]\nsize = [40, 20]\n[march]\nmethod = \"verlet\"\nskip_rad = 1e-5\n",
+        "[flow]\nfile = \"flow.vti\"\ndensity = \"rho\"\n[film]\nsize = [40, 20]\n[march]\nmethod \
+         = \"verlet\"\nskip_rad = 1e-5\n",
     )
     .unwrap();
     let base = ["--density", "rho", "--size", "40x20", "--march", "verlet", "--json", "--quiet"];
@@ -264,7 +305,8 @@ fn gas_is_left_out_within_a_bound_that_is_reported() {
     };
     let plain = json(&[&["render", &file, "-o", &png], &base[..]].concat());
     assert!(plain[0]["left_out"].is_null());
-    let by_option = json(&[&["render", &file, "-o", &png, "--skip", "1e-5rad"], &base[..]].concat());
+    let by_option =
+        json(&[&["render", &file, "-o", &png, "--skip", "1e-5rad"], &base[..]].concat());
     let by_scene = json(&["render", "--scene", &scene, "-o", &png, "--json", "--quiet"]);
     let probed = json(&["probe", "--scene", &scene, "--pixel", "2,18", "--json", "--quiet"]);
     let swept = json(&[
@@ -283,7 +325,10 @@ fn gas_is_left_out_within_a_bound_that_is_reported() {
     for object in [&by_option[0], &by_scene[0], &probed[0], &swept[1]] {
         let left = &object["left_out"];
         assert!(left["steps_part"].as_f64().is_some_and(|p| p > 0.0 && p <= 1.0), "{object}");
-        assert!(left["bound_rad"].as_f64().is_some_and(|b| (0.0..=1e-5 * 1.001).contains(&b)), "{object}");
+        assert!(
+            left["bound_rad"].as_f64().is_some_and(|b| (0.0..=1e-5 * 1.001).contains(&b)),
+            "{object}"
+        );
         assert!(object["march"].as_str().is_some_and(|m| m.contains("leaving out")), "{object}");
     }
     // Where the probe looks, the gas is even to the last digit; over the picture it is not.
@@ -334,7 +379,9 @@ fn transfer_functions_from_options_and_from_a_scene_are_the_same() {
     let (file, png, scene) = (path("flow.vti"), path("a.png"), path("scene.toml"));
     std::fs::write(
         &scene,
-        "[flow]\nfile = \"flow.vti\"\n[flow.multifield]\nrule = \"largest\"\n[flow.multifield.fields]\nT = { knots = [[293.15, 0.0], [400.0, -1e-4]], weight = 2.0 }\nrho = { knots = [[0.9, 2e-5], [1.2, 0.0]] }\n[film]\nsize = [40, 20]\n",
+        "[flow]\nfile = \"flow.vti\"\n[flow.multifield]\nrule \
+         = \"largest\"\n[flow.multifield.fields]\nT = { knots = [[293.15, 0.0], [400.0, -1e-4]], \
+         weight = 2.0 }\nrho = { knots = [[0.9, 2e-5], [1.2, 0.0]] }\n[film]\nsize = [40, 20]\n",
     )
     .unwrap();
     let curves = [
@@ -385,7 +432,8 @@ fn smoke_glow_and_rotation_reach_pictures_layers_probes_and_sweeps() {
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));
     let file = path("flow.vti");
-    let media = ["--absorption", "soot", "--emission", "0.5", "--rotation", "-3", "--analyser", "-20"];
+    let media =
+        ["--absorption", "soot", "--emission", "0.5", "--rotation", "-3", "--analyser", "-20"];
     let run = |command: &str, args: &[&str], media: &[&str]| {
         let mut all = vec![command, &file, "--density", "rho", "--size", "40x20", "--json"];
         all.extend(media);
@@ -403,9 +451,11 @@ fn smoke_glow_and_rotation_reach_pictures_layers_probes_and_sweeps() {
     let picture = read_exr(Path::new(&exr)).unwrap();
     let (tau, deep) = (6.0 * 0.1f32, 0.1f32);
     let glow = 0.5 / 6.0 * (1.0 - (-tau).exp());
-    for (plane, unit, value) in
-        [("optical_depth.Y", "1", tau), ("emission.Y", "1", glow), ("rotation.Y", "rad", -3.0 * deep)]
-    {
+    for (plane, unit, value) in [
+        ("optical_depth.Y", "1", tau),
+        ("emission.Y", "1", glow),
+        ("rotation.Y", "rad", -3.0 * deep),
+    ] {
         let p = picture.plane(plane).unwrap_or_else(|| panic!("{plane}"));
         assert_eq!(p.unit, unit, "{plane}");
         let seen = p.samples[10 * 40 + 20];
@@ -424,8 +474,12 @@ fn smoke_glow_and_rotation_reach_pictures_layers_probes_and_sweeps() {
     assert!(!picture.metadata.keys().any(|k| k.starts_with("media.")));
 
     let probe: Value = serde_json::from_str(&run("probe", &["--pixel", "20,10"], &media)).unwrap();
-    for (key, value) in [("optical_depth", tau), ("emission", glow), ("rotation_rad", -3.0 * deep)] {
-        assert!((probe[key].as_f64().unwrap() as f32 - value).abs() < 1e-5 * value.abs(), "{probe}");
+    for (key, value) in [("optical_depth", tau), ("emission", glow), ("rotation_rad", -3.0 * deep)]
+    {
+        assert!(
+            (probe[key].as_f64().unwrap() as f32 - value).abs() < 1e-5 * value.abs(),
+            "{probe}"
+        );
     }
     let malus = (-20f32.to_radians() + 0.3).cos().powi(2) * (-tau).exp();
     assert!((probe["transmission"].as_f64().unwrap() as f32 - malus).abs() < 1e-5, "{probe}");
@@ -474,7 +528,8 @@ fn the_index_of_a_state_and_of_a_table() {
     let csv = dir.path().join("t.csv");
     std::fs::write(&csv, "lambda_um,T_C,p_Pa,RH_frac,CO2_ppm\n0.633,20,101325,0,450\n").unwrap();
     let o = schlieren(&["index", "--csv", csv.to_str().unwrap()]);
-    let expected = "lambda_um,T_C,p_Pa,RH_frac,CO2_ppm,n_minus_1\n0.633,20,101325,0,450,2.71799831635e-4\n";
+    let expected =
+        "lambda_um,T_C,p_Pa,RH_frac,CO2_ppm,n_minus_1\n0.633,20,101325,0,450,2.71799831635e-4\n";
     assert_eq!(text(&o.stdout), expected);
     let o = schlieren(&["index", "--csv", csv.to_str().unwrap(), "--humidity", "0.5"]);
     assert_eq!(o.status.code(), Some(2));
@@ -487,7 +542,8 @@ fn completions_know_the_commands() {
     assert!(text(&o.stdout).contains("sweep"));
 }
 
-/// Without a Vulkan device, as on most machines that have no display: --device gpu is an error that names the cure, auto draws on the CPU and says why.
+/// Without a Vulkan device, as on most machines that have no display: --device gpu is an error that
+/// names the cure, auto draws on the CPU and says why.
 #[test]
 fn a_gpu_that_is_not_there() {
     let dir = tempfile::tempdir().unwrap();
@@ -495,7 +551,16 @@ fn a_gpu_that_is_not_there() {
     flow(&dir.path().join("flow.vti"));
     let run = |device: &str, png: &str| {
         Command::new(env!("CARGO_BIN_EXE_schlieren"))
-            .args(["render", &path("flow.vti"), "--density", "rho", "--size", "16x8", "--march", "verlet"])
+            .args([
+                "render",
+                &path("flow.vti"),
+                "--density",
+                "rho",
+                "--size",
+                "16x8",
+                "--march",
+                "verlet",
+            ])
             .args(["--device", device, "-o", png])
             .env("VK_DRIVER_FILES", "/nonexistent.json")
             .env("VK_ICD_FILENAMES", "/nonexistent.json")

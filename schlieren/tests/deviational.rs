@@ -8,7 +8,9 @@ use glam::DVec3;
 use schlieren::analytic::{Gaussian, abel};
 use schlieren::field::Field;
 use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
-use schlieren::march::{Deviational, Euler, Full, FullOptions, Integrator, Options, Pefrl, Scheme, Verlet};
+use schlieren::march::{
+    Deviational, Euler, Full, FullOptions, Integrator, Options, Pefrl, Scheme, Verlet,
+};
 use schlieren::path::{LightPaths, PathQuantities};
 use schlieren::view::{Axis, View};
 
@@ -33,8 +35,9 @@ fn reference<'a, I: Interpolate, G: Integrator>(
     )
 }
 
-/// Direct f32 marching loses 35 % of the deflection at 1e-6 in an oblique view, and all of it below (notes: the code this replaces). The tolerance is
-/// eight roundings of f32; what is left comes from weights and positions, not from sums.
+/// Direct f32 marching loses 35 % of the deflection at 1e-6 in an oblique view, and all of it below
+/// (notes: the code this replaces). The tolerance is eight roundings of f32; what is left comes
+/// from weights and positions, not from sums.
 #[test]
 fn f32_keeps_its_digits_at_any_amplitude_in_an_oblique_view() {
     let starts = grid(16, 0.8);
@@ -44,9 +47,13 @@ fn f32_keeps_its_digits_at_any_amplitude_in_an_oblique_view() {
         let wanted = trace(&reference(&field, &spline, Verlet, oblique(), 1.0), &starts);
         for opd in [false, true] {
             let options = Options { wanted: PathQuantities { opd }, ..Default::default() };
-            let got = trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, options), &starts);
+            let got =
+                trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, options), &starts);
             let (rms, max) = difference(&got, &wanted);
-            assert!(rms < 1e-7 && max < 5e-7, "amplitude {amplitude}: rms {rms:.1e}, max {max:.1e}");
+            assert!(
+                rms < 1e-7 && max < 5e-7,
+                "amplitude {amplitude}: rms {rms:.1e}, max {max:.1e}"
+            );
         }
     }
 }
@@ -79,7 +86,8 @@ fn phase_is_right_within_a_thousandth_of_a_radian_of_three_thousand() {
         let phase = |e: &schlieren::path::Exit| f64::from(e.opd_m) * wave_number;
         let largest = wanted.iter().map(phase).fold(0.0, f64::max);
         assert!(largest > 2800.0, "{largest}");
-        let worst = got.iter().zip(&wanted).map(|(a, b)| (phase(a) - phase(b)).abs()).fold(0.0, f64::max);
+        let worst =
+            got.iter().zip(&wanted).map(|(a, b)| (phase(a) - phase(b)).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-3, "{worst} rad");
     }
 }
@@ -122,7 +130,8 @@ fn every_interpolant_and_scheme_agrees_with_its_f64_reference() {
         }
     }
     check(&field, &spline, Interpolant::BSpline, &starts, 5e-7);
-    // The gradient of trilinear eps jumps between cells: a point rounded into the next cell takes the other value.
+    // The gradient of trilinear eps jumps between cells: a point rounded into the next cell takes
+    // the other value.
     check(&field, &line, Interpolant::Trilinear, &starts, 5e-4);
     check(&field, &gradient, Interpolant::TrilinearGradient, &starts, 1e-6);
 }
@@ -138,10 +147,13 @@ fn all_instruction_sets_agree() {
     let levels = [Some(best)];
     for interpolant in INTERPOLANTS {
         let options = Options { wanted: OPD, ..Default::default() };
-        let wanted = trace(&Deviational::with_level(&field, oblique(), interpolant, options, best), &starts);
+        let wanted =
+            trace(&Deviational::with_level(&field, oblique(), interpolant, options, best), &starts);
         for level in levels.into_iter().flatten() {
-            let got =
-                trace(&Deviational::with_level(&field, oblique(), interpolant, options, level), &starts);
+            let got = trace(
+                &Deviational::with_level(&field, oblique(), interpolant, options, level),
+                &starts,
+            );
             // Levels without fused multiply-add round once more.
             let tolerance = if interpolant == Interpolant::Trilinear { 5e-4 } else { 1e-6 };
             let (_, max) = difference(&got, &wanted);
@@ -179,12 +191,14 @@ fn views_along_all_axes_agree() {
     // From behind: light the other way is deflected the same way in space, for weak gas.
     let behind = View { right: -DVec3::X, up: DVec3::Y, forward: -DVec3::Z, centre_m: DVec3::ZERO };
     let weak = cube(48, |p| 1e-4 * lopsided(p));
-    let wanted = trace(&Deviational::new(&weak, along_z, Interpolant::BSpline, Options::default()), &starts);
+    let wanted =
+        trace(&Deviational::new(&weak, along_z, Interpolant::BSpline, Options::default()), &starts);
     let seen: Vec<_> = starts
         .iter()
         .map(|s| schlieren::path::Start { position_m: [-s.position_m[0], s.position_m[1]], ..*s })
         .collect();
-    let mut got = trace(&Deviational::new(&weak, behind, Interpolant::BSpline, Options::default()), &seen);
+    let mut got =
+        trace(&Deviational::new(&weak, behind, Interpolant::BSpline, Options::default()), &seen);
     for e in &mut got {
         e.deflection_rad[0] *= -1.0;
     }
@@ -233,7 +247,8 @@ fn gaussian_blob_is_the_closed_form_to_first_order() {
         }
         let path = g.path_difference_m(x, y, 0.5);
         let off = (f64::from(e.opd_m) - path).abs() / g.path_difference_m(0.0, 0.0, 0.5);
-        // Interpolation 1e-6; of second order in eps the squares of eps and of the deflection: a few times 1e-5.
+        // Interpolation 1e-6; of second order in eps the squares of eps and of the deflection: a
+        // few times 1e-5.
         assert!(off < 5e-5, "{off:.1e}");
     }
 }
@@ -262,11 +277,13 @@ fn interpolation_errors_are_those_on_record() {
         for (s, e) in starts.iter().zip(&exits) {
             let [x, y] = s.position_m.map(f64::from);
             let u = g.deflection_rad(x, y, 0.5);
-            u2 += (0..2).map(|c| (f64::from(e.deflection_rad[c]) - u[c]).powi(2)).sum::<f64>() / 2.0;
+            u2 +=
+                (0..2).map(|c| (f64::from(e.deflection_rad[c]) - u[c]).powi(2)).sum::<f64>() / 2.0;
             p2 += (f64::from(e.opd_m) - g.path_difference_m(x, y, 0.5)).powi(2);
         }
         let n = starts.len() as f64;
-        on_record.push(((u2 / n).sqrt() / scale, (p2 / n).sqrt() / g.path_difference_m(0.0, 0.0, 0.5)));
+        on_record
+            .push(((u2 / n).sqrt() / scale, (p2 / n).sqrt() / g.path_difference_m(0.0, 0.0, 0.5)));
     }
     let [spline, line, gradient] = on_record[..] else { unreachable!() };
     assert!(spline.0 < 2e-5 && spline.1 < 1e-6, "B-spline {spline:?}");
@@ -278,8 +295,9 @@ fn interpolation_errors_are_those_on_record() {
 fn cylinders_are_abel_pairs() {
     let (radius, a) = (0.35, 1e-6);
     for m in [2u32, 3] {
-        let field =
-            cube(128, |p| a * (1.0 - (p.x * p.x + p.z * p.z) / (radius * radius)).max(0.0).powi(m as i32));
+        let field = cube(128, |p| {
+            a * (1.0 - (p.x * p.x + p.z * p.z) / (radius * radius)).max(0.0).powi(m as i32)
+        });
         let starts = grid(20, 0.8);
         let paths = Deviational::new(
             &field,
@@ -296,7 +314,8 @@ fn cylinders_are_abel_pairs() {
                 "m = {m}, x = {x}"
             );
             assert!(
-                (f64::from(e.deflection_rad[0]) - a * abel::power_slope(x, radius, m)).abs() < 1e-2 * scale,
+                (f64::from(e.deflection_rad[0]) - a * abel::power_slope(x, radius, m)).abs()
+                    < 1e-2 * scale,
                 "m = {m}, x = {x}"
             );
             assert!(f64::from(e.deflection_rad[1]).abs() < 1e-6 * scale);
@@ -304,7 +323,8 @@ fn cylinders_are_abel_pairs() {
     }
 }
 
-/// A plane layer of any profile: weak light turns by d(eps) tan(angle of incidence), whatever the thickness.
+/// A plane layer of any profile: weak light turns by d(eps) tan(angle of incidence), whatever the
+/// thickness.
 #[test]
 fn planar_jump_turns_light_like_a_prism() {
     let jump = 8e-4;
@@ -336,11 +356,15 @@ fn spacing_may_differ_along_the_axes() {
     let starts = grid(16, 0.7);
     let view = oblique();
     let fine = cube(97, lopsided);
-    let wanted = trace(&Deviational::new(&fine, view, Interpolant::BSpline, Options::default()), &starts);
+    let wanted =
+        trace(&Deviational::new(&fine, view, Interpolant::BSpline, Options::default()), &starts);
     for dims in [[97, 49, 65], [49, 97, 81]] {
         let spacing = dims.map(|n: usize| 1.0 / (n - 1) as f64);
         let field = Field::from_fn(dims, spacing, DVec3::splat(-0.5), 1.0, lopsided).unwrap();
-        let got = trace(&Deviational::new(&field, view, Interpolant::BSpline, Options::default()), &starts);
+        let got = trace(
+            &Deviational::new(&field, view, Interpolant::BSpline, Options::default()),
+            &starts,
+        );
         let (_, max) = difference(&got, &wanted);
         // Interpolation at sigma = 4 voxels.
         assert!(max < 2e-3, "{dims:?}: {max:.1e}");
@@ -358,7 +382,8 @@ fn fields_of_a_nanometre_and_of_a_thousand_kilometres_bend_light_alike() {
     for unit in [1e-9, 1e-3, 1e3, 1e6] {
         let h = unit / (n - 1) as f64;
         let field =
-            Field::from_fn([n; 3], [h; 3], DVec3::splat(-0.5 * unit), 1.0, |p| lopsided(p / unit)).unwrap();
+            Field::from_fn([n; 3], [h; 3], DVec3::splat(-0.5 * unit), 1.0, |p| lopsided(p / unit))
+                .unwrap();
         let scaled: Vec<_> = starts
             .iter()
             .map(|s| schlieren::path::Start {
@@ -378,7 +403,8 @@ fn fields_of_a_nanometre_and_of_a_thousand_kilometres_bend_light_alike() {
         let (_, max) = difference(&got, &wanted);
         assert!(max < 2e-6, "{unit} m: {max:.1e}");
         assert!(
-            got.iter().all(|e| e.opd_m.is_finite() && f64::from(e.displacement_m[0].abs()) < 1e-3 * unit)
+            got.iter()
+                .all(|e| e.opd_m.is_finite() && f64::from(e.displacement_m[0].abs()) < 1e-3 * unit)
         );
     }
 }
@@ -388,10 +414,11 @@ fn fields_of_a_nanometre_and_of_a_thousand_kilometres_bend_light_alike() {
 fn huge_offset_origin() {
     let n = 40;
     let far = DVec3::new(3e6, -7e6, 1e7);
-    let field = Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], far - DVec3::splat(0.5), 1.0, |p| {
-        lopsided(p - far)
-    })
-    .unwrap();
+    let field =
+        Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], far - DVec3::splat(0.5), 1.0, |p| {
+            lopsided(p - far)
+        })
+        .unwrap();
     let starts = grid(8, 0.7);
     let wanted = trace(
         &Deviational::new(&cube(n, lopsided), oblique(), Interpolant::BSpline, Options::default()),
@@ -431,7 +458,9 @@ fn tilted_beams_are_seen_from_their_own_direction() {
             &[Default::default()],
         )[0];
         for c in 0..2 {
-            assert!((alone.deflection_rad[c] - e.deflection_rad[c]).abs() < 1e-6 * largest(&got) as f32);
+            assert!(
+                (alone.deflection_rad[c] - e.deflection_rad[c]).abs() < 1e-6 * largest(&got) as f32
+            );
         }
     }
 }
@@ -439,8 +468,10 @@ fn tilted_beams_are_seen_from_their_own_direction() {
 #[test]
 fn path_is_not_computed_unless_wanted() {
     let field = blob(16, 1e-4, 0.1);
-    let e =
-        trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default()), &grid(4, 0.5));
+    let e = trace(
+        &Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default()),
+        &grid(4, 0.5),
+    );
     assert!(e.iter().all(|e| e.opd_m.is_nan()));
 }
 
@@ -448,8 +479,12 @@ fn path_is_not_computed_unless_wanted() {
 fn number_of_threads_and_neighbours_do_not_matter() {
     let field = cube(32, lopsided);
     let starts = grid(70, 0.9);
-    let paths =
-        Deviational::new(&field, View::along(Axis::Z, DVec3::ZERO), Interpolant::BSpline, Options::default());
+    let paths = Deviational::new(
+        &field,
+        View::along(Axis::Z, DVec3::ZERO),
+        Interpolant::BSpline,
+        Options::default(),
+    );
     let one = trace(&paths, &starts);
     let mut many = one.clone();
     for threads in [1, 3] {
@@ -467,8 +502,12 @@ fn jacobians_are_the_closed_form() {
     let g = Gaussian { amplitude: 1e-6, sigma_m: 0.1 };
     let field = blob(80, g.amplitude, g.sigma_m);
     let starts = grid(8, 0.5);
-    let paths =
-        Deviational::new(&field, View::along(Axis::Z, DVec3::ZERO), Interpolant::BSpline, Options::default());
+    let paths = Deviational::new(
+        &field,
+        View::along(Axis::Z, DVec3::ZERO),
+        Interpolant::BSpline,
+        Options::default(),
+    );
     let mut exits = vec![schlieren::path::Exit::UNDISTURBED; starts.len()];
     let mut jacobians = vec![schlieren::path::Jacobian::default(); starts.len()];
     paths.trace_with_jacobians(&starts, &mut exits, &mut jacobians);

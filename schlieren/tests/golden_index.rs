@@ -1,7 +1,8 @@
 //! The refractive index against published and independently computed tables (`tests/data`).
 //!
-//! `nist_table1.csv`: NIST Engineering Metrology Toolbox, documentation, table 1. `ciddor_grid.csv`: Ciddor 1996 by two other
-//! implementations. `gladstone_dale.csv`: from the dispersion formulas in refractiveindex.info (CC0).
+//! `nist_table1.csv`: NIST Engineering Metrology Toolbox, documentation, table 1.
+//! `ciddor_grid.csv`: Ciddor 1996 by two other implementations. `gladstone_dale.csv`: from the
+//! dispersion formulas in refractiveindex.info (CC0).
 
 use datasets::read::csv::{self, CsvTable};
 use schlieren::index::Gas;
@@ -14,7 +15,8 @@ const NIST_TOLERANCE: f64 = 1e-9;
 const GRID_TOLERANCE: f64 = 1e-9;
 /// The first of the two has the same constants as ours and 13 digits are printed.
 const SAME_FORMULA_TOLERANCE: f64 = 1e-12;
-/// Measurements of one gas by two laboratories differ by up to 0.3 %; the same source must agree to this.
+/// Measurements of one gas by two laboratories differ by up to 0.3 %; the same source must agree to
+/// this.
 const GLADSTONE_DALE_TOLERANCE: f64 = 1e-3;
 
 fn table(name: &str) -> CsvTable {
@@ -50,14 +52,20 @@ fn every_row_of_the_ciddor_grid() {
     assert_eq!((t.len(), answers.warnings()), (1440, &[][..]));
     for (i, got) in answers.n_minus_1().iter().enumerate() {
         assert!((got - second[i]).abs() <= GRID_TOLERANCE, "line {}", t.line(i));
-        assert!((got - first[i]).abs() <= SAME_FORMULA_TOLERANCE, "line {}: {:e}", t.line(i), got - first[i]);
+        assert!(
+            (got - first[i]).abs() <= SAME_FORMULA_TOLERANCE,
+            "line {}: {:e}",
+            t.line(i),
+            got - first[i]
+        );
     }
 }
 
 #[test]
 fn gladstone_dale_constants_of_every_gas() {
     let t = table("gladstone_dale.csv");
-    let (wavelength, expected) = (t.numbers("lambda_um").unwrap(), t.numbers("K_cm3_per_g").unwrap());
+    let (wavelength, expected) =
+        (t.numbers("lambda_um").unwrap(), t.numbers("K_cm3_per_g").unwrap());
     let (gas, source) = (t.column_index("gas").unwrap(), t.column_index("source").unwrap());
     let mut worst: f64 = 0.0;
     for i in 0..t.len() {

@@ -1,6 +1,7 @@
 //! The GPU against the CPU: the same march, so the same numbers within roundings.
 //!
-//! Any Vulkan device serves, Mesa's lavapipe too. Without one these tests say so and pass, unless RTSV_REQUIRE_PEERS=1.
+//! Any Vulkan device serves, Mesa's lavapipe too. Without one these tests say so and pass, unless
+//! RTSV_REQUIRE_PEERS=1.
 #![cfg(feature = "gpu")]
 
 mod common;
@@ -18,8 +19,9 @@ use schlieren::view::{Axis, View};
 use std::io::Write as _;
 use std::sync::Arc;
 
-/// Largest difference of deflections, of the largest deflection. Both sum up a hundred terms in f32, compensated, from positions that are one rounding (1e-7 of
-/// 30 voxels) apart, because devices need not fuse multiplication and addition.
+/// Largest difference of deflections, of the largest deflection. Both sum up a hundred terms in
+/// f32, compensated, from positions that are one rounding (1e-7 of 30 voxels) apart, because
+/// devices need not fuse multiplication and addition.
 const TOLERANCE: f64 = 1e-6;
 
 /// The device, or why the test is skipped.
@@ -35,7 +37,12 @@ fn gpu() -> Option<Arc<Gpu>> {
     }
 }
 
-fn cpu<'a>(field: &'a Field, view: View, interpolant: Interpolant, options: GpuOptions) -> Deviational<'a> {
+fn cpu<'a>(
+    field: &'a Field,
+    view: View,
+    interpolant: Interpolant,
+    options: GpuOptions,
+) -> Deviational<'a> {
     let GpuOptions { step_voxels, wanted, blank } = options;
     let options = Options { step_voxels, wanted, blank, ..Options::default() };
     Deviational::new(field, view, interpolant, options)
@@ -60,7 +67,8 @@ fn both(
 /// Largest difference of `value`, of its largest value.
 fn relative(a: &[Exit], b: &[Exit], value: impl Fn(&Exit) -> f32) -> f64 {
     let largest = b.iter().map(|e| f64::from(value(e)).abs()).fold(0.0, f64::max);
-    let differences = a.iter().zip(b).map(|(a, b)| (f64::from(value(a)) - f64::from(value(b))).abs());
+    let differences =
+        a.iter().zip(b).map(|(a, b)| (f64::from(value(a)) - f64::from(value(b))).abs());
     differences.fold(0.0, |m, d| if d.is_nan() || d > m { d } else { m }) / largest
 }
 
@@ -88,8 +96,8 @@ fn deflection_displacement_and_opd_agree_with_the_cpu() {
     }
 }
 
-/// Its gradient jumps from cell to cell: a sample within a rounding of a cell's face may take the other cell's. That is one step's push, changed by the
-/// jump; all other rays agree.
+/// Its gradient jumps from cell to cell: a sample within a rounding of a cell's face may take the
+/// other cell's. That is one step's push, changed by the jump; all other rays agree.
 #[test]
 fn trilinear_agrees_but_for_samples_on_a_face() {
     let Some(gpu) = gpu() else { return };
@@ -97,10 +105,13 @@ fn trilinear_agrees_but_for_samples_on_a_face() {
     for view in [View::along(Axis::Y, DVec3::ZERO), oblique()] {
         let wanted = PathQuantities { opd: true };
         let options = GpuOptions { wanted, ..GpuOptions::default() };
-        let [a, b] = both(gpu.clone(), &field, view, Interpolant::Trilinear, options, &grid(15, 0.9));
+        let [a, b] =
+            both(gpu.clone(), &field, view, Interpolant::Trilinear, options, &grid(15, 0.9));
         let scale = largest(&b);
         let off = |(a, b): &(&Exit, &Exit)| {
-            (0..2).any(|c| f64::from((a.deflection_rad[c] - b.deflection_rad[c]).abs()) > TOLERANCE * scale)
+            (0..2).any(|c| {
+                f64::from((a.deflection_rad[c] - b.deflection_rad[c]).abs()) > TOLERANCE * scale
+            })
         };
         let others = a.iter().zip(&b).filter(off).count();
         assert!(others <= 2, "{others} of {} rays differ", a.len());
@@ -111,12 +122,14 @@ fn trilinear_agrees_but_for_samples_on_a_face() {
     }
 }
 
-/// Not a multiple of a work group, of a group of rays or of anything; a lattice of 3 x 2 x 29 nodes; rays beside the field; a single ray; none.
+/// Not a multiple of a work group, of a group of rays or of anything; a lattice of 3 x 2 x 29
+/// nodes; rays beside the field; a single ray; none.
 #[test]
 fn odd_sizes() {
     let Some(gpu) = gpu() else { return };
     let spacing = [0.3, 0.41, 0.037];
-    let field = Field::from_fn([3, 2, 29], spacing, DVec3::new(-0.3, -0.2, -0.5), 1.0003, lopsided).unwrap();
+    let field = Field::from_fn([3, 2, 29], spacing, DVec3::new(-0.3, -0.2, -0.5), 1.0003, lopsided)
+        .unwrap();
     let view = View::new(DVec3::new(0.2, -0.3, 1.0), DVec3::Y, field.centre_m()).unwrap();
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         for count in [0, 1, 31, 65, 997] {
@@ -133,28 +146,37 @@ fn odd_sizes() {
             }
             let (_, max) = difference(&a, &b);
             assert!(max < TOLERANCE, "{interpolant:?}, {count} rays: {max:e}");
-            let beside = a.iter().filter(|e| **e == Exit { opd_m: 0.0, ..Exit::UNDISTURBED }).count();
+            let beside =
+                a.iter().filter(|e| **e == Exit { opd_m: 0.0, ..Exit::UNDISTURBED }).count();
             assert!(count < 997 || beside > 100, "{beside} rays pass beside the field");
         }
     }
 }
 
-/// The paraxial form keeps its digits for gases of any strength: as tests/deviational.rs has it for the CPU.
+/// The paraxial form keeps its digits for gases of any strength: as tests/deviational.rs has it for
+/// the CPU.
 #[test]
 fn weak_gases_keep_their_digits_at_oblique_views() {
     let Some(gpu) = gpu() else { return };
     let starts = grid(9, 0.7);
     for amplitude in [1e-8, 1e-4] {
         let field = blob(33, amplitude, 0.12);
-        let [a, b] =
-            both(gpu.clone(), &field, oblique(), Interpolant::BSpline, GpuOptions::default(), &starts);
+        let [a, b] = both(
+            gpu.clone(),
+            &field,
+            oblique(),
+            Interpolant::BSpline,
+            GpuOptions::default(),
+            &starts,
+        );
         let (_, max) = difference(&a, &b);
         assert!(max < TOLERANCE, "{amplitude:e}: {max:e}");
         assert!(a.iter().all(|e| e.opd_m.is_nan()), "not asked for");
     }
 }
 
-/// Thousands of terms: a compiler that takes the compensation of the sums for nothing, as Vulkan lets it, fails here.
+/// Thousands of terms: a compiler that takes the compensation of the sums for nothing, as Vulkan
+/// lets it, fails here.
 #[test]
 fn compilers_keep_the_compensation_of_sums() {
     let Some(gpu) = gpu() else { return };
@@ -196,8 +218,15 @@ fn with_body(n: usize) -> Field {
         }
     };
     let nodes = (0..n * n * n).map(node).collect();
-    Field::new(plain.dims(), plain.spacing_m(), plain.origin_m(), plain.eps().to_vec(), 1.0, Some(nodes))
-        .unwrap()
+    Field::new(
+        plain.dims(),
+        plain.spacing_m(),
+        plain.origin_m(),
+        plain.eps().to_vec(),
+        1.0,
+        Some(nodes),
+    )
+    .unwrap()
 }
 
 #[test]
@@ -221,7 +250,9 @@ fn masks_stop_the_rays_that_they_stop_on_the_cpu() {
         }
         // The shell of blank cells stops light before the body does.
         let solid_is_met = blank == BlankCells::Continued;
-        for (status, met) in [(Status::Free, true), (Status::Masked, true), (Status::Blocked, solid_is_met)] {
+        for (status, met) in
+            [(Status::Free, true), (Status::Masked, true), (Status::Blocked, solid_is_met)]
+        {
             assert_eq!(a.iter().any(|e| e.status == status), met, "{blank:?}: {status:?}");
         }
         let dark = a.iter().filter(|e| e.transmission == 0.0).count();
@@ -244,7 +275,8 @@ fn a_field_larger_than_a_binding_is_the_same_field() {
         // 20 layers of cells: room for 8, then 4 of them with what their neighbours share.
         for (layers, slabs) in [(8, 3), (4, 5)] {
             let (row, halo) = if interpolant == Interpolant::BSpline { (23, 3) } else { (21, 1) };
-            let small = Gpu::open().unwrap().with_binding_limit(4 * row * row * (layers + halo) + 15);
+            let small =
+                Gpu::open().unwrap().with_binding_limit(4 * row * row * (layers + halo) + 15);
             let many = GpuPaths::new(Arc::new(small), &field, view, interpolant, options).unwrap();
             assert_eq!(many.slabs(), slabs, "{interpolant:?}, {layers} layers");
             assert_eq!(trace(&many, &starts), expected, "{interpolant:?}, {slabs} slabs");
@@ -257,8 +289,9 @@ fn a_field_that_fits_no_way_is_refused_with_numbers() {
     let Some(_) = gpu() else { return };
     let tiny = Arc::new(Gpu::open().unwrap().with_binding_limit(1024));
     let field = cube(21, lopsided);
-    let e =
-        GpuPaths::new(tiny, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).err().unwrap();
+    let e = GpuPaths::new(tiny, &field, oblique(), Interpolant::BSpline, GpuOptions::default())
+        .err()
+        .unwrap();
     assert!(matches!(e, GpuError::TooLarge { dims: [21, 21, 21], .. }), "{e:?}");
     assert!(e.to_string().contains("--device cpu"), "{e}");
 }
@@ -268,7 +301,8 @@ fn an_interpolant_without_a_kernel_is_refused_by_name() {
     let Some(gpu) = gpu() else { return };
     let field = cube(5, lopsided);
     let interpolant = Interpolant::TrilinearGradient;
-    let e = GpuPaths::new(gpu, &field, oblique(), interpolant, GpuOptions::default()).err().unwrap();
+    let e =
+        GpuPaths::new(gpu, &field, oblique(), interpolant, GpuOptions::default()).err().unwrap();
     assert!(e.to_string().contains("trilinear-gradient"), "{e}");
 }
 
@@ -282,7 +316,9 @@ fn several_batches_have_the_bits_of_one() {
     let starts = &grid(40, 1.1)[..1597];
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         let paths = |batch| {
-            GpuPaths::new(gpu.clone(), &field, oblique(), interpolant, options).unwrap().with_batch(batch)
+            GpuPaths::new(gpu.clone(), &field, oblique(), interpolant, options)
+                .unwrap()
+                .with_batch(batch)
         };
         let one = paths(starts.len());
         let expected = format!("{:?}", trace(&one, starts));
@@ -307,11 +343,14 @@ fn pictures_larger_than_a_dispatch_agree_with_the_cpu() {
     let field = cube(9, lopsided);
     let starts = grid(515, 0.9);
     assert!(starts.len() > 1 << 18);
-    let on_gpu = GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).unwrap();
-    let (mut a, mut b) = (vec![Exit::UNDISTURBED; starts.len()], vec![Exit::UNDISTURBED; starts.len()]);
+    let on_gpu =
+        GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).unwrap();
+    let (mut a, mut b) =
+        (vec![Exit::UNDISTURBED; starts.len()], vec![Exit::UNDISTURBED; starts.len()]);
     on_gpu.trace_parallel(&starts, &mut a);
     assert_eq!((on_gpu.counters().dispatches, on_gpu.counters().rays_on_cpu), (2, 0));
-    cpu(&field, oblique(), Interpolant::BSpline, GpuOptions::default()).trace_parallel(&starts, &mut b);
+    cpu(&field, oblique(), Interpolant::BSpline, GpuOptions::default())
+        .trace_parallel(&starts, &mut b);
     let (_, max) = difference(&a, &b);
     assert!(max < TOLERANCE, "{max:e}");
 }
@@ -321,7 +360,8 @@ fn pictures_larger_than_a_dispatch_agree_with_the_cpu() {
 fn batches_of_several_threads_do_not_mix() {
     let Some(gpu) = gpu() else { return };
     let field = cube(17, lopsided);
-    let paths = GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).unwrap();
+    let paths =
+        GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, GpuOptions::default()).unwrap();
     let starts = grid(32, 0.9);
     let expected = trace(&paths, &starts);
     let mut parallel = vec![Exit::UNDISTURBED; starts.len()];
@@ -346,14 +386,17 @@ fn drawn(field: &Field, device: &str, rest: &str) -> Result<RenderOutput, Box<Re
     // Shadowgraphs are seen far behind the flow: contrast needs a lever.
     let focus = if rest.contains("shadowgraph") { "focus_m = 30.0\n" } else { "" };
     let toml = format!(
-        "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n{focus}[march]\ndevice = \"{device}\"\n{rest}"
+        "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n{focus}[march]\ndevice \
+         = \"{device}\"\n{rest}"
     );
     let scene = Scene::from_toml(&toml).unwrap();
     let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
-    render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).map_err(Box::new)
+    render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+        .map_err(Box::new)
 }
 
-/// Schlieren by photons, a noise-free shadowgraph, an interferogram (which reads the phase), and BOS, which is traced from the film.
+/// Schlieren by photons, a noise-free shadowgraph, an interferogram (which reads the phase), and
+/// BOS, which is traced from the film.
 #[test]
 fn films_agree_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
@@ -365,7 +408,8 @@ fn films_agree_with_the_cpu() {
         "method = \"verlet\"\n[technique]\nkind = \"bos\"",
     ] {
         let [a, b] = ["gpu", "cpu"].map(|d| drawn(&field, d, rest).unwrap());
-        let sum: f64 = a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
+        let sum: f64 =
+            a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
         let rms = (sum / a.pixels.len() as f64).sqrt();
         assert!(rms < 1e-3, "{rest}: {rms:e}");
         let contrast = b.report.levels[1] - b.report.levels[0];
@@ -374,7 +418,11 @@ fn films_agree_with_the_cpu() {
         assert!(!b.report.march.contains(" on "), "{}", b.report.march);
         let [a, b] = [a, b].map(|r| r.map.unwrap().deflection_rad);
         let scale = b.iter().flatten().fold(0.0f32, |m, d| m.max(d.abs()));
-        let off = a.iter().flatten().zip(b.iter().flatten()).fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+        let off = a
+            .iter()
+            .flatten()
+            .zip(b.iter().flatten())
+            .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
         assert!(f64::from(off / scale) < TOLERANCE, "{rest}: {:e}", off / scale);
     }
 }
@@ -396,7 +444,8 @@ fn marches_without_a_kernel_are_refused_by_name_or_left_to_the_cpu() {
             r.report
         );
     }
-    // What the plan would do by line of sight, because the tolerance is wide, is traced when the GPU is asked for.
+    // What the plan would do by line of sight, because the tolerance is wide, is traced when the
+    // GPU is asked for.
     let r = drawn(&field, "gpu", "tolerance_rad = 1e-3").unwrap();
     assert!(r.report.march.starts_with("verlet"), "{}", r.report.march);
     let r = drawn(&field, "auto", "tolerance_rad = 1e-3").unwrap();

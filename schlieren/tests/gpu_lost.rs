@@ -33,7 +33,8 @@ fn gpu() -> Option<Arc<Gpu>> {
 
 /// A scene of `field` drawn on the GPU.
 fn drawn(field: &Field) -> RenderOutput {
-    let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice = \"gpu\"\nmethod = \"verlet\"";
+    let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice \
+                = \"gpu\"\nmethod = \"verlet\"";
     let scene = Scene::from_toml(toml).unwrap();
     let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
     render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
@@ -48,9 +49,10 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
     let starts = grid(32, 0.9);
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         let own = Arc::new(Gpu::open().unwrap());
-        let paths = GpuPaths::new(own.clone(), &field, oblique(), interpolant, GpuOptions::default())
-            .unwrap()
-            .with_batch(100);
+        let paths =
+            GpuPaths::new(own.clone(), &field, oblique(), interpolant, GpuOptions::default())
+                .unwrap()
+                .with_batch(100);
         let expected = format!("{:?}", trace(&paths, &starts));
         assert_eq!(paths.device_warning(), None);
         own.lose();
@@ -58,10 +60,15 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
         let c = paths.counters();
         assert!(c.rays_on_cpu == 0 && c.rays_repeated > 0, "{c:?}");
         assert!(
-            !Arc::ptr_eq(&paths.gpu(), &own) && own.failure().is_some() && paths.gpu().failure().is_none()
+            !Arc::ptr_eq(&paths.gpu(), &own)
+                && own.failure().is_some()
+                && paths.gpu().failure().is_none()
         );
         let told = paths.device_warning().unwrap();
-        assert!(told.contains("lost") && told.contains("opened again") && !told.contains("CPU"), "{told}");
+        assert!(
+            told.contains("lost") && told.contains("opened again") && !told.contains("CPU"),
+            "{told}"
+        );
 
         // Under way, with the work of four threads on it.
         let lost = paths.gpu();
@@ -95,7 +102,11 @@ fn the_program_s_gpu_comes_back_after_it_was_lost() {
         let r = drawn(&field);
         assert!(r.pixels == expected.pixels, "another picture");
         assert!(r.report.march.contains(" on "), "{}", r.report.march);
-        assert!(!r.report.warnings.iter().any(|w| w.contains("on the CPU")), "{:?}", r.report.warnings);
+        assert!(
+            !r.report.warnings.iter().any(|w| w.contains("on the CPU")),
+            "{:?}",
+            r.report.warnings
+        );
     }
     let after = Gpu::shared().unwrap();
     assert!(after.failure().is_none() && !Arc::ptr_eq(&before, &after));
@@ -109,9 +120,10 @@ fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
     let field = cube(17, lopsided);
     let starts = grid(16, 0.9);
     let own = Arc::new(Gpu::open().unwrap());
-    let paths = GpuPaths::new(own.clone(), &field, oblique(), Interpolant::BSpline, GpuOptions::default())
-        .unwrap()
-        .with_batch(64);
+    let paths =
+        GpuPaths::new(own.clone(), &field, oblique(), Interpolant::BSpline, GpuOptions::default())
+            .unwrap()
+            .with_batch(64);
     let on_cpu = Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default());
     let expected = trace(&on_cpu, &starts);
     for lost in 1..=5 {

@@ -8,7 +8,8 @@ use schlieren::analytic::{Luneburg, Selfoc};
 use schlieren::field::{Field, Node};
 use schlieren::interpolate::{BSpline, Interpolant, Trilinear, TrilinearGradient};
 use schlieren::march::{
-    BlankCells, Deviational, Full, FullOptions, LineOfSight, Medium, Options, Pefrl, Scheme, Sharma, Verlet,
+    BlankCells, Deviational, Full, FullOptions, LineOfSight, Medium, Options, Pefrl, Scheme,
+    Sharma, Verlet,
 };
 use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use schlieren::view::{Axis, View};
@@ -21,11 +22,13 @@ fn start(x: f64, y: f64) -> Start {
     Start { position_m: [x as f32, y as f32], tilt_rad: [0.0; 2] }
 }
 
-/// In a uniform gradient every ray that is in the field, be it in a face or an edge of it or of a cell, is deflected alike.
+/// In a uniform gradient every ray that is in the field, be it in a face or an edge of it or of a
+/// cell, is deflected alike.
 #[test]
 fn rays_in_faces_and_edges_are_in_the_field() {
     let field =
-        Field::from_fn([9; 3], [0.125; 3], DVec3::splat(-0.5), 1.0, |p| 1e-5 * (p.x + 2.0 * p.y)).unwrap();
+        Field::from_fn([9; 3], [0.125; 3], DVec3::splat(-0.5), 1.0, |p| 1e-5 * (p.x + 2.0 * p.y))
+            .unwrap();
     let paths = |i| {
         Deviational::new(
             &field,
@@ -61,7 +64,9 @@ fn rays_in_faces_and_edges_are_in_the_field() {
 #[test]
 fn directions_with_zeros_and_the_long_diagonal() {
     let field = cube(24, |_| 1e-4);
-    for d in [DVec3::X, -DVec3::Y, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, -1.0, 1e-300), DVec3::ONE] {
+    for d in
+        [DVec3::X, -DVec3::Y, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, -1.0, 1e-300), DVec3::ONE]
+    {
         let view = View::new(d, DVec3::Z, DVec3::ZERO).unwrap();
         let e = trace(
             &Deviational::new(
@@ -98,7 +103,8 @@ fn starts_that_are_not_numbers_or_far_away_do_no_harm() {
         }
     }
     assert!(
-        trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default()), &[]).is_empty()
+        trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default()), &[])
+            .is_empty()
     );
 }
 
@@ -109,16 +115,21 @@ fn power_of_two_strides_and_their_neighbours_agree_with_the_reference() {
     for n in [62, 63, 64, 65, 126, 128] {
         let field = cube(n, lopsided);
         let options = FullOptions { step_voxels: 1.0, ..Default::default() };
-        let spline = trace(&Full::new(&field, &BSpline::new(&field), Verlet, view, options), &starts);
-        let line = trace(&Full::new(&field, &Trilinear::new(&field), Verlet, view, options), &starts);
-        let gradient =
-            trace(&Full::new(&field, &TrilinearGradient::new(&field), Verlet, view, options), &starts);
+        let spline =
+            trace(&Full::new(&field, &BSpline::new(&field), Verlet, view, options), &starts);
+        let line =
+            trace(&Full::new(&field, &Trilinear::new(&field), Verlet, view, options), &starts);
+        let gradient = trace(
+            &Full::new(&field, &TrilinearGradient::new(&field), Verlet, view, options),
+            &starts,
+        );
         for (interpolant, wanted, tolerance) in [
             (Interpolant::BSpline, spline, 5e-7),
             (Interpolant::Trilinear, line, 5e-4),
             (Interpolant::TrilinearGradient, gradient, 1e-6),
         ] {
-            let got = trace(&Deviational::new(&field, view, interpolant, Options::default()), &starts);
+            let got =
+                trace(&Deviational::new(&field, view, interpolant, Options::default()), &starts);
             let (_, max) = difference(&got, &wanted);
             assert!(max < tolerance, "{interpolant:?} {n}: {max:.1e}");
         }
@@ -130,11 +141,18 @@ fn two_nodes_are_a_field() {
     let field = Field::from_fn([2; 3], [1.0; 3], DVec3::splat(-0.5), 1.0, |p| 1e-5 * p.x).unwrap();
     for interpolant in INTERPOLANTS {
         let e = trace(
-            &Deviational::new(&field, View::along(Axis::Z, DVec3::ZERO), interpolant, Options::default()),
+            &Deviational::new(
+                &field,
+                View::along(Axis::Z, DVec3::ZERO),
+                interpolant,
+                Options::default(),
+            ),
             &grid(3, 0.9),
         );
         assert!(
-            e.iter().all(|e| (e.deflection_rad[0] - 1e-5).abs() < 1e-11 && e.deflection_rad[1].abs() < 1e-12),
+            e.iter()
+                .all(|e| (e.deflection_rad[0] - 1e-5).abs() < 1e-11
+                    && e.deflection_rad[1].abs() < 1e-12),
             "{interpolant:?}"
         );
     }
@@ -145,10 +163,13 @@ fn two_nodes_are_a_field() {
         OPD,
         BlankCells::Opaque,
     );
-    assert!(trace(&sight, &grid(3, 0.9)).iter().all(|e| (e.deflection_rad[0] - 1e-5).abs() < 1e-11));
+    assert!(
+        trace(&sight, &grid(3, 0.9)).iter().all(|e| (e.deflection_rad[0] - 1e-5).abs() < 1e-11)
+    );
 }
 
-/// A gas of eps = 2.7e-4 everywhere and a disturbance a thousand times smaller: the constant must not eat the digits of the rest.
+/// A gas of eps = 2.7e-4 everywhere and a disturbance a thousand times smaller: the constant must
+/// not eat the digits of the rest.
 #[test]
 fn a_large_constant_does_not_drown_a_small_signal() {
     let starts = grid(12, 0.8);
@@ -156,10 +177,12 @@ fn a_large_constant_does_not_drown_a_small_signal() {
         blob(64, 2.7e-7, 0.12),
         cube(64, |p| 2.7e-4 + 2.7e-7 * (-p.length_squared() / (2.0 * 0.0144)).exp()),
     );
-    let trace =
-        |f: &Field| trace(&Deviational::new(f, oblique(), Interpolant::BSpline, Options::default()), &starts);
+    let trace = |f: &Field| {
+        trace(&Deviational::new(f, oblique(), Interpolant::BSpline, Options::default()), &starts)
+    };
     let (rms, max) = difference(&trace(&drowned), &trace(&alone));
-    // Storing eps in f32 costs 6e-8 of 1000 signals a node, and a slope of it is a tenth of it: 6e-4, averaged over a hundred nodes and more.
+    // Storing eps in f32 costs 6e-8 of 1000 signals a node, and a slope of it is a tenth of it:
+    // 6e-4, averaged over a hundred nodes and more.
     assert!(rms < 5e-4 && max < 3e-3, "rms {rms:.1e}, max {max:.1e}");
 }
 
@@ -181,7 +204,12 @@ fn nan_cells_are_dark_or_continued_as_told() {
         for (blank, transmission) in [(BlankCells::Opaque, 0.0), (BlankCells::Continued, 1.0)] {
             let options = Options { blank, scheme, ..Default::default() };
             let e = trace(
-                &Deviational::new(&field, View::along(Axis::Z, DVec3::ZERO), Interpolant::BSpline, options),
+                &Deviational::new(
+                    &field,
+                    View::along(Axis::Z, DVec3::ZERO),
+                    Interpolant::BSpline,
+                    options,
+                ),
                 &[start(0.0, 0.01), start(0.3, 0.3)],
             );
             assert_eq!((e[0].status, e[0].transmission), (Status::Masked, transmission));
@@ -198,13 +226,18 @@ fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
     let field = blob(97, 1e-4, 0.04);
     let starts = grid(40, 0.95);
     let view = View::along(Axis::Z, DVec3::ZERO);
-    let plain =
-        Deviational::new(&field, view, Interpolant::BSpline, Options { wanted: OPD, ..Default::default() });
+    let plain = Deviational::new(
+        &field,
+        view,
+        Interpolant::BSpline,
+        Options { wanted: OPD, ..Default::default() },
+    );
     let wanted = trace(&plain, &starts);
     assert_eq!(plain.counters().ray_steps_skipped, 0);
     assert!(plain.bricks().is_none());
     for tolerance in [1e-9, 1e-7] {
-        let options = Options { wanted: OPD, skip_rad: tolerance, skip_opd_m: 1e-10, ..Default::default() };
+        let options =
+            Options { wanted: OPD, skip_rad: tolerance, skip_opd_m: 1e-10, ..Default::default() };
         let paths = Deviational::new(&field, view, Interpolant::BSpline, options);
         let got = trace(&paths, &starts);
         let worst = difference(&got, &wanted).1 * largest(&wanted);
@@ -213,7 +246,8 @@ fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
         assert!(c.skipped_femtorad as f64 <= tolerance * 1e15 * 1.001);
         assert!(c.ray_steps_skipped > c.ray_steps, "{c:?}");
         assert_eq!((c.rays, c.rays_in_field), (1600, 1600));
-        let opd = got.iter().zip(&wanted).map(|(a, b)| (a.opd_m - b.opd_m).abs()).fold(0.0, f32::max);
+        let opd =
+            got.iter().zip(&wanted).map(|(a, b)| (a.opd_m - b.opd_m).abs()).fold(0.0, f32::max);
         assert!(opd < 13.0 * 1e-10, "{opd:.1e}");
         // Four numbers in a brick of 512 voxels.
         assert!(paths.bricks().unwrap().memory_bytes() * 16 < field.memory_bytes());
@@ -222,14 +256,16 @@ fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
 
 #[test]
 fn full_march_focuses_a_luneburg_lens_on_a_lattice() {
-    // The lens in a box; outside of it n = 1. The slope of n jumps at its surface, and the spline rounds that off.
+    // The lens in a box; outside of it n = 1. The slope of n jumps at its surface, and the spline
+    // rounds that off.
     let n = 96;
     let h = 2.4 / (n - 1) as f64;
     let lens = |p: DVec3| if p.length() < 1.0 { Luneburg.sample(p).0 } else { 0.0 };
     let field = Field::from_fn([n; 3], [h; 3], DVec3::splat(-1.2), 1.0, lens).unwrap();
     let spline = BSpline::new(&field);
     let view = View::along(Axis::Z, DVec3::ZERO);
-    let paths = Full::new(&field, &spline, Sharma, view, FullOptions { wanted: OPD, ..Default::default() });
+    let paths =
+        Full::new(&field, &spline, Sharma, view, FullOptions { wanted: OPD, ..Default::default() });
     let starts: Vec<Start> = [-0.8, -0.4, 0.2, 0.6].into_iter().map(|b| start(b, 0.0)).collect();
     for (s, e) in starts.iter().zip(trace(&paths, &starts)) {
         let b = f64::from(s.position_m[0]);
@@ -268,12 +304,18 @@ fn full_and_deviational_agree_where_both_hold() {
         &starts,
     );
     let got = trace(
-        &Deviational::new(&field, view, Interpolant::BSpline, Options { wanted: OPD, ..Default::default() }),
+        &Deviational::new(
+            &field,
+            view,
+            Interpolant::BSpline,
+            Options { wanted: OPD, ..Default::default() },
+        ),
         &starts,
     );
     assert!(difference(&got, &wanted).1 < 1e-5);
     for (s, e) in starts.iter().zip(&got) {
-        // x = x0 cos(g t) with the path parameter t = z / w_z: w_z is the index where the ray entered.
+        // x = x0 cos(g t) with the path parameter t = z / w_z: w_z is the index where the ray
+        // entered.
         let [x, y] = s.position_m.map(f64::from);
         let w_z = (1.0 - 0.0025 * (x * x + y * y)).sqrt();
         let u = -x * 0.05 * (0.05 / w_z).sin();

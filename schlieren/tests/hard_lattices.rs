@@ -1,4 +1,5 @@
-//! Lattices that break careless code, by name: sizes, spacings, views, borders, masks, shocks thinner than a voxel. (Rays that do: hard_cases.rs.)
+//! Lattices that break careless code, by name: sizes, spacings, views, borders, masks, shocks
+//! thinner than a voxel. (Rays that do: hard_cases.rs.)
 
 mod common;
 
@@ -10,8 +11,8 @@ use schlieren::field::{Field, Node};
 use schlieren::input::{self, from_dataset};
 use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use schlieren::march::{
-    BlankCells, CellExact, Deviational, Full, FullOptions, Integrator, InterpolatedMedium, LineOfSight,
-    Medium, Options, Pefrl, Ray, RungeKutta4, Scheme, Verlet,
+    BlankCells, CellExact, Deviational, Full, FullOptions, Integrator, InterpolatedMedium,
+    LineOfSight, Medium, Options, Pefrl, Ray, RungeKutta4, Scheme, Verlet,
 };
 use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use schlieren::skip::Bricks;
@@ -28,7 +29,8 @@ fn weak(field: &Field, view: View, interpolant: Interpolant) -> Deviational<'_> 
     Deviational::new(field, view, interpolant, Options::default())
 }
 
-/// Rows of 256 nodes put a column of the lattice into a few lines of the cache, and are stored with a gap: an index that forgets the gap is wrong from the second row on.
+/// Rows of 256 nodes put a column of the lattice into a few lines of the cache, and are stored with
+/// a gap: an index that forgets the gap is wrong from the second row on.
 #[test]
 fn sizes_255_256_and_260_along_every_axis_agree() {
     let view = oblique();
@@ -48,37 +50,45 @@ fn sizes_255_256_and_260_along_every_axis_agree() {
                     (Interpolant::Trilinear, 0.1),
                 ]
             {
-                let (_, max) = difference(&trace(&weak(&field, view, interpolant), &starts), &wanted);
+                let (_, max) =
+                    difference(&trace(&weak(&field, view, interpolant), &starts), &wanted);
                 assert!(max < tolerance, "{dims:?} {interpolant:?}: {max:.1e}");
             }
         }
     }
 }
 
-/// A blob stretched by the spacing's factors is, in lattice coordinates, round: the lattice of unequal spacing must give what an equal one gives for the
-/// stretched blob, and the same picture when everything is turned by 90 degrees.
+/// A blob stretched by the spacing's factors is, in lattice coordinates, round: the lattice of
+/// unequal spacing must give what an equal one gives for the stretched blob, and the same picture
+/// when everything is turned by 90 degrees.
 #[test]
 fn anisotropic_spacing_is_the_rotated_isotropic_answer() {
     let starts = grid(12, 0.7);
     let [coarse, fine] = [[49, 65, 97], [97, 97, 97]].map(|dims: [usize; 3]| {
-        Field::from_fn(dims, dims.map(|n| 1.0 / (n - 1) as f64), DVec3::splat(-0.5), 1.0, lopsided).unwrap()
+        Field::from_fn(dims, dims.map(|n| 1.0 / (n - 1) as f64), DVec3::splat(-0.5), 1.0, lopsided)
+            .unwrap()
     });
     // x' = y, y' = z, z' = x.
     let dims = [65, 97, 49];
-    let turned =
-        Field::from_fn(dims, dims.map(|n: usize| 1.0 / (n - 1) as f64), DVec3::splat(-0.5), 1.0, |p| {
-            lopsided(DVec3::new(p.z, p.x, p.y))
-        })
-        .unwrap();
+    let turned = Field::from_fn(
+        dims,
+        dims.map(|n: usize| 1.0 / (n - 1) as f64),
+        DVec3::splat(-0.5),
+        1.0,
+        |p| lopsided(DVec3::new(p.z, p.x, p.y)),
+    )
+    .unwrap();
     let turn = |v: DVec3| DVec3::new(v.y, v.z, v.x);
     let view = oblique();
-    let other = View { right: turn(view.right), up: turn(view.up), forward: turn(view.forward), ..view };
+    let other =
+        View { right: turn(view.right), up: turn(view.up), forward: turn(view.forward), ..view };
     for interpolant in INTERPOLANTS {
         let [a, b] = [
             trace(&weak(&coarse, view, interpolant), &starts),
             trace(&weak(&turned, other, interpolant), &starts),
         ];
-        // The same numbers in another order: rounding, and for the trilinear gradient samples that fall to either side of a face.
+        // The same numbers in another order: rounding, and for the trilinear gradient samples that
+        // fall to either side of a face.
         let tolerance = if interpolant == Interpolant::Trilinear { 2e-4 } else { 1e-6 };
         let (_, max) = difference(&b, &a);
         assert!(max < tolerance, "{interpolant:?}: {max:.1e}");
@@ -87,15 +97,19 @@ fn anisotropic_spacing_is_the_rotated_isotropic_answer() {
     assert!(difference(&a, &b).1 < 2e-3);
 }
 
-/// Turned about the light by 0.6 rad, the picture is turned and nothing else; and a round blob looks alike 0.6 rad off an axis of the lattice.
+/// Turned about the light by 0.6 rad, the picture is turned and nothing else; and a round blob
+/// looks alike 0.6 rad off an axis of the lattice.
 #[test]
 fn a_view_turned_by_0_6_rad_sees_the_same_within_a_millionth() {
     let field = cube(64, lopsided);
     let starts = grid(12, 0.6);
     let (sin, cos) = 0.6f64.sin_cos();
     for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
-        let rolled =
-            View { right: cos * view.right + sin * view.up, up: cos * view.up - sin * view.right, ..view };
+        let rolled = View {
+            right: cos * view.right + sin * view.up,
+            up: cos * view.up - sin * view.right,
+            ..view
+        };
         let turned = |[x, y]: [f32; 2], sin: f64| {
             let [x, y] = [x, y].map(f64::from);
             [(cos * x + sin * y) as f32, (cos * y - sin * x) as f32]
@@ -108,14 +122,18 @@ fn a_view_turned_by_0_6_rad_sees_the_same_within_a_millionth() {
         let (_, max) = difference(&got, &wanted);
         assert!(max < 1e-6, "rolled: {max:.1e}");
     }
-    // Sigma of 22 voxels: the spline's own error is 7.5e-6 at ten and falls with the third power and more. The lattice ends at 5 sigma, where eps is
-    // 3.7e-6 of its largest value, and the two views see its border differently: hence the largest error.
+    // Sigma of 22 voxels: the spline's own error is 7.5e-6 at ten and falls with the third power
+    // and more. The lattice ends at 5 sigma, where eps is 3.7e-6 of its largest value, and the two
+    // views see its border differently: hence the largest error.
     let g = Gaussian { amplitude: 1e-5, sigma_m: 0.1 };
     let field = blob(221, g.amplitude, g.sigma_m);
     let starts = grid(12, 0.4);
-    let straight = trace(&weak(&field, View::along(Axis::Z, DVec3::ZERO), Interpolant::BSpline), &starts);
-    let turned = View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).unwrap();
-    let (rms, max) = difference(&trace(&weak(&field, turned, Interpolant::BSpline), &starts), &straight);
+    let straight =
+        trace(&weak(&field, View::along(Axis::Z, DVec3::ZERO), Interpolant::BSpline), &starts);
+    let turned =
+        View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).unwrap();
+    let (rms, max) =
+        difference(&trace(&weak(&field, turned, Interpolant::BSpline), &starts), &straight);
     assert!(rms < 1e-6 && max < 5e-6, "rms {rms:.1e}, max {max:.1e}");
 }
 
@@ -127,7 +145,8 @@ fn trace_back_returns_to_the_start_through_a_lattice() {
     fn home<I: Interpolate>(field: &Field, i: &I, march: &impl Integrator, steps: u32) -> f64 {
         let medium = InterpolatedMedium::new(field, i);
         let direction = oblique().forward;
-        let begin = Ray::inside(&medium, DVec3::new(0.05, -0.08, 0.02) - 0.4 * direction, direction);
+        let begin =
+            Ray::inside(&medium, DVec3::new(0.05, -0.08, 0.02) - 0.4 * direction, direction);
         let there = march.run(&medium, &begin, 0.8, steps);
         assert!((there.u - begin.u).length() > 1e-3);
         let turned = Ray { u: direction - there.w(), ..Ray::new(there.position_m(), -direction) };
@@ -135,9 +154,12 @@ fn trace_back_returns_to_the_start_through_a_lattice() {
         (back.position_m() - begin.start_m).length()
     }
     // Symmetric schemes: to rounding, at any step.
-    assert!(home(&field, &spline, &Verlet, 40) < 1e-12 && home(&field, &spline, &Pefrl, 40) < 1e-12);
+    assert!(
+        home(&field, &spline, &Verlet, 40) < 1e-12 && home(&field, &spline, &Pefrl, 40) < 1e-12
+    );
     assert!(home(&field, &trilinear, &Verlet, 40) < 1e-12);
-    // From face to face the steps are the same both ways but for where the way ends, and each is symmetric.
+    // From face to face the steps are the same both ways but for where the way ends, and each is
+    // symmetric.
     assert!(home(&field, &spline, &CellExact::new(&field), 1) < 1e-11);
     assert!(home(&field, &trilinear, &CellExact::new(&field), 1) < 1e-11);
     // Others return within their error.
@@ -151,8 +173,10 @@ fn image(n: [u32; 3], values: Vec<f64>) -> Dataset {
     Dataset::ImageData(image)
 }
 
-/// A shock much thinner than a voxel, 20 degrees off the lattice. Sampled at points it is a staircase, and light sees the steps: every march is wrong by a quarter and more, the
-/// cell-exact one too, so it is not the march. As means over cells, or smoothed on reading, it is a prism again: deps tan(phi).
+/// A shock much thinner than a voxel, 20 degrees off the lattice. Sampled at points it is a
+/// staircase, and light sees the steps: every march is wrong by a quarter and more, the cell-exact
+/// one too, so it is not the march. As means over cells, or smoothed on reading, it is a prism
+/// again: deps tan(phi).
 #[test]
 fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     let (jump, n) = (8e-4, 65u32);
@@ -168,7 +192,8 @@ fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     // 6³ points of each cell around a node.
     let averaged = |i: usize| {
         let one = |s: usize| {
-            let o = DVec3::new((s % 6) as f64, (s / 6 % 6) as f64, (s / 36) as f64) / 6.0 - 5.0 / 12.0;
+            let o =
+                DVec3::new((s % 6) as f64, (s / 6 % 6) as f64, (s / 36) as f64) / 6.0 - 5.0 / 12.0;
             f64::from(u8::from((at(i) + o * h).dot(normal) > 0.0))
         };
         jump * (0..216).map(one).sum::<f64>() / 216.0
@@ -185,7 +210,8 @@ fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     let prism = jump * phi.tan();
     let across = [twist.cos(), twist.sin()];
     let error = |u: [f64; 2]| (u[0] - prism * across[0]).hypot(u[1] - prism * across[1]) / prism;
-    let rms = |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    let rms =
+        |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     let of_paths = |paths: &dyn LightPaths| {
         let mut exits = vec![Exit::UNDISTURBED; starts.len()];
         paths.trace(&starts, &mut exits);
@@ -208,10 +234,12 @@ fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     assert!(by_means < 0.01 && smoothed < 0.04, "{by_means} {smoothed}");
 }
 
-/// What a brick says of itself holds on its border, where the spline's 64 taps reach two nodes into the next one.
+/// What a brick says of itself holds on its border, where the spline's 64 taps reach two nodes into
+/// the next one.
 #[test]
 fn brick_borders_have_their_halo() {
-    // A slope on one side of the border between bricks, at 8 nodes from each other; nothing on the other.
+    // A slope on one side of the border between bricks, at 8 nodes from each other; nothing on the
+    // other.
     for border in [8.0, 16.0] {
         let n = 33;
         let field = cube(n, |p| 1e-4 * ((p.x + 0.5) * 32.0 - border).max(0.0));
@@ -227,7 +255,10 @@ fn brick_borders_have_their_halo() {
                 "{at:?}: {slope} {brick:?}"
             );
             let off = (s.eps - f64::from(brick.mean_eps)).abs();
-            assert!(off <= f64::from(brick.half_range_eps) * (1.0 + 1e-5) + 1e-9, "{at:?}: {s:?} {brick:?}");
+            assert!(
+                off <= f64::from(brick.half_range_eps) * (1.0 + 1e-5) + 1e-9,
+                "{at:?}: {s:?} {brick:?}"
+            );
         }
     }
     // And rays along a border, with bricks left out on its empty side.
@@ -245,18 +276,22 @@ fn brick_borders_have_their_halo() {
     assert!(difference(&got, &plain).1 * largest(&plain) <= 1e-8);
 }
 
-/// A ball in the stream, by any march: what is behind it is dark and says why, what passes it is free, and nothing is bent by what the ball's cells hold.
+/// A ball in the stream, by any march: what is behind it is dark and says why, what passes it is
+/// free, and nothing is bent by what the ball's cells hold.
 #[test]
 fn solid_bodies_stop_rays_in_every_march() {
     let n = 41;
-    let at =
-        |i: usize| DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) / (n - 1) as f64 - 0.5;
+    let at = |i: usize| {
+        DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) / (n - 1) as f64 - 0.5
+    };
     let ball = |p: DVec3| p.length() < 0.2;
     let nodes: Vec<Node> =
         (0..n * n * n).map(|i| if ball(at(i)) { Node::Solid } else { Node::Gas }).collect();
-    let eps = (0..n * n * n).map(|i| if ball(at(i)) { 1e9 } else { (1e-5 * at(i).x) as f32 }).collect();
+    let eps =
+        (0..n * n * n).map(|i| if ball(at(i)) { 1e9 } else { (1e-5 * at(i).x) as f32 }).collect();
     let field =
-        Field::new([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), eps, 1.0, Some(nodes)).unwrap();
+        Field::new([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), eps, 1.0, Some(nodes))
+            .unwrap();
     assert_eq!(field.not_finite(), 0);
     let spline = BSpline::new(&field);
     let starts = [start(0.01, 0.0), start(0.0, 0.17), start(0.24, 0.0), start(-0.3, 0.3)];
@@ -272,10 +307,19 @@ fn solid_bodies_stop_rays_in_every_march() {
                     BlankCells::Opaque,
                 )),
             ),
-            ("PEFRL".into(), Box::new(Full::new(&field, &spline, Pefrl, view, FullOptions::default()))),
+            (
+                "PEFRL".into(),
+                Box::new(Full::new(&field, &spline, Pefrl, view, FullOptions::default())),
+            ),
             (
                 "cell-exact".into(),
-                Box::new(Full::new(&field, &spline, CellExact::new(&field), view, FullOptions::default())),
+                Box::new(Full::new(
+                    &field,
+                    &spline,
+                    CellExact::new(&field),
+                    view,
+                    FullOptions::default(),
+                )),
             ),
         ];
         for interpolant in INTERPOLANTS {
@@ -305,8 +349,9 @@ fn solid_bodies_stop_rays_in_every_march() {
 #[test]
 fn iblank_cells_are_masked_and_counted() {
     let n = 11usize;
-    let blanked =
-        |i: usize, j: usize, k: usize| (4..7).contains(&i) && (4..7).contains(&j) && (4..7).contains(&k);
+    let blanked = |i: usize, j: usize, k: usize| {
+        (4..7).contains(&i) && (4..7).contains(&j) && (4..7).contains(&k)
+    };
     let (mut grid, mut q) = (Vec::new(), Vec::new());
     for out in [&mut grid, &mut q] {
         (0..3).for_each(|_| out.extend((n as i32).to_be_bytes()));
@@ -346,7 +391,10 @@ fn iblank_cells_are_masked_and_counted() {
         // Nothing of the rubbish is left.
         assert!(field.eps().iter().all(|e| e.abs() < 1e-6));
         let view = View::along(Axis::Z, field.centre_m());
-        let e = trace(&weak(&field, view, Interpolant::BSpline), &[start(0.01, 0.02), start(0.35, -0.35)]);
+        let e = trace(
+            &weak(&field, view, Interpolant::BSpline),
+            &[start(0.01, 0.02), start(0.35, -0.35)],
+        );
         assert_eq!([e[0].status, e[1].status], [status, Status::Free]);
     }
 }

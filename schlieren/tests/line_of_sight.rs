@@ -32,7 +32,8 @@ fn very_weak_gas_looks_as_marched_from_any_side() {
     let field = cube(64, |p| 1e-5 * lopsided(p));
     let starts = grid(24, 0.75);
     for view in [Axis::X, Axis::Y, Axis::Z].map(|a| View::along(a, DVec3::ZERO)) {
-        let (got, wanted) = (trace(&sight(&field, view), &starts), trace(&marched(&field, view), &starts));
+        let (got, wanted) =
+            (trace(&sight(&field, view), &starts), trace(&marched(&field, view), &starts));
         let (_, max) = difference(&got, &wanted);
         assert!(max < 2e-6, "{view:?}: {max:.1e}");
         let scale = wanted.iter().map(|e| e.opd_m.abs()).fold(0.0, f32::max);
@@ -59,7 +60,8 @@ fn straight_rays_are_off_by_an_amount_of_order_eps() {
     assert!((large / small - 10.0).abs() < 1.0, "{large:.1e} {small:.1e}");
 }
 
-/// Twice the gas, twice the deflection: to the last bit for powers of two, because nothing but products and sums is done.
+/// Twice the gas, twice the deflection: to the last bit for powers of two, because nothing but
+/// products and sums is done.
 #[test]
 fn linearity_bit_exact() {
     let starts = grid(20, 0.9);
@@ -105,7 +107,8 @@ fn blob_and_its_second_derivatives_are_the_closed_form() {
     }
 }
 
-/// Seen obliquely the box is a prism in projection, but light enters and leaves through windows normal to it.
+/// Seen obliquely the box is a prism in projection, but light enters and leaves through windows
+/// normal to it.
 #[test]
 fn uniform_gas_in_an_oblique_box_is_no_prism() {
     let field = cube(32, |_| 1e-4);
@@ -143,7 +146,8 @@ fn solids_throw_shadows_from_every_side() {
     }
     let h = 1.0 / (n - 1) as f64;
     let field =
-        Field::new([n; 3], [h; 3], DVec3::splat(-0.5), vec![1e-5; n * n * n], 1.0, Some(nodes)).unwrap();
+        Field::new([n; 3], [h; 3], DVec3::splat(-0.5), vec![1e-5; n * n * n], 1.0, Some(nodes))
+            .unwrap();
     let starts = grid(40, 0.9);
     for view in [View::along(Axis::X, DVec3::ZERO), oblique()] {
         let (a, b) = (trace(&sight(&field, view), &starts), trace(&marched(&field, view), &starts));

@@ -5,7 +5,9 @@ use schlieren::analytic::erf;
 use schlieren::field::{Field, Node};
 use schlieren::interpolate::{BSpline, Interpolant};
 use schlieren::march::{BlankCells, Deviational, Full, FullOptions, Options, Pefrl};
-use schlieren::media::{AttenuatedPaths, Bend, Media, MediaIntegrals, MediaIntegrator, Property, Volume};
+use schlieren::media::{
+    AttenuatedPaths, Bend, Media, MediaIntegrals, MediaIntegrator, Property, Volume,
+};
 use schlieren::path::{Exit, LightPaths, Start, Status};
 use schlieren::view::{Axis, View};
 use std::sync::Arc;
@@ -55,8 +57,14 @@ fn an_even_slab_absorbs_emits_and_turns_by_its_closed_forms() {
                 );
                 assert!((f64::from(c.optical_depth) / (alpha * depth) - 1.0).abs() < 1e-6);
                 let emission = j / alpha * (1.0 - (-alpha * depth).exp());
-                assert!((f64::from(c.emission) / emission - 1.0).abs() < 2e-6, "{bend:?} {c:?} {emission}");
-                assert!((f64::from(c.rotation_rad) / (rho * depth) - 1.0).abs() < 1e-6, "{bend:?} {c:?}");
+                assert!(
+                    (f64::from(c.emission) / emission - 1.0).abs() < 2e-6,
+                    "{bend:?} {c:?} {emission}"
+                );
+                assert!(
+                    (f64::from(c.rotation_rad) / (rho * depth) - 1.0).abs() < 1e-6,
+                    "{bend:?} {c:?}"
+                );
             }
             // Beside the field there is nothing.
             assert_eq!(along(&w, &[start(0.5, 0.0)]), [MediaIntegrals::default()]);
@@ -71,7 +79,9 @@ fn malus_passes_half_at_45_degrees_and_nothing_crossed() {
     assert!((at(c(0.0), 45.0) - 0.5).abs() < 1e-15);
     assert!(at(c(0.0), 90.0) < 1e-30 && (at(c(0.0), 180.0) - 1.0).abs() < 1e-15);
     // Turned towards the analyser, and away from it.
-    assert!((at(c(0.3), 45.0) - (45f64.to_radians() - f64::from(0.3f32)).cos().powi(2)).abs() < 1e-15);
+    assert!(
+        (at(c(0.3), 45.0) - (45f64.to_radians() - f64::from(0.3f32)).cos().powi(2)).abs() < 1e-15
+    );
     assert!(at(c(0.3), 45.0) > at(c(-0.3), 45.0));
     let foggy = MediaIntegrals { optical_depth: 2.0, ..c(0.0) };
     assert!((at(foggy, 60.0) - 0.25 * (-2f64).exp()).abs() < 1e-15);
@@ -99,7 +109,8 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
             for (s, c) in starts.iter().zip(along(&walk(&field, view, &media, bend), &starts)) {
                 let [x, y] = s.position_m.map(f64::from);
                 let expected = closed(x.hypot(y), half);
-                // Trilinear, h²/8σ² = 3.4e-4 of the largest value along each of the two axes across the light.
+                // Trilinear, h²/8σ² = 3.4e-4 of the largest value along each of the two axes across
+                // the light.
                 let largest = closed(0.0, half);
                 assert!(
                     (f64::from(c.optical_depth) - expected).abs() < 7e-4 * largest,
@@ -107,7 +118,8 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
                 );
             }
         }
-        // Oblique views see the same ball. The box is cut elsewhere, at 2.5 σ or farther: 1 % of the middle's value is outside.
+        // Oblique views see the same ball. The box is cut elsewhere, at 2.5 σ or farther: 1 % of
+        // the middle's value is outside.
         let view = View::from_angles_deg(34.0, 21.0, DVec3::ZERO).unwrap();
         for (s, c) in starts.iter().zip(along(&walk(&field, view, &media, bend), &starts)) {
             let b = f64::from(s.position_m[0]).hypot(f64::from(s.position_m[1]));
@@ -131,7 +143,8 @@ fn views_turned_with_the_smoke_agree() {
     };
     let (a, smoke_a) = make(|p| p, |p| p);
     let (b, smoke_b) = make(|p| DVec3::new(p.z, p.x, p.y), |p| DVec3::new(p.y, p.z, p.x));
-    let starts: Vec<Start> = (-6..=6).map(|i| start(f64::from(i) * 0.005, f64::from(i) * 0.003)).collect();
+    let starts: Vec<Start> =
+        (-6..=6).map(|i| start(f64::from(i) * 0.005, f64::from(i) * 0.003)).collect();
     for (light_a, up_a) in [(DVec3::Z, DVec3::Y), (DVec3::new(0.5, 0.3, 0.8), DVec3::Y)] {
         let turn = |p: DVec3| DVec3::new(p.z, p.x, p.y);
         let view_a = View::new(light_a, up_a, DVec3::ZERO).unwrap();
@@ -140,7 +153,10 @@ fn views_turned_with_the_smoke_agree() {
             let one = along(&walk(&a, view_a, &smoke_a, bend), &starts);
             let other = along(&walk(&b, view_b, &smoke_b, bend), &starts);
             for (p, q) in one.iter().zip(&other) {
-                assert!((p.optical_depth - q.optical_depth).abs() < 1e-6 * 0.6, "{bend:?} {p:?} {q:?}");
+                assert!(
+                    (p.optical_depth - q.optical_depth).abs() < 1e-6 * 0.6,
+                    "{bend:?} {p:?} {q:?}"
+                );
             }
         }
     }
@@ -157,8 +173,9 @@ fn emission_is_dimmed_by_what_lies_between_it_and_the_eye() {
     let glow = Volume::from_fn([2, 2, 17], [0.4, 0.3, h], field.origin_m(), |p| {
         if p.z > z0 + 10.5 * h { 3.0 } else { 0.0 }
     });
-    let media =
-        Media::default().with(Property::Absorption, smoke.unwrap()).with(Property::Emission, glow.unwrap());
+    let media = Media::default()
+        .with(Property::Absorption, smoke.unwrap())
+        .with(Property::Emission, glow.unwrap());
     let forward = View::along(Axis::Z, field.centre_m());
     let backward = View { right: -forward.right, forward: -forward.forward, ..forward };
     for bend in EVERY_BEND {
@@ -185,7 +202,8 @@ fn walks_end_at_bodies_and_where_they_are_told() {
             *node = Node::Solid;
         }
     }
-    let walled = Field::new(dims, [h; 3], DVec3::ZERO, vec![0.0; n * n * n], 1.0, Some(nodes)).unwrap();
+    let walled =
+        Field::new(dims, [h; 3], DVec3::ZERO, vec![0.0; n * n * n], 1.0, Some(nodes)).unwrap();
     let open = Field::from_fn(dims, [h; 3], DVec3::ZERO, 1.0, |_| 0.0).unwrap();
     let media = Media::default().with(Property::Absorption, Volume::uniform(2.0, &open).unwrap());
     let view = View::along(Axis::Z, open.centre_m());
@@ -194,19 +212,25 @@ fn walks_end_at_bodies_and_where_they_are_told() {
         let c = along(&walk(&walled, view, &media, bend), &[start(0.0, 0.0)])[0];
         assert!((c.optical_depth - 2.0 * 0.095).abs() < 2.0 * 0.0051, "{bend:?} {c:?}");
         let mut out = [MediaIntegrals::default(); 2];
-        walk(&open, view, &media, bend).collect(&[start(0.0, 0.0); 2], Some(&[-0.063, -0.4]), &mut out);
+        walk(&open, view, &media, bend).collect(
+            &[start(0.0, 0.0); 2],
+            Some(&[-0.063, -0.4]),
+            &mut out,
+        );
         assert!((out[0].optical_depth - 2.0 * 0.037).abs() < 1e-6, "{bend:?} {out:?}");
         assert_eq!(out[1], MediaIntegrals::default());
     }
 }
 
-/// SELFOC, n² = n0² (1 - g² r²): x = x0 cos(g τ), z = w_z τ, ds = (n/n0) dτ, so the path is longer than the rod by a closed integral.
+/// SELFOC, n² = n0² (1 - g² r²): x = x0 cos(g τ), z = w_z τ, ds = (n/n0) dτ, so the path is longer
+/// than the rod by a closed integral.
 #[test]
 fn what_a_ray_collects_does_not_depend_on_the_rays_beside_it() {
     // Long ways, short ones across a corner, and rays that miss, in one packet and alone.
-    let field =
-        Field::from_fn([33, 25, 17], [0.0125; 3], DVec3::ZERO, 1.0003, |x| 1e-4 * (9.0 * x.x * x.y).sin())
-            .unwrap();
+    let field = Field::from_fn([33, 25, 17], [0.0125; 3], DVec3::ZERO, 1.0003, |x| {
+        1e-4 * (9.0 * x.x * x.y).sin()
+    })
+    .unwrap();
     let smoke: Vec<f32> = (0..33 * 25 * 17).map(|i| 1.0 + (i % 7) as f32).collect();
     let volume = Volume::new([33, 25, 17], [0.0125; 3], DVec3::ZERO, smoke, None).unwrap();
     let media = Media::default().with(Property::Absorption, volume);
@@ -253,7 +277,8 @@ fn in_strong_index_the_way_is_the_bent_one() {
     }
     assert!(path > 1.02 * length, "the test must tell bent from straight: {path}");
     let collect = |bend| {
-        let w = MediaIntegrator::new(&rod, view, &media, &Property::ALL, bend, 0.5, BlankCells::Opaque);
+        let w =
+            MediaIntegrator::new(&rod, view, &media, &Property::ALL, bend, 0.5, BlankCells::Opaque);
         along(&w, &[start(x0, 0.0)])[0]
     };
     let full = collect(Bend::Full);
@@ -268,13 +293,15 @@ fn in_strong_index_the_way_is_the_bent_one() {
     assert!((f64::from(straight.optical_depth) - length).abs() < 1e-6);
 }
 
-/// The walk's own rays end where the march's do: x weighs the place of the ray, so that the integral of its step function is the displacement.
+/// The walk's own rays end where the march's do: x weighs the place of the ray, so that the
+/// integral of its step function is the displacement.
 #[test]
 fn the_walk_goes_where_the_march_goes() {
     let (n, half, sigma) = (65, 0.05, 0.015);
     let warm = |p: DVec3| -2e-3 * (-p.length_squared() / (2.0 * sigma * sigma)).exp();
     let field =
-        Field::from_fn([n; 3], [2.0 * half / (n - 1) as f64; 3], DVec3::splat(-half), 1.0, warm).unwrap();
+        Field::from_fn([n; 3], [2.0 * half / (n - 1) as f64; 3], DVec3::splat(-half), 1.0, warm)
+            .unwrap();
     let view = View::along(Axis::Z, DVec3::ZERO);
     let s = start(0.015, 0.0);
     let fine = FullOptions { step_voxels: 0.25, ..FullOptions::default() };
@@ -285,10 +312,19 @@ fn the_walk_goes_where_the_march_goes() {
     let last = 5e-3;
     let at_end = |p: DVec3| if p.z > half - last { p.x } else { 0.0 };
     let v =
-        Volume::from_fn([3, 3, 801], [half, half, 2.0 * half / 800.0], DVec3::splat(-half), at_end).unwrap();
+        Volume::from_fn([3, 3, 801], [half, half, 2.0 * half / 800.0], DVec3::splat(-half), at_end)
+            .unwrap();
     let media = Media::default().with(Property::Rotation, v);
     let place = |bend| {
-        let w = MediaIntegrator::new(&field, view, &media, &Property::ALL, bend, 1.0, BlankCells::Opaque);
+        let w = MediaIntegrator::new(
+            &field,
+            view,
+            &media,
+            &Property::ALL,
+            bend,
+            1.0,
+            BlankCells::Opaque,
+        );
         let reference = MediaIntegrator::new(
             &field,
             view,
@@ -302,8 +338,8 @@ fn the_walk_goes_where_the_march_goes() {
         0.015 * bent / straight
     };
     // Where the ray is on the average of its last 5 mm, by the deflection that it then has.
-    let expected =
-        0.015 + f64::from(exit[0].displacement_m[0]) - 0.5 * last * f64::from(exit[0].deflection_rad[0]);
+    let expected = 0.015 + f64::from(exit[0].displacement_m[0])
+        - 0.5 * last * f64::from(exit[0].deflection_rad[0]);
     let moved = expected - 0.015;
     assert!(moved > 1e-4, "{moved}");
     for bend in [Bend::Paraxial, Bend::Full] {
@@ -318,10 +354,13 @@ fn paths_keep_all_but_the_transmission_bit_by_bit() {
     let (n, half, sigma) = (33, 0.05, 0.015);
     let warm = |p: DVec3| -1e-4 * (-p.length_squared() / (2.0 * sigma * sigma)).exp();
     let field =
-        Field::from_fn([n; 3], [2.0 * half / (n - 1) as f64; 3], DVec3::splat(-half), 1.0, warm).unwrap();
+        Field::from_fn([n; 3], [2.0 * half / (n - 1) as f64; 3], DVec3::splat(-half), 1.0, warm)
+            .unwrap();
     let view = View::from_angles_deg(20.0, 10.0, DVec3::ZERO).unwrap();
-    let media = Media::default().with(Property::Absorption, Volume::uniform(4000.0, &field).unwrap());
-    let march = || Box::new(Deviational::new(&field, view, Interpolant::BSpline, Options::default()));
+    let media =
+        Media::default().with(Property::Absorption, Volume::uniform(4000.0, &field).unwrap());
+    let march =
+        || Box::new(Deviational::new(&field, view, Interpolant::BSpline, Options::default()));
     let starts: Vec<Start> = (-20..=20).map(|i| start(f64::from(i) * 0.004, 0.003)).collect();
     let mut plain = vec![Exit::UNDISTURBED; starts.len()];
     let mut dimmed = plain.clone();

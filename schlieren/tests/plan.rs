@@ -53,17 +53,22 @@ fn what_is_forced_is_kept() {
 /// against the truth.
 #[test]
 fn errors_are_within_bounds_and_bounds_within_tolerance_where_possible() {
-    let fields = [blob(64, 1e-4, 0.12), blob(48, 1e-6, 0.15), cube(48, lopsided), blob(64, 1e-3, 0.15)];
+    let fields =
+        [blob(64, 1e-4, 0.12), blob(48, 1e-6, 0.15), cube(48, lopsided), blob(64, 1e-3, 0.15)];
     let mut possible = 0;
     for field in &fields {
         for tolerance in [1e-3, 1e-5, 1e-6, 1e-7, 1e-9] {
             for view in [View::along(Axis::X, DVec3::ZERO), oblique()] {
-                let plan = Plan::new(field, Request { direction: Some(view.forward), ..ask(tolerance) });
+                let plan =
+                    Plan::new(field, Request { direction: Some(view.forward), ..ask(tolerance) });
                 let b = plan.bounds;
                 let achieved = plan.measure(field, view, 200);
                 // Arithmetic in f32 adds 1e-6 of the deflection.
                 let floor = 1e-6 * b.deflection_rad;
-                assert!(achieved.max_rad <= b.total_rad() + floor, "{tolerance}: {plan:?} {achieved:?}");
+                assert!(
+                    achieved.max_rad <= b.total_rad() + floor,
+                    "{tolerance}: {plan:?} {achieved:?}"
+                );
                 if b.interpolation_rad <= 0.25 * tolerance && floor <= 0.25 * tolerance {
                     possible += 1;
                     assert!(b.total_rad() <= tolerance, "{tolerance}: {plan:?}");
@@ -84,7 +89,9 @@ const FLOWS: [(&str, Eps); 6] = [
     // No second differences along the lattice's axes at all, and a gradient on all faces.
     ("saddle", |p| 1e-3 * p.x * p.y),
     ("oblique saddle", |p| 1e-3 * (p.x + 0.5 * p.z) * (p.y - 0.25 * p.x)),
-    ("ring", |p| 1e-4 * (-((p.x.hypot(p.y) - 0.2).powi(2) + p.z * p.z) / (2.0 * 0.08 * 0.08)).exp()),
+    ("ring", |p| {
+        1e-4 * (-((p.x.hypot(p.y) - 0.2).powi(2) + p.z * p.z) / (2.0 * 0.08 * 0.08)).exp()
+    }),
     ("shear layer", |p| 2e-5 * (p.y / 0.08).tanh()),
     ("smeared shock", |p| 5e-5 * ((0.8 * p.x + 0.6 * p.y + 0.03) / 0.02).tanh()),
     ("blob", |p| 1e-4 * (-p.length_squared() / (2.0 * 0.12 * 0.12)).exp()),
@@ -155,7 +162,11 @@ fn truth(eps: Eps, view: &View, start: &Start) -> Option<([f64; 2], f64)> {
 }
 
 /// Largest errors of deflections and of optical paths (0 when not wanted) against the truth.
-fn errors(paths: &dyn LightPaths, starts: &[Start], truths: &[Option<([f64; 2], f64)>]) -> [f64; 2] {
+fn errors(
+    paths: &dyn LightPaths,
+    starts: &[Start],
+    truths: &[Option<([f64; 2], f64)>],
+) -> [f64; 2] {
     let mut exits = vec![Exit::UNDISTURBED; starts.len()];
     paths.trace(starts, &mut exits);
     let (mut angle, mut path) = (0.0f64, 0.0f64);
@@ -194,16 +205,21 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     wanted: PathQuantities { opd },
                     ..ask(0.0)
                 };
-                let of_lattice = errors(&*Plan::new(&field, finest).paths(&field, view), &starts, &truths);
+                let of_lattice =
+                    errors(&*Plan::new(&field, finest).paths(&field, view), &starts, &truths);
                 for tolerance in [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9] {
-                    let mut scene = Scene::from_toml("[flow]\nfile = \"\"\ndensity = \"-\"").unwrap();
+                    let mut scene =
+                        Scene::from_toml("[flow]\nfile = \"\"\ndensity = \"-\"").unwrap();
                     scene.march.tolerance_rad = tolerance;
-                    let mut section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
+                    let mut section =
+                        TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
                     section.view = view;
-                    let planned = section.paths(&scene, 0, PathQuantities { opd }, false, true).unwrap();
+                    let planned =
+                        section.paths(&scene, 0, PathQuantities { opd }, false, true).unwrap();
                     let [angle, path] = errors(&*planned.paths, &starts, &truths);
                     let what = format!(
-                        "{name} along {axis}, {tolerance:e} asked: {angle:.1e} rad, {path:.1e} m got by {}; the lattice's {:.1e} rad, {:.1e} m; {:?}",
+                        "{name} along {axis}, {tolerance:e} asked: {angle:.1e} rad, {path:.1e} m \
+                         got by {}; the lattice's {:.1e} rad, {:.1e} m; {:?}",
                         planned.description, of_lattice[0], of_lattice[1], planned.warnings
                     );
                     if planned.description.starts_with("line-of-sight") {
@@ -219,7 +235,9 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                         && of_lattice[1] <= 0.5 * tolerance * longest_m
                         && tolerance > 1e-9;
                     assert!(kept || !can, "the lattice can: {what}");
-                    let named = |w: &String| w.contains("lattice") && w.contains(&format!("{tolerance:.1e}"));
+                    let named = |w: &String| {
+                        w.contains("lattice") && w.contains(&format!("{tolerance:.1e}"))
+                    };
                     let is_warned = planned.warnings.iter().any(named);
                     assert!(kept || is_warned, "nobody was told: {what}");
                     got += usize::from(kept);
@@ -230,7 +248,10 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
         }
     }
     // The table has all cases in it, and warnings are not given for nothing.
-    assert!(straight >= 30 && bent >= 60 && got >= 120 && warned >= 20, "{straight} {bent} {got} {warned}");
+    assert!(
+        straight >= 30 && bent >= 60 && got >= 120 && warned >= 20,
+        "{straight} {bent} {got} {warned}"
+    );
     assert!(for_nothing == 0, "{for_nothing} of {warned} warnings for nothing");
 }
 

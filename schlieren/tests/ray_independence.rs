@@ -1,4 +1,5 @@
-//! A ray's exit is its own: bit for bit the same alone, among any neighbours, in any order, on any number of threads.
+//! A ray's exit is its own: bit for bit the same alone, among any neighbours, in any order, on any
+//! number of threads.
 
 mod common;
 
@@ -15,7 +16,8 @@ use schlieren::view::{Axis, View};
 const INTERPOLANTS: [Interpolant; 3] =
     [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
 
-/// A body in the first corner (the node that lanes without a ray look at), another behind a layer without data, and gas.
+/// A body in the first corner (the node that lanes without a ray look at), another behind a layer
+/// without data, and gas.
 fn with_bodies() -> Field {
     let n = 24;
     let mut eps = vec![];
@@ -26,7 +28,8 @@ fn with_bodies() -> Field {
                 let p = DVec3::new(i as f64, j as f64, k as f64) / (n - 1) as f64 - 0.5;
                 eps.push((100.0 * lopsided(p)) as f32);
                 let blank = k == 9 && (8..16).contains(&i) && (6..18).contains(&j);
-                let solid = i < 3 && j < 3 && k < 3 || (p - DVec3::new(0.02, 0.05, 0.2)).length() < 0.17;
+                let solid =
+                    i < 3 && j < 3 && k < 3 || (p - DVec3::new(0.02, 0.05, 0.2)).length() < 0.17;
                 nodes.push(match (solid, blank) {
                     (true, _) => Node::Solid,
                     (_, true) => Node::Blank,
@@ -35,7 +38,8 @@ fn with_bodies() -> Field {
             }
         }
     }
-    Field::new([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), eps, 1.0, Some(nodes)).unwrap()
+    Field::new([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), eps, 1.0, Some(nodes))
+        .unwrap()
 }
 
 fn bits(e: &Exit) -> ([u32; 7], Status) {
@@ -56,7 +60,8 @@ fn scattered(count: usize) -> Vec<usize> {
 }
 
 fn assert_independent(paths: &impl LightPaths, starts: &[Start], what: &str) {
-    let alone: Vec<Exit> = starts.iter().map(|s| trace(paths, std::slice::from_ref(s))[0]).collect();
+    let alone: Vec<Exit> =
+        starts.iter().map(|s| trace(paths, std::slice::from_ref(s))[0]).collect();
     let check = |order: &[usize], exits: &[Exit], how: &str| {
         for (i, e) in order.iter().zip(exits) {
             assert_eq!(
@@ -98,8 +103,11 @@ fn gas_alone_is_independent_of_neighbours_and_threads() {
     let starts = rays();
     for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
         for interpolant in INTERPOLANTS {
-            for (scheme, opd) in [(Scheme::Verlet, false), (Scheme::Verlet, true), (Scheme::Euler, true)] {
-                let options = Options { scheme, wanted: PathQuantities { opd }, ..Options::default() };
+            for (scheme, opd) in
+                [(Scheme::Verlet, false), (Scheme::Verlet, true), (Scheme::Euler, true)]
+            {
+                let options =
+                    Options { scheme, wanted: PathQuantities { opd }, ..Options::default() };
                 let paths = Deviational::new(&field, view, interpolant, options);
                 assert_independent(&paths, &starts, &format!("{interpolant:?} {scheme:?} {opd}"));
             }
@@ -115,10 +123,18 @@ fn masked_and_blocked_are_independent_of_neighbours_and_threads() {
         for blank in [BlankCells::Opaque, BlankCells::Continued] {
             for interpolant in INTERPOLANTS {
                 for scheme in [Scheme::Verlet, Scheme::Euler] {
-                    let options =
-                        Options { scheme, blank, wanted: PathQuantities { opd: true }, ..Options::default() };
+                    let options = Options {
+                        scheme,
+                        blank,
+                        wanted: PathQuantities { opd: true },
+                        ..Options::default()
+                    };
                     let paths = Deviational::new(&field, view, interpolant, options);
-                    assert_independent(&paths, &starts, &format!("{interpolant:?} {scheme:?} {blank:?}"));
+                    assert_independent(
+                        &paths,
+                        &starts,
+                        &format!("{interpolant:?} {scheme:?} {blank:?}"),
+                    );
                 }
             }
         }
@@ -141,7 +157,8 @@ fn straight_and_full_marches_are_independent_of_neighbours_and_threads() {
     }
 }
 
-/// The layer without data lies before the body: what stops the ray there is the layer, however long its neighbours go on.
+/// The layer without data lies before the body: what stops the ray there is the layer, however long
+/// its neighbours go on.
 #[test]
 fn a_ray_keeps_the_name_of_what_stopped_it() {
     let field = with_bodies();
@@ -152,7 +169,8 @@ fn a_ray_keeps_the_name_of_what_stopped_it() {
     let full = Full::new(&field, &spline, Verlet, view, FullOptions::default());
     let (fast, full) = (trace(&fast, &starts), trace(&full, &starts));
     let count = |exits: &[Exit], s: Status| exits.iter().filter(|e| e.status == s).count();
-    // Both kinds are met, and the two marches tell them apart alike but for rays along the edge of a node's cell.
+    // Both kinds are met, and the two marches tell them apart alike but for rays along the edge of
+    // a node's cell.
     for status in [Status::Free, Status::Masked, Status::Blocked] {
         let [a, b] = [count(&fast, status), count(&full, status)];
         assert!(a > 15 && 10 * a.abs_diff(b) <= a, "{status:?}: {a} {b}");
@@ -173,7 +191,10 @@ fn rays_beside_the_field_do_not_meet_its_first_node() {
         for scheme in [Scheme::Verlet, Scheme::Euler] {
             let options = Options { scheme, ..Options::default() };
             let e = trace(&Deviational::new(&field, view, Interpolant::BSpline, options), &starts);
-            assert_eq!((e[3].status, e[3].transmission, e[3].deflection_rad), (Status::Free, 1.0, [0.0; 2]));
+            assert_eq!(
+                (e[3].status, e[3].transmission, e[3].deflection_rad),
+                (Status::Free, 1.0, [0.0; 2])
+            );
         }
     }
 }

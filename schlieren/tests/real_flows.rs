@@ -1,5 +1,6 @@
-//! Flows of others, from file to field. They are not part of this repository: the folder is `RTSV_FLOWS`, or
-//! `shared/data/flow` beside the workspace; without it these tests say that they are skipped.
+//! Flows of others, from file to field. They are not part of this repository: the folder is
+//! `RTSV_FLOWS`, or `shared/data/flow` beside the workspace; without it these tests say that they
+//! are skipped.
 
 use datasets::resample::Resolution;
 use glam::DVec3;
@@ -22,12 +23,14 @@ fn flow(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// NASA Ames (Hung and Buning): Mach 2.95 past a blunt fin on a plate. The leading edge has radius R = 0.5 and its
-/// stagnation line lies at x = 0 in the plane y = 0. Billig (1967) for a cylinder: stand-off d/R = 0.386 exp(4.67/M²) = 0.660.
+/// NASA Ames (Hung and Buning): Mach 2.95 past a blunt fin on a plate. The leading edge has radius
+/// R = 0.5 and its stagnation line lies at x = 0 in the plane y = 0. Billig (1967) for a cylinder:
+/// stand-off d/R = 0.386 exp(4.67/M²) = 0.660.
 #[test]
 fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
     let Some(path) = flow("bluntfinxyz.bin") else { return };
-    let medium = Medium::Density { density: Quantity::array("Density").scaled(1.2), species: vec![] };
+    let medium =
+        Medium::Density { density: Quantity::array("Density").scaled(1.2), species: vec![] };
     let whole = load(&path, &Options::new(medium.clone())).unwrap();
     let r = whole.report.resampling.unwrap();
     assert!(
@@ -35,10 +38,14 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         "{:?}",
         whole.report.warnings
     );
-    // The stretched mesh is finer than any lattice over all of it at the fin; even so the error is small.
+    // The stretched mesh is finer than any lattice over all of it at the fin; even so the error is
+    // small.
     assert!(r.back.compared > 20_000 && r.back.rms < 0.03 * r.back.range, "{r:?}");
     let [low, high] = whole.report.density_range_kg_m3.unwrap();
-    assert!((low - 1.2 * 0.1926).abs() < 0.01 && (high - 1.2 * 4.9775).abs() < 0.01, "{low} {high}");
+    assert!(
+        (low - 1.2 * 0.1926).abs() < 0.01 && (high - 1.2 * 4.9775).abs() < 0.01,
+        "{low} {high}"
+    );
 
     // The nose, where the light of the picture goes.
     let options = Options {
@@ -60,7 +67,8 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         let (eps, kinds) = (&field.eps()[row.clone()], &nodes[row]);
         let fin = kinds.iter().position(|n| *n == Node::Solid).unwrap();
         // Centre of the rise: where most of the density is gained, by first moment.
-        let steps: Vec<f64> = eps[..fin].windows(2).map(|w| f64::from(w[1] - w[0]).max(0.0)).collect();
+        let steps: Vec<f64> =
+            eps[..fin].windows(2).map(|w| f64::from(w[1] - w[0]).max(0.0)).collect();
         let steepest = (0..steps.len()).max_by(|&a, &b| steps[a].total_cmp(&steps[b])).unwrap();
         let near = steepest.saturating_sub(8)..(steepest + 9).min(steps.len());
         let (sum, moment) =
@@ -71,19 +79,22 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
     }
 }
 
-/// The same flow as a photograph: light along the span, the knife upright. Every row of the picture away from the plate shows the bow shock ahead of the
-/// fin's dark edge, and the distance between the two is the stand-off.
+/// The same flow as a photograph: light along the span, the knife upright. Every row of the picture
+/// away from the plate shows the bow shock ahead of the fin's dark edge, and the distance between
+/// the two is the stand-off.
 ///
-/// The shock is curved around the fin, so that along the light only its foremost part is met edge-on, and the mesh, 0.15 R coarse there, draws it over three cells: hence the
-/// tolerance. The stream has 0.1 kg/m³, as in a tunnel at Mach 3 that draws air from the room, and the picture reaches from grey to nearly white without
-/// being saturated.
+/// The shock is curved around the fin, so that along the light only its foremost part is met
+/// edge-on, and the mesh, 0.15 R coarse there, draws it over three cells: hence the tolerance. The
+/// stream has 0.1 kg/m³, as in a tunnel at Mach 3 that draws air from the room, and the picture
+/// reaches from grey to nearly white without being saturated.
 #[test]
 fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     let Some(path) = flow("bluntfinxyz.bin") else { return };
     let (stream, radius) = (0.1, 0.5);
     let options = Options {
         wavelength_nm: 633.0,
-        // Fin and shock, and the light's way past them; from the plate's influence to the mesh's upper end.
+        // Fin and shock, and the light's way past them; from the plate's influence to the mesh's
+        // upper end.
         bounds: Some([DVec3::new(-1.5, 0.0, 1.0), DVec3::new(0.3, 1.5, 5.7)]),
         resolution: Resolution::Spacing(0.03),
         length_unit_m: 0.02,
@@ -95,19 +106,22 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     };
     let field = load(&path, &options).unwrap().field;
     let unit_m = options.length_unit_m;
-    let scene = "[flow]\nfile = \"\"\ndensity = \"-\"\n[view]\ndirection = \"y\"\n[film]\nsize = [180, 470]\n[technique]\nkind = \"schlieren\"";
+    let scene = "[flow]\nfile = \"\"\ndensity = \"-\"\n[view]\ndirection = \"y\"\n[film]\nsize = \
+                 [180, 470]\n[technique]\nkind = \"schlieren\"";
     let scene = Scene::from_toml(scene).unwrap();
     let centre_m = field.centre_m();
     let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
     let picture =
-        render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
+        render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+            .unwrap();
     let photograph = Photograph::of(&picture).unwrap();
     let framing = photograph.framing;
 
     // The fin's silhouette: from the right, the last dark pixel of the row.
     let width = framing.width as usize;
     let edge_m = |z_m: f64| {
-        let row = (0.5 * f64::from(framing.height) - (z_m - framing.center_m[1]) / framing.pixel_m) as usize;
+        let row = (0.5 * f64::from(framing.height) - (z_m - framing.center_m[1]) / framing.pixel_m)
+            as usize;
         let dark = (0..width).rev().take_while(|i| !photograph.lit[i + row * width]).last();
         dark.map(|i| framing.plane_from_pixel(i as f64, 0.0)[0])
     };
@@ -118,7 +132,11 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
         if (2.0..5.5).contains(&z) {
             let edge_m = edge_m(up_m).expect("a row of the fin");
             // The leading edge is at x = 0: found within a node of the lattice.
-            assert!(((centre_m.x + edge_m) / unit_m).abs() < 0.06, "{}", (centre_m.x + edge_m) / unit_m);
+            assert!(
+                ((centre_m.x + edge_m) / unit_m).abs() < 0.06,
+                "{}",
+                (centre_m.x + edge_m) / unit_m
+            );
             stand_offs.push((edge_m - x_m) / unit_m / radius);
         }
     }
@@ -126,7 +144,10 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     stand_offs.sort_by(f64::total_cmp);
     let at = |share: f64| stand_offs[(share * (stand_offs.len() - 1) as f64) as usize];
     let (low, median, high) = (at(0.0), at(0.5), at(1.0));
-    let _ = writeln!(std::io::stderr(), "d/R in the picture: median {median:.3}, {low:.3} to {high:.3}");
+    let _ = writeln!(
+        std::io::stderr(),
+        "d/R in the picture: median {median:.3}, {low:.3} to {high:.3}"
+    );
     assert!((low - 0.66).abs() <= 0.15 && (high - 0.66).abs() <= 0.15, "{low} {median} {high}");
 }
 
@@ -134,18 +155,22 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
 #[test]
 fn combustor_is_read_and_resampled() {
     let Some(path) = flow("combxyz.bin") else { return };
-    let LoadedField { field, report } = load(&path, &Options::new(Medium::density("Density"))).unwrap();
+    let LoadedField { field, report } =
+        load(&path, &Options::new(Medium::density("Density"))).unwrap();
     let r = report.resampling.unwrap();
     // Two of its cells are folded indeed.
     assert_eq!((r.cells, r.folded_cells), (56 * 32 * 24, 2));
-    assert!(r.inside > 100_000 && r.back.compared > 20_000 && r.back.rms < 0.02 * r.back.range, "{r:?}");
+    assert!(
+        r.inside > 100_000 && r.back.compared > 20_000 && r.back.rms < 0.02 * r.back.range,
+        "{r:?}"
+    );
     let [low, high] = report.density_range_kg_m3.unwrap();
     assert!((low - 0.198).abs() < 1e-3 && (high - 0.710).abs() < 1e-3);
     assert!(field.eps().iter().all(|e| e.is_finite() && e.abs() < 2e-4));
 }
 
-/// Air from a converging nozzle at 60 psi gauge into one atmosphere (Ladenburg's interferometer experiment), computed with OpenFOAM as an
-/// axisymmetric wedge; the file holds cell centres.
+/// Air from a converging nozzle at 60 psi gauge into one atmosphere (Ladenburg's interferometer
+/// experiment), computed with OpenFOAM as an axisymmetric wedge; the file holds cell centres.
 #[test]
 fn ladenburgs_jet_is_revolved() {
     let Some(path) = flow("ladenburg_jet_60psi.csv") else { return };
@@ -155,7 +180,11 @@ fn ladenburgs_jet_is_revolved() {
     let r = report.resampling.unwrap();
     // The jet is as cold as 130 K: beyond Ciddor's range, which is said.
     assert_eq!(report.formula, "gladstone-dale");
-    assert!(report.warnings.iter().any(|w| w.contains("leave -40..100 C")), "{:?}", report.warnings);
+    assert!(
+        report.warnings.iter().any(|w| w.contains("leave -40..100 C")),
+        "{:?}",
+        report.warnings
+    );
     assert!(r.back.rms < 0.02 * r.back.range, "{r:?}");
     // Round: eps on the four points at a right angle around the axis is the same.
     let [nx, ny, nz] = field.dims();
@@ -163,8 +192,11 @@ fn ladenburgs_jet_is_revolved() {
     let eps = |i: usize, j: usize, k: usize| field.eps()[i + nx * (j + ny * k)];
     let (i, middle) = (nx / 3, ny / 2);
     let quarter = ny / 4;
-    let around =
-        [eps(i, quarter, middle), eps(i, ny - 1 - quarter, ny - 1 - middle), eps(i, middle, quarter)];
+    let around = [
+        eps(i, quarter, middle),
+        eps(i, ny - 1 - quarter, ny - 1 - middle),
+        eps(i, middle, quarter),
+    ];
     let spread = around.iter().fold(0.0f32, |s, e| s.max((e - around[0]).abs()));
     assert!(spread < 1e-3 * 1e-3, "{around:?}");
     // Nozzle exit: 2.7 bar and 247 K, so n − 1 is about three times that of the room.

@@ -44,15 +44,23 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
 fn without_the_token_nothing_is_told() {
     let s = Served::start(&SMALL);
     let wrong = format!("/{}/", "0".repeat(32));
-    for path in ["/", "/state", "/frame", "//", &wrong, &format!("{wrong}state"), &s.base.to_uppercase()[..9]]
-    {
+    for path in [
+        "/",
+        "/state",
+        "/frame",
+        "//",
+        &wrong,
+        &format!("{wrong}state"),
+        &s.base.to_uppercase()[..9],
+    ] {
         let request = format!("GET {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
         let answer = s.raw(request.as_bytes()).unwrap();
         assert_eq!(answer.status, 403, "{path}");
         assert!(!answer.text().contains(s.base.trim_matches('/')), "{path}");
     }
     let request = format!(
-        "POST {wrong}scene HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 2\r\n\r\n{{}}"
+        "POST {wrong}scene HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: \
+         2\r\n\r\n{{}}"
     );
     assert_eq!(s.raw(request.as_bytes()).unwrap().status, 403);
     assert!(s.is_healthy());
@@ -97,7 +105,8 @@ fn the_finished_picture_is_that_of_render() {
     assert!(status.success());
     let again = read_png(&path("again.png")).unwrap();
     assert_eq!(again.rgba().unwrap(), png.rgba().unwrap());
-    let bytes: Vec<u8> = again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
+    let bytes: Vec<u8> =
+        again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
     assert_eq!(bytes, shown.rgb);
 }
 
@@ -166,7 +175,8 @@ fn painting_changes_the_picture_where_its_light_is() {
     );
     assert!(changed(&white.filter, &by_picture.filter) > 0.0);
 
-    // The same by its place on the filter changes nothing any more; the axis turns the background red.
+    // The same by its place on the filter changes nothing any more; the axis turns the background
+    // red.
     let by_filter = red("filter", json!([place]));
     assert!(changed(&by_picture.rgb, &by_filter.rgb) < 0.01);
     let axis = red("filter", json!([[0.0, 0.0]]));
@@ -198,7 +208,8 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     let first = s.finished();
     assert_eq!(first.info["error"], serde_json::Value::Null);
 
-    // The last: another picture, and the saved scene makes the same, relative to the first step's surroundings.
+    // The last: another picture, and the saved scene makes the same, relative to the first step's
+    // surroundings.
     assert_eq!(s.change(&json!({"step": 3}))["step"], 3);
     let last = s.finished();
     assert_eq!(last.info["error"], serde_json::Value::Null);
@@ -206,7 +217,8 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let toml = s.get("save/toml").text();
-    let reference = toml.lines().find_map(|l| l.strip_prefix("reference_n_minus_1 = ")).expect(&toml);
+    let reference =
+        toml.lines().find_map(|l| l.strip_prefix("reference_n_minus_1 = ")).expect(&toml);
     // 1.2 kg/m3 of air in red light; that step's own surroundings would be 2.48e-4.
     assert!((reference.parse::<f64>().unwrap() - 2.71e-4).abs() < 2e-6, "{reference}");
     assert!(toml.contains("flow-3.vti"), "{toml}");
@@ -220,7 +232,8 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
         .unwrap();
     assert!(status.success());
     let again = read_png(&path("again.png")).unwrap();
-    let bytes: Vec<u8> = again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
+    let bytes: Vec<u8> =
+        again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
     assert_eq!(bytes, last.rgb);
 
     // Transfer functions stay with the step, and other changes with both.
@@ -278,9 +291,16 @@ fn bad_requests_get_a_reason_and_harm_nothing() {
     // Not HTTP at all; a header without end; a length that is a lie.
     for bytes in [
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03".to_vec(),
-        b"GET / HTTP/1.1\r\nX: ".iter().copied().chain(std::iter::repeat_n(b'a', 1 << 20)).collect(),
-        format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999\r\n\r\n", s.base)
-            .into_bytes(),
+        b"GET / HTTP/1.1\r\nX: "
+            .iter()
+            .copied()
+            .chain(std::iter::repeat_n(b'a', 1 << 20))
+            .collect(),
+        format!(
+            "POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999\r\n\r\n",
+            s.base
+        )
+        .into_bytes(),
     ] {
         if let Some(answer) = s.raw(&bytes) {
             assert!((400..500).contains(&answer.status), "{}", answer.head);
@@ -296,13 +316,18 @@ fn dropped_and_idle_connections_are_left_behind() {
     for _ in 0..20 {
         let mut half = s.connect();
         half.write_all(
-            format!("POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n{{\"film\"", s.base)
-                .as_bytes(),
+            format!(
+                "POST {}scene HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n{{\"film\"",
+                s.base
+            )
+            .as_bytes(),
         )
         .unwrap();
         let mut wait = s.connect();
-        wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
-            .unwrap();
+        wait.write_all(
+            format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes(),
+        )
+        .unwrap();
         let mut reads_a_little = s.connect();
         reads_a_little
             .write_all(format!("GET {}frame HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
@@ -312,7 +337,8 @@ fn dropped_and_idle_connections_are_left_behind() {
     // A file that takes long and that nobody waits for.
     s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
     let mut gone = s.connect();
-    gone.write_all(format!("GET {}save/exr HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes()).unwrap();
+    gone.write_all(format!("GET {}save/exr HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
+        .unwrap();
     std::thread::sleep(Duration::from_millis(300));
     drop(gone);
 
@@ -331,11 +357,16 @@ fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
     let mut s = Served::start(&SMALL);
     s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
     let mut wait = s.connect();
-    wait.write_all(format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
-        .unwrap();
+    wait.write_all(
+        format!("GET {}frame?after=999999 HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes(),
+    )
+    .unwrap();
     std::thread::sleep(Duration::from_millis(500));
     let start = Instant::now();
-    let kill = std::process::Command::new("kill").args(["-INT", &s.child.id().to_string()]).status().unwrap();
+    let kill = std::process::Command::new("kill")
+        .args(["-INT", &s.child.id().to_string()])
+        .status()
+        .unwrap();
     assert!(kill.success());
     let status = s.child.wait().unwrap();
     assert_eq!(status.code(), Some(130));
@@ -346,7 +377,10 @@ fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
 fn a_taken_port_and_a_wrong_flow_are_errors_of_the_command_line() {
     let s = Served::start(&SMALL);
     let run = |args: &[&str]| {
-        let out = std::process::Command::new(env!("CARGO_BIN_EXE_schlieren")).args(args).output().unwrap();
+        let out = std::process::Command::new(env!("CARGO_BIN_EXE_schlieren"))
+            .args(args)
+            .output()
+            .unwrap();
         (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
     };
     let (code, text) = run(&["serve", "nothing.vti", "--density", "rho", "--listen", &s.address]);

@@ -1,6 +1,8 @@
-//! The page in a real browser, by hand: look, orbit, paint, switch. What the window shows must change where it should.
+//! The page in a real browser, by hand: look, orbit, paint, switch. What the window shows must
+//! change where it should.
 //!
-//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes, unless RTSV_REQUIRE_PEERS is set.
+//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes,
+//! unless RTSV_REQUIRE_PEERS is set.
 #![cfg(feature = "serve")]
 
 #[path = "serving/browser.rs"]
@@ -23,7 +25,8 @@ type Rect = [f64; 4];
 
 fn rect(b: &mut Browser, id: &str) -> Rect {
     let r = b.evaluate(&format!(
-        "(() => {{ const r = document.getElementById('{id}').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; }})()"
+        "(() => {{ const r = document.getElementById('{id}').getBoundingClientRect(); return \
+         [r.left, r.top, r.width, r.height]; }})()"
     ));
     [0, 1, 2, 3].map(|i| r[i].as_f64().unwrap())
 }
@@ -38,7 +41,8 @@ fn look(b: &mut Browser, name: &str) -> Window {
     Window { rgba: picture.rgba().unwrap(), picture }
 }
 
-/// Part of the pixels in a part of a rectangle (`[left, top, right, bottom]` as fractions) that differ visibly.
+/// Part of the pixels in a part of a rectangle (`[left, top, right, bottom]` as fractions) that
+/// differ visibly.
 fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
     let x = [0, 2].map(|i| (r[0] + part[i] * r[2]) as usize);
     let y = [1, 3].map(|i| (r[1] + part[i] * r[3]) as usize);
@@ -57,7 +61,8 @@ fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
 /// Waits until the page shows the finished picture of the scene that the program has now.
 fn settled(b: &mut Browser) {
     b.wait_for(
-        "fetch('state').then(r => r.json()).then(s => document.body.dataset.finished === 'true' && Number(document.body.dataset.generation) === s.generation)",
+        "fetch('state').then(r => r.json()).then(s => document.body.dataset.finished === 'true' && \
+         Number(document.body.dataset.generation) === s.generation)",
     );
 }
 
@@ -70,13 +75,23 @@ fn looking_orbiting_painting_and_switching() {
     let program = match chromium() {
         Ok(program) => program,
         Err(why) => {
-            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none(), "Chromium is required: {why}");
+            assert!(
+                std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
+                "Chromium is required: {why}"
+            );
             // Not `eprintln!`: libtest swallows that.
             let _ = writeln!(std::io::stderr(), "skipped: {why}");
             return;
         }
     };
-    let s = Served::start_series(&["--size", "384x192", "--samples", "16", "--source", "circle:0.05mm"]);
+    let s = Served::start_series(&[
+        "--size",
+        "384x192",
+        "--samples",
+        "16",
+        "--source",
+        "circle:0.05mm",
+    ]);
     let mut b = Browser::open(&program, &s.url());
     b.wait_for("document.readyState === 'complete' && document.body.dataset.finished === 'true'");
     let first = look(&mut b, "first");
@@ -116,7 +131,8 @@ fn looking_orbiting_painting_and_switching() {
         "the same view is the same picture"
     );
 
-    // Paint on the filter: a red dab in the middle colours undisturbed light, on the picture and on the filter.
+    // Paint on the filter: a red dab in the middle colours undisturbed light, on the picture and on
+    // the filter.
     b.evaluate("document.getElementById('clear-white').click()");
     settled(&mut b);
     let clear = look(&mut b, "clear");
@@ -126,7 +142,9 @@ fn looking_orbiting_painting_and_switching() {
         inside(filter, 0.5, 0.5),
         inside(filter, 0.5, 0.6),
     ]);
-    b.wait_for("fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)");
+    b.wait_for(
+        "fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)",
+    );
     settled(&mut b);
     let painted = look(&mut b, "painted-filter");
     let corner = [0.02, 0.05, 0.2, 0.4];
@@ -137,18 +155,31 @@ fn looking_orbiting_painting_and_switching() {
         "the rest of the filter is as it was"
     );
 
-    // Paint on the picture: what is under the brush changes; undisturbed light goes elsewhere on the filter.
+    // Paint on the picture: what is under the brush changes; undisturbed light goes elsewhere on
+    // the filter.
     b.evaluate("document.getElementById('clear-white').click()");
     settled(&mut b);
-    b.evaluate("document.querySelector('input[value=paint]').click(); const r = document.getElementById('radius'); r.value = 0.05; r.dispatchEvent(new Event('input'))");
+    b.evaluate(
+        "document.querySelector('input[value=paint]').click(); const r = \
+                document.getElementById('radius'); r.value = 0.05; r.dispatchEvent(new \
+                Event('input'))",
+    );
     b.drag(&[inside(picture, 0.59, 0.38), inside(picture, 0.6, 0.4), inside(picture, 0.61, 0.42)]);
-    b.wait_for("fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)");
+    b.wait_for(
+        "fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)",
+    );
     settled(&mut b);
     let on_picture = look(&mut b, "painted-picture");
-    assert!(differs(&clear, &on_picture, picture, [0.59, 0.38, 0.61, 0.42]) > 0.8, "under the brush");
+    assert!(
+        differs(&clear, &on_picture, picture, [0.59, 0.38, 0.61, 0.42]) > 0.8,
+        "under the brush"
+    );
 
     // Switch: another picture, other settings.
-    b.evaluate("const t = document.querySelector('select[name=technique]'); t.value = 'interferogram'; t.dispatchEvent(new Event('change'))");
+    b.evaluate(
+        "const t = document.querySelector('select[name=technique]'); t.value = \
+                'interferogram'; t.dispatchEvent(new Event('change'))",
+    );
     b.wait_for("document.body.innerText.includes('fringe spacing')");
     settled(&mut b);
     let switched = look(&mut b, "interferogram");
@@ -159,14 +190,20 @@ fn looking_orbiting_painting_and_switching() {
     );
 
     // Another time: the blob is elsewhere.
-    b.evaluate("const step = document.getElementById('step'); step.value = 3; step.dispatchEvent(new Event('input'))");
+    b.evaluate(
+        "const step = document.getElementById('step'); step.value = 3; \
+                step.dispatchEvent(new Event('input'))",
+    );
     b.wait_for("document.getElementById('when').innerText.includes('4 of 4')");
     settled(&mut b);
     let later = look(&mut b, "later");
     assert!(differs(&switched, &later, picture, [0.1, 0.1, 0.9, 0.9]) > 0.1);
 
     // Nonsense is answered on the page, and the page goes on.
-    b.evaluate("const w = document.querySelector('input[name=wavelengths]'); w.value = '0.5'; w.dispatchEvent(new Event('change'))");
+    b.evaluate(
+        "const w = document.querySelector('input[name=wavelengths]'); w.value = '0.5'; \
+                w.dispatchEvent(new Event('change'))",
+    );
     b.wait_for("document.getElementById('message').innerText.includes('wavelengths_nm')");
     settled(&mut b);
     let refused: Vec<&String> = b.complaints.iter().filter(|c| !c.contains("422")).collect();

@@ -1,6 +1,8 @@
-//! Angles of shocks, measured in schlieren pictures as one would on a photograph, against theta-beta-M and Taylor and Maccoll; and the phase across a shock.
+//! Angles of shocks, measured in schlieren pictures as one would on a photograph, against
+//! theta-beta-M and Taylor and Maccoll; and the phase across a shock.
 //!
-//! Flow, field, march, optics and film: all of it stands between the gas dynamics and the number that is compared.
+//! Flow, field, march, optics and film: all of it stands between the gas dynamics and the number
+//! that is compared.
 
 use datasets::generate::cone_shock::Cone;
 use datasets::generate::flow::{Fields, Flow};
@@ -20,7 +22,8 @@ const TOLERANCE_DEG: f64 = 0.3;
 fn photographed(flow: Flow, toml: &str, layers: Layers) -> RenderOutput {
     let (w, h) = (flow.high_m().x - flow.origin_m.x, flow.high_m().y - flow.origin_m.y);
     let rows = (300.0 * h / w).round();
-    let scene = format!("[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [300, {rows}]\n{toml}");
+    let scene =
+        format!("[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [300, {rows}]\n{toml}");
     let scene = Scene::from_toml(&scene).unwrap();
     let options = Options { wavelength_nm: 633.0, ..Options::new(Medium::density("density")) };
     let field = from_dataset(&flow.into_dataset(), &options).unwrap().field;
@@ -28,10 +31,12 @@ fn photographed(flow: Flow, toml: &str, layers: Layers) -> RenderOutput {
     render(&scene, &section, layers, &Control::default()).unwrap()
 }
 
-/// The angle of the shock above the body. `part` of the picture's columns is looked at, from 0 at the left to 1.
+/// The angle of the shock above the body. `part` of the picture's columns is looked at, from 0 at
+/// the left to 1.
 fn shock(flow: Flow, knife_deg: f64, part: [f64; 2]) -> Line {
     let toml = format!(
-        "[technique]\nkind = \"schlieren\"\ncutoff = {{ kind = \"knife\", angle_deg = {knife_deg:?} }}\n[sampling]\nmethod = \"photons\"\nsamples = 4"
+        "[technique]\nkind = \"schlieren\"\ncutoff = {{ kind = \"knife\", angle_deg = \
+         {knife_deg:?} }}\n[sampling]\nmethod = \"photons\"\nsamples = 4"
     );
     let rendered = photographed(flow, &toml, Layers { map: true, ..Layers::NONE });
     let photograph = Photograph::of(&rendered).unwrap();
@@ -120,7 +125,8 @@ fn the_phase_steps_by_the_density_across_a_shock() {
     };
     let (mut checked, mut worst, mut worst_brightness) = (0, 0.0f64, 0.0f64);
     for x_m in [0.02, 0.03, 0.04, 0.05] {
-        // Between body and shock, and above it, well away from both; upwards, the same place of the picture mirrored downwards.
+        // Between body and shock, and above it, well away from both; upwards, the same place of the
+        // picture mirrored downwards.
         let (surface, front) = (x_m * wedge.half_angle_rad.tan(), x_m * shock.shock_rad.tan());
         for share in [0.35, 0.5, 0.65] {
             for side in [1.0, -1.0] {
@@ -130,13 +136,15 @@ fn the_phase_steps_by_the_density_across_a_shock() {
                 let step = f64::from(map.waves[behind]) - f64::from(map.waves[before]);
                 worst = worst.max((step - waves).abs());
                 let fringe = 0.5 * (1.0 + (2.0 * std::f64::consts::PI * waves).cos());
-                worst_brightness = worst_brightness.max((f64::from(r.pixels[behind][0]) - fringe).abs());
+                worst_brightness =
+                    worst_brightness.max((f64::from(r.pixels[behind][0]) - fringe).abs());
                 checked += 1;
             }
         }
     }
     println!("{waves:.4} waves, off by {worst:.1e}; brightness by {worst_brightness:.1e}");
-    // The spline rings for a few voxels beside the jump, 1/14 a voxel; places are 4 voxels and more from it. 2e-3 of the step and of a fringe's brightness.
+    // The spline rings for a few voxels beside the jump, 1/14 a voxel; places are 4 voxels and more
+    // from it. 2e-3 of the step and of a fringe's brightness.
     assert!(
         checked == 24 && worst < 2e-3 * waves && worst_brightness < 0.05,
         "{worst} of {waves}; {worst_brightness}"

@@ -40,10 +40,20 @@ pub(crate) fn assemble(
             parts.push((std::sync::Arc::as_ptr(&m.mesh) as usize, m.geometry(), true, &d.property));
         }
         if let Some(s) = &d.built.spheres {
-            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false, &d.property));
+            parts.push((
+                std::sync::Arc::as_ptr(s) as usize,
+                Geometry::Shape(s.clone()),
+                false,
+                &d.property,
+            ));
         }
         if let Some(s) = &d.built.tubes {
-            parts.push((std::sync::Arc::as_ptr(s) as usize, Geometry::Shape(s.clone()), false, &d.property));
+            parts.push((
+                std::sync::Arc::as_ptr(s) as usize,
+                Geometry::Shape(s.clone()),
+                false,
+                &d.property,
+            ));
         }
         if let (Some(s), Some(back)) = (&d.built.back_faces, &d.back) {
             parts.push((
@@ -67,7 +77,8 @@ pub(crate) fn assemble(
         out.edges.resize_with(out.instances.len(), || None);
     }
     if options.ao == 0 && !options.path_tracing {
-        out.materials = std::mem::take(&mut out.materials).into_iter().map(ambient_as_emission).collect();
+        out.materials =
+            std::mem::take(&mut out.materials).into_iter().map(ambient_as_emission).collect();
     }
     out
 }
@@ -114,7 +125,12 @@ impl Assembled {
                             let color = [*r, *g, *b].map(|c| f32::from(c) / 255.0);
                             let opacity = base.opacity * f32::from(*a) / 255.0;
                             let source = ColorSource::Constant;
-                            self.material(Material { color, opacity, color_source: source, ..base.clone() })
+                            self.material(Material {
+                                color,
+                                opacity,
+                                color_source: source,
+                                ..base.clone()
+                            })
                         }
                     });
                     self.place(geometry, *place, m, colors, encoding);
@@ -159,10 +175,13 @@ impl Assembled {
 
 /// Whether ambient light would show.
 pub(crate) fn any_ambient(materials: &[Material]) -> bool {
-    materials.iter().any(|m| matches!(m.model, SurfaceModel::Phong { ambient, .. } if ambient > 0.0))
+    materials
+        .iter()
+        .any(|m| matches!(m.model, SurfaceModel::Phong { ambient, .. } if ambient > 0.0))
 }
 
-/// Whether rays are sent for mirrors: properties alone (every physically based surface reflects a little) do not ask for it.
+/// Whether rays are sent for mirrors: properties alone (every physically based surface reflects a
+/// little) do not ask for it.
 pub(crate) fn wants_reflections(options: &Options) -> bool {
     options.reflections
         || options.mirror > 0.0

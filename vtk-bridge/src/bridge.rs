@@ -1,8 +1,9 @@
-//! One renderer of the program: what it draws this frame, what is kept from the frames before, and the picture.
+//! One renderer of the program: what it draws this frame, what is kept from the frames before, and
+//! the picture.
 //!
-//! A frame is [`Bridge::begin`], then everything that is drawn, then [`Bridge::render`] (thesis section 3.2.2: one frame per render
-//! event). What it keeps: acceleration structures by the key of their arrays, colours by the key of theirs, and the whole picture while
-//! nothing changes at all.
+//! A frame is [`Bridge::begin`], then everything that is drawn, then [`Bridge::render`] (thesis
+//! section 3.2.2: one frame per render event). What it keeps: acceleration structures by the key of
+//! their arrays, colours by the key of theirs, and the whole picture while nothing changes at all.
 
 use crate::assemble::{Assembled, assemble};
 use crate::colors::{self, MeshColors};
@@ -129,7 +130,10 @@ impl Bridge {
     pub fn add_surface(&mut self, surface: &Surface<'_>) -> AddOutcome {
         let start = Instant::now();
         let Some(place) = affine(surface.world_from_data) else {
-            self.warn(format!("{}: its matrix is singular or not affine; it is not drawn", surface.name));
+            self.warn(format!(
+                "{}: its matrix is singular or not affine; it is not drawn",
+                surface.name
+            ));
             return AddOutcome::Nothing("singular matrix");
         };
         let key = surface.shape.key;
@@ -150,7 +154,8 @@ impl Bridge {
         };
         if built.skipped > 0 {
             self.warn(format!(
-                "{}: {} triangles have a point that is not a number or does not exist; they are left out",
+                "{}: {} triangles have a point that is not a number or does not exist; they are \
+                 left out",
                 surface.name, built.skipped
             ));
         }
@@ -198,9 +203,10 @@ impl Bridge {
         if self.options.path_tracing {
             return Err("a volume: RTV_MODE=path knows none".to_owned());
         }
-        let place =
-            affine(volume.world_from_data).ok_or("a volume whose matrix is singular or not affine")?;
-        let (mut volume_cache, mut content) = (std::mem::take(&mut self.volume_cache), self.content.clone());
+        let place = affine(volume.world_from_data)
+            .ok_or("a volume whose matrix is singular or not affine")?;
+        let (mut volume_cache, mut content) =
+            (std::mem::take(&mut self.volume_cache), self.content.clone());
         if volume.key == 0 {
             self.frame.hash(&mut content);
         }
@@ -210,7 +216,12 @@ impl Bridge {
         if let Some(warning) = warning {
             self.warn(format!("{}: {warning}", volume.name));
         }
-        self.report.traced.push(TracedItem { name: volume.name.to_owned(), triangles: 0, cells, copies: 1 });
+        self.report.traced.push(TracedItem {
+            name: volume.name.to_owned(),
+            triangles: 0,
+            cells,
+            copies: 1,
+        });
         self.report.ms.extract += ms(start);
         Ok(())
     }
@@ -246,7 +257,8 @@ impl Bridge {
             kept.frame = frame;
             return kept.value.clone();
         }
-        let resolved = self.in_pool(|| colors::resolve(&surface.color, mesh, surface.shape.points.len()));
+        let resolved =
+            self.in_pool(|| colors::resolve(&surface.color, mesh, surface.shape.points.len()));
         let value = resolved.unwrap_or_else(|fault| {
             self.warn(format!("{}: {fault}", surface.name));
             None
@@ -271,7 +283,8 @@ impl Bridge {
         format!("{:?}{:?}{:?}", s.property, s.back, s.world_from_data).hash(h);
         if let Some(m) = &s.maps {
             [m.material, m.normal, m.emissive].map(|i| i.map(|i| i.key)).hash(h);
-            format!("{:?}{:?}{:?}", m.normal_scale, m.occlusion_strength, m.emissive_factor).hash(h);
+            format!("{:?}{:?}{:?}", m.normal_scale, m.occlusion_strength, m.emissive_factor)
+                .hash(h);
         }
         if let Some(g) = &s.glyphs {
             g.rgba.hash(h);
@@ -364,14 +377,18 @@ impl Bridge {
         scene.volumes = self.volume_cache.placed().to_vec();
         if !scene.volumes.is_empty() && encodings.contains(&crate::materials::Encoding::Pbr) {
             self.warn(
-                "volumes in front of physically based surfaces: these encode their colours (power 1/2.2), and what the volume adds there is encoded with them"
+                "volumes in front of physically based surfaces: these encode their colours (power \
+                 1/2.2), and what the volume adds there is encoded with them"
                     .to_owned(),
             );
         }
         if options.ao > 0 && !options.path_tracing {
             let automatic = 0.2 * world.bounds().extent().as_dvec3().length();
-            let distance =
-                options.ao_radius.unwrap_or(if automatic > 0.0 { automatic } else { f64::INFINITY });
+            let distance = options.ao_radius.unwrap_or(if automatic > 0.0 {
+                automatic
+            } else {
+                f64::INFINITY
+            });
             scene.ambient_occlusion = Some(AmbientOcclusion { distance, rays: options.ao });
         }
         let camera = self.camera(view, &options)?;
@@ -379,28 +396,35 @@ impl Bridge {
         // ---- What it needs, of what is wanted.
         let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
         let mirrors = Effects::REFLECTION | Effects::GLOSSY_REFLECTION;
-        let effects =
-            if crate::assemble::wants_reflections(&options) { needed } else { needed.without(mirrors) };
+        let effects = if crate::assemble::wants_reflections(&options) {
+            needed
+        } else {
+            needed.without(mirrors)
+        };
         if effects.intersects(mirrors | Effects::REFRACTION) || options.path_tracing {
             scene.background = WindowImage::gradient_background(view);
         }
-        let secondary = mirrors | Effects::REFRACTION | Effects::SHADOWS | Effects::AMBIENT_OCCLUSION;
+        let secondary =
+            mirrors | Effects::REFRACTION | Effects::SHADOWS | Effects::AMBIENT_OCCLUSION;
         if effects.intersects(secondary) && crate::report::ranks() > 1 {
             self.warn(
-                "several ranks: shadows, ambient occlusion, mirrors and glass see only the data of their own rank; run on one rank for the \
+                "several ranks: shadows, ambient occlusion, mirrors and glass see only the data of \
+                 their own rank; run on one rank for the \
                  whole"
                     .to_owned(),
             );
         }
         if shadows && !effects.contains(Effects::SHADOWS) {
             self.warn(
-                "shadows change no pixel: the only lights are headlights, whose shadows are left out; add a light (vtkLight, vtkLightKit, \
+                "shadows change no pixel: the only lights are headlights, whose shadows are left \
+                 out; add a light (vtkLight, vtkLightKit, \
                  ParaView's light kit)"
                     .to_owned(),
             );
         }
         let mut render = RenderOptions::new(view.width, view.height);
-        render.samples = if view.interactive { 1 } else { options.samples.max(view.samples).max(1) };
+        render.samples =
+            if view.interactive { 1 } else { options.samples.max(view.samples).max(1) };
         render.path_tracing = options.path_tracing;
         render.max_bounces = options.max_bounces;
         render.seed = options.seed.wrapping_add(u64::from(mean_of) << 32);
@@ -425,8 +449,9 @@ impl Bridge {
         self.report.effects = effects.names().map(str::to_owned).collect();
         self.report.rays = crate::report::rays(&outcome.rays);
         for w in outcome.warnings {
-            // Nobody asked for the effects one by one: reflections are left out on purpose, and others may happen not to be in view. Alpha of 1 at
-            // all corners comes out a rounding below 1 inside.
+            // Nobody asked for the effects one by one: reflections are left out on purpose, and
+            // others may happen not to be in view. Alpha of 1 at all corners comes out a rounding
+            // below 1 inside.
             let of_no_use = ["left out", "drawn opaque", "changed no pixel of this picture"];
             if !of_no_use.iter().any(|t| w.contains(t)) {
                 self.warn(w);
@@ -447,17 +472,23 @@ impl Bridge {
             let mut time = |e: Effects| {
                 let options = RenderOptions { effects: Some(e), ..inputs.options.clone() };
                 let start = Instant::now();
-                let ok = self.in_pool(|| renderer.render(inputs.scene, inputs.camera, &options)).is_ok();
+                let ok =
+                    self.in_pool(|| renderer.render(inputs.scene, inputs.camera, &options)).is_ok();
                 ok.then(|| ms(start))
             };
             let whole = time(effects);
-            let costs = Effects::ALL.iter().filter(|(e, _)| effects.contains(*e)).filter_map(|(e, name)| {
-                let without = effects.without(*e);
-                // Soft shadows are shadows.
-                let without =
-                    if *e == Effects::SHADOWS { without.without(Effects::SOFT_SHADOWS) } else { without };
-                Some(((*name).to_owned(), (whole? - time(without)?).max(0.0)))
-            });
+            let costs = Effects::ALL.iter().filter(|(e, _)| effects.contains(*e)).filter_map(
+                |(e, name)| {
+                    let without = effects.without(*e);
+                    // Soft shadows are shadows.
+                    let without = if *e == Effects::SHADOWS {
+                        without.without(Effects::SOFT_SHADOWS)
+                    } else {
+                        without
+                    };
+                    Some(((*name).to_owned(), (whole? - time(without)?).max(0.0)))
+                },
+            );
             let costs = costs.collect();
             self.costs.insert(names.clone(), costs);
         }
@@ -484,8 +515,11 @@ impl Bridge {
         geometries: Vec<Geometry>,
         instances: Vec<rt_core::bvh::Instance>,
     ) -> Result<Arc<World>, BridgeError> {
-        let build =
-            BuildOptions { quality: self.options.build, robustness: self.options.robustness, simd: None };
+        let build = BuildOptions {
+            quality: self.options.build,
+            robustness: self.options.robustness,
+            simd: None,
+        };
         if let Some((world, placed, options)) = &self.world
             && *placed == instances
             && *options == build
@@ -494,13 +528,15 @@ impl Bridge {
             return Ok(Arc::clone(world));
         }
         let mut previous = self.world.take().map(|(w, ..)| w);
-        let shares = |w: &Arc<World>| geometries.iter().any(|g| w.geometries().iter().any(|h| same(g, h)));
+        let shares =
+            |w: &Arc<World>| geometries.iter().any(|g| w.geometries().iter().any(|h| same(g, h)));
         if !previous.as_ref().is_some_and(shares) {
             // Nothing to share: the old trees must not be in memory beside the new ones.
             previous = None;
         }
         let list = instances.clone();
-        let built = self.in_pool(|| World::build_sharing(geometries, list, &build, previous.as_deref()));
+        let built =
+            self.in_pool(|| World::build_sharing(geometries, list, &build, previous.as_deref()));
         let world = Arc::new(built?);
         self.world = Some((Arc::clone(&world), instances, build));
         Ok(world)
@@ -543,7 +579,9 @@ pub(crate) struct RenderInputs<'a> {
 fn same(a: &Geometry, b: &Geometry) -> bool {
     match (a, b) {
         (Geometry::Mesh(a), Geometry::Mesh(b)) => Arc::ptr_eq(a, b),
-        (Geometry::Shape(a), Geometry::Shape(b)) => std::ptr::addr_eq(Arc::as_ptr(a), Arc::as_ptr(b)),
+        (Geometry::Shape(a), Geometry::Shape(b)) => {
+            std::ptr::addr_eq(Arc::as_ptr(a), Arc::as_ptr(b))
+        }
         _ => false,
     }
 }

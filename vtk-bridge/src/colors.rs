@@ -20,13 +20,19 @@ pub enum MeshColors {
 /// Values a task works on.
 const CHUNK: usize = 1 << 14;
 
-/// VTK's colours are the numbers that end up in the picture: they are not decoded, and the picture is not encoded.
+/// VTK's colours are the numbers that end up in the picture: they are not decoded, and the picture
+/// is not encoded.
 fn float(c: [u8; 4]) -> [f32; 4] {
     c.map(|v| f32::from(v) / 255.0)
 }
 
-/// `color` for `built`, or why it cannot be. `points` is the number of points that the colours were made for.
-pub fn resolve(color: &Color<'_>, built: &PolygonMesh, points: usize) -> Result<Option<MeshColors>, String> {
+/// `color` for `built`, or why it cannot be. `points` is the number of points that the colours were
+/// made for.
+pub fn resolve(
+    color: &Color<'_>,
+    built: &PolygonMesh,
+    points: usize,
+) -> Result<Option<MeshColors>, String> {
     let length = |what, expected: usize, found: usize| {
         format!("{found} colours for {expected} {what}: the property's colour is used")
     };
@@ -39,9 +45,9 @@ pub fn resolve(color: &Color<'_>, built: &PolygonMesh, points: usize) -> Result<
             let values: Vec<[f32; 4]> =
                 values[..points].par_iter().with_min_len(CHUNK).map(|c| float(*c)).collect();
             let values = match &built.clip_map {
-                Some(c) => {
-                    c.vertex_values(&values, |a, b, t| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t))
-                }
+                Some(c) => c.vertex_values(&values, |a, b, t| {
+                    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
+                }),
                 None => values,
             };
             Ok(Some(MeshColors::Values(Arc::new(Attribute::per_vertex(values)))))
@@ -61,10 +67,12 @@ pub fn resolve(color: &Color<'_>, built: &PolygonMesh, points: usize) -> Result<
             if coordinates.len() < points || row.is_empty() {
                 return Err(length("points", points, coordinates.len()));
             }
-            // A table whose range is one number makes 0/0 of that number; OpenGL takes its first colour then.
+            // A table whose range is one number makes 0/0 of that number; OpenGL takes its first
+            // colour then.
             let place = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-1000.0, 1000.0) };
             let of = |c: &[f32; 2]| if c[1] > 0.5 { f32::NAN } else { place(c[0]) };
-            let values: Vec<f32> = coordinates[..points].par_iter().with_min_len(CHUNK).map(of).collect();
+            let values: Vec<f32> =
+                coordinates[..points].par_iter().with_min_len(CHUNK).map(of).collect();
             let values = match &built.clip_map {
                 Some(c) => c.vertex_values(&values, |a, b, t| a + (b - a) * t),
                 None => values,
@@ -80,8 +88,8 @@ pub fn resolve(color: &Color<'_>, built: &PolygonMesh, points: usize) -> Result<
 /// Most entries of a map that steps are made of.
 const MAP_ENTRIES: usize = 4096;
 
-/// VTK takes the nearest colour of its row, rt-core's maps are linear between colours: each colour is repeated, so that only a small
-/// part of the range lies between two different ones.
+/// VTK takes the nearest colour of its row, rt-core's maps are linear between colours: each colour
+/// is repeated, so that only a small part of the range lies between two different ones.
 fn stepped(row: &[[u8; 4]], nan: [u8; 4]) -> ColorMap {
     let repeat = (MAP_ENTRIES / row.len()).max(1);
     let n = row.len() * repeat;

@@ -1,5 +1,6 @@
-//! Edges of polygons on a surface, as VTK 9's shaders draw them: by the distance of a pixel from the projected edges of its polygon, and
-//! a little beyond the outline, because the geometry shader moves the corners of each triangle outwards.
+//! Edges of polygons on a surface, as VTK 9's shaders draw them: by the distance of a pixel from
+//! the projected edges of its polygon, and a little beyond the outline, because the geometry shader
+//! moves the corners of each triangle outwards.
 
 use crate::geometry::PolygonMesh;
 use crate::input::{Property, View};
@@ -22,10 +23,11 @@ pub(crate) struct Edges {
     world_from_object: DAffine3,
     color: [f32; 3],
     width_px: f64,
-    /// Triangles that turn this way in the window are not drawn: 1 or −1 (rows from the top), or both.
+    /// Triangles that turn this way in the window are not drawn: 1 or −1 (rows from the top), or
+    /// both.
     culled: [bool; 2],
-    /// How far a corner moves, line widths. VTK 9.1's shader means half a width and takes the window to be as wide as its coordinates from −1 to 1:
-    /// it moves corners by a quarter.
+    /// How far a corner moves, line widths. VTK 9.1's shader means half a width and takes the
+    /// window to be as wide as its coordinates from −1 to 1: it moves corners by a quarter.
     reach: f64,
 }
 
@@ -67,7 +69,8 @@ impl Edges {
         }
     }
 
-    /// `None` for triangles with a corner behind the eye, which has no place in the window, and for those without an area.
+    /// `None` for triangles with a corner behind the eye, which has no place in the window, and for
+    /// those without an area.
     fn project(&self, primitive: usize, view: &View) -> Option<ProjectedTriangle> {
         let indices = self.mesh.indices.get(primitive)?;
         let sides = self.sides.as_ref().map_or(7, |s| s.get(primitive).copied().unwrap_or(7));
@@ -85,7 +88,8 @@ impl Edges {
         }
         let [a, b, c] = corners;
         let winding = (b - a).perp_dot(c - a);
-        let inward = [b - a, c - b, a - c].map(|side| winding.signum() * side.perp().normalize_or_zero());
+        let inward =
+            [b - a, c - b, a - c].map(|side| winding.signum() * side.perp().normalize_or_zero());
         if winding == 0.0 || !winding.is_finite() || inward.contains(&DVec2::ZERO) {
             return None;
         }
@@ -102,9 +106,16 @@ impl Edges {
     }
 
     /// Pixels of the edges of triangle `primitive` that lie beside it, in front of `depth`.
-    fn outline_fragments(&self, primitive: usize, view: &View, depth: &[f32], out: &mut Vec<Fragment>) {
+    fn outline_fragments(
+        &self,
+        primitive: usize,
+        view: &View,
+        depth: &[f32],
+        out: &mut Vec<Fragment>,
+    ) {
         let Some(t) = self.project(primitive, view) else { return };
-        // OpenGL's front turns to the left with rows from the bottom: to the right with rows from the top.
+        // OpenGL's front turns to the left with rows from the bottom: to the right with rows from
+        // the top.
         if self.culled[usize::from(t.winding > 0.0)] {
             return;
         }
@@ -158,13 +169,15 @@ impl ProjectedTriangle {
     }
 }
 
-/// Draws the edges of all instances into `frame`, which has its identity layers. `edges` is one per instance, or empty. `first_depth` is that of what
-/// lies in front of the opaque surfaces, or empty.
+/// Draws the edges of all instances into `frame`, which has its identity layers. `edges` is one per
+/// instance, or empty. `first_depth` is that of what lies in front of the opaque surfaces, or
+/// empty.
 pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges>], view: &View) {
     if edges.is_empty() {
         return;
     }
-    // What is translucent in front of the opaque surfaces hides the part of an edge that has no surface behind it.
+    // What is translucent in front of the opaque surfaces hides the part of an edge that has no
+    // surface behind it.
     let veiled: Vec<bool> =
         first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
 
@@ -211,7 +224,8 @@ mod tests {
     use super::*;
     use rt_core::glam::{DMat4, Vec3};
 
-    /// A square from pixel (50, 50) to (100, 0), in the middle of the depth, whose diagonal is no edge.
+    /// A square from pixel (50, 50) to (100, 0), in the middle of the depth, whose diagonal is no
+    /// edge.
     fn square() -> (Edges, View) {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
@@ -267,11 +281,15 @@ mod tests {
             frame
         };
         let shown = |f: &Frame, x: usize, y: usize| f.depth[y * 100 + x] < 1.0;
-        // A corner moves by one pixel along the diagonal, that is 0.7 pixels in x and in y: the pixels whose middle is half a pixel outside.
+        // A corner moves by one pixel along the diagonal, that is 0.7 pixels in x and in y: the
+        // pixels whose middle is half a pixel outside.
         let (again, _) = square();
         let frame = draw(again, 1.0);
         assert!(
-            shown(&frame, 50, 75) && shown(&frame, 75, 50) && shown(&frame, 24, 50) && shown(&frame, 50, 24)
+            shown(&frame, 50, 75)
+                && shown(&frame, 75, 50)
+                && shown(&frame, 24, 50)
+                && shown(&frame, 50, 24)
         );
         assert!(
             !shown(&frame, 50, 76) && !shown(&frame, 50, 74),

@@ -1,7 +1,9 @@
-//! What a visualization program has, borrowed as it lies in memory: points, cells, attributes, properties, lights, a camera.
+//! What a visualization program has, borrowed as it lies in memory: points, cells, attributes,
+//! properties, lights, a camera.
 //!
-//! The types mirror VTK's arrays (`vtkPoints`, `vtkCellArray`, `vtkUnsignedCharArray`), but know nothing of VTK: any program with such
-//! arrays can fill them in. Nothing is read before [`crate::bridge::Bridge::add_surface`] needs it.
+//! The types mirror VTK's arrays (`vtkPoints`, `vtkCellArray`, `vtkUnsignedCharArray`), but know
+//! nothing of VTK: any program with such arrays can fill them in. Nothing is read before
+//! [`crate::bridge::Bridge::add_surface`] needs it.
 
 use rt_core::glam::{DMat4, DVec3};
 
@@ -69,8 +71,8 @@ impl Ids<'_> {
         }
     }
 
-    /// Number `i` as a vertex index. What no index can be (negative, or beyond 32 bits) becomes `u32::MAX`, which no mesh has: such a
-    /// triangle is left out and counted.
+    /// Number `i` as a vertex index. What no index can be (negative, or beyond 32 bits) becomes
+    /// `u32::MAX`, which no mesh has: such a triangle is left out and counted.
     #[inline]
     pub fn vertex(&self, i: usize) -> u32 {
         u32::try_from(self.at(i)).unwrap_or(u32::MAX)
@@ -118,8 +120,8 @@ pub enum PerItem<'a, T> {
     Cell(&'a [T]),
 }
 
-/// Which points and cells, and everything else that decides where rays meet them. The acceleration structure is kept as long as
-/// `key` stays the same.
+/// Which points and cells, and everything else that decides where rays meet them. The acceleration
+/// structure is kept as long as `key` stays the same.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape<'a> {
     /// Changes whenever one of the arrays or numbers below does; 0 is never kept.
@@ -196,7 +198,8 @@ pub struct Image<'a> {
 /// Textures of a physically based property besides that of its colour, as VTK's shader reads them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Maps<'a> {
-    /// Occlusion, roughness (times the property's) and metalness (times the property's) in red, green and blue.
+    /// Occlusion, roughness (times the property's) and metalness (times the property's) in red,
+    /// green and blue.
     pub material: Option<Image<'a>>,
     /// Normals, 2 rgb - 1; nothing without [`Shape::tangents`].
     pub normal: Option<Image<'a>>,
@@ -222,7 +225,8 @@ pub enum Color<'a> {
         /// Not premultiplied.
         rgba: PerItem<'a, [u8; 4]>,
     },
-    /// Coordinates that are interpolated first and looked up in a row of colours then (VTK's *interpolate scalars before mapping*).
+    /// Coordinates that are interpolated first and looked up in a row of colours then (VTK's
+    /// *interpolate scalars before mapping*).
     Mapped {
         /// Changes whenever coordinates or row do; 0 is never kept.
         key: u64,
@@ -319,9 +323,11 @@ pub struct Surface<'a> {
     pub maps: Option<Maps<'a>>,
     /// Its answer to light.
     pub property: Property,
-    /// Another answer on the backs of its polygons, opaque and of one colour (needs [`Shape::has_back_faces`]).
+    /// Another answer on the backs of its polygons, opaque and of one colour (needs
+    /// [`Shape::has_back_faces`]).
     pub back: Option<Property>,
-    /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input) puts it.
+    /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input)
+    /// puts it.
     pub glyphs: Option<Glyphs<'a>>,
 }
 
@@ -349,7 +355,8 @@ pub enum Scalars<'a> {
     F64(&'a [f64]),
 }
 
-/// A uniform grid of scalars as a glowing, absorbing medium: `vtkImageData` through a volume mapper, blended front to back.
+/// A uniform grid of scalars as a glowing, absorbing medium: `vtkImageData` through a volume
+/// mapper, blended front to back.
 #[derive(Debug, Clone, Copy)]
 pub struct Volume<'a> {
     /// Name for messages and the report.
@@ -376,13 +383,16 @@ pub struct Volume<'a> {
     pub unit_distance: f64,
     /// Answer to light; `None` for none.
     pub shading: Option<Shading>,
-    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and its colour; none for a white one at the viewer.
+    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and
+    /// its colour; none for a white one at the viewer.
     pub lights: &'a [[f32; 6]],
-    /// Opacities by gradient, evenly spaced from 0 to `steepest`, that the others are multiplied by; empty for 1.
+    /// Opacities by gradient, evenly spaced from 0 to `steepest`, that the others are multiplied
+    /// by; empty for 1.
     pub gradient_opacities: &'a [f32],
     /// Gradient of the last of them, scalar per data unit.
     pub steepest: f64,
-    /// What a ray makes of the scalars. All but [`VolumeBlend::Composite`] take the opacities as they are, whatever the thickness.
+    /// What a ray makes of the scalars. All but [`VolumeBlend::Composite`] take the opacities as
+    /// they are, whatever the thickness.
     pub blend: VolumeBlend<'a>,
 }
 

@@ -1,4 +1,5 @@
-//! Ray tracing inside unmodified VTK and ParaView (thesis chapter 3), and for any program that has VTK-like arrays.
+//! Ray tracing inside unmodified VTK and ParaView (thesis chapter 3), and for any program that has
+//! VTK-like arrays.
 //!
 //! Programs in Rust use [`bridge::Bridge`] with the types of [`input`]:
 //!
@@ -39,8 +40,9 @@
 //! # Ok::<(), vtk_bridge::bridge::BridgeError>(())
 //! ```
 //!
-//! VTK and ParaView come in through [`loader`] (found by `VTK_AUTOLOAD_PATH`), which loads the C++ shim built for the VTK in the process;
-//! the shim calls [`capi`]. [`setup`] builds and lays out these pieces; the program `vtk-bridge` is its command line.
+//! VTK and ParaView come in through [`loader`] (found by `VTK_AUTOLOAD_PATH`), which loads the C++
+//! shim built for the VTK in the process; the shim calls [`capi`]. [`setup`] builds and lays out
+//! these pieces; the program `vtk-bridge` is its command line.
 #![deny(unsafe_code)]
 
 pub mod anari;

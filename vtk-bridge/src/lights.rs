@@ -26,9 +26,10 @@ fn light(l: &SceneLight, shadows: bool, options: &Options) -> Option<Light> {
             Kind::Directional { to_light: -axis, angular_radius_rad: options.light_size_rad }
         }
         // A light that is seen under the angle asked for, from where it looks.
-        LightKind::Point => {
-            Kind::Point { position: l.position, radius: axis.length() * options.light_size_rad.tan() }
-        }
+        LightKind::Point => Kind::Point {
+            position: l.position,
+            radius: axis.length() * options.light_size_rad.tan(),
+        },
         LightKind::Spot { cutoff_rad, exponent } => Kind::Spot {
             position: l.position,
             direction: axis,
@@ -37,7 +38,8 @@ fn light(l: &SceneLight, shadows: bool, options: &Options) -> Option<Light> {
             radius: axis.length() * options.light_size_rad.tan(),
         },
     };
-    let sharp = Light { kind, color: l.color, attenuation: l.attenuation, shadows, ..Light::headlight() };
+    let sharp =
+        Light { kind, color: l.color, attenuation: l.attenuation, shadows, ..Light::headlight() };
     Some(Light { frame: rt_core::light::LightFrame::World, ..sharp })
 }
 

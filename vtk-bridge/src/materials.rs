@@ -1,8 +1,10 @@
 //! VTK's properties as rt-core's materials, so that without any effect the picture is VTK's.
 //!
-//! VTK 9's shader (measured: 0 to 0.1 levels of 255 apart): ambient coefficient times ambient colour, always; diffuse coefficient times colour
-//! times cosine; highlight (R·V)^p, and (N·L)^p where one headlight is the only light. Numbers are neither decoded nor encoded, except by the
-//! physically based shader, which ends with `pow(c, 1/2.2)` and divides diffuse light by π: [`Encoding::Pbr`] says so for the picture.
+//! VTK 9's shader (measured: 0 to 0.1 levels of 255 apart): ambient coefficient times ambient
+//! colour, always; diffuse coefficient times colour times cosine; highlight (R·V)^p, and (N·L)^p
+//! where one headlight is the only light. Numbers are neither decoded nor encoded, except by the
+//! physically based shader, which ends with `pow(c, 1/2.2)` and divides diffuse light by π:
+//! [`Encoding::Pbr`] says so for the picture.
 
 use crate::input::{Image, Maps, Property};
 use crate::options::{MaterialChoice, Options};
@@ -32,13 +34,19 @@ pub struct MaterialContext<'a> {
     pub dark: bool,
 }
 
-/// Ambient occlusion needs light to occlude: this share of the diffuse coefficient answers ambient light instead of lights.
+/// Ambient occlusion needs light to occlude: this share of the diffuse coefficient answers ambient
+/// light instead of lights.
 fn ambient_share(options: &Options) -> f32 {
     if options.ao > 0 && !options.path_tracing { options.ao_strength } else { 0.0 }
 }
 
-/// The material of `p`. `from_values` is true where colours of points, cells or a map replace the property's.
-pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) -> (Material, Encoding) {
+/// The material of `p`. `from_values` is true where colours of points, cells or a map replace the
+/// property's.
+pub fn material(
+    p: &Property,
+    from_values: bool,
+    context: &MaterialContext<'_>,
+) -> (Material, Encoding) {
     let options = context.options;
     let sides = match (p.cull_front, p.cull_back) {
         (false, false) | (true, true) => Sides::Both,
@@ -83,7 +91,8 @@ pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) 
         }
         MaterialChoice::Scene | MaterialChoice::Transparent => {}
     }
-    let opacity = if options.material == MaterialChoice::Transparent { 0.5 * opacity } else { opacity };
+    let opacity =
+        if options.material == MaterialChoice::Transparent { 0.5 * opacity } else { opacity };
     let base = Material { opacity, ..base };
     if !p.lighting || context.dark {
         // Complexity 0 of VTK's shader: ambient and diffuse as they are.
@@ -107,10 +116,15 @@ pub fn material(p: &Property, from_values: bool, context: &MaterialContext<'_>) 
         diffuse: non_negative(p.diffuse) * (1.0 - share),
         specular,
         shininess: non_negative(p.specular_power),
-        highlight: if context.only_headlight { PhongForm::TowardsLight } else { PhongForm::Mirrored },
+        highlight: if context.only_headlight {
+            PhongForm::TowardsLight
+        } else {
+            PhongForm::Mirrored
+        },
         mirror: options.mirror,
     };
-    let emission = if same { [0.0; 3] } else { p.ambient_color.map(|c| non_negative(c * p.ambient)) };
+    let emission =
+        if same { [0.0; 3] } else { p.ambient_color.map(|c| non_negative(c * p.ambient)) };
     (Material { model, emission, ..base }, Encoding::Direct)
 }
 
@@ -165,10 +179,13 @@ impl PbrTextures {
     }
 }
 
-/// The ambient part of a surface of one colour as light that it gives off. An ambient light in the scene would show on every surface, also
-/// on physically based ones, whose shader knows no ambient coefficient; so it is left to surfaces whose colour varies, and to ambient occlusion.
+/// The ambient part of a surface of one colour as light that it gives off. An ambient light in the
+/// scene would show on every surface, also on physically based ones, whose shader knows no ambient
+/// coefficient; so it is left to surfaces whose colour varies, and to ambient occlusion.
 pub fn ambient_as_emission(mut m: Material) -> Material {
-    if let (ColorSource::Constant, SurfaceModel::Phong { ambient, .. }) = (&m.color_source, &mut m.model) {
+    if let (ColorSource::Constant, SurfaceModel::Phong { ambient, .. }) =
+        (&m.color_source, &mut m.model)
+    {
         m.emission = std::array::from_fn(|c| m.emission[c] + m.color[c] * *ambient);
         *ambient = 0.0;
     }
@@ -191,7 +208,8 @@ mod tests {
     #[test]
     fn ambient_occlusion_takes_its_light_from_the_lights() {
         let options = Options { ao: 8, ao_strength: 0.25, ..Options::default() };
-        let (m, _) = material(&Property { diffuse: 0.8, ..Property::default() }, false, &context(&options));
+        let (m, _) =
+            material(&Property { diffuse: 0.8, ..Property::default() }, false, &context(&options));
         let SurfaceModel::Phong { ambient, diffuse, .. } = m.model else { panic!("{m:?}") };
         assert!((ambient - 0.2).abs() < 1e-6 && (diffuse - 0.6).abs() < 1e-6);
     }
@@ -214,7 +232,8 @@ mod tests {
             ..Property::default()
         };
         let (m, _) = material(&p, false, &context(&Options::default()));
-        let constant = ambient_as_emission(Material { color_source: ColorSource::Constant, ..m.clone() });
+        let constant =
+            ambient_as_emission(Material { color_source: ColorSource::Constant, ..m.clone() });
         assert!(matches!(constant.model, SurfaceModel::Phong { ambient: 0.0, .. }), "{constant:?}");
         assert_eq!(constant.emission, [0.3, 0.15, 0.0]);
         let varying = Material { color_source: ColorSource::Attribute, ..m };
@@ -223,9 +242,16 @@ mod tests {
 
     #[test]
     fn nan_in_a_property_is_no_error_of_the_scene() {
-        let p =
-            Property { specular_power: f32::NAN, diffuse: -1.0, opacity: f32::NAN, ..Property::default() };
+        let p = Property {
+            specular_power: f32::NAN,
+            diffuse: -1.0,
+            opacity: f32::NAN,
+            ..Property::default()
+        };
         let (m, _) = material(&p, false, &context(&Options::default()));
-        assert!(matches!(m.model, SurfaceModel::Phong { shininess: 0.0, diffuse: 0.0, .. }), "{m:?}");
+        assert!(
+            matches!(m.model, SurfaceModel::Phong { shininess: 0.0, diffuse: 0.0, .. }),
+            "{m:?}"
+        );
     }
 }

@@ -1,6 +1,8 @@
-//! The options of the bridge: from environment variables `RTV_*`, or set by a program (ParaView's panel).
+//! The options of the bridge: from environment variables `RTV_*`, or set by a program (ParaView's
+//! panel).
 //!
-//! What is not understood is not silently dropped: [`Options::parse`] names the variable, the value and the rule.
+//! What is not understood is not silently dropped: [`Options::parse`] names the variable, the value
+//! and the rule.
 
 use rt_core::bvh::{BuildQuality, Robustness};
 use std::ffi::OsString;
@@ -68,8 +70,8 @@ pub struct Options {
     pub point_radius: f64,
     /// Lines and edges become tubes of this radius, data units; 0: they stay OpenGL's lines.
     pub line_radius: f64,
-    /// How far corners of triangles with edges move outwards, line widths: the geometry shader of VTK 9.0 to 9.2 moves them by a quarter. 0: edges
-    /// end at the outline.
+    /// How far corners of triangles with edges move outwards, line widths: the geometry shader of
+    /// VTK 9.0 to 9.2 moves them by a quarter. 0: edges end at the outline.
     pub edge_reach: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -112,7 +114,8 @@ impl Default for Options {
     }
 }
 
-/// Name, what it does and what it may be: for `vtk-bridge --help`, the book, and the check for misspelt names.
+/// Name, what it does and what it may be: for `vtk-bridge --help`, the book, and the check for
+/// misspelt names.
 pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_OFF", "leave everything to OpenGL", "0 or 1"),
     ("RTV_THREADS", "threads that trace", "1 to 1024; all by default"),
@@ -122,8 +125,16 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_LIGHT_SIZE", "half angle under which lights are seen, degrees (soft shadows)", "0 to 45"),
     ("RTV_AO", "rays of ambient occlusion per point and sample", "0 to 4096"),
     ("RTV_AO_RADIUS", "how far ambient occlusion looks, world units", "positive, or auto"),
-    ("RTV_AO_STRENGTH", "share of the light that is ambient while ambient occlusion is on", "0 to 1"),
-    ("RTV_REFLECTIONS", "physically based and metallic surfaces mirror their surroundings", "0 or 1"),
+    (
+        "RTV_AO_STRENGTH",
+        "share of the light that is ambient while ambient occlusion is on",
+        "0 to 1",
+    ),
+    (
+        "RTV_REFLECTIONS",
+        "physically based and metallic surfaces mirror their surroundings",
+        "0 or 1",
+    ),
     ("RTV_MIRROR", "share of mirror reflection added to every surface", "0 to 1"),
     ("RTV_MATERIAL", "what all surfaces are made of", "scene, matte, metal, glass or transparent"),
     ("RTV_ROUGHNESS", "roughness of the material metal", "0 to 1"),
@@ -131,7 +142,11 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_MODE", "scivis: effects one by one; path: light over many bounces", "scivis or path"),
     ("RTV_MAX_BOUNCES", "most reflections and refractions in a row", "0 to 1000"),
     ("RTV_APERTURE", "radius of the lens, world units (depth of field)", "0 or positive"),
-    ("RTV_FOCUS", "distance in focus, world units", "positive, or auto for the camera's focal point"),
+    (
+        "RTV_FOCUS",
+        "distance in focus, world units",
+        "positive, or auto for the camera's focal point",
+    ),
     ("RTV_ROBUSTNESS", "watertight: no ray between neighbours; fast", "watertight or fast"),
     ("RTV_BUILD", "effort of building acceleration structures", "fast, balanced or best"),
     ("RTV_POINT_RADIUS", "vertices become spheres of this radius, data units", "0 or positive"),
@@ -142,7 +157,11 @@ pub const NAMES: &[(&str, &str, &str)] = &[
         "0 to 4",
     ),
     ("RTV_SEED", "seed of the noise", "a whole number"),
-    ("RTV_REPORT", "file that tells after each frame what was traced, passed on, and what it cost", "a path"),
+    (
+        "RTV_REPORT",
+        "file that tells after each frame what was traced, passed on, and what it cost",
+        "a path",
+    ),
     ("RTV_QUIET", "no warnings on stderr", "0 or 1"),
     ("RTV_HOME", "where `vtk-bridge install` has put things (set by `vtk-bridge env`)", "a folder"),
     (
@@ -165,7 +184,8 @@ pub fn readable(variables: &[(OsString, OsString)]) -> (Vec<(String, String)>, V
             (Some(name), None) if PATHS.contains(&name) => {}
             _ => {
                 // As `Debug` writes them: with the bytes that are no text.
-                let [name, value] = [name, value].map(|t| format!("{t:?}").trim_matches('"').to_owned());
+                let [name, value] =
+                    [name, value].map(|t| format!("{t:?}").trim_matches('"').to_owned());
                 faults.push(format!(
                     "{name}={value} is not UTF-8 text: it is left out; set it anew, or unset it"
                 ));
@@ -190,12 +210,17 @@ impl Options {
     /// Sets one option by the name of its variable.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
         let Some((_, _, rule)) = NAMES.iter().find(|(n, ..)| *n == name) else {
-            let near = NAMES.iter().map(|(n, ..)| *n).min_by_key(|n| distance(n, name)).unwrap_or("RTV_AO");
+            let near = NAMES
+                .iter()
+                .map(|(n, ..)| *n)
+                .min_by_key(|n| distance(n, name))
+                .unwrap_or("RTV_AO");
             return Err(format!("{name} is no option of vtk-bridge; did you mean {near}?"));
         };
         let value = value.trim();
-        self.apply(name, value)
-            .ok_or_else(|| format!("{name}={value} is not understood: it must be {rule}; it is left out"))
+        self.apply(name, value).ok_or_else(|| {
+            format!("{name}={value} is not understood: it must be {rule}; it is left out")
+        })
     }
 
     fn apply(&mut self, name: &str, value: &str) -> Option<()> {
@@ -262,7 +287,11 @@ fn within<T: std::str::FromStr + PartialOrd>(value: &str, low: T, high: T) -> Op
 }
 
 fn automatic(value: &str) -> Option<Option<f64>> {
-    if value == "auto" { Some(None) } else { within(value, f64::MIN_POSITIVE, f64::INFINITY).map(Some) }
+    if value == "auto" {
+        Some(None)
+    } else {
+        within(value, f64::MIN_POSITIVE, f64::INFINITY).map(Some)
+    }
 }
 
 /// Edit distance (Levenshtein 1966), to guess what a misspelt name means.
@@ -291,10 +320,15 @@ mod tests {
 
     #[test]
     fn values_out_of_range_are_named_with_their_rule_and_left_out() {
-        let (options, faults) = parse(&[("RTV_AO", "-3"), ("RTV_SAMPLES", "16"), ("RTV_IOR", "NaN")]);
+        let (options, faults) =
+            parse(&[("RTV_AO", "-3"), ("RTV_SAMPLES", "16"), ("RTV_IOR", "NaN")]);
         assert_eq!((options.ao, options.samples, options.ior), (0, 16, 1.5));
         assert_eq!(faults.len(), 2);
-        assert!(faults[0].contains("RTV_AO=-3") && faults[0].contains("0 to 4096"), "{}", faults[0]);
+        assert!(
+            faults[0].contains("RTV_AO=-3") && faults[0].contains("0 to 4096"),
+            "{}",
+            faults[0]
+        );
     }
 
     #[test]

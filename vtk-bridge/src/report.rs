@@ -86,7 +86,8 @@ pub(crate) fn rays(r: &RayStats) -> Vec<(String, u64)> {
 /// Last reports of all renderers of the process, by number.
 static RENDERERS: Mutex<BTreeMap<u64, FrameReport>> = Mutex::new(BTreeMap::new());
 
-/// Writes the reports of all renderers that had something to draw. A rank of a parallel program writes its own file.
+/// Writes the reports of all renderers that had something to draw. A rank of a parallel program
+/// writes its own file.
 pub fn write(renderer: u64, report: &FrameReport, path: &str) -> std::io::Result<()> {
     #[derive(Serialize)]
     struct ReportFile<'a> {
@@ -130,7 +131,8 @@ fn of_rank(path: &Path, variable: impl Fn(&str) -> Option<String>) -> PathBuf {
     let size = number(&variable, RANKS);
     match (rank, size) {
         (Some(rank), Some(2..)) => {
-            let extension = path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
+            let extension =
+                path.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
             path.with_extension(format!("rank{rank}{extension}"))
         }
         _ => path.to_owned(),

@@ -1,4 +1,5 @@
-//! Grids of scalars as rt-core's volumes, kept while their scalars stay the same; and where a volume lies in the window's depth.
+//! Grids of scalars as rt-core's volumes, kept while their scalars stay the same; and where a
+//! volume lies in the window's depth.
 
 use crate::input::{Scalars, View, Volume as Input, VolumeBlend};
 use rayon::prelude::*;
@@ -8,7 +9,8 @@ use rt_core::grid::Grid;
 use rt_core::scene::VolumeInstance;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Blend, GradientOpacity, Interpolation, Volume, VolumeHighlight, VolumeLight, VolumeOptions, VolumeShading,
+    Blend, GradientOpacity, Interpolation, Volume, VolumeHighlight, VolumeLight, VolumeOptions,
+    VolumeShading,
 };
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -56,7 +58,8 @@ impl VolumeCache {
         self.kept.retain(|_, m| m.used);
     }
 
-    /// Adds `v` at `place`, and what it looks like to `content`. Number of cells, and what the user should know.
+    /// Adds `v` at `place`, and what it looks like to `content`. Number of cells, and what the user
+    /// should know.
     pub(crate) fn add(
         &mut self,
         v: &Input<'_>,
@@ -76,23 +79,32 @@ impl VolumeCache {
             }
             Some(kept) => {
                 let grid = Arc::clone(kept.volume.grid());
-                *kept = CachedVolume { volume: Arc::new(medium(v, grid, lights)?), appearance, used: true };
+                *kept = CachedVolume {
+                    volume: Arc::new(medium(v, grid, lights)?),
+                    appearance,
+                    used: true,
+                };
                 Arc::clone(&kept.volume)
             }
             None => {
                 let [x, y, z] = v.spacing;
                 let values = values(&v.scalars);
-                let grid = Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
-                    .map_err(|e| format!("a volume: {e}"))?;
+                let grid =
+                    Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
+                        .map_err(|e| format!("a volume: {e}"))?;
                 let volume = Arc::new(medium(v, Arc::new(grid), lights)?);
-                self.kept.insert(v.key, CachedVolume { volume: Arc::clone(&volume), appearance, used: true });
+                self.kept.insert(
+                    v.key,
+                    CachedVolume { volume: Arc::clone(&volume), appearance, used: true },
+                );
                 volume
             }
         };
         let report = volume.report();
         let bad = report.cells_non_finite;
-        let warning = (bad > 0)
-            .then(|| format!("{bad} cells have a corner that is not a number; nothing is drawn in them"));
+        let warning = (bad > 0).then(|| {
+            format!("{bad} cells have a corner that is not a number; nothing is drawn in them")
+        });
         self.placed.push(VolumeInstance { volume, world_from_object: place });
         Ok((report.cells, warning))
     }
@@ -103,7 +115,8 @@ fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
     let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
     tables.for_each(|x| x.to_bits().hash(&mut h));
-    format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing).hash(&mut h);
+    format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing)
+        .hash(&mut h);
     format!("{:?}{:?}{lights:?}", v.steepest, v.blend).hash(&mut h);
     h.finish()
 }
@@ -157,7 +170,9 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
     let last = (v.opacities.len() - 1).max(1) as f32;
     let point = |(i, a): (usize, &f32)| {
         let sigma = match v.blend {
-            VolumeBlend::Composite => -f64::from(-finite(*a).min(MAX_OPACITY)).ln_1p() / v.unit_distance,
+            VolumeBlend::Composite => {
+                -f64::from(-finite(*a).min(MAX_OPACITY)).ln_1p() / v.unit_distance
+            }
             VolumeBlend::Additive => f64::from(finite(*a)) / v.unit_distance,
             _ => f64::from(finite(*a)),
         };
@@ -186,16 +201,25 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
         VolumeBlend::Minimum => Blend::Minimum,
         VolumeBlend::Average => Blend::Average,
         VolumeBlend::Additive => Blend::Additive,
-        VolumeBlend::Isosurfaces(values) => Blend::Isosurfaces(values.iter().map(|v| *v as f32).collect()),
+        VolumeBlend::Isosurfaces(values) => {
+            Blend::Isosurfaces(values.iter().map(|v| *v as f32).collect())
+        }
     };
     // As OpenGL's textures.
     let clamped_gradients = true;
-    let options =
-        VolumeOptions { shading, interpolation, blend, lights, gradient_opacity, clamped_gradients };
+    let options = VolumeOptions {
+        shading,
+        interpolation,
+        blend,
+        lights,
+        gradient_opacity,
+        clamped_gradients,
+    };
     Volume::new(grid, transfer, options).map_err(|e| format!("a volume: {e}"))
 }
 
-/// Leaves out points that lie on the line between their neighbours: fewer bends, fewer steps of the integration.
+/// Leaves out points that lie on the line between their neighbours: fewer bends, fewer steps of the
+/// integration.
 fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     let mut out: Vec<[f32; 2]> = Vec::with_capacity(points.len());
     for p in points {
@@ -210,15 +234,17 @@ fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     out
 }
 
-/// Window depth for pixels that show a volume: the middle of the ray's way through it, where that is in front of `depth`. What OpenGL draws before that is in
-/// front of the volume, what it draws behind is seen through it.
+/// Window depth for pixels that show a volume: the middle of the ray's way through it, where that
+/// is in front of `depth`. What OpenGL draws before that is in front of the volume, what it draws
+/// behind is seen through it.
 pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mut [f32]) {
     let world_from_clip = view.clip_from_world.inverse();
     let boxes: Vec<(DAffine3, Vec3, Vec3)> = volumes
         .iter()
         .map(|v| {
             let b = v.volume.bounds();
-            let to_object = DAffine3::from_translation(-v.volume.origin()) * v.world_from_object.inverse();
+            let to_object =
+                DAffine3::from_translation(-v.volume.origin()) * v.world_from_object.inverse();
             (to_object, b.min, b.max)
         })
         .collect();
@@ -233,7 +259,8 @@ pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mu
             let (mut near, mut far) = (0.0f64, 1.0f64);
             for k in 0..3 {
                 let (u, v) = ((f64::from(lo[k]) - a[k]) / d[k], (f64::from(hi[k]) - a[k]) / d[k]);
-                // Parallel to the face: NaN and infinities leave both ends alone or empty the stretch, as they should.
+                // Parallel to the face: NaN and infinities leave both ends alone or empty the
+                // stretch, as they should.
                 (near, far) = (near.max(u.min(v)), far.min(u.max(v)));
             }
             if near < far {
@@ -251,7 +278,8 @@ mod tests {
 
     #[test]
     fn a_table_keeps_its_corners_only() {
-        let tent: Vec<[f32; 2]> = (0..=100).map(|i| [i as f32, (50 - i32::abs(i - 50)) as f32]).collect();
+        let tent: Vec<[f32; 2]> =
+            (0..=100).map(|i| [i as f32, (50 - i32::abs(i - 50)) as f32]).collect();
         let corners = straight(tent);
         assert!(corners.len() <= 5, "{corners:?}");
         assert!(corners.contains(&[50.0, 50.0]));
@@ -266,8 +294,10 @@ mod tests {
         .transpose();
         let grid = Grid::new(UVec3::splat(2), DVec3::ZERO, DVec3::ONE, vec![1.0; 8]).unwrap();
         let transfer =
-            TransferFunction::new(ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]), vec![[0.0, 1.0]]).unwrap();
-        let volume = Arc::new(Volume::new(Arc::new(grid), transfer, VolumeOptions::default()).unwrap());
+            TransferFunction::new(ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]), vec![[0.0, 1.0]])
+                .unwrap();
+        let volume =
+            Arc::new(Volume::new(Arc::new(grid), transfer, VolumeOptions::default()).unwrap());
         let placed = VolumeInstance {
             volume,
             world_from_object: DAffine3::from_translation(DVec3::new(-0.5, -0.5, -5.0)),

@@ -1,4 +1,5 @@
-//! rt-core's frame as the window wants it: 8-bit colour where everything is opaque, premultiplied floating point elsewhere, and OpenGL's depth.
+//! rt-core's frame as the window wants it: 8-bit colour where everything is opaque, premultiplied
+//! floating point elsewhere, and OpenGL's depth.
 
 use crate::bridge::{BridgeError, RenderInputs, ms};
 use crate::input::View;
@@ -64,15 +65,21 @@ impl WindowImage {
         let layers = Layers::COLOR | Layers::DEPTH;
         let options = RenderOptions {
             layers: if mixed || !inputs.edges.is_empty() { layers | Layers::IDS } else { layers },
-            // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is opaque.
-            depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) { 1.0 - 1.0 / 512.0 } else { 0.0 },
+            // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is
+            // opaque.
+            depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) {
+                1.0 - 1.0 / 512.0
+            } else {
+                0.0
+            },
             ..inputs.options.clone()
         };
         let output = renderer.render(inputs.scene, inputs.camera, &options)?;
         let mut frame = output.frame;
         let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
         let mut first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
-            let depth_only = RenderOptions { layers: Layers::DEPTH, samples: 1, ..inputs.options.clone() };
+            let depth_only =
+                RenderOptions { layers: Layers::DEPTH, samples: 1, ..inputs.options.clone() };
             renderer.render(inputs.scene, inputs.camera, &depth_only)?.frame.depth
         } else {
             Vec::new()
@@ -105,9 +112,13 @@ impl WindowImage {
                 std::mem::swap(&mut self.blended, &mut frame.color);
             }
             if !inputs.edges.is_empty() {
-                first_depth.iter_mut().zip(&self.depth).for_each(|(first, own)| *first = first.min(*own));
+                first_depth
+                    .iter_mut()
+                    .zip(&self.depth)
+                    .for_each(|(first, own)| *first = first.min(*own));
             }
-            self.first_depth = if first_depth.is_empty() { self.depth.clone() } else { first_depth };
+            self.first_depth =
+                if first_depth.is_empty() { self.depth.clone() } else { first_depth };
         } else {
             self.blended.clear();
             self.first_depth.clear();
@@ -121,7 +132,8 @@ impl WindowImage {
     }
 }
 
-/// Takes the background away again that mirrors and glass needed: pixels where nothing is are the window's.
+/// Takes the background away again that mirrors and glass needed: pixels where nothing is are the
+/// window's.
 fn clear_background(frame: &mut Frame, first_depth: &[f32]) {
     let clear = |(c, d): (&mut [f32; 4], &f32)| {
         if *d >= 1.0 {

@@ -1,4 +1,5 @@
-//! The ANARI device in ANARI's own loader, which the wheel pynari brings, with test programs in Python next to this file: `tests/anari`.
+//! The ANARI device in ANARI's own loader, which the wheel pynari brings, with test programs in
+//! Python next to this file: `tests/anari`.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,8 @@ fn python() -> Option<PathBuf> {
 fn device_folder() -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("anari");
     std::fs::create_dir_all(&folder).expect("a folder for the device");
-    let built = std::env::current_exe().expect("a test is a file").with_file_name("libvtk_bridge.so");
+    let built =
+        std::env::current_exe().expect("a test is a file").with_file_name("libvtk_bridge.so");
     // Tests run side by side: each moves a complete copy into place.
     let copy = folder.join(format!("copy-{:?}", std::thread::current().id()));
     std::fs::copy(&built, &copy).unwrap_or_else(|e| panic!("{}: {e}", built.display()));
@@ -31,7 +33,11 @@ fn run(python: &Path, program: &str, arguments: &[&str]) -> Output {
     let folder = device_folder();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/anari").join(program);
     let mut command = Command::new(python);
-    command.arg(script).args(arguments).env("LD_LIBRARY_PATH", &folder).env("PYTHONDONTWRITEBYTECODE", "1");
+    command
+        .arg(script)
+        .args(arguments)
+        .env("LD_LIBRARY_PATH", &folder)
+        .env("PYTHONDONTWRITEBYTECODE", "1");
     command.output().expect("python runs")
 }
 
@@ -70,8 +76,8 @@ fn numbers_at_their_limits_and_random_values_harm_nothing() {
 /// `c_abi/anari.c`, which ends with "done", with a program before it.
 fn c_program(before: &[&str]) -> Option<Output> {
     let python = python()?;
-    let place =
-        "import importlib.util, os; print(os.path.dirname(importlib.util.find_spec('pynari').origin))";
+    let place = "import importlib.util, os; \
+                 print(os.path.dirname(importlib.util.find_spec('pynari').origin))";
     let found = Command::new(&python).args(["-c", place]).output().expect("python runs");
     let loader = Path::new(String::from_utf8_lossy(&found.stdout).trim()).join("libanari.so.0");
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("anari-c-{}", before.len()));
@@ -87,7 +93,11 @@ fn c_program(before: &[&str]) -> Option<Output> {
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let mut words = before.iter().map(|w| (*w).to_owned()).chain([out.display().to_string()]);
     let mut command = Command::new(words.next().expect("a program"));
-    command.args(words).arg(loader).env("LD_LIBRARY_PATH", device_folder()).env("RAYON_NUM_THREADS", "2");
+    command
+        .args(words)
+        .arg(loader)
+        .env("LD_LIBRARY_PATH", device_folder())
+        .env("RAYON_NUM_THREADS", "2");
     Some(command.output().expect("it starts"))
 }
 
@@ -105,24 +115,29 @@ fn a_c_program_draws_every_kind_of_object_through_the_loader() {
 
 #[test]
 fn valgrind_finds_no_fault_in_the_device() {
-    let valgrind = std::env::var("RTSV_VALGRIND").unwrap_or_else(|_| "/usr/bin/valgrind".to_owned());
+    let valgrind =
+        std::env::var("RTSV_VALGRIND").unwrap_or_else(|_| "/usr/bin/valgrind".to_owned());
     if !Path::new(&valgrind).exists() {
         // Not a peer that must be there: the program itself runs without it.
         writeln!(std::io::stderr(), "SKIPPED: {valgrind} was not found (apt-get install valgrind)")
             .expect("stderr");
         return;
     }
-    // The loader up to 0.14 deletes the library as an object of a type that it does not know: with C++'s delete and without the destructor. It is memory
-    // of malloc's, which is what that gives it back to.
-    let command = [valgrind.as_str(), "--error-exitcode=9", "--quiet", "--show-mismatched-frees=no"];
-    let leaks = ["--leak-check=full", "--show-leak-kinds=definite", "--errors-for-leak-kinds=definite"];
+    // The loader up to 0.14 deletes the library as an object of a type that it does not know: with
+    // C++'s delete and without the destructor. It is memory of malloc's, which is what that gives
+    // it back to.
+    let command =
+        [valgrind.as_str(), "--error-exitcode=9", "--quiet", "--show-mismatched-frees=no"];
+    let leaks =
+        ["--leak-check=full", "--show-leak-kinds=definite", "--errors-for-leak-kinds=definite"];
     let command = [&command[..], &leaks].concat();
     if let Some(output) = c_program(&command) {
         assert_done(&output);
     }
 }
 
-/// PSNR that counts as the same picture: edges differ by how pixels are sampled, and barney's noise remains.
+/// PSNR that counts as the same picture: edges differ by how pixels are sampled, and barney's noise
+/// remains.
 const SAME_DB: f64 = 30.0;
 
 #[test]
@@ -133,7 +148,8 @@ fn every_kind_of_object_looks_as_in_barney() {
     let output = run(&python, "compare.py", &[&folder.display().to_string()]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}\n{said}", output.status);
-    let scenes: serde_json::Value = serde_json::from_slice(&output.stdout).expect("compare.py prints JSON");
+    let scenes: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("compare.py prints JSON");
     let scenes = scenes.as_object().expect("an object");
     assert!(scenes.len() >= 20, "{}", scenes.len());
     let mut compared = 0;

@@ -1,5 +1,6 @@
-//! `include/rtv.h` is made from the Rust sources by this test, and compared with the committed one. With `RTV_WRITE_HEADER=1` it is
-//! written anew. (cbindgen does the same for any source; its licence, MPL-2.0, is not among those we use.)
+//! `include/rtv.h` is made from the Rust sources by this test, and compared with the committed one.
+//! With `RTV_WRITE_HEADER=1` it is written anew. (cbindgen does the same for any source; its
+//! licence, MPL-2.0, is not among those we use.)
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -45,7 +46,8 @@ fn declaration(field: &str) -> String {
 fn function_type(rust: &str) -> Option<(String, String)> {
     let rest = rust.strip_prefix("unsafe ").unwrap_or(rust).strip_prefix("extern \"C\" fn(")?;
     let (arguments, result) = rest.rsplit_once(')').expect("closed");
-    let arguments: Vec<String> = arguments.split(", ").filter(|a| !a.is_empty()).map(c_type).collect();
+    let arguments: Vec<String> =
+        arguments.split(", ").filter(|a| !a.is_empty()).map(c_type).collect();
     let arguments = if arguments.is_empty() { "void".to_owned() } else { arguments.join(", ") };
     let result = result.trim().strip_prefix("-> ").map_or("void".to_owned(), c_type);
     Some((arguments, result))
@@ -54,8 +56,10 @@ fn function_type(rust: &str) -> Option<(String, String)> {
 /// The header for sources in the plain style of `src/capi`.
 fn header(sources: &[&str]) -> String {
     let mut out = String::from(
-        "/* The C interface of vtk-bridge; src/capi tells how to use it.\n * Made from the Rust sources by tests/c_header.rs: do not edit. */\n\
-         #ifndef RTV_H\n#define RTV_H\n#include <stdint.h>\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n\n\
+        "/* The C interface of vtk-bridge; src/capi tells how to use it.\n * Made from the Rust \
+         sources by tests/c_header.rs: do not edit. */\n\
+         #ifndef RTV_H\n#define RTV_H\n#include <stdint.h>\n#ifdef __cplusplus\nextern \"C\" \
+         {\n#endif\n\n\
          /* A renderer's side of the bridge. */\ntypedef struct RtvBridge RtvBridge;\n",
     );
     let mut calls = String::new();
@@ -67,18 +71,23 @@ fn header(sources: &[&str]) -> String {
             let line = lines[i];
             if let Some(text) = line.trim().strip_prefix("/// ") {
                 comment.push(text);
-            } else if let Some(rest) = line.strip_prefix("pub const ").filter(|r| r.contains(": u32 = ")) {
+            } else if let Some(rest) =
+                line.strip_prefix("pub const ").filter(|r| r.contains(": u32 = "))
+            {
                 let (name, value) = rest.split_once(": u32 = ").expect("checked");
                 describe(&mut out, "", &comment);
                 writeln!(out, "#define {name} {}u", value.trim_end_matches(';').replace('_', ""))
                     .expect("to a string");
                 comment.clear();
             } else if line.starts_with("#[repr(C)]") {
-                let name_line =
-                    lines[i + 1..].iter().position(|l| l.starts_with("pub struct")).expect("a struct")
-                        + i
-                        + 1;
-                let name = lines[name_line].trim_start_matches("pub struct ").trim_end_matches(" {");
+                let name_line = lines[i + 1..]
+                    .iter()
+                    .position(|l| l.starts_with("pub struct"))
+                    .expect("a struct")
+                    + i
+                    + 1;
+                let name =
+                    lines[name_line].trim_start_matches("pub struct ").trim_end_matches(" {");
                 describe(&mut out, "", &comment);
                 writeln!(out, "typedef struct {name} {{").expect("to a string");
                 comment.clear();
@@ -101,9 +110,14 @@ fn header(sources: &[&str]) -> String {
                 let (_, rest) = text.split_once(" fn ").expect("a function");
                 let (name, rest) = rest.split_once('(').expect("arguments");
                 let (arguments, result) = rest.rsplit_once(')').expect("closed");
-                let arguments: Vec<String> =
-                    arguments.split(',').map(str::trim).filter(|a| !a.is_empty()).map(declaration).collect();
-                let arguments = if arguments.is_empty() { "void".to_owned() } else { arguments.join(", ") };
+                let arguments: Vec<String> = arguments
+                    .split(',')
+                    .map(str::trim)
+                    .filter(|a| !a.is_empty())
+                    .map(declaration)
+                    .collect();
+                let arguments =
+                    if arguments.is_empty() { "void".to_owned() } else { arguments.join(", ") };
                 let result = result.trim().trim_end_matches('{').trim();
                 let result = result.strip_prefix("-> ").map_or("void".to_owned(), c_type);
                 let safety = comment.iter().position(|c| *c == "# Safety").unwrap_or(comment.len());
@@ -136,7 +150,8 @@ fn fingerprint(header: &str) -> u32 {
 
 #[test]
 fn the_number_of_the_interface_follows_structures_and_calls_and_not_comments() {
-    let header = "/* One. */\ntypedef struct A {\n  /* Two. */\n  double b;\n} A;\n#define RTV_ABI 7u\n";
+    let header =
+        "/* One. */\ntypedef struct A {\n  /* Two. */\n  double b;\n} A;\n#define RTV_ABI 7u\n";
     let same = header.replace("Two", "Three").replace("7u", "8u");
     assert_eq!(fingerprint(header), fingerprint(&same));
     assert_ne!(fingerprint(header), fingerprint(&header.replace("double", "float")));
@@ -152,12 +167,20 @@ fn the_header_says_what_the_library_does() {
     }
     let committed = std::fs::read_to_string(&path).expect("include/rtv.h is there");
     assert!(made == committed, "include/rtv.h is old; run this test with RTV_WRITE_HEADER=1");
-    // A shim built for one interface must not be used with another: the number is that of the interface itself.
+    // A shim built for one interface must not be used with another: the number is that of the
+    // interface itself.
     let number = fingerprint(&made);
-    assert_eq!(vtk_bridge::capi::RTV_ABI, number, "the interface has changed: set RTV_ABI to {number}");
-    let python =
-        std::fs::read_to_string(folder.join("python/rtvtk/library.py")).expect("library.py is there");
-    assert!(python.contains(&format!("\nABI = {number}\n")), "python/rtvtk/library.py needs ABI = {number}");
+    assert_eq!(
+        vtk_bridge::capi::RTV_ABI,
+        number,
+        "the interface has changed: set RTV_ABI to {number}"
+    );
+    let python = std::fs::read_to_string(folder.join("python/rtvtk/library.py"))
+        .expect("library.py is there");
+    assert!(
+        python.contains(&format!("\nABI = {number}\n")),
+        "python/rtvtk/library.py needs ABI = {number}"
+    );
     for expected in [
         "int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);",
         "  double world_from_data[16];",

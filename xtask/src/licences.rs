@@ -1,7 +1,7 @@
 //! Checks the packages we build with against the lists in deny.toml, with nothing but `cargo tree`.
 //!
-//! cargo-deny checks more (advisories, sources, other platforms) but takes minutes to build and needs github.com;
-//! this check takes a second and runs everywhere. Both read the same deny.toml.
+//! cargo-deny checks more (advisories, sources, other platforms) but takes minutes to build and
+//! needs github.com; this check takes a second and runs everywhere. Both read the same deny.toml.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -27,9 +27,14 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
     ];
     println!("cargo {}", args.join(" "));
     let tree = match Command::new("cargo").args(args).current_dir(context.root).output() {
-        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).into_owned(),
+        Ok(output) if output.status.success() => {
+            String::from_utf8_lossy(&output.stdout).into_owned()
+        }
         Ok(output) => {
-            return Outcome::Failed(format!("cargo tree: {}", String::from_utf8_lossy(&output.stderr)));
+            return Outcome::Failed(format!(
+                "cargo tree: {}",
+                String::from_utf8_lossy(&output.stderr)
+            ));
         }
         Err(e) => return Outcome::Failed(format!("cargo tree does not start: {e}")),
     };
@@ -42,8 +47,13 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
     Outcome::Failed(format!("{} of {packages} packages are against deny.toml", faults.len()))
 }
 
-/// Number of packages in the output of `cargo tree`, and one line per package that may not be there.
-fn faults(tree: &str, allowed: &BTreeSet<String>, banned: &BTreeSet<String>) -> (usize, Vec<String>) {
+/// Number of packages in the output of `cargo tree`, and one line per package that may not be
+/// there.
+fn faults(
+    tree: &str,
+    allowed: &BTreeSet<String>,
+    banned: &BTreeSet<String>,
+) -> (usize, Vec<String>) {
     // A package that occurs again ends in "(*)", after the licence.
     let packages: BTreeSet<&str> =
         tree.lines().map(|l| l.trim_end_matches(" (*)")).filter(|l| !l.is_empty()).collect();
@@ -63,35 +73,45 @@ fn faults(tree: &str, allowed: &BTreeSet<String>, banned: &BTreeSet<String>) -> 
     (packages.len(), faults)
 }
 
-// ---- The two lists of deny.toml ---------------------------------------------------------------------------------
-
+// ---- The two lists of deny.toml -----------------------------------------------------------------
 /// The strings of `allow = [...]` in section `[licenses]`.
 fn allowed_licences(deny: &str) -> BTreeSet<String> {
-    let lines =
-        section(deny, "[licenses]").skip_while(|l| !l.starts_with("allow = [")).take_while(|l| *l != "]");
+    let lines = section(deny, "[licenses]")
+        .skip_while(|l| !l.starts_with("allow = ["))
+        .take_while(|l| *l != "]");
     lines.filter_map(|l| Some(l.trim().strip_prefix('"')?.split_once('"')?.0.to_owned())).collect()
 }
 
 /// The names in `{ crate = "NAME"` in section `[bans]`.
 fn banned_crates(deny: &str) -> BTreeSet<String> {
     let lines = section(deny, "[bans]");
-    lines.filter_map(|l| Some(l.trim().strip_prefix("{ crate = \"")?.split_once('"')?.0.to_owned())).collect()
+    lines
+        .filter_map(|l| Some(l.trim().strip_prefix("{ crate = \"")?.split_once('"')?.0.to_owned()))
+        .collect()
 }
 
 fn section<'a>(deny: &'a str, head: &'a str) -> impl Iterator<Item = &'a str> {
     deny.lines().skip_while(move |l| *l != head).skip(1).take_while(|l| !l.starts_with('['))
 }
 
-// ---- SPDX expressions -------------------------------------------------------------------------------------------
-
-/// Whether an SPDX expression can be met with the allowed licences. The slash of old manifests means OR.
+// ---- SPDX expressions ---------------------------------------------------------------------------
+/// Whether an SPDX expression can be met with the allowed licences. The slash of old manifests
+/// means OR.
 fn satisfied(expression: &str, allowed: &BTreeSet<String>) -> Result<bool, String> {
-    let spaced =
-        expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ").replace(" WITH ", "+WITH+");
-    let words: Vec<String> = spaced.split_whitespace().map(|w| w.replace("+WITH+", " WITH ")).collect();
+    let spaced = expression
+        .replace('/', " OR ")
+        .replace('(', " ( ")
+        .replace(')', " ) ")
+        .replace(" WITH ", "+WITH+");
+    let words: Vec<String> =
+        spaced.split_whitespace().map(|w| w.replace("+WITH+", " WITH ")).collect();
     let mut rest = words.as_slice();
     let value = any_of(&mut rest, allowed)?;
-    if let Some(extra) = rest.first() { Err(format!("`{extra}` was not expected")) } else { Ok(value) }
+    if let Some(extra) = rest.first() {
+        Err(format!("`{extra}` was not expected"))
+    } else {
+        Ok(value)
+    }
 }
 
 fn any_of(rest: &mut &[String], allowed: &BTreeSet<String>) -> Result<bool, String> {
@@ -160,7 +180,8 @@ mod tests {
 
     #[test]
     fn a_banned_and_a_copyleft_package_are_found_once_each() {
-        let tree = "good v1.0.0|MIT\nvtkio v0.6.3|MIT\nfar v2.0.0|GPL-3.0-only\nfar v2.0.0|GPL-3.0-only (*)\nbare v1.0.0|\n";
+        let tree = "good v1.0.0|MIT\nvtkio v0.6.3|MIT\nfar v2.0.0|GPL-3.0-only\nfar \
+                    v2.0.0|GPL-3.0-only (*)\nbare v1.0.0|\n";
         let (packages, faults) = faults(tree, &set(&["MIT"]), &set(&["vtkio"]));
         assert_eq!(packages, 4);
         assert_eq!(faults.len(), 3, "{faults:?}");
@@ -171,8 +192,8 @@ mod tests {
 
     #[test]
     fn the_real_deny_toml_has_both_lists() {
-        let deny =
-            std::fs::read_to_string(crate::workspace_root().join("deny.toml")).expect("deny.toml is there");
+        let deny = std::fs::read_to_string(crate::workspace_root().join("deny.toml"))
+            .expect("deny.toml is there");
         assert!(allowed_licences(&deny).contains("MIT"));
         assert!(allowed_licences(&deny).contains("Apache-2.0"));
         assert!(banned_crates(&deny).contains("vtkio"));

@@ -1,7 +1,8 @@
 //! Set-up and checks of the workspace, as one small program without dependencies.
 //!
-//! The steps are a list in [`plan`]; [`runner`] runs them and prints what each cost; [`peers`] finds and installs the
-//! software of others that some tests compare with; [`licences`] checks what we link against.
+//! The steps are a list in [`plan`]; [`runner`] runs them and prints what each cost; [`peers`]
+//! finds and installs the software of others that some tests compare with; [`licences`] checks what
+//! we link against.
 
 mod licences;
 mod main_job;
@@ -23,12 +24,15 @@ cargo xtask test [--require-peers] [--no-install] [--only NAME,...]
       --only NAME,...   run only these steps (names as in `ci-list`)
 
 cargo xtask setup
-    Installs the peers: Debian packages with apt-get (as root or through sudo), Python wheels in target/peers/venv.
+    Installs the peers: Debian packages with apt-get (as root or through sudo), Python wheels in \
+    target/peers/venv.
     Where it may not install, it says what it would have installed.
 
 cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
-    Builds vtk-bridge from this checkout and installs it for the VTK and ParaView of this machine; then
-    `eval \"$(target/debug/vtk-bridge env --vtk)\"` (or --paraview) makes any script in this shell ray traced.
+    Builds vtk-bridge from this checkout and installs it for the VTK and ParaView of this machine; \
+    then
+    `eval \"$(target/debug/vtk-bridge env --vtk)\"` (or --paraview) makes any script in this shell \
+    ray traced.
       --release         build it optimised, into target/release
       --prefix FOLDER, --include FOLDER, --plugin    as of `vtk-bridge install`
 
@@ -38,7 +42,8 @@ cargo xtask book
 cargo xtask ci-list
     Prints the steps and their commands without running them.
 
-Exit status: 0 all passed, 1 a step failed, 2 the command line was wrong, 3 a required peer is missing.
+Exit status: 0 all passed, 1 a step failed, 2 the command line was wrong, 3 a required peer is \
+missing.
 ";
 
 /// What the command line asks for.
@@ -94,8 +99,9 @@ fn parse(args: &[String]) -> Result<Command, String> {
                     "--require-peers" => options.require_peers = true,
                     "--no-install" => options.keep_machine = true,
                     "--only" => {
-                        let names =
-                            rest.next().ok_or("`--only` needs step names, as in `--only fmt,clippy`")?;
+                        let names = rest
+                            .next()
+                            .ok_or("`--only` needs step names, as in `--only fmt,clippy`")?;
                         for name in names.split(',') {
                             if !plan::STEPS.iter().any(|s| s.name == name) {
                                 let known: Vec<_> = plan::STEPS.iter().map(|s| s.name).collect();
@@ -107,7 +113,11 @@ fn parse(args: &[String]) -> Result<Command, String> {
                             options.only.push(name.to_owned());
                         }
                     }
-                    other => return Err(format!("`test` does not know `{other}`; see `cargo xtask help`")),
+                    other => {
+                        return Err(format!(
+                            "`test` does not know `{other}`; see `cargo xtask help`"
+                        ));
+                    }
                 }
             }
             Ok(Command::Test(options))
@@ -116,13 +126,18 @@ fn parse(args: &[String]) -> Result<Command, String> {
             release: rest.iter().any(|a| a == "--release"),
             install: rest.iter().filter(|a| *a != "--release").cloned().collect(),
         }),
-        other => Err(format!("no command `{other}`; there are test, setup, vtk, book, ci-list and help")),
+        other => {
+            Err(format!("no command `{other}`; there are test, setup, vtk, book, ci-list and help"))
+        }
     }
 }
 
 /// The root of the workspace: the folder above xtask.
 fn workspace_root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies inside the workspace").to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("xtask lies inside the workspace")
+        .to_owned()
 }
 
 /// Builds vtk-bridge and lets it install itself. Its own options and messages are its business.
@@ -136,7 +151,8 @@ fn vtk(release: bool, install: &[String]) -> Exit {
 
 /// `cargo run -p MEMBER ARGS` in the root of the workspace.
 fn run_member(member: &str, args: &[&str]) -> Exit {
-    let mut cargo = std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut cargo =
+        std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(workspace_root()).args(["run", "--quiet", "-p", member]).args(args);
     match cargo.status() {
         Ok(status) if status.success() => Exit::Success,
@@ -186,7 +202,8 @@ mod tests {
 
     #[test]
     fn options_of_the_bridge_are_its_own() {
-        let expected = Command::Vtk { release: true, install: vec!["--prefix".to_owned(), "/x".to_owned()] };
+        let expected =
+            Command::Vtk { release: true, install: vec!["--prefix".to_owned(), "/x".to_owned()] };
         assert_eq!(parsed("vtk --release --prefix /x"), Ok(expected));
         assert_eq!(parsed("vtk"), Ok(Command::Vtk { release: false, install: Vec::new() }));
     }
@@ -198,7 +215,10 @@ mod tests {
             keep_machine: true,
             only: vec!["fmt".to_owned(), "clippy".to_owned()],
         };
-        assert_eq!(parsed("test --require-peers --no-install --only fmt,clippy"), Ok(Command::Test(options)));
+        assert_eq!(
+            parsed("test --require-peers --no-install --only fmt,clippy"),
+            Ok(Command::Test(options))
+        );
         assert_eq!(parsed("test"), Ok(Command::Test(TestOptions::default())));
         assert_eq!(parsed(""), Ok(Command::Help));
     }

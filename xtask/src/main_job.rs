@@ -1,9 +1,9 @@
-//! The step `main-job`: what `cargo run --release -p bench` does for users, with the programs that the tests were built
-//! with.
+//! The step `main-job`: what `cargo run --release -p bench` does for users, with the programs that
+//! the tests were built with.
 //!
-//! Nothing has to be compiled that the step `build-tests` has not: a release build takes ten minutes on two cores. The
-//! dev profile optimises all members, but keeps their checks, so numbers measured here mean nothing; what is checked is
-//! that every experiment runs to its end.
+//! Nothing has to be compiled that the step `build-tests` has not: a release build takes ten
+//! minutes on two cores. The dev profile optimises all members, but keeps their checks, so numbers
+//! measured here mean nothing; what is checked is that every experiment runs to its end.
 
 use crate::runner::{self, Context, Outcome};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,8 @@ pub(crate) const ARGUMENTS: &[&str] = &[];
 
 /// Runs the program `bench` of the build folder.
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
-    // Nothing to do after `build-tests`; alone, this step builds what it runs, with the features that the tests have.
+    // Nothing to do after `build-tests`; alone, this step builds what it runs, with the features
+    // that the tests have.
     let built = runner::cargo(context, &["test", "--workspace", "--no-run", "--quiet"], &[]);
     if built != Outcome::Passed {
         return built;

@@ -1,7 +1,9 @@
-//! Peers: software of others that some tests and measurements compare with. None of it is linked or shipped.
+//! Peers: software of others that some tests and measurements compare with. None of it is linked or
+//! shipped.
 //!
-//! Debian packages come with apt-get; Python wheels go into `target/peers/venv`, where `cargo clean` removes them.
-//! Tests learn about peers only through the variables of [`Peers::environment`]; CONTRIBUTING.md documents these.
+//! Debian packages come with apt-get; Python wheels go into `target/peers/venv`, where `cargo
+//! clean` removes them. Tests learn about peers only through the variables of
+//! [`Peers::environment`]; CONTRIBUTING.md documents these.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -13,7 +15,10 @@ use crate::runner::first_line_of;
 
 /// Debian 12 packages, and what each is for.
 const PACKAGES: &[(&str, &str)] = &[
-    ("libembree-dev", "Embree 3.13.5, the CPU ray tracing kernels that rt-core is measured against"),
+    (
+        "libembree-dev",
+        "Embree 3.13.5, the CPU ray tracing kernels that rt-core is measured against",
+    ),
     (
         "mesa-vulkan-drivers",
         "lavapipe, a Vulkan device on the CPU that schlieren's GPU kernels are tested on",
@@ -28,10 +33,14 @@ const PACKAGES: &[(&str, &str)] = &[
     ("mesa-utils", "glxgears"),
     (
         "paraview",
-        "ParaView 5.11, which vtk-bridge and gluray work in, and its IceT, which composite is measured against",
+        "ParaView 5.11, which vtk-bridge and gluray work in, and its IceT, which composite is \
+         measured against",
     ),
     ("python3-paraview", "pvbatch, and VTK 9.2 in Python"),
-    ("paraview-dev", "the headers that vtk-bridge's C++ shim and ParaView plugin are compiled with"),
+    (
+        "paraview-dev",
+        "the headers that vtk-bridge's C++ shim and ParaView plugin are compiled with",
+    ),
     ("valgrind", "watches a C program that uses and misuses vtk-bridge's C interface"),
     ("libglew-dev", "headers that paraview-dev includes but does not depend on"),
     ("cmake", "configures the ParaView plugin"),
@@ -46,7 +55,8 @@ const PACKAGES: &[(&str, &str)] = &[
     ("xscreensaver-gl-extra", "more of them"),
 ];
 
-/// Debian packages that conflict with some above, so they are unpacked in `target/peers/vtk91` instead of installed.
+/// Debian packages that conflict with some above, so they are unpacked in `target/peers/vtk91`
+/// instead of installed.
 const UNPACKED: &[&str] = &["libvtk9-dev", "python3-vtk9", "libvtk9.1", "libvtk9.1-qt", "vtk9"];
 
 /// Programs: name, variable through which tests learn of it, and where Debian puts it.
@@ -137,8 +147,8 @@ impl Peers {
     }
 }
 
-/// Finds the peers, after installing those that are missing where that is allowed. Never fails: what is missing
-/// stays missing, with a note.
+/// Finds the peers, after installing those that are missing where that is allowed. Never fails:
+/// what is missing stays missing, with a note.
 pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
     let folder = root.join("target/peers");
     let venv = folder.join("venv");
@@ -163,7 +173,11 @@ pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
             path: wheel_library(&venv, "embreex.libs", "libembree4"),
         },
         Peer { name: "IceT", variable: "RTSV_ICET", path: in_system("libvtkIceTCore-pv5.11.so.1") },
-        Peer { name: "VTK 9.1", variable: "RTSV_VTK91", path: vtk91_is_there(&unpacked).then_some(unpacked) },
+        Peer {
+            name: "VTK 9.1",
+            variable: "RTSV_VTK91",
+            path: vtk91_is_there(&unpacked).then_some(unpacked),
+        },
         Peer { name: "piglit", variable: "RTSV_PIGLIT", path: piglit() },
         Peer {
             name: "Python with VTK",
@@ -178,36 +192,47 @@ pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
     Peers { folder, all, notes }
 }
 
-// ---- Debian packages ------------------------------------------------------------------------------------------
-
+// ---- Debian packages ----------------------------------------------------------------------------
 fn install_packages(notes: &mut Vec<String>) {
-    let missing: Vec<&str> = PACKAGES.iter().map(|(p, _)| *p).filter(|p| !package_is_there(p)).collect();
+    let missing: Vec<&str> =
+        PACKAGES.iter().map(|(p, _)| *p).filter(|p| !package_is_there(p)).collect();
     if missing.is_empty() {
         return;
     }
     let list = missing.join(" ");
     if first_line_of("apt-get", &["--version"]).is_none() {
-        notes.push(format!("no apt-get here; on Debian 12 these packages would be installed: {list}"));
+        notes.push(format!(
+            "no apt-get here; on Debian 12 these packages would be installed: {list}"
+        ));
         return;
     }
     let Some(root_prefix) = root_prefix() else {
-        notes.push(format!("neither root nor sudo; this would be installed: apt-get install {list}"));
+        notes.push(format!(
+            "neither root nor sudo; this would be installed: apt-get install {list}"
+        ));
         return;
     };
-    // The lists may be empty (fresh container) or old; without an update the packages may not be found.
-    for args in [vec!["update"], [&["install", "-y", "--no-install-recommends"], &missing[..]].concat()] {
+    // The lists may be empty (fresh container) or old; without an update the packages may not be
+    // found.
+    for args in
+        [vec!["update"], [&["install", "-y", "--no-install-recommends"], &missing[..]].concat()]
+    {
         let mut line = root_prefix.clone();
         line.extend(["apt-get", "-o", "DPkg::Lock::Timeout=300", "-q"]);
         line.extend(args);
         println!("==> set-up: {}", line.join(" "));
-        let status = Command::new(line[0]).args(&line[1..]).env("DEBIAN_FRONTEND", "noninteractive").status();
+        let status = Command::new(line[0])
+            .args(&line[1..])
+            .env("DEBIAN_FRONTEND", "noninteractive")
+            .status();
         if !status.as_ref().is_ok_and(|s| s.success()) {
             notes.push(format!("`{}` failed: {status:?}", line.join(" ")));
         }
     }
 }
 
-/// Downloads [`UNPACKED`] and unpacks them below `root`, which needs no rights and installs nothing.
+/// Downloads [`UNPACKED`] and unpacks them below `root`, which needs no rights and installs
+/// nothing.
 fn unpack_packages(root: &Path) -> Result<(), String> {
     if vtk91_is_there(root) || first_line_of("apt-get", &["--version"]).is_none() {
         return Ok(());
@@ -215,7 +240,9 @@ fn unpack_packages(root: &Path) -> Result<(), String> {
     let failed = |e: std::io::Error| format!("{}: {e}", root.display());
     let downloads = root.join("downloads");
     fs::create_dir_all(&downloads).map_err(failed)?;
-    run_noted(Command::new("apt-get").args(["-q", "download"]).args(UNPACKED).current_dir(&downloads))?;
+    run_noted(
+        Command::new("apt-get").args(["-q", "download"]).args(UNPACKED).current_dir(&downloads),
+    )?;
     for entry in fs::read_dir(&downloads).map_err(failed)? {
         let package = entry.map_err(failed)?.path();
         run_noted(Command::new("dpkg").arg("-x").args([&package, root]))?;
@@ -238,8 +265,8 @@ fn package_is_there(package: &str) -> bool {
         == Some("installed")
 }
 
-/// What to put before a command to run it as root: nothing, or sudo; `None` when there is no way. Without a terminal
-/// sudo must not ask for a password, or the run would wait for ever.
+/// What to put before a command to run it as root: nothing, or sudo; `None` when there is no way.
+/// Without a terminal sudo must not ask for a password, or the run would wait for ever.
 fn root_prefix() -> Option<Vec<&'static str>> {
     if first_line_of("id", &["-u"]).as_deref() == Some("0") {
         return Some(vec![]);
@@ -250,8 +277,7 @@ fn root_prefix() -> Option<Vec<&'static str>> {
     first_line_of("sudo", &["-n", "true"]).map(|_| vec!["sudo", "-n"])
 }
 
-// ---- Python wheels --------------------------------------------------------------------------------------------
-
+// ---- Python wheels ------------------------------------------------------------------------------
 fn install_wheels(venv: &Path, notes: &mut Vec<String>) -> Result<(), String> {
     let python = venv.join("bin/python");
     if wheels_are_there(&python) {
@@ -260,18 +286,29 @@ fn install_wheels(venv: &Path, notes: &mut Vec<String>) -> Result<(), String> {
     if first_line_of(&python, &["-c", "import pip"]).is_none() {
         let Some(base) = base_python() else {
             return Err(
-                "no Python 3 with the modules venv and ensurepip: no wheels were installed".to_owned()
+                "no Python 3 with the modules venv and ensurepip: no wheels were installed"
+                    .to_owned(),
             );
         };
         run_noted(Command::new(base).args(["-m", "venv", "--clear"]).arg(venv))?;
     }
-    // --no-deps: vtk asks for matplotlib (60 MB with its own dependencies) for text in formulas, which nothing here draws.
+    // --no-deps: vtk asks for matplotlib (60 MB with its own dependencies) for text in formulas,
+    // which nothing here draws.
     let mut pip = Command::new(&python);
-    pip.args(["-m", "pip", "install", "--disable-pip-version-check", "--only-binary=:all:", "--no-deps"]);
+    pip.args([
+        "-m",
+        "pip",
+        "install",
+        "--disable-pip-version-check",
+        "--only-binary=:all:",
+        "--no-deps",
+    ]);
     pip.args(WHEELS.iter().map(|(name, version, _)| format!("{name}=={version}")));
     run_noted(&mut pip)?;
     if !wheels_are_there(&python) {
-        notes.push("pip succeeded, but the wheels cannot be imported in the versions asked for".to_owned());
+        notes.push(
+            "pip succeeded, but the wheels cannot be imported in the versions asked for".to_owned(),
+        );
     }
     Ok(())
 }
@@ -285,7 +322,8 @@ fn run_noted(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// A Python that can make virtual environments: Debian's own before others, because apt-get can complete that one.
+/// A Python that can make virtual environments: Debian's own before others, because apt-get can
+/// complete that one.
 fn base_python() -> Option<&'static str> {
     ["/usr/bin/python3", "python3"]
         .into_iter()
@@ -297,22 +335,24 @@ fn wheels_are_there(python: &Path) -> bool {
     let mut script =
         "from importlib.metadata import version\nfrom vtkmodules import vtkCommonCore\n".to_owned();
     for (name, version, _) in WHEELS {
-        writeln!(script, "assert version('{name}') == '{version}'").expect("writing to a String cannot fail");
+        writeln!(script, "assert version('{name}') == '{version}'")
+            .expect("writing to a String cannot fail");
     }
     python.is_file() && first_line_of(python, &["-c", &script]).is_some()
 }
 
-// ---- Shared libraries -----------------------------------------------------------------------------------------
-
+// ---- Shared libraries ---------------------------------------------------------------------------
 fn system_library_folders() -> Vec<PathBuf> {
     let multiarch = format!("/usr/lib/{}-linux-gnu", std::env::consts::ARCH);
     [multiarch.as_str(), "/usr/lib64", "/usr/lib", "/usr/local/lib"].map(PathBuf::from).to_vec()
 }
 
-/// The file in `folder` whose name starts with `prefix`; of several the shortest, which is the link without version.
+/// The file in `folder` whose name starts with `prefix`; of several the shortest, which is the link
+/// without version.
 fn library_in(folder: &Path, prefix: &str) -> Option<PathBuf> {
     let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok).map(|e| e.path());
-    let names = entries.filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(prefix)));
+    let names =
+        entries.filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(prefix)));
     names.min_by_key(|p| (p.as_os_str().len(), p.clone()))
 }
 
@@ -333,13 +373,18 @@ mod tests {
         let peers = Peers {
             folder: "peers".into(),
             all: vec![
-                Peer { name: "Embree 3", variable: "RTSV_EMBREE3", path: Some("libembree3.so".into()) },
+                Peer {
+                    name: "Embree 3",
+                    variable: "RTSV_EMBREE3",
+                    path: Some("libembree3.so".into()),
+                },
                 Peer { name: "Embree 4", variable: "RTSV_EMBREE4", path: None },
             ],
             notes: vec!["why".to_owned()],
         };
         assert_eq!(peers.missing(), ["Embree 4"]);
-        let names = |require| peers.environment(require).into_iter().map(|(n, _)| n).collect::<Vec<_>>();
+        let names =
+            |require| peers.environment(require).into_iter().map(|(n, _)| n).collect::<Vec<_>>();
         assert_eq!(names(false), ["RTSV_PEERS", "RTSV_EMBREE3"]);
         assert_eq!(names(true), ["RTSV_PEERS", "RTSV_EMBREE3", "RTSV_REQUIRE_PEERS"]);
         assert!(peers.describe().contains("Embree 4         not found\n"), "{}", peers.describe());

@@ -1,8 +1,9 @@
 //! The steps of `cargo xtask test`, in order. To add, drop or change a check, edit this list.
 //!
-//! The order is cheap before dear, so that a misplaced comma is reported after seconds and not after minutes.
-//! All steps share one target directory and one set of features, so that nothing is compiled twice without need:
-//! `clippy` and `api-docs` check, all others build with the dev profile, whose members are optimised: also `main-job`.
+//! The order is cheap before dear, so that a misplaced comma is reported after seconds and not
+//! after minutes. All steps share one target directory and one set of features, so that nothing is
+//! compiled twice without need: `clippy` and `api-docs` check, all others build with the dev
+//! profile, whose members are optimised: also `main-job`.
 
 use crate::runner::{Context, Outcome};
 use crate::{licences, main_job, runner};
@@ -65,22 +66,33 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step {
         name: "licences",
-        tells: "every package we build with has a licence that deny.toml allows, and none is banned",
+        tells: "every package we build with has a licence that deny.toml allows, and none is \
+                banned",
         action: Action::Call(licences::check),
     },
     Step {
         name: "deny",
-        tells: "cargo-deny agrees, also about sources, duplicates and other platforms; needs cargo-deny",
+        tells: "cargo-deny agrees, also about sources, duplicates and other platforms; needs \
+                cargo-deny",
         action: Action::Call(runner::cargo_deny),
     },
     Step {
         name: "clippy",
         tells: "no warnings, with all features, in tests, examples and benches too",
-        action: cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "-D", "warnings"]),
+        action: cargo(&[
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--all-features",
+            "--",
+            "-D",
+            "warnings",
+        ]),
     },
     Step {
         name: "compositor-alone",
-        tells: "who embeds the compositor builds it without the renderer, the data sets and the program",
+        tells: "who embeds the compositor builds it without the renderer, the data sets and the \
+                program",
         action: cargo(&[
             "clippy",
             "-p",
@@ -107,13 +119,15 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step {
         name: "build-tests",
-        tells: "all tests compile, and so do the programs and the shared library (for SimGrid) that they run",
+        tells: "all tests compile, and so do the programs and the shared library (for SimGrid) \
+                that they run",
         action: cargo(&["test", "--workspace", "--no-run"]),
     },
     Step {
         name: "tests",
         tells: "unit and integration tests of all members pass, with the peers that were found",
-        // Not --examples: with it, examples become test harnesses, and tests need the one that is a shared library.
+        // Not --examples: with it, examples become test harnesses, and tests need the one that is a
+        // shared library.
         action: cargo(&["test", "--workspace", "--no-fail-fast", "--lib", "--bins", "--tests"]),
     },
     Step {
@@ -123,7 +137,8 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step {
         name: "counters",
-        tells: "rt-core's unit tests also pass with the counters of the traversal loops compiled in",
+        tells: "rt-core's unit tests also pass with the counters of the traversal loops compiled \
+                in",
         action: cargo(&["test", "-p", "rt-core", "--features", "stats", "--lib"]),
     },
     Step {
@@ -149,7 +164,10 @@ mod tests {
     fn the_main_job_runs_experiments_and_does_not_only_list_them() {
         let step = STEPS.iter().find(|s| s.name == "main-job").expect("main-job");
         assert!(matches!(step.action, Action::Call(_)), "{:?} measures nothing", step.action);
-        assert!(main_job::ARGUMENTS.is_empty(), "without a command, bench runs the quick form of everything");
+        assert!(
+            main_job::ARGUMENTS.is_empty(),
+            "without a command, bench runs the quick form of everything"
+        );
     }
 
     #[test]

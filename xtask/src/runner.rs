@@ -24,7 +24,8 @@ pub(crate) struct Context<'a> {
 pub(crate) enum Outcome {
     /// It holds.
     Passed,
-    /// It could not be checked here, for this reason. Does not stop the run; the summary repeats it.
+    /// It could not be checked here, for this reason. Does not stop the run; the summary repeats
+    /// it.
     NotRun(String),
     /// It does not hold, for this reason.
     Failed(String),
@@ -127,8 +128,7 @@ pub(crate) fn first_line_of(program: impl AsRef<std::ffi::OsStr>, args: &[&str])
     output.status.success().then(|| text.lines().next().unwrap_or_default().to_owned())
 }
 
-// ---- Steps that are functions ---------------------------------------------------------------------------------
-
+// ---- Steps that are functions -------------------------------------------------------------------
 /// The compiler is at least the `rust-version` of the workspace; rustfmt and clippy are there.
 pub(crate) fn check_tools(context: &Context<'_>) -> Outcome {
     let manifest = match std::fs::read_to_string(context.root.join("Cargo.toml")) {
@@ -141,7 +141,9 @@ pub(crate) fn check_tools(context: &Context<'_>) -> Outcome {
         return Outcome::Failed("Cargo.toml: [workspace.package] has no rust-version".to_owned());
     };
     let Some(rustc) = first_line_of("rustc", &["--version"]) else {
-        return Outcome::Failed("rustc does not run; install Rust from https://rustup.rs".to_owned());
+        return Outcome::Failed(
+            "rustc does not run; install Rust from https://rustup.rs".to_owned(),
+        );
     };
     println!("{rustc}");
     if version_numbers(&rustc).is_none_or(|found| found < wanted) {
@@ -186,8 +188,9 @@ pub(crate) fn report_peers(context: &Context<'_>) -> Outcome {
     }
 }
 
-/// Runs cargo-deny where it is installed. CI does not install it: building it costs 150 CPU-seconds (0.20.2, measured),
-/// and its advisory database comes from github.com, which CI cannot reach. The `licences` step checks the same lists.
+/// Runs cargo-deny where it is installed. CI does not install it: building it costs 150 CPU-seconds
+/// (0.20.2, measured), and its advisory database comes from github.com, which CI cannot reach. The
+/// `licences` step checks the same lists.
 pub(crate) fn cargo_deny(context: &Context<'_>) -> Outcome {
     if first_line_of("cargo", &["deny", "--version"]).is_none() {
         return Outcome::NotRun(

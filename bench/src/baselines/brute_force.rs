@@ -14,15 +14,25 @@ impl BruteForce {
     /// Triangles that cannot be rendered are left out of the answers.
     pub fn new(mesh: &TriMesh) -> BruteForce {
         let corners = |i: usize| {
-            if mesh.is_renderable(i) { mesh.triangle(i).map(|p| p.as_dvec3()) } else { [DVec3::NAN; 3] }
+            if mesh.is_renderable(i) {
+                mesh.triangle(i).map(|p| p.as_dvec3())
+            } else {
+                [DVec3::NAN; 3]
+            }
         };
         BruteForce { triangles: (0..mesh.num_triangles()).map(corners).collect() }
     }
 
-    /// Distance, triangle and barycentric coordinates of the closest hit in `tmin..=tmax`. The edge functions are
-    /// volumes of origin and edge (Pluecker form): the same number for both triangles of an edge, so nothing
-    /// leaks between them.
-    pub fn closest_hit(&self, o: DVec3, d: DVec3, tmin: f64, tmax: f64) -> Option<(f64, u32, f64, f64)> {
+    /// Distance, triangle and barycentric coordinates of the closest hit in `tmin..=tmax`. The edge
+    /// functions are volumes of origin and edge (Pluecker form): the same number for both triangles
+    /// of an edge, so nothing leaks between them.
+    pub fn closest_hit(
+        &self,
+        o: DVec3,
+        d: DVec3,
+        tmin: f64,
+        tmax: f64,
+    ) -> Option<(f64, u32, f64, f64)> {
         let mut best: Option<(f64, u32, f64, f64)> = None;
         for (i, &[a, b, c]) in self.triangles.iter().enumerate() {
             let (a, b, c) = (a - o, b - o, c - o);
@@ -80,10 +90,19 @@ mod tests {
         let mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0], vec![[0, 1, 2]]);
         let b = BruteForce::new(&mesh);
         let down = DVec3::new(0.0, 0.0, -2.0);
-        let (t, prim, u, v) = b.closest_hit(DVec3::new(1.0, 2.0, 3.0), down, 0.0, f64::INFINITY).unwrap();
+        let (t, prim, u, v) =
+            b.closest_hit(DVec3::new(1.0, 2.0, 3.0), down, 0.0, f64::INFINITY).unwrap();
         assert_eq!((t, prim, u, v), (1.5, 0, 0.25, 0.5));
-        assert_eq!(b.closest_hit(DVec3::new(1.0, 2.0, 3.0), down, 0.0, 1.4), None, "tmax is honoured");
-        assert_eq!(b.closest_hit(DVec3::new(1.0, 2.0, 3.0), down, 1.6, 9.0), None, "tmin is honoured");
+        assert_eq!(
+            b.closest_hit(DVec3::new(1.0, 2.0, 3.0), down, 0.0, 1.4),
+            None,
+            "tmax is honoured"
+        );
+        assert_eq!(
+            b.closest_hit(DVec3::new(1.0, 2.0, 3.0), down, 1.6, 9.0),
+            None,
+            "tmin is honoured"
+        );
         assert_eq!(b.closest_hit(DVec3::new(3.0, 3.0, 3.0), down, 0.0, 9.0), None, "outside");
     }
 

@@ -1,8 +1,8 @@
 //! Other ray tracers behind one interface, to measure ours against.
 //!
-//! [`embree`] is loaded at run time when it is installed; [`obvhs`] is a crate and always here; [`brute_force`]
-//! tests every triangle in f64 and is what the others are checked against. [`thesis_schlieren`] is the dissertation's way
-//! through a gas.
+//! [`embree`] is loaded at run time when it is installed; [`obvhs`] is a crate and always here;
+//! [`brute_force`] tests every triangle in f64 and is what the others are checked against.
+//! [`thesis_schlieren`] is the dissertation's way through a gas.
 
 pub mod brute_force;
 pub mod embree;
@@ -21,7 +21,8 @@ pub trait Tracer: Sync {
     /// Closest hits of `rays` into `hits`, which has the same length. Empty lanes may get anything.
     fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]);
 
-    /// Whether anything lies on each ray: bit i of a block's mask is lane i. Bits of empty lanes are 0.
+    /// Whether anything lies on each ray: bit i of a block's mask is lane i. Bits of empty lanes
+    /// are 0.
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]);
 }
 
@@ -73,7 +74,8 @@ pub enum BaselineError {
     },
     /// The mesh has triangles that no peer accepts.
     #[error(
-        "the mesh has {count} triangles with missing or non-finite vertices; peers need a clean mesh: remove them"
+        "the mesh has {count} triangles with missing or non-finite vertices; peers need a clean \
+         mesh: remove them"
     )]
     Mesh {
         /// How many.
@@ -92,7 +94,8 @@ pub enum BaselineError {
 }
 
 impl BaselineError {
-    /// The message as records keep it, for everyone to read: files by their name alone, without this machine's folders.
+    /// The message as records keep it, for everyone to read: files by their name alone, without
+    /// this machine's folders.
     pub fn for_a_record(&self) -> String {
         let BaselineError::Unusable { path, reason } = self else { return self.to_string() };
         let file = std::path::Path::new(path);
@@ -117,16 +120,25 @@ const CHUNK: usize = 64;
 /// Traces all rays on the calling thread (`threads == 1`) or on rayon's current pool.
 pub fn closest_all(tracer: &dyn Tracer, rays: &RaySet, hits: &mut [HitBlock], threads: usize) {
     if threads == 1 {
-        rays.blocks.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)).for_each(|(r, h)| tracer.closest(r, h));
+        rays.blocks
+            .chunks(CHUNK)
+            .zip(hits.chunks_mut(CHUNK))
+            .for_each(|(r, h)| tracer.closest(r, h));
     } else {
-        rays.blocks.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).for_each(|(r, h)| tracer.closest(r, h));
+        rays.blocks
+            .par_chunks(CHUNK)
+            .zip(hits.par_chunks_mut(CHUNK))
+            .for_each(|(r, h)| tracer.closest(r, h));
     }
 }
 
 /// As [`closest_all`], for occlusion.
 pub fn occluded_all(tracer: &dyn Tracer, rays: &RaySet, masks: &mut [u16], threads: usize) {
     if threads == 1 {
-        rays.blocks.chunks(CHUNK).zip(masks.chunks_mut(CHUNK)).for_each(|(r, m)| tracer.occluded(r, m));
+        rays.blocks
+            .chunks(CHUNK)
+            .zip(masks.chunks_mut(CHUNK))
+            .for_each(|(r, m)| tracer.occluded(r, m));
     } else {
         rays.blocks
             .par_chunks(CHUNK)
@@ -177,8 +189,10 @@ pub(crate) mod testing {
     pub(crate) fn mesh() -> TriMesh {
         let (n, m) = (48u32, 24u32);
         let point = |i: u32, j: u32| {
-            let (a, b) =
-                (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
+            let (a, b) = (
+                i as f32 / n as f32 * std::f32::consts::TAU,
+                j as f32 / m as f32 * std::f32::consts::TAU,
+            );
             let r = 1.0 + 0.35 * (b + 0.3 * (5.0 * a).sin()).cos();
             Vec3::new(r * a.cos(), 0.35 * b.sin() + 0.1 * (3.0 * a).sin(), r * a.sin())
         };
@@ -199,7 +213,8 @@ pub(crate) mod testing {
         masks: Vec<u16>,
     }
 
-    /// Primary, shadow, ambient-occlusion and random rays through [`mesh`], answered once by brute force.
+    /// Primary, shadow, ambient-occlusion and random rays through [`mesh`], answered once by brute
+    /// force.
     fn cases() -> &'static [Case] {
         static CASES: OnceLock<Vec<Case>> = OnceLock::new();
         CASES.get_or_init(|| {
@@ -210,7 +225,8 @@ pub(crate) mod testing {
                 closest_all(&exact, &rays, &mut hits, 2);
                 // Something is on a ray exactly when there is a closest hit.
                 let lane = |h: &HitBlock, l: usize| u16::from(h.prim[l] != NO_HIT) << l;
-                let masks = hits.iter().map(|h| (0..LANES).fold(0, |m, l| m | lane(h, l))).collect();
+                let masks =
+                    hits.iter().map(|h| (0..LANES).fold(0, |m, l| m | lane(h, l))).collect();
                 Case { kind, rays, hits, masks }
             };
             let view = View::orbit(&mesh);
@@ -228,8 +244,9 @@ pub(crate) mod testing {
         })
     }
 
-    /// Compares a tracer that was built from [`mesh`] with brute force. Where a ray meets an edge or a silhouette
-    /// f32 may differ: at most one ray in 2000 may; distances agree to 1e-4 of the mesh's size.
+    /// Compares a tracer that was built from [`mesh`] with brute force. Where a ray meets an edge
+    /// or a silhouette f32 may differ: at most one ray in 2000 may; distances agree to 1e-4 of the
+    /// mesh's size.
     pub(crate) fn agrees_with_brute_force(tracer: &dyn Tracer) {
         for Case { kind, rays, hits, masks } in cases() {
             let what = format!("{}, {kind}", tracer.name());
@@ -253,7 +270,11 @@ pub(crate) mod testing {
             // Bits of the last block's empty lanes.
             let used = rays.len - (rays.blocks.len() - 1) * LANES;
             let empty = (!0u32 << used) as u16;
-            assert_eq!(got_masks[rays.blocks.len() - 1] & empty, 0, "{what}: an empty lane is occluded");
+            assert_eq!(
+                got_masks[rays.blocks.len() - 1] & empty,
+                0,
+                "{what}: an empty lane is occluded"
+            );
         }
     }
 }

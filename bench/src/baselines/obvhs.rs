@@ -1,8 +1,9 @@
 //! obvhs' compressed wide BVH (Ylitie et al. 2017), one ray at a time.
 //!
-//! The triangles are stored in leaf order, as the crate's own benchmark does. obvhs gives distance and triangle and
-//! no barycentric coordinates, and none are computed here: that is in its favour. Its vector width is fixed when the
-//! program is compiled (SSE in a default build), unlike Embree's and ours, which are chosen at run time.
+//! The triangles are stored in leaf order, as the crate's own benchmark does. obvhs gives distance
+//! and triangle and no barycentric coordinates, and none are computed here: that is in its favour.
+//! Its vector width is fixed when the program is compiled (SSE in a default build), unlike Embree's
+//! and ours, which are chosen at run time.
 
 use super::{BaselineError, BuildCost, Tracer, require_clean};
 use crate::clock;
@@ -34,8 +35,14 @@ pub enum Preset {
 
 impl Preset {
     /// From fastest to best.
-    pub const ALL: [Preset; 6] =
-        [Preset::Fastest, Preset::VeryFast, Preset::Fast, Preset::Medium, Preset::Slow, Preset::VerySlow];
+    pub const ALL: [Preset; 6] = [
+        Preset::Fastest,
+        Preset::VeryFast,
+        Preset::Fast,
+        Preset::Medium,
+        Preset::Slow,
+        Preset::VerySlow,
+    ];
 
     /// Name in the tables.
     pub fn name(self) -> &'static str {
@@ -82,7 +89,8 @@ impl Obvhs {
         let input: Vec<Triangle> = (0..mesh.num_triangles()).map(corners).collect();
         let ((bvh, triangles), time) = clock::measure(|| {
             let bvh = build_cwbvh_from_tris(&input, preset.params(), &mut Default::default());
-            let leaf_order = bvh.primitive_indices.iter().map(|&i| RtTriangle::from(&input[i as usize]));
+            let leaf_order =
+                bvh.primitive_indices.iter().map(|&i| RtTriangle::from(&input[i as usize]));
             let triangles: Vec<RtTriangle> = leaf_order.collect();
             (bvh, triangles)
         });
@@ -117,7 +125,10 @@ impl Tracer for Obvhs {
                     continue;
                 }
                 let mut hit = RayHit::none();
-                if self.bvh.ray_traverse(ray(r, l), &mut hit, |ray, i| self.triangles[i].intersect(ray)) {
+                if self
+                    .bvh
+                    .ray_traverse(ray(r, l), &mut hit, |ray, i| self.triangles[i].intersect(ray))
+                {
                     h.t[l] = hit.t;
                     h.prim[l] = self.bvh.primitive_indices[hit.primitive_id as usize];
                 }
@@ -129,7 +140,9 @@ impl Tracer for Obvhs {
         for (r, m) in rays.iter().zip(masks) {
             *m = 0;
             for l in (0..LANES).filter(|&l| r.t_max[l] >= 0.0) {
-                let miss = self.bvh.ray_traverse_miss(ray(r, l), |ray, i| self.triangles[i].intersect(ray));
+                let miss = self
+                    .bvh
+                    .ray_traverse_miss(ray(r, l), |ray, i| self.triangles[i].intersect(ray));
                 *m |= u16::from(!miss) << l;
             }
         }

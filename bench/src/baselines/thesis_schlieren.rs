@@ -1,9 +1,12 @@
-//! The dissertation's march (section 5.3, equations 5.7 and 5.8) as one would write it from the text: a texture of (gradient, n), trilinear; position and
-//! direction stepped by Euler's method in f32; a step length for all.
+//! The dissertation's march (section 5.3, equations 5.7 and 5.8) as one would write it from the
+//! text: a texture of (gradient, n), trilinear; position and direction stepped by Euler's method in
+//! f32; a step length for all.
 //!
-//! Signs and lengths of gradients are right here, which they are not in the code its author published (TACC/SchlierenRay, 2015): central differences are
-//! divided by twice the spacing and point to higher index, rays start with |v| = n, and march until they leave the box. What remains is the method: 16 bytes
-//! a voxel, first order, and kicks that vanish when they are smaller than half a unit in the last place of the direction.
+//! Signs and lengths of gradients are right here, which they are not in the code its author
+//! published (TACC/SchlierenRay, 2015): central differences are divided by twice the spacing and
+//! point to higher index, rays start with |v| = n, and march until they leave the box. What remains
+//! is the method: 16 bytes a voxel, first order, and kicks that vanish when they are smaller than
+//! half a unit in the last place of the direction.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -33,8 +36,10 @@ impl ThesisMarch {
             let node = [i % dims[0], i / dims[0] % dims[1], i / stride[2]];
             let slope = |c: usize| {
                 let (low, high) = (node[c].saturating_sub(1), (node[c] + 1).min(dims[c] - 1));
-                let value = |k: usize| f64::from(field.eps()[i + k * stride[c] - node[c] * stride[c]]);
-                ((value(high) - value(low)) * field.n0() / ((high - low) as f64 * spacing[c])) as f32
+                let value =
+                    |k: usize| f64::from(field.eps()[i + k * stride[c] - node[c] * stride[c]]);
+                ((value(high) - value(low)) * field.n0() / ((high - low) as f64 * spacing[c]))
+                    as f32
             };
             [slope(0), slope(1), slope(2), n(i)]
         };
@@ -106,7 +111,8 @@ impl ThesisMarch {
         let mut at = (middle + v.forward * near).as_vec3();
         let rcp_h = (1.0 / self.spacing_m).as_vec3();
         let mut direction = v.forward.as_vec3() * self.texture(at * rcp_h)[3];
-        let (size, limit) = (size.as_vec3(), ((far - near) / f64::from(self.step_m) * 2.0) as u32 + 4);
+        let (size, limit) =
+            (size.as_vec3(), ((far - near) / f64::from(self.step_m) * 2.0) as u32 + 4);
         // A hair of slack, or rays that start on a face would stop there.
         let slack = size * 1e-5;
         for _ in 0..limit {
@@ -161,14 +167,20 @@ mod tests {
         let mut exit = [Exit::UNDISTURBED];
         march.trace(&[Start { position_m: [0.12, 0.0], tilt_rad: [0.0; 2] }], &mut exit);
         let expected = -1e-3 * 2.5066 * (-0.5f64).exp();
-        assert!((f64::from(exit[0].deflection_rad[0]) / expected - 1.0).abs() < 0.03, "{:?}", exit[0]);
+        assert!(
+            (f64::from(exit[0].deflection_rad[0]) / expected - 1.0).abs() < 0.03,
+            "{:?}",
+            exit[0]
+        );
     }
 
     #[test]
     fn weak_deflections_seen_obliquely_drown_in_rounding() {
-        // The flaw that the deviational form does not have: 1e-8 is below the direction's last place, so light on both sides of the blob, which it
-        // bends in opposite directions, comes out the same.
-        let view = View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).unwrap();
+        // The flaw that the deviational form does not have: 1e-8 is below the direction's last
+        // place, so light on both sides of the blob, which it bends in opposite directions, comes
+        // out the same.
+        let view =
+            View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).unwrap();
         let exits = |amplitude: f64| {
             let march = ThesisMarch::new(&blob(amplitude), view, 0.5);
             let start = |x: f32| Start { position_m: [x, 0.0], tilt_rad: [0.0; 2] };

@@ -12,7 +12,8 @@ struct Entry {
 }
 
 pub(super) fn list(common: CommonArgs) -> anyhow::Result<()> {
-    let entry = |e: &experiments::Experiment| Entry { id: e.id, chapter: e.chapter, title: e.title };
+    let entry =
+        |e: &experiments::Experiment| Entry { id: e.id, chapter: e.chapter, title: e.title };
     let entries: Vec<Entry> = experiments::ALL.iter().map(entry).collect();
     common.result(&entries, || {
         let width = entries.iter().map(|e| e.id.len()).max().unwrap_or(0);

@@ -17,8 +17,8 @@ use std::process::ExitCode;
 
 /// Measures every table and figure of the dissertation, and error against time.
 ///
-/// Without a command, the quick form of every experiment runs (within five minutes on two cores, after the build)
-/// and the path of the report is printed.
+/// Without a command, the quick form of every experiment runs (within five minutes on two cores,
+/// after the build) and the path of the report is printed.
 #[derive(Debug, Parser)]
 #[command(name = "bench", version)]
 struct Cli {
@@ -42,7 +42,8 @@ enum Command {
     Render(RenderArgs),
     /// Draws one of the report's pictures of generated data
     Picture(PictureArgs),
-    /// Says which other ray tracers are found and how to get the others; `bench run peers` measures them
+    /// Says which other ray tracers are found and how to get the others; `bench run peers` measures
+    /// them
     Peers,
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
@@ -57,8 +58,8 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// Also keep the records in bench/runs/DATE-MACHINE/. Refused where the tree has uncommitted changes, the load of
-    /// the machine is above 0.75 per core, or this is no release build
+    /// Also keep the records in bench/runs/DATE-MACHINE/. Refused where the tree has uncommitted
+    /// changes, the load of the machine is above 0.75 per core, or this is no release build
     #[arg(long)]
     record: bool,
     /// As --record, whatever speaks against it: records and reports then name that
@@ -82,7 +83,8 @@ struct ReportArgs {
 /// Options of `bench render`.
 #[derive(Debug, Args)]
 struct RenderArgs {
-    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, OBJ, glTF, PLY, STL
+    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, OBJ, glTF,
+    /// PLY, STL
     file: PathBuf,
     /// The picture as PNG
     #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]
@@ -96,14 +98,16 @@ struct RenderArgs {
     /// Samples per pixel
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     samples: u32,
-    /// Separated by commas: shadows, soft-shadows, ao, reflections, glossy-reflections, refraction, transparency,
-    /// depth-of-field, volumes (image data as a glowing medium), path-tracing
+    /// Separated by commas: shadows, soft-shadows, ao, reflections, glossy-reflections, refraction,
+    /// transparency, depth-of-field, volumes (image data as a glowing medium), path-tracing
     #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::picture::style::parse_effects)]
     effects: Effects,
-    /// A camera as TOML or JSON: eye, target, up, vertical_fov_degrees, parallel_height [default: fits the data]
+    /// A camera as TOML or JSON: eye, target, up, vertical_fov_degrees, parallel_height [default:
+    /// fits the data]
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
-    /// Array to colour by; `velocity` is a vector's length, `velocity:x` a component [default: what the file marks]
+    /// Array to colour by; `velocity` is a vector's length, `velocity:x` a component [default: what
+    /// the file marks]
     #[arg(long, value_name = "ARRAY")]
     color_by: Option<String>,
     /// Colour map: viridis, cool-warm, grey
@@ -118,8 +122,8 @@ struct RenderArgs {
     /// Draws this array as a volume; `--effects volumes` alone takes the array that the file marks
     #[arg(long, value_name = "ARRAY")]
     volume: Option<String>,
-    /// Of a volume: SCALAR:OPACITY,..., the opacity of a stretch as long as a tenth of the volume's diagonal, linear in
-    /// between [default: a ramp from 0 to 0.5 over the range of the colours]
+    /// Of a volume: SCALAR:OPACITY,..., the opacity of a stretch as long as a tenth of the volume's
+    /// diagonal, linear in between [default: a ramp from 0 to 0.5 over the range of the colours]
     #[arg(long, value_name = "POINTS", value_parser = render::opacity, allow_hyphen_values = true)]
     opacity: Option<render::Opacity>,
     /// gradient, white, black, transparent

@@ -23,7 +23,9 @@ pub(super) fn peers(common: CommonArgs) -> anyhow::Result<()> {
                 let (version, path) = (Some(e.version().into()), Some(e.path().into()));
                 Peer { name, found: true, version, path, reason: None }
             }
-            Err(e) => Peer { name, found: false, version: None, path: None, reason: Some(e.to_string()) },
+            Err(e) => {
+                Peer { name, found: false, version: None, path: None, reason: Some(e.to_string()) }
+            }
         })
         .collect();
     let (version, path) = (Some("0.4".into()), Some("built in".into()));

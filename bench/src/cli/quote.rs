@@ -7,9 +7,10 @@ use serde_json::json;
 /// Brings what the book quotes from records up to date, and prints the files that changed.
 pub(super) fn quote(common: CommonArgs) -> anyhow::Result<()> {
     let here = std::env::current_dir()?;
-    let root = here.ancestors().find(|d| d.join("docs/src/SUMMARY.md").exists()).ok_or_else(|| {
-        UsageError("the book is not here: start `bench quote` inside the repository".into())
-    })?;
+    let root =
+        here.ancestors().find(|d| d.join("docs/src/SUMMARY.md").exists()).ok_or_else(|| {
+            UsageError("the book is not here: start `bench quote` inside the repository".into())
+        })?;
     let written = quote::update(root)?;
     common.result(&json!({ "written": written }), || {
         let lines: Vec<String> = written.iter().map(|p| p.display().to_string()).collect();

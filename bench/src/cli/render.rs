@@ -37,11 +37,14 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     let start = Instant::now();
     common.note(1, format_args!("reading {file}"));
     let opened = datasets::read::open(&args.file)?;
-    let load_options = LoadOptions { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
+    let load_options =
+        LoadOptions { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
     let cure = if load_options.volume == VolumeChoice::No {
-        "look at the file with the options --color-by and --isovalue in mind, or convert it to .vtp or .vti with ParaView"
+        "look at the file with the options --color-by and --isovalue in mind, or convert it to \
+         .vtp or .vti with ParaView"
     } else {
-        "draw it without `volumes`, or make image data of it: in ParaView by Resample To Image, saved as .vti; \
+        "draw it without `volumes`, or make image data of it: in ParaView by Resample To Image, \
+         saved as .vti; \
          --volume names one of its arrays"
     };
     let subject = Subject::from_file(&opened, &load_options)
@@ -73,7 +76,8 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     };
     let bar = common.progress(u64::from(args.samples), "drawing");
     let mut told = |samples: u32| bar.set_position(u64::from(samples));
-    let mut control = RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+    let mut control =
+        RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
     let rendered = draw(subject, &request, &mut control)?;
     drop(bar);
     warnings.extend(rendered.warnings.iter().cloned());
@@ -100,7 +104,8 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         "exr": exr,
     });
     common.result(&object, || {
-        let written: Vec<String> = [png, exr].iter().flatten().map(|p| p.display().to_string()).collect();
+        let written: Vec<String> =
+            [png, exr].iter().flatten().map(|p| p.display().to_string()).collect();
         format!(
             "{}: {}; read {read_secs:.2} s, build {:.2} s, render {:.2} s, {} rays",
             written.join(", "),
@@ -119,7 +124,8 @@ pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<
     let (png, exr) = outputs(args.out.as_deref(), args.exr.as_deref())?;
     let bar = common.progress(u64::from(args.samples), entry.name);
     let mut told = |samples: u32| bar.set_position(u64::from(samples));
-    let mut control = RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+    let mut control =
+        RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
     let p = entry.render(args.size, args.samples, &mut control)?;
     drop(bar);
     let mut warnings = p.rendered.warnings.clone();
@@ -209,11 +215,11 @@ fn rays(r: &RayStats) -> Value {
     })
 }
 
-// ---- values of options ----------------------------------------------------------------------------------------
-
+// ---- values of options --------------------------------------------------------------------------
 /// `960x540`.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
-    let wrong = || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
+    let wrong =
+        || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
     let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let pixels = |t: &str| t.parse().ok().filter(|n| (1..=16384).contains(n));
     Ok([pixels(w).ok_or_else(wrong)?, pixels(h).ok_or_else(wrong)?])
@@ -221,7 +227,8 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
 
 /// `0.5,2`.
 pub(super) fn range(text: &str) -> Result<[f32; 2], String> {
-    let wrong = || format!("`{text}` is not a range; write for example 0.5,2 (the lower number first)");
+    let wrong =
+        || format!("`{text}` is not a range; write for example 0.5,2 (the lower number first)");
     let (lo, hi) = text.split_once(',').ok_or_else(wrong)?;
     let number = |t: &str| t.trim().parse().ok().filter(|v: &f32| v.is_finite());
     let (lo, hi) = (number(lo).ok_or_else(wrong)?, number(hi).ok_or_else(wrong)?);
@@ -259,9 +266,9 @@ pub(super) fn opacity(text: &str) -> Result<Opacity, String> {
         (numbers[0].is_finite() && (0.0..=1.0).contains(&numbers[1])).then_some(numbers)
     };
     let points: Option<Vec<[f32; 2]>> = text.split(',').map(point).collect();
-    let points = points
-        .filter(|p| p.is_sorted_by(|a, b| a[0] <= b[0]))
-        .ok_or("give SCALAR:OPACITY in order of scalar, opacity 0 to 1, as in 40:0,150:0.1,270:0.9")?;
+    let points = points.filter(|p| p.is_sorted_by(|a, b| a[0] <= b[0])).ok_or(
+        "give SCALAR:OPACITY in order of scalar, opacity 0 to 1, as in 40:0,150:0.1,270:0.9",
+    )?;
     Ok(Opacity(points))
 }
 pub(super) fn background(text: &str) -> Result<Background, String> {

@@ -73,13 +73,15 @@ fn gate(insist: bool, cancel: Cancel) -> Gate {
 /// Nothing was measured: it would not have been kept.
 fn refusal(id: &str, why: &[String]) -> UsageError {
     UsageError(format!(
-        "`{id}` is not recorded:\n  {}\n--record-despite-doubts records it all the same, and its record and report say \
+        "`{id}` is not recorded:\n  {}\n--record-despite-doubts records it all the same, and its \
+         record and report say \
          why it is in doubt; without --record it is measured and not kept",
         why.join("\n  ")
     ))
 }
 
-/// The progress of experiments: a bar on a terminal; elsewhere a line for each experiment, and with -v for each step.
+/// The progress of experiments: a bar on a terminal; elsewhere a line for each experiment, and with
+/// -v for each step.
 struct Steps {
     common: CommonArgs,
     cancel: Cancel,
@@ -122,8 +124,9 @@ impl Steps {
     }
 }
 
-/// Every experiment in its quick form. One that fails is reported, and the others go on; one that compares with programs which are not
-/// there (another of our members not built, ParaView not installed) is left out by name, with the cure: with Rust alone that is no failure.
+/// Every experiment in its quick form. One that fails is reported, and the others go on; one that
+/// compares with programs which are not there (another of our members not built, ParaView not
+/// installed) is left out by name, with the cure: with Rust alone that is no failure.
 pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
     let dir = default_dir();
     let cancel = Cancel::on_ctrl_c()?;
@@ -172,7 +175,8 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
         common.note(
             0,
             format_args!(
-                "left out, for want of other programs: {}; the report and `bench run ID` say what each needs",
+                "left out, for want of other programs: {}; the report and `bench run ID` say what \
+                 each needs",
                 left_out.join(", ")
             ),
         );
@@ -188,7 +192,8 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes the report and says where it is: on standard output, or beside the progress where that carries JSON.
+/// Makes the report and says where it is: on standard output, or beside the progress where that
+/// carries JSON.
 fn finish(common: CommonArgs, dir: &Path) -> anyhow::Result<()> {
     let page = write_page(dir, &dir.join("index.html"))?;
     if common.json {
@@ -201,20 +206,26 @@ fn finish(common: CommonArgs, dir: &Path) -> anyhow::Result<()> {
 fn find(id: &str) -> Result<&'static Experiment, UsageError> {
     experiments::find(id).ok_or_else(|| {
         let known: Vec<&str> = experiments::ALL.iter().map(|e| e.id).collect();
-        UsageError(format!("there is no experiment `{id}`; `bench list` names them: {}", known.join(", ")))
+        UsageError(format!(
+            "there is no experiment `{id}`; `bench list` names them: {}",
+            known.join(", ")
+        ))
     })
 }
 
 /// What is missing and the ratios.
 fn summary(r: &Record) -> String {
-    let mut text = format!("{}: {} ({} rows, {:.1} s)", r.id, r.title, r.rows.len(), r.elapsed_secs);
+    let mut text =
+        format!("{}: {} ({} rows, {:.1} s)", r.id, r.title, r.rows.len(), r.elapsed_secs);
     for m in &r.missing {
         text += &format!("\n  missing: {m}");
     }
     for x in &r.ratios {
         let low_high = format!("{:.2} to {:.2}", x.low, x.high);
-        let open = x.why_open().map_or(String::new(), |why| format!(", {} rounds ({why})", x.rounds));
-        text += &format!("\n  {:6.2}  ({low_high})  {}  against  {}{open}", x.value, x.name, x.rival);
+        let open =
+            x.why_open().map_or(String::new(), |why| format!(", {} rounds ({why})", x.rounds));
+        text +=
+            &format!("\n  {:6.2}  ({low_high})  {}  against  {}{open}", x.value, x.name, x.rival);
     }
     text
 }
@@ -224,7 +235,9 @@ fn runs_dir() -> anyhow::Result<PathBuf> {
     let here = std::env::current_dir()?;
     let root = here.ancestors().find(|d| d.join("bench/Cargo.toml").exists()).ok_or_else(|| {
         UsageError(
-            "--record writes to bench/runs of the repository: start `bench` inside it, or use --out".into(),
+            "--record writes to bench/runs of the repository: start `bench` inside it, or use \
+             --out"
+                .into(),
         )
     })?;
     let machine = Machine::describe();

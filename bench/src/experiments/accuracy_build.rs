@@ -1,5 +1,6 @@
-//! What a better build costs and what rays gain by it: the dissertation's choice between approximate and full builds
-//! (section 4.1.2), with the number of frames after which the better build has paid for itself.
+//! What a better build costs and what rays gain by it: the dissertation's choice between
+//! approximate and full builds (section 4.1.2), with the number of frames after which the better
+//! build has paid for itself.
 
 use super::Context;
 use super::compare::{self, Contender, Kind};
@@ -22,8 +23,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("build", "s", "fastest of two builds, wall time, all threads");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
     record.notes.push(
-        "Every preset gives the same picture; only the time differs. A ratio is the time of the fastest build’s rays \
-         divided by the preset’s: above 1 the better structure pays. Embree’s medium and high builds (the latter cuts \
+        "Every preset gives the same picture; only the time differs. A ratio is the time of the \
+         fastest build’s rays \
+         divided by the preset’s: above 1 the better structure pays. Embree’s medium and high \
+         builds (the latter cuts \
          triangles between boxes) trace the same rays; ratios to them are theirs divided by ours."
             .into(),
     );
@@ -33,7 +36,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let embree = installed.embree.last();
     let (size, pixels) = if context.quick { (Size::M1, 512) } else { (Size::M4, 1024) };
     let pipes = meshes::pipes(if context.quick { 600 } else { 2600 });
-    let scenes = [(format!("wavelet {}", size.name()), context.wavelet(size)?), ("pipes".into(), pipes)];
+    let scenes =
+        [(format!("wavelet {}", size.name()), context.wavelet(size)?), ("pipes".into(), pipes)];
     for (name, mesh) in &scenes {
         scene(context, record, embree, name, mesh, pixels)?;
     }
@@ -56,7 +60,11 @@ fn scene(
     for round in 0..2 {
         for i in order(fastest_secs.len(), round) {
             let quality = BuildQuality::ALL[i];
-            context.report_step(format!("{name}: building, {}, round {}", quality.name(), round + 1))?;
+            context.report_step(format!(
+                "{name}: building, {}, round {}",
+                quality.name(),
+                round + 1
+            ))?;
             let ours = RtCoreTracer::build(mesh, &BuildOptions { quality, ..Default::default() })?;
             fastest_secs[i] = fastest_secs[i].min(ours.cost.wall_secs);
             if round == 1 {
@@ -81,7 +89,9 @@ fn scene(
     }
     let view = View::orbit(mesh);
     let kinds = [Kind::Primary, Kind::AmbientOcclusion];
-    for (kind, rays) in compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent)) {
+    for (kind, rays) in
+        compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent))
+    {
         let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
         context.report_step(format!("{name}: {} rays", kind.name()))?;
         let mode = if kind.coherent() { Mode::Coherent } else { Mode::Incoherent };
@@ -101,8 +111,10 @@ fn scene(
         }));
         let schedule = context.schedule(Schedule::one_thread(), 3.0);
         let timings = compare::time(&schedule, kind, &rays, &contenders)?;
-        let base =
-            Row::new().with("mesh", name).with("triangles", mesh.num_triangles()).with("view", view.name);
+        let base = Row::new()
+            .with("mesh", name)
+            .with("triangles", mesh.num_triangles())
+            .with("view", view.name);
         let rows = compare::rows(&base.with("simd", "best"), kind, &rays, &contenders, &timings);
         let ours = built.iter().map(|(quality, o)| ("rt-core watertight", quality.name(), o.cost));
         let theirs = rivals.iter().map(|(rival, s)| (rival.as_str(), rival.as_str(), s.cost));
@@ -131,21 +143,24 @@ fn scene(
 
 /// Time to the n-th frame, build included: where lines cross, the better build has paid for itself.
 fn plot(record: &Record, mesh: &str) -> Plot {
-    let title =
-        format!("{mesh}: build, then frames of these primary and ambient-occlusion rays, one thread tracing");
+    let title = format!(
+        "{mesh}: build, then frames of these primary and ambient-occlusion rays, one thread tracing"
+    );
     let mut plot = Plot::lines(&title, Axis::log("frames", ""), Axis::log("total time", "s"));
     for quality in BuildQuality::ALL {
         let rows = || {
-            record
-                .rows
-                .iter()
-                .filter(|r| r.text("mesh") == Some(mesh) && r.text("preset") == Some(quality.name()))
+            record.rows.iter().filter(|r| {
+                r.text("mesh") == Some(mesh) && r.text("preset") == Some(quality.name())
+            })
         };
         let frame_secs: f64 = rows().filter_map(|r| r.number("time")).sum::<f64>() / 1e3;
         let Some(build_secs) = rows().find_map(|r| r.number("build")) else { continue };
         let frames = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
         let point = |n: &f64| Point { x: *n, y: build_secs + n * frame_secs, range: None };
-        plot.series.push(Series { name: quality.name().into(), points: frames.iter().map(point).collect() });
+        plot.series.push(Series {
+            name: quality.name().into(),
+            points: frames.iter().map(point).collect(),
+        });
     }
     plot
 }
@@ -182,8 +197,8 @@ mod tests {
         out
     }
 
-    /// Reads the record and times nothing: for some mesh and some number of frames, building with the preset and tracing that many frames takes
-    /// the least time.
+    /// Reads the record and times nothing: for some mesh and some number of frames, building with
+    /// the preset and tracing that many frames takes the least time.
     #[test]
     fn every_preset_is_the_best_choice_somewhere_in_the_record() {
         let rows = recorded();
@@ -199,7 +214,10 @@ mod tests {
             }
         }
         for name in known {
-            assert!(winners.contains(name), "`{name}` is never the best choice; these are: {winners:?}");
+            assert!(
+                winners.contains(name),
+                "`{name}` is never the best choice; these are: {winners:?}"
+            );
         }
     }
 }

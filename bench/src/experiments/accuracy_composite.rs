@@ -26,19 +26,28 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("bytes_per_pixel", "B", "of a drawn pixel in a message");
     record.column("strategy", "", "how the layers come together; all give the same bits");
     record.column("alpha", "", "opacity of each of the 128 layers");
-    record.column("error", "1/255", "largest difference of a channel from the sum in f64, in 8-bit steps");
+    record.column(
+        "error",
+        "1/255",
+        "largest difference of a channel from the sum in f64, in 8-bit steps",
+    );
     record.column("error_rms", "1/255", "root mean square of the same");
     record.column("time", "ms", "median over the frames until the image is on rank 0");
     record.column("sent", "MB", "bytes sent by all ranks");
     let (size, frames) = if context.quick { (96, 2) } else { (512, VERDICT_ROUNDS) };
     record.notes.push(format!(
-        "{LAYERS} ranks with one faint layer each over the whole image of {size} x {size} pixels, whose colour and opacity vary by a tenth from pixel to \
-         pixel. Formats, strategies and IceT take turns on the same ranks, in another order for every frame."
+        "{LAYERS} ranks with one faint layer each over the whole image of {size} x {size} pixels, \
+         whose colour and opacity vary by a tenth from pixel to \
+         pixel. Formats, strategies and IceT take turns on the same ranks, in another order for \
+         every frame."
     ));
     record.notes.push(CAVEAT.into());
-    let icet = icet::find().map_err(|why| record.missing.push(format!("IceT's 8-bit blending: {why}"))).ok();
+    let icet = icet::find()
+        .map_err(|why| record.missing.push(format!("IceT's 8-bit blending: {why}")))
+        .ok();
     // The strategies give the same bits: the one with fewer messages will do for the short form.
-    let strategies = [("radix-k", Strategy::RadixK { k: 8 }), ("direct send", Strategy::DirectSend)];
+    let strategies =
+        [("radix-k", Strategy::RadixK { k: 8 }), ("direct send", Strategy::DirectSend)];
     let strategies = &strategies[..if context.quick { 1 } else { 2 }];
     for alpha in ALPHAS {
         context.report_step(format!("alpha {alpha}"))?;
@@ -57,7 +66,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         Axis::log("largest error", "1/255"),
     );
     for format in ["u8", "u16", "f16", "f32", ICET_FORMAT] {
-        let of = |r: &&Row| r.text("format") == Some(format) && r.text("strategy") != Some("direct send");
+        let of = |r: &&Row| {
+            r.text("format") == Some(format) && r.text("strategy") != Some("direct send")
+        };
         let points = |column: &str| -> Vec<(f64, f64)> {
             let rows = record.rows.iter().filter(of);
             rows.filter_map(|r| r.number(column).zip(r.number("error"))).collect()
@@ -93,8 +104,9 @@ fn describe(rows: &[Row]) -> Option<String> {
             Some(format!("{icet_compositor:.1} and {ours:.1} at alpha {alpha}"))
         })
         .collect();
-    (!each.is_empty())
-        .then(|| format!("Largest errors of 8-bit blending, IceT's and ours, in 1/255: {}.", each.join("; ")))
+    (!each.is_empty()).then(|| {
+        format!("Largest errors of 8-bit blending, IceT's and ours, in 1/255: {}.", each.join("; "))
+    })
 }
 
 /// Premultiplied colour of `layer` at pixel `k`: a function that every format then rounds.
@@ -120,7 +132,8 @@ fn exact(alpha: f64, k: usize) -> [f64; 4] {
 
 /// One way to composite, on one rank.
 trait Contender {
-    /// Composites the rank's layer. When that was done on the rank's clock, and the bytes it sent, where that is known.
+    /// Composites the rank's layer. When that was done on the rank's clock, and the bytes it sent,
+    /// where that is known.
     fn composite(&mut self, comm: &mut SimComm) -> anyhow::Result<(f64, Option<u64>)>;
     /// The last image, on rank 0.
     fn image(&self) -> Option<Vec<[f32; 4]>>;
@@ -141,7 +154,8 @@ where
     PremultipliedPixel<C>: Composite + PixelFormat<Color = C>,
 {
     fn composite(&mut self, comm: &mut SimComm) -> anyhow::Result<(f64, Option<u64>)> {
-        let frame = Frame::<PremultipliedPixel<C>>::premultiplied(self.size, self.size, &self.layer)?;
+        let frame =
+            Frame::<PremultipliedPixel<C>>::premultiplied(self.size, self.size, &self.layer)?;
         let done = self.compositor.composite(comm, &frame)?;
         let end_secs = comm.now();
         self.image = done.image;
@@ -191,8 +205,12 @@ fn layer<C: Color>(case: &Case<'_>, rank: usize) -> Vec<C> {
     (0..pixels).map(|k| C::from_f32(layer_color(case.alpha, rank, k).map(|v| v as f32))).collect()
 }
 
-fn ours<C: Color + 'static>(all: &mut Vec<NamedContender>, format: &'static str, case: &Case<'_>, rank: usize)
-where
+fn ours<C: Color + 'static>(
+    all: &mut Vec<NamedContender>,
+    format: &'static str,
+    case: &Case<'_>,
+    rank: usize,
+) where
     PremultipliedPixel<C>: Composite + PixelFormat<Color = C>,
 {
     let layer = Rc::new(layer::<C>(case, rank));
@@ -204,8 +222,12 @@ where
             final_barrier: false,
             ..Options::default()
         });
-        let contender =
-            Box::new(OurCompositor { size: case.size, layer: layer.clone(), compositor, image: None });
+        let contender = Box::new(OurCompositor {
+            size: case.size,
+            layer: layer.clone(),
+            compositor,
+            image: None,
+        });
         all.push(NamedContender { format, bytes_per_pixel: size_of::<C>(), strategy, contender });
     }
 }
@@ -223,7 +245,8 @@ fn contenders(comm: &mut SimComm, case: &Case<'_>) -> anyhow::Result<Vec<NamedCo
         let strategy = IcetStrategy::RadixKr;
         icet.set_strategy(strategy);
         icet.set_order(&(0..ranks).collect::<Vec<_>>());
-        let icet_compositor = IcetCompositor { size: case.size, layer: layer(case, rank), icet, image: None };
+        let icet_compositor =
+            IcetCompositor { size: case.size, layer: layer(case, rank), icet, image: None };
         let (format, strategy) = (ICET_FORMAT, strategy.name());
         all.push(NamedContender {
             format,
@@ -270,8 +293,9 @@ fn measure(record: &mut Record, case: &Case<'_>) -> anyhow::Result<()> {
     })?;
     let Some(root) = results.first() else { return Ok(()) };
     for (k, of) in root.iter().enumerate() {
-        let slowest: Vec<f64> =
-            (0..case.frames).map(|f| results.iter().map(|r| r[k].secs[f]).fold(0.0, f64::max)).collect();
+        let slowest: Vec<f64> = (0..case.frames)
+            .map(|f| results.iter().map(|r| r[k].secs[f]).fold(0.0, f64::max))
+            .collect();
         let sent: Option<u64> = results.iter().map(|r| r[k].sent).sum();
         let Some(image) = &of.image else { anyhow::bail!("{}: rank 0 has no image", of.format) };
         let (worst, rms) = error_of(image, case.alpha);
@@ -317,15 +341,23 @@ mod tests {
                 return;
             }
         };
-        let mut record = Record::new("accuracy-composite", "", 3, true, crate::machine::Machine::describe());
+        let mut record =
+            Record::new("accuracy-composite", "", 3, true, crate::machine::Machine::describe());
         let strategies = [("radix-k", Strategy::RadixK { k: 8 })];
-        let case = Case { alpha: ALPHAS[0], size: 16, frames: 1, strategies: &strategies, icet: Some(&icet) };
+        let case = Case {
+            alpha: ALPHAS[0],
+            size: 16,
+            frames: 1,
+            strategies: &strategies,
+            icet: Some(&icet),
+        };
         measure(&mut record, &case).unwrap();
         let of = |format: &str| {
             let row = record.rows.iter().find(|r| r.text("format") == Some(format)).expect(format);
             row.number("error").unwrap()
         };
-        // 128 layers of 1/255 each sum up to 0.473 of white; whoever rounds every sum down has no more than one of them.
+        // 128 layers of 1/255 each sum up to 0.473 of white; whoever rounds every sum down has no
+        // more than one of them.
         assert!(of(ICET_FORMAT) > 100.0, "{}", of(ICET_FORMAT));
         assert!(of("u8") < 60.0 && of("u16") < 1.0 && of("f32") < 1e-3, "{:?}", record.rows);
         let note = describe(&record.rows).unwrap();

@@ -1,9 +1,9 @@
-//! Leaks: rays from inside closed surfaces, aimed exactly at vertices and edges, that come out; and what not leaking
-//! costs in time.
+//! Leaks: rays from inside closed surfaces, aimed exactly at vertices and edges, that come out; and
+//! what not leaking costs in time.
 //!
-//! From inside a closed surface every ray must hit. Rays are aimed at mesh vertices, at points on edges, and in random
-//! directions; a miss is a leak. Nothing else is judged here: which triangle answers is a matter for the
-//! comparison with brute force in the tests.
+//! From inside a closed surface every ray must hit. Rays are aimed at mesh vertices, at points on
+//! edges, and in random directions; a miss is a leak. Nothing else is judged here: which triangle
+//! answers is a matter for the comparison with brute force in the tests.
 
 use super::Context;
 use super::installed_tracers::InstalledBaselines;
@@ -64,16 +64,23 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("aim", "", "what the rays are aimed at, from inside");
     record.column("rays", "", "number of rays");
     record.column("leaks", "", "rays that came out");
-    record.column("seconds", "s", "CPU time of tracing them, all threads together, without making them");
+    record.column(
+        "seconds",
+        "s",
+        "CPU time of tracing them, all threads together, without making them",
+    );
     let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     // 12 combinations of mesh and aim: 10^8 rays for each of our modes in full.
     let (per_combination, rivals) =
         if context.quick { (4 * BATCH, 2 * BATCH) } else { (128 * BATCH, 32 * BATCH) };
     record.notes.push(format!(
-        "Every ray starts inside a closed surface, so every miss is a leak. rt-core traces {} rays in each mode, its \
-         rivals {}: half from random points one at a time, half from common points as packets. The meshes are a \
-         sphere at the origin, the same far from it, a crumpled one, and a globe with needle triangles.",
+        "Every ray starts inside a closed surface, so every miss is a leak. rt-core traces {} rays \
+         in each mode, its \
+         rivals {}: half from random points one at a time, half from common points as packets. The \
+         meshes are a \
+         sphere at the origin, the same far from it, a crumpled one, and a globe with needle \
+         triangles.",
         12 * per_combination,
         12 * rivals
     ));
@@ -84,8 +91,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let cases = [
         Case { name: "sphere", mesh: sphere(0.0, DVec3::ZERO), center: DVec3::ZERO, radius: 0.7 },
         Case { name: "sphere far away", mesh: sphere(0.0, far), center: far, radius: 0.7 },
-        Case { name: "crumpled sphere", mesh: sphere(0.02, DVec3::ZERO), center: DVec3::ZERO, radius: 0.5 },
-        Case { name: "globe", mesh: Arc::new(meshes::globe(1000, 60)), center: DVec3::ZERO, radius: 0.7 },
+        Case {
+            name: "crumpled sphere",
+            mesh: sphere(0.02, DVec3::ZERO),
+            center: DVec3::ZERO,
+            radius: 0.5,
+        },
+        Case {
+            name: "globe",
+            mesh: Arc::new(meshes::globe(1000, 60)),
+            center: DVec3::ZERO,
+            radius: 0.7,
+        },
     ];
     for case in &cases {
         let base = Row::new().with("mesh", case.name).with("triangles", case.mesh.num_triangles());
@@ -157,7 +174,8 @@ fn count_leaks(case: &Case, tracers: &[TracerUnderTest<'_>]) -> Vec<Row> {
                     if batch < s.count / BATCH {
                         let tracer = &*s.modes[batch % 2];
                         let ((), time) = clock::measure(|| tracer.closest(&rays.blocks, &mut hits));
-                        found[i] = (rays.len as u64 - count_hits(&rays, &hits), time.thread_cpu_secs);
+                        found[i] =
+                            (rays.len as u64 - count_hits(&rays, &hits), time.thread_cpu_secs);
                     }
                 }
                 found
@@ -171,9 +189,10 @@ fn count_leaks(case: &Case, tracers: &[TracerUnderTest<'_>]) -> Vec<Row> {
     by_tracer.concat()
 }
 
-/// A batch of rays from inside, the same for every tracer: even batches from random points at random triangles, odd
-/// ones from one point at triangles in the mesh's order, so that neighbouring rays go the same way and packets are
-/// used. Origins are rounded to f32 first, so that the direction is the difference of the numbers the tracer sees.
+/// A batch of rays from inside, the same for every tracer: even batches from random points at
+/// random triangles, odd ones from one point at triangles in the mesh's order, so that neighbouring
+/// rays go the same way and packets are used. Origins are rounded to f32 first, so that the
+/// direction is the difference of the numbers the tracer sees.
 fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
     let mut random = Random::new(batch << 8 | aim as u64);
     let (mesh, packets) = (&case.mesh, batch % 2 == 1);
@@ -207,8 +226,10 @@ fn plot(record: &Record) -> Plot {
     let mut plot = Plot::bars(title, Axis::log("leaks per million rays", ""), categories);
     let mut names: Vec<(String, String)> = vec![];
     for r in &record.rows {
-        let key =
-            (r.text("tracer").unwrap_or("").to_string(), r.text("robustness").unwrap_or("").to_string());
+        let key = (
+            r.text("tracer").unwrap_or("").to_string(),
+            r.text("robustness").unwrap_or("").to_string(),
+        );
         if !names.contains(&key) {
             names.push(key);
         }
@@ -225,7 +246,8 @@ fn plot(record: &Record) -> Plot {
             let sum = |column: &str| rows().filter_map(|r| r.number(column)).sum::<f64>();
             1e6 * sum("leaks") / sum("rays").max(1.0)
         };
-        let points = Aim::ALL.iter().enumerate().map(|(i, &a)| (i as f64, per_million(a))).collect();
+        let points =
+            Aim::ALL.iter().enumerate().map(|(i, &a)| (i as f64, per_million(a))).collect();
         plot.series.push(Series::new(format!("{tracer} {robustness}"), points));
     }
     plot
@@ -260,7 +282,8 @@ mod tests {
         let ours = RtCoreTracer::build(&case.mesh, &BuildOptions::default()).unwrap();
         let modes: [Box<dyn Tracer + '_>; 2] =
             [Box::new(ours.view(Mode::Single)), Box::new(ours.view(Mode::Coherent))];
-        let rows = count_leaks(&case, &[TracerUnderTest { row: Row::new(), modes, count: 2 * BATCH }]);
+        let rows =
+            count_leaks(&case, &[TracerUnderTest { row: Row::new(), modes, count: 2 * BATCH }]);
         assert_eq!(rows.len(), 3);
         for r in rows {
             assert_eq!(r.number("leaks"), Some(0.0), "{r:?}");

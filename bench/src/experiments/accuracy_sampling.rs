@@ -47,8 +47,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("reference_samples", "", "samples of the reference");
     let (pixels, most, reference) = if context.quick { (96, 64, 1024) } else { (256, 256, 16384) };
     record.notes.push(format!(
-        "A grey level is 1/255 of white in linear light. References have {reference} low-discrepancy samples with another \
-         seed. Ambient occlusion and soft shadows are sampled at the pixel’s centre alone, so that each curve shows one \
+        "A grey level is 1/255 of white in linear light. References have {reference} \
+         low-discrepancy samples with another \
+         seed. Ambient occlusion and soft shadows are sampled at the pixel’s centre alone, so that \
+         each curve shows one \
          source of error; antialiasing is the pixel’s area."
     ));
     let mesh = meshes::coarse_wavelet(if context.quick { 41 } else { 101 })?;
@@ -61,7 +63,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             Axis::log("RMS error", "grey level"),
         );
         context.report_step(format!("{}: reference of {reference} samples", quantity.name))?;
-        let plain = RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
+        let plain =
+            RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
         let (exact, _) = picture(&quantity, &camera, &options, reference)?;
         // All settings of a quantity in turns: a slow minute of the machine is slow for all.
@@ -97,7 +100,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         if let Some(e) = failed.into_inner() {
             return Err(e);
         }
-        for ((timed, (sampling, n)), frame) in timings.variants.iter().zip(&settings).zip(frames.into_inner())
+        for ((timed, (sampling, n)), frame) in
+            timings.variants.iter().zip(&settings).zip(frames.into_inner())
         {
             let (Some(frame), time) = (frame, timed.summary(Clock::Wall)) else { continue };
             let (rms, largest) = difference(&frame, &exact);
@@ -105,24 +109,29 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let row = row.with("samples", *n).with("time", time.median * 1e3);
             let row = row.with("time_low", time.low * 1e3).with("time_high", time.high * 1e3);
             let row = row.with("rounds", timed.samples.len()).with("rms_error", rms);
-            record.rows.push(row.with("largest_error", largest).with("reference_samples", reference));
+            record
+                .rows
+                .push(row.with("largest_error", largest).with("reference_samples", reference));
         }
         let mut words = vec![];
         for sampling in Sampling::ALL {
             let of = |r: &&Row| {
-                r.text("quantity") == Some(quantity.name) && r.text("sampling") == Some(sampling.name())
+                r.text("quantity") == Some(quantity.name)
+                    && r.text("sampling") == Some(sampling.name())
             };
             let rows: Vec<&Row> = record.rows.iter().filter(of).collect();
             let points = rows.iter().filter_map(|r| r.number("time").zip(r.number("rms_error")));
             plot.series.push(Series::new(sampling.name(), points.collect()));
             let (first, last) = (rows.first(), rows.last());
-            let ends = first.zip(last).and_then(|(a, b)| a.number("rms_error").zip(b.number("rms_error")));
+            let ends =
+                first.zip(last).and_then(|(a, b)| a.number("rms_error").zip(b.number("rms_error")));
             if let Some((few, many)) = ends {
                 words.push(format!("{} {:.1} times", sampling.name(), few / many));
             }
         }
         record.notes.push(format!(
-            "{}: from 1 sample to {most} the error fell: {}. Errors that fall with the square root would have fallen {:.1} times.",
+            "{}: from 1 sample to {most} the error fell: {}. Errors that fall with the square root \
+             would have fallen {:.1} times.",
             quantity.name,
             words.join(", "),
             f64::from(most).sqrt()
@@ -150,7 +159,8 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
             scene: ao,
             with: |s, o, rays| {
                 let mut scene = s.clone();
-                scene.ambient_occlusion = s.ambient_occlusion.map(|a| AmbientOcclusion { rays, ..a });
+                scene.ambient_occlusion =
+                    s.ambient_occlusion.map(|a| AmbientOcclusion { rays, ..a });
                 (scene, o.clone())
             },
         },
@@ -202,7 +212,8 @@ mod tests {
 
     #[test]
     fn more_samples_come_closer_and_low_discrepancy_closest() {
-        let world = World::from_mesh(meshes::coarse_wavelet(21).unwrap(), &BuildOptions::default()).unwrap();
+        let world = World::from_mesh(meshes::coarse_wavelet(21).unwrap(), &BuildOptions::default())
+            .unwrap();
         let camera = Framing::Fitted.of(&world, [32, 32]).unwrap();
         for q in quantities(world, &camera) {
             let draw = |sampling, seed, n| {

@@ -1,5 +1,5 @@
-//! Error against time of light's way through a gas: integrator by interpolant by step by precision, on closed forms; and the tolerance asked for
-//! against the error got.
+//! Error against time of light's way through a gas: integrator by interpolant by step by precision,
+//! on closed forms; and the tolerance asked for against the error got.
 
 use super::Context;
 use super::test_section::{
@@ -15,8 +15,8 @@ use schlieren::analytic::Luneburg;
 use schlieren::field::Field;
 use schlieren::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use schlieren::march::{
-    BlankCells, CellExact, Deviational, DormandPrince, Euler, Full, FullOptions, Integrator, LineOfSight,
-    Options, Pefrl, Ray, RungeKutta4, Scheme, Sharma, Verlet,
+    BlankCells, CellExact, Deviational, DormandPrince, Euler, Full, FullOptions, Integrator,
+    LineOfSight, Options, Pefrl, Ray, RungeKutta4, Scheme, Sharma, Verlet,
 };
 use schlieren::path::{LightPaths, PathQuantities, Start};
 use schlieren::plan::{Mode, Plan, Request};
@@ -36,14 +36,24 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("precision", "", "of the march's numbers");
     record.column("step", "voxel", "longest step");
     record.column("samples", "", "samples of the medium along a ray");
-    record.column("time", "ns", "CPU time of one thread for a ray: lattice and tolerance median over rounds in turns, integrators fastest of three runs");
+    record.column(
+        "time",
+        "ns",
+        "CPU time of one thread for a ray: lattice and tolerance median \
+                                 over rounds in turns, integrators fastest of three runs",
+    );
     record.column(
         "rms_error",
         "",
-        "root mean square over rays, as part of the largest true deflection (Luneburg: of the radius)",
+        "root mean square over rays, as part of the largest true deflection (Luneburg: of the \
+         radius)",
     );
     record.column("largest_error", "", "largest error, the same way");
-    record.column("order", "", "observed order: from this and the row before, at half as many samples");
+    record.column(
+        "order",
+        "",
+        "observed order: from this and the row before, at half as many samples",
+    );
     record.column("amplitude", "", "largest eps of the blob");
     record.column("asked", "rad", "tolerance asked for");
     record.column("bound", "rad", "a-priori bound of all errors of the plan");
@@ -80,12 +90,16 @@ struct MarchCase<'a> {
 /// Times in turns on this thread, in ns a ray (median), rms and largest error of each.
 fn measure_cases(quick: bool, cases: &[MarchCase<'_>]) -> anyhow::Result<Vec<(f64, f64, f64)>> {
     // The runs that give the errors warm up.
-    let errors: Vec<(f64, f64)> =
-        cases.iter().map(|s| error_of(&traced(&*s.paths, &s.rays.compared), &s.rays.truth)).collect();
+    let errors: Vec<(f64, f64)> = cases
+        .iter()
+        .map(|s| error_of(&traced(&*s.paths, &s.rays.compared), &s.rays.truth))
+        .collect();
     let mut variants: Vec<Variant<'_>> = cases
         .iter()
         .enumerate()
-        .map(|(i, s)| Variant::new(i.to_string(), move || fingerprint(&traced(&*s.paths, &s.rays.timed))))
+        .map(|(i, s)| {
+            Variant::new(i.to_string(), move || fingerprint(&traced(&*s.paths, &s.rays.timed)))
+        })
         .collect();
     let timings = interleave(&rounds_of(quick), &mut variants)?;
     let times = timings.variants.iter().zip(cases);
@@ -100,7 +114,11 @@ fn rounds_of(quick: bool) -> Schedule {
 }
 
 fn steps(quick: bool) -> &'static [f64] {
-    if quick { &[16.0, 8.0, 4.0, 2.0, 1.0, 0.5] } else { &[16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125] }
+    if quick {
+        &[16.0, 8.0, 4.0, 2.0, 1.0, 0.5]
+    } else {
+        &[16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125]
+    }
 }
 
 /// A blob on a lattice, seen obliquely: every march, interpolant and step.
@@ -109,17 +127,23 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     context.report_step(format!("closed form on a lattice, amplitude {amplitude:e}"))?;
     let (gaussian, field) = blob(amplitude, n)?;
     let view = oblique()?;
-    // All are compared by the same rays. The f64 marches take a ray at a time and ten times as long, so fewer are timed.
+    // All are compared by the same rays. The f64 marches take a ray at a time and ten times as
+    // long, so fewer are timed.
     let compared = tiles(if context.quick { 16 } else { 32 }, 0.5);
     let truth = blob_deflections(&gaussian, &view, &compared)?;
     let few = Rays { timed: compared.clone(), compared, truth };
-    let fast = Rays { timed: tiles(64, 0.5), compared: few.compared.clone(), truth: few.truth.clone() };
+    let fast =
+        Rays { timed: tiles(64, 0.5), compared: few.compared.clone(), truth: few.truth.clone() };
     if amplitude < 1e-3 {
         record.notes.push(format!(
-            "Lattice: blobs of eps 1e-5 (a gas) and 0.03 (a liquid) and sigma 0.08 m in a cube of 1 m, {n}³ nodes (sigma is {:.1} voxels), seen 0.6 \
-             rad off its axes. The truth is an adaptive march in f64 through the blob itself. f32 marches carry deviations, sixteen rays at a time; \
-             f64 marches take one ray at a time; the cell-exact one ends its steps on the faces of cells and takes three Gauss points in each, so that what it \
-             has left of error is the interpolant's. The dissertation's march carries position and direction in f32.",
+            "Lattice: blobs of eps 1e-5 (a gas) and 0.03 (a liquid) and sigma 0.08 m in a cube of \
+             1 m, {n}³ nodes (sigma is {:.1} voxels), seen 0.6 \
+             rad off its axes. The truth is an adaptive march in f64 through the blob itself. f32 \
+             marches carry deviations, sixteen rays at a time; \
+             f64 marches take one ray at a time; the cell-exact one ends its steps on the faces of \
+             cells and takes three Gauss points in each, so that what it \
+             has left of error is the interpolant's. The dissertation's march carries position and \
+             direction in f32.",
             0.08 * (n - 1) as f64
         ));
     }
@@ -129,8 +153,13 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     let gradients = TrilinearGradient::new(&field);
     let mut named: Vec<(&str, &str, &str, Option<f64>)> = vec![];
     let mut cases: Vec<MarchCase<'_>> = vec![];
-    let los =
-        LineOfSight::new(&field, view, Interpolant::BSpline, PathQuantities::default(), BlankCells::Opaque);
+    let los = LineOfSight::new(
+        &field,
+        view,
+        Interpolant::BSpline,
+        PathQuantities::default(),
+        BlankCells::Opaque,
+    );
     named.push(("line of sight", "b-spline", "f32", None));
     cases.push(fast.march_case(Box::new(los)));
     for (name, interpolant) in INTERPOLANTS {
@@ -139,7 +168,12 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
             for (march, scheme) in [("Verlet", Scheme::Verlet), ("Euler", Scheme::Euler)] {
                 let options = Options { scheme, step_voxels, ..Options::default() };
                 named.push((march, name, "f32", Some(step_voxels)));
-                cases.push(fast.march_case(Box::new(Deviational::new(&field, view, interpolant, options))));
+                cases.push(fast.march_case(Box::new(Deviational::new(
+                    &field,
+                    view,
+                    interpolant,
+                    options,
+                ))));
             }
             let options = FullOptions { step_voxels, ..FullOptions::default() };
             let full = FullMarches { field: &field, view, options };
@@ -162,25 +196,26 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     let results = measure_cases(context.quick, &cases)?;
 
     let mut curves: Vec<Series> = vec![];
-    let mut add = |march: &str, interpolant: &str, precision: &str, step: Option<f64>, m: (f64, f64, f64)| {
-        record.rows.push(
-            Row::new()
-                .with("part", "lattice")
-                .with("march", march)
-                .with("interpolant", interpolant)
-                .with("precision", precision)
-                .with("step", step)
-                .with("time", m.0)
-                .with("rms_error", m.1)
-                .with("largest_error", m.2)
-                .with("amplitude", amplitude),
-        );
-        let name = format!("{march}, {interpolant}, {precision}");
-        match curves.iter_mut().find(|s| s.name == name) {
-            Some(s) => s.points.extend(Series::new("", vec![(m.0, m.1)]).points),
-            None => curves.push(Series::new(name, vec![(m.0, m.1)])),
-        }
-    };
+    let mut add =
+        |march: &str, interpolant: &str, precision: &str, step: Option<f64>, m: (f64, f64, f64)| {
+            record.rows.push(
+                Row::new()
+                    .with("part", "lattice")
+                    .with("march", march)
+                    .with("interpolant", interpolant)
+                    .with("precision", precision)
+                    .with("step", step)
+                    .with("time", m.0)
+                    .with("rms_error", m.1)
+                    .with("largest_error", m.2)
+                    .with("amplitude", amplitude),
+            );
+            let name = format!("{march}, {interpolant}, {precision}");
+            match curves.iter_mut().find(|s| s.name == name) {
+                Some(s) => s.points.extend(Series::new("", vec![(m.0, m.1)]).points),
+                None => curves.push(Series::new(name, vec![(m.0, m.1)])),
+            }
+        };
     for ((march, interpolant, precision, step), m) in named.into_iter().zip(results) {
         add(march, interpolant, precision, step, m);
     }
@@ -209,7 +244,8 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     Ok(())
 }
 
-/// What decides the error on a lattice: rms errors by interpolant, by integrator, and of the dissertation's march by step.
+/// What decides the error on a lattice: rms errors by interpolant, by integrator, and of the
+/// dissertation's march by step.
 fn describe_lattice(rows: &[Row], amplitude: f64) -> String {
     let find = |march: &str, interpolant: &str, precision: &str, step: f64| {
         let here = |r: &&Row| {
@@ -223,12 +259,16 @@ fn describe_lattice(rows: &[Row], amplitude: f64) -> String {
         let error = rows.iter().find(here).and_then(|r| r.number("rms_error"));
         error.map_or("not measured".into(), |e| format!("{e:.1e}"))
     };
-    let by_interpolant = INTERPOLANTS.map(|(i, _)| format!("{i} {}", find("Verlet", i, "f32", 1.0)));
-    let by_march = ["Euler", "Verlet", "PEFRL"].map(|m| format!("{m} {}", find(m, "b-spline", "f64", 1.0)));
-    let by_step = [16.0, 1.0, 0.5]
-        .map(|s| format!("{} at steps of {s}", find("dissertation", "trilinear gradients", "f32", s)));
+    let by_interpolant =
+        INTERPOLANTS.map(|(i, _)| format!("{i} {}", find("Verlet", i, "f32", 1.0)));
+    let by_march =
+        ["Euler", "Verlet", "PEFRL"].map(|m| format!("{m} {}", find(m, "b-spline", "f64", 1.0)));
+    let by_step = [16.0, 1.0, 0.5].map(|s| {
+        format!("{} at steps of {s}", find("dissertation", "trilinear gradients", "f32", s))
+    });
     format!(
-        "eps {amplitude:e}, rms errors at steps of a voxel: by interpolant (Verlet, f32) {}; by integrator (b-spline, f64) {}. The dissertation's march: \
+        "eps {amplitude:e}, rms errors at steps of a voxel: by interpolant (Verlet, f32) {}; by \
+         integrator (b-spline, f64) {}. The dissertation's march: \
          {} voxels.",
         by_interpolant.join(", "),
         by_march.join(", "),
@@ -244,7 +284,11 @@ struct FullMarches<'a> {
 }
 
 impl<'a> FullMarches<'a> {
-    fn one<I: Interpolate, G: Integrator + 'a>(&self, i: &'a I, integrator: G) -> Box<dyn LightPaths + 'a> {
+    fn one<I: Interpolate, G: Integrator + 'a>(
+        &self,
+        i: &'a I,
+        integrator: G,
+    ) -> Box<dyn LightPaths + 'a> {
         Box::new(Full::new(self.field, i, integrator, self.view, self.options))
     }
 
@@ -268,8 +312,10 @@ impl<'a> FullMarches<'a> {
 fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     context.report_step("integrators on the Luneburg lens")?;
     record.notes.push(
-        "Integrators: 101 rays through a quarter turn of a Luneburg lens, f64, no lattice; the error is that of the place they reach. \
-         By theory orders are 1 for Euler, 2 for Verlet, 4 for Sharma, RK4 and PEFRL; the column has what was observed. The adaptive Dormand-Prince is \
+        "Integrators: 101 rays through a quarter turn of a Luneburg lens, f64, no lattice; the \
+         error is that of the place they reach. \
+         By theory orders are 1 for Euler, 2 for Verlet, 4 for Sharma, RK4 and PEFRL; the column \
+         has what was observed. The adaptive Dormand-Prince is \
          the reference of everything else."
             .into(),
     );
@@ -338,12 +384,14 @@ fn lens(mut end: impl FnMut(f64) -> DVec3) -> (f64, f64, f64) {
     let mut ends = vec![];
     let secs = (0..3)
         .map(|_| {
-            let (places, time) = clock::measure(|| heights.iter().map(|b| end(*b)).collect::<Vec<DVec3>>());
+            let (places, time) =
+                clock::measure(|| heights.iter().map(|b| end(*b)).collect::<Vec<DVec3>>());
             ends = places;
             time.thread_cpu_secs
         })
         .fold(f64::INFINITY, f64::min);
-    let off = heights.iter().zip(&ends).map(|(b, e)| (*e - Luneburg::ray(*b, FRAC_PI_2).0).length());
+    let off =
+        heights.iter().zip(&ends).map(|(b, e)| (*e - Luneburg::ray(*b, FRAC_PI_2).0).length());
     let (squares, largest) = off.fold((0.0, 0.0f64), |(s, l), o| (s + o * o, l.max(o)));
     let n = heights.len() as f64;
     (secs * 1e9 / n, (squares / n).sqrt(), largest)
@@ -362,7 +410,8 @@ fn describe_tolerances(rows: &[Row]) -> String {
         .collect();
     let (low, high) = over.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     format!(
-        "Of {} plans {} kept the tolerance asked; of the {} whose own bound is within it {} did. Bounds are {low:.1} to {high:.0} times the error got.",
+        "Of {} plans {} kept the tolerance asked; of the {} whose own bound is within it {} did. \
+         Bounds are {low:.1} to {high:.0} times the error got.",
         plans.len(),
         plans.iter().filter(kept).count(),
         plans.iter().filter(within).count(),
@@ -374,7 +423,8 @@ fn describe_tolerances(rows: &[Row]) -> String {
 fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let n = if context.quick { 64 } else { 128 };
     record.notes.push(format!(
-        "Tolerance: plans for blobs of three amplitudes on {n}³ nodes. A plan's bound adds up worst cases."
+        "Tolerance: plans for blobs of three amplitudes on {n}³ nodes. A plan's bound adds up \
+         worst cases."
     ));
     let mut plot = Plot::lines(
         "Tolerance asked against error got",
@@ -398,13 +448,15 @@ fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<
         let scale = truth.iter().map(|t| t[0].hypot(t[1])).fold(0.0, f64::max);
         let (mut got_points, mut time_points) = (vec![], vec![]);
         let exponents: Vec<i32> = (3..=10).collect();
-        let plan_for =
-            |e: &i32| Plan::new(&field, Request { tolerance_rad: 10f64.powi(-e), ..Request::default() });
+        let plan_for = |e: &i32| {
+            Plan::new(&field, Request { tolerance_rad: 10f64.powi(-e), ..Request::default() })
+        };
         let plans: Vec<Plan> = exponents.iter().map(plan_for).collect();
         let cases: Vec<MarchCase<'_>> =
             plans.iter().map(|p| rays.march_case(p.paths(&field, view))).collect();
         let results = measure_cases(context.quick, &cases)?;
-        for ((exponent, plan), (ns, rms, largest)) in exponents.into_iter().zip(&plans).zip(results) {
+        for ((exponent, plan), (ns, rms, largest)) in exponents.into_iter().zip(&plans).zip(results)
+        {
             let asked = 10f64.powi(-exponent);
             let b = plan.bounds;
             let got = largest * scale;

@@ -1,7 +1,7 @@
 //! Ours against Embree 3, Embree 4 and obvhs: same mesh, same rays, one process, in turns.
 //!
-//! Our watertight mode is compared with everyone's modes, also with those that are not robust; each rival enters with
-//! the packet width that was fastest for it.
+//! Our watertight mode is compared with everyone's modes, also with those that are not robust; each
+//! rival enters with the packet width that was fastest for it.
 
 use super::Context;
 use super::compare::{self, Kind};
@@ -31,9 +31,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     record.notes.push(
-        "One thread traces; every tracer gets the same rays in the same order, in turns within one process. A rival's \
-         time is that of its fastest mode. rt-core uses its packet entry point for rays that go the same way and its \
-         sorting entry point for the others, whichever is faster. obvhs is compiled for the baseline instruction set \
+        "One thread traces; every tracer gets the same rays in the same order, in turns within one \
+         process. A rival's \
+         time is that of its fastest mode. rt-core uses its packet entry point for rays that go \
+         the same way and its \
+         sorting entry point for the others, whichever is faster. obvhs is compiled for the \
+         baseline instruction set \
          and computes no barycentric coordinates."
             .into(),
     );
@@ -42,7 +45,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let w1 = context.wavelet(Size::M1)?;
         vec![("wavelet 1M", w1, Isa::Best), ("pipes", meshes::pipes(600), Isa::Best)]
     } else {
-        let (w1, w16, pipes) = (context.wavelet(Size::M1)?, context.wavelet(Size::M16)?, meshes::pipes(2600));
+        let (w1, w16, pipes) =
+            (context.wavelet(Size::M1)?, context.wavelet(Size::M16)?, meshes::pipes(2600));
         vec![
             ("wavelet 1M", w1.clone(), Isa::Best),
             ("wavelet 1M", w1.clone(), Isa::Avx2),
@@ -67,16 +71,23 @@ fn scene(
     mesh: &Arc<TriMesh>,
     isa: Isa,
 ) -> anyhow::Result<()> {
-    let full_name = if isa == Isa::Best { name.to_string() } else { format!("{name}, {}", isa.name()) };
-    let tracers =
-        TracerSet::build(mesh, installed, isa, &mut |s| context.report_step(format!("{full_name}: {s}")))?;
-    let base = Row::new().with("mesh", name).with("triangles", mesh.num_triangles()).with("simd", isa.name());
+    let full_name =
+        if isa == Isa::Best { name.to_string() } else { format!("{name}, {}", isa.name()) };
+    let tracers = TracerSet::build(mesh, installed, isa, &mut |s| {
+        context.report_step(format!("{full_name}: {s}"))
+    })?;
+    let base = Row::new()
+        .with("mesh", name)
+        .with("triangles", mesh.num_triangles())
+        .with("simd", isa.name());
 
     // ---- Builds. Each was built once; fig4.7 measures build times in turns.
     for (tracer, cost) in tracers.costs() {
         let per_triangle = |bytes: u64| bytes as f64 / mesh.num_triangles() as f64;
         let row = base.clone().with("tracer", tracer).with("build", cost.wall_secs);
-        let row = row.with("build_cpu", cost.cpu_secs).with("bytes_per_triangle", per_triangle(cost.bytes));
+        let row = row
+            .with("build_cpu", cost.cpu_secs)
+            .with("bytes_per_triangle", per_triangle(cost.bytes));
         record.rows.push(row.with("peak_bytes_per_triangle", cost.peak_bytes.map(per_triangle)));
     }
 
@@ -92,7 +103,8 @@ fn scene(
         };
         let watertight = tracers.ours[0].1.view(crate::rt_core_tracer::Mode::Coherent);
         for (kind, rays) in compare::make_rays(mesh, view, size, kinds, &watertight) {
-            // Eight ambient-occlusion rays per pixel: runs of blocks from all over the picture are enough.
+            // Eight ambient-occlusion rays per pixel: runs of blocks from all over the picture are
+            // enough.
             let rays = rays.thinned(if context.quick { 1 << 18 } else { 1 << 21 });
             if rays.len == 0 {
                 continue;
@@ -106,10 +118,14 @@ fn scene(
             let what = format!("{full_name}, {}, {}", view.name, kind.name());
             for rival in tracers.baseline_names() {
                 let Some(best) = compare::best_mode(rival, &contenders, &timings) else { continue };
-                let ours: &[&str] = if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
+                let ours: &[&str] =
+                    if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
                 for tracer in ours {
-                    // Ours is the suited mode, listed first; only rivals have the best picked for them.
-                    let Some(c) = contenders.iter().find(|c| c.tracer_name == *tracer) else { continue };
+                    // Ours is the suited mode, listed first; only rivals have the best picked for
+                    // them.
+                    let Some(c) = contenders.iter().find(|c| c.tracer_name == *tracer) else {
+                        continue;
+                    };
                     if let Some(r) = timings.ratio(&c.name(), &best) {
                         record.ratios.push(Ratio { name: format!("{what}: {tracer}"), ..r });
                     }
@@ -126,7 +142,11 @@ fn plots(record: &mut Record) {
     for r in &record.ratios {
         let Some(what) = r.name.strip_suffix(&format!(": {OURS}")) else { continue };
         // "mesh, view, rays"; the rays' name may have a comma of its own.
-        let kind = Kind::ALL.iter().map(|k| k.name()).filter(|k| what.ends_with(k)).max_by_key(|k| k.len());
+        let kind = Kind::ALL
+            .iter()
+            .map(|k| k.name())
+            .filter(|k| what.ends_with(k))
+            .max_by_key(|k| k.len());
         let Some(kind) = kind else { continue };
         let scene = what.trim_end_matches(kind).trim_end_matches(", ").to_string();
         match groups.iter_mut().find(|(s, _)| *s == scene) {

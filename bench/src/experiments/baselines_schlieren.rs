@@ -1,8 +1,10 @@
-//! Time at equal error against the dissertation's method (Euler, trilinear gradients): in one process, in turns.
+//! Time at equal error against the dissertation's method (Euler, trilinear gradients): in one
+//! process, in turns.
 //!
-//! The rival runs twice: as one would write it from the text (scalar, position and direction in f32), and as its scheme in our own kernel
-//! (deviations, sixteen rays at a time), which leaves only the difference of the method. For each of its steps, ours is the cheapest setting whose error is not
-//! larger.
+//! The rival runs twice: as one would write it from the text (scalar, position and direction in
+//! f32), and as its scheme in our own kernel (deviations, sixteen rays at a time), which leaves
+//! only the difference of the method. For each of its steps, ours is the cheapest setting whose
+//! error is not larger.
 
 use super::Context;
 use super::test_section::{
@@ -33,7 +35,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("view", "", "where from: along an axis of the lattice, or 0.6 rad off");
     record.column("march", "", "who, and how");
     record.column("step", "voxel", "step");
-    record.column("rms_error", "", "root mean square over rays, as part of the largest true deflection");
+    record.column(
+        "rms_error",
+        "",
+        "root mean square over rays, as part of the largest true deflection",
+    );
     record.column("largest_error", "", "largest error, the same way");
     record.column(
         "time",
@@ -44,10 +50,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("our_error", "", "its rms error");
     record.column("our_time", "ns", "its time for a ray");
     record.notes.push(
-        "A blob of eps 1e-4 and sigma 0.08 m in a cube of 1 m; the truth is an adaptive march in f64. Ratios are the rival's time by ours, in \
-         turns on one thread by CPU time, at an error of ours that is not larger. `traced` takes every ray through the volume; `line of sight` \
-         reads a projection that is made before, and `projected anew` makes it inside the time. Building the dissertation's texture and our \
-         spline is outside. Signs and scales that the published code of the dissertation has wrong are right here. Where no traced setting \
+        "A blob of eps 1e-4 and sigma 0.08 m in a cube of 1 m; the truth is an adaptive march in \
+         f64. Ratios are the rival's time by ours, in \
+         turns on one thread by CPU time, at an error of ours that is not larger. `traced` takes \
+         every ray through the volume; `line of sight` \
+         reads a projection that is made before, and `projected anew` makes it inside the time. \
+         Building the dissertation's texture and our \
+         spline is outside. Signs and scales that the published code of the dissertation has wrong \
+         are right here. Where no traced setting \
          reaches the rival's error the record says so."
             .into(),
     );
@@ -74,7 +84,8 @@ fn describe(rows: &[Row]) -> String {
     let of = || rows.iter().filter(|r| r.text("march") == Some(rival));
     let mut each = vec![];
     for coarse in of().filter(|r| r.number("step") == Some(16.0)) {
-        let place = |r: &Row| (r.number("nodes").unwrap_or(0.0), r.text("view").unwrap_or("").to_string());
+        let place =
+            |r: &Row| (r.number("nodes").unwrap_or(0.0), r.text("view").unwrap_or("").to_string());
         let fine = of().find(|r| place(r) == place(coarse) && r.number("step") == Some(0.5));
         let error = |r: &Row| r.number("rms_error").unwrap_or(f64::NAN);
         if let Some(fine) = fine {
@@ -83,7 +94,8 @@ fn describe(rows: &[Row]) -> String {
         }
     }
     format!(
-        "From steps of 16 voxels to steps of half a voxel the error of the {rival} went from and to: {}. What stays is its interpolant's.",
+        "From steps of 16 voxels to steps of half a voxel the error of the {rival} went from and \
+         to: {}. What stays is its interpolant's.",
         each.join("; ")
     )
 }
@@ -99,8 +111,15 @@ fn compare(
     let n = field.dims()[0];
     let mut traced_ours = ours(field, view);
     trial(&mut traced_ours, starts, truth)?;
-    let los =
-        || LineOfSight::new(field, view, Interpolant::BSpline, PathQuantities::default(), BlankCells::Opaque);
+    let los = || {
+        LineOfSight::new(
+            field,
+            view,
+            Interpolant::BSpline,
+            PathQuantities::default(),
+            BlankCells::Opaque,
+        )
+    };
     let projected = los();
     let (los_error, _) = error_of(&traced(&projected, starts), truth);
     let base = || Row::new().with("nodes", n).with("view", view_name);
@@ -115,27 +134,36 @@ fn compare(
         let scalar = ThesisMarch::new(field, view, step);
         let options = Options { scheme: Scheme::Euler, step_voxels: step, ..Options::default() };
         let kernel = Deviational::new(field, view, Interpolant::TrilinearGradient, options);
-        let rivals: [(&str, &dyn LightPaths); 2] =
-            [("dissertation, from the text", &scalar), ("dissertation's scheme in our kernel", &kernel)];
+        let rivals: [(&str, &dyn LightPaths); 2] = [
+            ("dissertation, from the text", &scalar),
+            ("dissertation's scheme in our kernel", &kernel),
+        ];
         for (rival, paths) in rivals {
             let (rms, largest) = error_of(&traced(paths, starts), truth);
-            let best = traced_ours.iter().filter(|o| o.error <= rms).min_by(|a, b| a.secs.total_cmp(&b.secs));
+            let best = traced_ours
+                .iter()
+                .filter(|o| o.error <= rms)
+                .min_by(|a, b| a.secs.total_cmp(&b.secs));
             let what = format!("{n}³, {view_name}, step {step}");
             let Some(best) = best else {
                 record.missing.push(format!(
-                    "{rival}, {what}: its error of {rms:.1e} is below that of every traced setting of ours"
+                    "{rival}, {what}: its error of {rms:.1e} is below that of every traced setting \
+                     of ours"
                 ));
                 continue;
             };
-            let mut variants = vec![tracing("rival", paths, starts), tracing("traced", &*best.paths, starts)];
+            let mut variants =
+                vec![tracing("rival", paths, starts), tracing("traced", &*best.paths, starts)];
             if los_error <= rms {
                 variants.push(tracing("line of sight", &projected, starts));
                 variants.push(Variant::new("line of sight, projected anew", || {
                     fingerprint(&traced(&los(), starts))
                 }));
             }
-            let timings = interleave(&context.schedule(Schedule::one_thread(), 0.5), &mut variants)?;
-            let ns = |name: &str| timings.summary(name).map(|s| s.median * 1e9 / starts.len() as f64);
+            let timings =
+                interleave(&context.schedule(Schedule::one_thread(), 0.5), &mut variants)?;
+            let ns =
+                |name: &str| timings.summary(name).map(|s| s.median * 1e9 / starts.len() as f64);
             record.rows.push(
                 base()
                     .with("march", rival)
@@ -186,11 +214,13 @@ fn ours(field: &Field, view: View) -> Vec<OurMarch<'_>> {
 /// Errors of all settings, and their times of a trial in turns.
 fn trial(ours: &mut [OurMarch<'_>], starts: &[Start], truth: &[[f64; 2]]) -> anyhow::Result<()> {
     // The runs that give the errors warm up.
-    let schedule = Schedule { warmup_rounds: 0, rounds: 2, min_rounds: 2, ..Schedule::one_thread() };
+    let schedule =
+        Schedule { warmup_rounds: 0, rounds: 2, min_rounds: 2, ..Schedule::one_thread() };
     for o in ours.iter_mut() {
         (o.error, _) = error_of(&traced(&*o.paths, starts), truth);
     }
-    let mut variants: Vec<Variant<'_>> = ours.iter().map(|o| tracing(&o.name, &*o.paths, starts)).collect();
+    let mut variants: Vec<Variant<'_>> =
+        ours.iter().map(|o| tracing(&o.name, &*o.paths, starts)).collect();
     let timings = interleave(&schedule, &mut variants)?;
     drop(variants);
     for (o, timed) in ours.iter_mut().zip(&timings.variants) {
@@ -211,7 +241,8 @@ fn tracing<'a>(name: &str, paths: &'a dyn LightPaths, starts: &'a [Start]) -> Va
 
 /// Bars of the ratios, and error against time on the finest lattice.
 fn plot(record: &mut Record) {
-    let (from_text, in_kernel) = ("dissertation, from the text", "dissertation's scheme in our kernel");
+    let (from_text, in_kernel) =
+        ("dissertation, from the text", "dissertation's scheme in our kernel");
     let mut bars = Plot::bars(
         "The dissertation's time / ours, traced, at an error that is not larger",
         Axis::log("ratio, above 1 ours is faster", ""),

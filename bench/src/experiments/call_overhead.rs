@@ -29,10 +29,12 @@ fn calls_of(source: &str) -> Vec<&str> {
 
 /// Refuses a run that does not tell each call once: there is nothing to compare the others with.
 fn check_complete(backend: &str, calls: &[&str], reported: &[(String, f64)]) -> anyhow::Result<()> {
-    let missing: Vec<&str> = calls.iter().copied().filter(|c| reported.iter().all(|(t, _)| t != c)).collect();
+    let missing: Vec<&str> =
+        calls.iter().copied().filter(|c| reported.iter().all(|(t, _)| t != c)).collect();
     anyhow::ensure!(
         missing.is_empty(),
-        "{backend}: the program of calls ended well, but told no time of {}; is the gluray beside bench as new as \
+        "{backend}: the program of calls ended well, but told no time of {}; is the gluray beside \
+         bench as new as \
          bench? `cargo build --workspace` builds both",
         missing.join(", ")
     );
@@ -52,12 +54,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "",
         "straight to Mesa, or through gluray as GLVND's vendor library or by LD_PRELOAD",
     );
-    record.column("time", "ns", "a call: median over the runs of each run's best round of two million");
+    record.column(
+        "time",
+        "ns",
+        "a call: median over the runs of each run's best round of two million",
+    );
     record.column("time_low", "ns", "fastest run");
     record.column("time_high", "ns", "slowest run");
     record.column("overhead", "ns", "how much more than native, median over pairs of runs");
     record.notes.push(
-        "CPU time of the thread that calls, in a program in C that opens OpenGL with dlopen; runs take turns. Colours and normals are kept back until \
+        "CPU time of the thread that calls, in a program in C that opens OpenGL with dlopen; runs \
+         take turns. Colours and normals are kept back until \
          something needs them, so they can cost less than native."
             .into(),
     );
@@ -77,8 +84,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let dir = tempfile::tempdir()?;
     let (source, program) = (dir.path().join("calls.c"), dir.path().join("calls"));
     std::fs::write(&source, CALLS)?;
-    let made = Command::new(compiler).arg("-O2").arg("-o").arg(&program).arg(&source).arg("-ldl").output()?;
-    anyhow::ensure!(made.status.success(), "the C compiler: {}", String::from_utf8_lossy(&made.stderr));
+    let made = Command::new(compiler)
+        .arg("-O2")
+        .arg("-o")
+        .arg(&program)
+        .arg(&source)
+        .arg("-ldl")
+        .output()?;
+    anyhow::ensure!(
+        made.status.success(),
+        "the C compiler: {}",
+        String::from_utf8_lossy(&made.stderr)
+    );
     let display = Display::start(&tools.xvfb)?;
     let runs = if context.quick { 3 } else { 11 };
     let mut times: BTreeMap<(String, usize), Vec<f64>> = BTreeMap::new();
@@ -95,7 +112,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     for call in calls {
         for (backend, (name, _)) in BACKENDS.iter().enumerate() {
-            let (own, native) = (&times[&(call.to_string(), backend)], &times[&(call.to_string(), 0)]);
+            let (own, native) =
+                (&times[&(call.to_string(), backend)], &times[&(call.to_string(), 0)]);
             let more: Vec<f64> = own.iter().zip(native).map(|(o, n)| o - n).collect();
             let Some(t) = Summary::of(own) else { continue };
             let row = Row::new().with("call", call).with("way", *name).with("time", t.median);
@@ -150,7 +168,9 @@ mod tests {
         let mut reported: Vec<(String, f64)> = calls.iter().map(|c| (c.to_string(), 1.0)).collect();
         check_complete("native", &calls, &reported).expect("all are told");
         reported.retain(|(call, _)| call != "glEnable");
-        let why = check_complete("LD_PRELOAD", &calls, &reported).expect_err("one is missing").to_string();
+        let why = check_complete("LD_PRELOAD", &calls, &reported)
+            .expect_err("one is missing")
+            .to_string();
         assert!(
             why.contains("LD_PRELOAD") && why.contains("glEnable") && !why.contains("glColor3f"),
             "{why}"

@@ -18,8 +18,13 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) const ALL: [Kind; 5] =
-        [Kind::Primary, Kind::Shadow, Kind::ShadowFromLight, Kind::AmbientOcclusion, Kind::Incoherent];
+    pub(super) const ALL: [Kind; 5] = [
+        Kind::Primary,
+        Kind::Shadow,
+        Kind::ShadowFromLight,
+        Kind::AmbientOcclusion,
+        Kind::Incoherent,
+    ];
 
     pub(super) fn name(self) -> &'static str {
         match self {
@@ -42,7 +47,8 @@ impl Kind {
     }
 }
 
-/// Makes the rays of a kind for a view of `size` x `size` pixels; `tracer` finds the surface they start on.
+/// Makes the rays of a kind for a view of `size` x `size` pixels; `tracer` finds the surface they
+/// start on.
 pub(super) fn make_rays(
     mesh: &TriMesh,
     view: &View,
@@ -136,8 +142,10 @@ pub(super) fn rows(
         let s = timed.summary(timings.clock);
         let row = base.clone().with("rays", kind.name()).with("count", rays.len);
         let row = row.with("tracer", c.tracer_name.as_str()).with("mode", c.mode.as_str());
-        let row =
-            row.with("time", s.median * 1e3).with("time_low", s.low * 1e3).with("time_high", s.high * 1e3);
+        let row = row
+            .with("time", s.median * 1e3)
+            .with("time_low", s.low * 1e3)
+            .with("time_high", s.high * 1e3);
         Some(row.with("rate", rays.len as f64 / s.median / 1e6).with("hits", timed.check))
     };
     contenders.iter().filter_map(row).collect()

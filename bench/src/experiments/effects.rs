@@ -1,4 +1,5 @@
-//! What each effect costs: the same view drawn plainly and with one effect, in turns, with the rays that it sends.
+//! What each effect costs: the same view drawn plainly and with one effect, in turns, with the rays
+//! that it sends.
 
 use super::Context;
 use crate::picture::framing::Framing;
@@ -37,7 +38,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("time", "ms", "median over the rounds, wall time, all threads");
     record.column("time_low", "ms", "fastest round");
     record.column("time_high", "ms", "slowest round");
-    record.column("times_plain", "", "time by that of the plain picture, median of the rounds’ ratios");
+    record.column(
+        "times_plain",
+        "",
+        "time by that of the plain picture, median of the rounds’ ratios",
+    );
     record.column("primary", "", "primary rays");
     record.column("shadow", "", "shadow rays");
     record.column("ambient_occlusion", "", "ambient-occlusion rays");
@@ -47,8 +52,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("path", "", "bounces of the path tracer");
     record.column("rate", "Mray/s", "rays of all kinds by median time");
     record.notes.push(format!(
-        "The scene is lit by one point light and ambient light. The row “{ALL_ALLOWED}” draws the plain scene with every \
-         effect switched on in the options: the scene needs none, so no secondary ray may be sent (else the experiment fails)."
+        "The scene is lit by one point light and ambient light. The row “{ALL_ALLOWED}” draws the \
+         plain scene with every \
+         effect switched on in the options: the scene needs none, so no secondary ray may be sent \
+         (else the experiment fails)."
     ));
 
     let mesh = if context.quick {
@@ -91,7 +98,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         return Err(e.into());
     }
 
-    let mut bars = Plot::bars("Time of a frame by that of the plain picture", Axis::log("ratio", ""), vec![]);
+    let mut bars =
+        Plot::bars("Time of a frame by that of the plain picture", Axis::log("ratio", ""), vec![]);
     bars.mark = Some(1.0);
     let mut heights = vec![];
     for (i, (case, seen)) in cases.iter().zip(rays.into_inner()).enumerate() {
@@ -140,7 +148,9 @@ fn describe_unused_effects(ratio: &Ratio) -> String {
         Verdict::Open => "whether unused effects cost time is left open",
         Verdict::Even => "the rounds do not tell the two apart: no cost of unused effects is seen",
         Verdict::Faster => "unused effects cost time here",
-        Verdict::Slower => "it was the shorter one, which no unused effect explains: something else differed",
+        Verdict::Slower => {
+            "it was the shorter one, which no unused effect explains: something else differed"
+        }
     };
     format!("Its time by that of the plain picture is {}; {conclusion}.", ratio.in_words())
 }
@@ -151,7 +161,8 @@ fn cases(mut plain: Scene, pixels: u32) -> anyhow::Result<Vec<Case>> {
     let camera = Framing::Fitted.of(&plain.world, [pixels, pixels])?;
     let eye = camera.eye().unwrap_or(center);
     let color = [0.6, 0.65, 0.7];
-    let light = Light::point(eye + camera.world_from_view() * DVec3::new(radius, 1.5 * radius, 0.0));
+    let light =
+        Light::point(eye + camera.world_from_view() * DVec3::new(radius, 1.5 * radius, 0.0));
     plain.lights = vec![light.without_shadows(), Light::ambient([0.3; 3])];
     plain.materials = vec![Material::phong(color, 0.2, 30.0)];
 
@@ -214,8 +225,9 @@ mod tests {
 
     #[test]
     fn the_note_on_unused_effects_follows_the_rounds() {
-        let words =
-            |rounds: &[f64]| describe_unused_effects(&Ratio::of_rounds(PLAIN, ALL_ALLOWED, rounds).unwrap());
+        let words = |rounds: &[f64]| {
+            describe_unused_effects(&Ratio::of_rounds(PLAIN, ALL_ALLOWED, rounds).unwrap())
+        };
         assert!(words(&[1.0, 1.01, 0.99, 1.0, 1.0]).contains("no cost of unused effects is seen"));
         let dear = words(&[1.5, 1.6, 1.4, 1.5, 1.5]);
         assert!(
@@ -231,7 +243,8 @@ mod tests {
         let scene = Scene::new(World::from_mesh(mesh, &BuildOptions::default()).unwrap());
         for c in cases(scene, 24).unwrap() {
             let r = render(&c.scene, &c.camera, &c.options).unwrap().report.rays;
-            let kinds = [r.shadow, r.ambient_occlusion, r.reflection, r.refraction, r.transparency, r.path];
+            let kinds =
+                [r.shadow, r.ambient_occlusion, r.reflection, r.refraction, r.transparency, r.path];
             let expected = match c.name {
                 n if n.contains("shadows") => Some(0),
                 n if n.starts_with("ambient") => Some(1),

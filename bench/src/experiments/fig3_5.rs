@@ -1,4 +1,5 @@
-//! Figure 3.5: frames per second of compositing alone, 2 to 128 ranks: binary swap against direct send and IceT.
+//! Figure 3.5: frames per second of compositing alone, 2 to 128 ranks: binary swap against direct
+//! send and IceT.
 
 use super::Context;
 use super::many_ranks::{CAVEAT, powers, simulated};
@@ -33,37 +34,51 @@ const ALL: [(&str, Backend); 5] = [
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("ranks", "", "ranks");
-    record.column("compositor", "", "strategy; IceT is the library of the dissertation, over the same ranks");
-    record.column("time", "ms", "median over the frames, from the common begin until the image is on rank 0");
+    record.column(
+        "compositor",
+        "",
+        "strategy; IceT is the library of the dissertation, over the same ranks",
+    );
+    record.column(
+        "time",
+        "ms",
+        "median over the frames, from the common begin until the image is on rank 0",
+    );
     record.column("fps", "1/s", "frames per second at that time");
     record.column("time_low", "ms", "fastest frame");
     record.column("time_high", "ms", "slowest frame");
     record.column(
         "smpi",
         "ms",
-        "the same under SimGrid's SMPI, of IceT its best strategy; empty where that is not installed",
+        "the same under SimGrid's SMPI, of IceT its best strategy; empty where that is not \
+         installed",
     );
     record.column(
         "model_over_smpi",
         "",
-        "time by our model over that by SMPI, of direct send, and of IceT its best strategy in either",
+        "time by our model over that by SMPI, of direct send, and of IceT its best strategy in \
+         either",
     );
     record.column("differ", "", "pixels that differ from direct send's image");
     let (size, frames, most) = if context.quick { (512, 2, 64) } else { (1024, 5, 128) };
     record.notes.push(format!(
-        "Frames of {size} x {size} pixels, RGBA8 and f32 depth, as ranks would have drawn a volume cut into bricks (`discs` of `composite \
-         compare`). All compositors take turns on the same frames and ranks, in another order for every frame. The dissertation: binary swap above 20 frames per second at 128 nodes, \
+        "Frames of {size} x {size} pixels, RGBA8 and f32 depth, as ranks would have drawn a volume \
+         cut into bricks (`discs` of `composite \
+         compare`). All compositors take turns on the same frames and ranks, in another order for \
+         every frame. The dissertation: binary swap above 20 frames per second at 128 nodes, \
          IceT near 100."
     ));
     record.notes.push(CAVEAT.into());
     record.notes.push(
-        "Here the model has SMPI's corrections of latency and bandwidth by length of message (measured on gigabit Ethernet), so that it can be compared \
+        "Here the model has SMPI's corrections of latency and bandwidth by length of message \
+         (measured on gigabit Ethernet), so that it can be compared \
          with SMPI."
             .into(),
     );
     if context.quick {
         record.notes.push(
-            "The quick form has SMPI up to 8 ranks only, from the library for SimGrid as it was built before: it builds nothing."
+            "The quick form has SMPI up to 8 ranks only, from the library for SimGrid as it was \
+             built before: it builds nothing."
                 .into(),
         );
     }
@@ -88,11 +103,16 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             }
         }
     }
-    let mut plot = Plot::lines("Compositing", Axis::log("ranks", ""), Axis::log("frames per second", "1/s"));
+    let mut plot =
+        Plot::lines("Compositing", Axis::log("ranks", ""), Axis::log("frames per second", "1/s"));
     for (name, _) in ALL {
         let of = |r: &&Row| r.text("compositor") == Some(name);
-        let points: Vec<(f64, f64)> =
-            record.rows.iter().filter(of).filter_map(|r| r.number("ranks").zip(r.number("fps"))).collect();
+        let points: Vec<(f64, f64)> = record
+            .rows
+            .iter()
+            .filter(of)
+            .filter_map(|r| r.number("ranks").zip(r.number("fps")))
+            .collect();
         if !points.is_empty() {
             plot.series.push(Series::new(name, points));
         }
@@ -110,8 +130,9 @@ fn measure(
 ) -> anyhow::Result<()> {
     let all: Vec<(&str, Backend)> =
         ALL.into_iter().filter(|(_, w)| icet.is_some() || matches!(w, Backend::Ours(_))).collect();
-    let results =
-        simulated(Network::QDR_AS_SMPI, ranks, |mut comm| run_rank(&mut comm, &all, size, frames, icet))?;
+    let results = simulated(Network::QDR_AS_SMPI, ranks, |mut comm| {
+        run_rank(&mut comm, &all, size, frames, icet)
+    })?;
     // By compositor and frame: the slowest rank.
     let secs = |k: usize, f: usize| results.iter().map(|r| r.secs[k][f]).fold(0.0, f64::max);
     for (k, (name, _)) in all.iter().enumerate() {
@@ -129,7 +150,11 @@ fn measure(
         );
         if k > 0 {
             let ratios: Vec<f64> = (0..frames).map(|f| secs(k, f) / secs(0, f)).collect();
-            record.ratios.extend(Ratio::of_rounds(format!("direct send, {ranks} ranks"), *name, &ratios));
+            record.ratios.extend(Ratio::of_rounds(
+                format!("direct send, {ranks} ranks"),
+                *name,
+                &ratios,
+            ));
         }
     }
     Ok(())
@@ -145,9 +170,9 @@ fn compare_with_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64
         let name = row.text("compositor").unwrap_or_default().to_string();
         let time = row.number("time");
         *row = match name.as_str() {
-            "direct send" => {
-                std::mem::take(row).with("smpi", ours_ms).with("model_over_smpi", time.map(|t| t / ours_ms))
-            }
+            "direct send" => std::mem::take(row)
+                .with("smpi", ours_ms)
+                .with("model_over_smpi", time.map(|t| t / ours_ms)),
             "IceT radix-kr" => {
                 let ratio = icet_best.map(|t| t / icet_ms);
                 std::mem::take(row).with("smpi", icet_ms).with("model_over_smpi", ratio)
@@ -157,7 +182,8 @@ fn compare_with_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64
     }
 }
 
-/// One rank's times by compositor and frame, and on rank 0 the pixels that differ from the first compositor's.
+/// One rank's times by compositor and frame, and on rank 0 the pixels that differ from the first
+/// compositor's.
 struct RankResult {
     secs: Vec<Vec<f64>>,
     differ: Vec<u64>,
@@ -186,11 +212,13 @@ fn run_rank(
             Backend::Icet(_) => None,
         })
         .collect();
-    let mut theirs = icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
+    let mut theirs =
+        icet.map(|path| Icet::over_comm(path, comm, IcetMode::Depth, size, size)).transpose()?;
     let mut out = RankResult { secs: vec![Vec::new(); all.len()], differ: vec![0; all.len()] };
     for n in 0..=frames {
         Workload::Discs.draw(n as u64, rank, ranks, &mut drawn);
-        let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?.with_bounds(drawn.bounds)?;
+        let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?
+            .with_bounds(drawn.bounds)?;
         // In turns, in another order for every frame, which is the same on all ranks.
         let mut images: Vec<Option<Vec<[u8; 4]>>> = vec![None; all.len()];
         for k in order(all.len(), n) {

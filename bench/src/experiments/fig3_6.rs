@@ -1,4 +1,5 @@
-//! Figure 3.6: weak scaling of data-parallel rendering: the same number of triangles for every rank.
+//! Figure 3.6: weak scaling of data-parallel rendering: the same number of triangles for every
+//! rank.
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
@@ -16,10 +17,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     cost_columns(record);
     record.column("triangles", "", "triangles of the whole scene");
     record.column("per_rank", "", "triangles per rank");
-    let (largest, size, count) = if context.quick { (Size::M1, 384, 1) } else { (Size::M8, 1024, 3) };
+    let (largest, size, count) =
+        if context.quick { (Size::M1, 384, 1) } else { (Size::M8, 1024, 3) };
     record.notes.push(format!(
-        "Wavelet surfaces, {size} x {size} pixels, headlight, triangles per rank as constant as the named sizes allow. Every rank traces camera rays \
-         where its part is; that the picture is that of one node is for composite's tests, and not looked at here. The dissertation plots average and maximum render time: what \
+        "Wavelet surfaces, {size} x {size} pixels, headlight, triangles per rank as constant as \
+         the named sizes allow. Every rank traces camera rays \
+         where its part is; that the picture is that of one node is for composite's tests, and not \
+         looked at here. The dissertation plots average and maximum render time: what \
          lies between them is waiting."
     ));
     for ranks in powers(1, 128) {
@@ -29,8 +33,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let triangles = mesh.num_triangles();
         let (scene, camera) = demo.scene_of(mesh)?;
         let partition = Partition::new(&scene, ranks, &Split::Triangles);
-        let prepared = PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
-        let measured = frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
+        let prepared =
+            PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
+        let measured =
+            frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
         record.rows.push(
             with_cost(Row::new(), ranks, &measured)
                 .with("triangles", triangles)

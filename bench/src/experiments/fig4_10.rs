@@ -1,5 +1,6 @@
-//! Figure 4.10: replicated data, pieces of the picture to ranks (section 4.2.3), beside the same scene in parts, and beside processes that share the pictures of an
-//! unmodified program ([`super::program_ranks`]).
+//! Figure 4.10: replicated data, pieces of the picture to ranks (section 4.2.3), beside the same
+//! scene in parts, and beside processes that share the pictures of an unmodified program
+//! ([`super::program_ranks`]).
 
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
 use super::{Context, program_ranks};
@@ -10,19 +11,31 @@ use composite::render::{FrameOptions, Partition, Split};
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     cost_columns(record);
-    record.column("sharing", "", "replicated: every rank has the scene; parts: every rank has a share of it; gluray: a program and its helpers, which have the scene");
+    record.column(
+        "sharing",
+        "",
+        "replicated: every rank has the scene; parts: every rank has a \
+                                  share of it; gluray: a program and its helpers, which have the \
+                                  scene",
+    );
     record.column("speedup", "", "frame time of one rank over that of this many, same sharing");
     program_ranks::columns(record);
     record.column("imbalance", "", "slowest rank’s render time over the mean");
     record.notes.push(
-        "The wavelet with a lamp’s shadows and ambient occlusion. Replicated data need a whole scene’s memory on every rank, and then no ray leaves \
-         its rank; parts need a share of it, and rays travel. That both give the picture of one node is for composite's tests, and not looked at here."
+        "The wavelet with a lamp’s shadows and ambient occlusion. Replicated data need a whole \
+         scene’s memory on every rank, and then no ray leaves \
+         its rank; parts need a share of it, and rays travel. That both give the picture of one \
+         node is for composite's tests, and not looked at here."
             .into(),
     );
     // One frame after the first is enough: a frame is seconds of computing.
     let (size, pixels, count) = if context.quick { ("1M", 320, 1) } else { ("4M", 1024, 1) };
-    let demo =
-        Demo { size: Some(size.into()), size_px: [pixels; 2], color_by_rank: false, ..Demo::default() };
+    let demo = Demo {
+        size: Some(size.into()),
+        size_px: [pixels; 2],
+        color_by_rank: false,
+        ..Demo::default()
+    };
     context.report_step("data")?;
     let mut prepared = demo.prepare(1, &mut |_, _| true)?;
     let quick = context.quick;
@@ -45,7 +58,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         }
     }
     program_ranks::run(context, record)?;
-    let mut plot = Plot::lines("Sharing", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
+    let mut plot =
+        Plot::lines("Sharing", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
     for name in ["replicated", "parts", program_ranks::SHARING] {
         for (column, of_what) in [("frame", ""), ("render_max", ", slowest rank’s render")] {
             let of = record.rows.iter().filter(|r| r.text("sharing") == Some(name));

@@ -1,5 +1,5 @@
-//! Figure 4.7: build time against the number of triangles, for fast and for careful builds; with the peers' builds, and with a frame of
-//! Mesa's rasteriser, which needs no build.
+//! Figure 4.7: build time against the number of triangles, for fast and for careful builds; with
+//! the peers' builds, and with a frame of Mesa's rasteriser, which needs no build.
 
 use super::Context;
 use super::installed_tracers::InstalledBaselines;
@@ -40,14 +40,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.missing.extend(installed.missing.iter().cloned());
     let mesa = Mesa::find().map_err(|missing| record.missing.extend(missing)).ok();
     record.notes.push(
-        "Wall time from triangles in memory to a structure that rays can use, on all threads. The dissertation’s \
-         builds took under 1 s for 1 million triangles (approximate) to over 60 s for 256 million, on one 8-core \
+        "Wall time from triangles in memory to a structure that rays can use, on all threads. The \
+         dissertation’s \
+         builds took under 1 s for 1 million triangles (approximate) to over 60 s for 256 million, \
+         on one 8-core \
          node (2012)."
             .into(),
     );
     record.notes.push(
-        "A frame of llvmpipe is one of an unmodified program that keeps the mesh in buffers, 1024 x 1024 pixels, measured in the same rounds: \
-         what a program waits for anyway each time its picture changes, and so the yardstick for a build that is needed once."
+        "A frame of llvmpipe is one of an unmodified program that keeps the mesh in buffers, 1024 \
+         x 1024 pixels, measured in the same rounds: \
+         what a program waits for anyway each time its picture changes, and so the yardstick for a \
+         build that is needed once."
             .into(),
     );
     let with = Baselines { installed: &installed, mesa: mesa.as_ref() };
@@ -93,7 +97,10 @@ fn measure(
     context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
     let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = with.mesa {
-        drawn = mesa.draw(mesh, 1024).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
+        drawn = mesa
+            .draw(mesh, 1024)
+            .map_err(|e| record.missing.push(format!("{n} triangles: {e:#}")))
+            .ok();
     }
     for round in 0..rounds {
         context.report_step(format!("{n} triangles, round {} of {rounds}", round + 1))?;
@@ -109,7 +116,9 @@ fn measure(
         record.rows.push(row(name, mesh, costs));
     }
     if let Some(frames) = drawn {
-        let row = Row::new().with("triangles", n).with("builder", format!("a frame of {}", frames.name()));
+        let row = Row::new()
+            .with("triangles", n)
+            .with("builder", format!("a frame of {}", frames.name()));
         record.rows.push(frames.end(row, 1.0)?);
     }
     Ok(())
@@ -154,7 +163,8 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
     let of = |f: &dyn Fn(&BuildCost) -> f64| Summary::of(&costs.iter().map(f).collect::<Vec<_>>());
     let row = Row::new().with("triangles", mesh.num_triangles()).with("builder", name);
     let row = row.with("threads", rayon::current_num_threads());
-    let (Some(wall), Some(cpu), Some(cost)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs), costs.last())
+    let (Some(wall), Some(cpu), Some(cost)) =
+        (of(&|c| c.wall_secs), of(&|c| c.cpu_secs), costs.last())
     else {
         return row;
     };
@@ -167,14 +177,16 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
         .with("peak_bytes_per_triangle", cost.peak_bytes.map(|b| b as f64 / n))
 }
 
-/// The largest sizes need up to 400 bytes per triangle while building; a machine without them reports it.
+/// The largest sizes need up to 400 bytes per triangle while building; a machine without them
+/// reports it.
 pub(super) fn fits_in_memory(size: Size, record: &mut Record) -> bool {
     let needed_gib = size.triangles() as f64 * 400.0 / (1u64 << 30) as f64;
     let there_gib = record.machine.memory_gib;
     let fits = there_gib == 0.0 || needed_gib < 0.8 * there_gib;
     if !fits {
         record.missing.push(format!(
-            "{} triangles: building needs about {needed_gib:.0} GiB and this machine has {there_gib:.0} GiB",
+            "{} triangles: building needs about {needed_gib:.0} GiB and this machine has \
+             {there_gib:.0} GiB",
             size.name()
         ));
     }
@@ -185,7 +197,8 @@ fn plot(record: &Record) -> Plot {
     let mut plot = Plot::lines("Build time", Axis::log("triangles", ""), Axis::log("time", "s"));
     for row in &record.rows {
         let number = |c: &str| row.number(c);
-        let (Some(name), Some(x), Some(y)) = (row.text("builder"), number("triangles"), number("time"))
+        let (Some(name), Some(x), Some(y)) =
+            (row.text("builder"), number("triangles"), number("time"))
         else {
             continue;
         };

@@ -35,7 +35,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         false => (context.wavelet(Size::M1)?, 40),
     };
     record.notes.push(format!(
-        "pvbatch turns a camera around {} triangles for {frames} frames through `gluray run`; the phases are those that the library wrote down meanwhile.",
+        "pvbatch turns a camera around {} triangles for {frames} frames through `gluray run`; the \
+         phases are those that the library wrote down meanwhile.",
         mesh.num_triangles()
     ));
     context.report_step("data")?;
@@ -61,7 +62,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let mut phases: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
     for s in spans {
         let text = |k: &str| s[k].as_str().unwrap_or("").to_string();
-        phases.entry((text("track"), text("phase"))).or_default().push(s["ms"].as_f64().unwrap_or(0.0));
+        phases
+            .entry((text("track"), text("phase")))
+            .or_default()
+            .push(s["ms"].as_f64().unwrap_or(0.0));
     }
     for ((track, phase), times) in &phases {
         let Some(t) = Summary::of(times) else { continue };
@@ -99,8 +103,11 @@ fn middle_frame(spans: &[Value]) -> (f64, f64) {
     let frame = |s: &Value| s["frame"].as_u64().unwrap_or(0);
     let last = spans.iter().map(frame).max().unwrap_or(0);
     let shown = |s: &&Value| (last.saturating_sub(5)..last).contains(&frame(s));
-    let from =
-        spans.iter().filter(shown).filter_map(|s| s["start_ms"].as_f64()).fold(f64::INFINITY, f64::min);
+    let from = spans
+        .iter()
+        .filter(shown)
+        .filter_map(|s| s["start_ms"].as_f64())
+        .fold(f64::INFINITY, f64::min);
     let to = spans
         .iter()
         .filter(shown)
@@ -109,7 +116,12 @@ fn middle_frame(spans: &[Value]) -> (f64, f64) {
     (from, to)
 }
 
-fn draw(gluray: &Path, report: &Path, files: &[&Path], window: Option<(f64, f64)>) -> anyhow::Result<()> {
+fn draw(
+    gluray: &Path,
+    report: &Path,
+    files: &[&Path],
+    window: Option<(f64, f64)>,
+) -> anyhow::Result<()> {
     let mut command = Command::new(gluray);
     command.args(["--quiet", "timeline"]).arg(report);
     for f in files {

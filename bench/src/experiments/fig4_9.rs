@@ -1,4 +1,5 @@
-//! Figure 4.9: frame time against the number of triangles, same view, primary rays with a headlight; with frames of Mesa's rasteriser.
+//! Figure 4.9: frame time against the number of triangles, same view, primary rays with a
+//! headlight; with frames of Mesa's rasteriser.
 
 use super::Context;
 use super::fig4_7::fits_in_memory;
@@ -21,12 +22,21 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column(
         "view",
         "",
-        "view of the data set; `llvmpipe`: the whole of it, turning, drawn by an unmodified program",
+        "view of the data set; `llvmpipe`: the whole of it, turning, drawn by an unmodified \
+         program",
     );
     record.column("pixels", "", "pixels of the frame, one primary ray each");
     record.column("covered", "", "pixels that show a surface");
-    record.column("threads", "", "threads that render; empty for llvmpipe, which takes what there is");
-    record.column("time", "ms", "median over the rounds, wall time of a frame with headlight shading");
+    record.column(
+        "threads",
+        "",
+        "threads that render; empty for llvmpipe, which takes what there is",
+    );
+    record.column(
+        "time",
+        "ms",
+        "median over the rounds, wall time of a frame with headlight shading",
+    );
     record.column("time_low", "ms", "fastest round");
     record.column("time_high", "ms", "slowest round");
     record.column("cpu", "ms", "median CPU time of all threads");
@@ -34,8 +44,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("build", "s", "wall time of the acceleration structure");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the mesh");
     record.notes.push(
-        "A frame through the renderer: one primary ray a pixel, headlight, matte material, no secondary rays, from the \
-         same camera for all sizes. Views and llvmpipe take turns, a frame each. Where a ray tracer’s time and a rasteriser’s \
+        "A frame through the renderer: one primary ray a pixel, headlight, matte material, no \
+         secondary rays, from the \
+         same camera for all sizes. Views and llvmpipe take turns, a frame each. Where a ray \
+         tracer’s time and a rasteriser’s \
          cross is the point of the dissertation’s figure."
             .into(),
     );
@@ -61,7 +73,10 @@ fn describe_growth(record: &Record) -> Option<String> {
             words.push(format!("{} {:.2} times", series.name, last.y / first.y));
         }
     }
-    let ends = plot(record).series.first().and_then(|s| Some((s.points.first()?.x, s.points.last()?.x)))?;
+    let ends = plot(record)
+        .series
+        .first()
+        .and_then(|s| Some((s.points.first()?.x, s.points.last()?.x)))?;
     let more = ends.1 / ends.0;
     (!words.is_empty()).then(|| {
         format!(
@@ -90,8 +105,10 @@ fn measure(
     let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = mesa {
         context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
-        drawn =
-            mesa.draw(&mesh, pixels).map_err(|e| record.missing.push(format!("{n} triangles: {e:#}"))).ok();
+        drawn = mesa
+            .draw(&mesh, pixels)
+            .map_err(|e| record.missing.push(format!("{n} triangles: {e:#}")))
+            .ok();
     }
     let mut cameras: Vec<(String, Camera)> = vec![];
     for view in catalogue::find("wavelet")?.views() {
@@ -129,7 +146,8 @@ fn measure(
     let rays = f64::from(pixels) * f64::from(pixels);
     for timed in &timings.variants {
         let (wall, cpu) = (timed.summary(Clock::Wall), timed.summary(Clock::ProcessCpu));
-        let row = Row::new().with("triangles", n).with("view", timed.name.as_str()).with("pixels", rays);
+        let row =
+            Row::new().with("triangles", n).with("view", timed.name.as_str()).with("pixels", rays);
         let row = row.with("time", wall.median * 1e3).with("time_low", wall.low * 1e3);
         let row = row.with("time_high", wall.high * 1e3).with("cpu", cpu.median * 1e3);
         let is_ours = cameras.iter().any(|(name, _)| *name == timed.name);
@@ -150,9 +168,11 @@ fn measure(
 }
 
 fn plot(record: &Record) -> Plot {
-    let mut plot = Plot::lines("Time of a frame", Axis::log("triangles", ""), Axis::log("time", "ms"));
+    let mut plot =
+        Plot::lines("Time of a frame", Axis::log("triangles", ""), Axis::log("time", "ms"));
     for row in &record.rows {
-        let (Some(view), Some(x), Some(y)) = (row.text("view"), row.number("triangles"), row.number("time"))
+        let (Some(view), Some(x), Some(y)) =
+            (row.text("view"), row.number("triangles"), row.number("time"))
         else {
             continue;
         };

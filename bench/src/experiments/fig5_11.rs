@@ -1,7 +1,10 @@
-//! Figure 5.11: photons per second by technique, on the combustion jet of 480x720x100, by line of sight and traced.
+//! Figure 5.11: photons per second by technique, on the combustion jet of 480x720x100, by line of
+//! sight and traced.
 
 use super::Context;
-use super::test_section::{GTX_280_PHOTONS_PER_SEC, check_cancelled, flow, picture, render_picture, scene};
+use super::test_section::{
+    GTX_280_PHOTONS_PER_SEC, check_cancelled, flow, picture, render_picture, scene,
+};
 use crate::clock::Clock;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
@@ -22,21 +25,28 @@ const TECHNIQUES: [(&str, &str); 9] = [
     ("shadowgraph", "[technique]\nkind = \"shadowgraph\""),
     ("schlieren, knife", "[technique]\nkind = \"schlieren\""),
     // The pair that shows what absorption costs, and that without it in the scene nothing is paid.
-    ("schlieren, knife, smoke", "[technique]\nkind = \"schlieren\"\n[media]\nabsorption = \"smoke\""),
+    (
+        "schlieren, knife, smoke",
+        "[technique]\nkind = \"schlieren\"\n[media]\nabsorption = \"smoke\"",
+    ),
     (
         "schlieren, circle",
         "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"circle\", radius_m = 2e-4 }",
     ),
     (
         "schlieren, complemented circle",
-        "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"complemented-circle\", radius_m = 2e-4 }",
+        "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"complemented-circle\", radius_m = \
+         2e-4 }",
     ),
     (
         "schlieren, colour",
         "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"color\", radius_m = 5e-4 }",
     ),
     ("interferogram, infinite fringe", "[technique]\nkind = \"interferogram\""),
-    ("interferogram, finite fringe", "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 2e-3"),
+    (
+        "interferogram, finite fringe",
+        "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 2e-3",
+    ),
     ("BOS", "[technique]\nkind = \"bos\""),
 ];
 
@@ -57,8 +67,17 @@ struct Bench {
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("technique", "", "what is made of the light");
-    record.column("march", "", "by line of sight (one projection), or every photon through the volume (Verlet, b-spline, a step a voxel)");
-    record.column("photons", "", "photons of a run: 512² pixels, 10 each by line of sight, 1 traced");
+    record.column(
+        "march",
+        "",
+        "by line of sight (one projection), or every photon through the \
+                                volume (Verlet, b-spline, a step a voxel)",
+    );
+    record.column(
+        "photons",
+        "",
+        "photons of a run: 512² pixels, 10 each by line of sight, 1 traced",
+    );
     record.column("rate", "Mphoton/s", "photons by median wall time on all threads, start to film");
     record.column("rate_per_core", "Mphoton/s", "photons by CPU time of all threads");
     record.column("frames", "1/s", "frames of 512² pixels with 10 photons each, by that rate");
@@ -67,13 +86,22 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "",
         "rate by the 34.1 Mphoton/s (13 frames) that the dissertation reports for its GTX 280",
     );
-    record.column("picture", "s", "wall time of a whole picture from the field at hand: plan, projection or spline, 16 photons a pixel or beams");
+    record.column(
+        "picture",
+        "s",
+        "wall time of a whole picture from the field at hand: plan, \
+                                   projection or spline, 16 photons a pixel or beams",
+    );
     let threads = rayon::current_num_threads();
     record.notes.push(format!(
-        "Everything a photon needs: low-discrepancy start, way through the gas, technique, film. Wall time on {threads} threads; the rate per core \
-         is by CPU time and is what an idle core does. The projection of line of sight and the spline of the march are made once for a view and \
-         are not in the rates; `picture` is a whole `schlieren render` without reading the file. Smoke (absorption, on the flow's \
-         own lattice) stands in the test section of every row; only the row that calls for it walks through it."
+        "Everything a photon needs: low-discrepancy start, way through the gas, technique, film. \
+         Wall time on {threads} threads; the rate per core \
+         is by CPU time and is what an idle core does. The projection of line of sight and the \
+         spline of the march are made once for a view and \
+         are not in the rates; `picture` is a whole `schlieren render` without reading the file. \
+         Smoke (absorption, on the flow's \
+         own lattice) stands in the test section of every row; only the row that calls for it \
+         walks through it."
     ));
     let (size, dims) = ("thesis", "480x720x100");
     context.report_step(format!("combustion jet {dims}"))?;
@@ -106,7 +134,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             scene.march.method = Some(method.into());
             scene.march.interpolant = Some("b-spline".into());
             scene.march.step_voxels = Some(1.0).filter(|_| march == TRACED);
-            let planned = section.paths(&scene, 0, PathQuantities { opd: b.needs.1 }, b.needs.0, false)?;
+            let planned =
+                section.paths(&scene, 0, PathQuantities { opd: b.needs.1 }, b.needs.0, false)?;
             shared.push((b.needs, planned.paths));
         }
         let mut variants: Vec<Variant<'_>> = vec![];
@@ -160,9 +189,19 @@ fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32
         margin_px: 0,
         tilted_beams: false,
     };
-    fn light<const C: usize>(e: &Exposure<'_>, film: Film<C>, passes: u32, never: &AtomicBool) -> u64 {
+    fn light<const C: usize>(
+        e: &Exposure<'_>,
+        film: Film<C>,
+        passes: u32,
+        never: &AtomicBool,
+    ) -> u64 {
         expose(e, std::slice::from_ref(&film), 0..passes, false, never, &|_| {});
-        film.developed(f64::from(passes)).iter().flatten().map(|v| f64::from(*v)).sum::<f64>().to_bits()
+        film.developed(f64::from(passes))
+            .iter()
+            .flatten()
+            .map(|v| f64::from(*v))
+            .sum::<f64>()
+            .to_bits()
     }
     if b.technique.is_colored() {
         light(&exposure, Film::<3>::new(framing, false), passes, &never)
@@ -171,8 +210,13 @@ fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32
     }
 }
 
-/// Whole pictures by line of sight, the comparisons that have no photons, and one as the customary tolerance chooses the march.
-fn pictures(context: &mut Context<'_>, record: &mut Record, section: &TestSection) -> anyhow::Result<()> {
+/// Whole pictures by line of sight, the comparisons that have no photons, and one as the customary
+/// tolerance chooses the march.
+fn pictures(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    section: &TestSection,
+) -> anyhow::Result<()> {
     let los = "[march]\nmethod = \"line-of-sight\"";
     let mut list: Vec<(String, String)> = vec![];
     for (name, toml) in TECHNIQUES {
@@ -193,9 +237,9 @@ fn pictures(context: &mut Context<'_>, record: &mut Record, section: &TestSectio
         let rendered = render_picture(context, &scene, section)?;
         let secs = start.elapsed().as_secs_f64();
         let march = rendered.report.march.as_str();
-        record
-            .rows
-            .push(Row::new().with("technique", name.as_str()).with("march", march).with("picture", secs));
+        record.rows.push(
+            Row::new().with("technique", name.as_str()).with("march", march).with("picture", secs),
+        );
         let march = if march.is_empty() { "no light" } else { march };
         let caption = format!("{name}: combustion jet, 512² pixels, {secs:.2} s; {march}");
         record.pictures.push(picture(&name, caption, &rendered)?);

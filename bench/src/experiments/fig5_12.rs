@@ -1,4 +1,5 @@
-//! Figure 5.12: the same flow by volume rendering, by line of sight and traced; and how far the latter two are apart, against n − 1.
+//! Figure 5.12: the same flow by volume rendering, by line of sight and traced; and how far the
+//! latter two are apart, against n − 1.
 
 use super::Context;
 use super::test_section::{blob, check_cancelled, flow, picture, render_picture, scene};
@@ -28,7 +29,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("picture", "", "which picture");
     record.column("time", "s", "wall time of the picture from the field at hand");
     record.notes.push(
-        "Traced: Verlet, cubic b-spline, half a voxel a step. Line of sight leaves out that rays bend. Flows are scaled to each amplitude. Volume rendering of |grad n| has no optics in it and no unit: nothing can be compared but the look."
+        "Traced: Verlet, cubic b-spline, half a voxel a step. Line of sight leaves out that rays \
+         bend. Flows are scaled to each amplitude. Volume rendering of |grad n| has no optics in \
+         it and no unit: nothing can be compared but the look."
             .into(),
     );
     pictures(context, record)?;
@@ -41,14 +44,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         Axis::log("largest |n/n0 - 1|", ""),
         Axis::log("rms difference / largest", ""),
     );
-    for (name, field) in [("Gaussian blob", &gaussian), ("combustion jet", &jet), ("blunt body", &body)] {
+    for (name, field) in
+        [("Gaussian blob", &gaussian), ("combustion jet", &jet), ("blunt body", &body)]
+    {
         let own = field.eps().iter().fold(0.0f64, |m, e| m.max(f64::from(e.abs())));
         let (mut deflection, mut path) = (vec![], vec![]);
         for exponent in [-7, -6, -5, -4, -3, -2] {
             check_cancelled(context)?;
             context.report_step(format!("{name}: amplitude 1e{exponent}"))?;
             let amplitude = 10f64.powi(exponent);
-            let d = difference(&scaled(field, amplitude / own)?, if context.quick { 96 } else { 256 });
+            let d =
+                difference(&scaled(field, amplitude / own)?, if context.quick { 96 } else { 256 });
             deflection.push((amplitude, d.deflection_rms));
             path.push((amplitude, d.path_rms));
             record.rows.push(
@@ -107,7 +113,8 @@ struct Difference {
     stray_voxels: f64,
 }
 
-/// Line of sight against traced, over a picture of the whole field along z. Rays that a body stops are left out.
+/// Line of sight against traced, over a picture of the whole field along z. Rays that a body stops
+/// are left out.
 fn difference(field: &Field, pixels: u32) -> Difference {
     let view = View::along(ViewAxis::Z, field.centre_m());
     let size = field.size_m();
@@ -125,7 +132,9 @@ fn difference(field: &Field, pixels: u32) -> Difference {
         Options { step_voxels: 0.5, wanted, ..Options::default() },
     )
     .trace_parallel(&starts, &mut traced);
-    let both = || straight.iter().zip(&traced).filter(|(a, b)| a.transmission > 0.0 && b.transmission > 0.0);
+    let both = || {
+        straight.iter().zip(&traced).filter(|(a, b)| a.transmission > 0.0 && b.transmission > 0.0)
+    };
     let size_of = |v: [f32; 2]| f64::from(v[0]).hypot(f64::from(v[1]));
     let largest = |f: &dyn Fn(&Exit) -> f64| both().map(|(_, b)| f(b)).fold(0.0, f64::max);
     let deflection_rad = largest(&|e| size_of(e.deflection_rad));
@@ -167,7 +176,8 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
         (
             "traced",
             format!(
-                "{schlieren}[march]\nmethod = \"verlet\"\ninterpolant = \"b-spline\"\nstep_voxels = 1.0\n"
+                "{schlieren}[march]\nmethod = \"verlet\"\ninterpolant = \"b-spline\"\nstep_voxels \
+                 = 1.0\n"
             ),
         ),
     ];
@@ -188,13 +198,15 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
     }
     // Both have the same photons, so what is left is the bending.
     if let [_, straight, traced] = &mut painted[..] {
-        let off: Vec<f32> = straight.pixels.iter().zip(&traced.pixels).map(|(a, b)| a[0] - b[0]).collect();
+        let off: Vec<f32> =
+            straight.pixels.iter().zip(&traced.pixels).map(|(a, b)| a[0] - b[0]).collect();
         let rms = (off.iter().map(|o| f64::from(o * o)).sum::<f64>() / off.len() as f64).sqrt();
         // A power of ten that makes the root mean square a visible grey.
         let gain = 10f64.powf((0.5 / rms.max(1e-12)).log10().floor());
         straight.pixels = off.iter().map(|o| [0.5 + (gain * f64::from(*o)) as f32; 3]).collect();
         let caption = format!(
-            "line of sight minus traced, {gain} times, on mid-grey; root mean square {rms:.1e} of white, from the \
+            "line of sight minus traced, {gain} times, on mid-grey; root mean square {rms:.1e} of \
+             white, from the \
              same photons"
         );
         let Picture { png, .. } = picture("difference", String::new(), straight)?;

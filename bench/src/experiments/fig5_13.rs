@@ -63,7 +63,11 @@ const GALLERY: [(&str, &str, &str); 12] = [
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("picture", "", "technique, or filter and photons per pixel");
     record.column("time", "s", "wall time from the field at hand");
-    record.column("march", "", "how light is taken through the flow; empty for comparisons without light");
+    record.column(
+        "march",
+        "",
+        "how light is taken through the flow; empty for comparisons without light",
+    );
     record.column("photons", "", "photons traced (rays, for beams)");
     record.column("filter", "", "against noise");
     record.column("samples", "", "photons per pixel");
@@ -80,15 +84,18 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     let fringe = format!("{:.6}", width_m / 24.0);
     let mut section = TestSection::of_fields(&scene("")?, vec![field], None)?;
     record.notes.push(format!(
-        "The combustion jet ({size} size, {:.3} m wide) in the customary bench: helium-neon light, mirrors of 1.5 m, a slit of 1 mm by 5 mm for the knife and \
-         a pinhole of 0.5 mm for the other cut-offs; the shadowgraph is focused 5 cm behind the flow, BOS 0.5 m before it. Photons are traced (Verlet, b-spline, a step a voxel).",
+        "The combustion jet ({size} size, {:.3} m wide) in the customary bench: helium-neon light, \
+         mirrors of 1.5 m, a slit of 1 mm by 5 mm for the knife and \
+         a pinhole of 0.5 mm for the other cut-offs; the shadowgraph is focused 5 cm behind the \
+         flow, BOS 0.5 m before it. Photons are traced (Verlet, b-spline, a step a voxel).",
         width_m
     ));
     for (name, toml, meaning) in GALLERY {
         check_cancelled(context)?;
         context.report_step(format!("picture: {name}"))?;
         let toml = toml.replace("FRINGE", &fringe);
-        // Comparisons follow no light and refuse a march; a shadowgraph of so small a flow is all caustics at the customary 0.5 m.
+        // Comparisons follow no light and refuse a march; a shadowgraph of so small a flow is all
+        // caustics at the customary 0.5 m.
         let lit = !meaning.starts_with("for comparison");
         let march = if lit {
             "[march]\nmethod = \"verlet\"\ninterpolant = \"b-spline\"\nstep_voxels = 1.0\n"
@@ -180,7 +187,8 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
                     .with("rms_error", rms),
             );
             if samples == 4 {
-                let caption = format!("filter {name}, 4 photons a pixel: rms error {rms:.2} % of white");
+                let caption =
+                    format!("filter {name}, 4 photons a pixel: rms error {rms:.2} % of white");
                 record.pictures.push(picture(&format!("filter {name}"), caption, &rendered)?);
             }
         }
@@ -188,8 +196,9 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     }
     record.plots.push(plot);
     let error = |filter: &str, samples: u32| {
-        let here =
-            |r: &&Row| r.text("filter") == Some(filter) && r.number("samples") == Some(f64::from(samples));
+        let here = |r: &&Row| {
+            r.text("filter") == Some(filter) && r.number("samples") == Some(f64::from(samples))
+        };
         record.rows.iter().find(here).and_then(|r| r.number("rms_error")).unwrap_or(f64::NAN)
     };
     let least = |samples: u32| {
@@ -199,7 +208,8 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     };
     let least: Vec<String> = counts.iter().map(|n| least(*n)).collect();
     record.notes.push(format!(
-        "Filters shrink as photons are added (radius as N^(-1/6)). The least error had, with {}. Times are those of a whole picture, field at hand, \
+        "Filters shrink as photons are added (radius as N^(-1/6)). The least error had, with {}. \
+         Times are those of a whole picture, field at hand, \
          seen once.",
         least.join("; ")
     ));

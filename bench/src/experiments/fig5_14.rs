@@ -1,5 +1,6 @@
-//! Figure 5.14: noise against samples: independent photons against low-discrepancy ones, filtered and not; and how far pictures of ever more
-//! samples are apart, which is what the dissertation gives numbers for.
+//! Figure 5.14: noise against samples: independent photons against low-discrepancy ones, filtered
+//! and not; and how far pictures of ever more samples are apart, which is what the dissertation
+//! gives numbers for.
 
 use super::Context;
 use super::test_section::{check_cancelled, flow, picture, render_picture, scene};
@@ -19,8 +20,9 @@ pub(super) const FILTERS: [(&str, FilterSpec); 4] = [
 /// Seed of the references: other photons than any measured picture has.
 const REFERENCE_SEED: u64 = 0x5eed;
 
-/// The dissertation's numbers: by filter, the root mean square difference in percent between its pictures of 1 and 10,
-/// of 10 and 100, and of 100 and 1000 samples. No errors: its pictures have no reference.
+/// The dissertation's numbers: by filter, the root mean square difference in percent between its
+/// pictures of 1 and 10, of 10 and 100, and of 100 and 1000 samples. No errors: its pictures have
+/// no reference.
 const THESIS: [(&str, [f64; 3]); 2] = [("none", [7.75, 2.78, 0.91]), ("cone", [0.83, 2.55, 0.176])];
 
 /// Samples of the first pictures of these pairs; the second ones have ten times as many.
@@ -34,7 +36,8 @@ pub(super) struct NoiseCase {
 }
 
 impl NoiseCase {
-    /// Each photon has its own point of an extended source, and the knife stops it or not: the dissertation's way, and the noisiest.
+    /// Each photon has its own point of an extended source, and the knife stops it or not: the
+    /// dissertation's way, and the noisiest.
     pub(super) fn knife(context: &mut Context<'_>) -> anyhow::Result<NoiseCase> {
         NoiseCase::of(context, "[technique]\nkind = \"schlieren\"\n[light]\nbeams = \"tilted\"\n")
     }
@@ -48,8 +51,9 @@ impl NoiseCase {
         let (size, pixels, reference_samples) =
             if context.quick { ("small", 96, 2048) } else { ("medium", 192, 16384) };
         context.report_step("combustion jet")?;
-        let text =
-            format!("[film]\nsize = [{pixels}, {pixels}]\n[march]\nmethod = \"line-of-sight\"\n{technique}");
+        let text = format!(
+            "[film]\nsize = [{pixels}, {pixels}]\n[march]\nmethod = \"line-of-sight\"\n{technique}"
+        );
         let scene = scene(&text)?;
         let section = TestSection::of_fields(&scene, vec![flow("combustion-jet", size)?], None)?;
         Ok(NoiseCase { scene, section, reference_samples })
@@ -73,20 +77,29 @@ impl NoiseCase {
 
     /// The picture without visible noise.
     pub(super) fn reference(&self, context: &Context<'_>) -> anyhow::Result<(RenderOutput, f64)> {
-        self.picture(context, Jitter::Sobol, self.reference_samples, REFERENCE_SEED, FilterSpec::None {})
+        self.picture(
+            context,
+            Jitter::Sobol,
+            self.reference_samples,
+            REFERENCE_SEED,
+            FilterSpec::None {},
+        )
     }
 }
 
 /// Root mean square difference of two pictures, in percent of white.
 pub(super) fn rms_difference(a: &RenderOutput, b: &RenderOutput) -> f64 {
-    let squares: f64 = a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
+    let squares: f64 =
+        a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
     100.0 * (squares / a.pixels.len().max(1) as f64).sqrt()
 }
 
 /// How photons are spread over pixel and source, by name.
-const SAMPLINGS: [(&str, Jitter); 2] = [("random", Jitter::Random), ("low-discrepancy", Jitter::Sobol)];
+const SAMPLINGS: [(&str, Jitter); 2] =
+    [("random", Jitter::Random), ("low-discrepancy", Jitter::Sobol)];
 
-/// The picture that the dissertation's numbers stand beside: a knife, and photons all over the source.
+/// The picture that the dissertation's numbers stand beside: a knife, and photons all over the
+/// source.
 const KNIFE: &str = "schlieren, knife";
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -95,15 +108,27 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("filter", "", "against noise");
     record.column("samples", "", "photons per pixel");
     record.column("rms_error", "%", "root mean square over pixels against the reference, of white");
-    record.column("samples_more", "", "photons per pixel of the picture that this one is compared with");
+    record.column(
+        "samples_more",
+        "",
+        "photons per pixel of the picture that this one is compared with",
+    );
     record.column(
         "difference",
         "%",
         "root mean square over pixels of the difference between these two pictures, of white",
     );
-    record.column("thesis", "%", "the dissertation's difference between pictures of as many samples");
+    record.column(
+        "thesis",
+        "%",
+        "the dissertation's difference between pictures of as many samples",
+    );
     record.column("time", "s", "wall time of the picture from the field at hand, seen once");
-    record.column("order", "", "exponent p of error = c N^-p over the whole curve, in its last row");
+    record.column(
+        "order",
+        "",
+        "exponent p of error = c N^-p over the whole curve, in its last row",
+    );
     for (name, noisy) in
         [(KNIFE, NoiseCase::knife(context)?), ("shadowgraph", NoiseCase::shadowgraph(context)?)]
     {
@@ -114,7 +139,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     let photons = if context.quick { 2048 } else { 16384 };
     record.notes.push(format!(
-        "References of `rms_error` have {photons} low-discrepancy photons a pixel with another seed; what they lack shows where a curve flattens. {}",
+        "References of `rms_error` have {photons} low-discrepancy photons a pixel with another \
+         seed; what they lack shows where a curve flattens. {}",
         describe_errors(&record.rows)
     ));
     record.notes.push(describe_differences(&record.rows));
@@ -141,8 +167,9 @@ fn errors(
             let mut points: Vec<(f64, f64)> = vec![];
             for samples in (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most) {
                 check_cancelled(context)?;
-                context
-                    .report_step(format!("{name}: {sampling}, filter {filter_name}, {samples} photons"))?;
+                context.report_step(format!(
+                    "{name}: {sampling}, filter {filter_name}, {samples} photons"
+                ))?;
                 let (rendered, secs) = noisy.picture(context, jitter, samples, 0, filter)?;
                 let rms = rms_difference(&rendered, &reference);
                 points.push((f64::from(samples), rms));
@@ -150,8 +177,13 @@ fn errors(
                 let row = row.with("filter", filter_name).with("samples", samples);
                 record.rows.push(row.with("rms_error", rms).with("time", secs));
                 if samples == 16 && filter_name == "none" {
-                    let caption = format!("{name}, 16 photons a pixel, {sampling}: rms error {rms:.2} %");
-                    record.pictures.push(picture(&format!("{name} {sampling}"), caption, &rendered)?);
+                    let caption =
+                        format!("{name}, 16 photons a pixel, {sampling}: rms error {rms:.2} %");
+                    record.pictures.push(picture(
+                        &format!("{name} {sampling}"),
+                        caption,
+                        &rendered,
+                    )?);
                 }
             }
             if let Some(last) = record.rows.last_mut() {
@@ -164,8 +196,8 @@ fn errors(
     Ok(())
 }
 
-/// The dissertation's own quantity, for both of its filters: each picture has ten times the photons of the one before,
-/// and these are the first of its photons.
+/// The dissertation's own quantity, for both of its filters: each picture has ten times the photons
+/// of the one before, and these are the first of its photons.
 fn differences(
     context: &mut Context<'_>,
     record: &mut Record,
@@ -220,7 +252,9 @@ fn describe_errors(rows: &[Row]) -> String {
     };
     let less = error("random", "none", 16.0) / error("low-discrepancy", "none", 16.0);
     let mut words = format!(
-        "With 16 photons a pixel behind the knife, independent photons have {less:.1} times the noise of low-discrepancy ones (as many as {:.0} times          16 of them would have, as 1/sqrt(N) goes).",
+        "With 16 photons a pixel behind the knife, independent photons have {less:.1} times the \
+         noise of low-discrepancy ones (as many as {:.0} times          16 of them would have, as \
+         1/sqrt(N) goes).",
         less * less
     );
     let counts = || {
@@ -235,10 +269,12 @@ fn describe_errors(rows: &[Row]) -> String {
     };
     for (sampling, _) in SAMPLINGS {
         let helps = |n: &f64| error(sampling, "gaussian", *n) < error(sampling, "none", *n);
-        let helped: Vec<String> = counts().iter().filter(|n| helps(n)).map(f64::to_string).collect();
+        let helped: Vec<String> =
+            counts().iter().filter(|n| helps(n)).map(f64::to_string).collect();
         let with = if helped.is_empty() { "no number of".into() } else { helped.join(", ") };
         words += &format!(
-            " The Gaussian filter lowers the error of {sampling} photons behind the knife with {with} photons a pixel."
+            " The Gaussian filter lowers the error of {sampling} photons behind the knife with \
+             {with} photons a pixel."
         );
     }
     words
@@ -247,9 +283,12 @@ fn describe_errors(rows: &[Row]) -> String {
 /// What the differences say beside the dissertation's.
 fn describe_differences(rows: &[Row]) -> String {
     let mut words = String::from(
-        "`difference` is the dissertation's quantity: it prints root mean square differences between pictures of 1 and 10, of 10 and 100, and of 100 \
-         and 1000 samples, and has no reference. The photons of each of our pictures are the first ones of the next. Of independent photons without a filter each \
-         such difference is sqrt(10) = 3.16 times the next. Its flow and bench are not ours, so ratios compare and heights do not.",
+        "`difference` is the dissertation's quantity: it prints root mean square differences \
+         between pictures of 1 and 10, of 10 and 100, and of 100 \
+         and 1000 samples, and has no reference. The photons of each of our pictures are the first \
+         ones of the next. Of independent photons without a filter each \
+         such difference is sqrt(10) = 3.16 times the next. Its flow and bench are not ours, so \
+         ratios compare and heights do not.",
     );
     for (filter, thesis) in THESIS {
         words += &format!(
@@ -258,10 +297,13 @@ fn describe_differences(rows: &[Row]) -> String {
             thesis[1] / thesis[2]
         );
         for (sampling, _) in SAMPLINGS {
-            let here = |r: &&Row| r.text("sampling") == Some(sampling) && r.text("filter") == Some(filter);
-            let ours: Vec<f64> = rows.iter().filter(here).filter_map(|r| r.number("difference")).collect();
+            let here =
+                |r: &&Row| r.text("sampling") == Some(sampling) && r.text("filter") == Some(filter);
+            let ours: Vec<f64> =
+                rows.iter().filter(here).filter_map(|r| r.number("difference")).collect();
             if let [a, b, c] = ours[..] {
-                words += &format!(", ours of {sampling} photons {:.2} and {:.2} times", a / b, b / c);
+                words +=
+                    &format!(", ours of {sampling} photons {:.2} and {:.2} times", a / b, b / c);
             }
         }
         words += ".";
@@ -271,11 +313,14 @@ fn describe_differences(rows: &[Row]) -> String {
 
 /// Exponent of a power law through the points: least squares in logarithms, falling is positive.
 fn order(points: &[(f64, f64)]) -> Option<f64> {
-    let logs: Vec<(f64, f64)> = points.iter().filter(|p| p.1 > 0.0).map(|p| (p.0.ln(), p.1.ln())).collect();
+    let logs: Vec<(f64, f64)> =
+        points.iter().filter(|p| p.1 > 0.0).map(|p| (p.0.ln(), p.1.ln())).collect();
     let n = logs.len() as f64;
-    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
-    let (sxy, sxx) =
-        logs.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.1 - my), b + (p.0 - mx).powi(2)));
+    let (mx, my) =
+        (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+    let (sxy, sxx) = logs
+        .iter()
+        .fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.1 - my), b + (p.0 - mx).powi(2)));
     (logs.len() >= 2).then(|| -sxy / sxx)
 }
 
@@ -285,7 +330,8 @@ mod tests {
 
     #[test]
     fn power_laws_give_their_exponent() {
-        let points: Vec<(f64, f64)> = [1.0, 4.0, 16.0, 64.0].map(|n: f64| (n, 3.0 * n.powf(-0.5))).to_vec();
+        let points: Vec<(f64, f64)> =
+            [1.0, 4.0, 16.0, 64.0].map(|n: f64| (n, 3.0 * n.powf(-0.5))).to_vec();
         assert!((order(&points).unwrap() - 0.5).abs() < 1e-12);
         assert_eq!(order(&points[..1]), None);
     }

@@ -81,8 +81,8 @@ impl InstalledBaselines {
 }
 
 impl TracerSet {
-    /// Builds each tracer, fast and watertight or robust. obvhs, whose instructions are chosen by the compiler,
-    /// takes part at the best level only.
+    /// Builds each tracer, fast and watertight or robust. obvhs, whose instructions are chosen by
+    /// the compiler, takes part at the best level only.
     pub(super) fn build(
         mesh: &Arc<TriMesh>,
         installed: &InstalledBaselines,
@@ -93,16 +93,19 @@ impl TracerSet {
         for robustness in [Robustness::Watertight, Robustness::Fast] {
             report_step("building rt-core")?;
             let options = BuildOptions { robustness, simd: isa.ours(), ..Default::default() };
-            tracers
-                .ours
-                .push((format!("rt-core {}", robustness.name()), RtCoreTracer::build(mesh, &options)?));
+            tracers.ours.push((
+                format!("rt-core {}", robustness.name()),
+                RtCoreTracer::build(mesh, &options)?,
+            ));
         }
         for e in &installed.embree {
             report_step(&format!("building {}", e.name()))?;
             for robust in [true, false] {
                 let options = Options { robust, max_isa: isa.embree(), ..Options::default() };
                 let kind = if robust { "robust" } else { "fast" };
-                tracers.embree.push((format!("{} {kind}", e.name()), EmbreeScene::build(e, mesh, &options)?));
+                tracers
+                    .embree
+                    .push((format!("{} {kind}", e.name()), EmbreeScene::build(e, mesh, &options)?));
             }
         }
         if isa == Isa::Best {

@@ -1,4 +1,5 @@
-//! What the experiments of many ranks share: ranks simulated in this process, frames measured, columns and words.
+//! What the experiments of many ranks share: ranks simulated in this process, frames measured,
+//! columns and words.
 
 use crate::record::{Record, Row};
 use crate::stats::Summary;
@@ -6,15 +7,21 @@ use composite::Communicator;
 use composite::comm::CommError;
 use composite::comm::sim::{Compute, Network, SimComm, run_on};
 use composite::render::demo::PreparedDemo;
-use composite::render::{Activity, DataParallel, FrameOptions, FrameOutput, RankReport, ray_parallel};
+use composite::render::{
+    Activity, DataParallel, FrameOptions, FrameOutput, RankReport, ray_parallel,
+};
 use rt_core::bvh::BuildOptions;
 use std::time::Duration;
 
 /// What stands beside every figure of many ranks.
-pub(super) const CAVEAT: &str = "Computing is measured for real: every rank is a thread, one at a time has a core, and its clock advances by \
-     the processor time of its thread. The network is simulated in this process by the LogGP model of 4X QDR InfiniBand (3.2 GB/s and 1 µs, an \
-     interface per rank whose two directions are shared fairly by the messages under way, nothing in the way between interfaces). Not modelled: contention inside \
-     the network, noise of the operating system, and that a node has its caches and its memory to itself. One thread a rank.";
+pub(super) const CAVEAT: &str = "Computing is measured for real: every rank is a thread, one at a \
+                                 time has a core, and its clock advances by \
+     the processor time of its thread. The network is simulated in this process by the LogGP model \
+     of 4X QDR InfiniBand (3.2 GB/s and 1 µs, an \
+     interface per rank whose two directions are shared fairly by the messages under way, nothing \
+     in the way between interfaces). Not modelled: contention inside \
+     the network, noise of the operating system, and that a node has its caches and its memory to \
+     itself. One thread a rank.";
 
 /// Longest wait for a message, on the ranks' own clocks.
 const TIMEOUT: Duration = Duration::from_secs(600);
@@ -44,10 +51,12 @@ impl FrameCost {
     fn of(reports: &[&RankReport]) -> FrameCost {
         let begin = reports.iter().map(|r| r.begin_at_secs).fold(f64::INFINITY, f64::min);
         let end = reports.iter().map(|r| r.begin_at_secs + r.total_secs()).fold(0.0, f64::max);
-        let render =
-            |r: &RankReport| r.secs(Activity::Render) + r.secs(Activity::Shade) + r.secs(Activity::Answer);
-        let mean =
-            |f: &dyn Fn(&RankReport) -> f64| reports.iter().map(|r| f(r)).sum::<f64>() / reports.len() as f64;
+        let render = |r: &RankReport| {
+            r.secs(Activity::Render) + r.secs(Activity::Shade) + r.secs(Activity::Answer)
+        };
+        let mean = |f: &dyn Fn(&RankReport) -> f64| {
+            reports.iter().map(|r| f(r)).sum::<f64>() / reports.len() as f64
+        };
         FrameCost {
             frame_secs: end - begin,
             render_mean_secs: mean(&render),
@@ -104,7 +113,11 @@ pub(super) fn frames(
         let options = FrameOptions { timeout: TIMEOUT, ..options.clone() };
         match sharing {
             Sharing::SortLast => {
-                let part = prepared.partition.part(&prepared.scene, comm.rank(), &BuildOptions::default())?;
+                let part = prepared.partition.part(
+                    &prepared.scene,
+                    comm.rank(),
+                    &BuildOptions::default(),
+                )?;
                 let mut renderer = DataParallel::new(&mut comm, part, options)?;
                 measure_frames(&mut comm, frames, |comm| {
                     Ok(renderer.frame(comm, &prepared.camera, &prepared.options)?)
@@ -121,8 +134,9 @@ pub(super) fn frames(
         let output: anyhow::Result<Vec<RankReport>> = output?;
         reports.push(output?);
     }
-    let costs =
-        (0..frames).map(|f| FrameCost::of(&reports.iter().map(|r| &r[f]).collect::<Vec<_>>())).collect();
+    let costs = (0..frames)
+        .map(|f| FrameCost::of(&reports.iter().map(|r| &r[f]).collect::<Vec<_>>()))
+        .collect();
     Ok(Frames { costs, last: reports.into_iter().filter_map(|mut r| r.pop()).collect() })
 }
 
@@ -164,9 +178,17 @@ pub(super) fn cost_columns(record: &mut Record) {
         "tracing and shading of the median frame, mean over the ranks (CPU time)",
     );
     record.column("render_max", "ms", "the same of the slowest rank");
-    record.column("rest_mean", "ms", "compositing, collecting, messages and waiting, mean over the ranks");
+    record.column(
+        "rest_mean",
+        "ms",
+        "compositing, collecting, messages and waiting, mean over the ranks",
+    );
     record.column("sent", "MB", "bytes sent by all ranks");
-    record.column("camera_rays", "Mray", "camera rays of all ranks: more than pixels where parts overlap");
+    record.column(
+        "camera_rays",
+        "Mray",
+        "camera rays of all ranks: more than pixels where parts overlap",
+    );
     record.notes.push(CAVEAT.into());
 }
 

@@ -88,11 +88,17 @@ pub const ALL: &[Experiment] = &[
         title: "Strong scaling, plasma (in place of VPIC)",
         run: strong_scaling::vpic,
     },
-    Experiment { id: "fig3.10", chapter: 3, title: "Strong scaling, wavelet", run: strong_scaling::wavelet },
+    Experiment {
+        id: "fig3.10",
+        chapter: 3,
+        title: "Strong scaling, wavelet",
+        run: strong_scaling::wavelet,
+    },
     Experiment {
         id: "paraview",
         chapter: 3,
-        title: "One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView with vtk-bridge",
+        title: "One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView \
+                with vtk-bridge",
         run: paraview::run,
     },
     Experiment {
@@ -122,7 +128,8 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig4.7",
         chapter: 4,
-        title: "Time to build the acceleration structure, by preset, against the number of triangles",
+        title: "Time to build the acceleration structure, by preset, against the number of \
+                triangles",
         run: fig4_7::run,
     },
     Experiment {
@@ -140,7 +147,8 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig4.10",
         chapter: 4,
-        title: "Replicated data against data in parts, 1 to 128 ranks; and processes that make a program’s picture",
+        title: "Replicated data against data in parts, 1 to 128 ranks; and processes that make a \
+                program’s picture",
         run: fig4_10::run,
     },
     Experiment {
@@ -152,7 +160,8 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "accuracy-sampling",
         chapter: 4,
-        title: "Error against time of ambient occlusion, soft shadows and antialiasing, by sampling",
+        title: "Error against time of ambient occlusion, soft shadows and antialiasing, by \
+                sampling",
         run: accuracy_sampling::run,
     },
     Experiment {
@@ -188,7 +197,8 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "fig5.12",
         chapter: 5,
-        title: "Volume rendering, line of sight and traced light, and how far the latter two are apart",
+        title: "Volume rendering, line of sight and traced light, and how far the latter two are \
+                apart",
         run: fig5_12::run,
     },
     Experiment {
@@ -212,13 +222,15 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "accuracy-schlieren",
         chapter: 5,
-        title: "Error against time of light’s way through a gas, and the tolerance asked against the error got",
+        title: "Error against time of light’s way through a gas, and the tolerance asked against \
+                the error got",
         run: accuracy_schlieren::run,
     },
     Experiment {
         id: "shock-angles",
         chapter: 5,
-        title: "Angles of wedge and cone shocks measured in pictures, against theta-beta-M and Taylor and Maccoll",
+        title: "Angles of wedge and cone shocks measured in pictures, against theta-beta-M and \
+                Taylor and Maccoll",
         run: shock_angles::run,
     },
     Experiment {
@@ -244,8 +256,8 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 pub struct Context<'a> {
     /// Smaller data and fewer rounds: done within a minute on two cores.
     pub quick: bool,
-    /// Told what is done next and, where it is known, what share of the experiment is done; an error stops the
-    /// experiment there.
+    /// Told what is done next and, where it is known, what share of the experiment is done; an
+    /// error stops the experiment there.
     pub progress: &'a mut Progress<'a>,
     /// Set to true to stop long pictures between two tiles.
     pub cancel: Option<Arc<AtomicBool>>,
@@ -257,7 +269,11 @@ pub type Progress<'a> = dyn FnMut(&str, Option<f64>) -> anyhow::Result<()> + 'a;
 
 impl<'a> Context<'a> {
     /// A context.
-    pub fn new(quick: bool, cancel: Option<Arc<AtomicBool>>, progress: &'a mut Progress<'a>) -> Context<'a> {
+    pub fn new(
+        quick: bool,
+        cancel: Option<Arc<AtomicBool>>,
+        progress: &'a mut Progress<'a>,
+    ) -> Context<'a> {
         Context { quick, progress, cancel, wavelets: BTreeMap::new() }
     }
 
@@ -270,7 +286,8 @@ impl<'a> Context<'a> {
         (self.progress)(what.as_ref(), Some(done))
     }
 
-    /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next experiment.
+    /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next
+    /// experiment.
     fn wavelet(&mut self, size: Size) -> anyhow::Result<Arc<TriMesh>> {
         if let Some(m) = self.wavelets.get(&size) {
             return Ok(m.clone());
@@ -309,7 +326,8 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
         Err(e) if e.is::<Interrupted>() && record.rows.is_empty() => return Err(e),
         Err(e) if e.is::<Interrupted>() => {
             record.missing.push(format!(
-                "everything after the first {} rows: the run was interrupted; `bench run {id}` measures it all",
+                "everything after the first {} rows: the run was interrupted; `bench run {id}` \
+                 measures it all",
                 record.rows.len()
             ));
             true
@@ -318,11 +336,15 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     };
     record.elapsed_secs = start.elapsed().as_secs_f64();
     let unexplained = record.unexplained_columns();
-    anyhow::ensure!(unexplained.is_empty(), "experiment `{id}` does not explain its columns {unexplained:?}");
+    anyhow::ensure!(
+        unexplained.is_empty(),
+        "experiment `{id}` does not explain its columns {unexplained:?}"
+    );
     Ok(Outcome { record, interrupted })
 }
 
-/// The record of an experiment that could not be run for want of another program: without rows, and with the reason.
+/// The record of an experiment that could not be run for want of another program: without rows, and
+/// with the reason.
 pub fn left_out(experiment: &Experiment, why: &str) -> Record {
     let Experiment { id, chapter, title, .. } = *experiment;
     let mut record = Record::new(id, title, chapter, true, Machine::describe());

@@ -1,7 +1,9 @@
-//! One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView, ray traced by vtk-bridge.
+//! One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView, ray traced by
+//! vtk-bridge.
 //!
-//! Both are run as users run them: `pvbatch` with the same script, once with what `vtk-bridge env --paraview` prints and once without. Processes take turns, so that
-//! both see the same load of the machine; CPU seconds are those of the whole process, with all threads of Mesa's or ours.
+//! Both are run as users run them: `pvbatch` with the same script, once with what `vtk-bridge env
+//! --paraview` prints and once without. Processes take turns, so that both see the same load of the
+//! machine; CPU seconds are those of the whole process, with all threads of Mesa's or ours.
 
 use super::Context;
 use crate::plot::{Axis, Plot, Series};
@@ -47,8 +49,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         )
     };
     record.notes.push(format!(
-        "{}, {pixels} x {pixels} pixels, one colour, ParaView's light kit, no effects. A frame is `Render(view)` after the camera was turned by 5 degrees; CPU seconds are user \
-         and system time of the whole process. The first frame has extraction, normals, uploads and acceleration structures in it. Programs take turns; both share \
+        "{}, {pixels} x {pixels} pixels, one colour, ParaView's light kit, no effects. A frame is \
+         `Render(view)` after the camera was turned by 5 degrees; CPU seconds are user \
+         and system time of the whole process. The first frame has extraction, normals, uploads \
+         and acceleration structures in it. Programs take turns; both share \
          the machine with whatever else runs.",
         host.version
     ));
@@ -107,9 +111,9 @@ fn order(subject: &Subject, pixels: u32, quick: bool, folder: &Path) -> anyhow::
         })
     });
     let views: Vec<Value> = views.collect();
-    let mut order =
-        json!({ "pixels": pixels, "frames": subject.frames, "views": views, "isovalues": [], "points": 201 });
-    if let Some(size) = Size::ALL.into_iter().find(|s| subject.data == "wavelet" && s.name() == subject.size)
+    let mut order = json!({ "pixels": pixels, "frames": subject.frames, "views": views, "isovalues": [], "points": 201 });
+    if let Some(size) =
+        Size::ALL.into_iter().find(|s| subject.data == "wavelet" && s.name() == subject.size)
     {
         order["isovalues"] = json!(size.isovalues());
         if quick {
@@ -133,15 +137,17 @@ fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Resul
     let views: Vec<String> =
         first["views"].as_object().into_iter().flatten().map(|(n, _)| n.clone()).collect();
     let triangles = first["triangles"].as_u64().unwrap_or(0);
-    let list =
-        |v: &Value| -> Vec<f64> { v.as_array().into_iter().flatten().filter_map(Value::as_f64).collect() };
+    let list = |v: &Value| -> Vec<f64> {
+        v.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+    };
     for view in &views {
         for (p, program) in PROGRAMS.iter().enumerate() {
             let of = |name: &str| -> Vec<f64> {
                 rounds.iter().flat_map(|r| list(&r[p]["views"][view.as_str()][name])).collect()
             };
-            let once =
-                |name: &str| -> Vec<f64> { rounds.iter().filter_map(|r| r[p][name].as_f64()).collect() };
+            let once = |name: &str| -> Vec<f64> {
+                rounds.iter().filter_map(|r| r[p][name].as_f64()).collect()
+            };
             let (cpu, wall) = (of("cpu"), of("wall"));
             let low = |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min);
             let high = |v: &[f64]| v.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -167,10 +173,12 @@ fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Resul
         }
         for name in ["cpu", "wall"] {
             let per_round = |r: &Vec<Value>| {
-                let [rival, ours] = [0, 1].map(|p| median(&list(&r[p]["views"][view.as_str()][name])));
+                let [rival, ours] =
+                    [0, 1].map(|p| median(&list(&r[p]["views"][view.as_str()][name])));
                 rival / ours
             };
-            let what = if name == "cpu" { "CPU seconds of a frame" } else { "wall time of a frame" };
+            let what =
+                if name == "cpu" { "CPU seconds of a frame" } else { "wall time of a frame" };
             record.ratios.extend(ratio(
                 format!("{what}, {data} {view}, {triangles} triangles"),
                 rounds.iter().map(per_round).collect(),
@@ -204,14 +212,16 @@ fn plots(record: &mut Record) {
         let mut plot = Plot::lines(title, Axis::log("triangles", ""), Axis::log(label, unit));
         for program in PROGRAMS {
             for data in ["wavelet", "mixing-layer", "plasma"] {
-                let of = |r: &&Row| r.text("program") == Some(program) && r.text("data") == Some(data);
+                let of =
+                    |r: &&Row| r.text("program") == Some(program) && r.text("data") == Some(data);
                 let mut views: Vec<&str> =
                     record.rows.iter().filter(of).filter_map(|r| r.text("view")).collect();
                 views.dedup();
                 views.sort_unstable();
                 views.dedup();
                 for view in views {
-                    let here = record.rows.iter().filter(of).filter(|r| r.text("view") == Some(view));
+                    let here =
+                        record.rows.iter().filter(of).filter(|r| r.text("view") == Some(view));
                     let points: Vec<(f64, f64)> =
                         here.filter_map(|r| r.number("triangles").zip(r.number(column))).collect();
                     plot.series.push(Series::new(format!("{program}, {data} {view}"), points));
@@ -233,19 +243,31 @@ struct Host {
 impl Host {
     fn find() -> anyhow::Result<Host> {
         let pvbatch = program("RTSV_PVBATCH", "pvbatch").ok_or_else(|| {
-            UsageError("pvbatch is not here: install ParaView (Debian: `apt-get install paraview python3-paraview`), or name it in RTSV_PVBATCH".into())
+            UsageError(
+                "pvbatch is not here: install ParaView (Debian: `apt-get install paraview \
+                        python3-paraview`), or name it in RTSV_PVBATCH"
+                    .into(),
+            )
         })?;
         let xvfb = program("RTSV_XVFB", "Xvfb").ok_or_else(|| {
             UsageError(
-                "Xvfb is not here: install it (Debian: `apt-get install xvfb`), or name it in RTSV_XVFB"
+                "Xvfb is not here: install it (Debian: `apt-get install xvfb`), or name it in \
+                 RTSV_XVFB"
                     .into(),
             )
         })?;
         let beside = std::env::current_exe().ok().map(|p| p.with_file_name("vtk-bridge"));
-        let bridge =
-            std::env::var_os("RTSV_VTK_BRIDGE").map(PathBuf::from).or(beside).filter(|p| p.is_file());
+        let bridge = std::env::var_os("RTSV_VTK_BRIDGE")
+            .map(PathBuf::from)
+            .or(beside)
+            .filter(|p| p.is_file());
         let bridge = bridge.ok_or_else(|| {
-            UsageError("the program `vtk-bridge` is not beside this one: `cargo build -p vtk-bridge` (with the same --release), or name it in RTSV_VTK_BRIDGE".into())
+            UsageError(
+                "the program `vtk-bridge` is not beside this one: `cargo build -p \
+                        vtk-bridge` (with the same --release), or name it in \
+                        RTSV_VTK_BRIDGE"
+                    .into(),
+            )
         })?;
         let said = Command::new(&pvbatch).arg("--version").output().context("pvbatch --version")?;
         let text = [said.stdout, said.stderr].concat();
@@ -264,7 +286,8 @@ impl Host {
         std::fs::write(&file, order.to_string())?;
         let ours = drawn_by == PROGRAMS[1];
         let line = if ours {
-            "exports=$(\"$1\" env --paraview --prefix \"$2\") || exit 97; eval \"$exports\"; shift 2; exec \"$@\""
+            "exports=$(\"$1\" env --paraview --prefix \"$2\") || exit 97; eval \"$exports\"; shift \
+             2; exec \"$@\""
         } else {
             "shift 2; exec \"$@\""
         };
@@ -275,14 +298,22 @@ impl Host {
             .env("DISPLAY", &self.display.name)
             .env_remove("VTK_AUTOLOAD_PATH")
             .env_remove("PV_PLUGIN_PATH");
-        for (name, _) in std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_")) {
+        for (name, _) in
+            std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_"))
+        {
             command.env_remove(name);
         }
         let out = command.output().context("sh")?;
         let said = String::from_utf8_lossy(&out.stdout);
         let errors = String::from_utf8_lossy(&out.stderr);
-        let last =
-            || errors.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it said nothing").to_owned();
+        let last = || {
+            errors
+                .lines()
+                .rev()
+                .find(|l| !l.trim().is_empty())
+                .unwrap_or("it said nothing")
+                .to_owned()
+        };
         let Some(line) = said.lines().find_map(|l| l.strip_prefix("RESULT ")) else {
             bail!("pvbatch with {drawn_by} ended with {}: {}", out.status, last());
         };
@@ -290,7 +321,8 @@ impl Host {
         let renderer = result["renderer"].as_str().unwrap_or_default();
         anyhow::ensure!(
             (renderer == "vtkRtvRenderer") == ours,
-            "{drawn_by} was measured with the renderer {renderer}: {}; `vtk-bridge doctor` says what is wrong",
+            "{drawn_by} was measured with the renderer {renderer}: {}; `vtk-bridge doctor` says \
+             what is wrong",
             last()
         );
         Ok(result)
@@ -314,9 +346,19 @@ struct Display {
 
 impl Display {
     fn start(xvfb: &Path) -> anyhow::Result<Display> {
-        // -noreset: else the server begins anew when its last client goes, and the next one dies of that.
+        // -noreset: else the server begins anew when its last client goes, and the next one dies of
+        // that.
         let mut server = Command::new(xvfb)
-            .args(["-displayfd", "1", "-noreset", "-nolisten", "tcp", "-screen", "0", "1280x1280x24"])
+            .args([
+                "-displayfd",
+                "1",
+                "-noreset",
+                "-nolisten",
+                "tcp",
+                "-screen",
+                "0",
+                "1280x1280x24",
+            ])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -382,7 +424,9 @@ mod tests {
         assert!((first.low - 2.0).abs() < 1e-9 && (first.high - 3.0).abs() < 1e-9);
         assert!(record.unexplained_columns().is_empty());
         plots(&mut record);
-        assert!(record.plots.iter().all(|p| !p.series.is_empty() && p.to_svg().contains("triangles")));
+        assert!(
+            record.plots.iter().all(|p| !p.series.is_empty() && p.to_svg().contains("triangles"))
+        );
     }
 
     #[test]
@@ -392,6 +436,9 @@ mod tests {
         }
         let names: Vec<String> =
             catalogue::find("mixing-layer").unwrap().views().into_iter().map(|v| v.name).collect();
-        assert!(names.contains(&"RMO".to_owned()) && names.contains(&"RMI".to_owned()), "{names:?}");
+        assert!(
+            names.contains(&"RMO".to_owned()) && names.contains(&"RMI".to_owned()),
+            "{names:?}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Parts with the same number of triangles against parts with the same expected work for the view (sections 3.2.1 and 3.2.2).
+//! Parts with the same number of triangles against parts with the same expected work for the view
+//! (sections 3.2.1 and 3.2.2).
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
@@ -18,7 +19,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("imbalance", "", "slowest rank’s render time over the mean");
     record.column("most_triangles", "", "triangles of the rank that has most");
     record.notes.push(
-        "A partition for the view must be made anew for every view: that cost is not in these times.".into(),
+        "A partition for the view must be made anew for every view: that cost is not in these \
+         times."
+            .into(),
     );
     let quick = context.quick;
     let (pixels, count) = if quick { (320, 1) } else { (1024, 3) };
@@ -44,14 +47,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             for (name, split) in [("triangles", Split::Triangles), ("view", by_view)] {
                 context.report_step(format!("{data} {view}: {ranks} ranks by {name}"))?;
                 prepared.partition = Partition::new(&prepared.scene, ranks, &split);
-                let measured = frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
+                let measured =
+                    frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
                 let cost = measured.median();
                 record.rows.push(
                     with_cost(Row::new(), ranks, &measured)
                         .with("view", format!("{data} {view}"))
                         .with("partition", name)
                         .with("imbalance", cost.render_max_secs / cost.render_mean_secs)
-                        .with("most_triangles", prepared.partition.sizes().into_iter().max().unwrap_or(0)),
+                        .with(
+                            "most_triangles",
+                            prepared.partition.sizes().into_iter().max().unwrap_or(0),
+                        ),
                 );
             }
         }
@@ -62,10 +69,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     for (data, view, _) in cases {
         for name in ["triangles", "view"] {
             let view = format!("{data} {view}");
-            let of = record
-                .rows
-                .iter()
-                .filter(|r| r.text("view") == Some(view.as_str()) && r.text("partition") == Some(name));
+            let of = record.rows.iter().filter(|r| {
+                r.text("view") == Some(view.as_str()) && r.text("partition") == Some(name)
+            });
             let points = of.filter_map(|r| r.number("ranks").zip(r.number("render_max"))).collect();
             plot.series.push(Series::new(format!("{view}, by {name}"), points));
         }
@@ -74,7 +80,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// The slowest rank's time with parts of as many triangles by that with parts of as much work, view by view.
+/// The slowest rank's time with parts of as many triangles by that with parts of as much work, view
+/// by view.
 fn describe(rows: &[Row]) -> String {
     let mut views: Vec<&str> = rows.iter().filter_map(|r| r.text("view")).collect();
     views.dedup();
@@ -92,7 +99,8 @@ fn describe(rows: &[Row]) -> String {
         .filter_map(|v| Some(format!("{v} {:.2}", slowest(v, "triangles")? / slowest(v, "view")?)))
         .collect();
     format!(
-        "On {most:.0} ranks the slowest rank's render time with parts of as many triangles, by that with parts of as much work, was: {}. Above 1 the \
+        "On {most:.0} ranks the slowest rank's render time with parts of as many triangles, by \
+         that with parts of as much work, was: {}. Above 1 the \
          partition for the view has gained.",
         each.join(", ")
     )

@@ -16,12 +16,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let (size, samples) = if context.quick { ([480, 270], 4) } else { ([1280, 720], 64) };
     let all = gallery::ALL.len() as f64;
     for (n, entry) in gallery::ALL.iter().enumerate() {
-        let share = |samples_done: u32| (n as f64 + f64::from(samples_done) / f64::from(samples)) / all;
+        let share =
+            |samples_done: u32| (n as f64 + f64::from(samples_done) / f64::from(samples)) / all;
         context.report_share(format!("{}: data", entry.name), share(0))?;
         let cancel = context.cancel.clone();
         let mut told = |done: u32| {
             // The flag stops the picture; nothing is lost when the account of it is not heard.
-            let _ = context.report_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
+            let _ = context
+                .report_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
         };
         let mut control = RenderControl { cancel, samples_done: Some(&mut told) };
         let p = entry.render(size, samples, &mut control)?;

@@ -1,4 +1,5 @@
-//! Ranks of `gluray run --ranks N`: processes that make one picture of an unmodified OpenGL program together.
+//! Ranks of `gluray run --ranks N`: processes that make one picture of an unmodified OpenGL program
+//! together.
 
 use super::Context;
 use crate::opengl::{Backend, Display, Program, Session, Tools, write};
@@ -17,8 +18,16 @@ pub(super) const SHARING: &str = "gluray";
 pub(super) fn columns(record: &mut Record) {
     record.column("rays_mean", "Mray", "gluray: rays of a rank in a frame, mean over the ranks");
     record.column("rays_max", "Mray", "gluray: the same of the rank with the most");
-    record.column("builds", "", "gluray: acceleration structures that the helpers built in all frames");
-    record.column("pixels_differ", "", "gluray: pixels of the window that are not those of one process");
+    record.column(
+        "builds",
+        "",
+        "gluray: acceleration structures that the helpers built in all frames",
+    );
+    record.column(
+        "pixels_differ",
+        "",
+        "gluray: pixels of the window that are not those of one process",
+    );
 }
 
 /// The rows of the program; without it or what runs it, its name among what is missing.
@@ -31,15 +40,22 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         }
     };
     record.notes.push(format!(
-        "`{SHARING}`: {} in a window of {SIZE_PX} x {SIZE_PX} pixels, through `gluray run --mode match --ranks N`. Its ranks are real processes on the cores of this \
-         machine, which they share: one rank has all cores, more have their part of them, so wall time shows what sharing costs and not what more machines would gain. `render` is wall time there, of a rank's share of a frame.",
+        "`{SHARING}`: {} in a window of {SIZE_PX} x {SIZE_PX} pixels, through `gluray run --mode \
+         match --ranks N`. Its ranks are real processes on the cores of this \
+         machine, which they share: one rank has all cores, more have their part of them, so wall \
+         time shows what sharing costs and not what more machines would gain. `render` is wall \
+         time there, of a rank's share of a frame.",
         PROGRAM.name()
     ));
     let display = Display::start(&tools.xvfb)?;
     let dir = tempfile::tempdir()?;
     let (counts, groups, frames): (&[u32], u32, u32) =
         if context.quick { (&[1, 2, 4], 2, 3) } else { (&[1, 2, 4, 8, 16], 5, 4) };
-    let mesh = if context.quick { crate::meshes::coarse_wavelet(51)? } else { context.wavelet(Size::M1)? };
+    let mesh = if context.quick {
+        crate::meshes::coarse_wavelet(51)?
+    } else {
+        context.wavelet(Size::M1)?
+    };
     let data = dir.path().join("wavelet").with_extension(PROGRAM.format().extension());
     write(&mesh, PROGRAM.format(), &data)?;
 
@@ -71,9 +87,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     if reports.iter().any(|r| r["traced_draws"].as_u64().unwrap_or(0) == 0) {
         let why = &reports[0]["passed_reasons"];
-        record
-            .missing
-            .push(format!("{}: gluray traces nothing of this version of it ({why})", PROGRAM.name()));
+        record.missing.push(format!(
+            "{}: gluray traces nothing of this version of it ({why})",
+            PROGRAM.name()
+        ));
         return Ok(());
     }
     for (i, (report, &ranks)) in reports.iter().zip(counts).enumerate() {
@@ -140,8 +157,7 @@ mod tests {
             serde_json::json!({ "rank": rank, "pictures": 4, "trace_ms": 40.0 * f64::from(rank + 1), "rays": rays, "builds": 1,
                                 "sent_bytes": 1000 })
         };
-        let report =
-            serde_json::json!({ "ranks": [account(0, 4_000_000), account(1, 8_000_000)], "problems": [] });
+        let report = serde_json::json!({ "ranks": [account(0, 4_000_000), account(1, 8_000_000)], "problems": [] });
         let r = row(2, &[0.02, 0.01, 0.03], &report, 0).unwrap();
         assert_eq!(
             [r.number("frame"), r.number("rays_mean"), r.number("rays_max")],
@@ -152,7 +168,8 @@ mod tests {
             [Some(15.0), Some(20.0), Some(1.0)]
         );
         assert!(row(3, &[0.02], &report, 0).is_err(), "a rank without an account");
-        let picture = |head: &str| [head.as_bytes(), &vec![7; 3 * (SIZE_PX * SIZE_PX) as usize]].concat();
+        let picture =
+            |head: &str| [head.as_bytes(), &vec![7; 3 * (SIZE_PX * SIZE_PX) as usize]].concat();
         let (a, mut b) = (picture("P6 1"), picture("P6 with another head"));
         assert_eq!(differing(&a, &b), 0);
         let last = b.len() - 1;

@@ -1,4 +1,5 @@
-//! Shocks whose angle is known exactly, photographed and measured with a ruler: wedges and cones, and how fine a lattice that takes.
+//! Shocks whose angle is known exactly, photographed and measured with a ruler: wedges and cones,
+//! and how fine a lattice that takes.
 
 use super::Context;
 use super::test_section::{check_cancelled, picture, render_picture_with, scene};
@@ -30,13 +31,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("outliers", "", "columns that were left out as outliers");
     record.column("scatter", "pixel", "root mean square distance of the points from the line");
     record.column("time", "s", "wall time of the picture, flow at hand");
-    // Rays go with the square. At 400 pixels the cones alone take most of a minute of a release build.
+    // Rays go with the square. At 400 pixels the cones alone take most of a minute of a release
+    // build.
     let width = if context.quick { 200 } else { 400 };
     record.notes.push(format!(
-        "Means over cells of the exact flows, air from a reservoir of 1 bar and 300 K, through the customary bench at \
-         the customary tolerance of 1e-7 rad; pictures {width} pixels wide, knife level. In each column the place \
-         where brightness changes most, from the stream inwards, is the shock's; the line is fitted against outliers \
-         (Theil and Sen, then least squares). Columns near the tip are left out, where shock and body are a few \
+        "Means over cells of the exact flows, air from a reservoir of 1 bar and 300 K, through the \
+         customary bench at \
+         the customary tolerance of 1e-7 rad; pictures {width} pixels wide, knife level. In each \
+         column the place \
+         where brightness changes most, from the stream inwards, is the shock's; the line is \
+         fitted against outliers \
+         (Theil and Sen, then least squares). Columns near the tip are left out, where shock and \
+         body are a few \
          voxels apart."
     ));
     let mut plot = Plot::lines(
@@ -56,7 +62,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let start = std::time::Instant::now();
             let rendered = photographed(context, flow, width)?;
             let secs = start.elapsed().as_secs_f64();
-            let line = shock(&rendered).ok_or_else(|| anyhow::anyhow!("{name}: no line in the picture"))?;
+            let line = shock(&rendered)
+                .ok_or_else(|| anyhow::anyhow!("{name}: no line in the picture"))?;
             let (got, exact) = (line.angle_rad.to_degrees(), exact_rad.to_degrees());
             let error = (got - exact).abs();
             points.push((f64::from(nodes), error));
@@ -73,8 +80,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                     .with("time", secs),
             );
             if nodes == finest {
-                let caption =
-                    format!("{name}: {got:.3} degrees in the picture (red line), {exact:.3} exactly");
+                let caption = format!(
+                    "{name}: {got:.3} degrees in the picture (red line), {exact:.3} exactly"
+                );
                 record.pictures.push(picture(&name, caption, &marked(rendered, &line))?);
             }
         }
@@ -95,7 +103,10 @@ fn flow(body: &str, mach: f64, half_deg: f64, nodes: u32) -> anyhow::Result<(Flo
     if body == "wedge" {
         let wedge = Wedge { stream, half_angle_rad, ..Wedge::default() };
         // Its lattice is about as high as it is long; nothing changes along the span.
-        return Ok((wedge.flow(UVec3::new(nodes, nodes, 17), Fields::Density)?, wedge.shock()?.shock_rad));
+        return Ok((
+            wedge.flow(UVec3::new(nodes, nodes, 17), Fields::Density)?,
+            wedge.shock()?.shock_rad,
+        ));
     }
     let cone = Cone { stream, half_angle_rad, ..Cone::default() };
     let exact_rad = cone.solution()?.shock_rad;
@@ -108,7 +119,8 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
     let sides = flow.high_m() - flow.origin_m;
     let rows = (f64::from(width) * sides.y / sides.x).round();
     let scene = scene(&format!(
-        "[film]\nsize = [{width}, {rows}]\n[technique]\nkind = \"schlieren\"\ncutoff = {{ kind = \"knife\", angle_deg = 90.0 }}"
+        "[film]\nsize = [{width}, {rows}]\n[technique]\nkind = \"schlieren\"\ncutoff = {{ kind \
+         = \"knife\", angle_deg = 90.0 }}"
     ))?;
     let options = Options { wavelength_nm: 633.0, ..Options::new(Medium::density("density")) };
     let field = from_dataset(&flow.into_dataset(), &options)?.field;
@@ -120,7 +132,8 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
 fn shock(rendered: &RenderOutput) -> Option<Line> {
     let photograph = Photograph::of(rendered)?;
     let width = f64::from(photograph.framing.width);
-    let [left, right] = [0.35, 0.98].map(|p| photograph.framing.plane_from_pixel(p * width, 0.0)[0]);
+    let [left, right] =
+        [0.35, 0.98].map(|p| photograph.framing.plane_from_pixel(p * width, 0.0)[0]);
     // On a coarse lattice a shock is many pixels wide, and the change from one to the next small.
     let points = photograph.fronts_m(From::Top, Mark::Edge, 0.01, 4);
     fitted_line(&points.into_iter().filter(|p| (left..right).contains(&p[0])).collect::<Vec<_>>())

@@ -1,4 +1,5 @@
-//! The same frames under SimGrid's SMPI, the established simulator of MPI programs: how far is our model from it?
+//! The same frames under SimGrid's SMPI, the established simulator of MPI programs: how far is our
+//! model from it?
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -23,17 +24,27 @@ fn library(program: &Path) -> Option<PathBuf> {
     built.is_file().then_some(built)
 }
 
-/// Median time in milliseconds of direct send, and of IceT's best strategy, for frames of `composite compare` under SMPI; or why there is none.
-/// With `as_built`, the library is taken as it was built before. Else `composite` has cargo bring it up to date, which can
-/// take minutes, and waits where another cargo is at work.
-pub(super) fn compare_ms(ranks: usize, size: u32, frames: usize, as_built: bool) -> Result<[f64; 2], String> {
+/// Median time in milliseconds of direct send, and of IceT's best strategy, for frames of
+/// `composite compare` under SMPI; or why there is none. With `as_built`, the library is taken as
+/// it was built before. Else `composite` has cargo bring it up to date, which can take minutes, and
+/// waits where another cargo is at work.
+pub(super) fn compare_ms(
+    ranks: usize,
+    size: u32,
+    frames: usize,
+    as_built: bool,
+) -> Result<[f64; 2], String> {
     let program = program().ok_or_else(|| {
-        format!("the program `composite` is not beside this one: cargo build -p composite --features cli (with the same --release), or name it in {PROGRAM_VARIABLE}")
+        format!(
+            "the program `composite` is not beside this one: cargo build -p composite \
+                 --features cli (with the same --release), or name it in {PROGRAM_VARIABLE}"
+        )
     })?;
     let mut command = Command::new(&program);
     if as_built && std::env::var_os(LIBRARY_VARIABLE).is_none() {
         let library = library(&program).ok_or(
-            "the quick form builds nothing, and the library for SimGrid is not beside the program `composite`: \
+            "the quick form builds nothing, and the library for SimGrid is not beside the program \
+             `composite`: \
              cargo build -p composite --example composite_smpi (with the same --release)",
         )?;
         command.env(LIBRARY_VARIABLE, library);
@@ -54,7 +65,12 @@ pub(super) fn compare_ms(ranks: usize, size: u32, frames: usize, as_built: bool)
     let number = |name: &str| row.and_then(|r| r[name].as_f64());
     number("ours_ms").zip(number("rival_ms")).map(|(a, b)| [a, b]).ok_or_else(|| {
         let why = String::from_utf8_lossy(&output.stderr);
-        let last = why.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("no reason given").to_string();
+        let last = why
+            .lines()
+            .rev()
+            .find(|l| !l.trim().is_empty())
+            .unwrap_or("no reason given")
+            .to_string();
         format!("composite compare --smpi ended with {}: {last}", output.status)
     })
 }

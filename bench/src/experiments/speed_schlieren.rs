@@ -1,4 +1,5 @@
-//! How fast light goes through a field: ray-steps and photons per second at 256³ and 256 steps, and a frame of the combustion jet.
+//! How fast light goes through a field: ray-steps and photons per second at 256³ and 256 steps, and
+//! a frame of the combustion jet.
 
 use super::Context;
 use super::test_section::{
@@ -36,8 +37,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("of_bar", "", "rate by bar");
     record.column("of_bar_idle", "", "rate of two cores by CPU time, by bar");
     record.notes.push(
-        "Wall time on all threads; on a machine that others use, the rate per core (by CPU time) is the steadier number. \
-         of_bar compares what was seen, of_bar_idle two cores' worth of CPU time. Marches take 256 steps of one voxel \
+        "Wall time on all threads; on a machine that others use, the rate per core (by CPU time) \
+         is the steadier number. \
+         of_bar compares what was seen, of_bar_idle two cores' worth of CPU time. Marches take 256 \
+         steps of one voxel \
          through 256³ nodes, rays in tiles of 4 by 4 as the renderer sends them."
             .into(),
     );
@@ -74,7 +77,8 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     context.report_step("a field of 256³ nodes")?;
     let blob = |p: DVec3| 1e-5 * (-p.length_squared() / (2.0 * 0.0144)).exp();
     let field = Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, blob)?;
-    let views = [("along an axis", View::along(ViewAxis::Z, DVec3::ZERO)), ("at 0.6 rad", oblique()?)];
+    let views =
+        [("along an axis", View::along(ViewAxis::Z, DVec3::ZERO)), ("at 0.6 rad", oblique()?)];
     let wanted = PathQuantities { opd: false };
     for (view_name, view) in views {
         let rays = tiles(if context.quick { 192 } else { 256 }, 0.9);
@@ -86,7 +90,12 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             ("b-spline", Interpolant::BSpline, Some(6e7)),
         ] {
             context.report_step(format!("{name}, {view_name}"))?;
-            let march = Deviational::new(&field, view, interpolant, Options { wanted, ..Options::default() });
+            let march = Deviational::new(
+                &field,
+                view,
+                interpolant,
+                Options { wanted, ..Options::default() },
+            );
             marches.push((format!("{name}, {view_name}"), march, bar));
         }
         let los = LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
@@ -120,7 +129,8 @@ fn tracing<'a>(name: &str, paths: &'a dyn LightPaths, starts: &'a [Start]) -> Va
     )
 }
 
-/// A frame of 512² pixels with 10 photons each, of the combustion jet, by line of sight: figure 5.11's 13 frames a second.
+/// A frame of 512² pixels with 10 photons each, of the combustion jet, by line of sight: figure
+/// 5.11's 13 frames a second.
 fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     context.report_step("combustion jet 480x720x100")?;
     let field = flow("combustion-jet", "thesis")?;
@@ -131,7 +141,13 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let framing = framing(&scene, &section);
     let technique = technique(&scene, 0, &framing, field.n0(), false)?;
     let los = |f: &Field| {
-        LineOfSight::new(f, view, Interpolant::BSpline, PathQuantities::default(), BlankCells::Opaque)
+        LineOfSight::new(
+            f,
+            view,
+            Interpolant::BSpline,
+            PathQuantities::default(),
+            BlankCells::Opaque,
+        )
     };
     let held = los(field);
     let never = AtomicBool::new(false);
@@ -162,7 +178,8 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     for v in &timings.variants {
         let (wall, cpu) = (v.summary(Clock::Wall).median, v.summary(Clock::ProcessCpu).median);
         record.notes.push(format!(
-            "{} (480x720x100 nodes, 512² pixels, 10 photons each, knife, whole exposure): {:.1} frames/s seen, {:.1} by the CPU \
+            "{} (480x720x100 nodes, 512² pixels, 10 photons each, knife, whole exposure): {:.1} \
+             frames/s seen, {:.1} by the CPU \
              time of two cores; the dissertation's GTX 280 reached 13.",
             v.name,
             1.0 / wall,
@@ -177,7 +194,8 @@ fn plots(record: &mut Record) {
         [("ray-steps", "Ray-steps per second, 256³, 256 steps"), ("photons", "Photons per second")]
     {
         let of_unit = || record.rows.iter().filter(|r| r.text("unit") == Some(unit));
-        let names: Vec<String> = of_unit().filter_map(|r| r.text("what").map(String::from)).collect();
+        let names: Vec<String> =
+            of_unit().filter_map(|r| r.text("what").map(String::from)).collect();
         let mut plot = Plot::bars(title, Axis::log("rate", "1/s"), names);
         let mut series = [
             Series::new("all threads, wall time", vec![]),

@@ -1,4 +1,5 @@
-//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering: the same scene cut into ever more parts.
+//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering: the same scene cut into ever
+//! more parts.
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
@@ -43,18 +44,21 @@ fn streaming(record: &Record) -> String {
             .find(|r| r.text("light") == Some(light) && r.number("ranks") == Some(ranks))?;
         row.number("frame").zip(row.number("render_max"))
     };
-    let ranks: Vec<f64> = record.rows.iter().filter_map(|r| r.number("ranks")).filter(|r| *r > 1.0).collect();
+    let ranks: Vec<f64> =
+        record.rows.iter().filter_map(|r| r.number("ranks")).filter(|r| *r > 1.0).collect();
     let gains: Vec<String> = ranks
         .iter()
         .enumerate()
         .filter(|(i, r)| !ranks[..*i].contains(r))
         .filter_map(|(_, &r)| {
-            let ((streamed, render), (one_by_one, _)) = (frame(HEADLIGHT, r)?, frame(NOT_STREAMED, r)?);
+            let ((streamed, render), (one_by_one, _)) =
+                (frame(HEADLIGHT, r)?, frame(NOT_STREAMED, r)?);
             Some(format!("{r:.0} ranks {one_by_one:.1} to {streamed:.1} (render {render:.1})"))
         })
         .collect();
     format!(
-        "Messages that travel while rays are traced, and tiles that are collected while others are not finished, take a headlight’s frame, ms: {}.",
+        "Messages that travel while rays are traced, and tiles that are collected while others are \
+         not finished, take a headlight’s frame, ms: {}.",
         gains.join(", ")
     )
 }
@@ -70,7 +74,8 @@ fn run(
     record.column(
         "light",
         "",
-        "headlight (no ray leaves a hit; not streamed: messages only when all rays are traced), or lamp with shadows and ambient occlusion",
+        "headlight (no ray leaves a hit; not streamed: messages only when all rays are traced), or \
+         lamp with shadows and ambient occlusion",
     );
     record.column("speedup", "", "frame time of one rank over that of this many");
     record.column("rounds", "", "rounds of questions between ranks");
@@ -113,7 +118,8 @@ fn run(
     context.report_step(format!("{data} {size}: picture"))?;
     record.pictures.push(picture(&demo)?);
     record.notes.push(streaming(record));
-    let mut plot = Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
+    let mut plot =
+        Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
     for (light, column, name) in [
         (HEADLIGHT, "frame", "frame, headlight"),
         (NOT_STREAMED, "frame", "frame, headlight, not streamed"),
@@ -122,8 +128,10 @@ fn run(
         (LAMP, "render_max", "slowest rank’s render, lamp and occlusion"),
     ] {
         let of = record.rows.iter().filter(|r| r.text("light") == Some(light));
-        plot.series
-            .push(Series::new(name, of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect()));
+        plot.series.push(Series::new(
+            name,
+            of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect(),
+        ));
     }
     record.plots.push(plot);
     Ok(())
@@ -134,12 +142,14 @@ fn picture(demo: &Demo) -> anyhow::Result<Picture> {
     const RANKS: usize = 8;
     let demo = Demo { color_by_rank: true, global_light: true, ..demo.clone() };
     let prepared = demo.prepare(RANKS, &mut |_, _| true)?;
-    let mut outputs = threads::run(RANKS, |mut comm| prepared.run(&mut comm, &FrameOptions::default()));
+    let mut outputs =
+        threads::run(RANKS, |mut comm| prepared.run(&mut comm, &FrameOptions::default()));
     let frame = outputs.swap_remove(0)??.frame.context("rank 0 has the picture")?;
     Ok(Picture {
         name: format!("{}-{}-parts", demo.data, demo.view.unwrap_or_default()),
         caption: format!(
-            "{} in {RANKS} parts, a colour for each rank, rendered by {RANKS} ranks: shadows and ambient occlusion cross the borders of parts.",
+            "{} in {RANKS} parts, a colour for each rank, rendered by {RANKS} ranks: shadows and \
+             ambient occlusion cross the borders of parts.",
             demo.data
         ),
         png: save::png_bytes(&frame)?,

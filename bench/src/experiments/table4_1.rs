@@ -17,8 +17,8 @@ use std::sync::Arc;
 const SIZE_PX: u32 = 1024;
 const BACKENDS: [Backend; 3] = [Backend::Llvmpipe, Backend::Serial, Backend::Asynchronous];
 
-/// The ways that differ for a program: ParaView and VTK draw into framebuffer objects, which are never late. What being late changes is seen at
-/// one million triangles.
+/// The ways that differ for a program: ParaView and VTK draw into framebuffer objects, which are
+/// never late. What being late changes is seen at one million triangles.
 fn backends(program: Program, triangles: usize) -> &'static [Backend] {
     match program {
         Program::Gmsh | Program::Geomview if triangles < 2_000_000 => &BACKENDS,
@@ -38,21 +38,38 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("time", "ms", "median wall time of a frame");
     record.column("time_low", "ms", "fastest frame or group of frames");
     record.column("time_high", "ms", "slowest");
-    record.column("cpu", "ms", "CPU time of a frame, of the program's process with all its threads");
-    record.column("first", "s", "start to first frame: the file, the program's preparations, the hierarchy");
+    record.column(
+        "cpu",
+        "ms",
+        "CPU time of a frame, of the program's process with all its threads",
+    );
+    record.column(
+        "first",
+        "s",
+        "start to first frame: the file, the program's preparations, the hierarchy",
+    );
     record.column("memory", "GiB", "the most the process held");
-    record.column("speedup", "", "wall time of llvmpipe's frames over that of these, group by group");
+    record.column(
+        "speedup",
+        "",
+        "wall time of llvmpipe's frames over that of these, group by group",
+    );
     record.column("cpu_speedup", "", "the same of CPU time");
     record.column("load", "", "load of the machine when the program's frames had been measured");
     record.notes.push(format!(
-        "Windows of {SIZE_PX} x {SIZE_PX} pixels on an X server without a screen. The programs take turns, a group of frames each, where two of them fit \
-         into memory; of 16 million triangles they run one after the other, so their ratios decide nothing. `one frame late` shows each frame while the next is asked for \
-         (section 4.1.2); ParaView and VTK draw into framebuffer objects, where gluray is never late."
+        "Windows of {SIZE_PX} x {SIZE_PX} pixels on an X server without a screen. The programs \
+         take turns, a group of frames each, where two of them fit \
+         into memory; of 16 million triangles they run one after the other, so their ratios decide \
+         nothing. `one frame late` shows each frame while the next is asked for \
+         (section 4.1.2); ParaView and VTK draw into framebuffer objects, where gluray is never \
+         late."
     ));
     let mut missing = Vec::new();
     let tools = Tools::find().map_err(|m| missing.extend(m)).ok();
-    let programs: Vec<Program> =
-        Program::ALL.into_iter().filter(|p| p.find().map_err(|m| missing.push(m)).is_ok()).collect();
+    let programs: Vec<Program> = Program::ALL
+        .into_iter()
+        .filter(|p| p.find().map_err(|m| missing.push(m)).is_ok())
+        .collect();
     let Some(tools) = tools.filter(|_| !programs.is_empty()) else {
         return Err(UsageError(format!(
             "table4.1 needs programs that are not here:\n  {}",
@@ -63,7 +80,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.missing.extend(missing);
     let display = Display::start(&tools.xvfb)?;
     let dir = tempfile::tempdir()?;
-    let sizes = if context.quick { &[None][..] } else { &[Some(Size::M1), Some(Size::M4), Some(Size::M16)] };
+    let sizes = if context.quick {
+        &[None][..]
+    } else {
+        &[Some(Size::M1), Some(Size::M4), Some(Size::M16)]
+    };
     for &size in sizes {
         let mesh = match size {
             None => crate::meshes::coarse_wavelet(51)?,
@@ -119,12 +140,20 @@ fn measure(
     let start = |backend: Backend, measurement: &mut Measurement| -> anyhow::Result<Session> {
         let dir = setup.dir.join(format!("{}-{backend:?}-{n}", program.name().replace(' ', "-")));
         let begun = std::time::Instant::now();
-        let mut s =
-            Session::start(program, backend, Some(&setup.tools.gluray), setup.display, &dir, &data, SIZE_PX)?;
+        let mut s = Session::start(
+            program,
+            backend,
+            Some(&setup.tools.gluray),
+            setup.display,
+            &dir,
+            &data,
+            SIZE_PX,
+        )?;
         measurement.first_secs = begun.elapsed().as_secs_f64();
         s.frames(if backend == Backend::Llvmpipe { 1 } else { settle })?;
         if backend != Backend::Llvmpipe && !is_built_once(n) {
-            // Builds of the best hierarchy go on beside the frames; they take about a second per million triangles and core.
+            // Builds of the best hierarchy go on beside the frames; they take about a second per
+            // million triangles and core.
             std::thread::sleep(std::time::Duration::from_secs_f64(2.0 + n as f64 / 4e5));
         }
         Ok(s)
@@ -132,7 +161,11 @@ fn measure(
     if together {
         let mut sessions = Vec::new();
         for (backend, m) in backends.iter().copied().zip(&mut all) {
-            context.report_step(format!("{}, {n} triangles: starting {}", program.name(), backend.name()))?;
+            context.report_step(format!(
+                "{}, {n} triangles: starting {}",
+                program.name(),
+                backend.name()
+            ))?;
             sessions.push(start(backend, m)?);
         }
         for round in 0..groups {
@@ -151,7 +184,11 @@ fn measure(
         }
     } else {
         for (backend, m) in backends.iter().copied().zip(&mut all) {
-            context.report_step(format!("{}, {n} triangles: {}", program.name(), backend.name()))?;
+            context.report_step(format!(
+                "{}, {n} triangles: {}",
+                program.name(),
+                backend.name()
+            ))?;
             let mut s = start(backend, m)?;
             for _ in 0..groups {
                 m.groups.push(per_frame(s.frames(frames)?, frames));
@@ -180,7 +217,11 @@ fn per_frame(c: Cost, frames: u32) -> Cost {
 }
 
 /// Frames that the driver drew would be no frames of ours.
-fn check(program: Program, backend: Backend, report: Option<serde_json::Value>) -> anyhow::Result<()> {
+fn check(
+    program: Program,
+    backend: Backend,
+    report: Option<serde_json::Value>,
+) -> anyhow::Result<()> {
     if backend == Backend::Llvmpipe {
         return Ok(());
     }
@@ -202,7 +243,8 @@ fn each(native: &Measurement, ours: &Measurement, of: impl Fn(&Cost) -> f64) -> 
 
 fn row(program: Program, n: usize, backend: Backend, native: &Measurement, m: &Measurement) -> Row {
     let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&m.groups.iter().map(f).collect::<Vec<_>>());
-    let row = Row::new().with("program", program.name()).with("triangles", n).with("way", backend.name());
+    let row =
+        Row::new().with("program", program.name()).with("triangles", n).with("way", backend.name());
     let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
     let median = |of: &dyn Fn(&Cost) -> f64| Summary::of(&each(native, m, of)).map(|s| s.median);
     row.with("fps", 1.0 / wall.median)
@@ -225,13 +267,17 @@ fn ratio(
     in_turns: bool,
 ) -> Option<Ratio> {
     let name = format!("{}, {n} triangles, {}", program.name(), backend.name());
-    let ratio = Ratio::of_rounds(name, Backend::Llvmpipe.name(), &each(native, ours, |c| c.wall_secs))?;
+    let ratio =
+        Ratio::of_rounds(name, Backend::Llvmpipe.name(), &each(native, ours, |c| c.wall_secs))?;
     Some(Ratio { in_turns, ..ratio })
 }
 
 fn plot(record: &Record) -> Plot {
-    let mut plot =
-        Plot::lines("Frames of programs", Axis::log("triangles", ""), Axis::log("frames a second", "1/s"));
+    let mut plot = Plot::lines(
+        "Frames of programs",
+        Axis::log("triangles", ""),
+        Axis::log("frames a second", "1/s"),
+    );
     for program in Program::ALL {
         for backend in BACKENDS {
             let of = record.rows.iter().filter(|r| {
@@ -240,7 +286,8 @@ fn plot(record: &Record) -> Plot {
             let points: Vec<(f64, f64)> =
                 of.filter_map(|r| r.number("triangles").zip(r.number("fps"))).collect();
             if !points.is_empty() {
-                plot.series.push(Series::new(format!("{}, {}", program.name(), backend.name()), points));
+                plot.series
+                    .push(Series::new(format!("{}, {}", program.name(), backend.name()), points));
             }
         }
     }

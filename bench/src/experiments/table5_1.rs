@@ -1,4 +1,5 @@
-//! Table 5.1: memory by data set; the dissertation's numbers by its layout, and what this program really holds.
+//! Table 5.1: memory by data set; the dissertation's numbers by its layout, and what this program
+//! really holds.
 
 use super::Context;
 use super::test_section::check_cancelled;
@@ -25,8 +26,9 @@ const TABLE: [(&str, f64); 5] = [
 /// Pixels along the side of the table's picture.
 const FILM: usize = 512;
 
-/// The layout that gives the table's numbers: a texture of gradient and index (16 B) and an octree level (1 B) a voxel, and two numbers of 4 B a pixel. The
-/// text speaks of random numbers three times the picture's size; its own table has no room for them.
+/// The layout that gives the table's numbers: a texture of gradient and index (16 B) and an octree
+/// level (1 B) a voxel, and two numbers of 4 B a pixel. The text speaks of random numbers three
+/// times the picture's size; its own table has no room for them.
 fn legacy_bytes(dims: [usize; 3]) -> usize {
     17 * dims.iter().product::<usize>() + 2 * 4 * FILM * FILM
 }
@@ -54,8 +56,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("build", "s", "wall time of preparing the march, field at hand");
     record.column("per_voxel", "B", "our bytes without the film by voxels");
     record.notes.push(
-        "By the `legacy` layout the dissertation's octree is the seventeenth byte of a voxel. Ours keeps eps alone (4 B) and takes gradients from spline coefficients (4 B more); line of \
-         sight keeps one projected plane. Fields here have the table's sizes and smooth contents: memory does not \
+        "By the `legacy` layout the dissertation's octree is the seventeenth byte of a voxel. Ours \
+         keeps eps alone (4 B) and takes gradients from spline coefficients (4 B more); line of \
+         sight keeps one projected plane. Fields here have the table's sizes and smooth contents: \
+         memory does not \
          depend on what they hold. MB are 10^6 bytes."
             .into(),
     );
@@ -86,20 +90,27 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 (n as f64 + march as f64 / marches.len() as f64) / 5.0,
             )?;
             let before = resident_bytes();
-            let field =
-                Field::from_fn(dims, [h; 3], DVec3::ZERO, 1.000_27, |p| 1e-5 * p.x * (p.y + 0.5 * p.z))?;
+            let field = Field::from_fn(dims, [h; 3], DVec3::ZERO, 1.000_27, |p| {
+                1e-5 * p.x * (p.y + 0.5 * p.z)
+            })?;
             let view = View::along(ViewAxis::Z, field.centre_m());
             let start = std::time::Instant::now();
             let row = Row::new().with("data", name).with("march", label);
             let dims_text = dims.map(|d| d.to_string()).join("x");
-            let row = row.with("dims", dims_text).with("thesis", thesis_mb).with("legacy", legacy_mb);
+            let row =
+                row.with("dims", dims_text).with("thesis", thesis_mb).with("legacy", legacy_mb);
             let row = row.with("legacy_off", (legacy_mb - thesis_mb).abs());
             let film = film_bytes();
             let (march_bytes, bricks, row, build_secs, after) = match interpolant {
                 None => {
                     let wanted = PathQuantities::default();
-                    let los =
-                        LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
+                    let los = LineOfSight::new(
+                        &field,
+                        view,
+                        Interpolant::BSpline,
+                        wanted,
+                        BlankCells::Opaque,
+                    );
                     (los.memory_bytes(), 0, row, start.elapsed().as_secs_f64(), resident_bytes())
                 }
                 Some(interpolant) => {
@@ -111,13 +122,19 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                     );
                     let build = start.elapsed().as_secs_f64();
                     let bricks = d.bricks().map_or(0, schlieren::skip::Bricks::memory_bytes);
-                    let row =
-                        row.with("bricks_build", d.bricks().map(|b| b.build_time().as_secs_f64() * 1e3));
+                    let row = row.with(
+                        "bricks_build",
+                        d.bricks().map(|b| b.build_time().as_secs_f64() * 1e3),
+                    );
                     (d.memory_bytes() - bricks, bricks, row, build, resident_bytes())
                 }
             };
             let ours = field.memory_bytes() + march_bytes + bricks;
-            series[march].points.push(Point { x: n as f64, y: (ours + film) as f64 / MEGA, range: None });
+            series[march].points.push(Point {
+                x: n as f64,
+                y: (ours + film) as f64 / MEGA,
+                range: None,
+            });
             let grown = before.zip(after).map(|(b, a)| (a as f64 - b as f64) / MEGA);
             record.rows.push(
                 row.with("field", field.memory_bytes() as f64 / MEGA)
@@ -133,7 +150,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     let off = record.rows.iter().filter_map(|r| r.number("legacy_off")).fold(0.0, f64::max);
     record.notes.push(format!(
-        "17 bytes a voxel and 8 a pixel are at most {off:.4} MB off the dissertation's five numbers, which are printed to 0.01 MB."
+        "17 bytes a voxel and 8 a pixel are at most {off:.4} MB off the dissertation's five \
+         numbers, which are printed to 0.01 MB."
     ));
     if resident_bytes().is_none() {
         record.missing.push("resident memory: this system has no /proc/self/status".into());
@@ -170,7 +188,8 @@ mod tests {
     #[test]
     fn legacy_layout_gives_the_tables_five_numbers_to_the_last_digit() {
         for (name, thesis_mb) in TABLE {
-            let dims = flows::find(name).unwrap().dims("thesis").unwrap().to_array().map(|d| d as usize);
+            let dims =
+                flows::find(name).unwrap().dims("thesis").unwrap().to_array().map(|d| d as usize);
             let mb = legacy_bytes(dims) as f64 / MEGA;
             // Half of the table's last digit.
             assert!((mb - thesis_mb).abs() <= 0.005 + 1e-9, "{name}: {mb}");

@@ -1,4 +1,5 @@
-//! What the experiments of chapter 5 share: flows of the catalogue between the lenses, rays through them, pictures as PNG.
+//! What the experiments of chapter 5 share: flows of the catalogue between the lenses, rays through
+//! them, pictures as PNG.
 
 use super::Context;
 use crate::record::Picture;
@@ -16,13 +17,15 @@ use schlieren::scene::Scene;
 use schlieren::view::View;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Photons per second of the dissertation's GTX 280: 13 frames of 512² pixels with 10 photons each, figure 5.11.
+/// Photons per second of the dissertation's GTX 280: 13 frames of 512² pixels with 10 photons each,
+/// figure 5.11.
 pub(super) const GTX_280_PHOTONS_PER_SEC: f64 = 13.0 * 512.0 * 512.0 * 10.0;
 
 /// Helium-neon, as in the dissertation's text.
 const WAVELENGTH_NM: f64 = 633.0;
 
-/// A flow of the catalogue as a field of index: air of its density by Gladstone-Dale, or the index itself.
+/// A flow of the catalogue as a field of index: air of its density by Gladstone-Dale, or the index
+/// itself.
 pub(super) fn flow(name: &str, size: &str) -> anyhow::Result<Field> {
     let flow = flows::find(name)?.generate(size, Fields::Density)?;
     let array = flow.fields.first().map_or("density", |f| f.name);
@@ -56,7 +59,8 @@ pub(super) fn render_picture_with(
     layers: Layers,
 ) -> anyhow::Result<RenderOutput> {
     let never = AtomicBool::new(false);
-    let control = Control { cancel: context.cancel.as_deref().unwrap_or(&never), progress: &|_| {} };
+    let control =
+        Control { cancel: context.cancel.as_deref().unwrap_or(&never), progress: &|_| {} };
     match render(scene, section, layers, &control) {
         Err(RenderError::Cancelled) => Err(Interrupted.into()),
         other => Ok(other?),
@@ -72,16 +76,23 @@ pub(super) fn check_cancelled(context: &Context<'_>) -> anyhow::Result<()> {
 }
 
 /// The picture as it goes into a record.
-pub(super) fn picture(name: &str, caption: String, rendered: &RenderOutput) -> anyhow::Result<Picture> {
+pub(super) fn picture(
+    name: &str,
+    caption: String,
+    rendered: &RenderOutput,
+) -> anyhow::Result<Picture> {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("picture.png");
     schlieren::output::write_png(&path, rendered)?;
     Ok(Picture { name: name.into(), caption, png: std::fs::read(&path)? })
 }
 
-/// Rays through the middle of a picture of `side_m`, in tiles of 4 by 4 as a renderer sends them: `width` by `width` of them.
+/// Rays through the middle of a picture of `side_m`, in tiles of 4 by 4 as a renderer sends them:
+/// `width` by `width` of them.
 pub(super) fn tiles(width: usize, side_m: f64) -> Vec<Start> {
-    let at = |block: usize, i: usize| ((((block * 4 + i) as f64 + 0.5) / width as f64 - 0.5) * side_m) as f32;
+    let at = |block: usize, i: usize| {
+        ((((block * 4 + i) as f64 + 0.5) / width as f64 - 0.5) * side_m) as f32
+    };
     (0..width * width / 16)
         .flat_map(|tile| {
             let (bx, by) = (tile % (width / 4), tile / (width / 4));
@@ -105,8 +116,9 @@ pub(super) fn blob(amplitude: f64, n: usize) -> anyhow::Result<(Gaussian, Field)
     Ok((blob, field))
 }
 
-/// Deflections by the blob itself, without a lattice: an adaptive march in f64, to 1e-13 of the index's amplitude. Rays have to pass within 0.3 m of the middle: farther
-/// out, the cube cuts off what this does not.
+/// Deflections by the blob itself, without a lattice: an adaptive march in f64, to 1e-13 of the
+/// index's amplitude. Rays have to pass within 0.3 m of the middle: farther out, the cube cuts off
+/// what this does not.
 pub(super) fn blob_deflections(
     blob: &Gaussian,
     view: &View,

@@ -90,7 +90,8 @@ mod tests {
     #[test]
     fn files_have_the_sizes_that_their_formats_say() {
         let dir = tempfile::tempdir().expect("a temporary folder");
-        let mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z], vec![[0, 1, 2], [0, 2, 3]]);
+        let mesh =
+            TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z], vec![[0, 1, 2], [0, 2, 3]]);
         let size = |format: Format| {
             let file = dir.path().join("mesh").with_extension(format.extension());
             write(&mesh, format, &file).expect("written");

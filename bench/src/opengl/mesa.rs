@@ -1,4 +1,5 @@
-//! Frames of a mesh by Mesa's software rasteriser alone: what a build or a traced frame is set against (figures 4.7 and 4.9).
+//! Frames of a mesh by Mesa's software rasteriser alone: what a build or a traced frame is set
+//! against (figures 4.7 and 4.9).
 
 use super::programs::find;
 use super::{Backend, Cost, Display, Program, Session, write};
@@ -9,7 +10,8 @@ use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// An X server without a screen, and a program that keeps its mesh in buffers of the driver, so that its frames are the driver's.
+/// An X server without a screen, and a program that keeps its mesh in buffers of the driver, so
+/// that its frames are the driver's.
 pub struct Mesa {
     display: Display,
     programs: Vec<Program>,
@@ -21,8 +23,10 @@ impl Mesa {
     pub fn find() -> Result<Mesa, Vec<String>> {
         let mut missing = Vec::new();
         let programs = [Program::Vtk, Program::Gmsh, Program::ParaView];
-        let programs: Vec<Program> =
-            programs.into_iter().filter(|p| p.find().map_err(|m| missing.push(m)).is_ok()).collect();
+        let programs: Vec<Program> = programs
+            .into_iter()
+            .filter(|p| p.find().map_err(|m| missing.push(m)).is_ok())
+            .collect();
         if !programs.is_empty() {
             missing.clear();
         }
@@ -36,16 +40,24 @@ impl Mesa {
         Ok(Mesa { display, programs, dir })
     }
 
-    /// A program that draws `mesh`, which fills a window of `size_px` pixels a side and turns by some degrees from frame to frame. The
-    /// error says what each program said that would not start.
+    /// A program that draws `mesh`, which fills a window of `size_px` pixels a side and turns by
+    /// some degrees from frame to frame. The error says what each program said that would not
+    /// start.
     pub fn draw(&self, mesh: &Arc<TriMesh>, size_px: u32) -> anyhow::Result<MesaFrames> {
         let mut faults = Vec::new();
         for &program in &self.programs {
             let data = self.dir.path().join("mesh").with_extension(program.format().extension());
             write(mesh, program.format(), &data)?;
             let dir = self.dir.path().join(program.name().replace(' ', "-"));
-            let started =
-                Session::start(program, Backend::Llvmpipe, None, &self.display, &dir, &data, size_px);
+            let started = Session::start(
+                program,
+                Backend::Llvmpipe,
+                None,
+                &self.display,
+                &dir,
+                &data,
+                size_px,
+            );
             std::fs::remove_file(&data)?;
             match started {
                 Ok(mut session) => {
@@ -60,7 +72,8 @@ impl Mesa {
     }
 }
 
-/// A program that draws a mesh by llvmpipe, a frame whenever it is asked, and what its frames have cost.
+/// A program that draws a mesh by llvmpipe, a frame whenever it is asked, and what its frames have
+/// cost.
 pub struct MesaFrames {
     program: &'static str,
     session: Session,
@@ -93,12 +106,15 @@ impl MesaFrames {
         self.session.end().map(drop)
     }
 
-    /// Ends the program. `row` with the columns `time`, `time_low`, `time_high` and `cpu` of a frame, where `per_second` of their unit
-    /// are a second.
+    /// Ends the program. `row` with the columns `time`, `time_low`, `time_high` and `cpu` of a
+    /// frame, where `per_second` of their unit are a second.
     pub fn end(self, row: Row, per_second: f64) -> anyhow::Result<Row> {
         self.session.end()?;
-        let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&self.costs.iter().map(f).collect::<Vec<_>>());
-        let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return Ok(row) };
+        let of =
+            |f: &dyn Fn(&Cost) -> f64| Summary::of(&self.costs.iter().map(f).collect::<Vec<_>>());
+        let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else {
+            return Ok(row);
+        };
         Ok(row
             .with("time", wall.median * per_second)
             .with("time_low", wall.low * per_second)

@@ -1,4 +1,5 @@
-//! Unmodified OpenGL programs on an X server without a screen, drawn by Mesa's llvmpipe or through `gluray run`, one frame at a time.
+//! Unmodified OpenGL programs on an X server without a screen, drawn by Mesa's llvmpipe or through
+//! `gluray run`, one frame at a time.
 
 mod data;
 mod display;

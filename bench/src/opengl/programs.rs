@@ -1,5 +1,5 @@
-//! The programs of table 4.1 and how each is made to draw one frame at a time. The programs are the installed ones; only their own
-//! script languages are used.
+//! The programs of table 4.1 and how each is made to draw one frame at a time. The programs are the
+//! installed ones; only their own script languages are used.
 
 use super::Format;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,8 @@ pub enum Program {
 
 impl Program {
     /// All of them.
-    pub const ALL: [Program; 4] = [Program::Gmsh, Program::Geomview, Program::ParaView, Program::Vtk];
+    pub const ALL: [Program; 4] =
+        [Program::Gmsh, Program::Geomview, Program::ParaView, Program::Vtk];
 
     /// Its name in tables.
     pub fn name(self) -> &'static str {
@@ -40,18 +41,22 @@ impl Program {
         }
     }
 
-    /// The executable, from the variable that `cargo xtask test` sets or from where Debian puts it; else what is missing, with the cure.
+    /// The executable, from the variable that `cargo xtask test` sets or from where Debian puts it;
+    /// else what is missing, with the cure.
     pub fn find(self) -> Result<PathBuf, String> {
         let (variable, place, package) = match self {
             Program::Gmsh => ("RTSV_GMSH", "/usr/bin/gmsh", "gmsh"),
             Program::Geomview => ("RTSV_GEOMVIEW", "/usr/bin/geomview", "geomview"),
             Program::ParaView => ("RTSV_PVBATCH", "/usr/bin/pvbatch", "paraview python3-paraview"),
-            Program::Vtk => {
-                ("RTSV_PYTHON", "/usr/bin/python3", "python3-vtk9, or a Python with the package vtk")
-            }
+            Program::Vtk => (
+                "RTSV_PYTHON",
+                "/usr/bin/python3",
+                "python3-vtk9, or a Python with the package vtk",
+            ),
         };
-        let found = find(variable, place)
-            .ok_or_else(|| format!("{}: install {package}, or name it in {variable}", self.name()))?;
+        let found = find(variable, place).ok_or_else(|| {
+            format!("{}: install {package}, or name it in {variable}", self.name())
+        })?;
         match self {
             // Its library is driven by Python.
             Program::Gmsh => find("RTSV_PYTHON", "/usr/bin/python3")
@@ -60,8 +65,14 @@ impl Program {
         }
     }
 
-    /// The command that draws `data` in a window of `size_px` a side, as arguments of `executable`; scripts go into `dir`.
-    pub(super) fn arguments(self, dir: &Path, data: &Path, size_px: u32) -> std::io::Result<Vec<String>> {
+    /// The command that draws `data` in a window of `size_px` a side, as arguments of `executable`;
+    /// scripts go into `dir`.
+    pub(super) fn arguments(
+        self,
+        dir: &Path,
+        data: &Path,
+        size_px: u32,
+    ) -> std::io::Result<Vec<String>> {
         let data = data.to_string_lossy().into_owned();
         let script = |name: &str, text: &str| -> std::io::Result<String> {
             let file = dir.join(name);
@@ -74,9 +85,15 @@ impl Program {
                 vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size]
             }
             Program::ParaView => {
-                vec![script("paraview_frames.py", include_str!("scripts/paraview_frames.py"))?, data, size]
+                vec![
+                    script("paraview_frames.py", include_str!("scripts/paraview_frames.py"))?,
+                    data,
+                    size,
+                ]
             }
-            Program::Vtk => vec![script("vtk_frames.py", include_str!("scripts/vtk_frames.py"))?, data, size],
+            Program::Vtk => {
+                vec![script("vtk_frames.py", include_str!("scripts/vtk_frames.py"))?, data, size]
+            }
             Program::Geomview => ["-nopanels", "-c", "-"].map(String::from).to_vec(),
         })
     }
@@ -85,8 +102,10 @@ impl Program {
     pub(super) fn greeting(self, data: &Path, size_px: u32) -> String {
         match self {
             Program::Geomview => format!(
-                "(load {})\n(window c0 {{size {size_px} {size_px}}})\n(bbox-draw g1 no)\n(normalization g1 none)\n\
-                 (merge-ap g1 {{ shading smooth -edge }})\n(look g1)\n(redraw c0)\n(echo \"ready\\n\")\n",
+                "(load {})\n(window c0 {{size {size_px} {size_px}}})\n(bbox-draw g1 \
+                 no)\n(normalization g1 none)\n\
+                 (merge-ap g1 {{ shading smooth -edge }})\n(look g1)\n(redraw \
+                 c0)\n(echo \"ready\\n\")\n",
                 data.display()
             ),
             _ => String::new(),
@@ -96,7 +115,9 @@ impl Program {
     /// What makes it draw the next frame, from another side.
     pub(super) fn next_frame(self) -> &'static str {
         match self {
-            Program::Geomview => "(transform g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n",
+            Program::Geomview => {
+                "(transform g1 g1 focus rotate 0 0.1 0)\n(redraw c0)\n(echo \"frame\\n\")\n"
+            }
             _ => "\n",
         }
     }

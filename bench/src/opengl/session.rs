@@ -1,7 +1,8 @@
 //! A program that runs and draws a frame whenever it is told to.
 //!
-//! Programs say `ready` when their first frame is drawn and `frame` after each that follows, so two of them (native, and through us) can
-//! take turns, and what each costs is read from the kernel's account of its process.
+//! Programs say `ready` when their first frame is drawn and `frame` after each that follows, so two
+//! of them (native, and through us) can take turns, and what each costs is read from the kernel's
+//! account of its process.
 
 use super::programs::find;
 use super::{Display, Program};
@@ -25,7 +26,8 @@ impl Tools {
     /// Those of this machine; else what is missing, each with its cure.
     pub fn find() -> Result<Tools, Vec<String>> {
         let beside = std::env::current_exe().ok().and_then(|e| Some(e.parent()?.join("gluray")));
-        let gluray = std::env::var_os("RTSV_GLURAY").map(PathBuf::from).or(beside).filter(|p| p.is_file());
+        let gluray =
+            std::env::var_os("RTSV_GLURAY").map(PathBuf::from).or(beside).filter(|p| p.is_file());
         let xvfb = find("RTSV_XVFB", "/usr/bin/Xvfb");
         match (xvfb, gluray) {
             (Some(xvfb), Some(gluray)) => Ok(Tools { xvfb, gluray }),
@@ -36,7 +38,8 @@ impl Tools {
                 }
                 if gluray.is_none() {
                     missing.push(
-                        "gluray: `cargo build --release -p gluray`, or name it in RTSV_GLURAY".to_string(),
+                        "gluray: `cargo build --release -p gluray`, or name it in RTSV_GLURAY"
+                            .to_string(),
                     );
                 }
                 Err(missing)
@@ -95,8 +98,8 @@ pub struct Session {
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(600);
 
 impl Session {
-    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own. Backends that are not the driver's need
-    /// `gluray`.
+    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own.
+    /// Backends that are not the driver's need `gluray`.
     pub fn start(
         program: Program,
         backend: Backend,
@@ -139,7 +142,8 @@ impl Session {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(errors);
-        let mut child = command.spawn().with_context(|| format!("cannot start {}", program.name()))?;
+        let mut child =
+            command.spawn().with_context(|| format!("cannot start {}", program.name()))?;
         let (Some(mut input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             anyhow::bail!("{} has no pipes", program.name());
         };
@@ -192,7 +196,11 @@ impl Session {
 
     /// Has VTK write what is in its window, as raw RGB behind a short head.
     pub fn save(&mut self, file: &Path) -> anyhow::Result<Vec<u8>> {
-        anyhow::ensure!(self.program == Program::Vtk, "{} is not made to save pictures", self.program.name());
+        anyhow::ensure!(
+            self.program == Program::Vtk,
+            "{} is not made to save pictures",
+            self.program.name()
+        );
         self.input.write_all(format!("save {}\n", file.display()).as_bytes())?;
         self.input.flush()?;
         self.wait_for("saved")?;
@@ -230,12 +238,14 @@ impl Session {
     }
 }
 
-/// CPU seconds of a process, its threads included, from the kernel's account of its threads in nanoseconds; of threads that have ended, in ticks.
+/// CPU seconds of a process, its threads included, from the kernel's account of its threads in
+/// nanoseconds; of threads that have ended, in ticks.
 fn cpu_secs(pid: u32) -> anyhow::Result<f64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat"))
         .with_context(|| format!("process {pid} is gone"))?;
     // The name in brackets may have spaces in it.
-    let fields: Vec<&str> = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
+    let fields: Vec<&str> =
+        stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
     let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).unwrap_or(0.0);
     Ok((ticks(11) + ticks(12)) / 100.0)
 }

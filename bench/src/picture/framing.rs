@@ -1,4 +1,5 @@
-//! Where a picture is taken from: a camera file, a data set's own view, or one that fits the subject.
+//! Where a picture is taken from: a camera file, a data set's own view, or one that fits the
+//! subject.
 
 use anyhow::Context as _;
 use datasets::cli::CureExt as _;
@@ -13,7 +14,8 @@ use std::path::Path;
 /// Where the camera stands.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Framing {
-    /// So that the whole subject just fits into the picture, seen from the front, a little from the side and from above.
+    /// So that the whole subject just fits into the picture, seen from the front, a little from the
+    /// side and from above.
     #[default]
     Fitted,
     /// The same, seen from this direction (towards the eye, world, any length).
@@ -38,7 +40,8 @@ const MARGIN: f64 = 1.04;
 
 /// World corners of everything that is drawn.
 pub(super) fn bounds(scene: &Scene) -> anyhow::Result<(DVec3, DVec3)> {
-    let volumes = scene.volumes.iter().map(|v| (v.volume.grid().origin, v.volume.grid().max_corner()));
+    let volumes =
+        scene.volumes.iter().map(|v| (v.volume.grid().origin, v.volume.grid().max_corner()));
     let all = bounds_of_surfaces(&scene.world).into_iter().chain(volumes);
     corners(all.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))))
 }
@@ -50,26 +53,31 @@ fn bounds_of_surfaces(world: &World) -> Option<(DVec3, DVec3)> {
 }
 
 fn corners(found: Option<(DVec3, DVec3)>) -> anyhow::Result<(DVec3, DVec3)> {
-    found
-        .context("there is nothing to draw: no triangle, line or point that can be seen")
-        .cure("look at the warnings above for what was left out; for image data, choose another --isovalue")
+    found.context("there is nothing to draw: no triangle, line or point that can be seen").cure(
+        "look at the warnings above for what was left out; for image data, choose another \
+               --isovalue",
+    )
 }
 
 impl Framing {
     /// The camera for everything in a world, z up, in a picture of `size` pixels.
     pub fn of(&self, world: &World, size: [u32; 2]) -> anyhow::Result<Camera> {
         let (lo, hi) = corners(bounds_of_surfaces(world))?;
-        let outline = |point: &mut dyn FnMut(DVec3)| corners_of_box(lo, hi).into_iter().for_each(point);
+        let outline =
+            |point: &mut dyn FnMut(DVec3)| corners_of_box(lo, hi).into_iter().for_each(point);
         let view = self.fitted(&outline, DVec3::Z, size);
         Ok(self.camera(view.as_ref(), lo, hi, size)?.camera)
     }
 
-    /// The view that a fitted framing takes of the points that `outline` names; `None` for the other framings.
+    /// The view that a fitted framing takes of the points that `outline` names; `None` for the
+    /// other framings.
     pub(super) fn fitted(&self, outline: &Outline<'_>, up: DVec3, size: [u32; 2]) -> Option<View> {
         let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
         match self {
             Framing::Fitted => Some(fit(outline, None, up, aspect)),
-            Framing::FittedFrom(backward) => Some(fit(outline, backward.try_normalize(), up, aspect)),
+            Framing::FittedFrom(backward) => {
+                Some(fit(outline, backward.try_normalize(), up, aspect))
+            }
             Framing::At(_) | Framing::Parallel(..) => None,
         }
     }
@@ -98,7 +106,8 @@ impl Framing {
         let camera = match height {
             Some(h) => Camera::orthographic(eye, target, view.up, h, aspect, [-far, far])?,
             None => {
-                let near = ((middle - eye).length() - 1.01 * radius).max(1e-3 * radius.min(focus_distance));
+                let near = ((middle - eye).length() - 1.01 * radius)
+                    .max(1e-3 * radius.min(focus_distance));
                 let fov = view.vertical_fov_degrees.to_radians();
                 Camera::perspective(eye, target, view.up, fov, aspect, [near, far.max(2.0 * near)])?
             }
@@ -118,8 +127,8 @@ pub(super) fn corners_of_box(lo: DVec3, hi: DVec3) -> [DVec3; 8] {
     })
 }
 
-/// The nearest place from which all points are in the picture, seen from `backward` or from the front. Flat subjects are
-/// seen face on.
+/// The nearest place from which all points are in the picture, seen from `backward` or from the
+/// front. Flat subjects are seen face on.
 fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -> View {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     outline(&mut |p| (lo, hi) = (lo.min(p), hi.max(p)));
@@ -146,8 +155,9 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
     let right = up.cross(backward).normalize_or(DVec3::X);
     let true_up = backward.cross(right);
 
-    // A point at (x, y, z), z towards the eye, is inside the picture's right border when x - eye.x <= tan (eye.z - z), and
-    // so on for the other three: each pair of borders asks for a least eye.z, and their middle is eye.x or eye.y.
+    // A point at (x, y, z), z towards the eye, is inside the picture's right border when x - eye.x
+    // <= tan (eye.z - z), and so on for the other three: each pair of borders asks for a least
+    // eye.z, and their middle is eye.x or eye.y.
     let tan = (0.5 * FOV_DEGREES).to_radians().tan() / MARGIN;
     let (tan_x, tan_y) = (tan * aspect, tan);
     let mut most = [f64::NEG_INFINITY; 4];
@@ -163,13 +173,15 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
         (most, nearest) = ([0.0; 4], 0.0);
     }
     let [right_most, left_most, upper_most, lower_most] = most;
-    let distance = (0.5 * (right_most + left_most) / tan_x).max(0.5 * (upper_most + lower_most) / tan_y);
+    let distance =
+        (0.5 * (right_most + left_most) / tan_x).max(0.5 * (upper_most + lower_most) / tan_y);
     // Points and lines seen end on have no extent to fit.
     let distance = distance.max(nearest + 1e-3 * extent.length()).max(1e-12);
     let mut shift = [0.5 * (right_most - left_most), 0.5 * (upper_most - lower_most)];
 
-    // Along the axis with room to spare, equal room on both sides: the outermost points seen from there, as slopes, each
-    // with the reciprocal of its distance, by which its slope changes when the eye moves.
+    // Along the axis with room to spare, equal room on both sides: the outermost points seen from
+    // there, as slopes, each with the reciprocal of its distance, by which its slope changes when
+    // the eye moves.
     let mut ends = [[(f64::INFINITY, 0.0), (f64::NEG_INFINITY, 0.0)]; 2];
     outline(&mut |p| {
         let c = p - middle;
@@ -218,8 +230,9 @@ fn default_fov() -> f64 {
     FOV_DEGREES
 }
 
-/// Reads a camera: `eye` and `target` (world), and if wished `up`, `vertical_fov_degrees`, or `parallel_height` (world
-/// units) for a parallel projection; as TOML, or as JSON when the name ends so.
+/// Reads a camera: `eye` and `target` (world), and if wished `up`, `vertical_fov_degrees`, or
+/// `parallel_height` (world units) for a parallel projection; as TOML, or as JSON when the name
+/// ends so.
 pub fn read_camera(path: &Path) -> anyhow::Result<Framing> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the camera file `{}`", path.display()))?;
@@ -230,7 +243,8 @@ pub fn read_camera(path: &Path) -> anyhow::Result<Framing> {
         toml::from_str(&text).map_err(Into::into)
     };
     let file = parsed.with_context(|| format!("`{}` is not a camera", path.display())).cure(
-        "write for example: eye = [0, -5, 2], target = [0, 0, 0], up = [0, 0, 1], vertical_fov_degrees = 30, one a line",
+        "write for example: eye = [0, -5, 2], target = [0, 0, 0], up = [0, 0, 1], \
+         vertical_fov_degrees = 30, one a line",
     )?;
     let view = View {
         up: file.up.into(),
@@ -261,10 +275,12 @@ mod tests {
             (DVec3::ZERO, DVec3::new(0.0, 3.0, 1.0)),
             (DVec3::ZERO, DVec3::new(1.0, 0.0, 7.0)),
         ] {
-            for (up, size) in [(DVec3::Z, [800, 200]), (DVec3::Y, [100, 400]), (DVec3::Z, [64, 64])] {
+            for (up, size) in [(DVec3::Z, [800, 200]), (DVec3::Y, [100, 400]), (DVec3::Z, [64, 64])]
+            {
                 for framing in [Framing::Fitted, Framing::FittedFrom(DVec3::new(3.0, -4.0, 2.0))] {
                     let corners = corners_of_box(lo, hi);
-                    let outline = |point: &mut dyn FnMut(DVec3)| corners.into_iter().for_each(point);
+                    let outline =
+                        |point: &mut dyn FnMut(DVec3)| corners.into_iter().for_each(point);
                     let view = framing.fitted(&outline, up, size);
                     let framed = framing.camera(view.as_ref(), lo, hi, size).unwrap();
                     let seen = corners.map(|p| ndc(&framed.camera, p));
@@ -274,8 +290,9 @@ mod tests {
                     assert!((0.95..=1.0).contains(&most), "{lo} {hi} {up} {size:?}: {most}");
                     // Centred along the other axis, too.
                     for a in [0, 1] {
-                        let ends =
-                            seen.iter().fold([f64::MAX, f64::MIN], |e, c| [e[0].min(c[a]), e[1].max(c[a])]);
+                        let ends = seen
+                            .iter()
+                            .fold([f64::MAX, f64::MIN], |e, c| [e[0].min(c[a]), e[1].max(c[a])]);
                         assert!(
                             (ends[0] + ends[1]).abs() < 0.05,
                             "{lo} {hi} {up} {size:?}: axis {a} {ends:?}"
@@ -297,7 +314,9 @@ mod tests {
         let toml = read_camera(&write("a.toml", "eye = [1, 2, 3]\ntarget = [0, 0, 0]\n")).unwrap();
         let json = read_camera(&write("a.json", r#"{"eye":[1,2,3],"target":[0,0,0]}"#)).unwrap();
         assert_eq!(toml, json);
-        assert!(matches!(toml, Framing::At(v) if v.up == DVec3::Z && v.vertical_fov_degrees == 30.0));
+        assert!(
+            matches!(toml, Framing::At(v) if v.up == DVec3::Z && v.vertical_fov_degrees == 30.0)
+        );
         let e = read_camera(&write("b.toml", "eye = [1, 2]\n")).unwrap_err();
         assert!(datasets::cli::report(&e).contains("b.toml"), "{e:?}");
         assert!(datasets::cli::report(&e).contains("cure"), "{e:?}");

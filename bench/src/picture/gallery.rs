@@ -1,4 +1,5 @@
-//! The pictures of the report and of the README: the dissertation's data sets, each with the command that draws it.
+//! The pictures of the report and of the README: the dissertation's data sets, each with the
+//! command that draws it.
 
 use super::framing::Framing;
 use super::style::{BACKGROUNDS, RenderStyle};
@@ -41,7 +42,8 @@ pub struct Entry {
     range: Option<[f32; 2]>,
     background: &'static str,
     occlusion_radii: f64,
-    /// The data's tubes are drawn so many times as thick: true to the data they would be thinner than a pixel.
+    /// The data's tubes are drawn so many times as thick: true to the data they would be thinner
+    /// than a pixel.
     tubes: f32,
 }
 
@@ -70,13 +72,15 @@ const PLAIN: Entry = Entry {
     tubes: 1.0,
 };
 
-const SOFT: Effects = Effects::SOFT_SHADOWS.union(Effects::SHADOWS).union(Effects::AMBIENT_OCCLUSION);
+const SOFT: Effects =
+    Effects::SOFT_SHADOWS.union(Effects::SHADOWS).union(Effects::AMBIENT_OCCLUSION);
 
 /// All pictures.
 pub const ALL: &[Entry] = &[
     Entry {
         name: "wavelet",
-        caption: "Nested isosurfaces of the wavelet, one million triangles, coloured by isovalue, with soft shadows \
+        caption: "Nested isosurfaces of the wavelet, one million triangles, coloured by isovalue, \
+                  with soft shadows \
                   and ambient occlusion (the dissertation’s figures 3.5 and 3.6).",
         data: &[("wavelet", "1M", Coloring::Scalars)],
         from: Viewpoint::Direction([247.0, -449.0, 224.0]),
@@ -86,7 +90,8 @@ pub const ALL: &[Entry] = &[
     },
     Entry {
         name: "mixing-layer-outside",
-        caption: "The turbulent interface of two gases from outside (RMO of table 4.1), coloured by height, with \
+        caption: "The turbulent interface of two gases from outside (RMO of table 4.1), coloured \
+                  by height, with \
                   ambient occlusion and soft shadows.",
         data: &[("mixing-layer", "small", Coloring::Height)],
         from: Viewpoint::Direction([-0.25, -1.0, 0.5]),
@@ -101,7 +106,8 @@ pub const ALL: &[Entry] = &[
     },
     Entry {
         name: "plasma",
-        caption: "Flux ropes of a reconnecting current sheet with magnetic field lines as tubes (VPIC of table 4.1), \
+        caption: "Flux ropes of a reconnecting current sheet with magnetic field lines as tubes \
+                  (VPIC of table 4.1), \
                   the tubes coloured by field strength.",
         data: &[
             ("plasma", "small", Coloring::Plain([0.55, 0.56, 0.58])),
@@ -114,7 +120,8 @@ pub const ALL: &[Entry] = &[
     },
     Entry {
         name: "impact",
-        caption: "A ball has hit a plate: crater, rim and ejecta (the fracture data of chapter 4), with soft shadows \
+        caption: "A ball has hit a plate: crater, rim and ejecta (the fracture data of chapter 4), \
+                  with soft shadows \
                   and ambient occlusion.",
         data: &[("impact", "small", Coloring::Plain([0.60, 0.50, 0.40]))],
         from: Viewpoint::Direction([0.38, -1.0, 0.5]),
@@ -122,7 +129,8 @@ pub const ALL: &[Entry] = &[
     },
     Entry {
         name: "star",
-        caption: "Magnetic field lines of a star as tubes (the VAPOR star of table 4.1), coloured by field strength, \
+        caption: "Magnetic field lines of a star as tubes (the VAPOR star of table 4.1), coloured \
+                  by field strength, \
                   around the star itself.",
         data: &[
             ("star-field-lines", "small", Coloring::Scalars),
@@ -136,7 +144,8 @@ pub const ALL: &[Entry] = &[
     },
     Entry {
         name: "glass",
-        caption: "The same star as a ball of glass: the field lines behind it are seen through it, upside down \
+        caption: "The same star as a ball of glass: the field lines behind it are seen through it, \
+                  upside down \
                   (refraction and absorption).",
         data: &[
             ("star-field-lines", "small", Coloring::Scalars),
@@ -200,11 +209,15 @@ impl Entry {
         }
         let framing = match self.from {
             Viewpoint::Direction(backward) => Framing::FittedFrom(backward.into()),
-            Viewpoint::Eye(eye, target) => Framing::At(View::new(self.name, eye.into(), target.into())),
+            Viewpoint::Eye(eye, target) => {
+                Framing::At(View::new(self.name, eye.into(), target.into()))
+            }
             Viewpoint::View(name) => {
                 let views = catalogue::find(self.data[0].0)?.views();
                 let view = views.into_iter().find(|v| v.name == name);
-                Framing::At(view.with_context(|| format!("{} has no view `{name}`", self.data[0].0))?)
+                Framing::At(
+                    view.with_context(|| format!("{} has no view `{name}`", self.data[0].0))?,
+                )
             }
         };
         let data_secs = start.elapsed().as_secs_f64();
@@ -215,7 +228,10 @@ impl Entry {
             range: self.range,
             glass_parts_only: true,
             occlusion_radii: self.occlusion_radii,
-            background: BACKGROUNDS.iter().find(|b| b.0 == self.background).map_or(BACKGROUNDS[0].1, |b| b.1),
+            background: BACKGROUNDS
+                .iter()
+                .find(|b| b.0 == self.background)
+                .map_or(BACKGROUNDS[0].1, |b| b.1),
             ..RenderStyle::default()
         };
         let request = RenderRequest {
@@ -233,7 +249,10 @@ impl Entry {
     /// The command that draws it.
     pub fn command(&self, size: [u32; 2], samples: u32) -> String {
         let [w, h] = size;
-        format!("bench picture {} -o {}.png --size {w}x{h} --samples {samples}", self.name, self.name)
+        format!(
+            "bench picture {} -o {}.png --size {w}x{h} --samples {samples}",
+            self.name, self.name
+        )
     }
 }
 
@@ -248,8 +267,17 @@ mod tests {
             let p = e.render([144, 96], 1, &mut RenderControl::default()).unwrap();
             // Paths inside glass may be cut; the renderer says so.
             let expected = |w: &String| e.name == "glass" && w.contains("max_bounces");
-            assert!(p.rendered.warnings.iter().all(expected), "{}: {:?}", e.name, p.rendered.warnings);
-            assert!(p.rendered.report.effects.contains(e.effects.without(Effects::SHADOWS)), "{}", e.name);
+            assert!(
+                p.rendered.warnings.iter().all(expected),
+                "{}: {:?}",
+                e.name,
+                p.rendered.warnings
+            );
+            assert!(
+                p.rendered.report.effects.contains(e.effects.without(Effects::SHADOWS)),
+                "{}",
+                e.name
+            );
             let colors: std::collections::BTreeSet<[u32; 4]> =
                 p.rendered.frame.color.iter().map(|c| c.map(f32::to_bits)).collect();
             assert!(colors.len() > 200, "{}: {} colours", e.name, colors.len());

@@ -32,8 +32,13 @@ impl<'a> SceneMaterials<'a> {
     }
 
     /// A picture in a role; `None` for a material that has none.
-    fn texture(&mut self, index: Option<usize>, role: Role) -> anyhow::Result<Option<Arc<Texture>>> {
-        let Some((index, picture)) = index.and_then(|i| Some((i, self.model.textures.get(i)?))) else {
+    fn texture(
+        &mut self,
+        index: Option<usize>,
+        role: Role,
+    ) -> anyhow::Result<Option<Arc<Texture>>> {
+        let Some((index, picture)) = index.and_then(|i| Some((i, self.model.textures.get(i)?)))
+        else {
             return Ok(None);
         };
         if let Some(made) = self.made.get(&(index, role)) {
@@ -41,9 +46,13 @@ impl<'a> SceneMaterials<'a> {
         }
         let row = picture.width.max(1) as usize;
         let rows = picture.rgba8.chunks(row);
-        // The reader leaves texture coordinates as the file has them: v = 0 is the upper edge unless `v_up`.
-        let mut texels: Vec<[u8; 4]> =
-            if picture.v_up { rows.rev().flatten().copied().collect() } else { picture.rgba8.clone() };
+        // The reader leaves texture coordinates as the file has them: v = 0 is the upper edge
+        // unless `v_up`.
+        let mut texels: Vec<[u8; 4]> = if picture.v_up {
+            rows.rev().flatten().copied().collect()
+        } else {
+            picture.rgba8.clone()
+        };
         for t in &mut texels {
             t[3] = match role {
                 Role::Color | Role::Linear => t[3],
@@ -66,17 +75,19 @@ impl<'a> SceneMaterials<'a> {
 
     pub(super) fn material(&mut self, m: &SurfaceMaterial) -> anyhow::Result<Material> {
         let [r, g, b, factor] = m.base_color;
-        // Reflectance of a smooth interface at normal incidence (Fresnel); rough dielectrics are drawn without mirror rays.
+        // Reflectance of a smooth interface at normal incidence (Fresnel); rough dielectrics are
+        // drawn without mirror rays.
         let fresnel = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
-        let mut out = if m.metallic == 0.0 && m.roughness > 0.5 && m.metallic_roughness_texture.is_none() {
-            Material::matte([r, g, b])
-        } else {
-            let mut out = Material::pbr([r, g, b], m.metallic, m.roughness);
-            if let SurfaceModel::Pbr { specular, .. } = &mut out.model {
-                *specular = fresnel.clamp(0.0, 1.0);
-            }
-            out
-        };
+        let mut out =
+            if m.metallic == 0.0 && m.roughness > 0.5 && m.metallic_roughness_texture.is_none() {
+                Material::matte([r, g, b])
+            } else {
+                let mut out = Material::pbr([r, g, b], m.metallic, m.roughness);
+                if let SurfaceModel::Pbr { specular, .. } = &mut out.model {
+                    *specular = fresnel.clamp(0.0, 1.0);
+                }
+                out
+            };
         let (opacity, role) = match m.alpha {
             AlphaMode::Opaque => (1.0, Role::Opaque),
             AlphaMode::Blend => (factor, Role::Color),
@@ -105,7 +116,10 @@ impl<'a> SceneMaterials<'a> {
             occlusion: self.texture(m.occlusion_texture, Role::Linear)?,
             occlusion_strength: m.occlusion_strength,
             emission: self.texture(m.emissive_texture, Role::Opaque)?,
-            rows_from_top: [m.normal_texture].into_iter().flatten().any(|i| !self.model.textures[i].v_up),
+            rows_from_top: [m.normal_texture]
+                .into_iter()
+                .flatten()
+                .any(|i| !self.model.textures[i].v_up),
             ..TextureMaps::new(MapConvention::Gltf)
         };
         let any = [&maps.normal, &maps.metallic_roughness, &maps.occlusion, &maps.emission];

@@ -1,8 +1,9 @@
 //! Pictures of files and of the generated data sets.
 //!
-//! A [`subject::Subject`] is what is drawn, without lights: out of any file that [`datasets::read`] knows, or out of the
-//! catalogue. [`style`] adds materials and lights for the wished effects, [`framing`] finds a camera, [`draw`] does the
-//! work and keeps the account, [`save`] writes PNG and OpenEXR. [`gallery`] holds the pictures of the report.
+//! A [`subject::Subject`] is what is drawn, without lights: out of any file that [`datasets::read`]
+//! knows, or out of the catalogue. [`style`] adds materials and lights for the wished effects,
+//! [`framing`] finds a camera, [`draw`] does the work and keeps the account, [`save`] writes PNG
+//! and OpenEXR. [`gallery`] holds the pictures of the report.
 
 pub mod framing;
 pub mod gallery;
@@ -93,8 +94,9 @@ pub fn draw(
     let mut warnings = vec![];
     let skipped = scene.world.report().skipped;
     if skipped > 0 {
-        warnings
-            .push(format!("{skipped} primitives left out: their coordinates are not finite or out of range"));
+        warnings.push(format!(
+            "{skipped} primitives left out: their coordinates are not finite or out of range"
+        ));
     }
 
     control.check()?;
@@ -136,14 +138,19 @@ pub fn draw(
     }
     let frame = progressive.frame();
     let render_secs = start.elapsed().as_secs_f64();
-    warnings.extend(report.warnings.iter().filter(|w| !is_about_unrequested_effect(w, requested)).cloned());
+    warnings.extend(
+        report.warnings.iter().filter(|w| !is_about_unrequested_effect(w, requested)).cloned(),
+    );
     Ok(RenderedImage { frame, report, warnings, build_secs, render_secs })
 }
 
-/// Whether a warning says that an effect changed nothing which the scene has by itself and nobody wished for.
+/// Whether a warning says that an effect changed nothing which the scene has by itself and nobody
+/// wished for.
 fn is_about_unrequested_effect(warning: &str, requested: Effects) -> bool {
     let mut others = Effects::ALL.into_iter().filter(|(e, _)| !requested.contains(*e));
     others.any(|(_, name)| {
-        warning.strip_prefix(name).is_some_and(|rest| rest.starts_with(" changed no pixel of this picture"))
+        warning
+            .strip_prefix(name)
+            .is_some_and(|rest| rest.starts_with(" changed no pixel of this picture"))
     })
 }

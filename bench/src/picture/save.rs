@@ -48,14 +48,19 @@ pub fn metadata(rendered: &RenderedImage, request: &RenderRequest) -> Metadata {
 pub fn write_png(path: &Path, frame: &Frame) -> anyhow::Result<image_io::PngReport> {
     let mut p = Picture::new(frame.width, frame.height);
     let opaque = frame.color.iter().all(|c| c[3] == 1.0);
-    for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate().filter(|(c, _)| *c < 3 || !opaque) {
+    for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate().filter(|(c, _)| *c < 3 || !opaque)
+    {
         p.add(name, "", frame.color.iter().map(|v| v[c]).collect())?;
     }
     Ok(image_io::write_png(path, &p, PngDepth::Eight)?)
 }
 
 /// Writes every layer as OpenEXR.
-pub fn write_exr(path: &Path, rendered: &RenderedImage, request: &RenderRequest) -> anyhow::Result<()> {
+pub fn write_exr(
+    path: &Path,
+    rendered: &RenderedImage,
+    request: &RenderRequest,
+) -> anyhow::Result<()> {
     let mut p = picture(&rendered.frame)?;
     p.metadata = metadata(rendered, request);
     Ok(image_io::write_exr(path, &p)?)

@@ -1,7 +1,9 @@
-//! Materials, lights and background: one studio for all pictures, so that pictures differ by their effects alone.
+//! Materials, lights and background: one studio for all pictures, so that pictures differ by their
+//! effects alone.
 //!
-//! The key light stands above the viewer's right shoulder, a weak headlight fills the shadows, ambient light is a quarter
-//! of white. All lights move with the camera: nothing that can be seen lies in the dark.
+//! The key light stands above the viewer's right shoulder, a weak headlight fills the shadows,
+//! ambient light is a quarter of white. All lights move with the camera: nothing that can be seen
+//! lies in the dark.
 
 use super::subject::{PartColoring, Subject, VolumeField};
 use anyhow::Context as _;
@@ -29,12 +31,13 @@ pub struct RenderStyle {
     pub range: Option<[f32; 2]>,
     /// What fills uncovered pixels.
     pub background: Background,
-    /// Refraction belongs to the parts that are [`PartColoring::Glass`]; otherwise it makes glass of everything.
+    /// Refraction belongs to the parts that are [`PartColoring::Glass`]; otherwise it makes glass
+    /// of everything.
     pub glass_parts_only: bool,
     /// How far ambient occlusion looks, in radii of the subject.
     pub occlusion_radii: f64,
-    /// Of a volume: scalars and the opacity of a stretch as long as a tenth of its diagonal, linear in between; `None`
-    /// for a ramp over the range of the colours.
+    /// Of a volume: scalars and the opacity of a stretch as long as a tenth of its diagonal, linear
+    /// in between; `None` for a ramp over the range of the colours.
     pub opacity: Option<Vec<[f32; 2]>>,
 }
 
@@ -53,7 +56,8 @@ impl Default for RenderStyle {
 }
 
 /// Pale, darker below.
-const BACKDROP: Background = Background::Gradient { bottom: [0.42, 0.45, 0.50], top: [0.86, 0.89, 0.93] };
+const BACKDROP: Background =
+    Background::Gradient { bottom: [0.42, 0.45, 0.50], top: [0.86, 0.89, 0.93] };
 
 /// Names of backgrounds, the default first.
 pub const BACKGROUNDS: [(&str, Background); 4] = [
@@ -68,8 +72,8 @@ const KEY_SIZE_RAD: f64 = 0.06;
 /// Aperture of the lens as a share of the distance to the subject.
 const APERTURE: f64 = 0.012;
 
-/// Opacity at the upper end of a volume's default ramp, and the stretch that opacities are given for as a share of the
-/// volume's diagonal: neither fog nor a wall for smooth fields.
+/// Opacity at the upper end of a volume's default ramp, and the stretch that opacities are given
+/// for as a share of the volume's diagonal: neither fog nor a wall for smooth fields.
 const RAMP_OPACITY: f32 = 0.5;
 const OPACITY_STRETCH: f64 = 0.1;
 
@@ -102,7 +106,10 @@ pub fn parse_effects(list: &str) -> Result<Effects, String> {
         let found = NAMES.iter().find(|(_, names)| names.contains(&simple.as_str()));
         let Some((effect, _)) = found else {
             let known: Vec<&str> = NAMES.iter().map(|(_, n)| n[0]).collect();
-            return Err(format!("there is no effect `{name}`; there are: {}, none", known.join(", ")));
+            return Err(format!(
+                "there is no effect `{name}`; there are: {}, none",
+                known.join(", ")
+            ));
         };
         all = all | *effect;
     }
@@ -129,9 +136,10 @@ impl RenderStyle {
                     self.with_effects(plain([0.8; 3])).colored_by_scalars(self.color_map(range)?)
                 }
                 PartColoring::Color(c) => self.with_effects(plain(c)),
-                PartColoring::FileMaterial(m) if self.has(MATERIAL_EFFECTS) => {
-                    Material { color_source: m.color_source.clone(), ..self.with_effects(plain(m.color)) }
-                }
+                PartColoring::FileMaterial(m) if self.has(MATERIAL_EFFECTS) => Material {
+                    color_source: m.color_source.clone(),
+                    ..self.with_effects(plain(m.color))
+                },
                 PartColoring::FileMaterial(m) => m,
             };
             let material = builder.material(material);
@@ -142,7 +150,9 @@ impl RenderStyle {
         builder.background = self.background;
         let mirrors = Effects::REFLECTION | Effects::GLOSSY_REFLECTION | Effects::REFRACTION;
         let surrounded = self.has(mirrors | Effects::PATH_TRACING);
-        for light in self.lights().into_iter().filter(|l| !(surrounded && l.kind == LightKind::Ambient)) {
+        for light in
+            self.lights().into_iter().filter(|l| !(surrounded && l.kind == LightKind::Ambient))
+        {
             builder.light(light);
         }
         if surrounded {
@@ -150,7 +160,9 @@ impl RenderStyle {
             let up = subject.up.as_vec3().try_normalize().unwrap_or(Vec3::Z);
             // What is seen through glass is as bright as what is seen beside it.
             let (bottom, top) = match self.background {
-                Background::Gradient { bottom, top } if self.has(Effects::REFRACTION) => (bottom, top),
+                Background::Gradient { bottom, top } if self.has(Effects::REFRACTION) => {
+                    (bottom, top)
+                }
                 _ => ([0.10, 0.10, 0.11], [0.42, 0.45, 0.5]),
             };
             builder.environment = Some(Environment::Gradient { bottom, top, up });
@@ -169,13 +181,15 @@ impl RenderStyle {
         let ramp = vec![[lo, 0.0], [hi, RAMP_OPACITY]];
         let stretch = OPACITY_STRETCH * (field.grid.max_corner() - field.grid.origin).length();
         let opacity = self.opacity.as_ref().unwrap_or(&ramp);
-        let transfer = TransferFunction::from_opacity(self.color_map([lo, hi])?, opacity, stretch as f32)?;
+        let transfer =
+            TransferFunction::from_opacity(self.color_map([lo, hi])?, opacity, stretch as f32)?;
         Ok(Volume::new(field.grid.clone(), transfer, VolumeOptions::default())?)
     }
 
     fn lights(&self) -> Vec<Light> {
         let shadows = self.has(Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
-        let mut key = Light::directional(DVec3::new(0.5, 0.75, 0.6)).with_color([0.72; 3]).in_camera_frame();
+        let mut key =
+            Light::directional(DVec3::new(0.5, 0.75, 0.6)).with_color([0.72; 3]).in_camera_frame();
         if self.has(Effects::SOFT_SHADOWS | Effects::PATH_TRACING) {
             key = key.with_size(KEY_SIZE_RAD).expect("a light with a size");
         }
@@ -188,8 +202,12 @@ impl RenderStyle {
         if self.has(Effects::REFRACTION) && !self.glass_parts_only {
             m = glass(m.color);
         } else if self.has(Effects::GLOSSY_REFLECTION) {
-            m.model =
-                SurfaceModel::Pbr { metallic: 0.0, roughness: 0.3, specular: 0.3, form: Default::default() };
+            m.model = SurfaceModel::Pbr {
+                metallic: 0.0,
+                roughness: 0.3,
+                specular: 0.3,
+                form: Default::default(),
+            };
         } else if self.has(Effects::REFLECTION)
             && let SurfaceModel::Phong { mirror, .. } = &mut m.model
         {
@@ -221,7 +239,8 @@ impl RenderStyle {
         if !self.has(Effects::DEPTH_OF_FIELD) {
             return Ok(camera);
         }
-        Ok(camera.with_lens(ThinLens { aperture_radius: APERTURE * focus_distance, focus_distance })?)
+        Ok(camera
+            .with_lens(ThinLens { aperture_radius: APERTURE * focus_distance, focus_distance })?)
     }
 }
 

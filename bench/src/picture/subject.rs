@@ -11,7 +11,9 @@ use rt_core::bvh::Geometry;
 use rt_core::grid::Grid;
 use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
-use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Shape, Spheres, Tubes};
+use rt_core::shapes::{
+    Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Shape, Spheres, Tubes,
+};
 use std::sync::Arc;
 
 /// Where a part's colour comes from.
@@ -79,7 +81,8 @@ pub struct Subject {
 pub struct LoadOptions {
     /// The array to colour by; `None` for the one that the file marks, if it does.
     pub color_by: Option<String>,
-    /// Isovalue for image data; `None` for the middle of the range, and for no isosurface inside a volume.
+    /// Isovalue for image data; `None` for the middle of the range, and for no isosurface inside a
+    /// volume.
     pub isovalue: Option<f32>,
     /// Whether image data is drawn as a volume.
     pub volume: VolumeChoice,
@@ -106,7 +109,14 @@ const POINT_RADIUS: f64 = 0.004;
 impl Subject {
     /// Nothing.
     pub fn empty(up: DVec3) -> Subject {
-        Subject { parts: vec![], volume: None, scalar_range: None, up, warnings: vec![], contents: vec![] }
+        Subject {
+            parts: vec![],
+            volume: None,
+            scalar_range: None,
+            up,
+            warnings: vec![],
+            contents: vec![],
+        }
     }
 
     /// Triangles of all parts.
@@ -118,12 +128,14 @@ impl Subject {
         self.parts.iter().map(count).sum()
     }
 
-    /// Calls `point` with world points that all of the subject lies between: vertices, points of lines, corners of boxes.
+    /// Calls `point` with world points that all of the subject lies between: vertices, points of
+    /// lines, corners of boxes.
     pub(super) fn outline(&self, point: &mut dyn FnMut(DVec3)) {
         for part in &self.parts {
             match &part.geometry {
                 Geometry::Mesh(m) => {
-                    let used = m.indices.iter().flatten().filter_map(|&k| m.positions.get(k as usize));
+                    let used =
+                        m.indices.iter().flatten().filter_map(|&k| m.positions.get(k as usize));
                     used.filter(|p| p.is_finite()).for_each(|p| point(m.origin + p.as_dvec3()));
                 }
                 Geometry::Shape(_) => part.outline.iter().for_each(|p| point(*p)),
@@ -155,7 +167,11 @@ impl Subject {
                 self.contents.push(format!("{} tube segments", lines.num_segments()));
                 self.extend_scalar_range(&lines.scalars);
                 let outline = lines.points.iter().map(|p| p.as_dvec3()).collect();
-                self.parts.push(Part::shape(Arc::new(lines.into_tubes()?), PartColoring::Scalars, outline));
+                self.parts.push(Part::shape(
+                    Arc::new(lines.into_tubes()?),
+                    PartColoring::Scalars,
+                    outline,
+                ));
             }
         }
         Ok(())
@@ -175,7 +191,8 @@ impl Subject {
         if opened.time_steps.len() > 1 {
             let (n, first) = (opened.time_steps.len(), &opened.time_steps[0]);
             subject.warnings.push(format!(
-                "the file lists {n} steps; this is the first (time {}): give another step’s own file for that",
+                "the file lists {n} steps; this is the first (time {}): give another step’s own \
+                 file for that",
                 first.time
             ));
         }
@@ -190,8 +207,7 @@ impl Subject {
     }
 }
 
-// ---- data sets ------------------------------------------------------------------------------------------------
-
+// ---- data sets ----------------------------------------------------------------------------------
 fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subject> {
     let mut subject = Subject::empty(DVec3::Z);
     let marked = || {
@@ -244,10 +260,13 @@ fn add_volume(
     let array = array.context("no array can be drawn as a volume: the file has none")?;
     let leaf = match data.leaves()[..] {
         [leaf] => leaf,
-        ref leaves => anyhow::bail!("the file has {} parts; a volume needs one uniform grid", leaves.len()),
+        ref leaves => {
+            anyhow::bail!("the file has {} parts; a volume needs one uniform grid", leaves.len())
+        }
     };
     ColorBy::find(leaf, &array)?;
-    let grid = leaf.to_grid(&array).with_context(|| format!("`{array}` cannot be drawn as a volume"))?;
+    let grid =
+        leaf.to_grid(&array).with_context(|| format!("`{array}` cannot be drawn as a volume"))?;
     let Some((lo, hi)) = grid.range() else {
         anyhow::bail!("`{array}` has no finite value: as a volume it would be empty");
     };
@@ -255,12 +274,14 @@ fn add_volume(
         && let Some(request) = load_options.color_by.as_ref().filter(|request| **request != array)
     {
         subject.warnings.push(format!(
-            "`{request}` colours nothing: a volume has the colours of its own scalars, and there is no isosurface without --isovalue"
+            "`{request}` colours nothing: a volume has the colours of its own scalars, and there \
+             is no isosurface without --isovalue"
         ));
     }
-    subject
-        .contents
-        .push(format!("`{array}` as a volume of {} points", grid.dims.as_u64vec3().element_product()));
+    subject.contents.push(format!(
+        "`{array}` as a volume of {} points",
+        grid.dims.as_u64vec3().element_product()
+    ));
     subject.extend_scalar_range(&[lo, hi]);
     subject.volume = Some(VolumeField { grid: Arc::new(grid), range: [lo, hi] });
     Ok(())
@@ -273,7 +294,8 @@ fn first_array(data: &Dataset) -> Option<String> {
     first.map(|a| a.name.clone())
 }
 
-/// The field of image data; `None` where there is none, or where its outer surface is all there is to see.
+/// The field of image data; `None` where there is none, or where its outer surface is all there is
+/// to see.
 fn lattice(
     data: &Dataset,
     color: &Option<String>,
@@ -288,7 +310,9 @@ fn lattice(
         Ok(grid) if grid.dims.min_element() >= 2 => Ok(Some(Arc::new(grid))),
         Ok(_) => Ok(None),
         Err(e) => {
-            subject.warnings.push(format!("drawn as its outer surface, without an isosurface: {e}"));
+            subject
+                .warnings
+                .push(format!("drawn as its outer surface, without an isosurface: {e}"));
             Ok(None)
         }
     }
@@ -302,10 +326,14 @@ fn isosurface(
 ) -> anyhow::Result<Subject> {
     // The surface belongs to the field that the file marks; another array colours it.
     let marked = data.leaves()[0].attributes().and_then(|a| {
-        a.point_scalars.clone().or_else(|| a.point.iter().find(|p| p.components == 1).map(|p| p.name.clone()))
+        a.point_scalars
+            .clone()
+            .or_else(|| a.point.iter().find(|p| p.components == 1).map(|p| p.name.clone()))
     });
     let field = match (&load_options.color_by, marked) {
-        (Some(request), Some(marked)) if *request != marked => Arc::new(data.leaves()[0].to_grid(&marked)?),
+        (Some(request), Some(marked)) if *request != marked => {
+            Arc::new(data.leaves()[0].to_grid(&marked)?)
+        }
         _ => colors.clone(),
     };
     let Some((lo, hi)) = field.range() else {
@@ -320,9 +348,9 @@ fn isosurface(
     let mut surface = Isosurface::new(field.clone(), &[iso], &options)?;
     let missing = surface.report().cells_non_finite;
     if missing > 0 {
-        subject
-            .warnings
-            .push(format!("{missing} cells have a value that is not finite: the surface has holes there"));
+        subject.warnings.push(format!(
+            "{missing} cells have a value that is not finite: the surface has holes there"
+        ));
     }
     let coloring = if Arc::ptr_eq(&field, &colors) {
         PartColoring::Color(DEFAULT_COLOR)
@@ -333,9 +361,10 @@ fn isosurface(
         surface = surface.with_color_by(colors);
         PartColoring::Scalars
     };
-    subject
-        .contents
-        .push(format!("isosurface at {iso} of {} points", field.dims.as_u64vec3().element_product()));
+    subject.contents.push(format!(
+        "isosurface at {iso} of {} points",
+        field.dims.as_u64vec3().element_product()
+    ));
     let outline = corners_of_box(field.origin, field.max_corner()).to_vec();
     subject.parts.push(Part::shape(Arc::new(surface), coloring, outline));
     Ok(subject)
@@ -358,7 +387,8 @@ fn add_tubes(subject: &mut Subject, lines: &[datasets::model::Polyline]) -> anyh
     let mut tubes = Tubes::from_f64_points(&points, &offsets, Radii::Common(radius))?;
     let mut coloring = PartColoring::Color(DEFAULT_COLOR);
     if lines.iter().all(|l| l.scalars.is_some()) {
-        let scalars: Vec<f32> = lines.iter().filter_map(|l| l.scalars.as_ref()).flatten().copied().collect();
+        let scalars: Vec<f32> =
+            lines.iter().filter_map(|l| l.scalars.as_ref()).flatten().copied().collect();
         subject.extend_scalar_range(&scalars);
         tubes = tubes.with_scalars(scalars)?;
         coloring = PartColoring::Scalars;
@@ -383,19 +413,21 @@ fn add_points(subject: &mut Subject, data: &Dataset, color: Option<&str>) -> any
     Ok(())
 }
 
-// ---- meshes with materials ------------------------------------------------------------------------------------
-
+// ---- meshes with materials ----------------------------------------------------------------------
 /// Scenes have y up, as glTF demands and most OBJ files do.
 fn from_scene(model: &SceneModel, load_options: &LoadOptions) -> anyhow::Result<Subject> {
     let mut subject = Subject::empty(DVec3::Y);
     if let Some(request) = &load_options.color_by {
-        subject
-            .warnings
-            .push(format!("`{request}` is not used: the file holds meshes with materials and no arrays"));
+        subject.warnings.push(format!(
+            "`{request}` is not used: the file holds meshes with materials and no arrays"
+        ));
     }
     let mut scene_materials = SceneMaterials::of(model);
-    let materials: Vec<Material> =
-        model.materials.iter().map(|m| scene_materials.material(m)).collect::<anyhow::Result<_>>()?;
+    let materials: Vec<Material> = model
+        .materials
+        .iter()
+        .map(|m| scene_materials.material(m))
+        .collect::<anyhow::Result<_>>()?;
     for m in &model.meshes {
         let coloring = match m.material {
             Some(i) => PartColoring::FileMaterial(materials[i].clone()),
@@ -403,7 +435,11 @@ fn from_scene(model: &SceneModel, load_options: &LoadOptions) -> anyhow::Result<
         };
         subject.parts.push(Part::mesh(Arc::new(m.mesh.clone()), coloring));
     }
-    subject.contents.push(format!("{} meshes, {} triangles", model.meshes.len(), model.num_triangles()));
+    subject.contents.push(format!(
+        "{} meshes, {} triangles",
+        model.meshes.len(),
+        model.num_triangles()
+    ));
     Ok(subject)
 }
 

@@ -1,8 +1,8 @@
 //! Plots as data, drawn as SVG.
 //!
-//! The data is part of the record; [`Plot::to_svg`] draws it. Drawn by hand rather than with a plotting library:
-//! a page needs lines, bars, logarithmic axes, spreads and a legend, text that follows the page's colours, and
-//! marks that tell series apart without colour.
+//! The data is part of the record; [`Plot::to_svg`] draws it. Drawn by hand rather than with a
+//! plotting library: a page needs lines, bars, logarithmic axes, spreads and a legend, text that
+//! follows the page's colours, and marks that tell series apart without colour.
 
 mod scale;
 mod svg;
@@ -52,7 +52,11 @@ impl Axis {
         Axis { label: label.into(), unit: unit.into(), scale: Scale::Log }
     }
     fn caption(&self) -> String {
-        if self.unit.is_empty() { self.label.clone() } else { format!("{} [{}]", self.label, self.unit) }
+        if self.unit.is_empty() {
+            self.label.clone()
+        } else {
+            format!("{} [{}]", self.label, self.unit)
+        }
     }
 }
 
@@ -107,7 +111,15 @@ pub struct Plot {
 impl Plot {
     /// An empty plot of lines.
     pub fn lines(title: &str, x: Axis, y: Axis) -> Plot {
-        Plot { title: title.into(), kind: Kind::Lines, x, y, categories: vec![], series: vec![], mark: None }
+        Plot {
+            title: title.into(),
+            kind: Kind::Lines,
+            x,
+            y,
+            categories: vec![],
+            series: vec![],
+            mark: None,
+        }
     }
 
     /// An empty plot of bars.

@@ -12,7 +12,8 @@ pub(super) struct Mapping {
 }
 
 impl Mapping {
-    /// Covers all values that the scale can show, widened to whole ticks. `zero` makes a linear scale begin at 0.
+    /// Covers all values that the scale can show, widened to whole ticks. `zero` makes a linear
+    /// scale begin at 0.
     pub(super) fn covering(
         values: impl Iterator<Item = f64>,
         scale: Scale,
@@ -32,7 +33,8 @@ impl Mapping {
                     (low, high) = (low.min(0.0), high.max(0.0));
                 }
                 if high - low <= high.abs().max(low.abs()) * 1e-12 {
-                    (low, high) = (low - 0.5 * low.abs().max(1.0), high + 0.5 * high.abs().max(1.0));
+                    (low, high) =
+                        (low - 0.5 * low.abs().max(1.0), high + 0.5 * high.abs().max(1.0));
                 }
                 let step = nice_step(high - low);
                 (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);

@@ -10,11 +10,14 @@ const RIGHT: f64 = 16.0;
 const TOP: f64 = 34.0;
 const INNER_HEIGHT: f64 = 270.0;
 const LEGEND_LINE: f64 = 18.0;
-/// Width of a character relative to the font size, for placing legends; on the safe side for sans-serif fonts.
+/// Width of a character relative to the font size, for placing legends; on the safe side for
+/// sans-serif fonts.
 const CHARACTER: f64 = 0.58;
 
-/// Okabe and Ito's palette, told apart with any colour vision; without the yellow that vanishes on white.
-const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#777777"];
+/// Okabe and Ito's palette, told apart with any colour vision; without the yellow that vanishes on
+/// white.
+const COLORS: [&str; 7] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#777777"];
 const DASHES: [&str; 4] = ["", "7 3", "2 3", "9 3 2 3"];
 
 pub(super) fn draw(plot: &Plot) -> String {
@@ -26,8 +29,10 @@ pub(super) fn draw(plot: &Plot) -> String {
     let height = legend.last().map_or(legend_top, |&(_, y)| y + LEGEND_LINE);
 
     let mut s = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height:.0}\" width=\"{WIDTH}\" \
-         height=\"{height:.0}\" role=\"img\" font-family=\"sans-serif\" font-size=\"12\" fill=\"currentColor\">"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height:.0}\" \
+         width=\"{WIDTH}\" \
+         height=\"{height:.0}\" role=\"img\" font-family=\"sans-serif\" font-size=\"12\" \
+         fill=\"currentColor\">"
     );
     let title = escape(&plot.title);
     write(&mut s, format_args!("<title>{title}</title>"));
@@ -35,14 +40,17 @@ pub(super) fn draw(plot: &Plot) -> String {
 
     // Axes, grid and their labels.
     let points = || plot.series.iter().flat_map(|s| s.points.iter());
-    let ys = points().flat_map(|p| [Some(p.y), p.range.map(|r| r.0), p.range.map(|r| r.1)]).flatten();
+    let ys =
+        points().flat_map(|p| [Some(p.y), p.range.map(|r| r.0), p.range.map(|r| r.1)]).flatten();
     let zero = plot.kind == Kind::Bars;
     let y = Mapping::covering(ys, plot.y.scale, zero, bottom, TOP);
     for t in y.ticks() {
         let Some(at) = y.at(t) else { continue };
         write(
             &mut s,
-            format_args!("<path d=\"M{LEFT} {at:.1}H{right}\" stroke=\"currentColor\" opacity=\"0.15\"/>"),
+            format_args!(
+                "<path d=\"M{LEFT} {at:.1}H{right}\" stroke=\"currentColor\" opacity=\"0.15\"/>"
+            ),
         );
         text(&mut s, LEFT - 6.0, at + 4.0, "end", "", &label(t));
     }
@@ -65,7 +73,8 @@ pub(super) fn draw(plot: &Plot) -> String {
                 write(
                     &mut s,
                     format_args!(
-                        "<path d=\"M{at:.1} {TOP}V{bottom}\" stroke=\"currentColor\" opacity=\"0.15\"/>"
+                        "<path d=\"M{at:.1} {TOP}V{bottom}\" stroke=\"currentColor\" \
+                         opacity=\"0.15\"/>"
                     ),
                 );
                 text(&mut s, at, bottom + 16.0, "middle", "", &label(t));
@@ -77,8 +86,9 @@ pub(super) fn draw(plot: &Plot) -> String {
         Kind::Bars => bars(&mut s, plot, &y, right, bottom),
     }
     if let Some(at) = line_across {
-        let line =
-            format!("<path d=\"M{LEFT} {at:.1}H{right}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\"/>");
+        let line = format!(
+            "<path d=\"M{LEFT} {at:.1}H{right}\" stroke=\"currentColor\" stroke-dasharray=\"5 4\"/>"
+        );
         s.push_str(&line);
     }
     let caption_y = bottom + bottom_labels + 14.0;
@@ -149,7 +159,8 @@ fn bars(s: &mut String, plot: &Plot, y: &Mapping, right: f64, bottom: f64) {
             write(
                 s,
                 format_args!(
-                    "<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{:.1}\" fill=\"{color}\" \
+                    "<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{:.1}\" \
+                     fill=\"{color}\" \
                      fill-opacity=\"{opacity}\"><title>{}: {}</title></rect>",
                     top.min(base),
                     (top - base).abs(),
@@ -163,7 +174,9 @@ fn bars(s: &mut String, plot: &Plot, y: &Mapping, right: f64, bottom: f64) {
                 let x = left + width / 2.0;
                 write(
                     s,
-                    format_args!("<path d=\"M{x:.1} {a:.1}V{b:.1}\" stroke=\"currentColor\" fill=\"none\"/>"),
+                    format_args!(
+                        "<path d=\"M{x:.1} {a:.1}V{b:.1}\" stroke=\"currentColor\" fill=\"none\"/>"
+                    ),
                 );
             }
         }
@@ -187,7 +200,11 @@ fn labels_turned(plot: &Plot) -> bool {
 
 fn bar_label_height(plot: &Plot) -> f64 {
     let longest = plot.categories.iter().map(|c| c.chars().count()).max().unwrap_or(0) as f64;
-    if labels_turned(plot) { 20.0 + longest * 12.0 * CHARACTER * 35f64.to_radians().sin() } else { 20.0 }
+    if labels_turned(plot) {
+        20.0 + longest * 12.0 * CHARACTER * 35f64.to_radians().sin()
+    } else {
+        20.0
+    }
 }
 
 /// Where each series' legend entry begins: filled row by row.
@@ -268,10 +285,13 @@ mod tests {
     use super::super::{Axis, Point};
     use super::*;
 
-    /// Checks that the text is well-formed XML with a real parser and gives the number of elements of a name.
+    /// Checks that the text is well-formed XML with a real parser and gives the number of elements
+    /// of a name.
     fn count(svg: &str, element: &str) -> usize {
         let doc = roxmltree::Document::parse(svg).unwrap_or_else(|e| panic!("{e}\n{svg}"));
-        doc.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/2000/svg", element))).count()
+        doc.descendants()
+            .filter(|n| n.has_tag_name(("http://www.w3.org/2000/svg", element)))
+            .count()
     }
 
     fn no_number_is_nan(svg: &str) {
@@ -281,7 +301,8 @@ mod tests {
     #[test]
     fn lines_with_hostile_names_and_values_are_well_formed() {
         let mut p = Plot::lines("a < b & \"c\"", Axis::log("n>1", ""), Axis::log("time", "s"));
-        let points = [(1.0, 1.0), (10.0, f64::NAN), (0.0, 3.0), (1e9, f64::INFINITY), (100.0, 2e-9)];
+        let points =
+            [(1.0, 1.0), (10.0, f64::NAN), (0.0, 3.0), (1e9, f64::INFINITY), (100.0, 2e-9)];
         p.series.push(Series::new("fast & <loose>\u{1}", points.to_vec()));
         p.series.push(Series {
             name: "spread".into(),

@@ -1,7 +1,7 @@
 //! One HTML page that shows a set of records.
 //!
-//! The page refers to nothing outside itself (no scripts, fonts or style sheets from elsewhere; pictures are data
-//! URIs), so that it can be mailed, archived and opened without a network.
+//! The page refers to nothing outside itself (no scripts, fonts or style sheets from elsewhere;
+//! pictures are data URIs), so that it can be mailed, archived and opened without a network.
 
 mod table;
 
@@ -27,10 +27,13 @@ pub fn page(records: &[Record]) -> String {
     }
 
     let mut s = String::from("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">");
-    s += "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>Measurements</title>";
+    s += "<meta name=\"viewport\" \
+          content=\"width=device-width,initial-scale=1\"><title>Measurements</title>";
     s += &format!("<style>{}</style></head><body>\n", include_str!("page.css"));
-    s += "<h1>Measurements</h1>\n<p>The tables and figures of <cite>Parallel Ray Tracing in Scientific \
-          Visualization</cite> (Brownlee, 2012), measured again, and what accuracy costs in time. Ratios are \
+    s += "<h1>Measurements</h1>\n<p>The tables and figures of <cite>Parallel Ray Tracing in \
+          Scientific \
+          Visualization</cite> (Brownlee, 2012), measured again, and what accuracy costs in time. \
+          Ratios are \
           <em>rival’s time / our time</em>: above 1 we are faster.</p>\n";
     s += &machines(records);
     s += "<nav><h2>Contents</h2>";
@@ -38,8 +41,10 @@ pub fn page(records: &[Record]) -> String {
         s += &format!("<h3>Chapter {chapter}: {}</h3><ul>", chapter_title(*chapter));
         for r in list {
             let (id, title) = (escape(&r.id), escape(&r.title));
-            let gaps = if r.missing.is_empty() { "" } else { " <span class=\"gap\">(with gaps)</span>" };
-            let doubt = if r.doubts().is_empty() { "" } else { " <span class=\"doubt\">(in doubt)</span>" };
+            let gaps =
+                if r.missing.is_empty() { "" } else { " <span class=\"gap\">(with gaps)</span>" };
+            let doubt =
+                if r.doubts().is_empty() { "" } else { " <span class=\"doubt\">(in doubt)</span>" };
             s += &format!("<li><a href=\"#{id}\">{id}</a> {title}{gaps}{doubt}</li>");
         }
         s += "</ul>";
@@ -67,7 +72,8 @@ fn section(r: &Record) -> String {
         m.cores
     );
     if !r.recorded_despite.is_empty() {
-        s += "<p class=\"doubt\">Recorded despite what spoke against it (<code>--record-despite-doubts</code>).</p>\n";
+        s += "<p class=\"doubt\">Recorded despite what spoke against it \
+              (<code>--record-despite-doubts</code>).</p>\n";
     }
     for doubt in r.doubts() {
         s += &format!("<p class=\"doubt\">In doubt: {}</p>\n", escape(&doubt));
@@ -85,7 +91,8 @@ fn section(r: &Record) -> String {
         let (name, caption) = (escape(&a.name), escape(&a.caption));
         let data = base64(&a.bytes);
         s += &format!(
-            "<figure><img alt=\"{name}\" src=\"data:image/svg+xml;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n"
+            "<figure><img alt=\"{name}\" \
+             src=\"data:image/svg+xml;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n"
         );
     }
     for p in r.pictures.iter().filter(|p| !p.png.is_empty()) {
@@ -93,7 +100,8 @@ fn section(r: &Record) -> String {
         let data = base64(&p.png);
         s += "<figure class=\"picture\">";
         s += &format!(
-            "<img alt=\"{name}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>"
+            "<img alt=\"{name}\" \
+             src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>"
         );
         s += "</figure>\n";
     }
@@ -107,8 +115,10 @@ fn ratios(ratios: &[Ratio]) -> String {
         return String::new();
     }
     let mut s = String::from(
-        "<div class=\"scroll\"><table><thead><tr><th>ours</th><th>rival</th><th class=\"n\">rival / ours</th>\
-         <th class=\"n\">spread</th><th class=\"n\">lowest to highest</th><th class=\"n\">rounds</th></tr></thead><tbody>",
+        "<div class=\"scroll\"><table><thead><tr><th>ours</th><th>rival</th><th class=\"n\">rival \
+         / ours</th>\
+         <th class=\"n\">spread</th><th class=\"n\">lowest to highest</th><th \
+         class=\"n\">rounds</th></tr></thead><tbody>",
     );
     for r in ratios {
         let class = match r.verdict() {
@@ -117,7 +127,8 @@ fn ratios(ratios: &[Ratio]) -> String {
             Verdict::Even => "even",
             Verdict::Open => "open",
         };
-        let rounds = r.why_open().map_or(r.rounds.to_string(), |why| format!("{} ({why})", r.rounds));
+        let rounds =
+            r.why_open().map_or(r.rounds.to_string(), |why| format!("{} ({why})", r.rounds));
         s += &format!(
             "<tr><td>{}</td><td>{}</td><td class=\"n {class}\">{:.2}</td><td class=\"n\">{:.2}</td>\
              <td class=\"n\">{:.2} to {:.2}</td><td class=\"n\">{rounds}</td></tr>",
@@ -137,7 +148,8 @@ fn machines(records: &[Record]) -> String {
         .iter()
         .map(|r| {
             let m = &r.machine;
-            let commit = m.commit.as_ref().map_or(", commit not known".into(), |c| format!(", commit {c}"));
+            let commit =
+                m.commit.as_ref().map_or(", commit not known".into(), |c| format!(", commit {c}"));
             let changed = if m.is_dirty() { ", with uncommitted changes" } else { "" };
             let memory = m.memory_gib;
             format!(
@@ -166,7 +178,8 @@ fn natural(id: &str) -> Vec<(String, u32)> {
     let mut rest = id;
     while !rest.is_empty() {
         let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
-        let end = rest[digits..].find(|c: char| !c.is_ascii_digit()).map_or(rest.len(), |e| digits + e);
+        let end =
+            rest[digits..].find(|c: char| !c.is_ascii_digit()).map_or(rest.len(), |e| digits + e);
         parts.push((rest[..digits].to_string(), rest[digits..end].parse().unwrap_or(0)));
         rest = &rest[end..];
     }
@@ -196,14 +209,19 @@ mod tests {
     use crate::record::{Picture, Row};
 
     fn records() -> Vec<Record> {
-        let mut r = Record::new("fig4.10", "Time <of> a frame & more", 4, true, Machine::describe());
+        let mut r =
+            Record::new("fig4.10", "Time <of> a frame & more", 4, true, Machine::describe());
         r.column("mesh", "", "which");
         r.column("time", "ms", "median");
         r.rows.push(Row::new().with("mesh", "<script>alert(1)</script>").with("time", 12.345678));
         let mut p = Plot::lines("p", Axis::log("x", ""), Axis::log("y", "s"));
         p.series.push(Series::new("a", vec![(1.0, 1.0), (2.0, 3.0)]));
         r.plots.push(p);
-        r.pictures.push(Picture { name: "v".into(), caption: "view".into(), png: b"\x89PNG".to_vec() });
+        r.pictures.push(Picture {
+            name: "v".into(),
+            caption: "view".into(),
+            png: b"\x89PNG".to_vec(),
+        });
         r.missing.push("Embree 4: not installed".into());
         vec![r, Record::new("fig4.9", "Earlier", 4, false, Machine::describe())]
     }
@@ -224,7 +242,8 @@ mod tests {
 
     #[test]
     fn page_is_well_formed() {
-        // The page is written so that, doctype and void tags aside, it is XML: then nothing is left open.
+        // The page is written so that, doctype and void tags aside, it is XML: then nothing is left
+        // open.
         let page = page(&records()).replace("<!doctype html>", "");
         let mut closed = String::new();
         let mut rest = page.as_str();
@@ -271,7 +290,8 @@ mod tests {
 
     #[test]
     fn base64_pads_every_length() {
-        let got: Vec<String> = ["", "f", "fo", "foo", "foob"].map(|t| base64(t.as_bytes())).to_vec();
+        let got: Vec<String> =
+            ["", "f", "fo", "foo", "foob"].map(|t| base64(t.as_bytes())).to_vec();
         assert_eq!(got, ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg=="]);
     }
 }

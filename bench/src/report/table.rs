@@ -14,7 +14,8 @@ pub(super) fn rows(r: &Record) -> String {
     let numeric = |c: &Column| r.rows.iter().any(|row| row.number(&c.name).is_some());
     let mut t = String::from("<div class=\"scroll\"><table><thead><tr>");
     for c in &r.columns {
-        let unit = if c.unit.is_empty() { String::new() } else { format!(" [{}]", escape(&c.unit)) };
+        let unit =
+            if c.unit.is_empty() { String::new() } else { format!(" [{}]", escape(&c.unit)) };
         let class = if numeric(c) { " class=\"n\"" } else { "" };
         t += &format!("<th{class} title=\"{}\">{}{unit}</th>", escape(&c.meaning), escape(&c.name));
     }

@@ -27,8 +27,7 @@ fn prose(file: &File) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-// ---- Links ------------------------------------------------------------------------------------------------------
-
+// ---- Links --------------------------------------------------------------------------------------
 /// Relative links of a document: line number and path from the workspace root.
 fn links(file: &File) -> Vec<(usize, String)> {
     let folder = file.path.rsplit_once('/').map_or("", |(folder, _)| folder);
@@ -71,21 +70,24 @@ fn links_lead_somewhere() {
     let faults: Vec<_> = documents().iter().flat_map(|d| dead_links(d, exists)).collect();
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
     for (path, what) in PENDING {
-        assert!(!root().join(path).exists(), "{path} ({what}) is there now: take it out of PENDING");
+        assert!(
+            !root().join(path).exists(),
+            "{path} ({what}) is there now: take it out of PENDING"
+        );
     }
 }
 
 #[test]
 fn planted_dead_links_are_found() {
-    let text =
-        "[a](../here.md#part) ![b](gone.png)\n```\n[c](code.md)\n```\n[d](https://example.org) [e](#top)\n";
+    let text = "[a](../here.md#part) \
+                ![b](gone.png)\n```\n[c](code.md)\n```\n[d](https://example.org) [e](#top)\n";
     let faults = dead_links(&File::new("docs/src/x.md", text), |path| path == "docs/here.md");
     assert_eq!(faults, ["docs/src/x.md:1: there is no docs/src/gone.png"]);
 }
 
-// ---- The book ---------------------------------------------------------------------------------------------------
-
-/// Chapters that SUMMARY.md lists, or that exist, or whose examples are compiled: all by path from docs/src.
+// ---- The book -----------------------------------------------------------------------------------
+/// Chapters that SUMMARY.md lists, or that exist, or whose examples are compiled: all by path from
+/// docs/src.
 #[test]
 fn the_book_is_complete() {
     let summary: BTreeSet<String> =
@@ -102,10 +104,14 @@ fn the_book_is_complete() {
             chapter.path
         );
     }
-    let compiled =
-        files().into_iter().find(|f| f.path == "bench/src/book.rs").expect("bench/src/book.rs is missing");
-    let lib =
-        files().into_iter().find(|f| f.path == "bench/src/lib.rs").expect("bench/src/lib.rs is missing");
+    let compiled = files()
+        .into_iter()
+        .find(|f| f.path == "bench/src/book.rs")
+        .expect("bench/src/book.rs is missing");
+    let lib = files()
+        .into_iter()
+        .find(|f| f.path == "bench/src/lib.rs")
+        .expect("bench/src/lib.rs is missing");
     assert!(
         lib.code.contains("mod book;"),
         "bench/src/lib.rs: add `mod book;`, or the book's examples are not compiled"
@@ -124,8 +130,7 @@ fn has_rust_examples(file: &File) -> bool {
     file.text.lines().any(|l| l.trim_start().starts_with("```rust"))
 }
 
-// ---- Invariants and their tests -----------------------------------------------------------------------------------
-
+// ---- Invariants and their tests -----------------------------------------------------------------
 /// The items of the lists below headings that begin with `## Invariants`.
 fn invariants(document: &File) -> Vec<String> {
     let mut items: Vec<String> = Vec::new();
@@ -150,8 +155,8 @@ fn invariants(document: &File) -> Vec<String> {
     items
 }
 
-/// Faults in the invariants of a document. Each ends in `*Test:*` with the names of test functions in backticks, or
-/// in `*Not tested yet:*` with the reason.
+/// Faults in the invariants of a document. Each ends in `*Test:*` with the names of test functions
+/// in backticks, or in `*Not tested yet:*` with the reason.
 fn untested_invariants(document: &File, is_test: impl Fn(&str) -> bool) -> (usize, Vec<String>) {
     let path = &document.path;
     let mut faults = Vec::new();
@@ -176,7 +181,8 @@ fn untested_invariants(document: &File, is_test: impl Fn(&str) -> bool) -> (usiz
     (items.len(), faults)
 }
 
-/// What ARCHITECTURE.md and the READMEs of all members call invariants: what moves between them is not lost.
+/// What ARCHITECTURE.md and the READMEs of all members call invariants: what moves between them is
+/// not lost.
 const FEWEST_INVARIANTS: usize = 110;
 
 #[test]
@@ -206,7 +212,8 @@ fn invariants_name_their_tests() {
 #[test]
 fn planted_untested_invariants_are_found() {
     let text = "# A\n\n## Invariants of it\n\nWhat holds:\n\n- A. *Test:*\n  `real`, `gone`\n- B.\n\
-                - C. *Not tested yet:* why.\n- D. *Test:* soon\n\n## Read on\n\n- not one of them\n";
+                - C. *Not tested yet:* why.\n- D. *Test:* soon\n\n## Read on\n\n- not one of \
+                them\n";
     let (count, faults) = untested_invariants(&File::new("A.md", text), |name| name == "real");
     assert_eq!(count, 4);
     assert_eq!(faults.len(), 3, "{faults:?}");
@@ -229,11 +236,11 @@ fn architecture_names_every_room() {
     }
 }
 
-// ---- Experiments ------------------------------------------------------------------------------------------------
-
+// ---- Experiments --------------------------------------------------------------------------------
 /// Ids in `bench -- run ID` in a document.
 fn experiment_ids(file: &File) -> Vec<String> {
-    let commands = file.text.match_indices("-p bench -- run ").map(|(at, m)| &file.text[at + m.len()..]);
+    let commands =
+        file.text.match_indices("-p bench -- run ").map(|(at, m)| &file.text[at + m.len()..]);
     let id = |rest: &str| {
         rest.chars().take_while(|c| c.is_alphanumeric() || "_-".contains(*c)).collect::<String>()
     };
@@ -244,7 +251,8 @@ fn experiment_ids(file: &File) -> Vec<String> {
 #[test]
 fn experiments_in_the_documents_exist() {
     use std::io::Write as _;
-    let output = Command::new(env!("CARGO_BIN_EXE_bench")).arg("list").output().expect("bench starts");
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_bench")).arg("list").output().expect("bench starts");
     let listed = String::from_utf8_lossy(&output.stdout).into_owned();
     if listed.trim().is_empty() {
         writeln!(std::io::stderr(), "skipped: bench lists no experiments yet")
@@ -264,13 +272,12 @@ fn experiments_in_the_documents_exist() {
 
 #[test]
 fn planted_experiments_are_read() {
-    let text =
-        "`cargo run --release -p bench -- run fig3_5` and `-p bench -- run ID`, -p bench -- run accuracy-ao.";
+    let text = "`cargo run --release -p bench -- run fig3_5` and `-p bench -- run ID`, -p bench -- \
+                run accuracy-ao.";
     assert_eq!(experiment_ids(&File::new("a.md", text)), ["fig3_5", "accuracy-ao"]);
 }
 
-// ---- Change log -------------------------------------------------------------------------------------------------
-
+// ---- Change log ---------------------------------------------------------------------------------
 #[test]
 fn the_changelog_has_a_place_for_what_is_new() {
     let log = document("CHANGELOG.md").text;

@@ -66,7 +66,8 @@ fn members() -> BTreeMap<String, Vec<Arrow>> {
 
 fn fault(arrow: &Arrow) -> Option<String> {
     let Arrow { from, to, weak } = arrow;
-    let rules = || ARROWS.iter().filter(|(f, _, targets)| f == from && targets.contains(&to.as_str()));
+    let rules =
+        || ARROWS.iter().filter(|(f, _, targets)| f == from && targets.contains(&to.as_str()));
     if rules().any(|(_, may, _)| *may == May::Use || *weak) {
         return None;
     }
@@ -93,8 +94,11 @@ fn arrows_point_down() {
 
 #[test]
 fn planted_arrows_are_found() {
-    let arrow = |from: &str, to: &str, weak| Arrow { from: from.to_owned(), to: to.to_owned(), weak };
-    assert!(fault(&arrow("rt-core", "datasets", false)).is_some_and(|f| f.contains("no such arrow")));
+    let arrow =
+        |from: &str, to: &str, weak| Arrow { from: from.to_owned(), to: to.to_owned(), weak };
+    assert!(
+        fault(&arrow("rt-core", "datasets", false)).is_some_and(|f| f.contains("no such arrow"))
+    );
     assert!(fault(&arrow("rt-core", "datasets", true)).is_some(), "not even in its tests");
     assert!(fault(&arrow("datasets", "bench", true)).is_some(), "nothing depends on bench");
     assert!(fault(&arrow("composite", "rt-core", false)).is_some_and(|f| f.contains("feature")));
@@ -102,8 +106,7 @@ fn planted_arrows_are_found() {
     assert_eq!(fault(&arrow("gluray", "composite", false)), None);
 }
 
-// ---- Versions, lints and licences stand in the root, once -------------------------------------------------------
-
+// ---- Versions, lints and licences stand in the root, once ---------------------------------------
 /// What a member's Cargo.toml must inherit, and the dependencies that do not.
 fn not_inherited(manifest: &File) -> Vec<String> {
     let mut faults = Vec::new();
@@ -125,7 +128,8 @@ fn not_inherited(manifest: &File) -> Vec<String> {
             && !line.contains("workspace = true")
         {
             faults.push(format!(
-                "{}:{}: `{line}`: versions stand in the root, [workspace.dependencies]; write `NAME.workspace = true`",
+                "{}:{}: `{line}`: versions stand in the root, [workspace.dependencies]; write \
+                 `NAME.workspace = true`",
                 manifest.path,
                 number + 1
             ));
@@ -136,10 +140,12 @@ fn not_inherited(manifest: &File) -> Vec<String> {
 
 #[test]
 fn versions_stand_in_the_root() {
-    let read =
-        |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
+    let read = |path: &str| {
+        std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+    };
     let manifests = members().into_keys().map(|m| format!("{m}/Cargo.toml"));
-    let faults: Vec<_> = manifests.flat_map(|path| not_inherited(&File::new(&path, &read(&path)))).collect();
+    let faults: Vec<_> =
+        manifests.flat_map(|path| not_inherited(&File::new(&path, &read(&path)))).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     assert!(
         !read("xtask/Cargo.toml").contains("dependencies]"),
@@ -149,7 +155,8 @@ fn versions_stand_in_the_root() {
 
 #[test]
 fn planted_versions_are_found() {
-    let good = "[package]\nversion.workspace = true\nedition.workspace = true\nrust-version.workspace = true\n\
+    let good = "[package]\nversion.workspace = true\nedition.workspace = \
+                true\nrust-version.workspace = true\n\
                 license.workspace = true\n[dependencies]\n# glam = \"0.1\"\nglam.workspace = true\n\
                 [lints]\nworkspace = true\n";
     assert_eq!(not_inherited(&File::new("m/Cargo.toml", good)), Vec::<String>::new());

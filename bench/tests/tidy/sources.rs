@@ -2,7 +2,8 @@
 
 use crate::tree::{File, files, words};
 
-/// The only places where `unsafe` may be written, and why it cannot be avoided there. ARCHITECTURE.md explains each.
+/// The only places where `unsafe` may be written, and why it cannot be avoided there.
+/// ARCHITECTURE.md explains each.
 pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
     ("gluray/src/interpose/symbols", "exported OpenGL symbols, called by programs we do not know"),
@@ -39,11 +40,11 @@ fn assert_none(faults: &[String]) {
     assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
 }
 
-// ---- unsafe ---------------------------------------------------------------------------------------------------
-
+// ---- unsafe -------------------------------------------------------------------------------------
 fn in_a_room(path: &str) -> bool {
     UNSAFE_ROOMS.iter().any(|(room, _)| {
-        path.strip_prefix(room).is_some_and(|rest| rest.is_empty() || rest.starts_with('/') || rest == ".rs")
+        path.strip_prefix(room)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('/') || rest == ".rs")
     })
 }
 
@@ -62,7 +63,8 @@ fn unguarded_root(file: &File) -> Vec<String> {
     if !is_root || file.member() == "xtask" || file.code.contains("#![forbid(unsafe_code)]") {
         return vec![];
     }
-    let has_room = UNSAFE_ROOMS.iter().any(|(room, _)| room.starts_with(&format!("{}/", file.member())));
+    let has_room =
+        UNSAFE_ROOMS.iter().any(|(room, _)| room.starts_with(&format!("{}/", file.member())));
     match has_room && file.code.contains("#![deny(unsafe_code)]") {
         true => vec![],
         false => vec![format!("{}: begin with `#![forbid(unsafe_code)]`", file.path)],
@@ -84,8 +86,16 @@ fn planted_unsafe_is_found() {
     assert_eq!(faults("datasets/src/gen/fire.rs", "fn f() {\n    unsafe { g() }\n}").len(), 1);
     assert_eq!(faults("rt-core/src/simd/load.rs", "unsafe { g() }"), Vec::<String>::new());
     assert_eq!(faults("rt-core/src/simd.rs", "unsafe { g() }"), Vec::<String>::new());
-    assert_eq!(faults("rt-core/src/simd_tables.rs", "unsafe { g() }").len(), 1, "a room is not a prefix");
-    assert_eq!(faults("datasets/src/lib.rs", "#![deny(unsafe_code)]").len(), 1, "no room, so forbid");
+    assert_eq!(
+        faults("rt-core/src/simd_tables.rs", "unsafe { g() }").len(),
+        1,
+        "a room is not a prefix"
+    );
+    assert_eq!(
+        faults("datasets/src/lib.rs", "#![deny(unsafe_code)]").len(),
+        1,
+        "no room, so forbid"
+    );
     assert_eq!(faults("bench/src/lib.rs", "#![deny(unsafe_code)]"), Vec::<String>::new());
     assert_eq!(
         faults("bench/src/main.rs", "// #![forbid(unsafe_code)]").len(),
@@ -94,8 +104,7 @@ fn planted_unsafe_is_found() {
     );
 }
 
-// ---- Who may do I/O ---------------------------------------------------------------------------------------------
-
+// ---- Who may do I/O -----------------------------------------------------------------------------
 /// Modules of std that reach outside the process.
 const OUTSIDE: &[&str] = &["fs", "net", "io", "process"];
 const PRINTING: &[&str] = &["print!", "println!", "eprint!", "eprintln!", "dbg!"];
@@ -141,11 +150,14 @@ fn rt_core_does_no_io() {
     assert_none(&all_faults(io_in_rt_core));
 }
 
-/// Library code: not a program, not the shared command-line conventions, not bench and xtask, which are programs.
+/// Library code: not a program, not the shared command-line conventions, not bench and xtask, which
+/// are programs.
 fn is_library(path: &str) -> bool {
     let Some((member, rest)) = path.split_once("/src/") else { return false };
-    let program =
-        rest == "main.rs" || rest.starts_with("bin/") || rest.starts_with("cli/") || rest == "cli.rs";
+    let program = rest == "main.rs"
+        || rest.starts_with("bin/")
+        || rest.starts_with("cli/")
+        || rest == "cli.rs";
     !program && !["bench", "xtask"].contains(&member)
 }
 
@@ -154,7 +166,8 @@ fn library_faults(file: &File) -> Vec<String> {
         return vec![];
     }
     let ends = ["process::exit", "process::abort"].into_iter();
-    let ends = ends.flat_map(|w| words(&file.code, w).map(move |at| format!("{}: {w}", file.place(at))));
+    let ends =
+        ends.flat_map(|w| words(&file.code, w).map(move |at| format!("{}: {w}", file.place(at))));
     prints(file).into_iter().chain(ends).collect()
 }
 
@@ -170,15 +183,18 @@ fn planted_io_is_found() {
     assert_eq!(io("use std::{\n    collections::BTreeMap,\n    fs,\n};"), 1);
     assert_eq!(io("let x = std::net::TcpStream::connect(a);"), 1);
     assert_eq!(io("println!(\"x\"); eprintln!();"), 2);
-    assert_eq!(io("// std::fs\nuse std::fmt; let offs = std::env::var(\"RTSV_SIMD\"); print_it();"), 0);
-    let library = |path: &str| library_faults(&File::new(path, "eprintln!(); std::process::exit(1)")).len();
+    assert_eq!(
+        io("// std::fs\nuse std::fmt; let offs = std::env::var(\"RTSV_SIMD\"); print_it();"),
+        0
+    );
+    let library =
+        |path: &str| library_faults(&File::new(path, "eprintln!(); std::process::exit(1)")).len();
     assert_eq!(library("datasets/src/read/obj.rs"), 2);
     assert_eq!(library("datasets/src/cli/progress.rs"), 0);
     assert_eq!(library("schlieren/src/main.rs"), 0);
 }
 
-// ---- composite's core -------------------------------------------------------------------------------------------
-
+// ---- composite's core ---------------------------------------------------------------------------
 fn composite_faults(file: &File) -> Vec<String> {
     let Some(path) = file.path.strip_prefix("composite/src/") else { return vec![] };
     let mut faults = Vec::new();
@@ -189,12 +205,16 @@ fn composite_faults(file: &File) -> Vec<String> {
     if !outer {
         let names = ["rt_core", "datasets"].into_iter();
         faults.extend(
-            names.flat_map(|n| words(&file.code, n).map(move |at| format!("{}: {n}", file.place(at)))),
+            names.flat_map(|n| {
+                words(&file.code, n).map(move |at| format!("{}: {n}", file.place(at)))
+            }),
         );
     }
     if !outer && !path.starts_with("comm/mpi/") {
-        // Names of MPI functions would be strings for dlsym, so the whole text counts, without comments.
-        let lines = file.text.lines().filter(|l| !l.trim_start().starts_with("//") && l.contains("MPI_"));
+        // Names of MPI functions would be strings for dlsym, so the whole text counts, without
+        // comments.
+        let lines =
+            file.text.lines().filter(|l| !l.trim_start().starts_with("//") && l.contains("MPI_"));
         faults.extend(lines.map(|l| format!("{}: `{}` outside comm/mpi", file.path, l.trim())));
     }
     faults
@@ -210,16 +230,19 @@ fn planted_rays_and_mpi_in_composite_are_found() {
     let faults = |path: &str, text: &str| composite_faults(&File::new(path, text)).len();
     assert_eq!(faults("composite/src/op.rs", "use rt_core::frame::Frame;"), 1);
     assert_eq!(faults("composite/src/render.rs", "use rt_core::frame::Frame;"), 0);
-    assert_eq!(faults("composite/src/comm/threads.rs", "// unlike MPI_Send\nsym(\"MPI_Init\");"), 1);
+    assert_eq!(
+        faults("composite/src/comm/threads.rs", "// unlike MPI_Send\nsym(\"MPI_Init\");"),
+        1
+    );
     assert_eq!(faults("composite/src/comm/mpi/library.rs", "sym(\"MPI_Init\");"), 0);
 }
 
-// ---- Length -----------------------------------------------------------------------------------------------------
-
+// ---- Length -------------------------------------------------------------------------------------
 /// Lines up to the module of unit tests.
 fn length(file: &File) -> usize {
     let lines: Vec<&str> = file.text.lines().collect();
-    let tests = lines.windows(2).position(|w| w[0] == "#[cfg(test)]" && w[1].starts_with("mod tests"));
+    let tests =
+        lines.windows(2).position(|w| w[0] == "#[cfg(test)]" && w[1].starts_with("mod tests"));
     tests.unwrap_or(lines.len())
 }
 
@@ -244,7 +267,8 @@ fn no_file_is_too_long() {
         assert!(files.iter().any(|f| f.path == *path), "LONG_FILES: {path} does not exist");
         assert!(!reason.is_empty(), "LONG_FILES: {path} needs a reason");
     }
-    let mut lengths: Vec<usize> = files.iter().filter(|f| f.path.contains("/src/")).map(length).collect();
+    let mut lengths: Vec<usize> =
+        files.iter().filter(|f| f.path.contains("/src/")).map(length).collect();
     lengths.sort_unstable();
     let (median, longest) = (lengths[lengths.len() / 2], lengths[lengths.len() - 1]);
     // Written past libtest's capture: the number is worth seeing when all is well, too.
@@ -260,17 +284,20 @@ fn no_file_is_too_long() {
 #[test]
 fn planted_long_files_are_found() {
     let file = |lines: usize, tests: usize| {
-        let text = "x\n".repeat(lines) + "#[cfg(test)]\nmod tests {\n" + &"y\n".repeat(tests) + "}\n";
+        let text =
+            "x\n".repeat(lines) + "#[cfg(test)]\nmod tests {\n" + &"y\n".repeat(tests) + "}\n";
         File::new("rt-core/src/x.rs", &text)
     };
     assert_eq!(too_long(&file(600, 500), &[]), None, "tests do not count");
     assert!(too_long(&file(601, 0), &[]).is_some());
     assert_eq!(too_long(&file(601, 0), &[("rt-core/src/x.rs", "a table")]), None);
-    assert!(too_long(&file(10, 0), &[("rt-core/src/x.rs", "a table")]).is_some(), "stale exception");
+    assert!(
+        too_long(&file(10, 0), &[("rt-core/src/x.rs", "a table")]).is_some(),
+        "stale exception"
+    );
 }
 
-// ---- Loose ends -------------------------------------------------------------------------------------------------
-
+// ---- Loose ends ---------------------------------------------------------------------------------
 fn loose_ends(file: &File) -> Vec<String> {
     let code = &file.code;
     let mut faults = Vec::new();
@@ -295,7 +322,10 @@ fn loose_ends(file: &File) -> Vec<String> {
         let before = code[..at].trim_end();
         let in_attribute = before.ends_with('#') || before.ends_with("#!") || open.starts_with(',');
         let list = &code[at..code[at..].find(']').map_or(code.len(), |end| at + end)];
-        if in_attribute && !list.contains("reason =") && (open.starts_with('[') || is_in_cfg_attr(code, at)) {
+        if in_attribute
+            && !list.contains("reason =")
+            && (open.starts_with('[') || is_in_cfg_attr(code, at))
+        {
             faults.push(format!("{}: an exception without `reason = \"...\"`", file.place(at)));
         }
     }
@@ -336,7 +366,8 @@ fn planted_loose_ends_are_found() {
     }
 }
 
-/// Beginnings of paths that exist on one machine only, put together so that this file does not contain them.
+/// Beginnings of paths that exist on one machine only, put together so that this file does not
+/// contain them.
 fn machine_paths() -> Vec<String> {
     ["work", "root", "home", "Users"].iter().map(|folder| format!("/{folder}/")).collect()
 }
@@ -364,5 +395,8 @@ fn no_file_names_a_machine() {
 fn planted_machine_paths_are_found() {
     let home = machine_paths().remove(2);
     assert_eq!(names_a_machine(&File::new("a.md", &format!("see `{home}me/x`"))).len(), 1);
-    assert_eq!(names_a_machine(&File::new("a.md", &format!("https://example.org{home}x"))).len(), 0);
+    assert_eq!(
+        names_a_machine(&File::new("a.md", &format!("https://example.org{home}x"))).len(),
+        0
+    );
 }

@@ -10,7 +10,8 @@ pub(crate) struct File {
     pub(crate) path: String,
     /// The whole text.
     pub(crate) text: String,
-    /// For Rust: the text with comments and the inside of literals blanked, line by line as long as before.
+    /// For Rust: the text with comments and the inside of literals blanked, line by line as long as
+    /// before.
     pub(crate) code: String,
 }
 
@@ -58,7 +59,8 @@ fn walk(folder: &Path, prefix: &str, files: &mut Vec<File>) {
         let name = entry.file_name().to_string_lossy().into_owned();
         let path = format!("{prefix}{name}");
         // What .gitignore names, and git's own folder (a file in a linked work tree).
-        let ignored = [".git", "target", "shared", "xtask/target", "docs/book"].contains(&path.as_str());
+        let ignored =
+            [".git", "target", "shared", "xtask/target", "docs/book"].contains(&path.as_str());
         if ignored || name.ends_with(".tmp") {
             continue;
         }
@@ -81,8 +83,8 @@ pub(crate) fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = us
     })
 }
 
-/// Rust source with comments and the inside of string and character literals replaced by spaces. Newlines stay, and
-/// every byte keeps its offset.
+/// Rust source with comments and the inside of string and character literals replaced by spaces.
+/// Newlines stay, and every byte keeps its offset.
 pub(crate) fn blank(source: &str) -> String {
     let s = source.as_bytes();
     let mut out = s.to_vec();
@@ -161,14 +163,18 @@ fn raw_string(s: &[u8]) -> Option<(usize, usize)> {
 #[test]
 fn blanking_keeps_code_and_lines_only() {
     let source = concat!(
-        "// unsafe\nlet a = \"un\\\"safe\"; /* unsafe /* nested */ unsafe */ let b: &'a str = r#\"un\"safe\"#;\n",
+        "// unsafe\nlet a = \"un\\\"safe\"; /* unsafe /* nested */ unsafe */ let b: &'a str = \
+         r#\"un\"safe\"#;\n",
         "let c = ['\"', '\\'', 'ü', b'\\n']; unsafe { x } // done\n",
         "for_each(); bar\"unsafe\"",
     );
     let code = blank(source);
     assert_eq!(code.len(), source.len(), "offsets changed");
     assert_eq!(code.matches('\n').count(), source.matches('\n').count(), "lines changed");
-    assert_eq!(words(&code, "unsafe").collect::<Vec<_>>(), [source.find("unsafe {").expect("planted")]);
+    assert_eq!(
+        words(&code, "unsafe").collect::<Vec<_>>(),
+        [source.find("unsafe {").expect("planted")]
+    );
     for kept in ["let a = \"", "&'a str", "for_each()", "x }"] {
         assert!(code.contains(kept), "`{kept}` is lost in\n{code}");
     }

@@ -1,5 +1,5 @@
-//! `composite check`: does this machine's transport carry every strategy to the bits of the serial reference? And, for tests, do faults
-//! end as they should?
+//! `composite check`: does this machine's transport carry every strategy to the bits of the serial
+//! reference? And, for tests, do faults end as they should?
 use super::first_ranks::FirstRanks;
 use super::hard_cases;
 use super::ranks::{RankArgs, RankComm};
@@ -27,7 +27,8 @@ pub(super) struct CheckArgs {
     /// Groups of the first N ranks instead of all
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     counts: Vec<usize>,
-    /// Also the hard cases: equal and strange depths, every size from 1x1 to 67x5 (a share of them for each number of ranks), empty ranks
+    /// Also the hard cases: equal and strange depths, every size from 1x1 to 67x5 (a share of them
+    /// for each number of ranks), empty ranks
     #[arg(long)]
     hard: bool,
     /// With --hard: how often equal depths are composited
@@ -83,7 +84,11 @@ struct CheckReport {
     hard_images_differ: u64,
 }
 
-pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
+pub(super) fn check(
+    common: CommonArgs,
+    args: &CheckArgs,
+    arguments: &[OsString],
+) -> anyhow::Result<Status> {
     args.ranks.run(
         common,
         arguments,
@@ -98,7 +103,10 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
             let size = comm.comm().size();
             let counts = if args.counts.is_empty() { vec![size] } else { args.counts.clone() };
             if let Some(wrong) = counts.iter().find(|c| !(1..=size).contains(*c)) {
-                let cure = format!("--counts {wrong}: there are {size} ranks; give numbers from 1 to {size}");
+                let cure = format!(
+                    "--counts {wrong}: there are {size} ranks; give numbers from 1 \
+                                    to {size}"
+                );
                 return Err(UsageError(cure).into());
             }
             let (mut images, mut images_differ, mut hard) = (0, 0, [0; 2]);
@@ -110,13 +118,22 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                 for scene in Workload::ALL {
                     for size_px in SIZES_PX {
                         for strategy in STRATEGIES {
-                            for same in one_frame(&mut group, scene, size_px, strategy, true, timeout)? {
+                            for same in
+                                one_frame(&mut group, scene, size_px, strategy, true, timeout)?
+                            {
                                 images += 1;
                                 images_differ += u64::from(!same);
                             }
                         }
                         if group.shared_segments().is_some() {
-                            for same in one_frame(&mut group, scene, size_px, Strategy::DirectSend, false, timeout)? {
+                            for same in one_frame(
+                                &mut group,
+                                scene,
+                                size_px,
+                                Strategy::DirectSend,
+                                false,
+                                timeout,
+                            )? {
                                 images += 1;
                                 images_differ += u64::from(!same);
                             }
@@ -126,12 +143,19 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
                 big_messages(&mut group, is_a_process, timeout)?;
                 if args.hard {
                     let most = counts.len().max(1);
-                    let [all, differ] =
-                        hard_cases::run(&mut group, &STRATEGIES, true, most, args.repeats, timeout)?;
+                    let [all, differ] = hard_cases::run(
+                        &mut group,
+                        &STRATEGIES,
+                        true,
+                        most,
+                        args.repeats,
+                        timeout,
+                    )?;
                     hard = [hard[0] + all, hard[1] + differ];
                     if group.shared_segments().is_some() {
                         let direct = [Strategy::DirectSend];
-                        let [all, differ] = hard_cases::run(&mut group, &direct, false, most, 1, timeout)?;
+                        let [all, differ] =
+                            hard_cases::run(&mut group, &direct, false, most, 1, timeout)?;
                         hard = [hard[0] + all, hard[1] + differ];
                     }
                 }
@@ -139,25 +163,51 @@ pub(super) fn check(common: CommonArgs, args: &CheckArgs, arguments: &[OsString]
             // Nobody leaves while others still composite.
             comm.comm().barrier(timeout)?;
             let [hard_images, hard_images_differ] = hard;
-            Ok(CheckReport { ranks: size, transport, nodes, counts, images, images_differ, hard_images, hard_images_differ })
+            Ok(CheckReport {
+                ranks: size,
+                transport,
+                nodes,
+                counts,
+                images,
+                images_differ,
+                hard_images,
+                hard_images_differ,
+            })
         },
         |checked| {
             common.result(&checked, || {
-                let CheckReport { ranks, transport, images, images_differ, hard_images, hard_images_differ, .. } = &checked;
+                let CheckReport {
+                    ranks,
+                    transport,
+                    images,
+                    images_differ,
+                    hard_images,
+                    hard_images_differ,
+                    ..
+                } = &checked;
                 let mut text = format!(
-                    "{ranks} ranks over {transport}: {images} images, {images_differ} differ from the serial reference"
+                    "{ranks} ranks over {transport}: {images} images, {images_differ} differ from \
+                     the serial reference"
                 );
                 if args.hard {
-                    text += &format!("; hard cases: {hard_images} images, {hard_images_differ} differ");
+                    text += &format!(
+                        "; hard cases: {hard_images} images, {hard_images_differ} \
+                                      differ"
+                    );
                 }
                 text
             })?;
-            Ok(if checked.images_differ + checked.hard_images_differ == 0 { Status::Success } else { Status::Failure })
+            Ok(if checked.images_differ + checked.hard_images_differ == 0 {
+                Status::Success
+            } else {
+                Status::Failure
+            })
         },
     )
 }
 
-/// Composites one scene with depth and blended, in shared memory if wanted and possible; on rank 0, whether each image has the bits of the reference.
+/// Composites one scene with depth and blended, in shared memory if wanted and possible; on rank 0,
+/// whether each image has the bits of the reference.
 fn one_frame(
     comm: &mut dyn Communicator,
     scene: Workload,
@@ -179,9 +229,15 @@ fn one_frame(
     // Everybody's frames, in the order of compositing, where they are compared.
     let everybody: Vec<_> =
         if rank == 0 { order.iter().map(|&rank| draw(rank)).collect() } else { Vec::new() };
-    let options = Options { strategy, in_memory, order: Some(order), timeout, ..Options::default() };
+    let options =
+        Options { strategy, in_memory, order: Some(order), timeout, ..Options::default() };
 
-    let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(width_px, height_px, &drawn.colors, &drawn.depths)?;
+    let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(
+        width_px,
+        height_px,
+        &drawn.colors,
+        &drawn.depths,
+    )?;
     let depth = composite(comm, &frame, &options)?.image;
     let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(width_px, height_px, &glass)?;
     let blend = composite(comm, &frame, &options)?.image;
@@ -195,8 +251,10 @@ fn one_frame(
         same.push(bits_are_equal(&image, &composite_serial(&frames?)?));
     }
     if let Some(image) = blend {
-        let frames: Result<Vec<_>, _> =
-            everybody.iter().map(|(_, glass)| Frame::premultiplied(width_px, height_px, glass)).collect();
+        let frames: Result<Vec<_>, _> = everybody
+            .iter()
+            .map(|(_, glass)| Frame::premultiplied(width_px, height_px, glass))
+            .collect();
         same.push(bits_are_equal(&image, &composite_serial(&frames?)?));
     }
     Ok(same)
@@ -206,7 +264,8 @@ fn bits_are_equal<P: Composite>(a: &crate::Image<P>, b: &crate::Image<P>) -> boo
     a.to_bytes() == b.to_bytes()
 }
 
-/// Room that a receive may take before anything has come: beside its chunk, what the allocator and the library take.
+/// Room that a receive may take before anything has come: beside its chunk, what the allocator and
+/// the library take.
 const MOST_ROOM_BYTES: u64 = 1 << 28;
 
 /// Bytes of this process's address space; 0 where the system does not say.
@@ -217,7 +276,11 @@ fn address_space_bytes() -> u64 {
 }
 
 /// Messages of many lengths around the ring, each byte checked.
-fn big_messages(comm: &mut dyn Communicator, is_a_process: bool, timeout: Duration) -> anyhow::Result<()> {
+fn big_messages(
+    comm: &mut dyn Communicator,
+    is_a_process: bool,
+    timeout: Duration,
+) -> anyhow::Result<()> {
     let (rank, size) = (comm.rank(), comm.size());
     let byte = |rank: usize, at: usize| (at.wrapping_mul(31) ^ rank ^ (at >> 8)) as u8;
     let (next, previous) = ((rank + 1) % size, (rank + size - 1) % size);
@@ -228,7 +291,10 @@ fn big_messages(comm: &mut dyn Communicator, is_a_process: bool, timeout: Durati
     comm.send(next, 78, vec![rank as u8; 3])?;
     // Of a process that other ranks share nobody can say what took its room.
     let more = if is_a_process { address_space_bytes().saturating_sub(before) } else { 0 };
-    anyhow::ensure!(more <= MOST_ROOM_BYTES, "a message of 3 bytes was made room of {more} bytes for");
+    anyhow::ensure!(
+        more <= MOST_ROOM_BYTES,
+        "a message of 3 bytes was made room of {more} bytes for"
+    );
     let came = comm.wait_any(&mut vec![announced], timeout)?.message;
     anyhow::ensure!(came == [previous as u8; 3], "{came:?} from rank {previous}");
     // All are posted before the first is sent, and taken in the order of arrival.
@@ -243,7 +309,11 @@ fn big_messages(comm: &mut dyn Communicator, is_a_process: bool, timeout: Durati
     while !posted.is_empty() {
         let message = comm.wait_any(&mut posted, timeout)?.message;
         let good = message.iter().enumerate().all(|(at, &found)| found == byte(previous, at));
-        anyhow::ensure!(good, "a message of {} bytes from rank {previous} has changed", message.len());
+        anyhow::ensure!(
+            good,
+            "a message of {} bytes from rank {previous} has changed",
+            message.len()
+        );
         seen.push(message.len());
         comm.recycle(message);
     }
@@ -257,7 +327,8 @@ fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<
     let culprit = comm.rank() + 1 == comm.size();
     if fault == Fault::Corrupt {
         // All composite the same frame.
-        let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
+        let frame =
+            Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
         let options = Options { timeout, verify: true, in_memory: false, ..Options::default() };
         if culprit {
             composite(&mut FirstRanks::damaged(comm), &frame, &options)?;

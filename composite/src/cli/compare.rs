@@ -1,5 +1,5 @@
-//! `composite compare`: our compositing and IceT's, frame by frame on the same ranks and frames, in one table for any lists of numbers of
-//! ranks, sizes, scenes, formats and instruction sets.
+//! `composite compare`: our compositing and IceT's, frame by frame on the same ranks and frames, in
+//! one table for any lists of numbers of ranks, sizes, scenes, formats and instruction sets.
 mod measure;
 mod table;
 
@@ -20,7 +20,8 @@ use table::{Comparison, Machine, Pixels};
 #[command(after_help = "Examples:\n  \
     composite compare --ranks 8 --size 1024 --mpi --json\n  \
     composite compare --ranks 2,4,8 --size 1024,2048 --scene all --mpi\n  \
-    composite compare --ranks 8 --smpi --simd avx512,avx2,scalar --pixels depth,blend --scene discs\n  \
+    composite compare --ranks 8 --smpi --simd avx512,avx2,scalar --pixels depth,blend --scene \
+    discs\n  \
     composite compare --ranks 127 --smpi --scene discs\n  \
     composite compare --ranks 4 --threads --pixels blend")]
 pub(super) struct CompareArgs {
@@ -32,16 +33,19 @@ pub(super) struct CompareArgs {
     /// Which frames: discs, dense, frag, several of them or all
     #[arg(long, default_value = "all", value_name = "SCENE", value_delimiter = ',', value_parser = workload_named)]
     scene: Vec<Workloads>,
-    /// What is composited: RGBA8 with depth (depth), premultiplied RGBA f32 in order (blend), or both as depth,blend
+    /// What is composited: RGBA8 with depth (depth), premultiplied RGBA f32 in order (blend), or
+    /// both as depth,blend
     #[arg(long, default_value = "depth", value_delimiter = ',')]
     pixels: Vec<Pixels>,
     /// Our strategy; auto takes the fastest by a model of the network, which is measured first
     #[arg(long, default_value = "auto", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
     strategy: Strategy,
-    /// Send messages also between processes of one machine and between threads, which else merge in shared memory
+    /// Send messages also between processes of one machine and between threads, which else merge in
+    /// shared memory
     #[arg(long)]
     messages: bool,
-    /// Our instruction set at most: scalar, sse4.2, avx2, avx512 or neon, as far as this machine has it; or several
+    /// Our instruction set at most: scalar, sse4.2, avx2, avx512 or neon, as far as this machine
+    /// has it; or several
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', value_parser = simd_named)]
     simd: Vec<SimdLevel>,
     /// Timed frames; 7 of them, 5 simulated
@@ -64,7 +68,8 @@ pub(super) fn compare(
     let icet = icet::find().map_err(|error| UsageError(error.to_string()))?;
     let counts = args.ranks.counts();
     if args.ranks.is_rank() || counts.len() < 2 {
-        let is_table = !args.messages && matches!(args.strategy, Strategy::DirectSend | Strategy::Automatic);
+        let is_table =
+            !args.messages && matches!(args.strategy, Strategy::DirectSend | Strategy::Automatic);
         let threads = if is_table && args.ranks.are_threads() { args.ranks.count()? } else { 0 };
         let groups = Groups::new(threads);
         return args.ranks.run(
@@ -89,7 +94,9 @@ pub(super) fn compare(
                 Some(all) => all.rows.extend(job.rows),
             },
             Err(failed) => {
-                common.warn(format_args!("the comparison on {ranks} ranks has failed; its rows are missing"));
+                common.warn(format_args!(
+                    "the comparison on {ranks} ranks has failed; its rows are missing"
+                ));
                 status = failed;
             }
         }
@@ -115,15 +122,19 @@ fn one_job(
         note: args.ranks.caveat(),
     };
     let frames = args.frames.unwrap_or(if args.ranks.is_simulated() { 5 } else { 7 }).max(1);
-    let levels: Vec<Option<SimdLevel>> =
-        if args.simd.is_empty() { vec![None] } else { args.simd.iter().copied().map(Some).collect() };
+    let levels: Vec<Option<SimdLevel>> = if args.simd.is_empty() {
+        vec![None]
+    } else {
+        args.simd.iter().copied().map(Some).collect()
+    };
     let mut rows = Vec::new();
     for &size_px in &args.size {
         for &pixels in &args.pixels {
             for &simd in &levels {
                 let timeout = args.ranks.timeout();
                 let (strategy, in_memory) = (args.strategy, !args.messages);
-                let setting = Setting { size_px, pixels, strategy, in_memory, simd, frames, timeout };
+                let setting =
+                    Setting { size_px, pixels, strategy, in_memory, simd, frames, timeout };
                 let mut bench = Bench::new(comm, icet, setting)?;
                 for &scene in args.scene.iter().copied().flatten() {
                     rows.push(bench.measure(scene, members.as_mut())?);
@@ -134,8 +145,12 @@ fn one_job(
     Ok(Comparison { machine, rows })
 }
 
-/// This program with one number of ranks, and what it has found; its notes and errors go where ours go.
-fn started_again(ranks: usize, arguments: &[OsString]) -> anyhow::Result<Result<Comparison, Status>> {
+/// This program with one number of ranks, and what it has found; its notes and errors go where ours
+/// go.
+fn started_again(
+    ranks: usize,
+    arguments: &[OsString],
+) -> anyhow::Result<Result<Comparison, Status>> {
     let mut command = Command::new(std::env::current_exe()?);
     command.args(of_one_count(ranks, arguments)).stdout(Stdio::piped());
     let output = command.spawn()?.wait_with_output()?;
@@ -203,8 +218,10 @@ mod tests {
         for given in ["--ranks 2,4", "--ranks=2,4", "-n 2,4", "-n2,4", "-n=2,4 --json"] {
             let words = format!("compare --mpi {given} --size 64,128");
             let arguments: Vec<OsString> = words.split(' ').map(OsString::from).collect();
-            let expected: Vec<OsString> =
-                "compare --mpi --size 64,128 --json --ranks=4".split(' ').map(OsString::from).collect();
+            let expected: Vec<OsString> = "compare --mpi --size 64,128 --json --ranks=4"
+                .split(' ')
+                .map(OsString::from)
+                .collect();
             assert_eq!(of_one_count(4, &arguments), expected, "{given}");
         }
     }

@@ -1,5 +1,5 @@
-//! `composite demo`: a data set rendered in parts ([`demo_data`]), or frames made without a renderer composited; with a plot of what
-//! each rank did when.
+//! `composite demo`: a data set rendered in parts ([`demo_data`]), or frames made without a
+//! renderer composited; with a plot of what each rank did when.
 use super::demo_args::DemoArgs;
 use super::rank_records::RankTimes;
 use super::ranks::RankComm;
@@ -31,9 +31,16 @@ struct DemoReport {
 /// The frame that is shown, on rank 0.
 type FinishedDemo = (String, f64, Vec<[u8; 4]>, Vec<RankTimes>);
 
-pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
+pub(super) fn demo(
+    common: CommonArgs,
+    args: &DemoArgs,
+    arguments: &[OsString],
+) -> anyhow::Result<Status> {
     if args.size == 0 || args.size > 32_768 || args.frames == 0 {
-        return Err(UsageError("give a size of 1 to 32768 pixels and at least one frame".to_string()).into());
+        return Err(UsageError(
+            "give a size of 1 to 32768 pixels and at least one frame".to_string(),
+        )
+        .into());
     }
     // Before anything is rendered: a folder that cannot be made is found out now.
     if !args.ranks.is_rank() {
@@ -50,7 +57,8 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
         |comm| frames(comm, args, scene),
         |(transport, frame_secs, colors, lines): FinishedDemo| {
             std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-            let (picture, plot) = (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
+            let (picture, plot) =
+                (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
             write_picture(&picture, args.size, &colors)?;
             let title = format!(
                 "{} ranks over {transport}, {}x{} {}: {:.2} ms",
@@ -60,7 +68,8 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
                 scene,
                 1e3 * frame_secs
             );
-            std::fs::write(&plot, gantt::svg(&title, &lines)).with_context(|| plot.display().to_string())?;
+            std::fs::write(&plot, gantt::svg(&title, &lines))
+                .with_context(|| plot.display().to_string())?;
             let shown = DemoReport {
                 transport,
                 scene: scene.name(),
@@ -85,7 +94,8 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
 
 /// The colours are taken as linear light; what nobody drew stays transparent.
 fn write_picture(path: &std::path::Path, size: u32, colors: &[[u8; 4]]) -> anyhow::Result<()> {
-    let linear: Vec<[f32; 4]> = colors.iter().map(|c| c.map(|channel| f32::from(channel) / 255.0)).collect();
+    let linear: Vec<[f32; 4]> =
+        colors.iter().map(|c| c.map(|channel| f32::from(channel) / 255.0)).collect();
     let mut picture = Picture::new(size, size);
     picture.add_rgba(&linear)?;
     write_png(path, &picture, PngDepth::Eight)?;
@@ -97,8 +107,11 @@ fn frames(comm: &mut RankComm, args: &DemoArgs, scene: Workload) -> anyhow::Resu
     let transport = comm.transport();
     let comm = comm.comm();
     let (rank, ranks) = (comm.rank(), comm.size());
-    let mut compositor =
-        Compositor::<DepthPixel<[u8; 4]>>::new(Options { depth: false, timeout, ..Options::default() });
+    let mut compositor = Compositor::<DepthPixel<[u8; 4]>>::new(Options {
+        depth: false,
+        timeout,
+        ..Options::default()
+    });
     let mut drawn = SyntheticFrame::new(args.size, args.size);
     let mut colors = Vec::new();
     let mut line = RankTimes::new(rank, 0.0, &Report::default());
@@ -118,7 +131,10 @@ fn frames(comm: &mut RankComm, args: &DemoArgs, scene: Workload) -> anyhow::Resu
         }
     }
     let all = comm.all_gather(&line.to_bytes(), RankTimes::BYTES, timeout)?;
-    let lines =
-        all.iter().enumerate().filter_map(|(rank, bytes)| RankTimes::from_bytes(rank, bytes)).collect();
+    let lines = all
+        .iter()
+        .enumerate()
+        .filter_map(|(rank, bytes)| RankTimes::from_bytes(rank, bytes))
+        .collect();
     Ok((transport, frame_secs, colors, lines))
 }

@@ -14,7 +14,8 @@ use std::path::PathBuf;
 pub(super) struct DemoArgs {
     #[command(flatten)]
     pub(super) ranks: RankArgs,
-    /// The data set: one of the catalogue of `datasets`, or a file with surfaces (VTK, OBJ, glTF, PLY, STL)
+    /// The data set: one of the catalogue of `datasets`, or a file with surfaces (VTK, OBJ, glTF,
+    /// PLY, STL)
     #[arg(long, default_value = "wavelet", value_name = "NAME")]
     pub(super) data: String,
     /// Its size; the smallest if not given

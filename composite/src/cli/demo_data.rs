@@ -37,7 +37,11 @@ struct FinishedDemo {
     lines: Vec<RankRecord>,
 }
 
-pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) -> anyhow::Result<Status> {
+pub(super) fn demo(
+    common: CommonArgs,
+    args: &DemoArgs,
+    arguments: &[OsString],
+) -> anyhow::Result<Status> {
     let wanted = Demo {
         data: args.data.clone(),
         size: args.data_size.clone(),
@@ -77,7 +81,8 @@ pub(super) fn demo(common: CommonArgs, args: &DemoArgs, arguments: &[OsString]) 
 
 fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Result<Status> {
     std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-    let (picture, plot) = (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
+    let (picture, plot) =
+        (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
     let mut png = Picture::new(args.size, args.size);
     png.add_rgba(&f.colors)?;
     write_png(&picture, &png, PngDepth::Eight)?;
@@ -90,7 +95,8 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Resul
         args.size,
         args.size
     );
-    std::fs::write(&plot, timeline::svg(&title, &f.lines)).with_context(|| plot.display().to_string())?;
+    std::fs::write(&plot, timeline::svg(&title, &f.lines))
+        .with_context(|| plot.display().to_string())?;
     let shown = DemoReport {
         transport: f.transport,
         data: args.data.clone(),
@@ -109,7 +115,8 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Resul
             match shown.unusable {
                 0 => String::new(),
                 n => format!(
-                    "left out: {n} primitives with corners that are no places (NaN, infinite, too large)\n"
+                    "left out: {n} primitives with corners that are no places (NaN, infinite, too \
+                     large)\n"
                 ),
             },
             timeline::table(&shown.ranks),
@@ -123,7 +130,11 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Resul
 /// What a rank may tell of its frame: some hundred thousand spans.
 const MOST_LINE_BYTES: usize = 1 << 24;
 
-fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &PreparedDemo) -> anyhow::Result<FinishedDemo> {
+fn frames(
+    comm: &mut RankComm,
+    args: &DemoArgs,
+    prepared: &PreparedDemo,
+) -> anyhow::Result<FinishedDemo> {
     let (timeout, transport) = (args.ranks.timeout(), comm.transport());
     let comm = comm.comm();
     let rank = comm.rank();
@@ -145,7 +156,8 @@ fn frames(comm: &mut RankComm, args: &DemoArgs, prepared: &PreparedDemo) -> anyh
     // Lengths first: how many spans a rank has is its own affair.
     let mine = serde_json::to_vec(&RankRecord::new(rank, triangles, &report))?;
     let lengths = comm.all_gather(&(mine.len() as u64).to_le_bytes(), 8, timeout)?;
-    let length = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes) as usize;
+    let length =
+        |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes) as usize;
     let longest = lengths.iter().map(length).max().unwrap_or(0);
     anyhow::ensure!(longest <= MOST_LINE_BYTES, "a rank announces {longest} bytes about its frame");
     let all = comm.all_gather(&mine, longest, timeout)?;

@@ -49,13 +49,20 @@ fn mpi(what: &'static str, names: &[&str], package: &str) -> Finding {
             let first = version.lines().next().unwrap_or_default().trim().to_string();
             let cure = abi.as_ref().err().map(ToString::to_string);
             let known = abi.map_or("unknown binary interface", |abi| abi.name());
-            Finding { what, usable: cure.is_none(), found: format!("{library}: {first} ({known})"), cure }
+            Finding {
+                what,
+                usable: cure.is_none(),
+                found: format!("{library}: {first} ({known})"),
+                cure,
+            }
         }
         Err(error) => Finding {
             what,
             usable: false,
             found: error.to_string(),
-            cure: Some(format!("install it (Debian: {package}), or name its library in COMPOSITE_MPI")),
+            cure: Some(format!(
+                "install it (Debian: {package}), or name its library in COMPOSITE_MPI"
+            )),
         },
     }
 }
@@ -63,8 +70,8 @@ fn mpi(what: &'static str, names: &[&str], package: &str) -> Finding {
 /// First line that a program prints of itself.
 fn version_of(program: impl AsRef<std::ffi::OsStr>, flag: &str) -> Option<String> {
     let output = Command::new(program).arg(flag).output().ok()?;
-    let text =
-        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
     text.lines().find(|line| !line.trim().is_empty()).map(|line| line.trim().to_string())
 }
 
@@ -83,7 +90,12 @@ fn mpirun_program(processors: usize) -> Finding {
             } else {
                 format!("; for more ranks than processors --mpi sets {}", settings.join(" "))
             };
-            Finding { what: "launcher", usable: true, found: format!("{name}: {version}{more}"), cure: None }
+            Finding {
+                what: "launcher",
+                usable: true,
+                found: format!("{name}: {version}{more}"),
+                cure: None,
+            }
         }
         None => Finding {
             what: "launcher",

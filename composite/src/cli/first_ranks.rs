@@ -1,5 +1,5 @@
-//! The first ranks of a group as a group of their own, so that one launch checks several numbers of ranks; and a rank whose messages
-//! are damaged, for tests.
+//! The first ranks of a group as a group of their own, so that one launch checks several numbers of
+//! ranks; and a rank whose messages are damaged, for tests.
 use crate::comm::{
     Arrival, CommError, Communicator, FIRST_RESERVED_TAG, Receive, SharedSegments, collective,
 };
@@ -56,7 +56,12 @@ impl Communicator for FirstRanks<'_> {
         if self.size == self.inner.size() { self.inner.shared_segments() } else { None }
     }
 
-    fn send(&mut self, destination: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {
+    fn send(
+        &mut self,
+        destination: usize,
+        tag: u32,
+        mut message: Vec<u8>,
+    ) -> Result<(), CommError> {
         if self.damage
             && tag < FIRST_RESERVED_TAG
             && let Some(last) = message.last_mut()
@@ -67,11 +72,20 @@ impl Communicator for FirstRanks<'_> {
         self.inner.send(destination, tag, message)
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.inner.post_recv(source, tag, capacity)
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         self.inner.wait_any(posted, timeout)
     }
 

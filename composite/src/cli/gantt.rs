@@ -10,7 +10,8 @@ const TOP: f64 = 64.0;
 /// Name, colour, and seconds of a rank.
 type Phase = (&'static str, &'static str, fn(&RankTimes) -> f64);
 
-/// The phases in the order in which they begin; the colours are Okabe and Ito's, which the colour-blind can tell apart.
+/// The phases in the order in which they begin; the colours are Okabe and Ito's, which the
+/// colour-blind can tell apart.
 const PHASES: [Phase; 5] = [
     ("render", "#009e73", |line| line.render_secs),
     ("compress", "#56b4e9", |line| line.compress_secs),
@@ -19,7 +20,8 @@ const PHASES: [Phase; 5] = [
     ("collect", "#cc79a7", |line| line.collect_secs),
 ];
 
-/// One bar for each rank. Phases of a frame alternate many times; a bar shows their sums one after the other.
+/// One bar for each rank. Phases of a frame alternate many times; a bar shows their sums one after
+/// the other.
 pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
     let longest = lines.iter().map(|line| line.total_secs).fold(1e-9, f64::max);
     let step = nice_step(1e3 * longest / 6.0);
@@ -30,7 +32,8 @@ pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
     // Writing to a String cannot fail.
     let _ = write!(
         text,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" \
+         font-family=\"sans-serif\" font-size=\"12\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
          <text x=\"{LEFT}\" y=\"22\" font-size=\"14\">{}</text>\n",
         LEFT + PLOT_WIDTH + 30.0,
@@ -72,7 +75,8 @@ pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
             let ms = 1e3 * secs(line);
             let _ = writeln!(
                 text,
-                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{:.1}\" fill=\"{color}\"><title>rank {}: {name} {ms:.3} ms</title></rect>",
+                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{:.1}\" \
+                 fill=\"{color}\"><title>rank {}: {name} {ms:.3} ms</title></rect>",
                 x(from_ms),
                 y + 3.0,
                 PLOT_WIDTH * ms / end_ms,
@@ -84,7 +88,8 @@ pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
     }
     let _ = write!(
         text,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">ms since the frame began; sums of each phase, one after the other</text>\n</svg>\n",
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">ms since the frame began; sums of \
+         each phase, one after the other</text>\n</svg>\n",
         LEFT + PLOT_WIDTH / 2.0,
         bottom + 38.0
     );
@@ -95,7 +100,14 @@ pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
 pub(super) fn table(lines: &[RankTimes]) -> String {
     let mut text = format!(
         "{:>4} {:>10} {:>12} {:>9} {:>8} {:>11} {:>9} {:>12}",
-        "rank", "render ms", "compress ms", "blend ms", "send ms", "collect ms", "total ms", "bytes sent"
+        "rank",
+        "render ms",
+        "compress ms",
+        "blend ms",
+        "send ms",
+        "collect ms",
+        "total ms",
+        "bytes sent"
     );
     for line in lines {
         let _ = write!(

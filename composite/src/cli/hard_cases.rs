@@ -1,4 +1,5 @@
-//! `composite check --hard`: cases that compositors are known to get wrong, by name, by every strategy, over whatever carries the messages.
+//! `composite check --hard`: cases that compositors are known to get wrong, by name, by every
+//! strategy, over whatever carries the messages.
 use crate::comm::Communicator;
 use crate::compositor::{Compositor, Options};
 use crate::error::CompositeError;
@@ -47,7 +48,8 @@ fn noise(a: usize, b: usize, c: usize) -> u64 {
 }
 
 impl Case {
-    /// Sizes in pixels that are checked on `ranks` ranks. Of the 335 sizes from 1x1 to 67x5, every rank count of a group of `most` has its share.
+    /// Sizes in pixels that are checked on `ranks` ranks. Of the 335 sizes from 1x1 to 67x5, every
+    /// rank count of a group of `most` has its share.
     fn sizes(self, ranks: usize, most: usize) -> Vec<(u32, u32)> {
         match self {
             Case::Sizes => {
@@ -77,7 +79,8 @@ impl Case {
     }
 }
 
-/// Images composited and those with a wrong bit, on rank 0. With `repeats`, the image of equal depths is made as often as that.
+/// Images composited and those with a wrong bit, on rank 0. With `repeats`, the image of equal
+/// depths is made as often as that.
 pub(super) fn run(
     comm: &mut dyn Communicator,
     strategies: &[Strategy],
@@ -87,9 +90,15 @@ pub(super) fn run(
     timeout: Duration,
 ) -> anyhow::Result<[u64; 2]> {
     let mut count = [0, 0];
-    let cases = [Case::EqualDepths, Case::StrangeDepths, Case::Sizes, Case::EmptyRanks, Case::AllEmpty];
-    let options =
-        |strategy| Options { strategy, in_memory, timeout, final_barrier: false, ..Options::default() };
+    let cases =
+        [Case::EqualDepths, Case::StrangeDepths, Case::Sizes, Case::EmptyRanks, Case::AllEmpty];
+    let options = |strategy| Options {
+        strategy,
+        in_memory,
+        timeout,
+        final_barrier: false,
+        ..Options::default()
+    };
     for strategy in strategies {
         let mut depth = Compositor::<DepthPixel<[u8; 4]>>::new(options(*strategy));
         let mut blend = Compositor::<PremultipliedPixel<[f32; 4]>>::new(options(*strategy));
@@ -97,7 +106,8 @@ pub(super) fn run(
             for (w, h) in case.sizes(comm.size(), most) {
                 let pixels = (w * h) as usize;
                 let drawn = |rank| case.draw(rank, pixels);
-                let times = if case == Case::EqualDepths { repeats / strategies.len() as u64 } else { 1 };
+                let times =
+                    if case == Case::EqualDepths { repeats / strategies.len() as u64 } else { 1 };
                 one(comm, &mut depth, times.max(1), &mut count, drawn, |(c, d)| {
                     Frame::with_depth(w, h, c, d)
                 })?;

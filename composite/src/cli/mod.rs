@@ -21,7 +21,8 @@ use std::ffi::OsString;
 
 /// Brings the images of many ranks together into one.
 ///
-/// Ranks are threads of this process (--threads), processes of an MPI job (--mpi) or simulated (--smpi).
+/// Ranks are threads of this process (--threads), processes of an MPI job (--mpi) or simulated
+/// (--smpi).
 #[derive(Debug, Parser)]
 #[command(name = "composite", version)]
 struct Cli {
@@ -45,7 +46,8 @@ enum Command {
     Completions(CompletionsArgs),
 }
 
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage or something missing, 130 interrupted.
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage or something missing, 130
+/// interrupted.
 pub fn main(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Status {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     status_of(execute(&arguments))

@@ -9,7 +9,9 @@ pub(super) const LAUNCHER_VARIABLE: &str = "COMPOSITE_MPIRUN";
 
 /// The launcher that is used.
 pub(super) fn launcher() -> OsString {
-    std::env::var_os(LAUNCHER_VARIABLE).filter(|name| !name.is_empty()).unwrap_or_else(|| "mpirun".into())
+    std::env::var_os(LAUNCHER_VARIABLE)
+        .filter(|name| !name.is_empty())
+        .unwrap_or_else(|| "mpirun".into())
 }
 
 /// Whether this is the superuser, without whom Open MPI does not ask twice.
@@ -18,8 +20,8 @@ fn is_root() -> bool {
     std::fs::metadata("/proc/self").is_ok_and(|me| me.uid() == 0)
 }
 
-/// What Open MPI needs to run more ranks than there are processors without waiting for whole time slices, and in a container. Others
-/// ignore it.
+/// What Open MPI needs to run more ranks than there are processors without waiting for whole time
+/// slices, and in a container. Others ignore it.
 pub(super) fn settings(ranks: usize) -> Vec<(&'static str, &'static str)> {
     let mut settings = vec![("OMPI_MCA_btl", "self,vader")];
     if is_root() {
@@ -37,7 +39,11 @@ pub(super) fn settings(ranks: usize) -> Vec<(&'static str, &'static str)> {
 }
 
 /// Runs `mpirun -n RANKS this-program ARGUMENTS` and waits for it.
-pub(super) fn start(common: CommonArgs, ranks: usize, arguments: &[OsString]) -> anyhow::Result<Status> {
+pub(super) fn start(
+    common: CommonArgs,
+    ranks: usize,
+    arguments: &[OsString],
+) -> anyhow::Result<Status> {
     let launcher = launcher();
     let name = launcher.display();
     let program = std::env::current_exe()?;

@@ -47,7 +47,8 @@ impl RankTimes {
     }
 
     pub(super) fn from_bytes(rank: usize, bytes: &[u8]) -> Option<Self> {
-        let words: Vec<[u8; 8]> = bytes.chunks_exact(8).filter_map(|word| word.try_into().ok()).collect();
+        let words: Vec<[u8; 8]> =
+            bytes.chunks_exact(8).filter_map(|word| word.try_into().ok()).collect();
         let number = |i: usize| words.get(i).map(|word| f64::from_le_bytes(*word));
         Some(Self {
             rank,

@@ -17,7 +17,8 @@ const MODEL: sim::Network = sim::Network::QDR_AS_SMPI;
 /// What every job takes.
 #[derive(Debug, clap::Args)]
 pub(super) struct RankArgs {
-    /// Number of ranks; under an MPI launcher those it has started. `compare` takes several, as 2,4,8
+    /// Number of ranks; under an MPI launcher those it has started. `compare` takes several, as
+    /// 2,4,8
     #[arg(long, short = 'n', value_name = "N", value_delimiter = ',')]
     ranks: Vec<usize>,
     /// Ranks are threads of this process (the default)
@@ -29,7 +30,8 @@ pub(super) struct RankArgs {
     /// Ranks are simulated by SimGrid on a network of 4X QDR InfiniBand
     #[arg(long, group = "where")]
     smpi: bool,
-    /// Ranks are simulated in this process, by a model (LogGP) of the same network; needs nothing installed
+    /// Ranks are simulated in this process, by a model (LogGP) of the same network; needs nothing
+    /// installed
     #[arg(long, group = "where")]
     model: bool,
     /// Longest wait for one message, in seconds
@@ -38,7 +40,8 @@ pub(super) struct RankArgs {
     /// Cut messages over MPI into chunks of this many bytes, as those of more than 64 MiB are
     #[arg(long, hide = true, default_value_t = 1 << 26)]
     chunk_bytes: usize,
-    /// Has the ranks but the last wait so many milliseconds behind each meeting in shared memory, as on a busy machine
+    /// Has the ranks but the last wait so many milliseconds behind each meeting in shared memory,
+    /// as on a busy machine
     #[arg(long, hide = true, default_value_t = 0)]
     linger_ms: u64,
 }
@@ -105,7 +108,9 @@ impl RankArgs {
             return Some(smpirun::CAVEAT.to_string());
         }
         self.model.then(|| {
-            "network by a model (LogGP, fair shares of every adapter) of 4X QDR InfiniBand, 3.2 GB/s; computing measured on this machine's cores".to_string()
+            "network by a model (LogGP, fair shares of every adapter) of 4X QDR InfiniBand, 3.2 \
+             GB/s; computing measured on this machine's cores"
+                .to_string()
         })
     }
 
@@ -131,7 +136,10 @@ impl RankArgs {
 
     pub(super) fn count(&self) -> Result<usize, UsageError> {
         if self.ranks.len() > 1 {
-            return Err(UsageError(format!("--ranks {:?}: this takes one number of ranks", self.ranks)));
+            return Err(UsageError(format!(
+                "--ranks {:?}: this takes one number of ranks",
+                self.ranks
+            )));
         }
         match self.ranks.first().copied().unwrap_or(4) {
             0 => Err(UsageError("0 ranks can do nothing; give at least 1".to_string())),
@@ -142,8 +150,8 @@ impl RankArgs {
         }
     }
 
-    /// Does `work` on every rank, starting them if this is not one, and hands what rank 0 made to `finish`. `arguments` are this
-    /// program's own, for processes that are to do the same.
+    /// Does `work` on every rank, starting them if this is not one, and hands what rank 0 made to
+    /// `finish`. `arguments` are this program's own, for processes that are to do the same.
     pub(super) fn run<T: Send>(
         &self,
         common: CommonArgs,
@@ -186,8 +194,11 @@ impl RankArgs {
                     if first_error.as_ref().is_none_or(is_echo) {
                         // What is wrong with the command is no one rank's.
                         let of_all = error.is::<UsageError>();
-                        first_error =
-                            Some(if of_all { error } else { error.context(format!("rank {rank}")) });
+                        first_error = Some(if of_all {
+                            error
+                        } else {
+                            error.context(format!("rank {rank}"))
+                        });
                     }
                 }
             }
@@ -213,7 +224,8 @@ impl RankArgs {
         let size = comm.comm().size();
         let result = match self.ranks.first().copied() {
             Some(wanted) if wanted != size => Err(anyhow::Error::new(UsageError(format!(
-                "--ranks {wanted}, but the launcher has started {size}: leave --ranks out, or start {wanted}"
+                "--ranks {wanted}, but the launcher has started {size}: leave --ranks out, or \
+                 start {wanted}"
             )))),
             _ => work(&mut comm),
         };
@@ -242,7 +254,8 @@ impl RankArgs {
 
 /// Whether an error only says that another rank has one.
 fn is_echo(error: &anyhow::Error) -> bool {
-    let of_comm = |error: &CommError| matches!(error, CommError::Aborted { .. } | CommError::PeerLost { .. });
+    let of_comm =
+        |error: &CommError| matches!(error, CommError::Aborted { .. } | CommError::PeerLost { .. });
     error.chain().any(|cause| {
         cause.downcast_ref::<CommError>().is_some_and(of_comm)
             || matches!(cause.downcast_ref::<CompositeError>(), Some(CompositeError::Comm(inner)) if of_comm(inner))

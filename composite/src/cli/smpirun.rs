@@ -1,7 +1,9 @@
-//! Starting this program as simulated ranks: SimGrid's `smpirun`, a made platform, and the program as a shared library.
+//! Starting this program as simulated ranks: SimGrid's `smpirun`, a made platform, and the program
+//! as a shared library.
 //!
-//! Computation is measured on this machine (CPU time of each rank), communication is simulated: a non-blocking crossbar of nodes with
-//! one 4X QDR InfiniBand adapter each, 3.2 GB/s both ways, half a microsecond per link. Those are the nodes of chapter 3 of the thesis.
+//! Computation is measured on this machine (CPU time of each rank), communication is simulated: a
+//! non-blocking crossbar of nodes with one 4X QDR InfiniBand adapter each, 3.2 GB/s both ways, half
+//! a microsecond per link. Those are the nodes of chapter 3 of the thesis.
 use super::mpirun::outcome;
 use datasets::cli::{CommonArgs, CureExt as _, Status, UsageError};
 use std::ffi::OsString;
@@ -15,8 +17,10 @@ const LIBRARY: &str = "libcomposite_smpi.so";
 const LIBRARY_VARIABLE: &str = "COMPOSITE_SMPI_LIBRARY";
 
 /// What is said of every number that was made this way.
-pub(super) const CAVEAT: &str = "simulated network (SimGrid SMPI): non-blocking crossbar, one 3.2 GB/s 4X QDR adapter per node; \
-     computing measured on this machine's cores; no noise of operating systems, no shared memory inside nodes";
+pub(super) const CAVEAT: &str = "simulated network (SimGrid SMPI): non-blocking crossbar, one 3.2 \
+                                 GB/s 4X QDR adapter per node; \
+     computing measured on this machine's cores; no noise of operating systems, no shared memory \
+     inside nodes";
 
 /// Whether this is a simulated rank.
 pub(super) fn inside() -> bool {
@@ -25,7 +29,11 @@ pub(super) fn inside() -> bool {
 }
 
 /// Runs `smpirun` and waits for it.
-pub(super) fn start(common: CommonArgs, ranks: usize, arguments: &[OsString]) -> anyhow::Result<Status> {
+pub(super) fn start(
+    common: CommonArgs,
+    ranks: usize,
+    arguments: &[OsString],
+) -> anyhow::Result<Status> {
     let library = library(common)?;
     let folder = std::env::temp_dir().join(format!("composite-smpi-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
@@ -65,8 +73,10 @@ pub(super) fn start(common: CommonArgs, ranks: usize, arguments: &[OsString]) ->
 fn platform_text(ranks: usize) -> String {
     format!(
         "<?xml version='1.0'?>\n<!DOCTYPE platform SYSTEM \"https://simgrid.org/simgrid.dtd\">\n\
-         <platform version=\"4.1\">\n  <cluster id=\"nodes\" prefix=\"node-\" suffix=\"\" radical=\"0-{}\" speed=\"1Gf\" \
-         bw=\"3.2GBps\" lat=\"0.5us\" sharing_policy=\"SPLITDUPLEX\" loopback_bw=\"20GBps\" loopback_lat=\"0.1us\"/>\n\
+         <platform version=\"4.1\">\n  <cluster id=\"nodes\" prefix=\"node-\" suffix=\"\" \
+         radical=\"0-{}\" speed=\"1Gf\" \
+         bw=\"3.2GBps\" lat=\"0.5us\" sharing_policy=\"SPLITDUPLEX\" loopback_bw=\"20GBps\" \
+         loopback_lat=\"0.1us\"/>\n\
          </platform>\n",
         ranks - 1
     )
@@ -103,7 +113,10 @@ fn library(common: CommonArgs) -> anyhow::Result<PathBuf> {
         if profile.ends_with("release") {
             cargo.arg("--release");
         }
-        common.note(0, "building the program as a shared library for SimGrid, unless it is up to date");
+        common.note(
+            0,
+            "building the program as a shared library for SimGrid, unless it is up to date",
+        );
         if cargo.status().is_ok_and(|status| status.success()) {
             let built = candidates(&program).into_iter().find(|path| path.is_file());
             if let Some(built) = built {
@@ -114,7 +127,8 @@ fn library(common: CommonArgs) -> anyhow::Result<PathBuf> {
     candidates(&program).into_iter().find(|path| path.is_file()).ok_or_else(|| {
         UsageError(format!(
             "the simulation needs this program as {LIBRARY}: \
-             run `cargo build -p composite --example composite_smpi`, or name the file in {LIBRARY_VARIABLE}"
+             run `cargo build -p composite --example composite_smpi`, or name the file in \
+             {LIBRARY_VARIABLE}"
         ))
         .into()
     })
@@ -127,7 +141,10 @@ mod tests {
     #[test]
     fn the_platform_has_one_host_for_each_rank() {
         let platform = platform_text(128);
-        assert!(platform.contains("radical=\"0-127\"") && platform.contains("bw=\"3.2GBps\""), "{platform}");
+        assert!(
+            platform.contains("radical=\"0-127\"") && platform.contains("bw=\"3.2GBps\""),
+            "{platform}"
+        );
         assert_eq!(hosts_text(3), "node-0\nnode-1\nnode-2\n");
     }
 }

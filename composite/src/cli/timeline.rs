@@ -8,7 +8,8 @@ const PLOT_WIDTH: f64 = 860.0;
 const ROW: f64 = 22.0;
 const TOP: f64 = 64.0;
 
-/// Colours of Okabe and Ito, which the colour-blind can tell apart, in the order of [`Activity::ALL`].
+/// Colours of Okabe and Ito, which the colour-blind can tell apart, in the order of
+/// [`Activity::ALL`].
 const COLORS: [&str; 6] = ["#009e73", "#0072b2", "#f0e442", "#56b4e9", "#dddddd", "#cc79a7"];
 
 /// A row for each rank, a bar for each span.
@@ -21,8 +22,10 @@ pub(super) fn svg(title: &str, lines: &[RankRecord]) -> String {
     // Writing to a String cannot fail.
     let _ = write!(
         text,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n<text x=\"{LEFT}\" y=\"22\" font-size=\"14\">{title}</text>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" \
+         font-family=\"sans-serif\" font-size=\"12\">\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n<text x=\"{LEFT}\" y=\"22\" \
+         font-size=\"14\">{title}</text>\n",
         LEFT + PLOT_WIDTH + 40.0,
         bottom + 48.0,
     );
@@ -30,7 +33,8 @@ pub(super) fn svg(title: &str, lines: &[RankRecord]) -> String {
         let at = LEFT + 100.0 * index as f64;
         let _ = writeln!(
             text,
-            "<rect x=\"{at}\" y=\"36\" width=\"12\" height=\"12\" fill=\"{color}\"/><text x=\"{}\" y=\"46\">{}</text>",
+            "<rect x=\"{at}\" y=\"36\" width=\"12\" height=\"12\" fill=\"{color}\"/><text x=\"{}\" \
+             y=\"46\">{}</text>",
             at + 17.0,
             activity.name()
         );
@@ -59,7 +63,8 @@ pub(super) fn svg(title: &str, lines: &[RankRecord]) -> String {
             let name = Activity::ALL.get(activity).map_or("", |a| a.name());
             let _ = writeln!(
                 text,
-                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{:.1}\" fill=\"{}\"><title>rank {}: {name} {:.3} ms</title></rect>",
+                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{:.1}\" \
+                 fill=\"{}\"><title>rank {}: {name} {:.3} ms</title></rect>",
                 x(begin_ms),
                 y + 3.0,
                 PLOT_WIDTH * (end_ms - begin_ms) / longest_ms,
@@ -83,8 +88,15 @@ pub(super) fn table(lines: &[RankRecord]) -> String {
     let _ = write!(text, " {:>9} {:>7} {:>12}", "total ms", "rounds", "bytes sent");
     for l in lines {
         let _ = write!(text, "\n{:>5} {:>10}", l.rank, l.triangles);
-        let columns =
-            [l.render_ms, l.composite_ms, l.shade_ms, l.answer_ms, l.exchange_ms, l.collect_ms, l.total_ms];
+        let columns = [
+            l.render_ms,
+            l.composite_ms,
+            l.shade_ms,
+            l.answer_ms,
+            l.exchange_ms,
+            l.collect_ms,
+            l.total_ms,
+        ];
         for ms in columns {
             let _ = write!(text, " {ms:>9.2}");
         }

@@ -23,7 +23,8 @@ fn planes<F: Composite>(width: u32, height: u32, active: impl Fn(u32, u32) -> bo
             let index = (y * width + x) as usize;
             if active(x, y) {
                 let value = |salt: u32| (x * 7 + y * 13 + salt) % 97 + 1;
-                layer.colors[index] = F::Color::from_f32([1, 2, 3, 4].map(|salt| value(salt) as f32 / 100.0));
+                layer.colors[index] =
+                    F::Color::from_f32([1, 2, 3, 4].map(|salt| value(salt) as f32 / 100.0));
                 if F::HAS_DEPTH {
                     layer.depths[index] = value(5) as f32 / 100.0;
                 }
@@ -77,7 +78,10 @@ fn check_format<F: Composite>() {
                 assert!(expected.len() <= longest::<F>(&rect));
                 for kernels in all_kernels() {
                     let mut message = vec![1, 2, 3];
-                    assert_eq!(codec(kernels).encode(&layer.view(), rect, depths, &mut message), counts);
+                    assert_eq!(
+                        codec(kernels).encode(&layer.view(), rect, depths, &mut message),
+                        counts
+                    );
                     assert!(message == expected, "{kernels:?}, pattern {kind}, {rect:?}");
                     let part = codec(kernels).decode::<F>(&message, rect, depths).unwrap();
                     assert_eq!(part.active, counts.active);
@@ -96,7 +100,8 @@ fn check_format<F: Composite>() {
                         continue;
                     }
 
-                    // Joined, from either side and as a message or as a view, it has the bits of the operator, pixel by pixel.
+                    // Joined, from either side and as a message or as a view, it has the bits of
+                    // the operator, pixel by pixel.
                     for side in [Side::Lower, Side::Higher] {
                         let mut one_by_one = held.clone();
                         for y in rect.y0..rect.y1 {
@@ -106,11 +111,17 @@ fn check_format<F: Composite>() {
                         }
                         let mut merged = held.clone();
                         part.merge_into(kernels, &mut merged, side);
-                        assert!(merged.colors == one_by_one.colors && merged.depths == one_by_one.depths);
+                        assert!(
+                            merged.colors == one_by_one.colors
+                                && merged.depths == one_by_one.depths
+                        );
                         let mut viewed = held.clone();
                         let view = View { bounds: rect, ..layer.view() };
                         viewed.merge_view(kernels, &view, side);
-                        assert!(viewed.colors == one_by_one.colors && viewed.depths == one_by_one.depths);
+                        assert!(
+                            viewed.colors == one_by_one.colors
+                                && viewed.depths == one_by_one.depths
+                        );
                     }
                 }
             }
@@ -238,7 +249,8 @@ proptest! {
         prop_assert!(codec.decode::<P>(&bytes, rect, true).is_err());
     }
 
-    /// Lies with a right checksum: the decoder must find the contradiction itself, and what it accepts can be read.
+    /// Lies with a right checksum: the decoder must find the contradiction itself, and what it
+    /// accepts can be read.
     #[test]
     fn consistent_checksums_do_not_make_the_decoder_trust_the_numbers(
         changes in proptest::collection::vec((24..200_usize, any::<u8>()), 1..6),

@@ -1,15 +1,18 @@
-//! Calls that all ranks take part in, made of messages: any [`Communicator`] has them without doing more, with the same timeouts.
+//! Calls that all ranks take part in, made of messages: any [`Communicator`] has them without doing
+//! more, with the same timeouts.
 use super::{CommError, Communicator, FIRST_RESERVED_TAG};
 use std::time::Duration;
 
 const BARRIER_TAG: u32 = FIRST_RESERVED_TAG;
 pub(super) const GATHER_TAG: u32 = FIRST_RESERVED_TAG + 1;
-/// Added to the timeout of each later round. A rank that waits for the stalled one itself is then the first to give up, and the
-/// group's error names the stalled rank instead of one that waits as well.
+/// Added to the timeout of each later round. A rank that waits for the stalled one itself is then
+/// the first to give up, and the group's error names the stalled rank instead of one that waits as
+/// well.
 const ROUND_GRACE: Duration = Duration::from_millis(50);
 
-/// A dissemination barrier (D. Hensgen, R. Finkel, U. Manber, "Two Algorithms for Barrier Synchronization", 1988): in round j
-/// every rank tells the one 2^j above it that it has come; after log2 p rounds everybody has heard of everybody.
+/// A dissemination barrier (D. Hensgen, R. Finkel, U. Manber, "Two Algorithms for Barrier
+/// Synchronization", 1988): in round j every rank tells the one 2^j above it that it has come;
+/// after log2 p rounds everybody has heard of everybody.
 ///
 /// # Errors
 /// As [`Communicator::barrier`].
@@ -32,8 +35,9 @@ pub fn barrier<C: Communicator + ?Sized>(comm: &mut C, timeout: Duration) -> Res
     Ok(())
 }
 
-/// The all-gather of J. Bruck et al. ("Efficient Algorithms for All-to-All Communications in Multiport Message-Passing Systems",
-/// 1997): in round j every rank hands all it knows to the one 2^j below, so log2 p rounds are enough for any p.
+/// The all-gather of J. Bruck et al. ("Efficient Algorithms for All-to-All Communications in
+/// Multiport Message-Passing Systems", 1997): in round j every rank hands all it knows to the one
+/// 2^j below, so log2 p rounds are enough for any p.
 ///
 /// # Errors
 /// As [`Communicator::all_gather`].
@@ -94,7 +98,8 @@ pub(super) fn block_at(bytes: &[u8], at: usize) -> Option<(usize, usize)> {
     (end <= bytes.len()).then_some((at + 8, end))
 }
 
-/// Where the first `count` strings end; `None` if they are not all there or one is longer than `longest`.
+/// Where the first `count` strings end; `None` if they are not all there or one is longer than
+/// `longest`.
 fn end_of(bytes: &[u8], count: usize, longest: usize) -> Option<usize> {
     (0..count).try_fold(0, |at, _| {
         let (start, end) = block_at(bytes, at)?;
@@ -130,7 +135,10 @@ mod tests {
     fn a_string_longer_than_agreed_is_named_by_its_rank() {
         let mut comm = threads::group(1).remove(0);
         let error = all_gather(&mut comm, &[0; 5], 4, LONG).unwrap_err();
-        assert!(matches!(error, CommError::TooLong { rank: 0, peer: 0, capacity: 4, .. }), "{error}");
+        assert!(
+            matches!(error, CommError::TooLong { rank: 0, peer: 0, capacity: 4, .. }),
+            "{error}"
+        );
     }
 
     #[test]

@@ -5,8 +5,10 @@
 pub enum CommError {
     /// A message did not come in time.
     #[error(
-        "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain, without a sign of life: \
-         is that rank stalled, or does its renderer work longer than the timeout without calling Communicator::alive?"
+        "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain, \
+         without a sign of life: \
+         is that rank stalled, or does its renderer work longer than the timeout without calling \
+         Communicator::alive?"
     )]
     Timeout {
         /// Who waited.
@@ -30,7 +32,8 @@ pub enum CommError {
     },
     /// Ranks met though they make different calls.
     #[error(
-        "rank {rank}: {} came to an all-gather and {} to a barrier: all ranks must make the same calls in the same order",
+        "rank {rank}: {} came to an all-gather and {} to a barrier: all ranks must make the same \
+         calls in the same order",
         ranks(gathering),
         ranks(waiting)
     )]
@@ -68,7 +71,8 @@ pub enum CommError {
     },
     /// A message is longer than the receiver allowed for: the two do not agree about what is sent.
     #[error(
-        "rank {rank} got a message from rank {peer} (tag {tag}) that is longer than the {capacity} bytes it allowed for: \
+        "rank {rank} got a message from rank {peer} (tag {tag}) that is longer than the {capacity} \
+         bytes it allowed for: \
          do all ranks use the same sizes and options?"
     )]
     TooLong {

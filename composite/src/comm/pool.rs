@@ -8,8 +8,8 @@ const MOST: usize = 512;
 /// How much larger than what is asked for a buffer may be.
 const MOST_WASTE: usize = 4;
 
-/// Capacities come in eight steps from one power of two to the next: frames are alike but not equal, and a buffer of the last one shall fit
-/// the next.
+/// Capacities come in eight steps from one power of two to the next: frames are alike but not
+/// equal, and a buffer of the last one shall fit the next.
 fn rounded(capacity: usize) -> usize {
     let step = (capacity.max(64).next_power_of_two() / 16).max(1);
     capacity.max(64).checked_next_multiple_of(step).unwrap_or(capacity)
@@ -28,10 +28,12 @@ impl BufferPool {
         self.fitting(capacity).unwrap_or_else(|| Vec::with_capacity(rounded(capacity)))
     }
 
-    /// The smallest free buffer that holds `capacity` bytes and is not so large that it will be missed.
+    /// The smallest free buffer that holds `capacity` bytes and is not so large that it will be
+    /// missed.
     pub fn fitting(&mut self, capacity: usize) -> Option<Vec<u8>> {
         let capacity = rounded(capacity);
-        let (&size, buffers) = self.free.range_mut(capacity..=capacity.saturating_mul(MOST_WASTE)).next()?;
+        let (&size, buffers) =
+            self.free.range_mut(capacity..=capacity.saturating_mul(MOST_WASTE)).next()?;
         let buffer = buffers.pop()?;
         if buffers.is_empty() {
             self.free.remove(&size);

@@ -1,6 +1,8 @@
-//! Ranks as threads of one process: every rank has a mailbox for each other rank, messages are moved and not copied.
+//! Ranks as threads of one process: every rank has a mailbox for each other rank, messages are
+//! moved and not copied.
 //!
-//! The whole group shares one lock. It is held for the move of one pointer, never while pixels are worked on.
+//! The whole group shares one lock. It is held for the move of one pointer, never while pixels are
+//! worked on.
 use super::{Arrival, BufferPool, CommError, Communicator, Receive};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -18,19 +20,22 @@ struct State {
     barriers_done: u64,
     /// When each rank has last sent anything or said that it is at work.
     heartbeats: Vec<Instant>,
-    /// For whom each rank waits: the sources of its receives. At a barrier these are all who are not there.
+    /// For whom each rank waits: the sources of its receives. At a barrier these are all who are
+    /// not there.
     waits_for: Vec<Vec<usize>>,
 }
 
 impl State {
-    /// The last sign of life of those for whom `rank` waits, and of those they wait for in turn, but not of `rank` itself.
+    /// The last sign of life of those for whom `rank` waits, and of those they wait for in turn,
+    /// but not of `rank` itself.
     fn last_heartbeat(&self, rank: usize) -> Option<Instant> {
         let ranks = 0..self.heartbeats.len();
         let mut seen = vec![false; ranks.len()];
         seen[rank] = true;
         let (mut last, mut to_do) = (None, vec![rank]);
         while let Some(waiting) = to_do.pop() {
-            let absent = ranks.clone().filter(|&other| self.at_barrier[waiting] && !self.at_barrier[other]);
+            let absent =
+                ranks.clone().filter(|&other| self.at_barrier[waiting] && !self.at_barrier[other]);
             for next in self.waits_for[waiting].iter().copied().chain(absent) {
                 if !std::mem::replace(&mut seen[next], true) {
                     last = last.max(Some(self.heartbeats[next]));
@@ -48,7 +53,8 @@ struct Group {
     state: Mutex<State>,
     /// One per rank, so that a message wakes its receiver alone.
     wake: Vec<Condvar>,
-    /// Of all ranks together: buffers travel with their messages, and a rank that only receives would hoard them.
+    /// Of all ranks together: buffers travel with their messages, and a rank that only receives
+    /// would hoard them.
     pool: Mutex<BufferPool>,
 }
 
@@ -65,8 +71,8 @@ impl Group {
     }
 }
 
-/// One rank of a group of threads. Dropping it leaves the group: whoever still waits for this rank gets
-/// [`CommError::PeerLost`], but messages already sent still arrive.
+/// One rank of a group of threads. Dropping it leaves the group: whoever still waits for this rank
+/// gets [`CommError::PeerLost`], but messages already sent still arrive.
 pub struct ThreadComm {
     rank: usize,
     group: Arc<Group>,
@@ -89,8 +95,12 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
         waits_for: vec![Vec::new(); size],
     };
     let wake = (0..size).map(|_| Condvar::new()).collect();
-    let group =
-        Arc::new(Group { begin: Instant::now(), state: Mutex::new(state), wake, pool: Mutex::default() });
+    let group = Arc::new(Group {
+        begin: Instant::now(),
+        state: Mutex::new(state),
+        wake,
+        pool: Mutex::default(),
+    });
     (0..size)
         .map(|rank| ThreadComm {
             rank,
@@ -102,10 +112,15 @@ pub fn group(size: usize) -> Vec<ThreadComm> {
         .collect()
 }
 
-/// Runs `work` on `size` ranks, each on a thread of its own, and returns their results in rank order.
+/// Runs `work` on `size` ranks, each on a thread of its own, and returns their results in rank
+/// order.
 ///
-/// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as [`CommError::PeerLost`].
-pub fn run<T: Send>(size: usize, work: impl Fn(ThreadComm) -> T + Sync) -> Vec<Result<T, CommError>> {
+/// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as
+/// [`CommError::PeerLost`].
+pub fn run<T: Send>(
+    size: usize,
+    work: impl Fn(ThreadComm) -> T + Sync,
+) -> Vec<Result<T, CommError>> {
     run_group(group(size), work)
 }
 
@@ -121,15 +136,18 @@ pub(super) fn run_group<C: Communicator + Send, T: Send>(
             .enumerate()
             .map(|(rank, comm)| {
                 let name = format!("rank {rank}");
-                (rank, std::thread::Builder::new().name(name).spawn_scoped(scope, move || work(comm)))
+                (
+                    rank,
+                    std::thread::Builder::new().name(name).spawn_scoped(scope, move || work(comm)),
+                )
             })
             .collect();
         threads
             .into_iter()
             .map(|(rank, thread)| match thread {
-                Ok(thread) => {
-                    thread.join().map_err(|panic| CommError::Panicked { rank, message: panic_text(&*panic) })
-                }
+                Ok(thread) => thread
+                    .join()
+                    .map_err(|panic| CommError::Panicked { rank, message: panic_text(&*panic) }),
                 Err(error) => Err(CommError::NoThread { rank, reason: error.to_string() }),
             })
             .collect()
@@ -138,7 +156,8 @@ pub(super) fn run_group<C: Communicator + Send, T: Send>(
 
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(ToString::to_string);
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string())
+    text.or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "no message".to_string())
 }
 
 impl ThreadComm {
@@ -149,8 +168,8 @@ impl ThreadComm {
 }
 
 impl Group {
-    /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed since the last sign of life of the `sources`
-    /// (then `None`).
+    /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed since the
+    /// last sign of life of the `sources` (then `None`).
     fn wait<T>(
         &self,
         rank: usize,
@@ -178,7 +197,8 @@ impl Group {
             if since.elapsed() >= timeout {
                 since = state.last_heartbeat(rank).map_or(since, |sign| since.max(sign));
             }
-            let Some(left) = timeout.checked_sub(since.elapsed()).filter(|left| !left.is_zero()) else {
+            let Some(left) = timeout.checked_sub(since.elapsed()).filter(|left| !left.is_zero())
+            else {
                 break Ok(None);
             };
             let woken = self.wake[rank].wait_timeout(state, left);
@@ -223,7 +243,12 @@ impl Communicator for ThreadComm {
         Ok(())
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.check_rank(source)?;
         let id = self.next_id;
         self.next_id += 1;
@@ -231,7 +256,11 @@ impl Communicator for ThreadComm {
         Ok(Receive { id, source, tag, capacity })
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         let rank = self.rank;
         let first = posted.first().ok_or(CommError::NothingPosted { rank })?;
         let silent = CommError::Timeout {
@@ -240,7 +269,8 @@ impl Communicator for ThreadComm {
             tag: first.tag,
             waited_ms: timeout.as_millis() as u64,
         };
-        // Every message goes to the oldest receive of its source and tag, whether that one is waited for now or later.
+        // Every message goes to the oldest receive of its source and tag, whether that one is
+        // waited for now or later.
         let (queues, early) = (&mut self.posted, &mut self.early);
         let sources = |to: &mut Vec<usize>| to.extend(posted.iter().map(|receive| receive.source));
         let came = self.group.wait(rank, timeout, sources, |state| {
@@ -293,7 +323,8 @@ impl Communicator for ThreadComm {
                 if state.barriers_done > before {
                     return Some(Ok(()));
                 }
-                let peer = (0..state.lost.len()).find(|&peer| state.lost[peer] && !state.at_barrier[peer])?;
+                let peer = (0..state.lost.len())
+                    .find(|&peer| state.lost[peer] && !state.at_barrier[peer])?;
                 Some(Err(CommError::PeerLost { rank, peer }))
             },
         )?;
@@ -306,7 +337,8 @@ impl Communicator for ThreadComm {
             return Ok(());
         }
         let missing = state.at_barrier.iter().position(|&here| !here).unwrap_or(rank);
-        // This rank no longer waits: without this, a latecomer would pass a barrier that has failed here.
+        // This rank no longer waits: without this, a latecomer would pass a barrier that has failed
+        // here.
         state.at_barrier[rank] = false;
         Err(CommError::BarrierTimeout { rank, missing, waited_ms: timeout.as_millis() as u64 })
     }
@@ -425,14 +457,18 @@ mod tests {
     fn receives_posted_in_advance_complete_in_the_order_of_arrival() {
         let order = results(3, |mut comm| {
             if comm.rank() == 0 {
-                let mut posted = vec![comm.post_recv(1, 5, 8).unwrap(), comm.post_recv(2, 5, 8).unwrap()];
+                let mut posted =
+                    vec![comm.post_recv(1, 5, 8).unwrap(), comm.post_recv(2, 5, 8).unwrap()];
                 assert_eq!(comm.test_any(&mut posted).unwrap(), None);
                 assert_eq!(posted.len(), 2, "looking takes nothing out of the list");
                 comm.barrier(LONG).unwrap();
                 let first = comm.wait_any(&mut posted, LONG).unwrap();
                 comm.send(1, 6, vec![]).unwrap();
                 let second = comm.wait_any(&mut posted, LONG).unwrap();
-                assert_eq!(comm.wait_any(&mut posted, LONG), Err(CommError::NothingPosted { rank: 0 }));
+                assert_eq!(
+                    comm.wait_any(&mut posted, LONG),
+                    Err(CommError::NothingPosted { rank: 0 })
+                );
                 return vec![first.source, second.source];
             }
             comm.barrier(LONG).unwrap();
@@ -449,7 +485,8 @@ mod tests {
     #[test]
     fn receives_of_one_source_are_served_as_posted_even_when_the_later_one_is_waited_for_first() {
         let mut comms = group(2);
-        let (early, late) = (comms[1].post_recv(0, 3, 8).unwrap(), comms[1].post_recv(0, 3, 8).unwrap());
+        let (early, late) =
+            (comms[1].post_recv(0, 3, 8).unwrap(), comms[1].post_recv(0, 3, 8).unwrap());
         comms[0].send(1, 3, vec![1]).unwrap();
         comms[0].send(1, 3, vec![2]).unwrap();
         assert_eq!(comms[1].wait_any(&mut vec![late], LONG).unwrap().message, [2]);

@@ -23,7 +23,9 @@ fn folders() -> Vec<PathBuf> {
 /// # Errors
 /// [`IcetError::Missing`].
 pub fn find() -> Result<PathBuf, IcetError> {
-    if let Some(path) = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from) {
+    if let Some(path) =
+        std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from)
+    {
         return if path.is_file() {
             Ok(path)
         } else {
@@ -32,12 +34,15 @@ pub fn find() -> Result<PathBuf, IcetError> {
     }
     for folder in folders() {
         let Ok(entries) = std::fs::read_dir(&folder) else { continue };
-        let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        let mut files: Vec<PathBuf> =
+            entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
         files.sort();
         for name in NAMES {
             let is_it = |path: &&PathBuf| {
-                let file =
-                    path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
+                let file = path
+                    .file_name()
+                    .map(|file| file.to_string_lossy().into_owned())
+                    .unwrap_or_default();
                 file.starts_with(name) && file.contains(".so")
             };
             if let Some(path) = files.iter().find(is_it) {
@@ -50,13 +55,15 @@ pub fn find() -> Result<PathBuf, IcetError> {
 
 /// The error that says that there is none.
 pub fn missing() -> IcetError {
-    let folders: Vec<String> = folders().iter().map(|folder| folder.display().to_string()).collect();
+    let folders: Vec<String> =
+        folders().iter().map(|folder| folder.display().to_string()).collect();
     IcetError::Missing { looked_for: format!("{} in {}", NAMES.join(", "), folders.join(", ")) }
 }
 
 macro_rules! functions {
     ($($field:ident: $symbol:literal, fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// IceT's functions. An image is a struct of one pointer, which the ABI passes as that pointer.
+        /// IceT's functions. An image is a struct of one pointer, which the ABI passes as that
+        /// pointer.
         pub(super) struct Functions {
             $(pub(super) $field: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
         }
@@ -65,7 +72,8 @@ macro_rules! functions {
             fn of(library: &Dynamic, path: &Path) -> Result<Self, IcetError> {
                 Ok(Self {
                     $($field: {
-                        // SAFETY: arguments as in IceT.h of version 2.2, which has not changed them since 2.0.
+                        // SAFETY: arguments as in IceT.h of version 2.2, which has not changed them
+                        // since 2.0.
                         let symbol = unsafe {
                             library.get::<unsafe extern "C" fn($($argument),*) $(-> $result)?>($symbol.as_bytes())
                         };
@@ -106,13 +114,15 @@ pub(super) struct Library {
 }
 
 impl Library {
-    /// Loads IceT; `private` from a copy of the file, so that its global variables are this rank's own.
+    /// Loads IceT; `private` from a copy of the file, so that its global variables are this rank's
+    /// own.
     pub(super) fn open(path: &Path, private: bool) -> Result<Self, IcetError> {
         let unusable = |reason: String| IcetError::Unusable { path: path.to_path_buf(), reason };
         let dynamic = if private {
             static COPIES: AtomicU64 = AtomicU64::new(0);
             let number = COPIES.fetch_add(1, Ordering::Relaxed);
-            // The address of a local tells apart ranks that have copies of this library too (SMPI), and so of the counter.
+            // The address of a local tells apart ranks that have copies of this library too (SMPI),
+            // and so of the counter.
             let salt = &raw const number as usize;
             let name = format!("composite-icet-{}-{salt:x}-{number}.so", std::process::id());
             let copy = std::env::temp_dir().join(name);
@@ -133,17 +143,23 @@ impl Library {
     }
 
     /// A communicator of IceT's own MPI layer, from the library beside the core.
-    pub(super) fn own_mpi_layer(&self, core: &Path, world: usize) -> Result<*mut c_void, IcetError> {
-        let name = core.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    pub(super) fn own_mpi_layer(
+        &self,
+        core: &Path,
+        world: usize,
+    ) -> Result<*mut c_void, IcetError> {
+        let name =
+            core.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let path = core.with_file_name(name.replace("IceTCore", "IceTMPI"));
         let unusable = |reason: String| IcetError::Unusable { path: path.clone(), reason };
         // SAFETY: it needs IceT's core and the MPI that this process uses, and both are loaded.
         let layer = unsafe { Dynamic::open(Some(&path), RTLD_NOW | RTLD_GLOBAL) };
         let layer = ManuallyDrop::new(layer.map_err(|error| unusable(error.to_string()))?);
-        // SAFETY: takes an MPI_Comm, a pointer in Open MPI, and gives IceT's communicator (IceTMPI.h).
+        // SAFETY: takes an MPI_Comm, a pointer in Open MPI, and gives IceT's communicator
+        // (IceTMPI.h).
         unsafe {
-            let create =
-                layer.get::<unsafe extern "C" fn(usize) -> *mut c_void>(b"icetCreateMPICommunicator");
+            let create = layer
+                .get::<unsafe extern "C" fn(usize) -> *mut c_void>(b"icetCreateMPICommunicator");
             let create = create.map_err(|error| unusable(error.to_string()))?;
             Ok(create(world))
         }

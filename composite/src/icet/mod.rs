@@ -1,9 +1,12 @@
-//! IceT (K. Moreland, W. Kendall, T. Peterka, J. Huang, "An Image Compositing Solution at Scale", SC11) on the same ranks and the same
-//! frames: the library that the thesis used, and what our times are compared with.
+//! IceT (K. Moreland, W. Kendall, T. Peterka, J. Huang, "An Image Compositing Solution at Scale",
+//! SC11) on the same ranks and the same frames: the library that the thesis used, and what our
+//! times are compared with.
 //!
-//! The stock build of a distribution is loaded at run time (Debian: package `paraview`); nothing of it is linked or shipped. Under
-//! Open MPI it uses its own MPI layer. Elsewhere it gets its messages through its table of functions: from MPI directly (MPICH, SMPI),
-//! or over a [`Communicator`] between threads, where every rank has a copy of the library, because IceT keeps its state in globals.
+//! The stock build of a distribution is loaded at run time (Debian: package `paraview`); nothing of
+//! it is linked or shipped. Under Open MPI it uses its own MPI layer. Elsewhere it gets its
+//! messages through its table of functions: from MPI directly (MPICH, SMPI), or over a
+//! [`Communicator`] between threads, where every rank has a copy of the library, because IceT keeps
+//! its state in globals.
 #![allow(unsafe_code, reason = "calls into IceT, which is found at run time")]
 
 mod library;
@@ -165,11 +168,19 @@ impl Icet {
             let own = library.own_mpi_layer(path, comm.library().world)?;
             // SAFETY: a communicator that IceT's MPI layer has just made.
             unsafe { (library.functions.create_context)(own) };
-            return Self::set_up(library, MessageLayer::Own, mode, width_px, height_px, comm.rank());
+            return Self::set_up(
+                library,
+                MessageLayer::Own,
+                mode,
+                width_px,
+                height_px,
+                comm.rank(),
+            );
         }
         let mut over = Box::new(OverMpi::new(comm.library(), comm.rank(), comm.size()));
         let mut table = Box::new(table::of::<OverMpi>((&raw mut *over).cast()));
-        // SAFETY: the table and what it points to live as long as this object, and IceT is not called after that.
+        // SAFETY: the table and what it points to live as long as this object, and IceT is not
+        // called after that.
         unsafe { (library.functions.create_context)((&raw mut *table).cast()) };
         Self::set_up(
             library,
@@ -181,8 +192,8 @@ impl Icet {
         )
     }
 
-    /// IceT over any communicator between threads, set up for images of this size that go to rank 0. The communicator is to be
-    /// passed again with every frame.
+    /// IceT over any communicator between threads, set up for images of this size that go to rank
+    /// 0. The communicator is to be passed again with every frame.
     ///
     /// # Errors
     /// [`IcetError`].
@@ -201,7 +212,14 @@ impl Icet {
         // SAFETY: as in `over_mpi`; the communicator is lent for this call.
         unsafe { (library.functions.create_context)((&raw mut *table).cast()) };
         drop(lent);
-        Self::set_up(library, MessageLayer::Comm { over, _table: table }, mode, width_px, height_px, rank)
+        Self::set_up(
+            library,
+            MessageLayer::Comm { over, _table: table },
+            mode,
+            width_px,
+            height_px,
+            rank,
+        )
     }
 
     fn set_up(
@@ -219,7 +237,8 @@ impl Icet {
             IcetMode::BlendF32 => (0x0302, 0xC002, 0xD000),
         };
         let f = &library.functions;
-        // SAFETY: a context is current (one per process or per copy of the library); all arguments are numbers.
+        // SAFETY: a context is current (one per process or per copy of the library); all arguments
+        // are numbers.
         unsafe {
             (f.diagnostics)(0);
             (f.composite_mode)(composite_mode);
@@ -260,8 +279,8 @@ impl Icet {
         unsafe { (self.library.functions.composite_order)(order.as_ptr()) };
     }
 
-    /// Composites a frame; all ranks call this. `bounds` holds all that was drawn. `comm` is the communicator of
-    /// [`over_comm`](Self::over_comm) and not used over MPI. Rank 0 gets the image.
+    /// Composites a frame; all ranks call this. `bounds` holds all that was drawn. `comm` is the
+    /// communicator of [`over_comm`](Self::over_comm) and not used over MPI. Rank 0 gets the image.
     ///
     /// # Errors
     /// [`IcetError::FrameSize`], [`IcetError::Reported`].
@@ -286,15 +305,15 @@ impl Icet {
                 (colors.as_ptr().cast(), std::ptr::null())
             }
         };
-        let viewport =
-            [bounds.x0, bounds.y0, bounds.width() as u32, bounds.height() as u32].map(|n| n as c_int);
+        let viewport = [bounds.x0, bounds.y0, bounds.width() as u32, bounds.height() as u32]
+            .map(|n| n as c_int);
         let background = [0.0_f32; 4];
         let lent = match &mut self.message_layer {
             MessageLayer::Comm { over, .. } => Some(over.with_comm(comm)),
             MessageLayer::Own | MessageLayer::Mpi { .. } => None,
         };
-        // SAFETY: buffers of the size of the tile in the formats of `set_up`, four numbers, no matrices (allowed: there is no bounding
-        // box to project), four channels.
+        // SAFETY: buffers of the size of the tile in the formats of `set_up`, four numbers, no
+        // matrices (allowed: there is no bounding box to project), four channels.
         let image = unsafe {
             (self.library.functions.composite_image)(
                 colors,
@@ -310,8 +329,8 @@ impl Icet {
         if self.rank != 0 {
             return Ok(None);
         }
-        // SAFETY: rank 0 displays the tile, so the image is whole and in the format of `set_up`; IceT keeps it until its next frame,
-        // which needs `&mut self`.
+        // SAFETY: rank 0 displays the tile, so the image is whole and in the format of `set_up`;
+        // IceT keeps it until its next frame, which needs `&mut self`.
         Ok(Some(unsafe {
             match self.mode {
                 IcetMode::BlendF32 => {
@@ -327,7 +346,11 @@ impl Icet {
     }
 
     fn fits(&self, found: usize) -> Result<(), IcetError> {
-        if found == self.pixels { Ok(()) } else { Err(IcetError::FrameSize { expected: self.pixels, found }) }
+        if found == self.pixels {
+            Ok(())
+        } else {
+            Err(IcetError::FrameSize { expected: self.pixels, found })
+        }
     }
 
     /// Whether its messages go over its own MPI layer.

@@ -1,4 +1,5 @@
-//! IceT's messages over a [`Communicator`]. Every message is copied into a buffer and out of it, as MPI does within a machine.
+//! IceT's messages over a [`Communicator`]. Every message is copied into a buffer and out of it, as
+//! MPI does within a machine.
 use super::table::Transport;
 use crate::comm::{CommError, Communicator, Receive};
 use std::ffi::c_int;
@@ -34,7 +35,8 @@ pub(super) struct CommGuard<'a> {
 
 impl Drop for CommGuard<'_> {
     fn drop(&mut self) {
-        // SAFETY: made by `with_comm` from a box that outlives the call into IceT during which this exists.
+        // SAFETY: made by `with_comm` from a box that outlives the call into IceT during which this
+        // exists.
         unsafe { (*self.over).comm = None };
     }
 }
@@ -46,7 +48,8 @@ impl OverComm {
 
     /// Lets IceT use `comm` until the result is dropped.
     pub(super) fn with_comm<'a>(&mut self, comm: &'a mut dyn Communicator) -> CommGuard<'a> {
-        // SAFETY: only the lifetime changes; `CommGuard` keeps the borrow and takes the pointer back.
+        // SAFETY: only the lifetime changes; `CommGuard` keeps the borrow and takes the pointer
+        // back.
         let comm: &'static mut dyn Communicator = unsafe { std::mem::transmute(comm) };
         self.comm = Some(comm);
         CommGuard { over: self, _comm: PhantomData }
@@ -66,8 +69,11 @@ impl OverComm {
     fn finish(&mut self, pending: Pending) {
         let comm = self.comm();
         let arrival = or_abort(comm.wait_any(&mut vec![pending.receive], TIMEOUT));
-        // SAFETY: IceT's buffer holds the count it posted, and the communicator lets no longer message through.
-        unsafe { pending.to.copy_from_nonoverlapping(arrival.message.as_ptr(), arrival.message.len()) };
+        // SAFETY: IceT's buffer holds the count it posted, and the communicator lets no longer
+        // message through.
+        unsafe {
+            pending.to.copy_from_nonoverlapping(arrival.message.as_ptr(), arrival.message.len())
+        };
         comm.recycle(arrival.message);
     }
 }
@@ -156,13 +162,17 @@ impl Transport for OverComm {
 
     fn allgather(&mut self, send: *const u8, count: usize, recv: *mut u8) {
         // SAFETY: in place, the rank's part is where it belongs.
-        let mine = if send.is_null() { unsafe { recv.add(self.rank * count).cast_const() } } else { send };
+        let mine =
+            if send.is_null() { unsafe { recv.add(self.rank * count).cast_const() } } else { send };
         // SAFETY: IceT passes `count` bytes.
         let mine = unsafe { std::slice::from_raw_parts(mine, count) }.to_vec();
         let all = or_abort(self.comm().all_gather(&mine, count, TIMEOUT));
         for (rank, part) in all.iter().enumerate() {
             // SAFETY: room for `count` bytes of each rank.
-            unsafe { recv.add(rank * count).copy_from_nonoverlapping(part.as_ptr(), part.len().min(count)) };
+            unsafe {
+                recv.add(rank * count)
+                    .copy_from_nonoverlapping(part.as_ptr(), part.len().min(count))
+            };
         }
     }
 
@@ -211,7 +221,9 @@ impl Transport for OverComm {
         }
         // All receives that are waited for, and whose they are.
         let (mut posted, mut owners) = (Vec::new(), Vec::new());
-        for (position, &request) in requests.iter().enumerate().filter(|(_, request)| **request != 0) {
+        for (position, &request) in
+            requests.iter().enumerate().filter(|(_, request)| **request != 0)
+        {
             if let Some(pending) = self.pending.get_mut(request - 1).and_then(Option::take) {
                 owners.push((pending.receive.id, position, request, pending.to));
                 posted.push(pending.receive);
@@ -226,7 +238,9 @@ impl Transport for OverComm {
                 None => {
                     done = position;
                     // SAFETY: as in `finish`.
-                    unsafe { to.copy_from_nonoverlapping(arrival.message.as_ptr(), arrival.message.len()) };
+                    unsafe {
+                        to.copy_from_nonoverlapping(arrival.message.as_ptr(), arrival.message.len())
+                    };
                 }
             }
         }

@@ -1,5 +1,5 @@
-//! IceT's messages by MPI's own functions, without a copy, as its own MPI layer does: for MPICH and SMPI, for which distributions
-//! build no such layer.
+//! IceT's messages by MPI's own functions, without a copy, as its own MPI layer does: for MPICH and
+//! SMPI, for which distributions build no such layer.
 use super::table::Transport;
 use crate::comm::mpi::{Handle, Mpi};
 use std::ffi::{c_int, c_void};
@@ -26,7 +26,8 @@ impl OverMpi {
             self.requests.len() - 1
         });
         self.requests[index] = request;
-        // A send may be complete at once and have no request; its number still has to differ from no number.
+        // A send may be complete at once and have no request; its number still has to differ from
+        // no number.
         index + 1
     }
 
@@ -35,8 +36,8 @@ impl OverMpi {
     }
 }
 
-// SAFETY of all calls below: bytes and counts are IceT's, which promises to MPI what it promises to its own layer; the communicator is
-// the world, whose errors end the job.
+// SAFETY of all calls below: bytes and counts are IceT's, which promises to MPI what it promises to
+// its own layer; the communicator is the world, whose errors end the job.
 impl Transport for OverMpi {
     fn rank(&self) -> usize {
         self.rank
@@ -54,14 +55,24 @@ impl Transport for OverMpi {
     fn send(&mut self, bytes: *const u8, count: usize, destination: c_int, tag: c_int) {
         let m = &self.mpi;
         // SAFETY: see above.
-        unsafe { (m.functions.send)(bytes.cast(), count as c_int, m.byte, destination, tag, m.world) };
+        unsafe {
+            (m.functions.send)(bytes.cast(), count as c_int, m.byte, destination, tag, m.world)
+        };
     }
 
     fn recv(&mut self, bytes: *mut u8, count: usize, source: c_int, tag: c_int) {
         let m = &self.mpi;
         // SAFETY: see above.
         unsafe {
-            (m.functions.recv)(bytes.cast(), count as c_int, m.byte, source, tag, m.world, m.status_ignore())
+            (m.functions.recv)(
+                bytes.cast(),
+                count as c_int,
+                m.byte,
+                source,
+                tag,
+                m.world,
+                m.status_ignore(),
+            )
         };
     }
 
@@ -100,7 +111,16 @@ impl Transport for OverMpi {
         let (m, n) = (&self.mpi, count as c_int);
         // SAFETY: see above.
         unsafe {
-            (m.functions.gather)(self.or_in_place(send), n, m.byte, recv.cast(), n, m.byte, root, m.world)
+            (m.functions.gather)(
+                self.or_in_place(send),
+                n,
+                m.byte,
+                recv.cast(),
+                n,
+                m.byte,
+                root,
+                m.world,
+            )
         };
     }
 
@@ -134,7 +154,15 @@ impl Transport for OverMpi {
         let (m, n) = (&self.mpi, count as c_int);
         // SAFETY: see above.
         unsafe {
-            (m.functions.allgather)(self.or_in_place(send), n, m.byte, recv.cast(), n, m.byte, m.world)
+            (m.functions.allgather)(
+                self.or_in_place(send),
+                n,
+                m.byte,
+                recv.cast(),
+                n,
+                m.byte,
+                m.world,
+            )
         };
     }
 
@@ -167,7 +195,15 @@ impl Transport for OverMpi {
         let m = &self.mpi;
         // SAFETY: see above.
         unsafe {
-            (m.functions.irecv)(bytes.cast(), count as c_int, m.byte, source, tag, m.world, &raw mut request)
+            (m.functions.irecv)(
+                bytes.cast(),
+                count as c_int,
+                m.byte,
+                source,
+                tag,
+                m.world,
+                &raw mut request,
+            )
         };
         self.keep(request)
     }

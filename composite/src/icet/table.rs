@@ -1,10 +1,13 @@
-//! IceT's communicator: a table of functions that it calls for every message (`IceTCommunicatorStruct` of IceT.h).
+//! IceT's communicator: a table of functions that it calls for every message
+//! (`IceTCommunicatorStruct` of IceT.h).
 //!
-//! Whatever carries the messages is a [`Transport`]; the functions here only turn IceT's counts and types into bytes. IceT has no
-//! way to hear of an error, so a failing transport ends the process with a message.
+//! Whatever carries the messages is a [`Transport`]; the functions here only turn IceT's counts and
+//! types into bytes. IceT has no way to hear of an error, so a failing transport ends the process
+//! with a message.
 use std::ffi::{c_int, c_void};
 
-/// Moves bytes for IceT. Pointers are valid for the given bytes as long as MPI would need them to be.
+/// Moves bytes for IceT. Pointers are valid for the given bytes as long as MPI would need them to
+/// be.
 pub(super) trait Transport {
     fn rank(&self) -> usize;
     fn size(&self) -> usize;
@@ -60,10 +63,30 @@ pub(super) struct Table {
     barrier: unsafe extern "C" fn(Comm),
     send: unsafe extern "C" fn(Comm, *const u8, c_int, u32, c_int, c_int),
     recv: unsafe extern "C" fn(Comm, *mut u8, c_int, u32, c_int, c_int),
-    sendrecv:
-        unsafe extern "C" fn(Comm, *const u8, c_int, u32, c_int, c_int, *mut u8, c_int, u32, c_int, c_int),
+    sendrecv: unsafe extern "C" fn(
+        Comm,
+        *const u8,
+        c_int,
+        u32,
+        c_int,
+        c_int,
+        *mut u8,
+        c_int,
+        u32,
+        c_int,
+        c_int,
+    ),
     gather: unsafe extern "C" fn(Comm, *const u8, c_int, u32, *mut u8, c_int),
-    gatherv: unsafe extern "C" fn(Comm, *const u8, c_int, u32, *mut u8, *const c_int, *const c_int, c_int),
+    gatherv: unsafe extern "C" fn(
+        Comm,
+        *const u8,
+        c_int,
+        u32,
+        *mut u8,
+        *const c_int,
+        *const c_int,
+        c_int,
+    ),
     allgather: unsafe extern "C" fn(Comm, *const u8, c_int, u32, *mut u8),
     alltoall: unsafe extern "C" fn(Comm, *const u8, c_int, u32, *mut u8),
     isend: unsafe extern "C" fn(Comm, *const u8, c_int, u32, c_int, c_int) -> usize,
@@ -100,13 +123,15 @@ pub(super) fn of<T: Transport>(data: *mut c_void) -> Table {
 }
 
 /// # Safety
-/// `comm` must come from [`of`] with the same `T`, and nobody else may use the transport during the call.
+/// `comm` must come from [`of`] with the same `T`, and nobody else may use the transport during the
+/// call.
 unsafe fn transport<'a, T>(comm: Comm) -> &'a mut T {
     // SAFETY: as promised by the caller.
     unsafe { &mut *(*comm).data.cast::<T>() }
 }
 
-/// Bytes of `count` values of an IceT type (0x8000 boolean, 0x8001 byte, 0x8002 short, 0x8003 int, 0x8004 float, 0x8005 double).
+/// Bytes of `count` values of an IceT type (0x8000 boolean, 0x8001 byte, 0x8002 short, 0x8003 int,
+/// 0x8004 float, 0x8005 double).
 fn bytes(count: c_int, kind: u32) -> usize {
     let width = match kind {
         0x8000 | 0x8001 => 1,
@@ -122,7 +147,8 @@ fn unless_in_place(send: *const u8) -> *const u8 {
     if send as usize == IN_PLACE { std::ptr::null() } else { send }
 }
 
-// IceT duplicates the communicator for its context and destroys its duplicate: one table serves both.
+// IceT duplicates the communicator for its context and destroys its duplicate: one table serves
+// both.
 unsafe extern "C" fn duplicate(comm: Comm) -> Comm {
     comm
 }
@@ -133,20 +159,34 @@ unsafe extern "C" fn subset(_: Comm, _: c_int, _: *const i32) -> Comm {
     panic!("IceT asks for a part of the ranks, which only its display walls do")
 }
 
-// SAFETY of all functions below: IceT passes the table it was given, with a transport of type `T` behind it, from the thread that
-// called IceT and holds the transport exclusively.
+// SAFETY of all functions below: IceT passes the table it was given, with a transport of type `T`
+// behind it, from the thread that called IceT and holds the transport exclusively.
 
 unsafe extern "C" fn barrier<T: Transport>(c: Comm) {
     // SAFETY: see above.
     unsafe { transport::<T>(c) }.barrier();
 }
 
-unsafe extern "C" fn send<T: Transport>(c: Comm, b: *const u8, n: c_int, t: u32, to: c_int, tag: c_int) {
+unsafe extern "C" fn send<T: Transport>(
+    c: Comm,
+    b: *const u8,
+    n: c_int,
+    t: u32,
+    to: c_int,
+    tag: c_int,
+) {
     // SAFETY: see above.
     unsafe { transport::<T>(c) }.send(b, bytes(n, t), to, tag);
 }
 
-unsafe extern "C" fn recv<T: Transport>(c: Comm, b: *mut u8, n: c_int, t: u32, from: c_int, tag: c_int) {
+unsafe extern "C" fn recv<T: Transport>(
+    c: Comm,
+    b: *mut u8,
+    n: c_int,
+    t: u32,
+    from: c_int,
+    tag: c_int,
+) {
     // SAFETY: see above.
     unsafe { transport::<T>(c) }.recv(b, bytes(n, t), from, tag);
 }
@@ -168,7 +208,14 @@ unsafe extern "C" fn sendrecv<T: Transport>(
     unsafe { transport::<T>(c) }.sendrecv(b, bytes(n, t), to, tag, rb, bytes(rn, rt), from, rtag);
 }
 
-unsafe extern "C" fn gather<T: Transport>(c: Comm, b: *const u8, n: c_int, t: u32, r: *mut u8, root: c_int) {
+unsafe extern "C" fn gather<T: Transport>(
+    c: Comm,
+    b: *const u8,
+    n: c_int,
+    t: u32,
+    r: *mut u8,
+    root: c_int,
+) {
     // SAFETY: see above.
     unsafe { transport::<T>(c) }.gather(unless_in_place(b), bytes(n, t), r, root);
 }

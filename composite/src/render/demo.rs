@@ -17,7 +17,8 @@ use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 /// What is shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demo {
-    /// Name in [`datasets::catalogue`], or a file that [`datasets::read::open`] reads and that has surfaces. Lines are drawn as tubes.
+    /// Name in [`datasets::catalogue`], or a file that [`datasets::read::open`] reads and that has
+    /// surfaces. Lines are drawn as tubes.
     pub data: String,
     /// Size of the data set; `None` for its smallest.
     pub size: Option<String>,
@@ -27,7 +28,8 @@ pub struct Demo {
     pub size_px: [u32; 2],
     /// Samples per pixel.
     pub samples: u32,
-    /// Shadows of a lamp and ambient occlusion; without it there is a headlight, and no ray leaves a hit.
+    /// Shadows of a lamp and ambient occlusion; without it there is a headlight, and no ray leaves
+    /// a hit.
     pub global_light: bool,
     /// A colour for each rank's part; without it everything is grey.
     pub color_by_rank: bool,
@@ -36,7 +38,8 @@ pub struct Demo {
 }
 
 impl Default for Demo {
-    /// The wavelet of a million triangles, 1024 x 768, with shadows and ambient occlusion, coloured by rank.
+    /// The wavelet of a million triangles, 1024 x 768, with shadows and ambient occlusion, coloured
+    /// by rank.
     fn default() -> Self {
         Demo {
             data: "wavelet".into(),
@@ -64,8 +67,8 @@ pub struct PreparedDemo {
 }
 
 impl Demo {
-    /// Generates the data, builds the scene and cuts it into `ranks` parts. `progress` hears how many steps of how many are done, and may stop
-    /// it by returning false.
+    /// Generates the data, builds the scene and cuts it into `ranks` parts. `progress` hears how
+    /// many steps of how many are done, and may stop it by returning false.
     ///
     /// # Errors
     /// Names that do not exist, with those that do.
@@ -74,7 +77,8 @@ impl Demo {
         ranks: usize,
         progress: &mut dyn FnMut(usize, usize) -> bool,
     ) -> Result<PreparedDemo, DemoError> {
-        let (scene, camera) = self.scene(DemoModel::load(&self.data, self.size.as_deref(), progress)?)?;
+        let (scene, camera) =
+            self.scene(DemoModel::load(&self.data, self.size.as_deref(), progress)?)?;
         let split = if self.cut_by_view {
             Split::View { camera: Box::new(camera), size_px: self.size_px }
         } else {
@@ -82,8 +86,10 @@ impl Demo {
         };
         let partition = Partition::new(&scene, ranks, &split);
         let scene = if self.color_by_rank { colored(&scene, &partition) } else { scene };
-        let options =
-            RenderOptions { samples: self.samples, ..RenderOptions::new(self.size_px[0], self.size_px[1]) };
+        let options = RenderOptions {
+            samples: self.samples,
+            ..RenderOptions::new(self.size_px[0], self.size_px[1])
+        };
         Ok(PreparedDemo { scene, camera, options, partition })
     }
 
@@ -91,7 +97,10 @@ impl Demo {
     ///
     /// # Errors
     /// [`DemoError::View`] for a view that the data set does not have.
-    pub fn scene_of(&self, mesh: impl Into<std::sync::Arc<TriMesh>>) -> Result<(Scene, Camera), DemoError> {
+    pub fn scene_of(
+        &self,
+        mesh: impl Into<std::sync::Arc<TriMesh>>,
+    ) -> Result<(Scene, Camera), DemoError> {
         let views = catalogue::find(&self.data)?.views();
         self.scene(DemoModel { bodies: vec![DemoShape::Mesh(mesh.into())], views })
     }
@@ -101,10 +110,12 @@ impl Demo {
         let view = match &self.view {
             None => &views[0],
             Some(name) => {
-                views.iter().find(|v| v.name.eq_ignore_ascii_case(name)).ok_or_else(|| DemoError::View {
-                    data: self.data.clone(),
-                    view: name.clone(),
-                    known: views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", "),
+                views.iter().find(|v| v.name.eq_ignore_ascii_case(name)).ok_or_else(|| {
+                    DemoError::View {
+                        data: self.data.clone(),
+                        view: name.clone(),
+                        known: views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", "),
+                    }
                 })?
             }
         };
@@ -131,8 +142,14 @@ impl Demo {
         let reach = (view.eye - middle).length() + 2.0 * radius;
         let aspect = f64::from(self.size_px[0]) / f64::from(self.size_px[1].max(1));
         let fov_rad = view.vertical_fov_degrees.to_radians();
-        let camera =
-            Camera::perspective(view.eye, view.target, view.up, fov_rad, aspect, [1e-3 * reach, reach])?;
+        let camera = Camera::perspective(
+            view.eye,
+            view.target,
+            view.up,
+            fov_rad,
+            aspect,
+            [1e-3 * reach, reach],
+        )?;
         Ok((scene, camera))
     }
 }
@@ -159,7 +176,8 @@ fn colored(scene: &Scene, partition: &Partition) -> Scene {
     for (geometry, appearance) in
         scene.world.instances().iter().map(|i| i.geometry).zip(&mut scene.appearances)
     {
-        let count: usize = (0..partition.parts()).map(|r| partition.primitives(r)[geometry].len()).sum();
+        let count: usize =
+            (0..partition.parts()).map(|r| partition.primitives(r)[geometry].len()).sum();
         let mut colors = vec![[0.0; 4]; count];
         for rank in 0..partition.parts() {
             for &triangle in &partition.primitives(rank)[geometry] {
@@ -197,10 +215,12 @@ mod tests {
         let tubes = Demo { data: "plasma-tubes".into(), ..small() };
         for demo in [small(), Demo { cut_by_view: true, global_light: false, ..small() }, tubes] {
             let prepared = demo.prepare(5, &mut |_, _| true).unwrap();
-            let outputs =
-                threads::run(5, |mut comm| prepared.run(&mut comm, &FrameOptions::default()).unwrap());
+            let outputs = threads::run(5, |mut comm| {
+                prepared.run(&mut comm, &FrameOptions::default()).unwrap()
+            });
             let picture = outputs[0].as_ref().unwrap().frame.as_ref().unwrap();
-            let expected = render(&prepared.scene, &prepared.camera, &prepared.options).unwrap().frame;
+            let expected =
+                render(&prepared.scene, &prepared.camera, &prepared.options).unwrap().frame;
             assert!(picture.color == expected.color);
             let shown = |rank: usize| {
                 let c = rank_color(rank);

@@ -4,7 +4,8 @@ use rt_core::distributed::ProtocolError;
 use rt_core::render::RenderError;
 use rt_core::scene::SceneError;
 
-/// Why a frame could not be made. After an error no rank gets a picture: the communicator is aborted.
+/// Why a frame could not be made. After an error no rank gets a picture: the communicator is
+/// aborted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrameError {
     /// Scene, camera or options.
@@ -18,7 +19,8 @@ pub enum FrameError {
     Comm(#[from] CommError),
     /// A message does not say what it should.
     #[error(
-        "rank {rank} got an unusable message from rank {from} ({what}, {words} words): all ranks must render the same scene, camera and options"
+        "rank {rank} got an unusable message from rank {from} ({what}, {words} words): all ranks \
+         must render the same scene, camera and options"
     )]
     Message {
         /// The receiver.
@@ -39,7 +41,9 @@ pub enum FrameError {
         source: ProtocolError,
     },
     /// The partition and the group do not match.
-    #[error("the scene was cut into {parts} parts, but there are {ranks} ranks: cut it into as many")]
+    #[error(
+        "the scene was cut into {parts} parts, but there are {ranks} ranks: cut it into as many"
+    )]
     Ranks {
         /// Parts of the partition.
         parts: usize,

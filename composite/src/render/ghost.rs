@@ -1,6 +1,7 @@
-//! Ghost zones: every rank also holds what lies within the distance of ambient occlusion around its part, and then answers for its
-//! own hits alone. Exact, because no such ray leaves the zone. They cost memory and a build once, and nothing per frame; asking costs messages and
-//! repeated rays every frame. `choose` estimates both.
+//! Ghost zones: every rank also holds what lies within the distance of ambient occlusion around its
+//! part, and then answers for its own hits alone. Exact, because no such ray leaves the zone. They
+//! cost memory and a build once, and nothing per frame; asking costs messages and repeated rays
+//! every frame. `choose` estimates both.
 use super::options::{FrameOptions, SecondaryRayPolicy};
 use super::rank_bounds::RankBounds;
 use super::request_reply::{RankChannel, Tag};
@@ -21,8 +22,8 @@ pub(super) struct Decision {
     pub(super) reason: String,
 }
 
-/// Prices of the estimate, for one thread of a 2020s server core and a network of 3 GB/s. Only their order of size matters: near the point where
-/// both cost the same, either will do.
+/// Prices of the estimate, for one thread of a 2020s server core and a network of 3 GB/s. Only
+/// their order of size matters: near the point where both cost the same, either will do.
 pub mod cost_model {
     /// Seconds for a secondary ray, with the work of making it.
     pub const RAY_SECS: f64 = 150e-9;
@@ -32,7 +33,8 @@ pub mod cost_model {
     pub const ROUND_SECS: f64 = 20e-6;
     /// Seconds to build the structure over a triangle.
     pub const BUILD_SECS: f64 = 400e-9;
-    /// Bytes of a triangle in a message: half a vertex of 12 bytes, with neighbours on the rim, and three indices.
+    /// Bytes of a triangle in a message: half a vertex of 12 bytes, with neighbours on the rim, and
+    /// three indices.
     pub const TRIANGLE_BYTES: f64 = 24.0;
     /// Bytes of a point and its answer.
     pub const POINT_BYTES: f64 = 52.0;
@@ -71,7 +73,8 @@ fn zone(bounds: &Aabb, distance: f64, whole: Aabb) -> Aabb {
     }
 }
 
-/// Decides between asking and ghost zones, the same on all ranks, and builds the zones where they win.
+/// Decides between asking and ghost zones, the same on all ranks, and builds the zones where they
+/// win.
 pub(super) fn choose(
     channel: &mut RankChannel<'_>,
     part: &mut Part,
@@ -80,7 +83,8 @@ pub(super) fn choose(
     render: &RenderOptions,
     distance: f64,
 ) -> Result<Decision, FrameError> {
-    let forward = |reason: String| Decision { distance, policy: SecondaryRayPolicy::Forward, reason };
+    let forward =
+        |reason: String| Decision { distance, policy: SecondaryRayPolicy::Forward, reason };
     if options.secondary_rays == SecondaryRayPolicy::Forward {
         return Ok(forward("asked of the ranks in whose bounds rays come".into()));
     }
@@ -90,7 +94,8 @@ pub(super) fn choose(
             Geometry::Mesh(mesh) => meshes.push(mesh.clone()),
             Geometry::Shape(_) => {
                 return Ok(forward(
-                    "asked of the ranks in whose bounds rays come: ghost zones are made of triangles only, and the scene has other shapes"
+                    "asked of the ranks in whose bounds rays come: ghost zones are made of \
+                     triangles only, and the scene has other shapes"
                         .into(),
                 ));
             }
@@ -102,8 +107,10 @@ pub(super) fn choose(
     let placed: Vec<Vec<Aabb>> =
         meshes.iter().enumerate().map(|(g, mesh)| placed_boxes(&part.scene, g, mesh)).collect();
 
-    // ---- Triangles for each other rank's zone, and how many other parts are near a triangle of this one.
-    let others = || (0..size).filter(|&r| r != rank && !are_disjoint(&zones[r], &rank_bounds.bounds[rank]));
+    // ---- Triangles for each other rank's zone, and how many other parts are near a triangle of
+    // this one.
+    let others =
+        || (0..size).filter(|&r| r != rank && !are_disjoint(&zones[r], &rank_bounds.bounds[rank]));
     let mut wanted: Vec<Vec<Vec<u32>>> = vec![vec![Vec::new(); meshes.len()]; size];
     let (mut near_parts, mut triangles) = (0u64, 0u64);
     for (g, placed) in placed.iter().enumerate() {
@@ -117,7 +124,8 @@ pub(super) fn choose(
             }
         }
     }
-    let give: Vec<u32> = wanted.iter().map(|w| w.iter().map(Vec::len).sum::<usize>() as u32).collect();
+    let give: Vec<u32> =
+        wanted.iter().map(|w| w.iter().map(Vec::len).sum::<usize>() as u32).collect();
     let mut numbers = give;
     numbers.extend([triangles as u32, near_parts.min(u64::from(u32::MAX)) as u32]);
     let all = channel.all_gather(&numbers)?;
@@ -131,9 +139,14 @@ pub(super) fn choose(
     let points = cost_model::COVERED * pixels / size as f64;
     let rays = f64::from(part.scene.ambient_occlusion.map_or(0, |ao| ao.rays));
     let ask_secs = 2.0 * cost_model::ROUND_SECS
-        + points * near * (rays * cost_model::RAY_SECS + cost_model::POINT_BYTES * cost_model::BYTE_SECS);
-    let frames =
-        if let SecondaryRayPolicy::Auto { frames } = options.secondary_rays { frames.max(1) } else { 1 };
+        + points
+            * near
+            * (rays * cost_model::RAY_SECS + cost_model::POINT_BYTES * cost_model::BYTE_SECS);
+    let frames = if let SecondaryRayPolicy::Auto { frames } = options.secondary_rays {
+        frames.max(1)
+    } else {
+        1
+    };
     let zone_secs = (0..size)
         .map(|r| {
             let ghost_layer: f64 = all.iter().map(|n| f64::from(n[r])).sum();
@@ -145,7 +158,8 @@ pub(super) fn choose(
         / f64::from(frames);
     let ghost_share = sum(&|n| n[..size].iter().map(|&v| f64::from(v)).sum()) / total;
     let estimate = format!(
-        "estimated {:.2} ms a frame to ask ({near:.2} other parts near a triangle), {:.2} ms for ghost zones ({:.2}x the geometry, {frames} frames)",
+        "estimated {:.2} ms a frame to ask ({near:.2} other parts near a triangle), {:.2} ms for \
+         ghost zones ({:.2}x the geometry, {frames} frames)",
         ask_secs * 1e3,
         zone_secs * 1e3,
         1.0 + ghost_share
@@ -188,11 +202,16 @@ fn fetch(
     // Light needs no attributes.
     let mut merged: Vec<TriMesh> = meshes
         .iter()
-        .map(|m| TriMesh { origin: m.origin, ..TriMesh::new(m.positions.clone(), m.indices.clone()) })
+        .map(|m| TriMesh {
+            origin: m.origin,
+            ..TriMesh::new(m.positions.clone(), m.indices.clone())
+        })
         .collect();
     let most = |from: usize| 2 * merged.len() + 12 * all[from][rank] as usize;
-    let sources: Vec<_> =
-        (0..size).filter(|&r| r != rank && all[r][rank] > 0).map(|from| (from, most(from))).collect();
+    let sources: Vec<_> = (0..size)
+        .filter(|&r| r != rank && all[r][rank] > 0)
+        .map(|from| (from, most(from)))
+        .collect();
     let mut came: Vec<(usize, Vec<u32>)> = Vec::new();
     channel.receive(Tag::Hits, "ghost triangles", sources, |_, from, words| {
         came.push((from, words));

@@ -1,14 +1,19 @@
-//! Data-parallel rendering: every rank holds a part of a scene, and all together make the picture that one node would make of the whole.
+//! Data-parallel rendering: every rank holds a part of a scene, and all together make the picture
+//! that one node would make of the whole.
 //!
-//! A [`Partition`] says which primitive goes to which rank, a [`Part`] is what one rank then holds. [`DataParallel::frame`] renders
-//! sort-last (thesis section 3.2.1): every rank traces camera rays against its part, owners of tiles keep the nearest hits, and what leaves
-//! those hits (shadow, ambient occlusion, mirror and glass rays) is asked of the ranks in whose bounds the rays come, until no ray is left: the
-//! open problem of section 6.2. Where local geometry with a rim around it does as well for less, [`ghost`] zones take the place of asking.
-//! [`ray_parallel()`] is the other way (sections 3.2.2 and 4.2.3): every rank holds everything and renders some tiles.
+//! A [`Partition`] says which primitive goes to which rank, a [`Part`] is what one rank then holds.
+//! [`DataParallel::frame`] renders sort-last (thesis section 3.2.1): every rank traces camera rays
+//! against its part, owners of tiles keep the nearest hits, and what leaves those hits (shadow,
+//! ambient occlusion, mirror and glass rays) is asked of the ranks in whose bounds the rays come,
+//! until no ray is left: the open problem of section 6.2. Where local geometry with a rim around it
+//! does as well for less, [`ghost`] zones take the place of asking. [`ray_parallel()`] is the other
+//! way (sections 3.2.2 and 4.2.3): every rank holds everything and renders some tiles.
 //!
-//! The picture has the bits of [`rt_core::render::render`] of the whole scene, for any number of ranks and any partition: parts take over the whole's
-//! local spaces ([`rt_core::bvh::World::build_part`]), hits are joined by parameter and then by number, light bits by *or*, and
-//! everything else is done by the functions that one node would use ([`rt_core::distributed`]).
+//! The picture has the bits of [`rt_core::render::render`] of the whole scene, for any number of
+//! ranks and any partition: parts take over the whole's local spaces
+//! ([`rt_core::bvh::World::build_part`]), hits are joined by parameter and then by number, light
+//! bits by *or*, and everything else is done by the functions that one node would use
+//! ([`rt_core::distributed`]).
 //!
 //! ```
 //! use composite::render::{DataParallel, FrameOptions, Partition, Split};

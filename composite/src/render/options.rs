@@ -6,7 +6,8 @@ use std::time::Duration;
 /// How light finds what is in its way on other ranks.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum SecondaryRayPolicy {
-    /// As [`SecondaryRayPolicy::Forward`] or by ghost zones, whichever is estimated to be cheaper. `frames` will be rendered before the scene changes.
+    /// As [`SecondaryRayPolicy::Forward`] or by ghost zones, whichever is estimated to be cheaper.
+    /// `frames` will be rendered before the scene changes.
     Auto {
         /// Frames that share the cost of building ghost zones.
         frames: u32,
@@ -14,10 +15,11 @@ pub enum SecondaryRayPolicy {
     /// Ask the ranks whose bounds light rays come into: exact for every effect.
     #[default]
     Forward,
-    /// Every rank also holds what is within the distance of ambient occlusion around its part, and answers alone. Exact, but only for ambient
-    /// occlusion of limited distance; other scenes ask.
+    /// Every rank also holds what is within the distance of ambient occlusion around its part, and
+    /// answers alone. Exact, but only for ambient occlusion of limited distance; other scenes ask.
     GhostZones,
-    /// Only the rank that was hit is asked: wrong near the borders of parts, as rendering without any of this is. For comparison.
+    /// Only the rank that was hit is asked: wrong near the borders of parts, as rendering without
+    /// any of this is. For comparison.
     LocalOnly,
 }
 
@@ -30,7 +32,8 @@ pub struct FrameOptions {
     pub timeout: Duration,
     /// How light crosses borders.
     pub secondary_rays: SecondaryRayPolicy,
-    /// Messages travel while rays are traced, and finished tiles while others are not. Off, one thing after the other: for comparison.
+    /// Messages travel while rays are traced, and finished tiles while others are not. Off, one
+    /// thing after the other: for comparison.
     pub stream: bool,
     /// Use rayon's threads within a rank. Off, a rank is one thread: for many ranks in one process.
     pub parallel: bool,

@@ -1,4 +1,5 @@
-//! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the same work for a view.
+//! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the
+//! same work for a view.
 use super::FrameError;
 use super::volume_bricks::{self, BrickData, VolumeBricks};
 use rt_core::bvh::{BuildOptions, Geometry};
@@ -13,10 +14,12 @@ use std::sync::Arc;
 /// How primitives are dealt to ranks.
 #[derive(Debug, Clone)]
 pub enum Split {
-    /// Bricks with the same number of primitives: the data-parallel partition of section 3.2.1. Does not depend on the view.
+    /// Bricks with the same number of primitives: the data-parallel partition of section 3.2.1.
+    /// Does not depend on the view.
     Triangles,
-    /// Bricks with the same expected work for one view: a primitive counts a little for being there, and more the larger it is in the
-    /// picture. The view-dependent partition of section 3.2.2; another view needs another one.
+    /// Bricks with the same expected work for one view: a primitive counts a little for being
+    /// there, and more the larger it is in the picture. The view-dependent partition of section
+    /// 3.2.2; another view needs another one.
     View {
         /// The view.
         camera: Box<Camera>,
@@ -83,7 +86,8 @@ struct Item {
 }
 
 impl Partition {
-    /// Cuts `scene` into `parts` parts. Geometries with several instances are cut where their first one stands.
+    /// Cuts `scene` into `parts` parts. Geometries with several instances are cut where their first
+    /// one stands.
     pub fn new(scene: &Scene, parts: usize, split: &Split) -> Partition {
         let parts = parts.max(1);
         let geometries = scene.world.geometries().len();
@@ -111,11 +115,13 @@ impl Partition {
         Partition { primitive_ids, volume_bricks }
     }
 
-    /// Deals a volume of `scene` otherwise: it is cut into as many bricks as `holders` has lists, and all ranks of a list hold its brick. One list with all ranks
-    /// is a volume that everybody has whole; without this call every rank has a brick.
+    /// Deals a volume of `scene` otherwise: it is cut into as many bricks as `holders` has lists,
+    /// and all ranks of a list hold its brick. One list with all ranks is a volume that everybody
+    /// has whole; without this call every rank has a brick.
     ///
     /// # Errors
-    /// [`FrameError::Holders`] for volumes and ranks that do not exist, bricks without a holder, and projections, which see whole volumes.
+    /// [`FrameError::Holders`] for volumes and ranks that do not exist, bricks without a holder,
+    /// and projections, which see whole volumes.
     pub fn distribute_volume(
         mut self,
         scene: &Scene,
@@ -145,11 +151,20 @@ impl Partition {
     /// Builds part `rank` of `scene`, the scene that was cut.
     ///
     /// # Errors
-    /// [`FrameError::Ranks`] when there is no such part, [`FrameError::Scene`] when it cannot be built.
-    pub fn part(&self, scene: &Scene, rank: usize, options: &BuildOptions) -> Result<Part, FrameError> {
+    /// [`FrameError::Ranks`] when there is no such part, [`FrameError::Scene`] when it cannot be
+    /// built.
+    pub fn part(
+        &self,
+        scene: &Scene,
+        rank: usize,
+        options: &BuildOptions,
+    ) -> Result<Part, FrameError> {
         let parts = self.parts();
-        let primitive_ids =
-            self.primitive_ids.get(rank).ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?.clone();
+        let primitive_ids = self
+            .primitive_ids
+            .get(rank)
+            .ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?
+            .clone();
         let mut part = scene.part(&primitive_ids, options)?;
         // Of media the sizes and places remain here, and the bricks apart.
         for placed in part.volumes.iter_mut().filter(|placed| placed.volume.is_medium()) {
@@ -194,12 +209,17 @@ fn items(scene: &Scene, split: &Split) -> Vec<Item> {
         for p in 0..count(geometry) {
             let [lo, hi] = box_of(geometry, p);
             // What cannot be hit may be anywhere.
-            let (lo, hi) =
-                if lo.is_finite() && hi.is_finite() { (lo, hi) } else { (DVec3::ZERO, DVec3::ZERO) };
+            let (lo, hi) = if lo.is_finite() && hi.is_finite() {
+                (lo, hi)
+            } else {
+                (DVec3::ZERO, DVec3::ZERO)
+            };
             let center = place.transform_point3(0.5 * (lo + hi));
             let radius = place.transform_vector3(0.5 * (hi - lo)).length();
             let work = match split {
-                Split::View { camera, size_px } => 0.05 + pixels_of(camera, *size_px, center, radius),
+                Split::View { camera, size_px } => {
+                    0.05 + pixels_of(camera, *size_px, center, radius)
+                }
                 _ => 1.0,
             };
             out.push(Item { geometry: g as u32, primitive: p as u32, center, work });
@@ -212,8 +232,9 @@ fn items(scene: &Scene, split: &Split) -> Vec<Item> {
 fn box_of(geometry: &Geometry, primitive: usize) -> [DVec3; 2] {
     match geometry {
         Geometry::Mesh(mesh) => {
-            let corners = mesh.indices[primitive]
-                .map(|k| mesh.positions.get(k as usize).map_or(DVec3::NAN, |p| mesh.origin + p.as_dvec3()));
+            let corners = mesh.indices[primitive].map(|k| {
+                mesh.positions.get(k as usize).map_or(DVec3::NAN, |p| mesh.origin + p.as_dvec3())
+            });
             // Minima of f64 would pass over NaN.
             if corners.iter().any(|c| !c.is_finite()) {
                 return [DVec3::NAN; 2];
@@ -228,7 +249,8 @@ fn box_of(geometry: &Geometry, primitive: usize) -> [DVec3; 2] {
     }
 }
 
-/// Pixels that a ball about covers in the picture; 0 outside of it. What hides it is not known here.
+/// Pixels that a ball about covers in the picture; 0 outside of it. What hides it is not known
+/// here.
 fn pixels_of(camera: &Camera, size_px: [u32; 2], center: DVec3, radius: f64) -> f64 {
     let matrix = camera.clip_from_world();
     let clip = matrix * center.extend(1.0);
@@ -239,12 +261,19 @@ fn pixels_of(camera: &Camera, size_px: [u32; 2], center: DVec3, radius: f64) -> 
     let reach = radius * across / w;
     let x = (clip.x / w + 1.0) * 0.5 * size[0];
     let y = (1.0 - clip.y / w) * 0.5 * size[1];
-    let inside = clip.w > 0.0 && x >= -reach && y >= -reach && x <= size[0] + reach && y <= size[1] + reach;
+    let inside =
+        clip.w > 0.0 && x >= -reach && y >= -reach && x <= size[0] + reach && y <= size[1] + reach;
     if inside { (reach * reach).min(size[0] * size[1]) } else { 0.0 }
 }
 
-/// Gives `items` to `ranks` ranks from `first_rank` on: halves along the longest axis of their centres, again and again.
-fn split_items(items: &mut [Item], first_rank: usize, ranks: usize, give: &mut impl FnMut(usize, &[Item])) {
+/// Gives `items` to `ranks` ranks from `first_rank` on: halves along the longest axis of their
+/// centres, again and again.
+fn split_items(
+    items: &mut [Item],
+    first_rank: usize,
+    ranks: usize,
+    give: &mut impl FnMut(usize, &[Item]),
+) {
     if ranks == 1 {
         give(first_rank, items);
         return;
@@ -302,7 +331,8 @@ mod tests {
         for parts in [1, 2, 3, 5, 64, 127, 1000, 1200] {
             for split in [Split::Triangles, Split::Random { seed: 4 }] {
                 let partition = Partition::new(&scene, parts, &split);
-                let mut all: Vec<u32> = (0..parts).flat_map(|r| partition.primitives(r)[0].clone()).collect();
+                let mut all: Vec<u32> =
+                    (0..parts).flat_map(|r| partition.primitives(r)[0].clone()).collect();
                 all.sort_unstable();
                 assert!(all.iter().copied().eq(0..1000), "{parts} parts, {split:?}");
                 if matches!(split, Split::Triangles) {
@@ -321,7 +351,11 @@ mod tests {
         let scene = Scene::new(World::from_mesh(mesh, &BuildOptions::default()).unwrap());
         let cut = || Partition::new(&scene, 7, &Split::Triangles);
         assert_eq!(cut(), cut());
-        assert_eq!(cut().sizes().iter().sum::<usize>(), 65, "unusable triangles are somewhere, too");
+        assert_eq!(
+            cut().sizes().iter().sum::<usize>(),
+            65,
+            "unusable triangles are somewhere, too"
+        );
     }
 
     #[test]
@@ -333,7 +367,8 @@ mod tests {
         let scene = line(1000);
         let split = Split::View { camera: Box::new(camera), size_px: [512, 512] };
         let partition = Partition::new(&scene, 8, &split);
-        let in_view = (0..8).filter(|&r| partition.primitives(r)[0].iter().all(|&t| t < 120)).count();
+        let in_view =
+            (0..8).filter(|&r| partition.primitives(r)[0].iter().all(|&t| t < 120)).count();
         assert!(in_view >= 5, "{:?}", partition.sizes());
         let plain = Partition::new(&scene, 8, &Split::Triangles);
         assert_eq!((0..8).filter(|&r| plain.primitives(r)[0].iter().all(|&t| t < 120)).count(), 0);

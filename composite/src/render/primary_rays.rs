@@ -1,8 +1,10 @@
-//! Camera rays: every rank traces them against its part, and owners of tiles keep the nearest hit of each pixel.
+//! Camera rays: every rank traces them against its part, and owners of tiles keep the nearest hit
+//! of each pixel.
 //!
-//! Streamed, hits leave for the owner of their tiles as soon as a few tiles are traced, and what has come meanwhile is joined: messages travel while
-//! rays are traced. Where local light suffices, finished tiles go on to the collecting rank at once. So a frame costs the longer of rendering and
-//! compositing and not their sum: what sections 3.3.2 and 6.1 of the thesis wish for.
+//! Streamed, hits leave for the owner of their tiles as soon as a few tiles are traced, and what
+//! has come meanwhile is joined: messages travel while rays are traced. Where local light suffices,
+//! finished tiles go on to the collecting rank at once. So a frame costs the longer of rendering
+//! and compositing and not their sum: what sections 3.3.2 and 6.1 of the thesis wish for.
 use super::rank_frame::RankFrame;
 use super::request_reply::{Inbox, Incoming, RankChannel, Tag};
 use super::tile_collector::TileCollector;
@@ -13,10 +15,11 @@ use rayon::prelude::*;
 use rt_core::distributed::{CameraHits, DistributedFrame, Pass, ShadingHit};
 use std::sync::atomic::Ordering;
 
-/// Chunks of an owner's tiles at most, one after the other by all ranks. With more, less is left to send at the end, in more messages.
+/// Chunks of an owner's tiles at most, one after the other by all ranks. With more, less is left to
+/// send at the end, in more messages.
 const CHUNKS: usize = 4;
-/// Tiles of a chunk at least: with fewer, messages and looking for them cost more than travelling while others trace gains (measured with 100 tiles
-/// and 128 ranks).
+/// Tiles of a chunk at least: with fewer, messages and looking for them cost more than travelling
+/// while others trace gains (measured with 100 tiles and 128 ranks).
 const CHUNK_TILES: usize = 8;
 /// Tiles traced between two looks for messages.
 const TILES_PER_LOOK: usize = 4;
@@ -39,7 +42,8 @@ pub(super) struct PrimaryPass {
     pub(super) stream: bool,
 }
 
-/// One pass of camera rays. With `collect`, colours of hits make finished tiles, which go to the collecting rank.
+/// One pass of camera rays. With `collect`, colours of hits make finished tiles, which go to the
+/// collecting rank.
 pub(super) fn run(
     channel: &mut RankChannel<'_>,
     side: &RankFrame<'_>,
@@ -66,7 +70,8 @@ pub(super) fn run(
     };
     wave.own.resize_with(side.frame.num_tiles(), || None);
     wave.post_receives(channel)?;
-    // ---- Rays, and hits to the owners of their tiles: to the next rank first, so that nobody gets all at once, and one's own last.
+    // ---- Rays, and hits to the owners of their tiles: to the next rank first, so that nobody gets
+    // all at once, and one's own last.
     let to = |step: usize| (rank + 1 + step) % size;
     let mut traced = 0;
     for chunk in 0..chunks {
@@ -147,7 +152,9 @@ impl PrimaryRays<'_, '_> {
             self.missing.push(missing);
         }
         match &mut self.collect {
-            Some(collect) => collect.post_receives(channel, &mut self.inbox, self.owners, self.chunks),
+            Some(collect) => {
+                collect.post_receives(channel, &mut self.inbox, self.owners, self.chunks)
+            }
             None => Ok(()),
         }
     }
@@ -208,7 +215,11 @@ impl PrimaryRays<'_, '_> {
         Ok(())
     }
 
-    fn take(&mut self, channel: &mut RankChannel<'_>, incoming: Incoming) -> Result<(), FrameError> {
+    fn take(
+        &mut self,
+        channel: &mut RankChannel<'_>,
+        incoming: Incoming,
+    ) -> Result<(), FrameError> {
         let Incoming { from, tag, words } = incoming;
         if tag == Tag::Tiles as u32 {
             return match &mut self.collect {
@@ -218,7 +229,8 @@ impl PrimaryRays<'_, '_> {
         }
         // Messages of one rank come in order; chunks of which it sees nothing are not sent.
         let (rank, chunks) = (channel.rank(), self.chunks);
-        let next = (self.merged[from]..chunks).find(|&c| self.owners.has_messages(from, rank, (c, chunks)));
+        let next = (self.merged[from]..chunks)
+            .find(|&c| self.owners.has_messages(from, rank, (c, chunks)));
         let chunk = next.ok_or_else(|| channel.message_error(from, "hits", words.len()))?;
         self.merged[from] = chunk + 1;
         self.merge_hits(channel, from, chunk, &words)
@@ -233,13 +245,15 @@ impl PrimaryRays<'_, '_> {
         words: &[u32],
     ) -> Result<(), FrameError> {
         let (rank, chunk_of) = (channel.rank(), (chunk, self.chunks));
-        let (tiles, first) = (self.owners.shared(from, rank, chunk_of), self.owners.tiles[rank].start);
+        let (tiles, first) =
+            (self.owners.shared(from, rank, chunk_of), self.owners.tiles[rank].start);
         let (answers, seen) = (&mut self.answers, &mut self.seen_by[from]);
         decode_hits(self.side, tiles, first, from, words, self.wanted.colors, answers, seen)
             .ok_or_else(|| channel.message_error(from, "hits", words.len()))?;
         channel.record_span(Activity::Composite);
         self.missing[chunk] -= 1;
-        // In the order of chunks, which the root relies on: a chunk that few ranks see may be complete before the one in front of it.
+        // In the order of chunks, which the root relies on: a chunk that few ranks see may be
+        // complete before the one in front of it.
         let Some(collect) = &mut self.collect else { return Ok(()) };
         while self.missing.get(self.finished) == Some(&0) {
             let tiles = self.owners.chunk(rank, (self.finished, self.chunks));
@@ -288,7 +302,8 @@ fn encode_hits(
     out
 }
 
-/// Joins what [`encode_hits`] of rank `from` made to the nearest hits of this rank's tiles, which begin at `first`.
+/// Joins what [`encode_hits`] of rank `from` made to the nearest hits of this rank's tiles, which
+/// begin at `first`.
 fn decode_hits(
     side: &RankFrame<'_>,
     tiles: impl Iterator<Item = usize>,
@@ -370,8 +385,9 @@ fn fetch_hit_details(
     }
     channel.record_span(Activity::Exchange);
     // ---- Everything about this rank's hits that won.
-    let with_hits =
-        |owner: usize| owners.shared(rank, owner, WHOLE).filter(|&t| own[t].is_some()).collect::<Vec<_>>();
+    let with_hits = |owner: usize| {
+        owners.shared(rank, owner, WHOLE).filter(|&t| own[t].is_some()).collect::<Vec<_>>()
+    };
     let reply = |tiles: &[usize], masks: &[u32]| {
         let mut out = Vec::new();
         for (&tile, mask) in tiles.iter().zip(masks.chunks_exact(MASK_WORDS)) {
@@ -393,12 +409,15 @@ fn fetch_hit_details(
         }
         (rest.is_empty() && mets.next().is_none()).then_some(())
     };
-    let own_words =
-        reply(&with_hits(rank), &won[rank]).ok_or_else(|| channel.message_error(rank, "hits that won", 0))?;
-    put(rank, &own_words).ok_or_else(|| channel.message_error(rank, "whole hits", own_words.len()))?;
+    let own_words = reply(&with_hits(rank), &won[rank])
+        .ok_or_else(|| channel.message_error(rank, "hits that won", 0))?;
+    put(rank, &own_words)
+        .ok_or_else(|| channel.message_error(rank, "whole hits", own_words.len()))?;
     channel.record_span(Activity::Composite);
-    let askers = (0..size).filter(|&owner| owner != rank && owners.has_messages(rank, owner, WHOLE));
-    let sources: Vec<_> = askers.map(|owner| (owner, with_hits(owner).len() * MASK_WORDS)).collect();
+    let askers =
+        (0..size).filter(|&owner| owner != rank && owners.has_messages(rank, owner, WHOLE));
+    let sources: Vec<_> =
+        askers.map(|owner| (owner, with_hits(owner).len() * MASK_WORDS)).collect();
     channel.receive(Tag::Winners, "hits that won", sources, |channel, owner, masks| {
         let tiles = with_hits(owner);
         let message_error =
@@ -428,7 +447,10 @@ fn winner_masks(from: usize, tiles: &[usize], first: usize, answers: &[TileHits]
     for &tile in tiles {
         let nearest = &answers[tile - first].nearest;
         out.extend(nearest.chunks_exact(32).map(|slots| {
-            slots.iter().enumerate().fold(0, |mask, (bit, n)| mask | ((n.rank == from as u32) as u32) << bit)
+            slots
+                .iter()
+                .enumerate()
+                .fold(0, |mask, (bit, n)| mask | ((n.rank == from as u32) as u32) << bit)
         }));
     }
     out

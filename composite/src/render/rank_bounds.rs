@@ -12,7 +12,8 @@ struct Block {
     high: [[f32; LANES]; 3],
 }
 
-/// Boxes of all ranks, a little too large: a ray that meets anything in a box is never said to miss it.
+/// Boxes of all ranks, a little too large: a ray that meets anything in a box is never said to miss
+/// it.
 pub(super) struct RankBounds {
     blocks: Vec<Block>,
     pub(super) bounds: Vec<Aabb>,

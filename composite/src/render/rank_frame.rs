@@ -20,7 +20,8 @@ impl RankFrame<'_> {
     }
 }
 
-/// Calls `f` with every item and its place, on several threads if wanted; each item done is a sign of life.
+/// Calls `f` with every item and its place, on several threads if wanted; each item done is a sign
+/// of life.
 pub(super) fn each<T: Send>(
     channel: &mut RankChannel<'_>,
     parallel: bool,

@@ -11,7 +11,12 @@ pub(super) fn write_ray(ray: &Ray, pixel: Option<u32>, out: &mut Vec<u32>) {
 
 pub(super) fn read_ray(words: &[u32]) -> Ray {
     let f = |i: usize| f32::from_bits(words[i]);
-    Ray { origin: Vec3::new(f(0), f(1), f(2)), dir: Vec3::new(f(3), f(4), f(5)), t_min: f(6), t_max: f(7) }
+    Ray {
+        origin: Vec3::new(f(0), f(1), f(2)),
+        dir: Vec3::new(f(3), f(4), f(5)),
+        t_min: f(6),
+        t_max: f(7),
+    }
 }
 
 /// Words of a ray in a message.

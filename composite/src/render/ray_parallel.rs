@@ -1,7 +1,9 @@
-//! Replicated data: every rank holds the whole scene and renders some pieces of the picture (thesis sections 3.2.2 and 4.2.3).
+//! Replicated data: every rank holds the whole scene and renders some pieces of the picture (thesis
+//! sections 3.2.2 and 4.2.3).
 //!
-//! Pieces are small and dealt along a lattice, so that every rank gets a little of everything: what is costly in a picture lies together. Bands of
-//! whole rows, tried first, stop scaling when there are as many ranks as bands (32 for 1024 rows).
+//! Pieces are small and dealt along a lattice, so that every rank gets a little of everything: what
+//! is costly in a picture lies together. Bands of whole rows, tried first, stop scaling when there
+//! are as many ranks as bands (32 for 1024 rows).
 use super::request_reply::{RankChannel, Tag};
 use super::{Activity, FrameError, FrameOptions, FrameOutput};
 use crate::comm::Communicator;
@@ -10,16 +12,19 @@ use rt_core::frame::{Frame, Layers};
 use rt_core::render::{Crop, RenderOptions, Renderer};
 use rt_core::scene::Scene;
 
-/// Pixels along the sides of a piece, and how many of them every rank has at least where they are used. Small pieces are even, but rays that go together make tracing cheap: on one
-/// thread the wavelet with shadows and ambient occlusion takes 1.57 s in pieces of 64 pixels, 1.68 s in those of 32, 1.90 s in those of 16, 2.3 s in those of 8 (1024 x 1024). The
-/// slowest rank's share of those costs, added up over each rank's pieces, is least with these bounds for 1 to 128 ranks: pieces of 8 pixels for 128 ranks are uneven by 4 % in place of 15 %, but
-/// cost 21 % more.
+/// Pixels along the sides of a piece, and how many of them every rank has at least where they are
+/// used. Small pieces are even, but rays that go together make tracing cheap: on one thread the
+/// wavelet with shadows and ambient occlusion takes 1.57 s in pieces of 64 pixels, 1.68 s in those
+/// of 32, 1.90 s in those of 16, 2.3 s in those of 8 (1024 x 1024). The slowest rank's share of
+/// those costs, added up over each rank's pieces, is least with these bounds for 1 to 128 ranks:
+/// pieces of 8 pixels for 128 ranks are uneven by 4 % in place of 15 %, but cost 21 % more.
 const PIECES: [(u32, usize); 3] = [(64, 32), (32, 11), (16, 6)];
 /// Where there are fewer of all those.
 const SMALLEST: u32 = 8;
 
-/// Renders a picture of a scene that every rank has, each rank some square pieces spread over the picture, of 64 pixels a side for few ranks to 8 for many. Every rank must call it with
-/// the same arguments. Time limits and error limits end a frame in each piece on its own.
+/// Renders a picture of a scene that every rank has, each rank some square pieces spread over the
+/// picture, of 64 pixels a side for few ranks to 8 for many. Every rank must call it with the same
+/// arguments. Time limits and error limits end a frame in each piece on its own.
 ///
 /// # Errors
 /// Any fault on any rank ends the frame for all.
@@ -80,8 +85,11 @@ fn render(
     let per_pixel = words_per_pixel(options.layers);
     put(&mut picture, pieces(area, rank, size), &mine)
         .ok_or_else(|| channel.message_error(rank, "pieces", mine.len()))?;
-    let pixels = |from: usize| pieces(area, from, size).map(|c| (c.width * c.height) as usize).sum::<usize>();
-    let sources = (0..size).filter(|&from| from != rank).map(|from| (from, pixels(from) * per_pixel));
+    let pixels = |from: usize| {
+        pieces(area, from, size).map(|c| (c.width * c.height) as usize).sum::<usize>()
+    };
+    let sources =
+        (0..size).filter(|&from| from != rank).map(|from| (from, pixels(from) * per_pixel));
     let sources: Vec<_> = sources.filter(|(_, words)| *words > 0).collect();
     channel.receive(Tag::Tiles, "pieces", sources, |channel, from, words| {
         let fits = put(&mut picture, pieces(area, from, size), &words);
@@ -93,7 +101,8 @@ fn render(
 }
 
 thread_local! {
-    /// This thread as a pool of its own: what runs in it uses no other thread, and nobody else's work is stolen meanwhile.
+    /// This thread as a pool of its own: what runs in it uses no other thread, and nobody else's
+    /// work is stolen meanwhile.
     static ALONE: Option<rayon::ThreadPool> =
         rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().ok();
 }
@@ -107,8 +116,9 @@ fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     })
 }
 
-/// The pieces of `rank`, relative to the area, row by row. Piece (i, j) goes to rank i + s j modulo the number of ranks: a lattice of rank 1, with s
-/// near the golden section of the number of ranks, so that a rank's pieces are about as far apart as they can be.
+/// The pieces of `rank`, relative to the area, row by row. Piece (i, j) goes to rank i + s j modulo
+/// the number of ranks: a lattice of rank 1, with s near the golden section of the number of ranks,
+/// so that a rank's pieces are about as far apart as they can be.
 fn pieces(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Crop> {
     let side = piece_side(area, size);
     let (columns, rows) = (area.width.div_ceil(side) as usize, area.height.div_ceil(side) as usize);
@@ -124,8 +134,12 @@ fn pieces(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Crop> {
 
 /// Pixels along the sides of the pieces of an area for so many ranks.
 fn piece_side(area: Crop, ranks: usize) -> u32 {
-    let pieces = |side: u32| area.width.div_ceil(side) as usize * area.height.div_ceil(side) as usize;
-    PIECES.iter().find(|(side, least)| pieces(*side) >= least * ranks).map_or(SMALLEST, |(side, _)| *side)
+    let pieces =
+        |side: u32| area.width.div_ceil(side) as usize * area.height.div_ceil(side) as usize;
+    PIECES
+        .iter()
+        .find(|(side, least)| pieces(*side) >= least * ranks)
+        .map_or(SMALLEST, |(side, _)| *side)
 }
 
 /// The number nearest to the golden section of `size` that has no divisor in common with it.
@@ -210,8 +224,14 @@ impl Put<'_> {
         self.layer(layer, channels, f32::from_bits)
     }
 
-    /// The next words into a layer of `channels` words per pixel; a layer that the picture does not have takes none.
-    fn layer<T>(&mut self, layer: &mut [T], channels: usize, value: impl Fn(u32) -> T) -> Option<()> {
+    /// The next words into a layer of `channels` words per pixel; a layer that the picture does not
+    /// have takes none.
+    fn layer<T>(
+        &mut self,
+        layer: &mut [T],
+        channels: usize,
+        value: impl Fn(u32) -> T,
+    ) -> Option<()> {
         if layer.is_empty() {
             return Some(());
         }
@@ -251,8 +271,10 @@ mod tests {
                 }
                 assert!(seen.iter().all(|n| *n == 1), "{width}x{height}, {size} ranks");
                 if width == 1024 {
-                    let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
-                    // A row of 64 pieces is half a round of 128 ranks, so counts are not exact: 30 to 34 there.
+                    let (least, most) =
+                        (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+                    // A row of 64 pieces is half a round of 128 ranks, so counts are not exact: 30
+                    // to 34 there.
                     assert!(most - least <= 2 + most / 8, "{size} ranks: {least}..{most}");
                 }
             }
@@ -261,8 +283,13 @@ mod tests {
 
     #[test]
     fn pieces_are_large_for_few_ranks_and_small_for_many_or_in_small_pictures() {
-        let side = |pixels: u32, ranks| piece_side(Crop { x: 0, y: 0, width: pixels, height: pixels }, ranks);
-        assert_eq!([1, 8, 12, 93, 128, 1000].map(|ranks| side(1024, ranks)), [64, 64, 32, 32, 16, 8]);
+        let side = |pixels: u32, ranks| {
+            piece_side(Crop { x: 0, y: 0, width: pixels, height: pixels }, ranks)
+        };
+        assert_eq!(
+            [1, 8, 12, 93, 128, 1000].map(|ranks| side(1024, ranks)),
+            [64, 64, 32, 32, 16, 8]
+        );
         assert_eq!([1, 9, 16, 128].map(|ranks| side(320, ranks)), [32, 32, 16, 8]);
         assert_eq!(side(1, 1), 8);
     }

@@ -5,7 +5,8 @@ use rt_core::ray_stats::RayStats;
 /// What a rank is busy with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Activity {
-    /// Tracing camera rays against its own part, and the colours of what they met where local light suffices.
+    /// Tracing camera rays against its own part, and the colours of what they met where local light
+    /// suffices.
     Render,
     /// Choosing the nearest of all ranks' hits.
     Composite,
@@ -63,7 +64,8 @@ pub struct RankReport {
     pub spans: Vec<Span>,
     /// Effects that ran.
     pub effects: Effects,
-    /// Camera rays traced against the own part: more than the pixels where parts overlap in the picture.
+    /// Camera rays traced against the own part: more than the pixels where parts overlap in the
+    /// picture.
     pub camera_rays: u64,
     /// Rays that owners of pixels sent, as one node would have counted them.
     pub rays: RayStats,

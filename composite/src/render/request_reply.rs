@@ -66,8 +66,12 @@ impl<'a> RankChannel<'a> {
         let _ = self.comm.alive();
     }
 
-    /// Does `work` on other threads and says meanwhile that this rank is at work, as far as the number of steps grows.
-    pub(super) fn in_background<T: Send>(&mut self, work: impl FnOnce(&AtomicUsize) -> T + Send) -> T {
+    /// Does `work` on other threads and says meanwhile that this rank is at work, as far as the
+    /// number of steps grows.
+    pub(super) fn in_background<T: Send>(
+        &mut self,
+        work: impl FnOnce(&AtomicUsize) -> T + Send,
+    ) -> T {
         let steps = AtomicUsize::new(0);
         // A thread of the pool works itself: if it waited, there might be no other.
         if rayon::current_thread_index().is_some() {
@@ -108,7 +112,12 @@ impl<'a> RankChannel<'a> {
         self.report.record_span(activity, self.comm.now());
     }
 
-    pub(super) fn message_error(&self, from: usize, what: &'static str, words: usize) -> FrameError {
+    pub(super) fn message_error(
+        &self,
+        from: usize,
+        what: &'static str,
+        words: usize,
+    ) -> FrameError {
         FrameError::Message { rank: self.rank(), from, what, words }
     }
 
@@ -121,7 +130,8 @@ impl<'a> RankChannel<'a> {
         Ok(())
     }
 
-    /// Receives one message from each of `sources` (rank and most words), in any order, and hands them to `take`.
+    /// Receives one message from each of `sources` (rank and most words), in any order, and hands
+    /// them to `take`.
     pub(super) fn receive(
         &mut self,
         tag: Tag,
@@ -138,15 +148,17 @@ impl<'a> RankChannel<'a> {
             self.report.bytes_received += arrival.message.len() as u64;
             self.record_span(Activity::Exchange);
             let words = decode_message(&arrival.message);
-            let words =
-                words.ok_or_else(|| self.message_error(arrival.source, what, arrival.message.len() / 4))?;
+            let words = words.ok_or_else(|| {
+                self.message_error(arrival.source, what, arrival.message.len() / 4)
+            })?;
             self.comm.recycle(arrival.message);
             take(self, arrival.source, words)?;
         }
         Ok(())
     }
 
-    /// Announces a message of at most `words` words. Those of one rank and tag come in the order of their announcements.
+    /// Announces a message of at most `words` words. Those of one rank and tag come in the order of
+    /// their announcements.
     pub(super) fn expect(
         &mut self,
         inbox: &mut Inbox,
@@ -159,7 +171,11 @@ impl<'a> RankChannel<'a> {
     }
 
     /// The next of the announced messages; with `wait`, when it comes, else only if it is there.
-    pub(super) fn next(&mut self, inbox: &mut Inbox, wait: bool) -> Result<Option<Incoming>, FrameError> {
+    pub(super) fn next(
+        &mut self,
+        inbox: &mut Inbox,
+        wait: bool,
+    ) -> Result<Option<Incoming>, FrameError> {
         if inbox.posted.is_empty() {
             return Ok(None);
         }
@@ -172,8 +188,9 @@ impl<'a> RankChannel<'a> {
         let Some(arrival) = arrival else { return Ok(None) };
         self.report.bytes_received += arrival.message.len() as u64;
         let words = decode_message(&arrival.message);
-        let words = words
-            .ok_or_else(|| self.message_error(arrival.source, "hits or tiles", arrival.message.len() / 4))?;
+        let words = words.ok_or_else(|| {
+            self.message_error(arrival.source, "hits or tiles", arrival.message.len() / 4)
+        })?;
         self.comm.recycle(arrival.message);
         Ok(Some(Incoming { from: arrival.source, tag: arrival.tag, words }))
     }
@@ -186,13 +203,18 @@ impl<'a> RankChannel<'a> {
         let mut out = Vec::with_capacity(all.len());
         for (from, message) in all.iter().enumerate() {
             let words = decode_message(message).filter(|w| w.len() == mine.len());
-            out.push(words.ok_or_else(|| self.message_error(from, "numbers for all", message.len() / 4))?);
+            out.push(
+                words.ok_or_else(|| {
+                    self.message_error(from, "numbers for all", message.len() / 4)
+                })?,
+            );
         }
         Ok(out)
     }
 
-    /// Asks `requests[r]` of each rank r (nothing where it is empty) and answers what others ask. `answer` turns a question into an answer;
-    /// `longest` bounds the words of the answer to a question; `take` gets the answers in any order. False when no rank had a question.
+    /// Asks `requests[r]` of each rank r (nothing where it is empty) and answers what others ask.
+    /// `answer` turns a question into an answer; `longest` bounds the words of the answer to a
+    /// question; `take` gets the answers in any order. False when no rank had a question.
     pub(super) fn request_reply(
         &mut self,
         what: &'static str,

@@ -6,7 +6,9 @@ use super::ray_codec::{RAY_WORDS, read_ray, write_ray};
 use super::request_reply::RankChannel;
 use super::tile_hits::TileHits;
 use super::{Activity, FrameError, RankReport, volumes};
-use rt_core::distributed::{DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState};
+use rt_core::distributed::{
+    DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
+};
 use rt_core::ray::Ray;
 
 /// By tile and ray.
@@ -53,7 +55,8 @@ impl SecondaryRays<'_> {
             } else if self.pass != Pass::Geometry && frame.light_rays_per_point() > 0 {
                 self.exchange_occlusion(channel, tiles, &live, &hit_ranks)?;
             }
-            let mut work: Vec<(&mut bool, &mut TileState)> = live.iter_mut().zip(tiles.iter_mut()).collect();
+            let mut work: Vec<(&mut bool, &mut TileState)> =
+                live.iter_mut().zip(tiles.iter_mut()).collect();
             each(channel, self.side.parallel, &mut work, |_, (live, tile)| {
                 **live = **live && tile.advance(frame)
             });
@@ -65,8 +68,7 @@ impl SecondaryRays<'_> {
         }
     }
 
-    // ---- Light that nothing passes through: points out, bits back ----------------------------------------------
-
+    // ---- Light that nothing passes through: points out, bits back -------------------------------
     fn exchange_occlusion(
         &self,
         channel: &mut RankChannel<'_>,
@@ -87,7 +89,10 @@ impl SecondaryRays<'_> {
             if points.is_empty() {
                 continue;
             }
-            let stays = matches!(self.policy, SecondaryRayPolicy::LocalOnly | SecondaryRayPolicy::GhostZones);
+            let stays = matches!(
+                self.policy,
+                SecondaryRayPolicy::LocalOnly | SecondaryRayPolicy::GhostZones
+            );
             let targets = match &hit_ranks[t] {
                 Some(hit) if stays => rank_that_was_hit(self.rank_bounds, tile, hit),
                 _ => ranks_to_ask(self.rank_bounds, tile),
@@ -129,20 +134,31 @@ impl SecondaryRays<'_> {
         };
         // At least nine words a point.
         let longest = |request: &[u32]| request.len() / 9 * words * 2;
-        let message_error =
-            |from: usize, n: usize| FrameError::Message { rank, from, what: "light bits", words: n };
-        channel.request_reply("points to light", &requests, longest, &mut answer, |from, reply| {
-            if reply.len() != asked[from].len() * words * 2 {
-                return Err(message_error(from, reply.len()));
-            }
-            for (&(t, p), answer) in asked[from].iter().zip(reply.chunks_exact(2 * words)) {
-                let first = p as usize * words;
-                for (k, pair) in answer.chunks_exact(2).enumerate() {
-                    bits[t as usize][first + k] |= u64::from(pair[0]) | u64::from(pair[1]) << 32;
+        let message_error = |from: usize, n: usize| FrameError::Message {
+            rank,
+            from,
+            what: "light bits",
+            words: n,
+        };
+        channel.request_reply(
+            "points to light",
+            &requests,
+            longest,
+            &mut answer,
+            |from, reply| {
+                if reply.len() != asked[from].len() * words * 2 {
+                    return Err(message_error(from, reply.len()));
                 }
-            }
-            Ok(())
-        })?;
+                for (&(t, p), answer) in asked[from].iter().zip(reply.chunks_exact(2 * words)) {
+                    let first = p as usize * words;
+                    for (k, pair) in answer.chunks_exact(2).enumerate() {
+                        bits[t as usize][first + k] |=
+                            u64::from(pair[0]) | u64::from(pair[1]) << 32;
+                    }
+                }
+                Ok(())
+            },
+        )?;
         let mut failed = None;
         for (t, tile) in tiles.iter_mut().enumerate().filter(|(t, _)| live[*t]) {
             if !bits[t].is_empty() {
@@ -153,8 +169,7 @@ impl SecondaryRays<'_> {
         failed.map_or(Ok(()), |source| Err(FrameError::Answer { rank, source }))
     }
 
-    // ---- Rays that want what they meet first --------------------------------------------------------------------
-
+    // ---- Rays that want what they meet first ----------------------------------------------------
     /// One layer of surfaces in the way of light. False when no light ray is under way anywhere.
     fn transmitted_light(
         &self,
@@ -162,8 +177,11 @@ impl SecondaryRays<'_> {
         tiles: &mut [TileState],
         live: &[bool],
     ) -> Result<bool, FrameError> {
-        let rays: Vec<Vec<Ray>> =
-            tiles.iter().zip(live).map(|(t, &l)| if l { t.light_rays().collect() } else { vec![] }).collect();
+        let rays: Vec<Vec<Ray>> = tiles
+            .iter()
+            .zip(live)
+            .map(|(t, &l)| if l { t.light_rays().collect() } else { vec![] })
+            .collect();
         let (any, met) = self.closest_hits(channel, &rays, RayQuery::Light)?;
         let rank = channel.rank();
         for (tile, met) in tiles.iter_mut().zip(&met).filter(|(_, met)| !met.is_empty()) {
@@ -182,8 +200,10 @@ impl SecondaryRays<'_> {
         live: &[bool],
     ) -> Result<bool, FrameError> {
         let of = |t: &TileState, live: bool| if live { t.rays().collect() } else { Vec::new() };
-        let waiting: Vec<Vec<(usize, u16, Ray)>> = tiles.iter().zip(live).map(|(t, &l)| of(t, l)).collect();
-        let rays: Vec<Vec<Ray>> = waiting.iter().map(|w| w.iter().map(|(.., ray)| *ray).collect()).collect();
+        let waiting: Vec<Vec<(usize, u16, Ray)>> =
+            tiles.iter().zip(live).map(|(t, &l)| of(t, l)).collect();
+        let rays: Vec<Vec<Ray>> =
+            waiting.iter().map(|w| w.iter().map(|(.., ray)| *ray).collect()).collect();
         let record = self.side.frame.records_geometry(self.pass);
         let pixel = |tile: &TileState, slot: u16| (tile.number() as u32) << 10 | u32::from(slot);
         let pixels: Option<Vec<Vec<u32>>> = record.then(|| {
@@ -210,12 +230,13 @@ impl SecondaryRays<'_> {
                 .map_err(|source| FrameError::Answer { rank, source })?;
         }
         channel.record_span(Activity::Shade);
-        // A wave of which every ray waits for nothing is still a wave of its tile; tiles agree with the others only on questions.
+        // A wave of which every ray waits for nothing is still a wave of its tile; tiles agree with
+        // the others only on questions.
         Ok(any)
     }
 
-    /// Of each ray of each tile the nearest of what all ranks in whose bounds it comes say it meets, ties to the lowest number. False when no
-    /// rank had a ray.
+    /// Of each ray of each tile the nearest of what all ranks in whose bounds it comes say it
+    /// meets, ties to the lowest number. False when no rank had a ray.
     fn closest_hits(
         &self,
         channel: &mut RankChannel<'_>,
@@ -235,7 +256,8 @@ impl SecondaryRays<'_> {
             for (i, ray) in rays.iter().enumerate() {
                 bits.fill(0);
                 self.rank_bounds.add_hit_ranks(ray, &mut bits);
-                // A ray that meets no part is still asked, of this rank: nobody may end while others have rays.
+                // A ray that meets no part is still asked, of this rank: nobody may end while
+                // others have rays.
                 let mut nobody = true;
                 for r in ranks_in(&bits).filter(|&r| r < size) {
                     nobody = false;
@@ -283,31 +305,39 @@ impl SecondaryRays<'_> {
             }
             Some(out)
         };
-        let longest = |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * ShadingHit::WORDS;
-        let message_error =
-            |from: usize, n: usize| FrameError::Message { rank, from, what: "first hits", words: n };
-        let any = channel.request_reply("rays", &requests, longest, &mut answer, |from, reply| {
-            let (mask, rest) = reply
-                .split_at_checked(asked[from].len().div_ceil(32))
-                .ok_or_else(|| message_error(from, reply.len()))?;
-            let (words, rest) = rest.as_chunks::<{ ShadingHit::WORDS }>();
-            let mut words = words.iter();
-            for (i, &(t, ray)) in asked[from].iter().enumerate() {
-                if mask[i / 32] >> (i % 32) & 1 == 0 {
-                    continue;
+        let longest =
+            |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * ShadingHit::WORDS;
+        let message_error = |from: usize, n: usize| FrameError::Message {
+            rank,
+            from,
+            what: "first hits",
+            words: n,
+        };
+        let any =
+            channel.request_reply("rays", &requests, longest, &mut answer, |from, reply| {
+                let (mask, rest) = reply
+                    .split_at_checked(asked[from].len().div_ceil(32))
+                    .ok_or_else(|| message_error(from, reply.len()))?;
+                let (words, rest) = rest.as_chunks::<{ ShadingHit::WORDS }>();
+                let mut words = words.iter();
+                for (i, &(t, ray)) in asked[from].iter().enumerate() {
+                    if mask[i / 32] >> (i % 32) & 1 == 0 {
+                        continue;
+                    }
+                    let m = ShadingHit::from_words(
+                        words.next().ok_or_else(|| message_error(from, reply.len()))?,
+                    );
+                    let best = &mut met[t as usize][ray as usize];
+                    if best.as_ref().is_none_or(|b| m.is_before(b)) {
+                        *best = Some(m);
+                    }
                 }
-                let m = ShadingHit::from_words(words.next().ok_or_else(|| message_error(from, reply.len()))?);
-                let best = &mut met[t as usize][ray as usize];
-                if best.as_ref().is_none_or(|b| m.is_before(b)) {
-                    *best = Some(m);
+                if rest.is_empty() && words.next().is_none() {
+                    Ok(())
+                } else {
+                    Err(message_error(from, reply.len()))
                 }
-            }
-            if rest.is_empty() && words.next().is_none() {
-                Ok(())
-            } else {
-                Err(message_error(from, reply.len()))
-            }
-        })?;
+            })?;
         Ok((any, met))
     }
 }
@@ -317,7 +347,8 @@ impl SecondaryRays<'_> {
 enum RayQuery<'a> {
     /// What they meet first; with pixels, depth and distance as well.
     Closest { pixels: Option<&'a [Vec<u32>]> },
-    /// Of rays to light: what they meet that may let it through, or that something opaque is in the way.
+    /// Of rays to light: what they meet that may let it through, or that something opaque is in the
+    /// way.
     Light,
 }
 

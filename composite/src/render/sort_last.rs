@@ -24,7 +24,8 @@ pub struct DataParallel {
 }
 
 impl DataParallel {
-    /// Tells all ranks the bounds of all parts. All ranks must call it, and [`DataParallel::frame`] with the same arguments.
+    /// Tells all ranks the bounds of all parts. All ranks must call it, and [`DataParallel::frame`]
+    /// with the same arguments.
     ///
     /// # Errors
     /// [`FrameError::Ranks`] when there are not as many ranks as parts, or the transport's.
@@ -42,8 +43,10 @@ impl DataParallel {
             [own.min, own.max].iter().flat_map(|v| v.to_array().map(f32::to_bits)).collect();
         let mut channel = RankChannel::new(comm, options.timeout);
         let all = channel.all_gather(&numbers)?;
-        let vector = |w: &[u32]| Vec3::new(f32::from_bits(w[0]), f32::from_bits(w[1]), f32::from_bits(w[2]));
-        let bounds: Vec<Aabb> = all.iter().map(|w| Aabb::new(vector(&w[..3]), vector(&w[3..]))).collect();
+        let vector =
+            |w: &[u32]| Vec3::new(f32::from_bits(w[0]), f32::from_bits(w[1]), f32::from_bits(w[2]));
+        let bounds: Vec<Aabb> =
+            all.iter().map(|w| Aabb::new(vector(&w[..3]), vector(&w[3..]))).collect();
         // No ray would come into such a box: the rank would be left out without a word.
         if let Some(from) = bounds.iter().position(|b| b.min.is_nan() || b.max.is_nan()) {
             let error = channel.message_error(from, "bounds of its part", numbers.len());
@@ -98,7 +101,8 @@ impl DataParallel {
         channel.report.warnings = frame.warnings().to_vec();
         let media = frame.media();
         if media.contains(&false) {
-            let words = "volumes that are no medium (maxima, minima, means, sums, isosurfaces) are not cut: every rank holds them whole";
+            let words = "volumes that are no medium (maxima, minima, means, sums, isosurfaces) are \
+                         not cut: every rank holds them whole";
             channel.report.warnings.push(words.into());
         }
         let owners = TileOwners::new(&frame, &self.rank_bounds.bounds);
@@ -111,11 +115,16 @@ impl DataParallel {
             let local = frame.needs_only_local_light() && pass != Pass::Geometry;
             let record = frame.records_geometry(pass);
             let stream = self.options.stream;
-            let wanted =
-                primary_rays::PrimaryPass { pass, colors: local, hit_details: record || !local, stream };
+            let wanted = primary_rays::PrimaryPass {
+                pass,
+                colors: local,
+                hit_details: record || !local,
+                stream,
+            };
             // Tiles of the last pass go to the root as they are finished.
             if stream && local && !record && number + 1 == passes.len() {
-                let mut collect = TileCollector::new(channel, &side, &owners, &mut tiles, self.options.root)?;
+                let mut collect =
+                    TileCollector::new(channel, &side, &owners, &mut tiles, self.options.root)?;
                 primary_rays::run(channel, &side, &owners, wanted, Some(&mut collect))?;
                 let picture = collect.into_picture();
                 for tile in &tiles {
@@ -151,7 +160,8 @@ impl DataParallel {
         for tile in &tiles {
             channel.report.rays += tile.stats();
         }
-        TileCollector::new(channel, &side, &owners, &mut tiles, self.options.root)?.all(channel, &owners)
+        TileCollector::new(channel, &side, &owners, &mut tiles, self.options.root)?
+            .all(channel, &owners)
     }
 
     /// Decides, once and on all ranks alike, how light crosses borders, and builds what that needs.
@@ -178,7 +188,8 @@ impl DataParallel {
                 }
                 _ => (
                     SecondaryRayPolicy::Forward,
-                    "asked of the ranks in whose bounds rays come: ghost zones do for ambient occlusion of limited distance only",
+                    "asked of the ranks in whose bounds rays come: ghost zones do for ambient \
+                     occlusion of limited distance only",
                 ),
             };
             channel.report.secondary_rays = words.into();

@@ -75,8 +75,11 @@ impl<'a> TileCollector<'a> {
         let (rank, frame) = (channel.rank(), self.side.frame);
         let places = range.start - self.first..range.end - self.first;
         let mut failed = Vec::new();
-        let mut work: Vec<_> =
-            self.tiles[places.clone()].iter_mut().zip(&answers[places]).map(|w| (w, None)).collect();
+        let mut work: Vec<_> = self.tiles[places.clone()]
+            .iter_mut()
+            .zip(&answers[places])
+            .map(|w| (w, None))
+            .collect();
         each(channel, self.side.parallel, &mut work, |_, ((tile, answer), error)| {
             tile.begin(frame, pass);
             *error = tile.select_colors(frame, &answer.colors()).err();
@@ -90,13 +93,18 @@ impl<'a> TileCollector<'a> {
     }
 
     /// Sends finished tiles to the root; on the root, puts them in their places.
-    fn send(&mut self, channel: &mut RankChannel<'_>, range: Range<usize>) -> Result<(), FrameError> {
+    fn send(
+        &mut self,
+        channel: &mut RankChannel<'_>,
+        range: Range<usize>,
+    ) -> Result<(), FrameError> {
         let (rank, frame) = (channel.rank(), self.side.frame);
         let Some(root) = self.root.filter(|_| !range.is_empty()) else { return Ok(()) };
         let tiles = &self.tiles[range.start - self.first..range.end - self.first];
         let words: Vec<u32> = tiles.iter().flat_map(|t| t.encode(frame)).collect();
         if rank == root {
-            self.put(range, &words).ok_or_else(|| channel.message_error(rank, "tiles", words.len()))?;
+            self.put(range, &words)
+                .ok_or_else(|| channel.message_error(rank, "tiles", words.len()))?;
         } else {
             channel.send(root, Tag::Tiles, &words)?;
         }

@@ -12,12 +12,14 @@ pub(super) struct TileOwners {
 }
 
 impl TileOwners {
-    /// Tiles in `bounds.len()` runs of about the same work: a tile counts once, and once more for each part that may be seen in it.
+    /// Tiles in `bounds.len()` runs of about the same work: a tile counts once, and once more for
+    /// each part that may be seen in it.
     pub(super) fn new(frame: &DistributedFrame<'_>, bounds: &[Aabb]) -> TileOwners {
         let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_overlapping(*b)).collect();
         let work = |tile: usize| {
             let parts = touched.iter().filter(|t| t[tile]).count() as u64;
-            // Uncovered tiles are filled with background; covered ones are shaded as well, whatever number of parts is there.
+            // Uncovered tiles are filled with background; covered ones are shaded as well, whatever
+            // number of parts is there.
             if parts == 0 { 1 } else { 8 + parts }
         };
         let work: Vec<u64> = (0..frame.num_tiles()).map(work).collect();

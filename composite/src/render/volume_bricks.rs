@@ -1,8 +1,10 @@
 //! Which rank holds which bricks of which volumes.
 //!
-//! Where volumes overlap, a span of a ray needs the blocks of all of them at once. So whoever holds a brick of a volume also holds what coarser volumes have there, and
-//! answers for every span in which that volume is the finest: little has to be held twice then. (The first volume of the scene, tried before, had others hold five times a fine
-//! volume that was turned against a coarse one.)
+//! Where volumes overlap, a span of a ray needs the blocks of all of them at once. So whoever holds
+//! a brick of a volume also holds what coarser volumes have there, and answers for every span in
+//! which that volume is the finest: little has to be held twice then. (The first volume of the
+//! scene, tried before, had others hold five times a fine volume that was turned against a coarse
+//! one.)
 use super::FrameError;
 use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3};
 use rt_core::scene::{Scene, VolumeInstance};
@@ -58,8 +60,11 @@ impl VolumeBricks {
             return;
         }
         let bricks = bricks(&placed.volume, holders.len(), &covered_by(scene, &self.finer, volume));
-        let volume_brick =
-            |(brick, holders): (Brick, &Vec<u16>)| VolumeBrick { volume, brick, holders: holders.clone() };
+        let volume_brick = |(brick, holders): (Brick, &Vec<u16>)| VolumeBrick {
+            volume,
+            brick,
+            holders: holders.clone(),
+        };
         self.all.extend(bricks.into_iter().zip(holders).map(volume_brick));
     }
 
@@ -68,7 +73,8 @@ impl VolumeBricks {
         self.occupied[volume][((block.z * blocks.y + block.y) * blocks.x + block.x) as usize]
     }
 
-    /// The piece whose holder has the blocks of all volumes that are `here`; `likely` is looked at first.
+    /// The piece whose holder has the blocks of all volumes that are `here`; `likely` is looked at
+    /// first.
     pub(super) fn find(&self, here: &[(usize, UVec3)], likely: Option<usize>) -> Option<usize> {
         let (volume, block) = *here.iter().min_by_key(|(v, _)| self.finer[*v])?;
         let has = |p: &VolumeBrick| p.volume == volume && p.brick.contains(block);
@@ -86,8 +92,9 @@ impl VolumeBricks {
 
     /// What `rank` holds, by the pieces' numbers.
     pub(super) fn brick_data(&self, scene: &Scene, rank: usize) -> Vec<Option<BrickData>> {
-        let holds =
-            |p: &VolumeBrick| p.holders.iter().any(|h| usize::from(*h) == rank) && !p.brick.is_empty();
+        let holds = |p: &VolumeBrick| {
+            p.holders.iter().any(|h| usize::from(*h) == rank) && !p.brick.is_empty()
+        };
         self.all.iter().map(|p| holds(p).then(|| BrickData::new(scene, &self.finer, p))).collect()
     }
 }
@@ -107,7 +114,9 @@ pub(super) fn checked(
         return fault(format!("the scene has {} volumes", scene.volumes.len()));
     };
     if !placed.volume.is_medium() {
-        return fault("it is a projection, which sees the whole volume: every rank holds it".into());
+        return fault(
+            "it is a projection, which sees the whole volume: every rank holds it".into(),
+        );
     }
     if holders.is_empty() {
         return fault("no brick has a holder".into());
@@ -117,9 +126,13 @@ pub(super) fn checked(
             return fault(format!("brick {brick} has no holder"));
         }
         if let Some(rank) = list.iter().find(|r| **r >= ranks) {
-            return fault(format!("rank {rank} is to hold brick {brick}, but there are {ranks} ranks"));
+            return fault(format!(
+                "rank {rank} is to hold brick {brick}, but there are {ranks} ranks"
+            ));
         }
-        if let Some(rank) = list.iter().enumerate().find(|(i, r)| list[..*i].contains(r)).map(|(_, r)| r) {
+        if let Some(rank) =
+            list.iter().enumerate().find(|(i, r)| list[..*i].contains(r)).map(|(_, r)| r)
+        {
             return fault(format!("rank {rank} is to hold brick {brick} twice"));
         }
     }
@@ -180,7 +193,8 @@ fn first_cell(volume: &Volume) -> DVec3 {
 
 /// Corners of a brick, in the space relative to the volume's origin.
 fn corners(volume: &Volume, brick: Brick) -> [DVec3; 2] {
-    let at = |block: UVec3| first_cell(volume) + (block * MACROCELL).as_dvec3() * volume.grid().spacing;
+    let at =
+        |block: UVec3| first_cell(volume) + (block * MACROCELL).as_dvec3() * volume.grid().spacing;
     [at(brick.first), at(brick.end)]
 }
 
@@ -195,7 +209,8 @@ fn moved(there: DAffine3, lo: DVec3, hi: DVec3) -> [DVec3; 2] {
     [low, high]
 }
 
-/// Blocks of `volume` that a box comes near to, by a cell: rays are rounded where they come into another volume's space.
+/// Blocks of `volume` that a box comes near to, by a cell: rays are rounded where they come into
+/// another volume's space.
 fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Brick {
     let [low, high] = moved(there, lo, hi);
     let cell = |p: DVec3| (p - first_cell(volume)) / volume.grid().spacing;
@@ -205,7 +220,8 @@ fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Bric
     Brick { first: first.min(end), end }
 }
 
-/// Of each volume how many have more cells to a length of the world; of those with as many, the first in the scene counts as finer.
+/// Of each volume how many have more cells to a length of the world; of those with as many, the
+/// first in the scene counts as finer.
 fn finer(scene: &Scene) -> Vec<usize> {
     let cell = |placed: &VolumeInstance| {
         let size = DMat3::from_diagonal(placed.volume.grid().spacing);
@@ -223,7 +239,9 @@ fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -
         .volumes
         .iter()
         .zip(finer)
-        .filter(|(placed, finer_than_it)| placed.volume.is_medium() && **finer_than_it < finer[volume])
+        .filter(|(placed, finer_than_it)| {
+            placed.volume.is_medium() && **finer_than_it < finer[volume]
+        })
         .map(|(placed, _)| (placed, world_from_object(placed).inverse() * world_from_object(here)))
         .collect();
     move |block| {
@@ -247,7 +265,8 @@ fn blocks_of(brick: Brick) -> impl Iterator<Item = UVec3> {
     })
 }
 
-/// Cuts a volume into `count` bricks with about the same number of blocks that have extinction and are not `covered`, and leaves covered ones at their sides away.
+/// Cuts a volume into `count` bricks with about the same number of blocks that have extinction and
+/// are not `covered`, and leaves covered ones at their sides away.
 fn bricks(volume: &Volume, count: usize, covered: &impl Fn(UVec3) -> bool) -> Vec<Brick> {
     let mut out = Vec::with_capacity(count);
     let all = Brick { first: UVec3::ZERO, end: volume.blocks() };

@@ -1,7 +1,10 @@
-//! Volumes in bricks: rays are carried through them, from near to far, with what they have collected.
+//! Volumes in bricks: rays are carried through them, from near to far, with what they have
+//! collected.
 //!
-//! The owner of a pixel knows which bricks a ray meets in which order ([`super::bricks`]). It asks a holder of the first one, takes back what the ray has collected there, and asks
-//! the next: one round of questions per brick along a ray. Sums are made in the order in which one node makes them, so they have the same bits.
+//! The owner of a pixel knows which bricks a ray meets in which order ([`super::bricks`]). It asks
+//! a holder of the first one, takes back what the ray has collected there, and asks the next: one
+//! round of questions per brick along a ray. Sums are made in the order in which one node makes
+//! them, so they have the same bits.
 use super::rank_frame::RankFrame;
 use super::request_reply::RankChannel;
 use super::{Activity, FrameError, RankReport};
@@ -48,7 +51,9 @@ impl BrickTraversal {
             let last = remaining.last_mut();
             match (bricks.find(here, last.as_ref().map(|s| s.brick)), last) {
                 (Some(brick), Some(last)) if last.brick == brick => last.end = number + 1,
-                (Some(brick), _) => remaining.push(BrickSpan { brick, first: number, end: number + 1 }),
+                (Some(brick), _) => {
+                    remaining.push(BrickSpan { brick, first: number, end: number + 1 })
+                }
                 (None, _) => held = false,
             }
         });
@@ -60,7 +65,8 @@ impl BrickTraversal {
     }
 }
 
-/// Carries the rays of `tiles`, which end where they `met` something, through all ranks' bricks, and gives the tiles what they collect.
+/// Carries the rays of `tiles`, which end where they `met` something, through all ranks' bricks,
+/// and gives the tiles what they collect.
 pub(super) fn composite_volumes(
     channel: &mut RankChannel<'_>,
     side: &RankFrame<'_>,
@@ -143,7 +149,10 @@ pub(super) fn composite_volumes(
 }
 
 /// The answer to one question; `None` for a question that is not for this rank.
-fn continue_ray(side: &RankFrame<'_>, words: &[u32; WORDS]) -> Option<[u32; PartialIntegral::WORDS]> {
+fn continue_ray(
+    side: &RankFrame<'_>,
+    words: &[u32; WORDS],
+) -> Option<[u32; PartialIntegral::WORDS]> {
     let ([brick, first, end], words) = words.split_first_chunk::<HEAD>()?;
     let (ray, collected) = words.split_last_chunk::<{ PartialIntegral::WORDS }>()?;
     let held = side.part.brick_data.get(*brick as usize)?.as_ref()?;

@@ -1,4 +1,5 @@
-//! Formats without depth: some pixels of all frames in the canonical grouping, which are joined while they are in the first cache.
+//! Formats without depth: some pixels of all frames in the canonical grouping, which are joined
+//! while they are in the first cache.
 use super::columns::Columns;
 use crate::layer::View;
 use crate::pixel::Composite;
@@ -7,8 +8,8 @@ use crate::simd::runs::over_one_by_one;
 use crate::simd::{Kernels, at_level};
 use std::ops::Range;
 
-/// Pixels of a block. Eight frames of f32 are read as streams of 4 KB; of 64 pixels (1 KB) dense scenes took a quarter longer. The groups that
-/// wait still fit into the first cache.
+/// Pixels of a block. Eight frames of f32 are read as streams of 4 KB; of 64 pixels (1 KB) dense
+/// scenes took a quarter longer. The groups that wait still fit into the first cache.
 pub(super) const BLOCK: usize = 256;
 
 /// What a thread needs to merge rows.
@@ -148,7 +149,9 @@ impl<P: Composite> BlendedRows<P> {
             None => target,
         };
         match (alone, last.first()) {
-            (Some((colors, part)), _) => put_behind(bytemuck::cast_slice(colors), &mut before[part]),
+            (Some((colors, part)), _) => {
+                put_behind(bytemuck::cast_slice(colors), &mut before[part])
+            }
             (None, Some(last)) => put_behind(bytemuck::cast_slice(&last[..pixels]), before),
             (None, None) => {}
         }

@@ -3,7 +3,8 @@ use crate::layer::View;
 use crate::pixel::Composite;
 use std::ops::Range;
 
-/// The frames that have drawn in each block (of `BLOCK` pixels) of a row, in their order; only those need to be read.
+/// The frames that have drawn in each block (of `BLOCK` pixels) of a row, in their order; only
+/// those need to be read.
 #[derive(Default)]
 pub(super) struct Columns<const BLOCK: usize> {
     /// For each block, which part of `drawn` are its frames.
@@ -36,7 +37,10 @@ impl<const BLOCK: usize> Columns<BLOCK> {
         self.drawn.clear();
         for x in (0..width).step_by(BLOCK) {
             let first = self.drawn.len();
-            let drawn = self.here.iter().filter(|(_, columns)| columns.start < x + BLOCK && x < columns.end);
+            let drawn = self
+                .here
+                .iter()
+                .filter(|(_, columns)| columns.start < x + BLOCK && x < columns.end);
             self.drawn.extend(drawn.map(|(index, _)| index));
             self.blocks.push(first..self.drawn.len());
         }
@@ -45,6 +49,9 @@ impl<const BLOCK: usize> Columns<BLOCK> {
 
     /// The first column of each block, and the numbers of its frames.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &[usize])> {
-        self.blocks.iter().enumerate().map(|(block, drawn)| (BLOCK * block, &self.drawn[drawn.clone()]))
+        self.blocks
+            .iter()
+            .enumerate()
+            .map(|(block, drawn)| (BLOCK * block, &self.drawn[drawn.clone()]))
     }
 }

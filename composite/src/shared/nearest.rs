@@ -1,7 +1,9 @@
-//! Formats with depth: of 64 pixels first the depths of eight frames, then the colours of those that have won.
+//! Formats with depth: of 64 pixels first the depths of eight frames, then the colours of those
+//! that have won.
 //!
-//! One frame after the other would read the colours of all that are nearest for a while (a third of them, of layers in any order), and read
-//! and write what it holds again and again. Here every pixel of the image is written once, and only those colours are read that are seen.
+//! One frame after the other would read the colours of all that are nearest for a while (a third of
+//! them, of layers in any order), and read and write what it holds again and again. Here every
+//! pixel of the image is written once, and only those colours are read that are seen.
 use super::columns::Columns;
 use crate::color::Color;
 use crate::layer::View;
@@ -12,8 +14,9 @@ use crate::simd::{Kernels, at_level, for_runs};
 use bytemuck::{cast_slice, cast_slice_mut};
 use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u8x64, u32x16};
 
-/// Pixels of a block: what it takes to find a block of a frame, and to guess wrongly how many frames there are, is spread over four words.
-/// (Blocks of one word took 190 cycles each and 24 for each frame.)
+/// Pixels of a block: what it takes to find a block of a frame, and to guess wrongly how many
+/// frames there are, is spread over four words. (Blocks of one word took 190 cycles each and 24 for
+/// each frame.)
 pub(super) const BLOCK: usize = WORD * WORDS;
 
 /// Pixels of a word of flags: four vectors of 16.
@@ -22,10 +25,12 @@ const WORD: usize = 64;
 /// Words of a block.
 const WORDS: usize = 2;
 
-/// Frames whose blocks are looked at together. (Of 32, sparse frames took 15 % longer: all places are written for each block.)
+/// Frames whose blocks are looked at together. (Of 32, sparse frames took 15 % longer: all places
+/// are written for each block.)
 const TOGETHER: usize = 8;
 
-/// The farthest depth that is not background: where it is held at the beginning, whoever is not behind it has drawn something.
+/// The farthest depth that is not background: where it is held at the beginning, whoever is not
+/// behind it has drawn something.
 const FARTHEST: f32 = f32::from_bits(1.0_f32.to_bits() - 1);
 
 /// A block of one frame.
@@ -60,7 +65,8 @@ impl<P: Composite> NearestRows<P> {
         Self { nan: Vec::new(), edges: Vec::new() }
     }
 
-    /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors` and, if it is not empty, `depths`.
+    /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors` and, if it is
+    /// not empty, `depths`.
     pub(super) fn merge_rows(
         &mut self,
         kernels: Kernels,
@@ -95,8 +101,11 @@ impl<P: Composite> NearestRows<P> {
         let mut padded = [P::EMPTY.color(); BLOCK];
         for (row, colors) in colors.chunks_exact_mut(width).enumerate() {
             let y = first_row + row as u32;
-            let depths =
-                if depths.is_empty() { &mut [][..] } else { &mut depths[row * width..(row + 1) * width] };
+            let depths = if depths.is_empty() {
+                &mut [][..]
+            } else {
+                &mut depths[row * width..(row + 1) * width]
+            };
             for (x, drawn) in columns.iter() {
                 let end = (x + BLOCK).min(width);
                 let colors = &mut colors[x..end];
@@ -112,8 +121,12 @@ impl<P: Composite> NearestRows<P> {
                 };
                 let depths_before = [FARTHEST; BLOCK];
                 let background = [u64::MAX; WORDS];
-                let mut held =
-                    BlockResult { colors: target, depths: depths_before, background, has_nan: false };
+                let mut held = BlockResult {
+                    colors: target,
+                    depths: depths_before,
+                    background,
+                    has_nan: false,
+                };
                 for some in drawn.chunks(TOGETHER) {
                     self.edges.clear();
                     for &index in some {
@@ -121,7 +134,8 @@ impl<P: Composite> NearestRows<P> {
                     }
                     let mut edges = self.edges.iter();
                     let mut blocks =
-                        [Block { colors: &nothing.0, depths: &nothing.1, lanes: [0; WORDS] }; TOGETHER];
+                        [Block { colors: &nothing.0, depths: &nothing.1, lanes: [0; WORDS] };
+                            TOGETHER];
                     for (&index, block) in some.iter().zip(&mut blocks) {
                         let lanes = lanes(&views[index], x);
                         *block = match within_planes(&views[index], x, y) {
@@ -150,9 +164,12 @@ impl<P: Composite> NearestRows<P> {
                 if !depths.is_empty() {
                     depths.copy_from_slice(&nearest[..depths.len()]);
                     for (depths, background) in depths.chunks_mut(WORD).zip(background) {
-                        for_runs(background & (u64::MAX >> (WORD - depths.len())), |first, length| {
-                            depths[first..first + length].fill(1.0);
-                        });
+                        for_runs(
+                            background & (u64::MAX >> (WORD - depths.len())),
+                            |first, length| {
+                                depths[first..first + length].fill(1.0);
+                            },
+                        );
                     }
                 }
                 if !is_whole {
@@ -177,7 +194,8 @@ fn lanes<P: Composite>(view: &View<'_, P>, x: usize) -> [u64; WORDS] {
     })
 }
 
-/// The block of row `y` that begins in column `x`, whatever it holds outside the frame's bounds, if the planes reach so far.
+/// The block of row `y` that begins in column `x`, whatever it holds outside the frame's bounds, if
+/// the planes reach so far.
 #[inline(always)]
 fn within_planes<'a, P: Composite>(
     view: &View<'a, P>,
@@ -212,7 +230,8 @@ fn fill_up<P: Composite>(
     edges.push((colors, depths));
 }
 
-/// Takes from each pixel of a word of `blocks` and `held` the nearest, and of equally near ones the last.
+/// Takes from each pixel of a word of `blocks` and `held` the nearest, and of equally near ones the
+/// last.
 #[inline(always)]
 fn take_nearest<C: Color, S: Simd>(
     simd: S,
@@ -236,7 +255,8 @@ fn take_nearest<C: Color, S: Simd>(
         for quarter in 0..4 {
             let mut depth = load(quarter, block.depths);
             if block.lanes[word] != u64::MAX {
-                let lanes = mask32x16::from_bitmask(simd, block.lanes[word] >> (16 * quarter) & 0xffff);
+                let lanes =
+                    mask32x16::from_bitmask(simd, block.lanes[word] >> (16 * quarter) & 0xffff);
                 depth = lanes.select(depth, f32x16::splat(simd, 1.0));
             }
             sums[quarter] += depth;
@@ -246,14 +266,17 @@ fn take_nearest<C: Color, S: Simd>(
         }
         any |= *wins;
     }
-    // A sum is a number if all depths are. Of infinite ones it need not be, but then they are only looked at one by one.
+    // A sum is a number if all depths are. Of infinite ones it need not be, but then they are only
+    // looked at one by one.
     let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
     held.has_nan |= !sum.simd_eq(sum).all_true();
     for quarter in 0..4 {
-        nearest[quarter].store_slice(&mut held.depths[first + 16 * quarter..first + 16 * quarter + 16]);
+        nearest[quarter]
+            .store_slice(&mut held.depths[first + 16 * quarter..first + 16 * quarter + 16]);
     }
 
-    // The last who was nearest is, so from the last frame on, until there is somebody for each pixel.
+    // The last who was nearest is, so from the last frame on, until there is somebody for each
+    // pixel.
     let winners = blocks.iter().zip(&wins).rev();
     if C::BYTES == 4 {
         let held_bytes: &mut [u8] = cast_slice_mut(&mut held.colors[first..first + WORD]);
@@ -287,8 +310,13 @@ fn take_nearest<C: Color, S: Simd>(
     }
 }
 
-/// [`take_nearest`] without vector types: loops over flags and numbers, which compilers turn into the vectors that every machine has.
-fn take_nearest_scalar<C: Color>(blocks: &[Block<'_, C>], word: usize, held: &mut BlockResult<'_, C>) {
+/// [`take_nearest`] without vector types: loops over flags and numbers, which compilers turn into
+/// the vectors that every machine has.
+fn take_nearest_scalar<C: Color>(
+    blocks: &[Block<'_, C>],
+    word: usize,
+    held: &mut BlockResult<'_, C>,
+) {
     let pixels = WORD * word..WORD * (word + 1);
     let mut wins = [0_u64; TOGETHER];
     let mut any = 0;
@@ -302,7 +330,9 @@ fn take_nearest_scalar<C: Color>(blocks: &[Block<'_, C>], word: usize, held: &mu
             }
         }
         held.has_nan |= depths.iter().fold(false, |any, depth| any | depth.is_nan());
-        for ((held, depth), flag) in held.depths[pixels.clone()].iter_mut().zip(&depths).zip(&mut flags) {
+        for ((held, depth), flag) in
+            held.depths[pixels.clone()].iter_mut().zip(&depths).zip(&mut flags)
+        {
             let is_nearest = *depth <= *held;
             *flag = u8::from(is_nearest);
             *held = if is_nearest { *depth } else { *held };

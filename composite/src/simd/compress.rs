@@ -4,7 +4,8 @@ use crate::simd::for_runs;
 use crate::simd::runs::{colors_16, padded_16};
 use fearless_simd::Simd;
 
-/// Appends the values of `SIZE` bytes in `row` whose bits are set in the words at `mask_at` of `out` itself.
+/// Appends the values of `SIZE` bytes in `row` whose bits are set in the words at `mask_at` of
+/// `out` itself.
 #[inline(always)]
 pub(crate) fn append_active<const SIZE: usize, S: Simd>(
     simd: S,
@@ -28,7 +29,11 @@ pub(crate) fn append_active<const SIZE: usize, S: Simd>(
 }
 
 /// [`append_active`] without vector types: run by run.
-pub(crate) fn append_active_scalar<const SIZE: usize>(out: &mut Vec<u8>, mask_at: usize, row: &[u8]) {
+pub(crate) fn append_active_scalar<const SIZE: usize>(
+    out: &mut Vec<u8>,
+    mask_at: usize,
+    row: &[u8],
+) {
     out.reserve(row.len() + 64);
     for (index, block) in row.chunks(64 * SIZE).enumerate() {
         match word_at(out, mask_at + 8 * index) {
@@ -42,7 +47,8 @@ pub(crate) fn append_active_scalar<const SIZE: usize>(out: &mut Vec<u8>, mask_at
 #[inline(always)]
 fn append_by_runs<const SIZE: usize>(out: &mut Vec<u8>, word: u64, block: &[u8]) {
     for_runs(word, |first, length| {
-        // Short runs are the rule in fragmented pictures, and a copy of fixed length costs less than one that must look.
+        // Short runs are the rule in fragmented pictures, and a copy of fixed length costs less
+        // than one that must look.
         let (from, bytes) = (first * SIZE, length * SIZE);
         if bytes <= 16 && from + 16 <= block.len() {
             out.extend_from_slice(&block[from..from + 16]);

@@ -15,7 +15,8 @@ pub(crate) struct SparseRow<'a> {
     pub(crate) colors: &'a [u8],
     /// Empty if the message has no depths.
     pub(crate) depths: &'a [u8],
-    /// The whole message from the colours and from the depths on: what may be read, though not used.
+    /// The whole message from the colours and from the depths on: what may be read, though not
+    /// used.
     pub(crate) behind_colors: &'a [u8],
     pub(crate) behind_depths: &'a [u8],
 }
@@ -63,11 +64,16 @@ pub(crate) fn merge_run_scalar<P: Composite>(
 
 /// Makes inactive pixels of a depth format [empty](crate::PixelFormat::EMPTY).
 #[inline(always)]
-pub(crate) fn clean_run<P: Composite, S: Simd>(simd: S, colors: &mut [P::Color], depths: &mut [f32]) {
+pub(crate) fn clean_run<P: Composite, S: Simd>(
+    simd: S,
+    colors: &mut [P::Color],
+    depths: &mut [f32],
+) {
     use fearless_simd::{SimdBase, SimdMask, f32x16};
     let whole = depths.len() / 16 * 16;
     for first in (0..whole).step_by(16) {
-        let active = f32x16::from_slice(simd, &depths[first..first + 16]).simd_lt(f32x16::splat(simd, 1.0));
+        let active =
+            f32x16::from_slice(simd, &depths[first..first + 16]).simd_lt(f32x16::splat(simd, 1.0));
         if !active.all_true() {
             clean_run_scalar::<P>(&mut colors[first..first + 16], &mut depths[first..first + 16]);
         }
@@ -79,7 +85,8 @@ pub(crate) fn clean_run<P: Composite, S: Simd>(simd: S, colors: &mut [P::Color],
 #[inline(always)]
 pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &mut [f32]) {
     for (colors, depths) in colors.chunks_mut(64).zip(depths.chunks_mut(64)) {
-        // Most blocks are active as a whole: to look at them all is done four at a time, to branch for each is not.
+        // Most blocks are active as a whole: to look at them all is done four at a time, to branch
+        // for each is not.
         if depths.iter().fold(true, |all, depth| all & (*depth < 1.0)) {
             continue;
         }
@@ -113,8 +120,16 @@ pub(crate) fn merge_row<P: Composite, S: Simd>(
         // Rows that end within the word, as those of slabs do, have fewer lanes for vectors.
         let mut word = word;
         if word != u64::MAX {
-            let lanes =
-                merge_by_vectors::<P, S>(simd, row, taken, word, first, held_colors, held_depths, side);
+            let lanes = merge_by_vectors::<P, S>(
+                simd,
+                row,
+                taken,
+                word,
+                first,
+                held_colors,
+                held_depths,
+                side,
+            );
             let done = if lanes == 64 { word } else { word & !(u64::MAX << lanes) };
             taken += done.count_ones() as usize;
             word ^= done;
@@ -122,8 +137,16 @@ pub(crate) fn merge_row<P: Composite, S: Simd>(
         for_runs(word, |start, length| {
             let (colors, depths) = taken_run::<P>(row, taken, length);
             let at = first + start;
-            let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
-            merge_run::<P, S>(simd, colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            let held_depths =
+                if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
+            merge_run::<P, S>(
+                simd,
+                colors,
+                depths,
+                &mut held_colors[at..at + length],
+                held_depths,
+                side,
+            );
             taken += length;
         });
     }
@@ -145,15 +168,22 @@ pub(crate) fn merge_row_scalar<P: Composite>(
         for_runs(word, |start, length| {
             let (colors, depths) = taken_run::<P>(row, taken, length);
             let at = 64 * index + start;
-            let held_depths = if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
-            merge_run_scalar::<P>(colors, depths, &mut held_colors[at..at + length], held_depths, side);
+            let held_depths =
+                if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
+            merge_run_scalar::<P>(
+                colors,
+                depths,
+                &mut held_colors[at..at + length],
+                held_depths,
+                side,
+            );
             taken += length;
         });
     }
 }
 
-/// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too. A message for rows with depths
-/// must bring depths.
+/// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too. A
+/// message for rows with depths must bring depths.
 #[inline(always)]
 pub(crate) fn copy_row<P: Composite, S: Simd>(
     simd: S,
@@ -171,11 +201,16 @@ pub(crate) fn copy_row<P: Composite, S: Simd>(
 }
 
 /// [`copy_row`] run by run.
-pub(crate) fn copy_row_scalar<P: Composite>(row: SparseRow<'_>, colors: &mut [P::Color], depths: &mut [f32]) {
+pub(crate) fn copy_row_scalar<P: Composite>(
+    row: SparseRow<'_>,
+    colors: &mut [P::Color],
+    depths: &mut [f32],
+) {
     copy_words::<P>(row, colors, depths, |_, _, _| false);
 }
 
-/// `place` may write the colours of a word of 64 pixels, of which so many were taken before, and say that it has.
+/// `place` may write the colours of a word of 64 pixels, of which so many were taken before, and
+/// say that it has.
 #[inline(always)]
 fn copy_words<P: Composite>(
     row: SparseRow<'_>,
@@ -227,7 +262,11 @@ fn copy_words<P: Composite>(
 }
 
 #[inline(always)]
-fn taken_run<'a, P: Composite>(row: SparseRow<'a>, taken: usize, length: usize) -> (&'a [u8], &'a [u8]) {
+fn taken_run<'a, P: Composite>(
+    row: SparseRow<'a>,
+    taken: usize,
+    length: usize,
+) -> (&'a [u8], &'a [u8]) {
     let colors = &row.colors[taken * P::Color::BYTES..(taken + length) * P::Color::BYTES];
     (colors, if P::HAS_DEPTH { &row.depths[4 * taken..4 * (taken + length)] } else { &[] })
 }
@@ -237,8 +276,8 @@ fn words(mask: &[u8]) -> impl Iterator<Item = u64> {
     mask.chunks_exact(8).map(bytemuck::pod_read_unaligned)
 }
 
-/// Joins as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens of a depth format with colours of four
-/// bytes. Says how many pixels those are.
+/// Joins as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens
+/// of a depth format with colours of four bytes. Says how many pixels those are.
 #[inline(always)]
 fn merge_by_vectors<P: Composite, S: Simd>(
     simd: S,
@@ -261,7 +300,8 @@ fn merge_by_vectors<P: Composite, S: Simd>(
         let held_depths = &mut held_depths[first..end];
         let mut taken = taken;
         let mut done = 0;
-        let quarters = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
+        let quarters =
+            held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
         for (held_color, held_depth) in quarters {
             let lanes = (word >> done) as u16;
             done += 16;
@@ -292,7 +332,8 @@ fn merge_by_vectors<P: Composite, S: Simd>(
     0
 }
 
-/// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether there is an instruction for it.
+/// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether
+/// there is an instruction for it.
 #[inline(always)]
 fn copy_by_vectors<P: Composite, S: Simd>(
     simd: S,

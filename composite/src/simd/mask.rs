@@ -46,7 +46,8 @@ pub(crate) fn row_words<P: Composite, S: Simd>(
             }
             counts.active += word.count_ones() as usize;
             counts.nan += u64::from(not_numbers);
-            word |= tail(last, counts, |depth| (*depth < 1.0, depth.is_nan())) << (16 * quarters.len());
+            word |=
+                tail(last, counts, |depth| (*depth < 1.0, depth.is_nan())) << (16 * quarters.len());
             put(word);
         }
         return;
@@ -57,8 +58,9 @@ pub(crate) fn row_words<P: Composite, S: Simd>(
         if P::Color::BYTES == 4 {
             let bytes: &[u8] = bytemuck::cast_slice(block);
             for quarter in 0..4 {
-                let zero = crate::simd::runs::colors_16(simd, &bytes[64 * quarter..64 * quarter + 64])
-                    .simd_eq(u32x16::splat(simd, 0));
+                let zero =
+                    crate::simd::runs::colors_16(simd, &bytes[64 * quarter..64 * quarter + 64])
+                        .simd_eq(u32x16::splat(simd, 0));
                 word |= (!zero.to_bitmask() & 0xffff) << (16 * quarter);
             }
         } else {
@@ -74,7 +76,8 @@ pub(crate) fn row_words<P: Composite, S: Simd>(
     }
 }
 
-/// [`row_words`] without vector types: loops over flags of one byte, which compilers turn into the vectors that every machine has.
+/// [`row_words`] without vector types: loops over flags of one byte, which compilers turn into the
+/// vectors that every machine has.
 pub(crate) fn row_words_scalar<P: Composite>(
     colors: &[P::Color],
     depths: &[f32],
@@ -88,7 +91,8 @@ pub(crate) fn row_words_scalar<P: Composite>(
             for (flag, depth) in flags.iter_mut().zip(block) {
                 *flag = u8::from(*depth < 1.0);
             }
-            counts.nan += u64::from(block.iter().map(|depth| u32::from(depth.is_nan())).sum::<u32>());
+            counts.nan +=
+                u64::from(block.iter().map(|depth| u32::from(depth.is_nan())).sum::<u32>());
             let word = packed(&flags);
             counts.active += word.count_ones() as usize;
             put(word);
@@ -112,7 +116,8 @@ pub(crate) fn row_words_scalar<P: Composite>(
     }
 }
 
-/// 64 flags, each 0 or 1, as bits. The product moves the flag of byte i by 7 (8 - i) bits, to bit 56 + i; no two flags meet anywhere, so nothing is carried.
+/// 64 flags, each 0 or 1, as bits. The product moves the flag of byte i by 7 (8 - i) bits, to bit
+/// 56 + i; no two flags meet anywhere, so nothing is carried.
 pub(crate) fn packed(flags: &[u8; 64]) -> u64 {
     let eights = flags.as_chunks::<8>().0.iter().enumerate();
     eights.fold(0, |word, (index, eight)| {

@@ -1,8 +1,10 @@
-//! Kernels over rows of pixels: active masks, compression to active pixels, depth tests and blending.
+//! Kernels over rows of pixels: active masks, compression to active pixels, depth tests and
+//! blending.
 //!
-//! Each is written once, generic over the vector type, and compiled for every instruction set; the best one is chosen at run
-//! time. [`SimdLevel::Scalar`] goes pixel by pixel through [`combine`](crate::combine) and is the reference the others are
-//! tested against: all levels give the same bits.
+//! Each is written once, generic over the vector type, and compiled for every instruction set; the
+//! best one is chosen at run time. [`SimdLevel::Scalar`] goes pixel by pixel through
+//! [`combine`](crate::combine) and is the reference the others are tested against: all levels give
+//! the same bits.
 pub(crate) mod compress;
 pub(crate) mod expand;
 pub(crate) mod mask;
@@ -30,7 +32,10 @@ impl SimdLevel {
     /// The levels this machine can run, lowest first.
     pub fn available() -> Vec<Self> {
         let levels = [Self::Scalar, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
-        levels.into_iter().filter(|level| *level == Self::Scalar || level.token().is_some()).collect()
+        levels
+            .into_iter()
+            .filter(|level| *level == Self::Scalar || level.token().is_some())
+            .collect()
     }
 
     /// The best level of this machine.
@@ -49,7 +54,8 @@ impl SimdLevel {
         }
     }
 
-    /// The level as fearless_simd knows it; `None` for [`SimdLevel::Scalar`] and where the machine lacks it.
+    /// The level as fearless_simd knows it; `None` for [`SimdLevel::Scalar`] and where the machine
+    /// lacks it.
     fn token(self) -> Option<Level> {
         let _best = Level::new();
         #[cfg(target_arch = "x86_64")]
@@ -83,7 +89,8 @@ impl Kernels {
 
 /// Runs one expression compiled for the vectors of the chosen level, or the scalar one.
 ///
-/// Not `fearless_simd::dispatch!`, which makes one more copy of every kernel, for processors without SSE4.2: those of before 2008.
+/// Not `fearless_simd::dispatch!`, which makes one more copy of every kernel, for processors
+/// without SSE4.2: those of before 2008.
 macro_rules! at_level {
     ($kernels:expr, $simd:ident => $vectors:expr, $scalar:expr) => {
         match $kernels.0 {
@@ -124,7 +131,8 @@ pub(crate) fn for_runs(mut word: u64, mut visit: impl FnMut(usize, usize)) {
         let first = word.trailing_zeros();
         let length = (word >> first).trailing_ones();
         visit(first as usize, length as usize);
-        // Adding the lowest one carries through the run; what it sets behind the run must not stay set.
+        // Adding the lowest one carries through the run; what it sets behind the run must not stay
+        // set.
         word &= !(u64::MAX >> (64 - length) << first);
     }
 }
@@ -147,7 +155,9 @@ mod tests {
 
     #[test]
     fn runs_of_a_word_are_all_of_its_ones() {
-        for word in [0, 1, u64::MAX, 1 << 63, 0xff00_0000_0000_00f1, 0x5555_5555_5555_5555, u64::MAX - 1] {
+        for word in
+            [0, 1, u64::MAX, 1 << 63, 0xff00_0000_0000_00f1, 0x5555_5555_5555_5555, u64::MAX - 1]
+        {
             let mut again = 0_u64;
             for_runs(word, |first, length| {
                 for bit in first..first + length {

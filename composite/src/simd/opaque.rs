@@ -1,8 +1,10 @@
-//! Colours of four bytes whose alpha is full, as three bytes and back: a quarter less for the wire that brings the image to one rank.
+//! Colours of four bytes whose alpha is full, as three bytes and back: a quarter less for the wire
+//! that brings the image to one rank.
 use crate::simd::runs::colors_16;
 use fearless_simd::{Bytes, Simd, SimdBase, u8x64, u32x16};
 
-/// The colours in `out` from `start` on as three bytes each, in place. False, and nothing is changed, if an alpha is not full.
+/// The colours in `out` from `start` on as three bytes each, in place. False, and nothing is
+/// changed, if an alpha is not full.
 #[inline(always)]
 pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize) -> bool {
     let length = out.len() - start;
@@ -14,11 +16,13 @@ pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize)
     let mut lanes = [0_u8; 64];
     all.bitcast::<u8x64<S>>().store_slice(&mut lanes);
     let rest = &out[start + 64 * blocks..];
-    if !lanes.as_chunks::<4>().0.iter().chain(rest.as_chunks::<4>().0).all(|color| color[3] == 255) {
+    if !lanes.as_chunks::<4>().0.iter().chain(rest.as_chunks::<4>().0).all(|color| color[3] == 255)
+    {
         return false;
     }
 
-    // Sixteen bytes at a time are moved down by a quarter; the four that are too many are written over by what comes next.
+    // Sixteen bytes at a time are moved down by a quarter; the four that are too many are written
+    // over by what comes next.
     let packed: [u8; 64] =
         std::array::from_fn(|i| if i % 16 < 12 { (i % 16 / 3 * 4 + i % 16 % 3) as u8 } else { 0 });
     let packed = u8x64::from_slice(simd, &packed);
@@ -39,8 +43,11 @@ pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize)
 
 /// [`drop_full_alpha`] without vector types: two colours in a word of 64 bits.
 pub(crate) fn drop_full_alpha_scalar(out: &mut Vec<u8>, start: usize) -> bool {
-    let all =
-        out[start..].as_chunks::<4>().0.iter().fold(u32::MAX, |all, color| all & u32::from_le_bytes(*color));
+    let all = out[start..]
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .fold(u32::MAX, |all, color| all & u32::from_le_bytes(*color));
     if all >> 24 != 255 {
         return false;
     }
@@ -82,7 +89,8 @@ pub(crate) fn give_full_alpha<S: Simd>(simd: S, narrow: &[u8], wide: &mut Vec<u8
         for (index, four) in loaded.as_chunks_mut::<16>().0.iter_mut().enumerate() {
             four.copy_from_slice(&bytes[12 * index..12 * index + 16]);
         }
-        let colors: u32x16<S> = u8x64::from_slice(simd, &loaded).swizzle_dyn_within_blocks(spread).bitcast();
+        let colors: u32x16<S> =
+            u8x64::from_slice(simd, &loaded).swizzle_dyn_within_blocks(spread).bitcast();
         let opaque = colors | u32x16::splat(simd, 0xff00_0000);
         opaque.bitcast::<u8x64<S>>().store_slice(block);
         done += 16;
@@ -96,7 +104,8 @@ pub(crate) fn give_full_alpha_scalar(narrow: &[u8], wide: &mut Vec<u8>) {
     let mut done = 0;
     for two in wide.as_chunks_mut::<8>().0 {
         // Eight bytes are loaded for six.
-        let Some(bytes) = narrow.get(3 * done..3 * done + 8).and_then(|bytes| bytes.first_chunk::<8>())
+        let Some(bytes) =
+            narrow.get(3 * done..3 * done + 8).and_then(|bytes| bytes.first_chunk::<8>())
         else {
             break;
         };

@@ -3,8 +3,8 @@ use crate::color::Color;
 use crate::simd::load_64;
 use bytemuck::{cast_slice, cast_slice_mut, pod_read_unaligned};
 use fearless_simd::{
-    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, mask32x16, u8x64,
-    u16x32, u32x16,
+    Bytes, Select, Simd, SimdBase, SimdInt, SimdMask, SimdNarrow, SimdWiden, f32x16, mask32x16,
+    u8x64, u16x32, u32x16,
 };
 
 /// Sixteen colours of four bytes.
@@ -13,9 +13,11 @@ pub(crate) fn colors_16<S: Simd>(simd: S, bytes: &[u8]) -> u32x16<S> {
     u8x64::from_slice(simd, bytes).bitcast()
 }
 
-/// Takes the pixels that are nearer than those held; equal depths too if `wins_ties`. Held depths are at most 1.
+/// Takes the pixels that are nearer than those held; equal depths too if `wins_ties`. Held depths
+/// are at most 1.
 ///
-/// `colors` and `depths` are raw values, one for each of `held_colors`; depths of 1 and beyond and NaN are never taken.
+/// `colors` and `depths` are raw values, one for each of `held_colors`; depths of 1 and beyond and
+/// NaN are never taken.
 #[inline(always)]
 pub(crate) fn nearest_run<C: Color, S: Simd>(
     simd: S,
@@ -28,7 +30,8 @@ pub(crate) fn nearest_run<C: Color, S: Simd>(
     let mut done = 0;
     if C::BYTES == 4 {
         let held_bytes: &mut [u8] = cast_slice_mut(held_colors);
-        let ours = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
+        let ours =
+            held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
         let theirs = colors.as_chunks::<64>().0.iter().zip(depths.as_chunks::<64>().0);
         for ((held_color, held_depth), (color, depth)) in ours.zip(theirs) {
             let depth: f32x16<S> = u8x64::from_slice(simd, depth).bitcast();
@@ -48,8 +51,8 @@ pub(crate) fn nearest_run<C: Color, S: Simd>(
     nearest_rest(colors, depths, held_colors, held_depths, wins_ties, done);
 }
 
-/// [`nearest_run`] without vector types: sixteen depths and colours of 32 bits at a time, as masks of all ones or zeros, which compilers
-/// turn into the vectors that every machine has.
+/// [`nearest_run`] without vector types: sixteen depths and colours of 32 bits at a time, as masks
+/// of all ones or zeros, which compilers turn into the vectors that every machine has.
 pub(crate) fn nearest_run_scalar<C: Color>(
     colors: &[u8],
     depths: &[u8],
@@ -59,7 +62,8 @@ pub(crate) fn nearest_run_scalar<C: Color>(
 ) {
     if C::BYTES == 4 {
         let held_bytes: &mut [u8] = cast_slice_mut(held_colors);
-        let ours = held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
+        let ours =
+            held_bytes.as_chunks_mut::<64>().0.iter_mut().zip(held_depths.as_chunks_mut::<16>().0);
         let theirs = colors.as_chunks::<64>().0.iter().zip(depths.as_chunks::<64>().0);
         for ((held_color, held_depth), (color, depth)) in ours.zip(theirs) {
             let depth: [f32; 16] = bytemuck::cast(*depth);
@@ -98,7 +102,8 @@ fn nearest_rest<C: Color>(
     wins_ties: bool,
     done: usize,
 ) {
-    let rest = colors[done * C::BYTES..].chunks_exact(C::BYTES).zip(depths[done * 4..].chunks_exact(4));
+    let rest =
+        colors[done * C::BYTES..].chunks_exact(C::BYTES).zip(depths[done * 4..].chunks_exact(4));
     let held = held_colors[done..].iter_mut().zip(&mut held_depths[done..]);
     for ((color, depth), (held_color, held_depth)) in rest.zip(held) {
         let depth: f32 = pod_read_unaligned(depth);
@@ -109,8 +114,8 @@ fn nearest_rest<C: Color>(
     }
 }
 
-/// The depth test of sixteen pixels, of which `lanes` says which take part. Colours that lose are not even read: of eight layers in any
-/// order a third is.
+/// The depth test of sixteen pixels, of which `lanes` says which take part. Colours that lose are
+/// not even read: of eight layers in any order a third is.
 #[inline(always)]
 pub(crate) fn take_nearer<S: Simd>(
     simd: S,
@@ -153,10 +158,16 @@ pub(crate) fn over_one_by_one<C: Color>(others: &[u8], held: &mut [C], others_in
 
 /// Sixteen pixels at a time in 16-bit lanes.
 ///
-/// A colour of zeros is the identity of this operator on either side, so nothing needs to be masked. `x / 255` for
-/// `x < 65535` is `(x + 1 + (x >> 8)) >> 8` (J. Blinn, "Three Wrongs Make a Right", IEEE CG&A 15(6), 1995).
+/// A colour of zeros is the identity of this operator on either side, so nothing needs to be
+/// masked. `x / 255` for `x < 65535` is `(x + 1 + (x >> 8)) >> 8` (J. Blinn, "Three Wrongs Make a
+/// Right", IEEE CG&A 15(6), 1995).
 #[inline(always)]
-pub(crate) fn over_rgba8<S: Simd>(simd: S, others: &[u8], held: &mut [[u8; 4]], others_in_front: bool) {
+pub(crate) fn over_rgba8<S: Simd>(
+    simd: S,
+    others: &[u8],
+    held: &mut [[u8; 4]],
+    others_in_front: bool,
+) {
     let alpha_of: [u8; 64] = std::array::from_fn(|i| (i % 16 / 4 * 4 + 3) as u8);
     let alpha_of = u8x64::from_slice(simd, &alpha_of);
     let held_bytes: &mut [u8] = cast_slice_mut(held);
@@ -184,7 +195,12 @@ fn divided_by_255<S: Simd>(simd: S, product: u16x32<S>) -> u16x32<S> {
 
 /// Four pixels at a time; inactive ones are the identity.
 #[inline(always)]
-pub(crate) fn over_f32<S: Simd>(simd: S, others: &[u8], held: &mut [[f32; 4]], others_in_front: bool) {
+pub(crate) fn over_f32<S: Simd>(
+    simd: S,
+    others: &[u8],
+    held: &mut [[f32; 4]],
+    others_in_front: bool,
+) {
     let alpha_of: [u8; 64] = std::array::from_fn(|i| (12 + i % 4) as u8);
     let alpha_of = u8x64::from_slice(simd, &alpha_of);
     let zero = u32x16::splat(simd, 0);
@@ -199,7 +215,8 @@ pub(crate) fn over_f32<S: Simd>(simd: S, others: &[u8], held: &mut [[f32; 4]], o
         let ours = colors_16(simd, cast_slice(four));
         let empty_ours = lanes_of_empty_pixels(ours.simd_eq(zero).to_bitmask());
         let (front, back) = if others_in_front { (theirs, ours) } else { (ours, theirs) };
-        let alpha: f32x16<S> = front.bitcast::<u8x64<S>>().swizzle_dyn_within_blocks(alpha_of).bitcast();
+        let alpha: f32x16<S> =
+            front.bitcast::<u8x64<S>>().swizzle_dyn_within_blocks(alpha_of).bitcast();
         let (front, back): (f32x16<S>, f32x16<S>) = (front.bitcast(), back.bitcast());
         let merged: f32x16<S> = front + (f32x16::splat(simd, 1.0) - alpha) * back;
         let mut merged: u32x16<S> = merged.bitcast();
@@ -212,7 +229,8 @@ pub(crate) fn over_f32<S: Simd>(simd: S, others: &[u8], held: &mut [[f32; 4]], o
     over_one_by_one(&others[64 * blocks..], &mut held[4 * blocks..], others_in_front);
 }
 
-/// All lanes of those of four pixels whose four lanes are all zero; a bit is set for each lane that is.
+/// All lanes of those of four pixels whose four lanes are all zero; a bit is set for each lane that
+/// is.
 #[inline(always)]
 fn lanes_of_empty_pixels(zero_lanes: u64) -> u64 {
     let pairs = zero_lanes & (zero_lanes >> 1);
@@ -238,7 +256,9 @@ mod tests {
 
     #[test]
     fn a_pixel_is_empty_only_if_its_own_four_lanes_are_zero() {
-        for (zero, empty) in [(0x000f, 0x000f), (0x0f00, 0x0f00), (0xf3c1, 0xf000), (0xffff, 0xffff)] {
+        for (zero, empty) in
+            [(0x000f, 0x000f), (0x0f00, 0x0f00), (0xf3c1, 0xf000), (0xffff, 0xffff)]
+        {
             assert_eq!(lanes_of_empty_pixels(zero), empty);
         }
         for zero in [0x0000, 0x00f0 >> 2, 0x7777] {

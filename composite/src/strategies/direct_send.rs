@@ -1,9 +1,12 @@
-//! Direct send: every rank owns a tile of the image and gets it from all ranks that drew something there.
+//! Direct send: every rank owns a tile of the image and gets it from all ranks that drew something
+//! there.
 //!
-//! One exchange instead of log p rounds. All ranks know from the rectangles they drew in which tiles there are and which messages
-//! will come, so nobody waits for a rank that has nothing to give, and every receive is posted before the first message is made.
-//! Tiles are cut in slices: while one slice travels the next is compressed, and a slice that is complete goes to the collecting
-//! rank while others are still being joined. [`crate::stream`] hands slices in while the frame is still being rendered.
+//! One exchange instead of log p rounds. All ranks know from the rectangles they drew in which
+//! tiles there are and which messages will come, so nobody waits for a rank that has nothing to
+//! give, and every receive is posted before the first message is made. Tiles are cut in slices:
+//! while one slice travels the next is compressed, and a slice that is complete goes to the
+//! collecting rank while others are still being joined. [`crate::stream`] hands slices in while the
+//! frame is still being rendered.
 use crate::codec;
 use crate::collect::Collector;
 use crate::error::CompositeError;
@@ -22,8 +25,13 @@ pub(crate) struct Plan {
 
 impl Plan {
     /// `root` is the place that collects the image over a wire of its own.
-    pub(crate) fn new<P: Composite>(drawn: &[Rect], slice_pixels: usize, root: Option<usize>) -> Self {
-        let cut = |tile: Rect| if tile.is_empty() { Vec::new() } else { slices(tile, slice_pixels) };
+    pub(crate) fn new<P: Composite>(
+        drawn: &[Rect],
+        slice_pixels: usize,
+        root: Option<usize>,
+    ) -> Self {
+        let cut =
+            |tile: Rect| if tile.is_empty() { Vec::new() } else { slices(tile, slice_pixels) };
         let mut owners = owners::<P>(drawn, root);
         Self { slices: balanced_among(drawn, &mut owners).into_iter().map(cut).collect() }
     }
@@ -49,17 +57,21 @@ const FULL_SHARE: u64 = 256;
 
 /// Which places own tiles, and how large ones.
 ///
-/// The collecting place gets the finished image besides, over the same wire. With a share `x` of the exchange `e` and of the image `g` (bytes
-/// that come in), it receives `x e + (1 - x) g` while each other one receives `(1 - x) e / (p - 1)`. They are equal for
-/// `x = (e / (p - 1) - g) / (e p / (p - 1) - g)`, which is nothing from a handful of ranks on. Two ranks share alike: there what one does not
-/// join the other must, and both work all the time. So do ranks of one memory, where every byte costs the same processors.
+/// The collecting place gets the finished image besides, over the same wire. With a share `x` of
+/// the exchange `e` and of the image `g` (bytes that come in), it receives `x e + (1 - x) g` while
+/// each other one receives `(1 - x) e / (p - 1)`. They are equal for `x = (e / (p - 1) - g) / (e p
+/// / (p - 1) - g)`, which is nothing from a handful of ranks on. Two ranks share alike: there what
+/// one does not join the other must, and both work all the time. So do ranks of one memory, where
+/// every byte costs the same processors.
 fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
     let num_ranks = drawn.len();
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).pixels();
     let layers: usize = drawn.iter().map(Rect::pixels).sum();
-    // As many as there are tiles worth a message, and enough that what comes to each is no more than what comes to the root.
+    // As many as there are tiles worth a message, and enough that what comes to each is no more
+    // than what comes to the root.
     let (drawn_bytes, image_bytes) = (layers * P::BYTES, whole * size_of::<P::Color>());
-    let wanted = (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, num_ranks);
+    let wanted =
+        (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, num_ranks);
 
     let share = match root {
         Some(_) if num_ranks > 2 => {
@@ -96,9 +108,10 @@ pub(crate) fn run<P: Composite>(
     let (order_index, num_ranks) = (exchange.order_index, exchange.num_ranks());
     let mut tile_exchange = TileExchange::new(plan, exchange)?;
 
-    // Everybody's first slices, then everybody's second …; the next place first, so that no rank gets all first messages. No more than two
-    // rounds are on their way: messages share the wire, and with all of them under way at once the first slices would be complete, and begin
-    // to be collected, no sooner than the last. With a few slices only there is nothing to gain.
+    // Everybody's first slices, then everybody's second …; the next place first, so that no rank
+    // gets all first messages. No more than two rounds are on their way: messages share the wire,
+    // and with all of them under way at once the first slices would be complete, and begin to be
+    // collected, no sooner than the last. With a few slices only there is nothing to gain.
     let most = plan.slices.iter().map(Vec::len).max().unwrap_or(0);
     let mut last_round = 0;
     for index in 0..most {
@@ -140,12 +153,17 @@ pub(crate) struct TileExchange<'a, P: Composite> {
 
 impl<'a, P: Composite> TileExchange<'a, P> {
     /// Posts the receives of this place.
-    pub(crate) fn new(plan: &Plan, exchange: &mut FrameExchange<'_>) -> Result<Self, CompositeError> {
+    pub(crate) fn new(
+        plan: &Plan,
+        exchange: &mut FrameExchange<'_>,
+    ) -> Result<Self, CompositeError> {
         let (order_index, num_ranks) = (exchange.order_index, exchange.num_ranks());
         let own = plan.slices[order_index].clone();
         let drawn = exchange.drawn.clone();
         let mut outstanding = vec![Vec::new(); num_ranks];
-        for (from, parts) in outstanding.iter_mut().enumerate().filter(|(from, _)| *from != order_index) {
+        for (from, parts) in
+            outstanding.iter_mut().enumerate().filter(|(from, _)| *from != order_index)
+        {
             for (index, slice) in own.iter().enumerate() {
                 let part = drawn[from].intersection(slice);
                 if !part.is_empty() {
@@ -236,7 +254,8 @@ impl<'a, P: Composite> TileExchange<'a, P> {
         let said = codec::rect_of(&bytes);
         let parts = &mut self.outstanding[from];
         let position = parts.iter().position(|part| Some(part.1) == said).unwrap_or(0);
-        let (index, part) = if parts.is_empty() { (0, Rect::EMPTY) } else { parts.remove(position) };
+        let (index, part) =
+            if parts.is_empty() { (0, Rect::EMPTY) } else { parts.remove(position) };
         let begin = exchange.comm.working_secs();
         let message = exchange.check::<P>(from, bytes, part, true)?;
         exchange.report.blend_secs += exchange.comm.working_secs() - begin;

@@ -1,4 +1,5 @@
-//! What tree, binary swap and radix-k share: slots instead of places, and what a block of slots can have drawn.
+//! What tree, binary swap and radix-k share: slots instead of places, and what a block of slots can
+//! have drawn.
 //!
 //! Ranks beyond a power of two hand their image to a neighbour first; each pair is one slot.
 use crate::collect::Collector;
@@ -46,14 +47,20 @@ impl<P: Composite> SlotImage<'_, P> {
 }
 
 /// The rectangle around all that the slots `first..first + count` have drawn.
-pub(crate) fn bounds_of_slots(drawn: &[Rect], folding: &Folding, first: usize, count: usize) -> Rect {
+pub(crate) fn bounds_of_slots(
+    drawn: &[Rect],
+    folding: &Folding,
+    first: usize,
+    count: usize,
+) -> Rect {
     // Slots keep the order of places, so a block of slots is a block of places.
     let last = folding.leader(first + count - 1);
     let end = folding.partner(last).unwrap_or(last) + 1;
     drawn[folding.leader(first)..end].iter().fold(Rect::EMPTY, |all, rect| all.around(rect))
 }
 
-/// Pairs are joined; returns the slot and what it holds on leaders, `None` on ranks that have handed theirs over.
+/// Pairs are joined; returns the slot and what it holds on leaders, `None` on ranks that have
+/// handed theirs over.
 pub(crate) fn fold<'a, P: Composite>(
     exchange: &mut FrameExchange<'_>,
     frame: &View<'a, P>,
@@ -79,12 +86,13 @@ pub(crate) fn fold<'a, P: Composite>(
     let members = [leader, partner];
     let rects = [frame.bounds, theirs];
     let bounds = frame.bounds.around(&theirs);
-    let layer = merge_members(exchange, &held, 0, &members, bounds, |i| rects[i], collector, scratch)?;
+    let layer =
+        merge_members(exchange, &held, 0, &members, bounds, |i| rects[i], collector, scratch)?;
     Ok(Some((slot, SlotImage::Merged(layer))))
 }
 
-/// Joins what `members` (places) have in `bounds`, as it comes; their receives are posted. `own` is the number of this rank, and
-/// `rect_of` says what each member brings.
+/// Joins what `members` (places) have in `bounds`, as it comes; their receives are posted. `own` is
+/// the number of this rank, and `rect_of` says what each member brings.
 pub(crate) fn merge_members<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     held: &SlotImage<'_, P>,

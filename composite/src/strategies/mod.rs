@@ -1,9 +1,11 @@
-//! Ways to bring the pixels of all ranks together, one a file, all with the signature
-//! `fn run<P>(&mut FrameExchange, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send takes its plan, radix-k its k as well) and
-//! all with the same bits as [`composite_serial`](crate::composite_serial).
+//! Ways to bring the pixels of all ranks together, one a file, all with the signature `fn
+//! run<P>(&mut FrameExchange, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send takes its
+//! plan, radix-k its k as well) and all with the same bits as
+//! [`composite_serial`](crate::composite_serial).
 //!
-//! Each hands the pieces of the finished image that the rank holds to the [collector](crate::collect), as soon as they are
-//! finished; its function `pieces` says beforehand, and on all ranks alike, which these will be.
+//! Each hands the pieces of the finished image that the rank holds to the
+//! [collector](crate::collect), as soon as they are finished; its function `pieces` says
+//! beforehand, and on all ranks alike, which these will be.
 pub(crate) mod binary_swap;
 pub(crate) mod direct_send;
 pub(crate) mod folding;
@@ -21,21 +23,25 @@ use crate::rect::Rect;
 /// Which way the pixels take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Strategy {
-    /// Every rank owns a tile of the image and gets that tile from all others at once. Tiles are balanced by what all ranks
-    /// have drawn, and ranks that drew nothing in a tile send nothing to its owner.
+    /// Every rank owns a tile of the image and gets that tile from all others at once. Tiles are
+    /// balanced by what all ranks have drawn, and ranks that drew nothing in a tile send nothing to
+    /// its owner.
     #[default]
     DirectSend,
-    /// Half of the ranks hand their whole image to the other half, again and again; ends whole on one rank.
+    /// Half of the ranks hand their whole image to the other half, again and again; ends whole on
+    /// one rank.
     Tree,
-    /// Ma et al. 1994: partners exchange halves of what they hold, log2 p times. Other rank counts are folded first.
+    /// Ma et al. 1994: partners exchange halves of what they hold, log2 p times. Other rank counts
+    /// are folded first.
     BinarySwap,
-    /// Peterka et al. 2009: as binary swap, in groups of up to `k` ranks. `k` is a power of two, at least 2 (IceT uses 8).
+    /// Peterka et al. 2009: as binary swap, in groups of up to `k` ranks. `k` is a power of two, at
+    /// least 2 (IceT uses 8).
     RadixK {
         /// Largest group of a round.
         k: usize,
     },
-    /// The one that should be fastest for the rectangles of this frame, by a [model](crate::Network) of the network that is
-    /// measured before the first frame.
+    /// The one that should be fastest for the rectangles of this frame, by a
+    /// [model](crate::Network) of the network that is measured before the first frame.
     Automatic,
 }
 
@@ -53,16 +59,24 @@ impl Strategy {
 
     pub(crate) fn check(self) -> Result<(), CompositeError> {
         match self {
-            Self::RadixK { k } if k < 2 || !k.is_power_of_two() => Err(CompositeError::Options(format!(
-                "radix-k with k = {k}: the fixed grouping of ranks needs a power of two, for example 8"
-            ))),
+            Self::RadixK { k } if k < 2 || !k.is_power_of_two() => {
+                Err(CompositeError::Options(format!(
+                    "radix-k with k = {k}: the fixed grouping of ranks needs a power of two, for \
+                     example 8"
+                )))
+            }
             _ => Ok(()),
         }
     }
 
     /// What this rank, and every other, is going to do with what all have drawn.
     /// `root` is the place that collects the image.
-    pub(crate) fn plan<P: Composite>(self, drawn: &[Rect], slice_pixels: usize, root: Option<usize>) -> Plan {
+    pub(crate) fn plan<P: Composite>(
+        self,
+        drawn: &[Rect],
+        slice_pixels: usize,
+        root: Option<usize>,
+    ) -> Plan {
         match self {
             // Automatic has been replaced by what was chosen.
             Self::DirectSend | Self::Automatic => {

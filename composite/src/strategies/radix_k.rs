@@ -1,9 +1,11 @@
-//! Radix-k (T. Peterka, D. Goodell, R. Ross, H.-W. Shen, R. Thakur, "A Configurable Algorithm for Parallel Image-Compositing
-//! Applications", SC09): the number of slots is a product of group sizes; in each round the members of a group divide the
-//! part they all hold, and each gets its share from all others at once.
+//! Radix-k (T. Peterka, D. Goodell, R. Ross, H.-W. Shen, R. Thakur, "A Configurable Algorithm for
+//! Parallel Image-Compositing Applications", SC09): the number of slots is a product of group
+//! sizes; in each round the members of a group divide the part they all hold, and each gets its
+//! share from all others at once.
 //!
-//! Fewer rounds than binary swap, more messages in each. Here group sizes are powers of two and the members of a group are
-//! joined as a balanced tree, so that the grouping is that of [`crate::rank_order`] for every k.
+//! Fewer rounds than binary swap, more messages in each. Here group sizes are powers of two and the
+//! members of a group are joined as a balanced tree, so that the grouping is that of
+//! [`crate::rank_order`] for every k.
 use super::folding::{SlotImage, bounds_of_slots, fold, merge_members};
 use crate::collect::Collector;
 use crate::error::CompositeError;
@@ -68,7 +70,8 @@ pub(crate) fn run<P: Composite>(
             }
         }
 
-        // Give each member its share, beginning with the next one, so that nobody gets all first messages.
+        // Give each member its share, beginning with the next one, so that nobody gets all first
+        // messages.
         for step in 1..members {
             let member = (digit + step) % members;
             let give = reaches[digit].intersection(&share(&part, member, members));
@@ -78,10 +81,19 @@ pub(crate) fn run<P: Composite>(
         }
 
         // Join the own share of all members.
-        let bounds = reaches.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).intersection(&keep);
+        let bounds =
+            reaches.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).intersection(&keep);
         let brings = |member: usize| reaches[member].intersection(&keep);
-        let layer =
-            merge_members(exchange, &held, digit, &order_indices, bounds, brings, collector, scratch)?;
+        let layer = merge_members(
+            exchange,
+            &held,
+            digit,
+            &order_indices,
+            bounds,
+            brings,
+            collector,
+            scratch,
+        )?;
         std::mem::replace(&mut held, SlotImage::Merged(layer)).recycle(scratch);
         part = keep;
         stride *= members;
@@ -93,7 +105,8 @@ pub(crate) fn run<P: Composite>(
     collector.submit(exchange, layer, scratch)
 }
 
-/// Share number `member` of `part`, cut into `members` shares of rows that differ by at most one row.
+/// Share number `member` of `part`, cut into `members` shares of rows that differ by at most one
+/// row.
 pub(crate) fn share(part: &Rect, member: usize, members: usize) -> Rect {
     let row = |i: usize| part.y0 + (part.height() as u64 * i as u64 / members as u64) as u32;
     let share = Rect { y0: row(member), y1: row(member + 1), ..*part };
@@ -109,7 +122,8 @@ mod tests {
         for rows in [1, 3, 8, 1001, u32::MAX - 10] {
             for members in [1, 2, 8, 16] {
                 let part = Rect { x0: 5, y0: 10, x1: 6, y1: 10 + rows };
-                let shares: Vec<Rect> = (0..members).map(|member| share(&part, member, members)).collect();
+                let shares: Vec<Rect> =
+                    (0..members).map(|member| share(&part, member, members)).collect();
                 assert_eq!(shares.iter().map(Rect::pixels).sum::<usize>(), part.pixels());
                 let whole = shares.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
                 assert_eq!(whole, part);

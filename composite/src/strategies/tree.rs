@@ -1,7 +1,8 @@
-//! Binary tree: in round l, slots with bit l set hand their whole image to the slot 2^l below and are done.
+//! Binary tree: in round l, slots with bit l set hand their whole image to the slot 2^l below and
+//! are done.
 //!
-//! Half of the ranks fall idle in every round and the last one moves a whole image, so it pays only for two ranks or for
-//! very sparse images; there is nothing left to collect.
+//! Half of the ranks fall idle in every round and the last one moves a whole image, so it pays only
+//! for two ranks or for very sparse images; there is nothing left to collect.
 use super::folding::{SlotImage, bounds_of_slots, fold, merge_members};
 use crate::collect::Collector;
 use crate::error::CompositeError;
@@ -34,7 +35,13 @@ pub(crate) fn run<P: Composite>(
         let own = bounds_of_slots(&drawn, &folding, slot, stride);
         if slot & stride != 0 {
             if !own.is_empty() {
-                exchange.send(folding.leader(slot - stride), Tag::Exchange, &held.view(), own, true)?;
+                exchange.send(
+                    folding.leader(slot - stride),
+                    Tag::Exchange,
+                    &held.view(),
+                    own,
+                    true,
+                )?;
             }
             return Ok(());
         }
@@ -44,8 +51,16 @@ pub(crate) fn run<P: Composite>(
             exchange.post::<P>(members[1], Tag::Exchange, &theirs)?;
             let rects = [own, theirs];
             let bounds = own.around(&theirs);
-            let layer =
-                merge_members(exchange, &held, 0, &members, bounds, |i| rects[i], collector, scratch)?;
+            let layer = merge_members(
+                exchange,
+                &held,
+                0,
+                &members,
+                bounds,
+                |i| rects[i],
+                collector,
+                scratch,
+            )?;
             std::mem::replace(&mut held, SlotImage::Merged(layer)).recycle(scratch);
         }
         stride *= 2;

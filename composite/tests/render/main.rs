@@ -4,8 +4,8 @@ mod volumes;
 
 use composite::comm::sim;
 use composite::render::{
-    Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Partition, SecondaryRayPolicy, Split,
-    ray_parallel,
+    Activity, DataParallel, FrameError, FrameOptions, FrameOutput, Partition, SecondaryRayPolicy,
+    Split, ray_parallel,
 };
 use composite::{Communicator, threads};
 use rt_core::bvh::BuildOptions;
@@ -20,7 +20,11 @@ fn one_node(case: &Case) -> Frame {
 }
 
 fn frame_options(light: SecondaryRayPolicy) -> FrameOptions {
-    FrameOptions { secondary_rays: light, timeout: Duration::from_secs(120), ..FrameOptions::default() }
+    FrameOptions {
+        secondary_rays: light,
+        timeout: Duration::from_secs(120),
+        ..FrameOptions::default()
+    }
 }
 
 /// All ranks' outputs; the picture is that of the last rank.
@@ -116,11 +120,15 @@ fn frames_without_secondary_rays_send_none_and_have_the_bits_of_one_node() {
         let case = scenes::headlight(samples);
         let expected = one_node(&case);
         for ranks in [2, 5, 32] {
-            let outputs = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
+            let outputs =
+                many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
             assert_same(&expected, &outputs, &format!("{samples} samples, {ranks} ranks"));
             for o in &outputs {
                 // Later rays of the geometry pass are answered by nobody, because there are none.
-                assert_eq!((o.report.points_sent, o.report.rays_sent, o.report.answered_rays), (0, 0, 0));
+                assert_eq!(
+                    (o.report.points_sent, o.report.rays_sent, o.report.answered_rays),
+                    (0, 0, 0)
+                );
                 assert_eq!(o.report.secondary_rays, "no light crosses borders");
             }
         }
@@ -145,16 +153,18 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
         ] {
             let partition = Partition::new(&case.scene, ranks, &split);
             for stream in [true, false] {
-                let outputs = sim::run(ranks, sim::Network::FREE, sim::Compute::Measured(1.0), |mut comm| {
-                    let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
-                    let options = FrameOptions {
-                        root: Some(ranks - 1),
-                        stream,
-                        ..frame_options(SecondaryRayPolicy::Forward)
-                    };
-                    let mut renderer = DataParallel::new(&mut comm, part, options)?;
-                    renderer.frame(&mut comm, &case.camera, &case.options)
-                });
+                let outputs =
+                    sim::run(ranks, sim::Network::FREE, sim::Compute::Measured(1.0), |mut comm| {
+                        let part =
+                            partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
+                        let options = FrameOptions {
+                            root: Some(ranks - 1),
+                            stream,
+                            ..frame_options(SecondaryRayPolicy::Forward)
+                        };
+                        let mut renderer = DataParallel::new(&mut comm, part, options)?;
+                        renderer.frame(&mut comm, &case.camera, &case.options)
+                    });
                 let outputs: Vec<FrameOutput> = outputs
                     .into_iter()
                     .map(|o: Result<Result<_, FrameError>, _>| o.unwrap().unwrap())
@@ -164,7 +174,8 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
                     &outputs,
                     &format!("{samples} samples, {ranks} ranks, stream {stream}"),
                 );
-                // Some rank has finished tiles before it has traced its last ray, or none has. (With few tiles for each rank it does not pay.)
+                // Some rank has finished tiles before it has traced its last ray, or none has.
+                // (With few tiles for each rank it does not pay.)
                 let overlaps = |o: &FrameOutput| {
                     let mut spans = o.report.spans.iter().map(|s| s.activity);
                     let last = spans.clone().rposition(|a| a == Activity::Render);
@@ -183,7 +194,8 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
 fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
     for case in scenes::several_waves() {
         let expected = one_node(&case);
-        for (ranks, split) in [(3, Split::Triangles), (8, Split::Random { seed: 9 }), (16, Split::Triangles)]
+        for (ranks, split) in
+            [(3, Split::Triangles), (8, Split::Random { seed: 9 }), (16, Split::Triangles)]
         {
             let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
@@ -196,7 +208,8 @@ fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
 fn a_volume_in_bricks_has_the_bits_of_one_node() {
     for case in scenes::volumes() {
         let expected = one_node(&case);
-        for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (64, Split::Triangles)]
+        for (ranks, split) in
+            [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (64, Split::Triangles)]
         {
             let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
@@ -205,7 +218,10 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
         // Every rank holds its brick with two layers of points around it, and not the whole.
         let whole = case.scene.volumes[0].volume.grid().values.len();
         let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
-        assert!(held.iter().all(|&n| n < whole / 2) && held.iter().sum::<usize>() >= whole, "{held:?}");
+        assert!(
+            held.iter().all(|&n| n < whole / 2) && held.iter().sum::<usize>() >= whole,
+            "{held:?}"
+        );
     }
 }
 
@@ -219,7 +235,9 @@ fn values_held(case: &Case, partition: &Partition) -> Vec<usize> {
 fn parts_of_tubes_cylinders_and_spheres_hold_their_own_and_have_the_bits_of_one_node() {
     let case = scenes::arrays_of_shapes();
     let expected = one_node(&case);
-    for (ranks, split) in [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (32, Split::Triangles)] {
+    for (ranks, split) in
+        [(2, Split::Triangles), (7, Split::Random { seed: 5 }), (32, Split::Triangles)]
+    {
         let outputs = many(&case, ranks, &split, SecondaryRayPolicy::Forward);
         assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
     }
@@ -239,14 +257,20 @@ fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
         );
         let asked = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
         assert_same(&expected, &asked, &format!("asking, {ranks} ranks"));
-        // Few points are asked of others with ghost zones: those whose hit is another rank's, once each.
+        // Few points are asked of others with ghost zones: those whose hit is another rank's, once
+        // each.
         let traced = |o: &[FrameOutput]| o.iter().map(|o| o.report.answered_rays).sum::<u64>();
         assert!(traced(&ghost) < traced(&asked), "{} {}", traced(&ghost), traced(&asked));
         // Built for one frame zones are dear, for thousands cheap: see the words.
         let once = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
-        let often = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 100_000 });
+        let often =
+            many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 100_000 });
         assert_same(&expected, &often, "many frames");
-        assert!(once[0].report.secondary_rays.contains("estimated"), "{}", once[0].report.secondary_rays);
+        assert!(
+            once[0].report.secondary_rays.contains("estimated"),
+            "{}",
+            once[0].report.secondary_rays
+        );
         assert!(
             often[0].report.secondary_rays.starts_with("ghost zones"),
             "{}",
@@ -261,12 +285,16 @@ fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
 
 #[test]
 fn replicated_data_have_the_bits_of_one_node() {
-    for case in scenes::several_waves().into_iter().chain([scenes::shadows_and_occlusion(DVec3::ZERO)]) {
+    for case in
+        scenes::several_waves().into_iter().chain([scenes::shadows_and_occlusion(DVec3::ZERO)])
+    {
         let expected = one_node(&case);
         for ranks in [1, 3, 6] {
             let outputs = threads::run(ranks, |mut comm| {
-                let options =
-                    FrameOptions { root: Some(ranks - 1), ..frame_options(SecondaryRayPolicy::Forward) };
+                let options = FrameOptions {
+                    root: Some(ranks - 1),
+                    ..frame_options(SecondaryRayPolicy::Forward)
+                };
                 ray_parallel(&mut comm, &case.scene, &case.camera, &case.options, &options).unwrap()
             });
             let outputs: Vec<_> = outputs.into_iter().map(Result::unwrap).collect();
@@ -281,7 +309,10 @@ fn spans_cover_a_frame_without_gaps_and_bytes_add_up() {
     let outputs = many(&case, 5, &Split::Triangles, SecondaryRayPolicy::Forward);
     for o in &outputs {
         let spans = &o.report.spans;
-        assert!(spans.windows(2).all(|w| w[0].end_secs == w[1].begin_secs) && spans[0].begin_secs == 0.0);
+        assert!(
+            spans.windows(2).all(|w| w[0].end_secs == w[1].begin_secs)
+                && spans[0].begin_secs == 0.0
+        );
         assert!(spans.iter().all(|s| s.end_secs > s.begin_secs));
     }
     let rays = render(&case.scene, &case.camera, &case.options).unwrap().report.rays;
@@ -300,7 +331,8 @@ fn ranks_that_render_different_pictures_all_get_an_error() {
         if comm.rank() == 1 {
             options.width = 96;
         }
-        let frame_options = FrameOptions { timeout: Duration::from_secs(5), ..FrameOptions::default() };
+        let frame_options =
+            FrameOptions { timeout: Duration::from_secs(5), ..FrameOptions::default() };
         // A rank that is late finds the group ended already.
         let mut renderer = DataParallel::new(&mut comm, part, frame_options)?;
         renderer.frame(&mut comm, &case.camera, &options)

@@ -24,11 +24,13 @@ pub(crate) struct Case {
     pub(crate) options: RenderOptions,
 }
 
-/// Bumps over a square of 4 x 4 that stand on edge at some places, with smooth normals and a colour per triangle.
+/// Bumps over a square of 4 x 4 that stand on edge at some places, with smooth normals and a colour
+/// per triangle.
 pub(crate) fn bumps(shift: DVec3, cells: u32) -> TriMesh {
     let n = cells + 1;
     let at = |k: u32| {
-        let (x, y) = ((k % n) as f32 / cells as f32 * 4.0 - 2.0, (k / n) as f32 / cells as f32 * 4.0 - 2.0);
+        let (x, y) =
+            ((k % n) as f32 / cells as f32 * 4.0 - 2.0, (k / n) as f32 / cells as f32 * 4.0 - 2.0);
         Vec3::new(x, y, 0.5 * (4.0 * x).sin() * (3.5 * y).cos())
     };
     let mut mesh = TriMesh::new((0..n * n).map(at).collect(), vec![]);
@@ -48,7 +50,8 @@ pub(crate) fn bumps(shift: DVec3, cells: u32) -> TriMesh {
 
 pub(crate) fn camera(shift: DVec3) -> Camera {
     let eye = shift + DVec3::new(2.5, -4.0, 3.0);
-    Camera::perspective(eye, shift + DVec3::new(0.0, 0.0, 0.3), DVec3::Z, 0.8, 1.25, [0.1, 100.0]).unwrap()
+    Camera::perspective(eye, shift + DVec3::new(0.0, 0.0, 0.3), DVec3::Z, 0.8, 1.25, [0.1, 100.0])
+        .unwrap()
 }
 
 pub(crate) fn scene(
@@ -93,10 +96,14 @@ pub(crate) fn options() -> RenderOptions {
 
 pub(crate) const AMBIENT: [f32; 3] = [0.3; 3];
 
-/// Shadows, area lights and ambient occlusion, with light at a finite place: what the exchange of light bits is for.
+/// Shadows, area lights and ambient occlusion, with light at a finite place: what the exchange of
+/// light bits is for.
 pub(crate) fn shadows_and_occlusion(shift: DVec3) -> Case {
     let lamp = Light::point(shift + DVec3::new(1.0, 1.0, 4.0));
-    let sun = Light::directional(DVec3::new(0.6, -0.3, 0.7)).with_color([0.7; 3]).with_size(0.05).unwrap();
+    let sun = Light::directional(DVec3::new(0.6, -0.3, 0.7))
+        .with_color([0.7; 3])
+        .with_size(0.05)
+        .unwrap();
     let lights = [lamp, sun, Light::ambient(AMBIENT)];
     Case {
         name: "shadows, area light, ambient occlusion",
@@ -124,7 +131,8 @@ pub(crate) fn volumes() -> Vec<Case> {
         let (x, y, z) = (k % dims.x, k / dims.x % dims.y, k / dims.x / dims.y);
         let at = Vec3::new(x as f32, y as f32, z as f32) * 0.3;
         // Clear in one corner, and one point is missing.
-        let v = if x < 12 && y < 15 { 0.0 } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * at.z.sin() };
+        let v =
+            if x < 12 && y < 15 { 0.0 } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * at.z.sin() };
         if k == 20_000 { f32::NAN } else { v }
     };
     let grid = || {
@@ -134,7 +142,8 @@ pub(crate) fn volumes() -> Vec<Case> {
     let volume = |shading, interpolation| {
         let colors = ColorMap::new(vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.1, 1.0]], [0.0, 1.0]);
         let transfer =
-            TransferFunction::from_opacity(colors, &[[0.2, 0.0], [0.6, 0.3], [1.0, 0.9]], 0.4).unwrap();
+            TransferFunction::from_opacity(colors, &[[0.2, 0.0], [0.6, 0.3], [1.0, 0.9]], 0.4)
+                .unwrap();
         Volume::new(
             grid().into(),
             transfer,
@@ -160,10 +169,17 @@ pub(crate) fn volumes() -> Vec<Case> {
             Some(Material::dielectric(1.5)),
             volume(Some(shading), Interpolation::Linear),
         ),
-        ("volume around layers", Some(matte().with_opacity(0.4)), volume(None, Interpolation::Nearest)),
+        (
+            "volume around layers",
+            Some(matte().with_opacity(0.4)),
+            volume(None, Interpolation::Nearest),
+        ),
     ] {
-        let mut scene = scene(DVec3::ZERO, matte(), balls, &[sun, Light::ambient(AMBIENT)], Some(0.5));
-        scene.volumes.push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
+        let mut scene =
+            scene(DVec3::ZERO, matte(), balls, &[sun, Light::ambient(AMBIENT)], Some(0.5));
+        scene
+            .volumes
+            .push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
         out.push(Case { name, scene, camera, options: RenderOptions { samples: 2, ..options() } });
     }
     let mut b = SceneBuilder::new();
@@ -183,19 +199,28 @@ pub(crate) fn arrays_of_shapes() -> Case {
         for k in 0..n {
             let s = k as f32 / n as f32;
             let a = turns * s + 0.4 * line as f32;
-            points.push(Vec3::new(1.8 * a.cos() * s, 1.8 * a.sin() * s, 0.4 + 0.03 * line as f32 + 0.4 * s));
+            points.push(Vec3::new(
+                1.8 * a.cos() * s,
+                1.8 * a.sin() * s,
+                0.4 + 0.03 * line as f32 + 0.4 * s,
+            ));
             radii.push(0.03 + 0.02 * (9.0 * s).sin());
         }
         offsets.push(points.len() as u32);
     }
     let scalars = (0..points.len()).map(|k| (k % 19) as f32 / 19.0).collect();
-    let tubes = Tubes::new(points, &offsets, Radii::Each(radii)).unwrap().with_scalars(scalars).unwrap();
+    let tubes =
+        Tubes::new(points, &offsets, Radii::Each(radii)).unwrap().with_scalars(scalars).unwrap();
     let colors = ColorMap::new(vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.1, 1.0]], [0.0, 1.0]);
-    b.shape(Arc::new(tubes), Material { color_source: ColorSource::Scalars(colors.into()), ..matte() });
+    b.shape(
+        Arc::new(tubes),
+        Material { color_source: ColorSource::Scalars(colors.into()), ..matte() },
+    );
     let ends: Vec<Vec3> =
         (0..60).map(|k| Vec3::new(-2.0 + 0.06 * k as f32, -1.5, 0.3 * (k % 4) as f32)).collect();
     b.shape(Arc::new(Cylinders::new(ends, Radii::Common(0.05), true).unwrap()), matte());
-    let centers: Vec<Vec3> = (0..90).map(|k| Vec3::new(1.5, -1.5 + 0.033 * k as f32, 0.9)).collect();
+    let centers: Vec<Vec3> =
+        (0..90).map(|k| Vec3::new(1.5, -1.5 + 0.033 * k as f32, 0.9)).collect();
     let shades = (0..90).map(|k| [k as f32 / 90.0, 0.5, 0.3, 1.0]).collect();
     let spheres = Spheres::new(centers, Radii::Common(0.07)).unwrap().with_colors(shades).unwrap();
     b.shape(Arc::new(spheres), matte());
@@ -220,7 +245,8 @@ pub(crate) fn headlight(samples: u32) -> Case {
 pub(crate) fn several_waves() -> Vec<Case> {
     let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
     let ambient = Light::ambient(AMBIENT);
-    let small = || RenderOptions { samples: 2, ..RenderOptions { width: 75, height: 61, ..options() } };
+    let small =
+        || RenderOptions { samples: 2, ..RenderOptions { width: 75, height: 61, ..options() } };
     let metal = Material::metal([0.9, 0.8, 0.7], 0.15);
     let case = |name, scene, options| Case { name, scene, camera: camera(DVec3::ZERO), options };
     vec![
@@ -231,12 +257,24 @@ pub(crate) fn several_waves() -> Vec<Case> {
         ),
         case(
             "transparent layers",
-            scene(DVec3::ZERO, matte(), Some(matte().with_opacity(0.4)), &[sun, ambient], Some(0.5)),
+            scene(
+                DVec3::ZERO,
+                matte(),
+                Some(matte().with_opacity(0.4)),
+                &[sun, ambient],
+                Some(0.5),
+            ),
             RenderOptions { depth_min_opacity: 0.7, ..small() },
         ),
         case(
             "paths",
-            scene(DVec3::ZERO, matte(), Some(Material::metal([0.9; 3], 0.0)), &[sun, ambient], None),
+            scene(
+                DVec3::ZERO,
+                matte(),
+                Some(Material::metal([0.9; 3], 0.0)),
+                &[sun, ambient],
+                None,
+            ),
             RenderOptions { path_tracing: true, max_bounces: Some(4), ..small() },
         ),
     ]

@@ -1,4 +1,5 @@
-//! Several volumes, each in bricks or whole on some ranks, that share space with each other and with surfaces.
+//! Several volumes, each in bricks or whole on some ranks, that share space with each other and
+//! with surfaces.
 use super::scenes::{self, AMBIENT, Case, camera, matte, options};
 use super::{assert_same, dealt, differing_pixels, many, one_node, values_held};
 use composite::render::{FrameError, Partition, SecondaryRayPolicy, Split};
@@ -27,12 +28,14 @@ fn waves(
     let dims = UVec3::from_array(dims);
     let spacing = size / (dims - 1).as_dvec3();
     let value = |k: u32| {
-        let p = UVec3::new(k % dims.x, k / dims.x % dims.y, k / dims.x / dims.y).as_dvec3() * spacing;
+        let p =
+            UVec3::new(k % dims.x, k / dims.x % dims.y, k / dims.x / dims.y).as_dvec3() * spacing;
         let at = p.as_vec3() * 4.0 + Vec3::splat(opacity);
         // Clear at one side, and one point is missing.
         if k == 777 { f32::NAN } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * (at.z + 0.7).sin() }
     };
-    let grid = Grid::new(dims, origin, spacing, (0..dims.element_product()).map(value).collect()).unwrap();
+    let grid =
+        Grid::new(dims, origin, spacing, (0..dims.element_product()).map(value).collect()).unwrap();
     let rgba = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
     let colors = ColorMap::new(vec![rgba(low), rgba(high)], [0.0, 1.0]);
     let points = [[0.35, 0.0], [0.6, 0.4 * opacity], [1.0, opacity]];
@@ -56,16 +59,31 @@ fn shaded() -> VolumeOptions {
     VolumeOptions { shading: Some(shading), ..VolumeOptions::default() }
 }
 
-/// Three media: a coarse one, a fine one turned and stretched across it, and one that is wholly inside the first.
+/// Three media: a coarse one, a fine one turned and stretched across it, and one that is wholly
+/// inside the first.
 fn three() -> Vec<VolumeInstance> {
-    let coarse =
-        waves([21, 26, 19], DVec3::new(-1.9, -1.7, -0.6), DVec3::new(3.4, 3.2, 2.2), BLUE, 0.5, shaded());
-    let nearest = VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
-    let fine =
-        waves([67, 40, 51], DVec3::new(-1.0, -0.8, -0.4), DVec3::new(2.6, 1.6, 1.5), RED, 0.7, nearest);
+    let coarse = waves(
+        [21, 26, 19],
+        DVec3::new(-1.9, -1.7, -0.6),
+        DVec3::new(3.4, 3.2, 2.2),
+        BLUE,
+        0.5,
+        shaded(),
+    );
+    let nearest =
+        VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
+    let fine = waves(
+        [67, 40, 51],
+        DVec3::new(-1.0, -0.8, -0.4),
+        DVec3::new(2.6, 1.6, 1.5),
+        RED,
+        0.7,
+        nearest,
+    );
     let steep = GradientOpacity { factors: vec![0.2, 1.0].into(), steepest: 3.0 };
     let inside = VolumeOptions { gradient_opacity: Some(steep), ..VolumeOptions::default() };
-    let inside = waves([33, 33, 33], DVec3::new(-0.7, -0.9, 0.2), DVec3::splat(0.8), GREEN, 0.9, inside);
+    let inside =
+        waves([33, 33, 33], DVec3::new(-0.7, -0.9, 0.2), DVec3::splat(0.8), GREEN, 0.9, inside);
     let turned = DAffine3::from_translation(DVec3::new(0.4, 0.3, 0.2))
         * DAffine3::from_rotation_z(0.6)
         * DAffine3::from_rotation_x(0.3)
@@ -96,7 +114,11 @@ fn alone(volumes: Vec<VolumeInstance>) -> Case {
 
 #[test]
 fn several_volumes_that_overlap_have_the_bits_of_one_node() {
-    let glass = case("volumes behind and around glass and mirrors", Some(Material::dielectric(1.5)), three());
+    let glass = case(
+        "volumes behind and around glass and mirrors",
+        Some(Material::dielectric(1.5)),
+        three(),
+    );
     let layers = case("volumes between layers", Some(matte().with_opacity(0.4)), three());
     let mut stepped = alone(three());
     (stepped.name, stepped.options.volume_quality) = ("steps", VolumeQuality::Step { voxels: 0.7 });
@@ -107,7 +129,11 @@ fn several_volumes_that_overlap_have_the_bits_of_one_node() {
             let mut without = case.scene.clone();
             without.volumes.remove(out);
             let without = render(&without, &case.camera, &case.options).unwrap().frame;
-            assert!(differing_pixels(&expected, &without) > 300, "volume {out} is not seen: {}", case.name);
+            assert!(
+                differing_pixels(&expected, &without) > 300,
+                "volume {out} is not seen: {}",
+                case.name
+            );
         }
         for (ranks, split) in [
             (1, Split::Triangles),
@@ -130,11 +156,20 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
     let cut = |ranks: &[usize]| ranks.iter().map(|r| vec![*r]).collect::<Vec<_>>();
     let everybody: Vec<usize> = (0..5).collect();
     let deals: [(&str, [Vec<Vec<usize>>; 3]); 4] = [
-        ("all whole everywhere", [vec![everybody.clone()], vec![everybody.clone()], vec![everybody.clone()]]),
-        ("one whole on each rank", [vec![everybody.clone()], cut(&[0, 1, 2, 3, 4]), cut(&[4, 3, 2, 1, 0])]),
+        (
+            "all whole everywhere",
+            [vec![everybody.clone()], vec![everybody.clone()], vec![everybody.clone()]],
+        ),
+        (
+            "one whole on each rank",
+            [vec![everybody.clone()], cut(&[0, 1, 2, 3, 4]), cut(&[4, 3, 2, 1, 0])],
+        ),
         // Rank 3 has nothing of any volume.
         ("each whole on another", [cut(&[4]), cut(&[1]), vec![vec![2, 0]]]),
-        ("bricks twice", [vec![vec![0, 3], vec![4, 1]], cut(&[2, 2, 0, 2, 1, 3, 4, 0, 3]), cut(&[1, 4])]),
+        (
+            "bricks twice",
+            [vec![vec![0, 3], vec![4, 1]], cut(&[2, 2, 0, 2, 1, 3, 4, 0, 3]), cut(&[1, 4])],
+        ),
     ];
     let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values.len()).sum();
     for (name, deal) in deals {
@@ -173,7 +208,10 @@ fn bricks_of_several_volumes_are_small_and_little_is_held_twice() {
         let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values.len()).sum();
         let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
         assert!(held.iter().all(|h| *h < whole * 3 / 10), "{held:?} of {whole}, turned by {turn}");
-        assert!(held.iter().sum::<usize>() < whole * 3 / 2, "{held:?} of {whole}, turned by {turn}");
+        assert!(
+            held.iter().sum::<usize>() < whole * 3 / 2,
+            "{held:?} of {whole}, turned by {turn}"
+        );
     }
 }
 
@@ -189,7 +227,8 @@ fn projections_are_seen_whole_and_have_the_bits_of_one_node() {
             0.6,
             projection,
         );
-        let projection = VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY };
+        let projection =
+            VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY };
         let one = case("a projection", None, vec![projection.clone()]);
         let among = case("a projection among media", None, {
             let mut volumes = three();
@@ -200,8 +239,18 @@ fn projections_are_seen_whole_and_have_the_bits_of_one_node() {
             let expected = one_node(&case);
             for ranks in [2, 6] {
                 let outputs = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
-                assert_same(&expected, &outputs, &format!("{} {blend:?}, {ranks} ranks", case.name));
-                assert!(outputs[0].report.warnings.iter().any(|w| w.contains("every rank holds them whole")));
+                assert_same(
+                    &expected,
+                    &outputs,
+                    &format!("{} {blend:?}, {ranks} ranks", case.name),
+                );
+                assert!(
+                    outputs[0]
+                        .report
+                        .warnings
+                        .iter()
+                        .any(|w| w.contains("every rank holds them whole"))
+                );
             }
         }
     }
@@ -212,7 +261,8 @@ fn deals_that_cannot_be_are_refused_by_name() {
     let mut volumes = three();
     let maximum = VolumeOptions { blend: Blend::Maximum, ..VolumeOptions::default() };
     let projection = waves([9, 9, 9], DVec3::ZERO, DVec3::ONE, GREEN, 0.6, maximum);
-    volumes.push(VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY });
+    volumes
+        .push(VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY });
     let case = alone(volumes);
     let refused = |volume: usize, holders: &[Vec<usize>]| {
         let partition = Partition::new(&case.scene, 4, &Split::Triangles);

@@ -1,5 +1,6 @@
-//! The cache's file format: plain arrays behind a small header, guarded by a checksum. It is private to one machine, so
-//! numbers are in native byte order; a marker refuses files of the other order.
+//! The cache's file format: plain arrays behind a small header, guarded by a checksum. It is
+//! private to one machine, so numbers are in native byte order; a marker refuses files of the other
+//! order.
 //!
 //! | part | content |
 //! |---|---|
@@ -33,8 +34,12 @@ pub(super) fn write(out: &mut dyn Write, key: &str, mesh: &TriMesh) -> io::Resul
     w.put(bytes_of(&[VERSION, BYTE_ORDER, key.len() as u32]))?;
     w.put(key.as_bytes())?;
     w.put(bytes_of(&mesh.origin.to_array()))?;
-    let optional =
-        [mesh.normals.is_some(), mesh.colors.is_some(), mesh.scalars.is_some(), mesh.texcoords.is_some()];
+    let optional = [
+        mesh.normals.is_some(),
+        mesh.colors.is_some(),
+        mesh.scalars.is_some(),
+        mesh.texcoords.is_some(),
+    ];
     w.put(bytes_of(&(2 + optional.iter().filter(|&&p| p).count() as u32)))?;
 
     let per = |p: PerElement| p as u32;
@@ -56,7 +61,8 @@ pub(super) fn write(out: &mut dyn Write, key: &str, mesh: &TriMesh) -> io::Resul
     w.inner.write_all(&sum.to_ne_bytes())
 }
 
-/// `length` is the file's: arrays that would not fit into it are refused before memory is asked for.
+/// `length` is the file's: arrays that would not fit into it are refused before memory is asked
+/// for.
 pub(super) fn read(input: impl Read, length: u64, key: &str) -> Result<TriMesh, String> {
     let mut r = ChecksumStream { inner: input, crc: flate2::Crc::new() };
     let mut magic = [0u8; 8];

@@ -51,7 +51,8 @@ enum Source {
     Sample(SampleField),
 }
 
-/// The sizes that every flow has, ascending: full size divided by 8, 4 and 2 along each axis, and full size.
+/// The sizes that every flow has, ascending: full size divided by 8, 4 and 2 along each axis, and
+/// full size.
 pub const SIZES: [(&str, u32); 4] = [("tiny", 8), ("small", 4), ("medium", 2), ("thesis", 1)];
 
 const fn flow(
@@ -130,7 +131,8 @@ static FLOWS: [FlowEntry; 12] = [
     ),
     flow(
         "gaussian",
-        "blob of refractive index 1 + 1e-4 exp(-r²/2σ²), σ 0.12 m in a cube of 1 m; as index_minus_one",
+        "blob of refractive index 1 + 1e-4 exp(-r²/2σ²), σ 0.12 m in a cube of 1 m; as \
+         index_minus_one",
         "none (validation: closed form)",
         UVec3::splat(256),
         Source::Sample(SampleField::Gaussian { amplitude: 1e-4, sigma_m: 0.12 }),
@@ -182,8 +184,8 @@ impl FlowEntry {
         Ok(self.generate_at(self.dims(size)?, fields)?)
     }
 
-    /// Generates the flow on any number of points. With [`Fields::Density`] the sample fields and the multifield jet are
-    /// cut to their first field.
+    /// Generates the flow on any number of points. With [`Fields::Density`] the sample fields and
+    /// the multifield jet are cut to their first field.
     pub fn generate_at(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let seed = SEED;
         match self.source {
@@ -199,7 +201,9 @@ impl FlowEntry {
             Source::Wedge => Wedge::default().flow(dims, fields),
             Source::Cone => Cone::default().flow(dims, fields),
             Source::ThermalPlume => ThermalPlume::default().flow(dims, fields),
-            Source::Sample(sample @ SampleField::Gaussian { .. }) => sample.index_minus_one(dims, 0.5),
+            Source::Sample(sample @ SampleField::Gaussian { .. }) => {
+                sample.index_minus_one(dims, 0.5)
+            }
             Source::Sample(sample) => sample.flow(dims, 1.25),
         }
     }
@@ -217,7 +221,8 @@ mod tests {
             let flow = e.generate_at(dims, Fields::All).unwrap();
             assert_eq!(flow.dims, dims, "{}", e.name);
             for f in &flow.fields {
-                let (low, high) = f.range().unwrap_or_else(|| panic!("{}: {} has no value", e.name, f.name));
+                let (low, high) =
+                    f.range().unwrap_or_else(|| panic!("{}: {} has no value", e.name, f.name));
                 assert!(low < high || f.name == "pressure", "{}: {} is constant", e.name, f.name);
                 assert!(
                     f.name.starts_with("Y_") || low >= 0.0 || f.name == "index_minus_one",
@@ -229,7 +234,11 @@ mod tests {
             let alone = e.generate_at(dims, Fields::Density).unwrap();
             assert_eq!(alone.fields.len(), 1, "{}", e.name);
             let same = alone.fields[0].values.iter().zip(&flow.fields[0].values);
-            assert!(same.map(|(a, b)| (a.to_bits(), b.to_bits())).all(|(a, b)| a == b), "{}", e.name);
+            assert!(
+                same.map(|(a, b)| (a.to_bits(), b.to_bits())).all(|(a, b)| a == b),
+                "{}",
+                e.name
+            );
             assert!(flow.into_dataset().check().is_ok());
         }
     }

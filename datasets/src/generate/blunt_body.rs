@@ -1,21 +1,25 @@
-//! A blunt re-entry body in a hypersonic wind tunnel: bow shock, shock layer, expansion at the base, wake. Stands for the
-//! 256³ data set of a re-entry vehicle in table 5.1 of the thesis.
+//! A blunt re-entry body in a hypersonic wind tunnel: bow shock, shock layer, expansion at the
+//! base, wake. Stands for the 256³ data set of a re-entry vehicle in table 5.1 of the thesis.
 //!
-//! A sphere-cone with a flat base, at zero incidence. What is exact, what is correlated and what is a model:
+//! A sphere-cone with a flat base, at zero incidence. What is exact, what is correlated and what is
+//! a model:
 //!
-//! * the shock's shape and stand-off: Billig's correlation ([`bow_shock`](super::gas_dynamics::bow_shock)), with the attached
-//!   cone's shock (Taylor and Maccoll) far away;
+//! * the shock's shape and stand-off: Billig's correlation
+//!   ([`bow_shock`](super::gas_dynamics::bow_shock)), with the attached cone's shock (Taylor and
+//!   Maccoll) far away;
 //! * the jump across it: Rankine and Hugoniot with the local shock angle;
-//! * the stagnation point: Rayleigh's pitot formula; the surface: modified Newtonian pressure (after L. Lees, 1955),
-//!   p = p∞ + (p02 - p∞) sin²φ, and the entropy of the stagnation streamline;
-//! * in between: linear in the radius from shock to surface (a model; smooth, so that only the shock and the wake have
-//!   sharp gradients);
-//! * behind the base: a wake of hot thin gas at a third of the free stream's pressure that necks and recompresses, with a
-//!   growing shear layer (a model; the pressure is of the order of base pressures in D. R. Chapman, NACA Report 1051, 1951).
+//! * the stagnation point: Rayleigh's pitot formula; the surface: modified Newtonian pressure
+//!   (after L. Lees, 1955), p = p∞ + (p02 - p∞) sin²φ, and the entropy of the stagnation
+//!   streamline;
+//! * in between: linear in the radius from shock to surface (a model; smooth, so that only the
+//!   shock and the wake have sharp gradients);
+//! * behind the base: a wake of hot thin gas at a third of the free stream's pressure that necks
+//!   and recompresses, with a growing shear layer (a model; the pressure is of the order of base
+//!   pressures in D. R. Chapman, NACA Report 1051, 1951).
 //!
-//! Defaults are conditions of the order of those in NASA Langley's 20-inch Mach 6 tunnel (p0 862 kPa, T0 500 K, which give 545 Pa,
-//! 61 K, 0.031 kg/m³).
-//! The densities are from 0.05 (wake) to 6 times the free stream's.
+//! Defaults are conditions of the order of those in NASA Langley's 20-inch Mach 6 tunnel (p0 862
+//! kPa, T0 500 K, which give 545 Pa, 61 K, 0.031 kg/m³). The densities are from 0.05 (wake) to 6
+//! times the free stream's.
 
 use super::cell_average::LayeredFlow;
 use super::flow::{Fields, Flow, FlowError};
@@ -59,8 +63,8 @@ impl BluntBody {
         Ok(BowShock::billig(Nose::Sphere, self.stream.mach, self.nose_radius_m, Some(far))?)
     }
 
-    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction), over 7 nose radii along the
-    /// stream and as many across.
+    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction), over
+    /// 7 nose radii along the stream and as many across.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let layers = Layers::new(self)?;
         let r = self.base_radius_m.max(self.nose_radius_m);
@@ -142,7 +146,8 @@ impl Layers {
         }
     }
 
-    /// Radius of body or wake, and the surface's angle to the stream; on the axis before the nose 0 and 90 degrees.
+    /// Radius of body or wake, and the surface's angle to the stream; on the axis before the nose 0
+    /// and 90 degrees.
     fn inner(&self, x: f64) -> (f64, f64) {
         if x <= 0.0 {
             (0.0, std::f64::consts::FRAC_PI_2)
@@ -150,7 +155,10 @@ impl Layers {
             let n = self.nose_radius_m;
             ((2.0 * n * x - x * x).sqrt(), ((n - x) / n).asin())
         } else if x < self.base_m.x {
-            (self.tangent_m.y + (x - self.tangent_m.x) * self.half_angle_rad.tan(), self.half_angle_rad)
+            (
+                self.tangent_m.y + (x - self.tangent_m.x) * self.half_angle_rad.tan(),
+                self.half_angle_rad,
+            )
         } else {
             let s = (x - self.base_m.x) / (self.base_m.y * NECK[1]);
             let necked = 1.0 - (1.0 - NECK[0]) * smooth(s);
@@ -169,7 +177,8 @@ impl Layers {
     fn inner_state(&self, x: f64, angle: f64) -> [f64; 2] {
         let [p0, rho0] = self.stagnation;
         let newton = |angle: f64| 1.0 + (p0 - 1.0) * angle.sin().powi(2);
-        // Behind the base the gas expands to the wake's pressure, and is compressed to the free stream's at the neck.
+        // Behind the base the gas expands to the wake's pressure, and is compressed to the free
+        // stream's at the neck.
         let behind = (x - self.base_m.x) / self.base_m.y;
         let p = if behind <= 0.0 {
             newton(angle)
@@ -230,8 +239,8 @@ impl LayeredFlow for Layers {
             let behind_base = x - self.base_m.x;
             let layer = 0.04 * self.base_m.y + 0.09 * behind_base;
             let outside = smooth(0.5 + (r - inner_r) / layer);
-            let reservoir =
-                self.stream.temperature_k * (1.0 + 0.5 * (GAMMA_AIR - 1.0) * self.stream.mach.powi(2));
+            let reservoir = self.stream.temperature_k
+                * (1.0 + 0.5 * (GAMMA_AIR - 1.0) * self.stream.mach.powi(2));
             // The wake cools by mixing as it goes.
             let core = WAKE_TEMPERATURE * reservoir / (1.0 + 0.12 * behind_base / self.base_m.y);
             let wake = self.wake_pressure(x);
@@ -277,7 +286,10 @@ mod tests {
         let free = body.stream.density();
         let (low, high) = flow.field(names::DENSITY).unwrap().range().unwrap();
         let most = stagnation_density(1.4, 6.0).unwrap();
-        assert!(low as f64 > 0.03 * free && (high as f64) < 1.0001 * most * free, "{low} {high} of {free}");
+        assert!(
+            low as f64 > 0.03 * free && (high as f64) < 1.0001 * most * free,
+            "{low} {high} of {free}"
+        );
         assert!(high as f64 > 4.0 * free);
         let (_, hottest) = flow.field(names::TEMPERATURE).unwrap().range().unwrap();
         assert!(hottest < 501.0, "nothing is hotter than the reservoir: {hottest}");

@@ -1,9 +1,9 @@
 //! Means over the boxes around lattice points, for fields that jump.
 //!
-//! The flows of this crate with shocks are plane (the same at all z) or revolved about the x axis, and along a line
-//! parallel to x the positions of their jumps are known. So the mean along x is exact up to Gauss quadrature between the
-//! jumps; across (y, z) boxes that contain a jump are divided further. Measured in the tests: volume fractions within
-//! 2e-3 of a box.
+//! The flows of this crate with shocks are plane (the same at all z) or revolved about the x axis,
+//! and along a line parallel to x the positions of their jumps are known. So the mean along x is
+//! exact up to Gauss quadrature between the jumps; across (y, z) boxes that contain a jump are
+//! divided further. Measured in the tests: volume fractions within 2e-3 of a box.
 
 use glam::DVec3;
 
@@ -12,20 +12,22 @@ const SUBDIVISIONS: usize = 8;
 /// Nodes and weights of Gauss quadrature with two points on -1..1.
 const GAUSS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 
-/// A flow about a body that is either plane (`r` = y) or revolved about x (`r` = distance to the x axis).
+/// A flow about a body that is either plane (`r` = y) or revolved about x (`r` = distance to the x
+/// axis).
 pub(crate) trait LayeredFlow: Sync {
     /// Quantities per point.
     const QUANTITIES: usize;
     /// The distance that the flow depends on.
     fn r_m(&self, y_m: f64, z_m: f64) -> f64;
-    /// Positions along x where the flow at `r_m` jumps or the body begins and ends, ascending; infinities are ignored.
+    /// Positions along x where the flow at `r_m` jumps or the body begins and ends, ascending;
+    /// infinities are ignored.
     fn jumps_m(&self, r_m: f64) -> [f64; 4];
     /// The quantities at a point between jumps; `None` inside the body.
     fn at(&self, x_m: f64, r_m: f64, out: &mut [f64]) -> bool;
 }
 
-/// Means over the boxes of a row, and the share of each box that is gas. `sums` has `QUANTITIES + 1` rows; the last is the
-/// gas fraction. Means of boxes without gas are NaN.
+/// Means over the boxes of a row, and the share of each box that is gas. `sums` has `QUANTITIES +
+/// 1` rows; the last is the gas fraction. Means of boxes without gas are NaN.
 pub(crate) fn average_row<F: LayeredFlow>(
     flow: &F,
     first_m: DVec3,
@@ -39,24 +41,26 @@ pub(crate) fn average_row<F: LayeredFlow>(
     scratch.sums.resize((q + 1) * n, 0.0);
     scratch.out.resize(q, 0.0);
 
-    // How far the jumps move within the row's boxes tells whether (y, z) need subdivision, box by box.
+    // How far the jumps move within the row's boxes tells whether (y, z) need subdivision, box by
+    // box.
     let half = 0.5 * spacing_m;
     let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (0.0, 0.0)];
-    let at_corners =
-        corners.map(|(a, b)| flow.jumps_m(flow.r_m(first_m.y + a * half.y, first_m.z + b * half.z)));
+    let at_corners = corners
+        .map(|(a, b)| flow.jumps_m(flow.r_m(first_m.y + a * half.y, first_m.z + b * half.z)));
     let index_of = |x: f64| (x - first_m.x) / spacing_m.x + 0.5;
     scratch.fine.clear();
     scratch.fine.resize(n, false);
     for jump in 0..4 {
         let xs = at_corners.map(|c| c[jump]);
         let finite = || xs.iter().copied().filter(|x| x.is_finite());
-        // A jump that some corners have and others lack ends within the box's (y, z): where, is not known; all boxes from
-        // its finite positions on are treated finely.
+        // A jump that some corners have and others lack ends within the box's (y, z): where, is not
+        // known; all boxes from its finite positions on are treated finely.
         let partly = finite().count() != corners.len();
         let low = finite().fold(f64::INFINITY, f64::min);
         let high = if partly { f64::INFINITY } else { finite().fold(f64::NEG_INFINITY, f64::max) };
         if low.is_finite() {
-            // One box more on each side: curved jumps can reach further between the corners than at them.
+            // One box more on each side: curved jumps can reach further between the corners than at
+            // them.
             let from = (index_of(low).floor() - 1.0).clamp(0.0, n as f64) as usize;
             let to = (index_of(high).floor() + 2.0).clamp(0.0, n as f64) as usize;
             scratch.fine[from..to.max(from)].fill(true);
@@ -142,8 +146,9 @@ mod tests {
             y.hypot(z)
         }
         fn jumps_m(&self, r: f64) -> [f64; 4] {
-            let [outer, inner] = [1.0, 0.5]
-                .map(|radius: f64| if r < radius { (radius * radius - r * r).sqrt() } else { f64::NAN });
+            let [outer, inner] = [1.0, 0.5].map(|radius: f64| {
+                if r < radius { (radius * radius - r * r).sqrt() } else { f64::NAN }
+            });
             [-outer, -inner, inner, outer]
         }
         fn at(&self, x: f64, r: f64, out: &mut [f64]) -> bool {
@@ -160,7 +165,8 @@ mod tests {
             let h = DVec3::splat(2.6 / n as f64);
             let mut scratch = Scratch::default();
             for jk in 0..n * n {
-                let first = shift + h * (DVec3::new(0.0, (jk % n) as f64, (jk / n) as f64) + 0.5) - 1.3;
+                let first =
+                    shift + h * (DVec3::new(0.0, (jk % n) as f64, (jk / n) as f64) + 0.5) - 1.3;
                 let (mut mean, mut fraction) = ([0f32; 16], [0f32; 16]);
                 average_row(&Ball, first, h, n, &mut scratch, &mut [&mut mean, &mut fraction]);
                 for (m, f) in mean.iter().zip(fraction) {

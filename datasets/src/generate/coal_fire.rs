@@ -1,12 +1,13 @@
-//! A round jet flame of coal volatiles in hot air, as in a pulverised-coal furnace. Stands for the 402 x 162 x 162 coal fire
-//! of table 5.1 of the thesis.
+//! A round jet flame of coal volatiles in hot air, as in a pulverised-coal furnace. Stands for the
+//! 402 x 162 x 162 coal fire of table 5.1 of the thesis.
 //!
-//! The jet leaves a pipe of 50 mm along x into air of 600 K. Mean field: a top hat that turns into the self-similar Gaussian of
-//! a round jet, Z = 5 d/x · exp(-(r/b)²), b = 0.12 x (the form after S. B. Pope, "Turbulent Flows", 2000, ch. 5; the constants
-//! are of the order of measured ones); eddies grow with x. The volatiles (CH4,
-//! CO, CO2 in N2) burn at the `flame_sheet` at up to 1900 K. Char and ash, which block light in a real one,
-//! are left out. Density 0.18 to 0.6 kg/m³. Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is
-//! sampled at points.
+//! The jet leaves a pipe of 50 mm along x into air of 600 K. Mean field: a top hat that turns into
+//! the self-similar Gaussian of a round jet, Z = 5 d/x · exp(-(r/b)²), b = 0.12 x (the form after
+//! S. B. Pope, "Turbulent Flows", 2000, ch. 5; the constants are of the order of measured ones);
+//! eddies grow with x. The volatiles (CH4, CO, CO2 in N2) burn at the `flame_sheet` at up to 1900
+//! K. Char and ash, which block light in a real one, are left out. Density 0.18 to 0.6 kg/m³.
+//! Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is sampled at
+//! points.
 
 use super::combustion_jet::{gas_fields, gas_row};
 use super::flame_sheet::{FlameSheet, Species};
@@ -48,8 +49,8 @@ pub struct CoalFire {
 }
 
 impl CoalFire {
-    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions of CH4, CO, O2, N2, CO2 and
-    /// H2O.
+    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions
+    /// of CH4, CO, O2, N2, CO2 and H2O.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
         let side = 0.5 * WIDTH_M;
         let mut flow =
@@ -77,7 +78,8 @@ impl CoalFire {
             z.clear();
             z.extend((0..n).map(|i| {
                 let p = origin + spacing * DVec3::new(i as f64, j as f64, k as f64);
-                let q = p + DVec3::new(d.rows[0][i] as f64, d.rows[1][i] as f64, d.rows[2][i] as f64);
+                let q =
+                    p + DVec3::new(d.rows[0][i] as f64, d.rows[1][i] as f64, d.rows[2][i] as f64);
                 let [x, r] = rings.origin_of([q.x, q.y.hypot(q.z)]);
                 mean(x, r) as f32
             }));
@@ -109,7 +111,8 @@ mod tests {
     #[test]
     fn flame_widens_downstream_and_fuel_comes_from_the_pipe() {
         let flow = CoalFire { dims: UVec3::new(101, 41, 41), seed: 1 }.flow(Fields::All).unwrap();
-        let (z, t) = (flow.grid(names::MIXTURE_FRACTION).unwrap(), flow.grid(names::TEMPERATURE).unwrap());
+        let (z, t) =
+            (flow.grid(names::MIXTURE_FRACTION).unwrap(), flow.grid(names::TEMPERATURE).unwrap());
         assert!(z.at(0, 20, 20) > 0.99 && z.at(0, 30, 20) < 1e-3);
         let (cold, hot) = t.range().unwrap();
         assert!(cold >= 499.0 && hot > 1700.0 && hot <= 1900.0, "{cold} {hot}");
@@ -123,7 +126,8 @@ mod tests {
     fn same_bits_on_1_2_7_threads() {
         let bits = |threads| {
             with_threads(threads, || {
-                let flow = CoalFire { dims: UVec3::new(30, 18, 18), seed: 3 }.flow(Fields::All).unwrap();
+                let flow =
+                    CoalFire { dims: UVec3::new(30, 18, 18), seed: 3 }.flow(Fields::All).unwrap();
                 flow.fields.iter().map(|f| crate::testing::crc32_f32(&f.values)).collect::<Vec<_>>()
             })
         };

@@ -1,12 +1,14 @@
-//! A turbulent plane jet of fuel between two streams of oxidiser, burning in thin sheets. Stands for the combustion
-//! simulation of 480 x 720 x 100 points in table 5.1 of the thesis (a temporally evolving jet: x along it, periodic; y
-//! across; z the span).
+//! A turbulent plane jet of fuel between two streams of oxidiser, burning in thin sheets. Stands
+//! for the combustion simulation of 480 x 720 x 100 points in table 5.1 of the thesis (a temporally
+//! evolving jet: x along it, periodic; y across; z the span).
 //!
-//! Streams, pressure and slot are after E. R. Hawkes et al., "Scalar mixing in direct numerical simulations of temporally
-//! evolving plane jet flames with skeletal CO/H2 kinetics", Proc. Combust. Inst. 31, 2007: fuel 50 % CO, 10 % H2, 40 % N2 and oxidiser 25 % O2, 75 % N2 by
-//! volume, both at 500 K and 1 atm, slot 1.37 mm. The mean mixture fraction is a smoothed top hat; rollers and
-//! `turbulence` fold it; the gas follows from the `flame_sheet`. Ranges: 500 to
-//! about 2030 K, density 0.19 to 0.71 kg/m³. Smooth at the scale of a cell (the finest wave has six), so it is sampled at points.
+//! Streams, pressure and slot are after E. R. Hawkes et al., "Scalar mixing in direct numerical
+//! simulations of temporally evolving plane jet flames with skeletal CO/H2 kinetics", Proc.
+//! Combust. Inst. 31, 2007: fuel 50 % CO, 10 % H2, 40 % N2 and oxidiser 25 % O2, 75 % N2 by volume,
+//! both at 500 K and 1 atm, slot 1.37 mm. The mean mixture fraction is a smoothed top hat; rollers
+//! and `turbulence` fold it; the gas follows from the `flame_sheet`. Ranges: 500 to about 2030 K,
+//! density 0.19 to 0.71 kg/m³. Smooth at the scale of a cell (the finest wave has six), so it is
+//! sampled at points.
 
 use super::flame_sheet::{FlameSheet, Species};
 use super::flow::{Fields, Flow, FlowError, names};
@@ -47,8 +49,8 @@ pub struct CombustionJet {
 }
 
 impl CombustionJet {
-    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions of CO, H2, O2, N2, CO2
-    /// and H2O.
+    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions
+    /// of CO, H2, O2, N2, CO2 and H2O.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
         let mut flow = self.lattice()?;
         let table = SYNGAS.table();
@@ -73,13 +75,15 @@ impl CombustionJet {
     pub(crate) fn mixing(&self, flow: &Flow) -> Mixing {
         let mut random = Random::new(self.seed);
         let length = flow.spacing_m.x * (flow.dims.x - 1) as f64;
-        // Rollers on both faces, staggered, about 3 slots apart; images left and right make them periodic.
+        // Rollers on both faces, staggered, about 3 slots apart; images left and right make them
+        // periodic.
         let count = (length / (3.0 * SLOT_M)).round().max(1.0);
         let mut rollers = Vec::new();
         for n in 0..count as u32 {
             for side in [-1.0, 1.0] {
                 let stagger = if side > 0.0 { 0.5 } else { 0.0 };
-                let x = (n as f64 + stagger + random.between(-0.15, 0.15)) / count * length - 0.5 * length;
+                let x = (n as f64 + stagger + random.between(-0.15, 0.15)) / count * length
+                    - 0.5 * length;
                 let y = side * (1.65 + random.between(-0.15, 0.15)) * SLOT_M;
                 let (size, turn) = (random.between(0.7, 1.1) * SLOT_M, random.between(2.5, 5.0));
                 for image in [-1.0, 0.0, 1.0] {
@@ -128,9 +132,12 @@ impl Mixing {
         let [a, b, c] = self.braid;
         let wander = 0.25
             * SLOT_M
-            * ((TAU * p.z / (2.6 * SLOT_M) + a).sin() + 0.6 * (TAU * p.z / (1.1 * SLOT_M) + b).sin());
-        let [x, y] = self.rollers.origin_of([p.x + wander, p.y + 0.3 * wander * (c + p.x / SLOT_M).cos()]);
-        // The jet has widened to 3.2 slots; its mixing layers are 0.4 slots thick, and its core is diluted.
+            * ((TAU * p.z / (2.6 * SLOT_M) + a).sin()
+                + 0.6 * (TAU * p.z / (1.1 * SLOT_M) + b).sin());
+        let [x, y] =
+            self.rollers.origin_of([p.x + wander, p.y + 0.3 * wander * (c + p.x / SLOT_M).cos()]);
+        // The jet has widened to 3.2 slots; its mixing layers are 0.4 slots thick, and its core is
+        // diluted.
         let edge = |y: f64| 0.5 * (1.0 + (y / (0.4 * SLOT_M)).tanh());
         let dilution = 0.85 - 0.15 * (TAU * x / (4.1 * SLOT_M)).sin();
         dilution * edge(y + 1.6 * SLOT_M) * edge(1.6 * SLOT_M - y)
@@ -138,7 +145,10 @@ impl Mixing {
 }
 
 /// Names and units of a flame's fields, as [`gas_row`] fills them.
-pub(crate) fn gas_fields(sheet: &FlameSheet<'_>, fields: Fields) -> Vec<(&'static str, &'static str)> {
+pub(crate) fn gas_fields(
+    sheet: &FlameSheet<'_>,
+    fields: Fields,
+) -> Vec<(&'static str, &'static str)> {
     let mut all = vec![(names::DENSITY, "kg/m³")];
     if fields == Fields::All {
         all.extend([(names::TEMPERATURE, "K"), (names::MIXTURE_FRACTION, "1")]);
@@ -169,7 +179,8 @@ mod tests {
 
     #[test]
     fn jet_burns_in_sheets_between_unburnt_streams() {
-        let flow = CombustionJet { dims: UVec3::new(96, 144, 12), seed: 1 }.flow(Fields::All).unwrap();
+        let flow =
+            CombustionJet { dims: UVec3::new(96, 144, 12), seed: 1 }.flow(Fields::All).unwrap();
         let (low, high) = flow.field(names::DENSITY).unwrap().range().unwrap();
         assert!(low > 0.13 && low < 0.2 && high > 0.6 && high < 0.75, "{low} {high}");
         let (cold, hot) = flow.field(names::TEMPERATURE).unwrap().range().unwrap();
@@ -196,7 +207,8 @@ mod tests {
             let flow = CombustionJet { dims, seed: 1 }.flow(Fields::Density).unwrap();
             let d = flow.grid(names::DENSITY).unwrap();
             let rows = (1..dims.y).flat_map(|j| (0..dims.x).map(move |i| (i, j)));
-            let squares = rows.map(|(i, j)| (d.at(i, j, 2) - d.at(i, j - 1, 2)).powi(2) as f64).sum::<f64>();
+            let squares =
+                rows.map(|(i, j)| (d.at(i, j, 2) - d.at(i, j - 1, 2)).powi(2) as f64).sum::<f64>();
             (squares / (dims.x * dims.y) as f64).sqrt() / flow.spacing_m.y
         };
         let [coarse, fine] = [UVec3::new(48, 72, 5), UVec3::new(192, 288, 5)].map(steepest);
@@ -206,7 +218,9 @@ mod tests {
     #[test]
     fn same_bits_on_1_2_7_threads_and_density_alone_is_the_same_density() {
         let bits = |threads, fields| {
-            with_threads(threads, || crate::testing::crc32_f32(&SMALL.flow(fields).unwrap().fields[0].values))
+            with_threads(threads, || {
+                crate::testing::crc32_f32(&SMALL.flow(fields).unwrap().fields[0].values)
+            })
         };
         let one = bits(1, Fields::All);
         assert!(one == bits(2, Fields::All) && one == bits(7, Fields::Density));

@@ -1,6 +1,8 @@
-//! A cone at zero incidence in a supersonic stream: the solution of Taylor and Maccoll as means over boxes.
+//! A cone at zero incidence in a supersonic stream: the solution of Taylor and Maccoll as means
+//! over boxes.
 //!
-//! The apex is the origin, the axis x. The flow is exact up to the end of the cone, where the lattice ends.
+//! The apex is the origin, the axis x. The flow is exact up to the end of the cone, where the
+//! lattice ends.
 
 use super::cell_average::LayeredFlow;
 use super::flow::{Fields, Flow, FlowError};
@@ -10,7 +12,8 @@ use super::oblique_shock::fill_gas;
 use super::revolve::revolve;
 use glam::{DVec2, DVec3, UVec3};
 
-/// The set-up. The default is a cone of 20 degrees at Mach 3 in a tunnel with a reservoir at 700 kPa and 300 K.
+/// The set-up. The default is a cone of 20 degrees at Mach 3 in a tunnel with a reservoir at 700
+/// kPa and 300 K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cone {
     /// Air far upstream.
@@ -37,8 +40,9 @@ impl Cone {
         Ok(cone_flow(GAMMA_AIR, self.stream.mach, self.half_angle_rad)?)
     }
 
-    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction). The lattice reaches from a
-    /// fifth of the length before the apex to the end of the cone, and as far sideways as the shock.
+    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction). The
+    /// lattice reaches from a fifth of the length before the apex to the end of the cone, and as
+    /// far sideways as the shock.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let layers = Layers { stream: self.stream, cone: self.solution()? };
         let side = self.length_m * layers.cone.shock_rad.tan() * 1.1;
@@ -89,7 +93,8 @@ mod tests {
         let cone = Cone::default();
         let exact = cone.solution().unwrap();
         let flow = cone.flow(UVec3::new(61, 41, 41), Fields::All).unwrap();
-        let (density, gas) = (flow.grid(names::DENSITY).unwrap(), flow.grid(names::GAS_FRACTION).unwrap());
+        let (density, gas) =
+            (flow.grid(names::DENSITY).unwrap(), flow.grid(names::GAS_FRACTION).unwrap());
         let h = flow.spacing_m;
         let mut checked = 0;
         for k in 0..41 {
@@ -99,13 +104,16 @@ mod tests {
                     let r = p.y.hypot(p.z);
                     let reach = h.length();
                     let value = density.at(i, j, k) as f64 / cone.stream.density();
-                    // Boxes that no surface crosses have the exact value (boxes are small, the field smooth); the apex aside.
+                    // Boxes that no surface crosses have the exact value (boxes are small, the
+                    // field smooth); the apex aside.
                     let distance = |angle: f64| (r * angle.cos() - p.x * angle.sin()).abs();
                     if distance(exact.shock_rad) < reach
                         || distance(exact.cone_rad) < reach
                         || p.length() < 4.0 * reach
                     {
-                        assert!(value.is_nan() || (0.999..1.25 * exact.jump.density).contains(&value));
+                        assert!(
+                            value.is_nan() || (0.999..1.25 * exact.jump.density).contains(&value)
+                        );
                         continue;
                     }
                     checked += 1;

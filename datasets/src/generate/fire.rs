@@ -1,9 +1,12 @@
-//! A heptane pool fire: a pool of 0.3 m burns in air. Stands for the 293³ heptane fire of table 5.1 of the thesis.
+//! A heptane pool fire: a pool of 0.3 m burns in air. Stands for the 293³ heptane fire of table 5.1
+//! of the thesis.
 //!
-//! `plume` mixes, the `flame_sheet` burns: C7H16 + 11 O2 = 7 CO2 + 8 H2O, stoichiometric
-//! mixture fraction 0.062. The flame's temperature is set to 1500 K, well below the adiabatic one of about 2270 K, as soot
-//! radiates: the order of magnitude of pool fires of this size. Ranges: 300 to 1500 K, density 0.23 to 3.3 kg/m³ (heptane's heavy vapour at its boiling point,
-//! just above the pool). Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is sampled at points.
+//! `plume` mixes, the `flame_sheet` burns: C7H16 + 11 O2 = 7 CO2 + 8 H2O, stoichiometric mixture
+//! fraction 0.062. The flame's temperature is set to 1500 K, well below the adiabatic one of about
+//! 2270 K, as soot radiates: the order of magnitude of pool fires of this size. Ranges: 300 to 1500
+//! K, density 0.23 to 3.3 kg/m³ (heptane's heavy vapour at its boiling point, just above the pool).
+//! Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is sampled at
+//! points.
 
 use super::combustion_jet::{gas_fields, gas_row};
 use super::flame_sheet::{FlameSheet, Species};
@@ -48,10 +51,11 @@ pub struct Fire {
 }
 
 impl Fire {
-    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions of C7H16, O2, N2, CO2 and
-    /// H2O.
+    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions
+    /// of C7H16, O2, N2, CO2 and H2O.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
-        let mut flow = Flow::over(self.dims, DVec3::new(-0.5, -0.5, 0.0), DVec3::new(0.5, 0.5, 1.0))?;
+        let mut flow =
+            Flow::over(self.dims, DVec3::new(-0.5, -0.5, 0.0), DVec3::new(0.5, 0.5, 1.0))?;
         let plume = Plume::new(&flow, SHAPE, self.seed);
         let table = HEPTANE.table();
         let scratch = || (Displacement::default(), Vec::new());

@@ -1,8 +1,9 @@
 //! The gas of a diffusion flame from its mixture fraction: Burke and Schumann's flame sheet.
 //!
-//! S. P. Burke and T. E. W. Schumann, "Diffusion flames", Ind. Eng. Chem. 20, 1928. With infinitely fast chemistry mass
-//! fractions and temperature are piecewise linear in the mixture fraction Z, with a corner at the stoichiometric value; the
-//! density follows from p = ρ R T Σ Y/W. The corner is rounded over a tenth of the way to either side, as finite rates do.
+//! S. P. Burke and T. E. W. Schumann, "Diffusion flames", Ind. Eng. Chem. 20, 1928. With infinitely
+//! fast chemistry mass fractions and temperature are piecewise linear in the mixture fraction Z,
+//! with a corner at the stoichiometric value; the density follows from p = ρ R T Σ Y/W. The corner
+//! is rounded over a tenth of the way to either side, as finite rates do.
 
 /// A gas.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,10 +49,12 @@ impl FlameSheet<'_> {
         let z = z.clamp(0.0, 1.0);
         let progress = if (z - st).abs() < round {
             let (low, high) = (burnt(st - round), burnt(st + round));
-            // Integrals of both straight parts within z - round..z + round; exact for a piecewise linear function.
+            // Integrals of both straight parts within z - round..z + round; exact for a piecewise
+            // linear function.
             let t = (z - st) / round;
-            let parabola =
-                1.0 - 0.25 * (1.0 - low) * (1.0 - t).powi(2) - 0.25 * (1.0 - high) * (1.0 + t).powi(2);
+            let parabola = 1.0
+                - 0.25 * (1.0 - low) * (1.0 - t).powi(2)
+                - 0.25 * (1.0 - high) * (1.0 + t).powi(2);
             parabola.min(1.0)
         } else {
             burnt(z)
@@ -63,7 +66,9 @@ impl FlameSheet<'_> {
         let temperature = unburnt(cold, hot) + rise * progress;
         let mut out = vec![0.0, temperature];
         out.extend(
-            self.species.iter().map(|s| (unburnt(s.oxidiser, s.fuel) + st * s.made * progress).max(0.0)),
+            self.species
+                .iter()
+                .map(|s| (unburnt(s.oxidiser, s.fuel) + st * s.made * progress).max(0.0)),
         );
         let moles: f64 = self.species.iter().zip(&out[2..]).map(|(s, y)| y / s.molar_mass).sum();
         out[0] = self.pressure_pa / (GAS_CONSTANT * temperature * moles);
@@ -83,8 +88,8 @@ impl FlameSheet<'_> {
     }
 }
 
-/// Density, temperature and mass fractions at equal steps of the mixture fraction; linear between (error below 1e-3 of a
-/// column's range next to the corner, far below elsewhere).
+/// Density, temperature and mass fractions at equal steps of the mixture fraction; linear between
+/// (error below 1e-3 of a column's range next to the corner, far below elsewhere).
 pub(crate) struct Table {
     columns: Vec<Vec<f32>>,
 }
@@ -128,7 +133,10 @@ mod tests {
         let sheet = fire::HEPTANE;
         let st = sheet.stoichiometric();
         let hottest = sheet.at(st)[1];
-        assert!(hottest < sheet.temperatures_k[1] && hottest > 0.93 * sheet.temperatures_k[1], "{hottest}");
+        assert!(
+            hottest < sheet.temperatures_k[1] && hottest > 0.93 * sheet.temperatures_k[1],
+            "{hottest}"
+        );
         let (mut last, mut slope) = (sheet.at(0.0)[1], None);
         for e in 1..=4000 {
             let now = sheet.at(e as f64 * 1e-4 * 0.5)[1];

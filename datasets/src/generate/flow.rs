@@ -1,4 +1,5 @@
-//! What the flow generators return: fields with units on a uniform lattice, and the body in the stream.
+//! What the flow generators return: fields with units on a uniform lattice, and the body in the
+//! stream.
 
 use crate::model::{DataArray, Dataset, ImageData, Values};
 use glam::{DVec3, UVec3};
@@ -8,10 +9,10 @@ use rt_core::mesh::TriMesh;
 
 /// A flow on a uniform lattice, in SI units.
 ///
-/// A value is the mean over the box of one spacing around its point (over the part of it that is not solid), never a
-/// sample at the point: shocks and surfaces between points would otherwise be staircases, which a schlieren picture,
-/// being a picture of gradients, shows before anything else. Smooth generators sample where that is the same to within
-/// their own accuracy, and say so.
+/// A value is the mean over the box of one spacing around its point (over the part of it that is
+/// not solid), never a sample at the point: shocks and surfaces between points would otherwise be
+/// staircases, which a schlieren picture, being a picture of gradients, shows before anything else.
+/// Smooth generators sample where that is the same to within their own accuracy, and say so.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flow {
     /// Points per axis.
@@ -20,7 +21,8 @@ pub struct Flow {
     pub origin_m: DVec3,
     /// Distance between points.
     pub spacing_m: DVec3,
-    /// The fields; the first is the one that a schlieren picture needs (density, or a refractive index).
+    /// The fields; the first is the one that a schlieren picture needs (density, or a refractive
+    /// index).
     pub fields: Vec<Field>,
     /// The solid body, if any: closed, counter-clockwise from outside.
     pub body: Option<TriMesh>,
@@ -53,8 +55,8 @@ pub mod names {
     pub const GAS_FRACTION: &str = "gas_fraction";
 }
 
-/// Which fields a generator computes. Large flows take gigabytes, and a schlieren picture in one gas needs the density
-/// only.
+/// Which fields a generator computes. Large flows take gigabytes, and a schlieren picture in one
+/// gas needs the density only.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Fields {
     /// The first field only.
@@ -68,7 +70,8 @@ pub enum Fields {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FlowError {
     /// Too few or too many points.
-    #[error("the lattice has {dims} points; each axis needs 4 to {most} points, and all together at most 2³² points", most = MOST_POINTS)]
+    #[error("the lattice has {dims} points; each axis needs 4 to {most} points, and all together \
+             at most 2³² points", most = MOST_POINTS)]
     Dims {
         /// What was asked for.
         dims: UVec3,
@@ -119,16 +122,19 @@ impl Flow {
         Some(Grid { dims: self.dims, origin: self.origin_m, spacing: self.spacing_m, values })
     }
 
-    /// The fields as VTK image data, to be written as `.vti`. The values move; the body stays behind.
+    /// The fields as VTK image data, to be written as `.vti`. The values move; the body stays
+    /// behind.
     pub fn into_dataset(self) -> Dataset {
         let mut image = ImageData::new(self.dims.to_array(), self.origin_m, self.spacing_m);
-        let arrays = self.fields.into_iter().map(|f| DataArray::new(f.name, 1, Values::F32(f.values)));
+        let arrays =
+            self.fields.into_iter().map(|f| DataArray::new(f.name, 1, Values::F32(f.values)));
         image.attributes.point = arrays.collect();
         Dataset::ImageData(image)
     }
 
-    /// Adds fields, computed a row (of constant y and z) at a time, in parallel over planes of constant z, so that the
-    /// bits do not depend on the number of threads. `row(scratch, j, k, rows)` fills one slice per field.
+    /// Adds fields, computed a row (of constant y and z) at a time, in parallel over planes of
+    /// constant z, so that the bits do not depend on the number of threads. `row(scratch, j, k,
+    /// rows)` fills one slice per field.
     pub(crate) fn fill<S>(
         &mut self,
         fields: &[(&'static str, &'static str)],
@@ -164,7 +170,8 @@ impl Field {
     /// Smallest and largest finite value; `None` when there is none.
     pub fn range(&self) -> Option<(f32, f32)> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
-        let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let (low, high) =
+            finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         (low <= high).then_some((low, high))
     }
 }
@@ -175,7 +182,8 @@ mod tests {
 
     #[test]
     fn fill_gives_each_point_its_own_row_and_plane() {
-        let mut flow = Flow::over(UVec3::new(4, 5, 6), DVec3::ZERO, DVec3::new(3.0, 8.0, 5.0)).unwrap();
+        let mut flow =
+            Flow::over(UVec3::new(4, 5, 6), DVec3::ZERO, DVec3::new(3.0, 8.0, 5.0)).unwrap();
         flow.fill(
             &[("a", "1"), ("b", "1")],
             || (),
@@ -196,7 +204,9 @@ mod tests {
 
     #[test]
     fn absurd_lattices_are_refused_before_memory_is_taken() {
-        for dims in [UVec3::new(3, 9, 9), UVec3::splat(0), UVec3::new(9, 9, 9000), UVec3::splat(8192)] {
+        for dims in
+            [UVec3::new(3, 9, 9), UVec3::splat(0), UVec3::new(9, 9, 9000), UVec3::splat(8192)]
+        {
             let error = Flow::over(dims, DVec3::ZERO, DVec3::ONE).unwrap_err().to_string();
             assert!(error.contains("4 to 8192"), "{error}");
         }

@@ -1,10 +1,12 @@
-//! A helium plume that puffs: a disc of helium of 1 m rises into air at rest, rolls up into rings and breaks up. Stands for
-//! the 227 x 302 x 302 simulation of table 5.1 of the thesis.
+//! A helium plume that puffs: a disc of helium of 1 m rises into air at rest, rolls up into rings
+//! and breaks up. Stands for the 227 x 302 x 302 simulation of table 5.1 of the thesis.
 //!
-//! The source is after the experiment of T. J. O'Hern et al., "Experimental study of a turbulent buoyant helium plume", J. Fluid
-//! Mech. 544, 2005 (source 1 m, puffing about 1.4 times a second); the neck at half a diameter and the rings are ours. Isothermal
-//! at 298 K and 1 atm, so density and helium are one field seen twice: 0.164 (helium) to 1.185 kg/m³ (air). The index of refraction is not a function of the density alone, which is
-//! why the mass fractions come along. Smooth at the scale of a cell, so it is sampled at points.
+//! The source is after the experiment of T. J. O'Hern et al., "Experimental study of a turbulent
+//! buoyant helium plume", J. Fluid Mech. 544, 2005 (source 1 m, puffing about 1.4 times a second);
+//! the neck at half a diameter and the rings are ours. Isothermal at 298 K and 1 atm, so density
+//! and helium are one field seen twice: 0.164 (helium) to 1.185 kg/m³ (air). The index of
+//! refraction is not a function of the density alone, which is why the mass fractions come along.
+//! Smooth at the scale of a cell, so it is sampled at points.
 
 use super::flow::{Field, Fields, Flow, FlowError, names};
 use super::plume::{Plume, Shape};
@@ -47,7 +49,8 @@ fn density(helium: f64) -> f64 {
 impl HeliumPlume {
     /// Fields: density; with [`Fields::All`] the mass fractions of helium and air.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
-        let mut flow = Flow::over(self.dims, DVec3::new(-1.5, -2.0, 0.0), DVec3::new(1.5, 2.0, 4.0))?;
+        let mut flow =
+            Flow::over(self.dims, DVec3::new(-1.5, -2.0, 0.0), DVec3::new(1.5, 2.0, 4.0))?;
         let plume = Plume::new(&flow, SHAPE, self.seed);
         let wanted = [(names::DENSITY, "kg/m³"), ("Y_He", "1")];
         let wanted = if fields == Fields::All { &wanted[..] } else { &wanted[..1] };

@@ -1,9 +1,11 @@
-//! A ball has hit a plate: crater with a torn rim, the flattened ball, and ejecta flying off in a cone. Stands for the
-//! fracture simulations among the data sets of chapter 4 of the thesis: many separate closed pieces of very different
-//! size, which is what acceleration structures find harder than one big surface.
+//! A ball has hit a plate: crater with a torn rim, the flattened ball, and ejecta flying off in a
+//! cone. Stands for the fracture simulations among the data sets of chapter 4 of the thesis: many
+//! separate closed pieces of very different size, which is what acceleration structures find harder
+//! than one big surface.
 //!
-//! The field is a signed distance in world units, positive in matter: the maximum over plate, ball and fragments, with a
-//! rough surface by noise. The plate is 1.8 x 1.8 x 0.25, its undisturbed top at z = 0.
+//! The field is a signed distance in world units, positive in matter: the maximum over plate, ball
+//! and fragments, with a rough surface by noise. The plate is 1.8 x 1.8 x 0.25, its undisturbed top
+//! at z = 0.
 
 use super::noise::{Noise, RowScratch};
 use super::random::Random;
@@ -42,20 +44,24 @@ pub struct Impact {
 }
 
 impl Impact {
-    /// The field on `points` x `points` x 0.8·`points` points (clamped to 16..=4096) with `fragments` ejecta.
+    /// The field on `points` x `points` x 0.8·`points` points (clamped to 16..=4096) with
+    /// `fragments` ejecta.
     pub fn new(points: u32, fragments: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let fragments = (0..fragments)
             .map(|_| {
-                // Sizes by a power law, as fragments have; the fastest are the smallest and furthest.
+                // Sizes by a power law, as fragments have; the fastest are the smallest and
+                // furthest.
                 let size = 0.01 * (1.0 - 0.997 * random.unit()).powf(-0.4);
                 let flight = random.between(0.05, 1.0).powf(0.7) * (1.0 - (size / 0.15).min(0.6));
                 let (s, c) = random.between(0.0, std::f64::consts::TAU).sin_cos();
                 let slope = random.between(0.9, 1.5);
                 let r = CRATER_RADIUS + 0.45 * flight;
                 let center = DVec3::new(r * c, r * s, 0.06 + slope * 0.55 * flight);
-                let radii = DVec3::new(1.0, random.between(0.4, 1.0), random.between(0.25, 0.8)) * size;
-                let turn = glam::DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.3));
+                let radii =
+                    DVec3::new(1.0, random.between(0.4, 1.0), random.between(0.25, 0.8)) * size;
+                let turn =
+                    glam::DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.3));
                 let unit_from_world =
                     DMat3::from_diagonal(radii.recip()) * DMat3::from_quat(turn).transpose();
                 let (largest_radius, smallest_radius) = (radii.max_element(), radii.min_element());
@@ -88,7 +94,8 @@ impl Impact {
     fn plate_faces(points: u32) -> Vec<[f32; 2]> {
         let d = (HIGH - LOW) / (points - 1) as f64;
         let face = |i: u32| {
-            let p = DVec2::new(LOW.x + (i % points) as f64 * d.x, LOW.y + (i / points) as f64 * d.y);
+            let p =
+                DVec2::new(LOW.x + (i % points) as f64 * d.x, LOW.y + (i / points) as f64 * d.y);
             let (r, angle) = (p.length(), p.to_angle());
             let bowl = CRATER_DEPTH * (1.0 - (r / CRATER_RADIUS).powi(2)).max(0.0);
             let torn = 1.0 + 0.35 * (9.0 * angle + 0.7).sin() + 0.25 * (23.0 * angle).cos();
@@ -104,7 +111,8 @@ impl Impact {
         let sides = PLATE_HALF - p.x.abs().max(p.y.abs());
         let plate = (top as f64 - p.z).min(p.z - bottom as f64).min(sides);
         // The ball, flattened to half its height, rests in the bowl.
-        let ball = 0.09 * (1.0 - ((p - DVec3::new(0.0, 0.0, -0.13)) / DVec3::new(0.2, 0.2, 0.09)).length());
+        let ball = 0.09
+            * (1.0 - ((p - DVec3::new(0.0, 0.0, -0.13)) / DVec3::new(0.2, 0.2, 0.09)).length());
         plate.max(ball) as f32
     }
 }
@@ -146,7 +154,11 @@ impl PlaneSource for Impact {
         for f in self.fragments.iter().filter(|f| (f.center.z - z).abs() < f.largest_radius + d.z) {
             let reach = f.largest_radius + d.x.max(d.y);
             let first = ((f.center - reach - LOW) / d).max(DVec3::ZERO).as_uvec3();
-            let last = ((f.center + reach - LOW) / d).ceil().max(DVec3::ZERO).as_uvec3().min(self.dims() - 1);
+            let last = ((f.center + reach - LOW) / d)
+                .ceil()
+                .max(DVec3::ZERO)
+                .as_uvec3()
+                .min(self.dims() - 1);
             for j in first.y..=last.y {
                 for i in first.x..=last.x {
                     let p = LOW + DVec3::new(i as f64, j as f64, 0.0) * d;
@@ -176,10 +188,14 @@ mod tests {
 
     #[test]
     fn more_fragments_are_more_pieces() {
-        let count =
-            |f| pieces(&Impact::new(96, f, 1).surface(Options::default(), |_| true).unwrap().mesh.indices);
+        let count = |f| {
+            pieces(
+                &Impact::new(96, f, 1).surface(Options::default(), |_| true).unwrap().mesh.indices,
+            )
+        };
         let [none, many] = [0, 400].map(count);
-        // The plate and the ball touch; fragments smaller than a cell are not seen at this resolution.
+        // The plate and the ball touch; fragments smaller than a cell are not seen at this
+        // resolution.
         assert_eq!(none, 1);
         assert!(many > 60, "{many}");
     }
@@ -187,7 +203,9 @@ mod tests {
     #[test]
     fn same_mesh_on_1_2_7_threads() {
         let mesh = |threads| {
-            with_threads(threads, || Impact::new(40, 50, 3).surface(Options::default(), |_| true).unwrap())
+            with_threads(threads, || {
+                Impact::new(40, 50, 3).surface(Options::default(), |_| true).unwrap()
+            })
         };
         let one = mesh(1);
         assert!(one == mesh(2) && one == mesh(7));

@@ -1,13 +1,16 @@
-//! A Richtmyer-Meshkov-like mixing layer: two gases, a shaken interface between them, and turbulence that tears it.
+//! A Richtmyer-Meshkov-like mixing layer: two gases, a shaken interface between them, and
+//! turbulence that tears it.
 //!
-//! Stands for the LLNL simulation (2048 x 2048 x 1920 points, 316 million triangles) that the thesis renders in table
-//! 4.1 as "RMO" (the whole, from outside) and "RMI" (close, from inside the layer).
+//! Stands for the LLNL simulation (2048 x 2048 x 1920 points, 316 million triangles) that the
+//! thesis renders in table 4.1 as "RMO" (the whole, from outside) and "RMI" (close, from inside the
+//! layer).
 //!
-//! The field is the share of the heavy gas, 0 above to 1 below. It falls linearly across a surface whose height is a
-//! sum of long waves (what the shock left behind) plus noise in octaves down to a few cells with Kolmogorov's
-//! amplitudes ∝ wavelength^(1/3). Where the noise's slope in z exceeds one the surface folds over, so its area grows
-//! faster than the square of the resolution, as in the simulation (measured: 0.18, 1.1, 6.8 and 42.5 million triangles at 128,
-//! 256, 512 and 1024 points). Along x and y the field is periodic.
+//! The field is the share of the heavy gas, 0 above to 1 below. It falls linearly across a surface
+//! whose height is a sum of long waves (what the shock left behind) plus noise in octaves down to a
+//! few cells with Kolmogorov's amplitudes ∝ wavelength^(1/3). Where the noise's slope in z exceeds
+//! one the surface folds over, so its area grows faster than the square of the resolution, as in
+//! the simulation (measured: 0.18, 1.1, 6.8 and 42.5 million triangles at 128, 256, 512 and 1024
+//! points). Along x and y the field is periodic.
 
 use super::noise::{Noise, RowScratch};
 use super::random::Random;
@@ -46,8 +49,8 @@ pub struct MixingLayer {
 }
 
 impl MixingLayer {
-    /// A layer sampled with `points` x `points` x 0.9375·`points` points (2048 for the thesis's size); between 16 and
-    /// 8192, values outside are clamped.
+    /// A layer sampled with `points` x `points` x 0.9375·`points` points (2048 for the thesis's
+    /// size); between 16 and 8192, values outside are clamped.
     pub fn new(points: u32, seed: u64) -> Self {
         let points = points.clamp(16, 8192);
         let mut random = Random::new(seed);
@@ -64,16 +67,18 @@ impl MixingLayer {
         waves.par_chunks_mut(points as usize).enumerate().for_each(|(j, row)| {
             for (i, v) in row.iter_mut().enumerate() {
                 let (x, y) = (i as f64 * dx, j as f64 * dx);
-                *v = modes.iter().map(|[kx, ky, p, a]| a * (TAU * (kx * x + ky * y) + p).cos()).sum::<f64>()
-                    as f32;
+                *v = modes
+                    .iter()
+                    .map(|[kx, ky, p, a]| a * (TAU * (kx * x + ky * y) + p).cos())
+                    .sum::<f64>() as f32;
             }
         });
         let highest_wave = waves.iter().fold(0f32, |m, w| m.max(w.abs()));
         MixingLayer { points, seed, waves, highest_wave }
     }
 
-    /// The interface as a mesh. Memory is bounded by the result: 32 planes of the field exist at a time. `progress`
-    /// hears how many planes are done and stops the work by returning false.
+    /// The interface as a mesh. Memory is bounded by the result: 32 planes of the field exist at a
+    /// time. `progress` hears how many planes are done and stops the work by returning false.
     pub fn surface(
         &self,
         options: Options,
@@ -105,7 +110,8 @@ impl MixingLayer {
         (0..16u32).map_while(move |o| {
             let period = FIRST_PERIOD << o;
             let noise = Noise { period: [period; 3], seed: seed ^ (o as u64 + 1) << 48 };
-            (o == 0 || period as f64 <= finest).then(|| (noise, AMPLITUDE * 0.5f32.powf(o as f32 / 3.0)))
+            (o == 0 || period as f64 <= finest)
+                .then(|| (noise, AMPLITUDE * 0.5f32.powf(o as f32 / 3.0)))
         })
     }
 }
@@ -128,7 +134,8 @@ impl PlaneSource for MixingLayer {
         let z = k as f64 * dx;
         let from_middle = (z - HEIGHT / 2.0) as f32;
         let calm = (-(from_middle as f64 / ZONE).powi(2)).exp() as f32;
-        // Gradient noise with components in ±1 stays within ±1.5: beyond that the surface cannot be, and noise is left out.
+        // Gradient noise with components in ±1 stays within ±1.5: beyond that the surface cannot
+        // be, and noise is left out.
         let octaves: Vec<_> = self.octaves().collect();
         let reach = self.highest_wave + 1.5 * calm * octaves.iter().map(|(_, a)| a).sum::<f32>();
         let turbulent = from_middle.abs() <= reach;
@@ -156,8 +163,13 @@ mod tests {
 
     #[test]
     fn area_grows_faster_than_the_square_of_the_resolution() {
-        let count =
-            |n| MixingLayer::new(n, 1).surface(Options::default(), |_| true).unwrap().mesh.num_triangles();
+        let count = |n| {
+            MixingLayer::new(n, 1)
+                .surface(Options::default(), |_| true)
+                .unwrap()
+                .mesh
+                .num_triangles()
+        };
         let [coarse, fine] = [48, 192].map(count);
         assert!(coarse > 5_000, "{coarse}");
         assert!(fine > 22 * coarse, "{coarse} to {fine}: 16 times the cells of a smooth surface");
@@ -168,7 +180,10 @@ mod tests {
         let layer = MixingLayer::new(64, 3);
         let d = layer.dims();
         let mut values = vec![0f32; (d.x * d.y * d.z) as usize];
-        values.chunks_mut((d.x * d.y) as usize).enumerate().for_each(|(k, p)| layer.fill_plane(k as u32, p));
+        values
+            .chunks_mut((d.x * d.y) as usize)
+            .enumerate()
+            .for_each(|(k, p)| layer.fill_plane(k as u32, p));
         let grid = Grid::new(d, layer.origin(), layer.spacing(), values).unwrap();
         assert_eq!((grid.at(5, 9, 0), grid.at(5, 9, d.z - 1)), (1.0, 0.0));
         for k in 0..d.z {
@@ -183,7 +198,8 @@ mod tests {
     fn same_mesh_on_1_2_7_threads_and_other_on_other_seeds() {
         let crc = |seed, threads| {
             with_threads(threads, || {
-                let m = MixingLayer::new(40, seed).surface(Options::default(), |_| true).unwrap().mesh;
+                let m =
+                    MixingLayer::new(40, seed).surface(Options::default(), |_| true).unwrap().mesh;
                 crc32_f32(bytemuck::cast_slice(&m.positions))
             })
         };

@@ -1,7 +1,8 @@
 //! Generators: every data set of the thesis as a deterministic function of its size.
 //!
-//! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random numbers come from
-//! [`random`], so the same parameters give the same data on every machine and any number of threads.
+//! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random
+//! numbers come from [`random`], so the same parameters give the same data on every machine and any
+//! number of threads.
 
 pub mod blunt_body;
 mod cell_average;

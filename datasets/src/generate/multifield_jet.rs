@@ -1,12 +1,14 @@
-//! The combustion jet as five fields for pictures of several quantities at once (section 5.7 of the thesis): scalar
-//! dissipation `chi`, heat release `hr`, mixture fraction `mixfrac`, vorticity `vort` and hydroxyl `Y_OH`, with the density in
-//! front of them.
+//! The combustion jet as five fields for pictures of several quantities at once (section 5.7 of the
+//! thesis): scalar dissipation `chi`, heat release `hr`, mixture fraction `mixfrac`, vorticity
+//! `vort` and hydroxyl `Y_OH`, with the density in front of them.
 //!
-//! Mixture fraction and density are those of [`combustion_jet`](super::combustion_jet). The others follow from them as in
-//! laminar flamelets (N. Peters, "Laminar diffusion flamelet models in non-premixed turbulent combustion", Prog. Energy
-//! Combust. Sci. 10, 1984): χ = 2 D |∇Z|²; the flame is a band of Z about the stoichiometric value, whose heat release
-//! grows with χ and which goes out (no OH) where χ exceeds its quenching value. The vorticity is the curl of the jet's mean
-//! velocity plus eddies that follow the displacements. Derivatives are central differences, one-sided at the border.
+//! Mixture fraction and density are those of [`combustion_jet`](super::combustion_jet). The others
+//! follow from them as in laminar flamelets (N. Peters, "Laminar diffusion flamelet models in
+//! non-premixed turbulent combustion", Prog. Energy Combust. Sci. 10, 1984): χ = 2 D |∇Z|²; the
+//! flame is a band of Z about the stoichiometric value, whose heat release grows with χ and which
+//! goes out (no OH) where χ exceeds its quenching value. The vorticity is the curl of the jet's
+//! mean velocity plus eddies that follow the displacements. Derivatives are central differences,
+//! one-sided at the border.
 
 use super::combustion_jet::{CombustionJet, SYNGAS};
 use super::flow::{Field, Flow, FlowError, names};
@@ -14,7 +16,8 @@ use super::turbulence::Displacement;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Diffusivity of mass, m²/s: that of N2 in air at 450 K, so that most of the flame burns and its most strained parts are out.
+/// Diffusivity of mass, m²/s: that of N2 in air at 450 K, so that most of the flame burns and its
+/// most strained parts are out.
 const DIFFUSIVITY: f64 = 4e-5;
 /// Scalar dissipation at which the flame goes out, 1/s: 2000, the order of magnitude for this fuel.
 const QUENCHING: f64 = 2000.0;
@@ -24,7 +27,8 @@ const HYDROXYL: f64 = 4e-3;
 const HEAT_RELEASE: f64 = 1.5e8;
 /// Mean velocity of the jet against the coflow, m/s.
 const JET_SPEED: f64 = 190.0;
-/// Metres per second per metre of displacement: eddies of a slot's size turn over about as fast as the jet passes.
+/// Metres per second per metre of displacement: eddies of a slot's size turn over about as fast as
+/// the jet passes.
 const EDDY_RATE: f64 = JET_SPEED / 1.4e-3;
 
 /// The six fields, in the order above behind the density.
@@ -32,7 +36,8 @@ pub fn multifield_jet(jet: CombustionJet) -> Result<Flow, FlowError> {
     let mut flow = jet.lattice()?;
     let mixing = jet.mixing(&flow);
     let table = SYNGAS.table();
-    let wanted = [(names::DENSITY, "kg/m³"), ("mixfrac", "1"), ("u", "m/s"), ("v", "m/s"), ("w", "m/s")];
+    let wanted =
+        [(names::DENSITY, "kg/m³"), ("mixfrac", "1"), ("u", "m/s"), ("v", "m/s"), ("w", "m/s")];
     let scratch = || (Displacement::default(), Vec::new());
     flow.fill(&wanted, scratch, |(d, z), j, k, rows| {
         mixing.mixture_row(d, j, k, z);
@@ -40,9 +45,12 @@ pub fn multifield_jet(jet: CombustionJet) -> Result<Flow, FlowError> {
             rows[0][i] = table.at(0, z);
             rows[1][i] = z;
             for c in 0..3 {
-                // The jet moves in opposite directions to its two sides' gas; eddies live where the jet mixes.
-                let eddies = EDDY_RATE as f32 * d.rows[c][i] * (4.0 * z * (1.0 - z)).clamp(0.1, 1.0);
-                rows[2 + c][i] = if c == 0 { JET_SPEED as f32 * (z - 0.5) + eddies } else { eddies };
+                // The jet moves in opposite directions to its two sides' gas; eddies live where the
+                // jet mixes.
+                let eddies =
+                    EDDY_RATE as f32 * d.rows[c][i] * (4.0 * z * (1.0 - z)).clamp(0.1, 1.0);
+                rows[2 + c][i] =
+                    if c == 0 { JET_SPEED as f32 * (z - 0.5) + eddies } else { eddies };
             }
         }
     });
@@ -76,9 +84,12 @@ pub fn multifield_jet(jet: CombustionJet) -> Result<Flow, FlowError> {
     let band = |z: f32, width: f64| (-((z as f64 - stoichiometric) / width).powi(2)).exp();
     let burning = |chi: f32| 1.0 / (1.0 + (chi as f64 / QUENCHING).powi(4));
     let both = || z.par_iter().zip(&chi);
-    let hydroxyl = both().map(|(&z, &chi)| (HYDROXYL * band(z, 0.12) * burning(chi)) as f32).collect();
+    let hydroxyl =
+        both().map(|(&z, &chi)| (HYDROXYL * band(z, 0.12) * burning(chi)) as f32).collect();
     let heat = both()
-        .map(|(&z, &chi)| (HEAT_RELEASE * (chi as f64).sqrt() * band(z, 0.06) * burning(chi)) as f32)
+        .map(|(&z, &chi)| {
+            (HEAT_RELEASE * (chi as f64).sqrt() * band(z, 0.06) * burning(chi)) as f32
+        })
         .collect();
     let field = |name, unit, values| Field { name, unit, values };
     let mixfrac = flow.fields.pop();
@@ -143,7 +154,8 @@ mod tests {
     fn same_bits_on_1_2_7_threads() {
         let bits = |threads| {
             with_threads(threads, || {
-                let flow = multifield_jet(CombustionJet { dims: UVec3::new(16, 24, 8), seed: 3 }).unwrap();
+                let flow =
+                    multifield_jet(CombustionJet { dims: UVec3::new(16, 24, 8), seed: 3 }).unwrap();
                 flow.fields.iter().map(|f| crate::testing::crc32_f32(&f.values)).collect::<Vec<_>>()
             })
         };

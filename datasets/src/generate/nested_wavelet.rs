@@ -1,9 +1,10 @@
-//! Nested isosurfaces of the wavelet with 1, 2, 4 … 64 million triangles: the scaling series of figures 3.5 and 3.6 of
-//! the thesis, which contours the same field more often rather than more finely.
+//! Nested isosurfaces of the wavelet with 1, 2, 4 … 64 million triangles: the scaling series of
+//! figures 3.5 and 3.6 of the thesis, which contours the same field more often rather than more
+//! finely.
 //!
-//! The isovalues are evenly spaced and rounded to two decimals, so that they can be typed into ParaView's Contour
-//! filter; the triangle counts are those of `vtkFlyingEdges3D`. 27 values give exactly the 16 022 136 triangles that the
-//! thesis reports.
+//! The isovalues are evenly spaced and rounded to two decimals, so that they can be typed into
+//! ParaView's Contour filter; the triangle counts are those of `vtkFlyingEdges3D`. 27 values give
+//! exactly the 16 022 136 triangles that the thesis reports.
 
 use super::wavelet::{Wavelet, WaveletError};
 use crate::isosurface::{self, IsosurfaceError, Isosurfaces, Options, count_triangles};
@@ -30,7 +31,8 @@ pub enum Size {
 
 impl Size {
     /// All sizes, ascending.
-    pub const ALL: [Size; 7] = [Size::M1, Size::M2, Size::M4, Size::M8, Size::M16, Size::M32, Size::M64];
+    pub const ALL: [Size; 7] =
+        [Size::M1, Size::M2, Size::M4, Size::M8, Size::M16, Size::M32, Size::M64];
 
     /// "1M", "2M", … "64M".
     pub fn name(self) -> &'static str {
@@ -44,7 +46,8 @@ impl Size {
 
     /// Triangles at 201³ points.
     pub fn triangles(self) -> usize {
-        [1_002_484, 1_996_950, 4_003_478, 8_005_776, 16_022_136, 31_996_300, 64_135_816][self as usize]
+        [1_002_484, 1_996_950, 4_003_478, 8_005_776, 16_022_136, 31_996_300, 64_135_816]
+            [self as usize]
     }
 
     /// The isovalues, ascending.
@@ -61,8 +64,8 @@ impl Size {
         evenly_spaced(count, lowest, highest)
     }
 
-    /// Generates the surfaces: 24 bytes a triangle, 30 with normals. 16 million take about a second and a half on two
-    /// cores.
+    /// Generates the surfaces: 24 bytes a triangle, 30 with normals. 16 million take about a second
+    /// and a half on two cores.
     pub fn generate(self, options: Options) -> Result<Isosurfaces, NestedWaveletError> {
         let grid = Wavelet::with_points(POINTS).grid()?;
         Ok(isosurface::extract(&grid, &self.isovalues(), options)?)
@@ -80,20 +83,23 @@ pub enum NestedWaveletError {
     Isosurface(#[from] IsosurfaceError),
 }
 
-/// `count` values from `lowest` to `highest`, rounded to two decimals. One value is put in the middle.
+/// `count` values from `lowest` to `highest`, rounded to two decimals. One value is put in the
+/// middle.
 pub fn evenly_spaced(count: usize, lowest: f64, highest: f64) -> Vec<f64> {
     let step = (highest - lowest) / (count.max(2) - 1) as f64;
-    let value = |i: usize| if count == 1 { 0.5 * (lowest + highest) } else { lowest + step * i as f64 };
+    let value =
+        |i: usize| if count == 1 { 0.5 * (lowest + highest) } else { lowest + step * i as f64 };
     (0..count).map(|i| (value(i) * 100.0).round() / 100.0).collect()
 }
 
-/// Isovalues between 115 and 195 for any wavelet grid (larger ones have proportionally more triangles per surface) that
-/// come as close to `triangles` as an evenly spaced series can.
+/// Isovalues between 115 and 195 for any wavelet grid (larger ones have proportionally more
+/// triangles per surface) that come as close to `triangles` as an evenly spaced series can.
 pub fn isovalues_for(grid: &Grid, triangles: usize) -> Result<Vec<f64>, IsosurfaceError> {
     let total = |n: usize| -> Result<usize, IsosurfaceError> {
         Ok(count_triangles(grid, &evenly_spaced(n, SPREAD[0], SPREAD[1]))?.iter().sum())
     };
-    // The mean over a fine series barely changes with its length: one guess, then compare with its neighbours.
+    // The mean over a fine series barely changes with its length: one guess, then compare with its
+    // neighbours.
     let mean = total(16)? as f64 / 16.0;
     let guess = if mean > 0.0 { (triangles as f64 / mean).round().max(1.0) as usize } else { 1 };
     let mut best = (usize::MAX, guess);
@@ -124,8 +130,8 @@ mod tests {
         assert_eq!(Size::M2.isovalues(), [105.5, 138.5, 171.5, 204.5]);
         assert_eq!(Size::M4.isovalues(), [115.0, 128.33, 141.67, 155.0, 168.33, 181.67, 195.0]);
         let m8 = [
-            112.0, 118.62, 125.23, 131.85, 138.46, 145.08, 151.69, 158.31, 164.92, 171.54, 178.15, 184.77,
-            191.38, 198.0,
+            112.0, 118.62, 125.23, 131.85, 138.46, 145.08, 151.69, 158.31, 164.92, 171.54, 178.15,
+            184.77, 191.38, 198.0,
         ];
         assert_eq!(Size::M8.isovalues(), m8);
         let m16: Vec<f64> = (0..27).map(|i| 116.0 + 3.0 * i as f64).collect();

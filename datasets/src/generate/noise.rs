@@ -1,8 +1,9 @@
 //! Periodic gradient noise (Perlin 2002) evaluated a grid row at a time.
 //!
-//! Along a row of constant y and z the noise is, in each lattice cell, a blend of two linear functions of x whose
-//! coefficients are the same for the whole cell. Computing those once a cell leaves about a dozen operations a point,
-//! which is what makes fields of 8 billion points affordable.
+//! Along a row of constant y and z the noise is, in each lattice cell, a blend of two linear
+//! functions of x whose coefficients are the same for the whole cell. Computing those once a cell
+//! leaves about a dozen operations a point, which is what makes fields of 8 billion points
+//! affordable.
 
 use super::random::mix;
 #[cfg(test)]
@@ -15,8 +16,8 @@ pub(crate) struct Noise {
     pub(crate) seed: u64,
 }
 
-/// Storage of [`Noise::add_row`]; keep one for each noise. Rows that follow each other mostly lie in the same lattice
-/// cells in y and z, and then need no new gradients.
+/// Storage of [`Noise::add_row`]; keep one for each noise. Rows that follow each other mostly lie
+/// in the same lattice cells in y and z, and then need no new gradients.
 #[derive(Default)]
 pub(crate) struct RowScratch {
     /// Lattice cell in y and z, and last node, of `gradients`; the noise itself.
@@ -32,7 +33,8 @@ impl Noise {
         let wrapped = |a: usize| cell[a].rem_euclid(self.period[a] as i64) as u64;
         let key = wrapped(0) | wrapped(1) << 21 | wrapped(2) << 42;
         let h = mix(key ^ self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        // Each component uniform in -1..1: not unit vectors, but isotropic enough once octaves are added.
+        // Each component uniform in -1..1: not unit vectors, but isotropic enough once octaves are
+        // added.
         [0, 21, 42].map(|shift| ((h >> shift & 0x1f_ffff) as f32) * (2.0 / 0x1f_ffff as f32) - 1.0)
     }
 

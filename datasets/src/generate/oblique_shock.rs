@@ -1,10 +1,11 @@
 //! A wedge in a supersonic stream: exact plane shocks, and the exact expansion behind its shoulder.
 //!
-//! The wedge lies along x with its edge at the origin, symmetric about y = 0, the same at all z. Its surface is at
-//! `half_angle` for `length_m`; then it is parallel to the stream. Between shock and shoulder the gas is uniform
-//! ([`theta_beta_m`](super::gas_dynamics::theta_beta_m)); the fan of Mach lines from the shoulder is the centred wave of
-//! Prandtl and Meyer. The lattice ends before the fan reaches the shock and bends it, so all of it is exact; values are
-//! means over boxes.
+//! The wedge lies along x with its edge at the origin, symmetric about y = 0, the same at all z.
+//! Its surface is at `half_angle` for `length_m`; then it is parallel to the stream. Between shock
+//! and shoulder the gas is uniform ([`theta_beta_m`](super::gas_dynamics::theta_beta_m)); the fan
+//! of Mach lines from the shoulder is the centred wave of Prandtl and Meyer. The lattice ends
+//! before the fan reaches the shock and bends it, so all of it is exact; values are means over
+//! boxes.
 
 use super::cell_average::{LayeredFlow, Scratch, average_row};
 use super::flow::{Fields, Flow, FlowError, names};
@@ -14,7 +15,8 @@ use glam::{DVec3, UVec3};
 use rt_core::mesh::TriMesh;
 use std::f64::consts::FRAC_PI_2;
 
-/// The set-up. The default is a wedge of 10 degrees at Mach 2 in a tunnel with a reservoir at 200 kPa and 300 K.
+/// The set-up. The default is a wedge of 10 degrees at Mach 2 in a tunnel with a reservoir at 200
+/// kPa and 300 K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wedge {
     /// Air far upstream.
@@ -44,8 +46,9 @@ impl Wedge {
         Ok(oblique_shock(GAMMA_AIR, self.stream.mach, self.half_angle_rad, Branch::Weak)?)
     }
 
-    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction). The lattice reaches from 0.2
-    /// lengths before the edge to 1.6 lengths behind it at most, and as far up and down as the shock.
+    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction). The
+    /// lattice reaches from 0.2 lengths before the edge to 1.6 lengths behind it at most, and as
+    /// far up and down as the shock.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let wave = Wave::new(self)?;
         let l = self.length_m;
@@ -68,8 +71,10 @@ impl Wedge {
         }
         outline.push([l, h]);
         let n = outline.len() as u32;
-        let points: Vec<DVec3> =
-            [-z, z].iter().flat_map(|&z| outline.iter().map(move |p| DVec3::new(p[0], p[1], z))).collect();
+        let points: Vec<DVec3> = [-z, z]
+            .iter()
+            .flat_map(|&z| outline.iter().map(move |p| DVec3::new(p[0], p[1], z)))
+            .collect();
         let mut triangles: Vec<[u32; 3]> =
             (2..n).flat_map(|i| [[0, i, i - 1], [n, n + i - 1, n + i]]).collect();
         for i in 0..n {
@@ -95,12 +100,26 @@ pub(crate) fn fill_gas<F: LayeredFlow>(flow: &mut Flow, layers: &F, fields: Fiel
         let first = origin + spacing * DVec3::new(0.0, j as f64, k as f64);
         let [temperature, pressure, gas] = spare;
         if let [density, temperature, pressure, gas] = rows {
-            average_row(layers, first, spacing, n, scratch, &mut [density, temperature, pressure, gas]);
+            average_row(
+                layers,
+                first,
+                spacing,
+                n,
+                scratch,
+                &mut [density, temperature, pressure, gas],
+            );
         } else {
             for v in [&mut *temperature, &mut *pressure, &mut *gas] {
                 v.resize(n, 0.0);
             }
-            average_row(layers, first, spacing, n, scratch, &mut [&mut *rows[0], temperature, pressure, gas]);
+            average_row(
+                layers,
+                first,
+                spacing,
+                n,
+                scratch,
+                &mut [&mut *rows[0], temperature, pressure, gas],
+            );
         }
     });
 }
@@ -132,15 +151,18 @@ impl Wave {
         let free = [s.density(), s.temperature_k, s.pressure_pa];
         let ratios = [shock.jump.density, shock.jump.temperature, shock.jump.pressure];
         let behind = [0, 1, 2].map(|c| free[c] * ratios[c]);
-        // Close to detachment the flow behind the shock is subsonic, and the closed form has no shoulder.
+        // Close to detachment the flow behind the shock is subsonic, and the closed form has no
+        // shoulder.
         let turn_before_rad = prandtl_meyer::angle_rad(GAMMA_AIR, before)?;
         let after = prandtl_meyer::mach(GAMMA_AIR, turn_before_rad + wedge.half_angle_rad)?;
         let fan_rad = [wedge.half_angle_rad + (1.0 / before).asin(), (1.0 / after).asin()];
         let total = [0, 1, 2].map(|c| behind[c] / ratios_at(before)[c]);
         let (l, h) = (wedge.length_m, wedge.length_m * wedge.half_angle_rad.tan());
         let (fan, front) = (fan_rad[0].tan(), shock.shock_rad.tan());
-        // The first Mach line is steeper than the shock (the flow behind a shock is subsonic across it), so they meet.
-        let undisturbed_until_m = if fan_rad[0] < FRAC_PI_2 { (l * fan - h) / (fan - front) } else { l };
+        // The first Mach line is steeper than the shock (the flow behind a shock is subsonic across
+        // it), so they meet.
+        let undisturbed_until_m =
+            if fan_rad[0] < FRAC_PI_2 { (l * fan - h) / (fan - front) } else { l };
         Ok(Wave {
             stream: s,
             shock,
@@ -228,13 +250,15 @@ mod tests {
         let flow = wedge.flow(DIMS, Fields::Density).unwrap();
         let density = flow.grid(names::DENSITY).unwrap();
         let (free, behind) = (wedge.stream.density(), wedge.stream.density() * shock.jump.density);
-        // Along rows above the shoulder and before the fan: the excess is (behind - free) times the length behind the shock.
+        // Along rows above the shoulder and before the fan: the excess is (behind - free) times the
+        // length behind the shock.
         for j in (50..78).step_by(3) {
             let y = flow.position_m(0, j, 0).y;
             let front = y / shock.shock_rad.tan();
-            let last = (((front + 0.004 - flow.origin_m.x) / flow.spacing_m.x) as u32).min(flow.dims.x - 1);
-            let mass: f64 =
-                (0..=last).map(|i| density.at(i, j, 1) as f64 - free).sum::<f64>() * flow.spacing_m.x;
+            let last = (((front + 0.004 - flow.origin_m.x) / flow.spacing_m.x) as u32)
+                .min(flow.dims.x - 1);
+            let mass: f64 = (0..=last).map(|i| density.at(i, j, 1) as f64 - free).sum::<f64>()
+                * flow.spacing_m.x;
             let end = flow.position_m(last, 0, 0).x + 0.5 * flow.spacing_m.x;
             let found = end - mass / (behind - free);
             assert!((found - front).abs() < 0.01 * flow.spacing_m.x, "row {j}: {found} {front}");
@@ -251,8 +275,8 @@ mod tests {
                 assert!((ratios[c] * wave.total[c] / state[c] - 1.0).abs() < 1e-12, "{angle} {c}");
             }
         }
-        let exponent =
-            (wave.states[2][2] / wave.states[1][2]).ln() / (wave.states[2][0] / wave.states[1][0]).ln();
+        let exponent = (wave.states[2][2] / wave.states[1][2]).ln()
+            / (wave.states[2][0] / wave.states[1][0]).ln();
         assert!((exponent - 1.4).abs() < 1e-12);
         // Shock loss aside, the pressure is back near the free stream's behind the shoulder.
         assert!((wave.states[2][2] / wave.states[0][2] - 1.0).abs() < 0.05);
@@ -265,11 +289,13 @@ mod tests {
         let body = flow.body.as_ref().unwrap();
         assert_eq!(open_or_flipped_edges(&body.indices), 0);
         assert!(volume(body) > 0.0);
-        let (density, gas) = (flow.field(names::DENSITY).unwrap(), flow.field(names::GAS_FRACTION).unwrap());
+        let (density, gas) =
+            (flow.field(names::DENSITY).unwrap(), flow.field(names::GAS_FRACTION).unwrap());
         for (d, g) in density.values.iter().zip(&gas.values) {
             assert_eq!(d.is_nan(), *g == 0.0);
         }
-        // Volume of the solid within the boxes, from fractions and from the body (whose ends lie in the middle of boxes).
+        // Volume of the solid within the boxes, from fractions and from the body (whose ends lie in
+        // the middle of boxes).
         let cell = flow.spacing_m.x * flow.spacing_m.y;
         let mut solid = 0.0;
         for i in 0..flow.dims.x as usize {

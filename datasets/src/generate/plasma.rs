@@ -1,10 +1,12 @@
-//! A reconnecting current sheet, the subject of the VPIC plasma simulation in table 4.1 of the thesis (102 million
-//! triangles): wrinkled flux ropes as an isosurface of density, and tubes along the magnetic field.
+//! A reconnecting current sheet, the subject of the VPIC plasma simulation in table 4.1 of the
+//! thesis (102 million triangles): wrinkled flux ropes as an isosurface of density, and tubes along
+//! the magnetic field.
 //!
-//! The field is a Harris sheet (Harris 1962) with a chain of magnetic islands that wander along y, under a guide field:
-//! B = ∇×(A ŷ) + B_g ŷ with A = -λ ln cosh(z/λ) + ε cos(k·x + κ(y)) exp(-z²/w²), so it is free of divergence exactly.
-//! Density is a function of A (plasma is tied to flux surfaces) with turbulence in octaves down to a few cells. The
-//! domain is 2 x 1 x 1, periodic along x and y, with z = 0 in the sheet.
+//! The field is a Harris sheet (Harris 1962) with a chain of magnetic islands that wander along y,
+//! under a guide field: B = ∇×(A ŷ) + B_g ŷ with A = -λ ln cosh(z/λ) + ε cos(k·x + κ(y))
+//! exp(-z²/w²), so it is free of divergence exactly. Density is a function of A (plasma is tied to
+//! flux surfaces) with turbulence in octaves down to a few cells. The domain is 2 x 1 x 1, periodic
+//! along x and y, with z = 0 in the sheet.
 
 use super::noise::{Noise, RowScratch};
 use super::polylines::{Line, Polylines};
@@ -42,7 +44,8 @@ pub struct Plasma {
 }
 
 impl Plasma {
-    /// Density sampled with 2·`points` x `points` x `points` points; `points` is clamped to 16..=4096.
+    /// Density sampled with 2·`points` x `points` x `points` points; `points` is clamped to
+    /// 16..=4096.
     pub fn new(points: u32, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let wander = [random.between(0.0, TAU), random.between(0.0, TAU)];
@@ -67,8 +70,8 @@ impl Plasma {
     pub fn magnetic_field(&self, p: DVec3) -> DVec3 {
         let (s, c) = (WAVE_NUMBER * p.x + self.phase(p.y).0).sin_cos();
         let envelope = (-(p.z / ISLAND_HEIGHT).powi(2)).exp();
-        let da_dz =
-            -(p.z / SHEET).tanh() - 2.0 * p.z / (ISLAND_HEIGHT * ISLAND_HEIGHT) * ISLAND * c * envelope;
+        let da_dz = -(p.z / SHEET).tanh()
+            - 2.0 * p.z / (ISLAND_HEIGHT * ISLAND_HEIGHT) * ISLAND * c * envelope;
         let da_dx = -ISLAND * WAVE_NUMBER * s * envelope;
         DVec3::new(-da_dz, GUIDE_FIELD, da_dx)
     }
@@ -87,8 +90,11 @@ impl Plasma {
     pub fn streamtubes(&self, count: usize) -> Polylines {
         let line = |i: usize| -> Line {
             let mut random = Random::new(self.seed ^ (i as u64 + 1) << 32);
-            let seed =
-                DVec3::new(random.between(0.0, 2.0), random.unit(), random.between(-1.0, 1.0) * 2.0 * SHEET);
+            let seed = DVec3::new(
+                random.between(0.0, 2.0),
+                random.unit(),
+                random.between(-1.0, 1.0) * 2.0 * SHEET,
+            );
             let (low, high) = (DVec3::new(0.0, 0.0, -0.5), DVec3::new(2.0, 1.0, 0.5));
             let step = |p: DVec3| (p.cmpge(low).all() && p.cmple(high).all()).then_some(0.006);
             let follow = |sign: f64| {
@@ -121,8 +127,10 @@ impl Plasma {
         let seed = self.seed;
         (0..16u32).map_while(move |o| {
             let period = FIRST_PERIOD << o;
-            let noise = Noise { period: [2 * period, period, period], seed: seed ^ (o as u64 + 1) << 40 };
-            (o == 0 || period as f64 <= finest).then(|| (noise, TURBULENCE * 0.5f32.powf(o as f32 / 3.0)))
+            let noise =
+                Noise { period: [2 * period, period, period], seed: seed ^ (o as u64 + 1) << 40 };
+            (o == 0 || period as f64 <= finest)
+                .then(|| (noise, TURBULENCE * 0.5f32.powf(o as f32 / 3.0)))
         })
     }
 }
@@ -149,7 +157,8 @@ impl PlaneSource for Plasma {
         let envelope = ISLAND * (-(z / ISLAND_HEIGHT).powi(2)).exp();
         let wave: Vec<DVec2> =
             (0..2 * self.points).map(|i| DVec2::from_angle(WAVE_NUMBER * i as f64 * d.x)).collect();
-        // Where even the middle of an island is thin, turbulence cannot reach the surface: leave it out.
+        // Where even the middle of an island is thin, turbulence cannot reach the surface: leave it
+        // out.
         let thickest = density(harris + envelope);
         let turbulent =
             thickest * (1.0 + 1.5 * self.octaves().map(|(_, a)| a).sum::<f32>()) > 0.9 * ISO as f32;
@@ -174,8 +183,9 @@ impl PlaneSource for Plasma {
     }
 }
 
-/// Density without turbulence: 1 in the middle of an island, where A = ε; 1/9 on the separatrix, where A = -ε; and falling
-/// further away from the sheet. (An exponential would do as well, but cost more than the noise.)
+/// Density without turbulence: 1 in the middle of an island, where A = ε; 1/9 on the separatrix,
+/// where A = -ε; and falling further away from the sheet. (An exponential would do as well, but
+/// cost more than the noise.)
 fn density(flux: f64) -> f32 {
     let q = ISLAND / (2.0 * ISLAND - flux);
     (q * q) as f32
@@ -193,7 +203,8 @@ mod tests {
         let h = 1e-6;
         for _ in 0..100 {
             let p = DVec3::new(random.between(0.0, 2.0), random.unit(), random.between(-0.4, 0.4));
-            let d = |axis: DVec3| (plasma.flux(p + axis * h) - plasma.flux(p - axis * h)) / (2.0 * h);
+            let d =
+                |axis: DVec3| (plasma.flux(p + axis * h) - plasma.flux(p - axis * h)) / (2.0 * h);
             let curl = DVec3::new(-d(DVec3::Z), GUIDE_FIELD, d(DVec3::X));
             assert!(curl.distance(plasma.magnetic_field(p)) < 1e-6, "{p}");
         }

@@ -1,5 +1,5 @@
-//! The shape that helium plumes and pool fires share: a round source at the floor, puffs that roll up into rings, and a
-//! column that necks in, breaks up and widens as it rises.
+//! The shape that helium plumes and pool fires share: a round source at the floor, puffs that roll
+//! up into rings, and a column that necks in, breaks up and widens as it rises.
 
 use super::flow::Flow;
 use super::random::Random;
@@ -16,7 +16,8 @@ pub(crate) struct Shape {
     pub(crate) neck: f64,
     /// Height of the neck.
     pub(crate) neck_height: f64,
-    /// Growth of the radius with height above the neck: 6/5 α after Morton, Taylor and Turner 1956 with α = 0.1 is 0.12.
+    /// Growth of the radius with height above the neck: 6/5 α after Morton, Taylor and Turner 1956
+    /// with α = 0.1 is 0.12.
     pub(crate) growth: f64,
     /// Height at which the axis is diluted to half.
     pub(crate) half_height: f64,

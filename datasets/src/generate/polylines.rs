@@ -1,4 +1,5 @@
-//! Lines with a radius and a scalar at every point: what streamline generators give, ready to become tubes.
+//! Lines with a radius and a scalar at every point: what streamline generators give, ready to
+//! become tubes.
 
 use glam::Vec3;
 use rt_core::shapes::{Radii, ShapeError, Tubes};
@@ -8,7 +9,8 @@ use rt_core::shapes::{Radii, ShapeError, Tubes};
 pub struct Polylines {
     /// World positions of all lines' points, one line after the other.
     pub points: Vec<Vec3>,
-    /// Line i has the points `offsets[i]..offsets[i + 1]`; the first offset is 0, the last `points.len()`.
+    /// Line i has the points `offsets[i]..offsets[i + 1]`; the first offset is 0, the last
+    /// `points.len()`.
     pub offsets: Vec<u32>,
     /// Tube radius at every point, in world units.
     pub radii: Vec<f32>,

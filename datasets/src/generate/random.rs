@@ -1,4 +1,5 @@
-//! Repeatable random numbers: the same seed gives the same sequence on every machine and thread count.
+//! Repeatable random numbers: the same seed gives the same sequence on every machine and thread
+//! count.
 
 use glam::{DVec2, DVec3};
 

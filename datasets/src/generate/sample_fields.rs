@@ -1,4 +1,5 @@
-//! Refractive indices through which rays are known in closed form, sampled at points: test objects for ray tracers.
+//! Refractive indices through which rays are known in closed form, sampled at points: test objects
+//! for ray tracers.
 
 use super::flow::{Flow, FlowError, names};
 use glam::{DVec3, UVec3};
@@ -13,7 +14,8 @@ pub enum SampleField {
         /// σ.
         sigma_m: f64,
     },
-    /// Luneburg's lens: n² = 2 - r² within the unit ball, 1 outside. Parallel rays meet at its far side.
+    /// Luneburg's lens: n² = 2 - r² within the unit ball, 1 outside. Parallel rays meet at its far
+    /// side.
     Luneburg,
     /// Maxwell's fish-eye: n = n0 / (1 + r²/a²). Rays are circles.
     Maxwell {
@@ -38,8 +40,8 @@ impl SampleField {
     }
 
     /// The index on a cube of `half_width_m` about the origin. The one field is called
-    /// [`refractive_index`](names::REFRACTIVE_INDEX); as f32 it resolves changes of 6e-8, so weak Gaussians (A < 1e-3) should
-    /// be taken from [`SampleField::index_minus_one`].
+    /// [`refractive_index`](names::REFRACTIVE_INDEX); as f32 it resolves changes of 6e-8, so weak
+    /// Gaussians (A < 1e-3) should be taken from [`SampleField::index_minus_one`].
     pub fn flow(&self, dims: UVec3, half_width_m: f64) -> Result<Flow, FlowError> {
         self.sampled(dims, half_width_m, (names::REFRACTIVE_INDEX, "1"), |p| self.index(p))
     }

@@ -7,8 +7,8 @@ use rt_core::mesh::{Attribute, TriMesh};
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-/// The unit sphere as an icosahedron subdivided `level` times: 20·4^level triangles of nearly equal size. Levels above
-/// 12 (335 million triangles) are treated as 12.
+/// The unit sphere as an icosahedron subdivided `level` times: 20·4^level triangles of nearly equal
+/// size. Levels above 12 (335 million triangles) are treated as 12.
 ///
 /// ```
 /// let ball = datasets::generate::shapes::icosphere(2);
@@ -51,8 +51,11 @@ pub fn icosphere(level: u32) -> TriMesh {
         triangles = triangles
             .iter()
             .flat_map(|&[a, b, c]| {
-                let (ab, bc, ca) =
-                    (middle(a, b, &mut points), middle(b, c, &mut points), middle(c, a, &mut points));
+                let (ab, bc, ca) = (
+                    middle(a, b, &mut points),
+                    middle(b, c, &mut points),
+                    middle(c, a, &mut points),
+                );
                 [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
             })
             .collect();
@@ -66,13 +69,14 @@ pub fn icosphere(level: u32) -> TriMesh {
 pub fn cube() -> TriMesh {
     let positions =
         (0..8).map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0);
-    let faces = [[0u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces =
+        [[0u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
     TriMesh::new(positions.collect(), triangles.collect())
 }
 
-/// The unit sphere by longitude and latitude around z, with one vertex at each pole: `around` (at least 3) by `rings` (at
-/// least 2) patches. Long thin triangles at the poles are the point of it.
+/// The unit sphere by longitude and latitude around z, with one vertex at each pole: `around` (at
+/// least 3) by `rings` (at least 2) patches. Long thin triangles at the poles are the point of it.
 pub fn uv_sphere(around: u32, rings: u32) -> TriMesh {
     let (around, rings) = (around.max(3), rings.max(2));
     let mut positions = vec![Vec3::Z];
@@ -99,7 +103,8 @@ pub fn uv_sphere(around: u32, rings: u32) -> TriMesh {
     TriMesh { normals, ..TriMesh::new(positions, triangles) }
 }
 
-/// A torus around z: circle of radius 1, tube of radius `tube`, `around` by `across` quads (at least 3 each) as triangles.
+/// A torus around z: circle of radius 1, tube of radius `tube`, `around` by `across` quads (at
+/// least 3 each) as triangles.
 pub fn torus(tube: f32, around: u32, across: u32) -> TriMesh {
     let (around, across) = (around.max(3), across.max(3));
     let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
@@ -118,12 +123,14 @@ pub fn torus(tube: f32, around: u32, across: u32) -> TriMesh {
     TriMesh { normals: Some(Attribute::per_vertex(normals)), ..TriMesh::new(positions, triangles) }
 }
 
-/// An isosurface of the wavelet on `points`³ samples whose border is pulled below every isovalue, so that the surface
-/// is closed: an intricate solid with handles and cavities, within the cube from -1 to 1.
+/// An isosurface of the wavelet on `points`³ samples whose border is pulled below every isovalue,
+/// so that the surface is closed: an intricate solid with handles and cavities, within the cube
+/// from -1 to 1.
 pub fn closed_wavelet(points: u32, iso: f64) -> Result<TriMesh, isosurface::IsosurfaceError> {
     let points = points.clamp(3, 1 << 10);
     let w = Wavelet::with_points(points);
-    let mut grid = w.grid().unwrap_or_else(|_| unreachable!("3 to 1024 points per axis are a valid extent"));
+    let mut grid =
+        w.grid().unwrap_or_else(|_| unreachable!("3 to 1024 points per axis are a valid extent"));
     let (n, last) = (points as usize, points as usize - 1);
     (grid.origin, grid.spacing) = (DVec3::NEG_ONE, DVec3::splat(2.0 / last as f64));
     for (i, v) in grid.values.iter_mut().enumerate() {
@@ -147,12 +154,21 @@ mod tests {
             ("icosphere", icosphere(4), ball, 0.01),
             ("cube", cube(), 8.0, 1e-9),
             ("uv sphere", uv_sphere(60, 40), ball, 0.01),
-            ("coarsest uv sphere", uv_sphere(0, 0), 0.75f64.sqrt(), 1e-6), // a double pyramid over a triangle
+            (
+                "coarsest uv \
+              sphere",
+                uv_sphere(0, 0),
+                0.75f64.sqrt(),
+                1e-6,
+            ), // a double pyramid over a triangle
             ("torus", torus(0.3, 80, 40), torus_volume, 0.01),
         ] {
             assert_eq!(open_or_flipped_edges(&mesh.indices), 0, "{name}");
             let v = volume(&mesh);
-            assert!((v / expected - 1.0).abs() <= tolerance, "{name}: volume {v}, expected {expected}");
+            assert!(
+                (v / expected - 1.0).abs() <= tolerance,
+                "{name}: volume {v}, expected {expected}"
+            );
             mesh.check().unwrap();
             assert_eq!(mesh.validate().zero_area, 0, "{name}");
         }

@@ -1,8 +1,9 @@
-//! Magnetic field lines of a star: stands for the 48 000 streamlines of the VAPOR star in table 4.1 of the thesis (there
-//! 86 million triangles of tubes; here round tubes without triangles).
+//! Magnetic field lines of a star: stands for the 48 000 streamlines of the VAPOR star in table 4.1
+//! of the thesis (there 86 million triangles of tubes; here round tubes without triangles).
 //!
-//! The field is that of a tilted dipole at the centre and a dozen smaller ones under the surface (starspots), so lines
-//! are of all lengths, from small arcades to loops that leave the domain. Units: the star's radius is 1.
+//! The field is that of a tilted dipole at the centre and a dozen smaller ones under the surface
+//! (starspots), so lines are of all lengths, from small arcades to loops that leave the domain.
+//! Units: the star's radius is 1.
 
 use super::polylines::{Line, Polylines};
 use super::random::{Random, fibonacci_direction};
@@ -17,7 +18,8 @@ pub const THESIS_LINES: usize = 48_000;
 const SPOTS: usize = 12;
 /// Lines that get this far from the centre end.
 const OUTER_RADIUS: f64 = 8.0;
-/// Step as a fraction of the distance to the centre: fine at the surface, where the field is intricate.
+/// Step as a fraction of the distance to the centre: fine at the surface, where the field is
+/// intricate.
 const RELATIVE_STEP: f64 = 0.03;
 /// Tube radius as a fraction of the distance to the centre.
 const RELATIVE_TUBE: f32 = 0.002;
@@ -44,7 +46,8 @@ impl StarField {
         StarField { dipoles }
     }
 
-    /// Field at `p`: Σ (3(m·r)r/r² - m)/r³, in units of the central dipole's equatorial surface field.
+    /// Field at `p`: Σ (3(m·r)r/r² - m)/r³, in units of the central dipole's equatorial surface
+    /// field.
     pub fn at(&self, p: DVec3) -> DVec3 {
         let dipole = |d: &Dipole| {
             let r = p - d.position;
@@ -54,8 +57,8 @@ impl StarField {
         self.dipoles.iter().map(dipole).sum()
     }
 
-    /// `count` field lines from points spread evenly over the surface, outward until they come back or reach eight radii.
-    /// The scalar is log₁₀|B|.
+    /// `count` field lines from points spread evenly over the surface, outward until they come back
+    /// or reach eight radii. The scalar is log₁₀|B|.
     pub fn lines(&self, count: usize) -> Polylines {
         let line = |i: usize| -> Line {
             let seed = fibonacci_direction(i, count);
@@ -100,7 +103,9 @@ mod tests {
         for _ in 0..100 {
             let p = random.direction() * random.between(1.0, 4.0);
             let h = 1e-4;
-            let d = |axis: DVec3| (field.at(p + axis * h) - field.at(p - axis * h)).dot(axis) / (2.0 * h);
+            let d = |axis: DVec3| {
+                (field.at(p + axis * h) - field.at(p - axis * h)).dot(axis) / (2.0 * h)
+            };
             let divergence = d(DVec3::X) + d(DVec3::Y) + d(DVec3::Z);
             assert!(divergence.abs() < 1e-3 * field.at(p).length(), "{p}: {divergence}");
         }
@@ -114,7 +119,10 @@ mod tests {
         for w in lines.offsets.windows(2) {
             let line = &lines.points[w[0] as usize..w[1] as usize];
             let end = line.last().unwrap().length();
-            assert!(line.len() >= 2 && (end < 1.0 || end >= OUTER_RADIUS as f32), "ends at radius {end}");
+            assert!(
+                line.len() >= 2 && (end < 1.0 || end >= OUTER_RADIUS as f32),
+                "ends at radius {end}"
+            );
             lengths.push(line.len());
         }
         lengths.sort();

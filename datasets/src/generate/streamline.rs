@@ -1,7 +1,8 @@
 //! Streamlines by the classical Runge-Kutta method of fourth order.
 //!
-//! Lines are followed by arc length, not by time: the direction field `v/|v|` is integrated, so points are evenly spaced
-//! however the speed varies (field lines of a magnet vary over many orders of magnitude).
+//! Lines are followed by arc length, not by time: the direction field `v/|v|` is integrated, so
+//! points are evenly spaced however the speed varies (field lines of a magnet vary over many orders
+//! of magnitude).
 
 use glam::DVec3;
 
@@ -16,8 +17,9 @@ pub struct StreamlineOptions {
     pub min_speed: f64,
 }
 
-/// Follows the field from `seed`, which becomes the first point. `step` gives the arc length of the next step at a point;
-/// a line ends where it returns `None` (outside), where the field is too weak or not finite, or at `max_points`.
+/// Follows the field from `seed`, which becomes the first point. `step` gives the arc length of the
+/// next step at a point; a line ends where it returns `None` (outside), where the field is too weak
+/// or not finite, or at `max_points`.
 pub fn trace(
     field: impl Fn(DVec3) -> DVec3,
     seed: DVec3,
@@ -64,8 +66,12 @@ mod tests {
     fn error_on_a_circle_falls_with_the_fourth_power_of_the_step() {
         let error = |n: usize| {
             let h = std::f64::consts::TAU / n as f64;
-            let line =
-                trace(rotation, DVec3::X, |_| Some(h), StreamlineOptions { max_points: n + 1, ..FORWARD });
+            let line = trace(
+                rotation,
+                DVec3::X,
+                |_| Some(h),
+                StreamlineOptions { max_points: n + 1, ..FORWARD },
+            );
             line[n].distance(DVec3::X)
         };
         // With fewer steps two error terms of opposite sign hide the order.
@@ -76,8 +82,12 @@ mod tests {
 
     #[test]
     fn backward_undoes_forward() {
-        let there =
-            trace(rotation, DVec3::X, |_| Some(0.01), StreamlineOptions { max_points: 101, ..FORWARD });
+        let there = trace(
+            rotation,
+            DVec3::X,
+            |_| Some(0.01),
+            StreamlineOptions { max_points: 101, ..FORWARD },
+        );
         let back = StreamlineOptions { max_points: 101, sign: -1.0, ..FORWARD };
         assert!(trace(rotation, there[100], |_| Some(0.01), back)[100].distance(DVec3::X) < 1e-10);
     }
@@ -85,7 +95,8 @@ mod tests {
     #[test]
     fn lines_end_at_stagnation_nan_and_border() {
         let sink = |p: DVec3| -p;
-        let line = trace(sink, DVec3::X, |_| Some(0.09), StreamlineOptions { min_speed: 0.2, ..FORWARD });
+        let line =
+            trace(sink, DVec3::X, |_| Some(0.09), StreamlineOptions { min_speed: 0.2, ..FORWARD });
         assert!((5..12).contains(&line.len()), "{}", line.len());
         assert_eq!(trace(|_| DVec3::NAN, DVec3::X, |_| Some(0.1), FORWARD), [DVec3::X]);
         let inside = |p: DVec3| (p.x < 2.0).then_some(0.25);

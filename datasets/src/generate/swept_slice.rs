@@ -1,19 +1,22 @@
-//! A plane slice of a computed flow, revolved or extruded to the three-dimensional flow that it stands for.
+//! A plane slice of a computed flow, revolved or extruded to the three-dimensional flow that it
+//! stands for.
 //!
-//! Solvers compute axisymmetric and plane flows on one layer of cells. What a beam of light crosses is the whole flow: the slice
-//! turned about its axis, or repeated along the span.
+//! Solvers compute axisymmetric and plane flows on one layer of cells. What a beam of light crosses
+//! is the whole flow: the slice turned about its axis, or repeated along the span.
 
 use super::flow::{Flow, FlowError, names};
 use crate::model::{Dataset, ModelError, StructuredGrid};
 use glam::{DVec3, UVec3};
 
-/// A slice on a lattice of cells: x along the stream, y the distance from the axis (or from the plane of symmetry). Lines of
-/// constant first index must have constant x, as in meshes made of blocks between vertical lines.
+/// A slice on a lattice of cells: x along the stream, y the distance from the axis (or from the
+/// plane of symmetry). Lines of constant first index must have constant x, as in meshes made of
+/// blocks between vertical lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slice {
     /// x of the lines, ascending.
     x_m: Vec<f64>,
-    /// y of the lattice's points on line i, ascending; the first is the body's surface, or the axis.
+    /// y of the lattice's points on line i, ascending; the first is the body's surface, or the
+    /// axis.
     y_m: Vec<Vec<f64>>,
     /// Per field: name, unit, and cell values by line and then along it.
     fields: Vec<(&'static str, &'static str, Vec<f64>)>,
@@ -35,14 +38,17 @@ pub enum Sweep {
 #[derive(Debug, thiserror::Error)]
 pub enum SliceError {
     /// Not a structured grid of one layer.
-    #[error("the slice must be a structured grid of at least 2 x 2 points in one layer, not {found}")]
+    #[error(
+        "the slice must be a structured grid of at least 2 x 2 points in one layer, not {found}"
+    )]
     NotASlice {
         /// What it is.
         found: String,
     },
     /// Lines lean, or run backwards.
     #[error(
-        "line {line} of the slice {what}; lines of constant first index must have constant and growing x, and growing y"
+        "line {line} of the slice {what}; lines of constant first index must have constant and \
+         growing x, and growing y"
     )]
     Line {
         /// First index.
@@ -63,7 +69,9 @@ impl Slice {
     pub fn from_dataset(data: &Dataset) -> Result<Slice, SliceError> {
         data.check()?;
         let not_a_slice = |found: String| SliceError::NotASlice { found };
-        let Dataset::StructuredGrid(grid) = data else { return Err(not_a_slice(data.kind().into())) };
+        let Dataset::StructuredGrid(grid) = data else {
+            return Err(not_a_slice(data.kind().into()));
+        };
         let [nx, ny, nz] = crate::model::extent_dims(grid.extent);
         if nx < 2 || ny < 2 || nz != 1 {
             return Err(not_a_slice(format!("{nx} x {ny} x {nz} points")));
@@ -72,13 +80,18 @@ impl Slice {
         let mut fields = Vec::new();
         for (name, unit) in [(names::DENSITY, "kg/m³"), (names::TEMPERATURE, "K")] {
             let Some(array) = grid.attributes.cell_array(name) else { continue };
-            let by_line =
-                (0..(nx - 1) * (ny - 1)).map(|c| array.get(c % (ny - 1) * (nx - 1) + c / (ny - 1), 0));
+            let by_line = (0..(nx - 1) * (ny - 1))
+                .map(|c| array.get(c % (ny - 1) * (nx - 1) + c / (ny - 1), 0));
             fields.push((name, unit, by_line.collect()));
         }
         if fields.first().is_none_or(|f| f.0 != names::DENSITY) {
-            let available =
-                grid.attributes.cell.iter().map(|a| format!("`{}`", a.name)).collect::<Vec<_>>().join(", ");
+            let available = grid
+                .attributes
+                .cell
+                .iter()
+                .map(|a| format!("`{}`", a.name))
+                .collect::<Vec<_>>()
+                .join(", ");
             return Err(ModelError::NoArray {
                 name: "density (per cell)".into(),
                 kind: data.kind(),
@@ -89,8 +102,8 @@ impl Slice {
         Ok(Slice { x_m, y_m, fields })
     }
 
-    /// The whole flow on a lattice of `dims` points. Values are means of 2 x 2 x 2 samples a box, bilinear between the slice's
-    /// cells; NaN within the body.
+    /// The whole flow on a lattice of `dims` points. Values are means of 2 x 2 x 2 samples a box,
+    /// bilinear between the slice's cells; NaN within the body.
     pub fn flow(&self, sweep: Sweep, dims: UVec3) -> Result<Flow, SliceError> {
         let (first, last) = (self.x_m[0], self.x_m[self.x_m.len() - 1]);
         // No further out than all lines reach.
@@ -100,8 +113,11 @@ impl Slice {
             Sweep::Extrude { span_m } => 0.5 * span_m,
         };
         let side = if sweep == Sweep::Revolve { half_span } else { side };
-        let mut flow =
-            Flow::over(dims, DVec3::new(first, -side, -half_span), DVec3::new(last, side, half_span))?;
+        let mut flow = Flow::over(
+            dims,
+            DVec3::new(first, -side, -half_span),
+            DVec3::new(last, side, half_span),
+        )?;
         let (origin, spacing) = (flow.origin_m, flow.spacing_m);
         let wanted: Vec<_> = self.fields.iter().map(|f| (f.0, f.1)).collect();
         flow.fill(
@@ -118,7 +134,8 @@ impl Slice {
                         if let Some(cells) = self.locate(q.x.clamp(first, last), r) {
                             count += 1;
                             for (sum, field) in sums.iter_mut().zip(&self.fields) {
-                                *sum += cells.iter().map(|&(cell, w)| w * field.2[cell]).sum::<f64>();
+                                *sum +=
+                                    cells.iter().map(|&(cell, w)| w * field.2[cell]).sum::<f64>();
                             }
                         }
                     }
@@ -153,8 +170,9 @@ impl Slice {
 
     /// How a point's value follows from cells: `None` within the body.
     ///
-    /// Linear along each of the two nearest columns of cells at the point's own y, then between the columns: where the
-    /// surface has a corner, cells of equal number lie at different heights, and interpolating by number would shear the field.
+    /// Linear along each of the two nearest columns of cells at the point's own y, then between the
+    /// columns: where the surface has a corner, cells of equal number lie at different heights, and
+    /// interpolating by number would shear the field.
     fn locate(&self, x: f64, y: f64) -> Option<[(usize, f64); 4]> {
         let line = self.x_m.partition_point(|&l| l <= x).clamp(1, self.x_m.len() - 1) - 1;
         let s = (x - self.x_m[line]) / (self.x_m[line + 1] - self.x_m[line]);
@@ -188,7 +206,11 @@ impl Slice {
 }
 
 /// Positions of the lattice's lines.
-fn lines(grid: &StructuredGrid, nx: usize, ny: usize) -> Result<(Vec<f64>, Vec<Vec<f64>>), SliceError> {
+fn lines(
+    grid: &StructuredGrid,
+    nx: usize,
+    ny: usize,
+) -> Result<(Vec<f64>, Vec<Vec<f64>>), SliceError> {
     let (mut x_m, mut y_m) = (Vec::new(), Vec::new());
     for line in 0..nx {
         let points: Vec<DVec3> = (0..ny).map(|j| grid.points.get(j * nx + line)).collect();

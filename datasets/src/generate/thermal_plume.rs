@@ -1,16 +1,17 @@
 //! The mean turbulent plume above a small heat source: similar at all heights, and in closed form.
 //!
-//! B. R. Morton, G. I. Taylor and J. S. Turner, "Turbulent gravitational convection from maintained and instantaneous
-//! sources", Proc. R. Soc. A 234, 1956. With the buoyancy flux F = g Q / (cp T0 ρ0) and entrainment α, a plume with Gaussian
-//! profiles in still air of constant density has
+//! B. R. Morton, G. I. Taylor and J. S. Turner, "Turbulent gravitational convection from maintained
+//! and instantaneous sources", Proc. R. Soc. A 234, 1956. With the buoyancy flux F = g Q / (cp T0
+//! ρ0) and entrainment α, a plume with Gaussian profiles in still air of constant density has
 //!
 //! ```text
 //! b = 6/5 α z,   w³ = 3 F z / (π b²),   g' = 2 F / (π w b²) ∝ z^(-5/3),   ρ = ρ0 (1 - g'/g · exp(-r²/b²)),
 //! ```
 //!
-//! so the density integrated along any horizontal line is the Abel transform of a Gaussian: `√π b exp(-y²/b²)` times its
-//! amplitude ([`ThermalPlume::deficit_kg_per_m2`]). Values are samples at points, so that the closed form holds to the last
-//! bit of an f32: the field is smooth, and its mean over a box differs by h²/b² only.
+//! so the density integrated along any horizontal line is the Abel transform of a Gaussian: `√π b
+//! exp(-y²/b²)` times its amplitude ([`ThermalPlume::deficit_kg_per_m2`]). Values are samples at
+//! points, so that the closed form holds to the last bit of an f32: the field is smooth, and its
+//! mean over a box differs by h²/b² only.
 
 use super::flow::{Fields, Flow, FlowError, names};
 use super::gas_dynamics::GAS_CONSTANT_AIR;
@@ -22,7 +23,8 @@ const GRAVITY: f64 = 9.806_65;
 /// Heat capacity of air, J/(kg K).
 const HEAT_CAPACITY: f64 = 1004.7;
 
-/// The set-up. The default is 100 W (a person) in a room at 293.15 K and 1 atm, seen from 0.5 to 2 m above the source.
+/// The set-up. The default is 100 W (a person) in a room at 293.15 K and 1 atm, seen from 0.5 to 2
+/// m above the source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalPlume {
     /// Heat that convection carries, W.
@@ -84,20 +86,23 @@ impl ThermalPlume {
         self.still_density() * (1.0 - self.lightness(z_m) * (-(r_m / b).powi(2)).exp())
     }
 
-    /// Density missing along a horizontal line that passes the axis at distance `y_m`, kg/m²: times the Gladstone-Dale
-    /// constant it is the optical path difference, its derivative the deflection.
+    /// Density missing along a horizontal line that passes the axis at distance `y_m`, kg/m²: times
+    /// the Gladstone-Dale constant it is the optical path difference, its derivative the
+    /// deflection.
     pub fn deficit_kg_per_m2(&self, y_m: f64, z_m: f64) -> f64 {
         let b = self.radius_m(z_m);
         self.still_density() * self.lightness(z_m) * PI.sqrt() * b * (-(y_m / b).powi(2)).exp()
     }
 
-    /// Fields: density; with [`Fields::All`] temperature and pressure. The lattice is three radii of the highest plane wide to
-    /// each side; z is up, the source at the origin.
+    /// Fields: density; with [`Fields::All`] temperature and pressure. The lattice is three radii
+    /// of the highest plane wide to each side; z is up, the source at the origin.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let [bottom, top] = self.heights_m;
         let side = 3.0 * self.radius_m(top);
-        let mut flow = Flow::over(dims, DVec3::new(-side, -side, bottom), DVec3::new(side, side, top))?;
-        let wanted = [(names::DENSITY, "kg/m³"), (names::TEMPERATURE, "K"), (names::PRESSURE, "Pa")];
+        let mut flow =
+            Flow::over(dims, DVec3::new(-side, -side, bottom), DVec3::new(side, side, top))?;
+        let wanted =
+            [(names::DENSITY, "kg/m³"), (names::TEMPERATURE, "K"), (names::PRESSURE, "Pa")];
         let wanted = if fields == Fields::All { &wanted[..] } else { &wanted[..1] };
         let (origin, spacing) = (flow.origin_m, flow.spacing_m);
         flow.fill(
@@ -105,10 +110,12 @@ impl ThermalPlume {
             || (),
             |(), j, k, rows| {
                 let first = origin + spacing * DVec3::new(0.0, j as f64, k as f64);
-                let (b, missing) = (self.radius_m(first.z), self.still_density() * self.lightness(first.z));
+                let (b, missing) =
+                    (self.radius_m(first.z), self.still_density() * self.lightness(first.z));
                 for i in 0..rows[0].len() {
                     let x = first.x + spacing.x * i as f64;
-                    let rho = self.still_density() - missing * (-(x * x + first.y * first.y) / (b * b)).exp();
+                    let rho = self.still_density()
+                        - missing * (-(x * x + first.y * first.y) / (b * b)).exp();
                     rows[0][i] = rho as f32;
                     if let [_, temperature, pressure] = rows {
                         temperature[i] = (self.pressure_pa / (GAS_CONSTANT_AIR * rho)) as f32;
@@ -137,12 +144,16 @@ mod tests {
             let (w, b, h) = (plume.velocity_m_per_s(z), plume.radius_m(z), 1e-5 * z);
             let ((v1, m1), (v2, m2)) = (flux(z - h), flux(z + h));
             let entrained = (v2 - v1) / (2.0 * h);
-            assert!((entrained / (2.0 * plume.entrainment * w * b) - 1.0).abs() < 1e-8, "volume at {z}");
+            assert!(
+                (entrained / (2.0 * plume.entrainment * w * b) - 1.0).abs() < 1e-8,
+                "volume at {z}"
+            );
             let lift = 2.0 * b * b * plume.lightness(z) * GRAVITY;
             assert!(((m2 - m1) / (2.0 * h) / lift - 1.0).abs() < 1e-8, "momentum at {z}");
         }
-        // Engineering formulas for Q in W and z in m: 0.128 Q^(1/3) z^(-1/3) m/s and 0.329 Q^(2/3) z^(-5/3) K on the axis
-        // (after E. Mundt, thesis, KTH Stockholm, 1996), which agree with the closed form for an entrainment of about 0.093.
+        // Engineering formulas for Q in W and z in m: 0.128 Q^(1/3) z^(-1/3) m/s and 0.329 Q^(2/3)
+        // z^(-5/3) K on the axis (after E. Mundt, thesis, KTH Stockholm, 1996), which agree with
+        // the closed form for an entrainment of about 0.093.
         let excess = plume.lightness(1.0) * plume.temperature_k;
         assert!((plume.velocity_m_per_s(1.0) / (0.128 * 100f64.cbrt()) - 1.0).abs() < 0.1);
         assert!((excess / (0.329 * 100f64.powf(2.0 / 3.0)) - 1.0).abs() < 0.15, "{excess}");
@@ -156,12 +167,14 @@ mod tests {
         for k in 0..5 {
             for j in [10, 20, 23] {
                 let p = flow.position_m(0, j, k);
-                let sum: f64 = (0..81).map(|i| plume.still_density() - rho.at(i, j, k) as f64).sum();
+                let sum: f64 =
+                    (0..81).map(|i| plume.still_density() - rho.at(i, j, k) as f64).sum();
                 let exact = plume.deficit_kg_per_m2(p.y, p.z);
                 let most = plume.deficit_kg_per_m2(0.0, p.z);
                 // f32 densities of 1.2 carry 6e-8 each.
                 assert!(
-                    (sum * flow.spacing_m.x - exact).abs() < 1e-4 * most + 81.0 * 6e-8 * flow.spacing_m.x,
+                    (sum * flow.spacing_m.x - exact).abs()
+                        < 1e-4 * most + 81.0 * 6e-8 * flow.spacing_m.x,
                     "{j} {k}"
                 );
             }

@@ -1,9 +1,12 @@
-//! The look of turbulence without its equations: smooth mean fields evaluated at displaced positions.
+//! The look of turbulence without its equations: smooth mean fields evaluated at displaced
+//! positions.
 //!
-//! Two displacements follow each other. [`Vortices`] wind the field up around a few large cores (Kelvin-Helmholtz rollers,
-//! the rings of puffing plumes). [`Turbulence`] displaces by gradient noise in octaves down to six cells, with amplitudes
-//! ∝ wavelength^(1/3): then differences of a passive scalar grow with distance^(1/3), as Obukhov and Corrsin found for real
-//! turbulence. Fronts of the mean field become folded, torn sheets that stay as sharp as the mean field makes them.
+//! Two displacements follow each other. [`Vortices`] wind the field up around a few large cores
+//! (Kelvin-Helmholtz rollers, the rings of puffing plumes). [`Turbulence`] displaces by gradient
+//! noise in octaves down to six cells, with amplitudes ∝ wavelength^(1/3): then differences of a
+//! passive scalar grow with distance^(1/3), as Obukhov and Corrsin found for real turbulence.
+//! Fronts of the mean field become folded, torn sheets that stay as sharp as the mean field makes
+//! them.
 
 use super::flow::Flow;
 use super::noise::{Noise, RowScratch};
@@ -29,7 +32,8 @@ pub(crate) struct Displacement {
     pub(crate) rows: [Vec<f32>; 3],
     octave: Vec<f32>,
     scratch: Vec<[RowScratch; 3]>,
-    /// Size and strength along the row, and what follows for each octave: most rows have those of the row before.
+    /// Size and strength along the row, and what follows for each octave: most rows have those of
+    /// the row before.
     local: Vec<(f64, f64)>,
     weights: Vec<Vec<f32>>,
 }
@@ -51,8 +55,9 @@ impl Turbulence {
         Turbulence { octaves, points: flow.dims.to_array() }
     }
 
-    /// Displacements along the row of constant y and z with indices `j`, `k`. `strength(i)` gives the local size of the
-    /// eddies at point `i`, and how far they carry gas, as a share of that size.
+    /// Displacements along the row of constant y and z with indices `j`, `k`. `strength(i)` gives
+    /// the local size of the eddies at point `i`, and how far they carry gas, as a share of that
+    /// size.
     pub(crate) fn displace_row(
         &self,
         out: &mut Displacement,
@@ -69,7 +74,8 @@ impl Turbulence {
         }
         let local: Vec<(f64, f64)> = (0..n).map(strength).collect();
         if local != out.local || out.weights.len() != self.octaves.len() {
-            let of_octave = |o: &Octave| local.iter().map(|&l| weight(o.wavelength_m, l) as f32).collect();
+            let of_octave =
+                |o: &Octave| local.iter().map(|&l| weight(o.wavelength_m, l) as f32).collect();
             out.weights = self.octaves.iter().map(of_octave).collect();
             out.local = local;
         }
@@ -78,7 +84,14 @@ impl Turbulence {
                 out.octave.clear();
                 out.octave.resize(n, 0.0);
                 let scratch = &mut out.scratch[o][c];
-                octave.noise[c].add_row(&mut out.octave, dx, j as f64 * dy, k as f64 * dz, 1.0, scratch);
+                octave.noise[c].add_row(
+                    &mut out.octave,
+                    dx,
+                    j as f64 * dy,
+                    k as f64 * dz,
+                    1.0,
+                    scratch,
+                );
                 for ((sum, v), w) in out.rows[c].iter_mut().zip(&out.octave).zip(&out.weights[o]) {
                     *sum += v * w;
                 }
@@ -87,7 +100,8 @@ impl Turbulence {
     }
 }
 
-/// Amplitude of an octave where eddies have this size and strength: the third-root law below it, little above.
+/// Amplitude of an octave where eddies have this size and strength: the third-root law below it,
+/// little above.
 fn weight(wavelength_m: f64, (size_m, strength): (f64, f64)) -> f64 {
     if size_m <= 0.0 || strength <= 0.0 {
         return 0.0;
@@ -115,7 +129,10 @@ impl Vortices {
             let s = (d[0] * d[0] + d[1] * d[1]) / (v.size_m * v.size_m);
             if s < 9.0 {
                 let (sin, cos) = (-v.turn_rad * (-s).exp()).sin_cos();
-                q = [v.center_m[0] + d[0] * cos - d[1] * sin, v.center_m[1] + d[0] * sin + d[1] * cos];
+                q = [
+                    v.center_m[0] + d[0] * cos - d[1] * sin,
+                    v.center_m[1] + d[0] * sin + d[1] * cos,
+                ];
             }
         }
         q
@@ -129,7 +146,8 @@ mod tests {
 
     #[test]
     fn differences_grow_with_the_third_root_of_distance() {
-        let flow = Flow::over(UVec3::new(513, 40, 40), DVec3::ZERO, DVec3::new(512.0, 39.0, 39.0)).unwrap();
+        let flow = Flow::over(UVec3::new(513, 40, 40), DVec3::ZERO, DVec3::new(512.0, 39.0, 39.0))
+            .unwrap();
         let turbulence = Turbulence::new(&flow, 256.0, 5);
         let mut out = Displacement::default();
         let mut squares = [0.0; 2];
@@ -155,7 +173,9 @@ mod tests {
         let mut out = Displacement::default();
         turbulence.displace_row(&mut out, 3, 4, |i| if i < 10 { (0.0, 1.0) } else { (0.5, 0.3) });
         for row in &out.rows {
-            assert!(row[..10].iter().all(|&v| v == 0.0) && row[10..].iter().any(|&v| v.abs() > 1e-3));
+            assert!(
+                row[..10].iter().all(|&v| v == 0.0) && row[10..].iter().any(|&v| v.abs() > 1e-3)
+            );
         }
     }
 

@@ -1,15 +1,18 @@
-//! The wavelet of `vtkRTAnalyticSource` (ParaView's *Sources > Wavelet*), bit for bit: the field whose nested
-//! isosurfaces chapter 3 of the thesis renders with 1 to 32 million triangles (figures 3.5 and 3.6).
+//! The wavelet of `vtkRTAnalyticSource` (ParaView's *Sources > Wavelet*), bit for bit: the field
+//! whose nested isosurfaces chapter 3 of the thesis renders with 1 to 32 million triangles (figures
+//! 3.5 and 3.6).
 //!
-//! With the scaled distances `x = (Cx - i)·sx`, `sx = 1/(xmax - xmin)` (y and z alike) and `t = 1/(2·σ²)`:
+//! With the scaled distances `x = (Cx - i)·sx`, `sx = 1/(xmax - xmin)` (y and z alike) and `t =
+//! 1/(2·σ²)`:
 //!
 //! ```text
 //! f = 255·exp(-(z² + y² + x²)·t) + 10·sin(60·x) + 18·sin(30·y) + 5·cos(40·z)
 //! ```
 //!
-//! VTK computes in f64, rounds each of the three waves to f32 and adds them one after the other in f64; only then the
-//! sum becomes f32. That order is kept here. `exp`, `sin` and `cos` come from the platform's C library, as VTK's do;
-//! results that differ in their last f64 bit disappear in the rounding to f32 except about once in 2²⁹ samples.
+//! VTK computes in f64, rounds each of the three waves to f32 and adds them one after the other in
+//! f64; only then the sum becomes f32. That order is kept here. `exp`, `sin` and `cos` come from
+//! the platform's C library, as VTK's do; results that differ in their last f64 bit disappear in
+//! the rounding to f32 except about once in 2²⁹ samples.
 
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
@@ -27,7 +30,8 @@ const MAX_POINTS_PER_AXIS: i64 = 1 << 20;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wavelet {
-    /// First point index per axis (`WholeExtent`); also its world position, because the spacing is 1.
+    /// First point index per axis (`WholeExtent`); also its world position, because the spacing is
+    /// 1.
     pub first: IVec3,
     /// Last point index per axis, not smaller than `first`.
     pub last: IVec3,
@@ -62,7 +66,8 @@ impl Default for Wavelet {
 pub enum WaveletError {
     /// An axis has no points, or absurdly many.
     #[error(
-        "wavelet extent {first}..={last} along {axis} has {points} points; give between 1 and {MAX_POINTS_PER_AXIS}"
+        "wavelet extent {first}..={last} along {axis} has {points} points; give between 1 and \
+         {MAX_POINTS_PER_AXIS}"
     )]
     Extent {
         /// 'x', 'y' or 'z'.
@@ -77,16 +82,20 @@ pub enum WaveletError {
 }
 
 impl Wavelet {
-    /// VTK's wavelet with `points` samples per axis, centred: 201 is `WholeExtent` -100..100 (an even number has one
-    /// more sample on the negative side). `points` 0 becomes 1.
+    /// VTK's wavelet with `points` samples per axis, centred: 201 is `WholeExtent` -100..100 (an
+    /// even number has one more sample on the negative side). `points` 0 becomes 1.
     pub fn with_points(points: u32) -> Self {
         let points = points.max(1) as i32;
         let first = -(points / 2);
-        Wavelet { first: IVec3::splat(first), last: IVec3::splat(first + points - 1), ..Default::default() }
+        Wavelet {
+            first: IVec3::splat(first),
+            last: IVec3::splat(first + points - 1),
+            ..Default::default()
+        }
     }
 
-    /// Samples the field; parallel over planes, same bits on any number of threads. An extent that is empty or has
-    /// more than 2²⁰ points along an axis is an error.
+    /// Samples the field; parallel over planes, same bits on any number of threads. An extent that
+    /// is empty or has more than 2²⁰ points along an axis is an error.
     pub fn grid(&self) -> Result<Grid, WaveletError> {
         let axis = |a: usize| -> Result<Axis, WaveletError> {
             let (first, last) = (self.first[a], self.last[a]);
@@ -122,19 +131,29 @@ impl Wavelet {
     }
 }
 
-/// What depends on one coordinate only: the squared scaled distance, and the wave after its rounding to f32.
+/// What depends on one coordinate only: the squared scaled distance, and the wave after its
+/// rounding to f32.
 struct Axis {
     square: Vec<f64>,
     wave: Vec<f64>,
 }
 
 impl Axis {
-    fn new(first: i32, last: i32, center: f64, magnitude: f64, frequency: f64, wave: fn(f64) -> f64) -> Self {
+    fn new(
+        first: i32,
+        last: i32,
+        center: f64,
+        magnitude: f64,
+        frequency: f64,
+        wave: fn(f64) -> f64,
+    ) -> Self {
         let scale = if last > first { 1.0 / (last as f64 - first as f64) } else { 1.0 };
         let scaled = |i: i32| (center - i as f64) * scale;
         Axis {
             square: (first..=last).map(|i| scaled(i) * scaled(i)).collect(),
-            wave: (first..=last).map(|i| (magnitude * wave(frequency * scaled(i))) as f32 as f64).collect(),
+            wave: (first..=last)
+                .map(|i| (magnitude * wave(frequency * scaled(i))) as f32 as f64)
+                .collect(),
         }
     }
 }
@@ -153,7 +172,8 @@ mod tests {
 
     #[test]
     fn bits_are_vtks() {
-        // zlib.crc32 of RTData from vtkRTAnalyticSource (VTK 9.7.2); wavelet_vs_vtk.rs repeats the comparison live.
+        // zlib.crc32 of RTData from vtkRTAnalyticSource (VTK 9.7.2); wavelet_vs_vtk.rs repeats the
+        // comparison live.
         assert_eq!(crc32_f32(&Wavelet::default().grid().unwrap().values), 0x6f34_cebe);
         assert_eq!(crc32_f32(&Wavelet::with_points(101).grid().unwrap().values), 0x1b8c_cc5c);
     }
@@ -165,15 +185,19 @@ mod tests {
 
     #[test]
     fn same_bits_on_1_2_7_threads() {
-        let crc =
-            |threads| with_threads(threads, || crc32_f32(&Wavelet::with_points(33).grid().unwrap().values));
+        let crc = |threads| {
+            with_threads(threads, || crc32_f32(&Wavelet::with_points(33).grid().unwrap().values))
+        };
         assert_eq!((crc(1), crc(1)), (crc(2), crc(7)));
     }
 
     #[test]
     fn one_point_axis_has_scale_one() {
-        let flat =
-            Wavelet { first: IVec3::new(-10, -10, 3), last: IVec3::new(10, 10, 3), ..Default::default() };
+        let flat = Wavelet {
+            first: IVec3::new(-10, -10, 3),
+            last: IVec3::new(10, 10, 3),
+            ..Default::default()
+        };
         let grid = flat.grid().unwrap();
         assert_eq!(grid.dims, glam::UVec3::new(21, 21, 1));
         // z = (0 - 3)·1: the Gaussian is exp(-18 - …), the wave along z is 5·cos(-120).
@@ -186,8 +210,11 @@ mod tests {
         let w = Wavelet { last: IVec3::new(10, -11, 10), ..Default::default() };
         let message = w.grid().unwrap_err().to_string();
         assert!(message.contains("along y") && message.contains("0 points"), "{message}");
-        let huge =
-            Wavelet { first: IVec3::splat(i32::MIN), last: IVec3::splat(i32::MAX), ..Default::default() };
+        let huge = Wavelet {
+            first: IVec3::splat(i32::MIN),
+            last: IVec3::splat(i32::MAX),
+            ..Default::default()
+        };
         assert!(huge.grid().is_err(), "2^32 points per axis");
     }
 }

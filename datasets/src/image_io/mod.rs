@@ -1,8 +1,9 @@
 //! Pictures in files: PNG for eyes, multi-layer OpenEXR for data.
 //!
-//! A [`Picture`] is a set of named f32 planes of equal size. Names follow the `layer.channel` convention by which tev,
-//! Nuke, Blender and OpenRV group channels: `R`, `G`, `B`, `A` for the colour, then `depth.Z`, `normal.X`, `deflection.X`…
-//! OpenEXR keeps every plane bit for bit with its unit and the picture's metadata; PNG keeps the colour only.
+//! A [`Picture`] is a set of named f32 planes of equal size. Names follow the `layer.channel`
+//! convention by which tev, Nuke, Blender and OpenRV group channels: `R`, `G`, `B`, `A` for the
+//! colour, then `depth.Z`, `normal.X`, `deflection.X`… OpenEXR keeps every plane bit for bit with
+//! its unit and the picture's metadata; PNG keeps the colour only.
 //!
 //! ```
 //! use datasets::image_io::{Picture, read_exr, write_exr};
@@ -32,7 +33,8 @@ pub struct Picture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// The planes, in the order they were added. Colour planes are linear with premultiplied alpha, as OpenEXR wants.
+    /// The planes, in the order they were added. Colour planes are linear with premultiplied alpha,
+    /// as OpenEXR wants.
     pub planes: Vec<Plane>,
     /// How the picture was made: see [`Metadata`].
     pub metadata: Metadata,
@@ -106,7 +108,8 @@ pub enum ImageError {
         /// Why.
         source: std::io::Error,
     },
-    /// The file's contents are not a picture that can be read, or the picture is not one that the format can hold.
+    /// The file's contents are not a picture that can be read, or the picture is not one that the
+    /// format can hold.
     #[error("{path}: {reason}")]
     Format {
         /// The file.
@@ -190,8 +193,9 @@ impl Picture {
             _ => [need("R")?, need("G")?, need("B")?],
         };
         let alpha = self.plane("A");
-        let pixel =
-            |i: usize| [r.samples[i], g.samples[i], b.samples[i], alpha.map_or(1.0, |a| a.samples[i])];
+        let pixel = |i: usize| {
+            [r.samples[i], g.samples[i], b.samples[i], alpha.map_or(1.0, |a| a.samples[i])]
+        };
         self.check()?;
         Ok((0..r.samples.len()).map(pixel).collect())
     }
@@ -217,7 +221,8 @@ impl Picture {
 
 /// Metadata that every program can give: its name and version, and its command line.
 pub fn metadata_of_this_run(software: &str, version: &str) -> Metadata {
-    let arguments: Vec<String> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    let arguments: Vec<String> =
+        std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     Metadata::from([
         (keys::SOFTWARE.to_string(), format!("{software} {version}").into()),
         (keys::COMMAND_LINE.to_string(), arguments.join(" ").into()),

@@ -1,17 +1,19 @@
-//! OpenEXR through the `exr` crate: all planes of a picture as 32-bit channels of one part, ZIP-compressed without loss.
+//! OpenEXR through the `exr` crate: all planes of a picture as 32-bit channels of one part,
+//! ZIP-compressed without loss.
 //!
-//! Metadata entries are attributes of the same name; the unit of plane `depth.Z` is the text attribute `unit.depth.Z`.
-//! Texts are written as UTF-8. Names that the format itself defines as a text (`software`, `comments`, `owner`…) or as a
-//! number (`expTime`, `near`…) become those standard attributes, which other programs show under their own headings.
-//! Standard numbers have 32 bits, all others 64.
+//! Metadata entries are attributes of the same name; the unit of plane `depth.Z` is the text
+//! attribute `unit.depth.Z`. Texts are written as UTF-8. Names that the format itself defines as a
+//! text (`software`, `comments`, `owner`…) or as a number (`expTime`, `near`…) become those
+//! standard attributes, which other programs show under their own headings. Standard numbers have
+//! 32 bits, all others 64.
 
 use super::{ImageError, Metadata, MetadataValue, Picture, Plane, format_error, io_error};
 use crate::atomic_file::write_atomically;
 use exr::meta::attribute::AttributeValue;
 use exr::meta::header::standard_names;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers,
-    Text, WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels,
+    ReadLayers, Text, WritableImage,
 };
 use std::io::Cursor;
 use std::path::Path;
@@ -24,7 +26,8 @@ const MAX_NAME_BYTES: usize = 255;
 pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
     picture.check()?;
     if picture.planes.is_empty() || picture.width == 0 || picture.height == 0 {
-        let size = format!("{}x{} with {} planes", picture.width, picture.height, picture.planes.len());
+        let size =
+            format!("{}x{} with {} planes", picture.width, picture.height, picture.planes.len());
         return Err(format_error(
             path,
             format!("OpenEXR cannot hold a picture of {size}; add pixels and a plane"),
@@ -32,7 +35,8 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
     }
     let mut attributes = LayerAttributes::default();
     let units = picture.planes.iter().filter(|p| !p.unit.is_empty());
-    let units = units.map(|p| (format!("{UNIT_PREFIX}{}", p.name), MetadataValue::Text(p.unit.clone())));
+    let units =
+        units.map(|p| (format!("{UNIT_PREFIX}{}", p.name), MetadataValue::Text(p.unit.clone())));
     for (key, value) in picture.metadata.clone().into_iter().chain(units) {
         let attribute = name(path, &key)?;
         if !standard_names::ALL.contains(&attribute.as_slice()) {
@@ -46,8 +50,9 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
                 MetadataValue::Text(_) => "text",
                 MetadataValue::Number(_) => "number",
             };
-            let reason =
-                format!("OpenEXR gives `{key}` a meaning of its own, which is no {kind}; rename the entry");
+            let reason = format!(
+                "OpenEXR gives `{key}` a meaning of its own, which is no {kind}; rename the entry"
+            );
             return Err(format_error(path, reason));
         }
     }
@@ -56,14 +61,16 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
         channels.push(AnyChannel::new(name(path, &p.name)?, FlatSamples::F32(p.samples.clone())));
     }
     let size = (picture.width as usize, picture.height as usize);
-    let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels.into()));
+    let layer =
+        Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels.into()));
     let mut bytes = Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(|e| format_error(path, e))?;
     write_atomically(path, |w| w.write_all(bytes.get_ref())).map_err(io_error(path, "write"))
 }
 
-/// Reads the channels of the first part that has any, 16-bit and integer channels as f32. Planes come sorted by name, as
-/// the format stores them; [`Picture`]s that differ in the order of planes hold the same.
+/// Reads the channels of the first part that has any, 16-bit and integer channels as f32. Planes
+/// come sorted by name, as the format stores them; [`Picture`]s that differ in the order of planes
+/// hold the same.
 pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
     let bytes = std::fs::read(path).map_err(io_error(path, "read"))?;
     let image = exr::prelude::read()
@@ -75,8 +82,9 @@ pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
         .from_buffered(Cursor::new(bytes))
         .map_err(|e| format_error(path, format!("not a readable OpenEXR file: {e}")))?;
     let layer = image.layer_data;
-    let size =
-        |n: usize| u32::try_from(n).map_err(|_| format_error(path, format!("{n} pixels along one side")));
+    let size = |n: usize| {
+        u32::try_from(n).map_err(|_| format_error(path, format!("{n} pixels along one side")))
+    };
     let mut picture = Picture::new(size(layer.size.0)?, size(layer.size.1)?);
     let mut entries: Metadata = layer.attributes.other.iter().filter_map(metadata_entry).collect();
     entries.extend(standard_entries(layer.attributes));
@@ -109,8 +117,7 @@ fn metadata_entry((key, value): (&Text, &AttributeValue)) -> Option<(String, Met
     Some((string(key), value))
 }
 
-// ---- attributes that the format defines ---------------------------------------------------------------------------
-
+// ---- attributes that the format defines ---------------------------------------------------------
 /// The name of an attribute and its place in the crate's structure.
 type Standard<T> = (&'static str, fn(&mut LayerAttributes) -> &mut Option<T>);
 
@@ -148,11 +155,15 @@ const STANDARD_NUMBERS: [Standard<f32>; 14] = [
 fn put_standard(attributes: &mut LayerAttributes, key: &str, value: &MetadataValue) -> bool {
     match value {
         MetadataValue::Text(t) => {
-            let Some((_, place)) = STANDARD_TEXTS.iter().find(|(k, _)| *k == key) else { return false };
+            let Some((_, place)) = STANDARD_TEXTS.iter().find(|(k, _)| *k == key) else {
+                return false;
+            };
             *place(attributes) = Some(text(t));
         }
         MetadataValue::Number(n) => {
-            let Some((_, place)) = STANDARD_NUMBERS.iter().find(|(k, _)| *k == key) else { return false };
+            let Some((_, place)) = STANDARD_NUMBERS.iter().find(|(k, _)| *k == key) else {
+                return false;
+            };
             *place(attributes) = Some(*n as f32);
         }
     }
@@ -167,13 +178,14 @@ fn standard_entries(mut attributes: LayerAttributes) -> Metadata {
         found.extend(place(a).take().map(|t| (key.to_string(), MetadataValue::Text(string(&t)))));
     }
     for (key, place) in STANDARD_NUMBERS {
-        found.extend(place(a).take().map(|n| (key.to_string(), MetadataValue::Number(f64::from(n)))));
+        found.extend(
+            place(a).take().map(|n| (key.to_string(), MetadataValue::Number(f64::from(n)))),
+        );
     }
     found
 }
 
-// ---- texts --------------------------------------------------------------------------------------------------------
-
+// ---- texts --------------------------------------------------------------------------------------
 fn text(s: &str) -> Text {
     Text::from_slice_unchecked(s.as_bytes())
 }
@@ -228,7 +240,8 @@ mod tests {
     fn names_that_the_format_defines_become_its_own_attributes() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("standard.exr");
-        let mut p = Picture { metadata: super::super::metadata_of_this_run("bench", "1.2"), ..picture() };
+        let mut p =
+            Picture { metadata: super::super::metadata_of_this_run("bench", "1.2"), ..picture() };
         for (key, _) in STANDARD_TEXTS {
             p.metadata.insert(key.into(), format!("a {key}").into());
         }
@@ -246,9 +259,11 @@ mod tests {
 
     #[test]
     fn a_reserved_name_with_another_kind_of_value_is_refused_by_name() {
-        for (key, value) in
-            [("software", 1.0.into()), ("expTime", "long".into()), ("channels", MetadataValue::from("R"))]
-        {
+        for (key, value) in [
+            ("software", 1.0.into()),
+            ("expTime", "long".into()),
+            ("channels", MetadataValue::from("R")),
+        ] {
             let mut p = picture();
             p.metadata.insert(key.into(), value);
             let message = write_exr(Path::new("never-written.exr"), &p).unwrap_err().to_string();
@@ -278,7 +293,12 @@ mod tests {
             let message = read_exr(&path).unwrap_err().to_string();
             assert!(message.contains("p.exr"), "{cut}: {message}");
         }
-        assert!(read_exr(&dir.path().join("absent.exr")).unwrap_err().to_string().contains("absent.exr"));
+        assert!(
+            read_exr(&dir.path().join("absent.exr"))
+                .unwrap_err()
+                .to_string()
+                .contains("absent.exr")
+        );
     }
 
     #[test]

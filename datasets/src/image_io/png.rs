@@ -35,13 +35,17 @@ pub fn write_png(path: &Path, picture: &Picture, depth: PngDepth) -> Result<PngR
     let mut report = PngReport::default();
     let encoded: Vec<[f32; 4]> = pixels.iter().map(|&p| encode(p, &mut report)).collect();
     let channels = if picture.plane("A").is_some() { 4 } else { 3 };
-    let quantized =
-        |max: f32| encoded.iter().flat_map(move |p| p[..channels].iter().map(move |v| (v * max).round()));
+    let quantized = |max: f32| {
+        encoded.iter().flat_map(move |p| p[..channels].iter().map(move |v| (v * max).round()))
+    };
     let (bytes, color) = match (depth, channels) {
-        (PngDepth::Eight, 4) => {
-            (quantized(255.0).map(|v| v as u8).collect::<Vec<u8>>(), image::ExtendedColorType::Rgba8)
+        (PngDepth::Eight, 4) => (
+            quantized(255.0).map(|v| v as u8).collect::<Vec<u8>>(),
+            image::ExtendedColorType::Rgba8,
+        ),
+        (PngDepth::Eight, _) => {
+            (quantized(255.0).map(|v| v as u8).collect(), image::ExtendedColorType::Rgb8)
         }
-        (PngDepth::Eight, _) => (quantized(255.0).map(|v| v as u8).collect(), image::ExtendedColorType::Rgb8),
         // `image` takes 16-bit samples in native byte order.
         (PngDepth::Sixteen, 4) => (
             quantized(65535.0).flat_map(|v| (v as u16).to_ne_bytes()).collect(),
@@ -78,8 +82,8 @@ pub fn read_png(path: &Path) -> Result<Picture, ImageError> {
     Ok(picture)
 }
 
-/// Samples divided by their largest value. (The crate's own conversion to f32 does the same, but is free to treat the
-/// values as a colour space of its choice.)
+/// Samples divided by their largest value. (The crate's own conversion to f32 does the same, but is
+/// free to treat the values as a colour space of its choice.)
 fn unit_range(decoded: DynamicImage) -> ImageBuffer<image::Rgba<f32>, Vec<f32>> {
     let pixels = decoded.to_rgba16();
     ImageBuffer::from_fn(pixels.width(), pixels.height(), |x, y| {
@@ -132,7 +136,10 @@ mod tests {
         p.add("Y", "", fine.clone()).unwrap();
         let error = |depth| {
             let back = round_trip(&p, depth).0;
-            fine.iter().zip(&back.planes[0].samples).map(|(a, b)| (a - b).abs()).fold(0f32, f32::max)
+            fine.iter()
+                .zip(&back.planes[0].samples)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0f32, f32::max)
         };
         assert!(error(PngDepth::Sixteen) < 2e-5 && error(PngDepth::Eight) > 1e-3);
     }
@@ -143,7 +150,8 @@ mod tests {
         p.add_rgba(&[[0.5, 0.25, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]]).unwrap();
         let (back, report) = round_trip(&p, PngDepth::Sixteen);
         assert_eq!(report.clamped, 0);
-        for (a, b) in p.rgba().unwrap().iter().flatten().zip(back.rgba().unwrap().iter().flatten()) {
+        for (a, b) in p.rgba().unwrap().iter().flatten().zip(back.rgba().unwrap().iter().flatten())
+        {
             assert!((a - b).abs() < 3e-5, "{a} {b}");
         }
     }

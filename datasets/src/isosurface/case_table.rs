@@ -1,22 +1,37 @@
 //! The 256 ways a surface can pass through a cell, derived from two rules instead of typed in.
 //!
-//! 1. **Faces decide.** On each of the six faces, walking around it, every run of inside corners is cut off by one
-//!    segment from where the walk enters it to where it leaves. On an ambiguous face (two inside corners on a diagonal)
-//!    this *separates the inside corners*. Both cells at a face see the same corners, so they agree, and the surface
-//!    has no holes (the flaw of the original table: Dürst 1988; Nielson and Hamann 1991).
-//! 2. **Loops become triangles.** The segments join to closed loops; each loop of n edges becomes n - 2 triangles. Among
-//!    all ways to do that, the one is taken that puts no diagonal into a face of the cell (there the neighbour might
-//!    have the same diagonal, and four triangles would meet at one edge) and that has the shortest diagonals.
+//! 1. **Faces decide.** On each of the six faces, walking around it, every run of inside corners is
+//!    cut off by one segment from where the walk enters it to where it leaves. On an ambiguous face
+//!    (two inside corners on a diagonal) this *separates the inside corners*. Both cells at a face
+//!    see the same corners, so they agree, and the surface has no holes (the flaw of the original
+//!    table: Dürst 1988; Nielson and Hamann 1991).
+//! 2. **Loops become triangles.** The segments join to closed loops; each loop of n edges becomes n
+//!    - 2 triangles. Among all ways to do that, the one is taken that puts no diagonal into a face
+//!    of the cell (there the neighbour might have the same diagonal, and four triangles would meet
+//!    at one edge) and that has the shortest diagonals.
 //!
-//! The number of triangles per case is that of VTK's `vtkMarchingCubesTriangleCases`, so counts agree with
-//! `vtkFlyingEdges3D`; the diagonals are our own.
+//! The number of triangles per case is that of VTK's `vtkMarchingCubesTriangleCases`, so counts
+//! agree with `vtkFlyingEdges3D`; the diagonals are our own.
 
 use std::sync::LazyLock;
 
-/// Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2); an edge joins two corners. Edges 0..4 run along x (rows
-/// (y,z) = 00, 10, 01, 11), 4..8 along y ((x,z) = 00, 10, 01, 11), 8..12 along z ((x,y) = 00, 10, 01, 11).
-pub(crate) const EDGE_CORNERS: [[u8; 2]; 12] =
-    [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+/// Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2); an edge joins two corners. Edges 0..4 run
+/// along x (rows (y,z) = 00, 10, 01, 11), 4..8 along y ((x,z) = 00, 10, 01, 11), 8..12 along z
+/// ((x,y) = 00, 10, 01, 11).
+pub(crate) const EDGE_CORNERS: [[u8; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
 
 /// The corners of each face, counter-clockwise seen from outside the cell.
 const FACES: [[u8; 4]; 6] =
@@ -32,12 +47,15 @@ pub(crate) struct Case {
     pub(crate) crossed: u16,
     /// How many of `triangles` are used.
     pub(crate) count: u8,
-    /// Edge numbers, counter-clockwise seen from the outside (from where values are below the isovalue).
+    /// Edge numbers, counter-clockwise seen from the outside (from where values are below the
+    /// isovalue).
     pub(crate) triangles: [[u8; 3]; MAX_TRIANGLES],
 }
 
-/// Indexed by the inside corners: bit c is set when the value at corner c is at or above the isovalue.
-pub(crate) static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| std::array::from_fn(|i| derive(i as u8)));
+/// Indexed by the inside corners: bit c is set when the value at corner c is at or above the
+/// isovalue.
+pub(crate) static CASES: LazyLock<[Case; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| derive(i as u8)));
 
 /// Indexed by missing corners: the edges that touch one of them.
 pub(crate) static EDGES_AT_CORNERS: LazyLock<[u16; 256]> = LazyLock::new(|| {
@@ -54,8 +72,9 @@ fn derive(inside: u8) -> Case {
         case.crossed |= ((is_inside(*a) != is_inside(*b)) as u16) << e;
     }
 
-    // Rule 1. The walks are counter-clockwise seen from outside the cell. From where a walk enters the inside to
-    // where it leaves: that direction makes the loops counter-clockwise seen from the low values (a test measures it).
+    // Rule 1. The walks are counter-clockwise seen from outside the cell. From where a walk enters
+    // the inside to where it leaves: that direction makes the loops counter-clockwise seen from the
+    // low values (a test measures it).
     let mut next = [None; 12];
     for face in FACES {
         let corner = |i: usize| face[i % 4];
@@ -101,8 +120,9 @@ fn edge_between(a: u8, b: u8) -> u8 {
 /// Diagonals inside faces, then the sum of squared diagonal lengths in quarter units.
 type Cost = (u32, i32);
 
-/// The cheapest triangulation of a polygon whose corners are edge midpoints: the triangle at the polygon's closing edge
-/// splits the rest into two smaller polygons (there are at most 42 triangulations of a heptagon).
+/// The cheapest triangulation of a polygon whose corners are edge midpoints: the triangle at the
+/// polygon's closing edge splits the rest into two smaller polygons (there are at most 42
+/// triangulations of a heptagon).
 fn best_triangulation(polygon: &[u8]) -> (Cost, Vec<[u8; 3]>) {
     let n = polygon.len();
     if n < 3 {
@@ -113,7 +133,8 @@ fn best_triangulation(polygon: &[u8]) -> (Cost, Vec<[u8; 3]>) {
     };
     (1..n - 1)
         .map(|apex| {
-            let (left, right) = (best_triangulation(&polygon[..=apex]), best_triangulation(&polygon[apex..]));
+            let (left, right) =
+                (best_triangulation(&polygon[..=apex]), best_triangulation(&polygon[apex..]));
             let (a, b) = (diagonal(0, apex), diagonal(apex, n - 1));
             let cost = (left.0.0 + right.0.0 + a.0 + b.0, left.0.1 + right.0.1 + a.1 + b.1);
             let mut triangles = vec![[polygon[0], polygon[apex], polygon[n - 1]]];
@@ -131,7 +152,8 @@ fn diagonal_cost(a: u8, b: u8) -> Cost {
     };
     let length = (0..3).map(|axis| (doubled(a, axis) - doubled(b, axis)).pow(2)).sum();
     // Both edges lie in the same face when all four corners agree in one coordinate.
-    let in_face = (0..3).any(|axis| matches!((doubled(a, axis), doubled(b, axis)), (0, 0) | (2, 2)));
+    let in_face =
+        (0..3).any(|axis| matches!((doubled(a, axis), doubled(b, axis)), (0, 0) | (2, 2)));
     (in_face as u32, length)
 }
 
@@ -147,10 +169,15 @@ mod tests {
 
     #[test]
     fn inverting_a_case_without_ambiguous_faces_flips_its_triangles() {
-        // One corner: one triangle; four corners of a face: two; five corners around one: the inverse of three.
-        for (case, count) in
-            [(0b0000_0001, 1), (0b1111_1110, 1), (0b0000_1111, 2), (0b0000_0111, 3), (0b1111_1000, 3)]
-        {
+        // One corner: one triangle; four corners of a face: two; five corners around one: the
+        // inverse of three.
+        for (case, count) in [
+            (0b0000_0001, 1),
+            (0b1111_1110, 1),
+            (0b0000_1111, 2),
+            (0b0000_0111, 3),
+            (0b1111_1000, 3),
+        ] {
             assert_eq!(CASES[case].count, count, "case {case:08b}");
         }
     }
@@ -165,7 +192,8 @@ mod tests {
     #[test]
     fn every_crossed_edge_is_used_and_every_used_edge_is_crossed() {
         for (i, c) in CASES.iter().enumerate() {
-            let used = c.triangles[..c.count as usize].iter().flatten().fold(0u16, |m, e| m | 1 << e);
+            let used =
+                c.triangles[..c.count as usize].iter().flatten().fold(0u16, |m, e| m | 1 << e);
             assert_eq!(used, c.crossed, "case {i:08b}");
         }
     }
@@ -175,7 +203,8 @@ mod tests {
         // Interior edges of the triangulation are those used in both directions.
         for (i, c) in CASES.iter().enumerate() {
             let t = &c.triangles[..c.count as usize];
-            let edges: Vec<_> = t.iter().flat_map(|t| (0..3).map(|k| (t[k], t[(k + 1) % 3]))).collect();
+            let edges: Vec<_> =
+                t.iter().flat_map(|t| (0..3).map(|k| (t[k], t[(k + 1) % 3]))).collect();
             for &(a, b) in edges.iter().filter(|(a, b)| edges.contains(&(*b, *a))) {
                 assert_eq!(diagonal_cost(a, b).0, 0, "case {i:08b} edge {a}-{b}");
             }

@@ -3,9 +3,9 @@
 use super::inside_bits::Block;
 use glam::{DVec3, Vec3};
 
-/// Gradient in value per world unit at point `p`: central where both neighbours are usable, one-sided at the border of
-/// the grid and beside missing values, 0 along an axis without usable neighbours. The block must hold the planes next
-/// to `p` that exist.
+/// Gradient in value per world unit at point `p`: central where both neighbours are usable,
+/// one-sided at the border of the grid and beside missing values, 0 along an axis without usable
+/// neighbours. The block must hold the planes next to `p` that exist.
 pub(crate) fn at_point(block: &Block<'_>, p: [usize; 3], spacing: DVec3) -> Vec3 {
     let stride = [1, block.dims[0]];
     let at = p[1] * stride[1] + p[0];
@@ -35,8 +35,8 @@ pub(crate) fn at_point(block: &Block<'_>, p: [usize; 3], spacing: DVec3) -> Vec3
     Vec3::new(along(0), along(1), along(2)) / spacing.as_vec3()
 }
 
-/// Unit normal at fraction `t` of the edge from `a` to `b`, away from the larger values. Where the gradient vanishes
-/// (or overflows), the edge itself points the way down.
+/// Unit normal at fraction `t` of the edge from `a` to `b`, away from the larger values. Where the
+/// gradient vanishes (or overflows), the edge itself points the way down.
 pub(crate) fn normal_on_edge(
     block: &Block<'_>,
     a: [usize; 3],

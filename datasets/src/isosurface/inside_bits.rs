@@ -1,7 +1,8 @@
 //! One bit per grid point of a plane: inside (value at or above the isovalue) or not.
 //!
-//! With 64 points a word, finding crossed edges is an exclusive-or, counting them a popcount, and finding the cells that
-//! the surface passes a handful of and/or: the cost of the cells that it misses, more than nine in ten, nearly vanishes.
+//! With 64 points a word, finding crossed edges is an exclusive-or, counting them a popcount, and
+//! finding the cells that the surface passes a handful of and/or: the cost of the cells that it
+//! misses, more than nine in ten, nearly vanishes.
 
 /// The part of a field that is in memory: planes `first_plane..` of a grid of `dims` points.
 #[derive(Clone, Copy)]
@@ -34,7 +35,8 @@ pub(crate) struct PlaneBits {
 }
 
 impl PlaneBits {
-    /// Fills this plane with the bits of plane `k`; `threshold` is the smallest f32 that counts as inside.
+    /// Fills this plane with the bits of plane `k`; `threshold` is the smallest f32 that counts as
+    /// inside.
     pub(crate) fn fill(&mut self, block: &Block<'_>, k: usize, threshold: f32) {
         let [nx, ny, _] = block.dims;
         let words = nx.div_ceil(64);
@@ -66,7 +68,8 @@ impl PlaneBits {
                 }
                 if !self.missing.is_empty() {
                     x &= !(self.missing[at] | shifted(&self.missing, at, w + 1 < words));
-                    y &= !(self.missing[at] | if j + 1 < ny { self.missing[at + words] } else { 0 });
+                    y &=
+                        !(self.missing[at] | if j + 1 < ny { self.missing[at + words] } else { 0 });
                 }
                 self.x[at] = x;
                 self.y[at] = y;
@@ -83,18 +86,23 @@ impl PlaneBits {
     #[inline]
     pub(crate) fn z(&self, above: &PlaneBits, at: usize) -> u64 {
         let crossed = self.inside[at] ^ above.inside[at];
-        if self.missing.is_empty() { crossed } else { crossed & !(self.missing[at] | above.missing[at]) }
+        if self.missing.is_empty() {
+            crossed
+        } else {
+            crossed & !(self.missing[at] | above.missing[at])
+        }
     }
 }
 
-/// Word `at` moved by one point, with the first bit of the next word (when the row has one) moving in.
+/// Word `at` moved by one point, with the first bit of the next word (when the row has one) moving
+/// in.
 #[inline]
 pub(crate) fn shifted(bits: &[u64], at: usize, has_next: bool) -> u64 {
     bits[at] >> 1 | if has_next { bits[at + 1] << 63 } else { 0 }
 }
 
-/// Packs a predicate of each row's values into words. Eight comparisons at a time become bytes first, which the compiler
-/// vectorises; a multiplication gathers their lowest bits into one byte.
+/// Packs a predicate of each row's values into words. Eight comparisons at a time become bytes
+/// first, which the compiler vectorises; a multiplication gathers their lowest bits into one byte.
 fn pack(plane: &[f32], nx: usize, bits: &mut [u64], predicate: impl Fn(f32) -> bool) {
     let words = nx.div_ceil(64);
     for (row, out) in plane.chunks_exact(nx).zip(bits.chunks_exact_mut(words)) {
@@ -122,7 +130,8 @@ mod tests {
     fn bits_match_values_at_word_borders() {
         for nx in [2usize, 63, 64, 65, 127, 128, 129] {
             let values: Vec<f32> = (0..2 * nx).map(|i| ((i * 7919) % 13) as f32).collect();
-            let block = Block { dims: [nx, 2, 1], first_plane: 0, values: &values, has_missing: false };
+            let block =
+                Block { dims: [nx, 2, 1], first_plane: 0, values: &values, has_missing: false };
             let mut bits = PlaneBits::default();
             bits.fill(&block, 0, 6.0);
             let inside = |i: usize, j: usize| values[j * nx + i] >= 6.0;

@@ -1,9 +1,10 @@
-//! Isosurfaces of uniform grids as triangle meshes with shared vertices: marching cubes (Lorensen and Cline 1987) with a
-//! hole-free case table, in two parallel passes over bit masks.
+//! Isosurfaces of uniform grids as triangle meshes with shared vertices: marching cubes (Lorensen
+//! and Cline 1987) with a hole-free case table, in two parallel passes over bit masks.
 //!
-//! The same rules as `vtkFlyingEdges3D`, so triangle counts are equal to VTK's: a point is inside when its value is at or
-//! above the isovalue (compared in f64), and triangles without area, which appear where a value equals the isovalue
-//! exactly, are kept. Triangles are counter-clockwise seen from the lower values, and normals point there too.
+//! The same rules as `vtkFlyingEdges3D`, so triangle counts are equal to VTK's: a point is inside
+//! when its value is at or above the isovalue (compared in f64), and triangles without area, which
+//! appear where a value equals the isovalue exactly, are kept. Triangles are counter-clockwise seen
+//! from the lower values, and normals point there too.
 //!
 //! | file | what |
 //! |---|---|
@@ -13,7 +14,8 @@
 //! | `gradient.rs` | normals |
 //! | `stream.rs` | fields larger than memory, a batch of planes at a time |
 //!
-//! Values that are NaN or infinite make the eight cells around them empty; how many cells were left out is reported.
+//! Values that are NaN or infinite make the eight cells around them empty; how many cells were left
+//! out is reported.
 
 mod case_table;
 mod gradient;
@@ -70,7 +72,8 @@ pub enum IsosurfaceError {
     Mesh(#[from] MeshError),
 }
 
-/// Extracts the surfaces where `grid` has the values `isos`. The result is the same on any number of threads.
+/// Extracts the surfaces where `grid` has the values `isos`. The result is the same on any number
+/// of threads.
 ///
 /// ```
 /// use datasets::{generate::wavelet::Wavelet, isosurface};
@@ -79,8 +82,13 @@ pub enum IsosurfaceError {
 /// assert_eq!(contour.mesh.num_triangles(), 5480); // as ParaView's Wavelet and Contour with their defaults
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn extract(grid: &Grid, isos: &[f64], options: Options) -> Result<Isosurfaces, IsosurfaceError> {
-    let placement = Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
+pub fn extract(
+    grid: &Grid,
+    isos: &[f64],
+    options: Options,
+) -> Result<Isosurfaces, IsosurfaceError> {
+    let placement =
+        Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
     let mut result = Isosurfaces { triangles_per_iso: vec![0; isos.len()], ..Default::default() };
     result.mesh.origin = placement.mesh_origin;
     let cuts = cuts(isos, &placement)?;
@@ -88,8 +96,10 @@ pub fn extract(grid: &Grid, isos: &[f64], options: Options) -> Result<Isosurface
     let planes = block.dims[2];
 
     // First pass: what every plane contributes to every surface.
-    let counts: Vec<Vec<PlaneCount>> = cuts.iter().map(|cut| count_planes(&block, cut, 0..planes)).collect();
-    result.skipped_cells = counts.first().map_or(0, |c| c.iter().map(|p| p.skipped_cells as u64).sum());
+    let counts: Vec<Vec<PlaneCount>> =
+        cuts.iter().map(|cut| count_planes(&block, cut, 0..planes)).collect();
+    result.skipped_cells =
+        counts.first().map_or(0, |c| c.iter().map(|p| p.skipped_cells as u64).sum());
 
     // Exact sizes, then every plane's own place in the result.
     let mut arrays = Arrays::new(options);
@@ -110,7 +120,8 @@ pub fn extract(grid: &Grid, isos: &[f64], options: Options) -> Result<Isosurface
             jobs.push((cut, first[range.start..=range.end].to_vec(), range, out));
         }
     }
-    jobs.into_par_iter().for_each(|(cut, first, range, out)| slab::emit(&block, cut, range, &first, out));
+    jobs.into_par_iter()
+        .for_each(|(cut, first, range, out)| slab::emit(&block, cut, range, &first, out));
     if let Some(scalars) = &mut arrays.scalars {
         for (first, &iso) in first_vertices.iter().zip(isos) {
             let end = first[planes] as usize;
@@ -121,12 +132,16 @@ pub fn extract(grid: &Grid, isos: &[f64], options: Options) -> Result<Isosurface
     Ok(result)
 }
 
-/// Number of triangles of each isovalue, without making them: about a third of the work and no memory.
+/// Number of triangles of each isovalue, without making them: about a third of the work and no
+/// memory.
 pub fn count_triangles(grid: &Grid, isos: &[f64]) -> Result<Vec<usize>, IsosurfaceError> {
-    let placement = Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
+    let placement =
+        Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
     let cuts = cuts(isos, &placement)?;
     let Some(block) = placement.whole(&grid.values) else { return Ok(vec![0; isos.len()]) };
-    let total = |cut| count_planes(&block, cut, 0..block.dims[2]).iter().map(|p| p.triangles as usize).sum();
+    let total = |cut| {
+        count_planes(&block, cut, 0..block.dims[2]).iter().map(|p| p.triangles as usize).sum()
+    };
     Ok(cuts.iter().map(total).collect())
 }
 
@@ -139,7 +154,12 @@ struct Placement {
 }
 
 impl Placement {
-    fn of(dims: glam::U64Vec3, origin: DVec3, spacing: DVec3, found: usize) -> Result<Self, GridError> {
+    fn of(
+        dims: glam::U64Vec3,
+        origin: DVec3,
+        spacing: DVec3,
+        found: usize,
+    ) -> Result<Self, GridError> {
         let expected = dims.x.saturating_mul(dims.y).saturating_mul(dims.z);
         if expected != found as u64 || expected == 0 {
             return Err(GridError::Length { dims: dims.as_uvec3(), expected, found });
@@ -151,8 +171,8 @@ impl Placement {
         if !origin.is_finite() {
             return Err(GridError::Geometry { field: "origin", value: origin, rule: "finite" });
         }
-        // Far from zero, f32 positions would lose detail: make them relative to the middle (as TriMesh does). Near
-        // zero they stay absolute, which keeps them equal to VTK's.
+        // Far from zero, f32 positions would lose detail: make them relative to the middle (as
+        // TriMesh does). Near zero they stay absolute, which keeps them equal to VTK's.
         let extent = spacing * (dims.as_dvec3() - DVec3::ONE);
         let center = origin + 0.5 * extent;
         let far = center.abs().max_element() > extent.max_element();
@@ -185,19 +205,22 @@ fn cuts(isos: &[f64], placement: &Placement) -> Result<Vec<Cut>, IsosurfaceError
     isos.iter().enumerate().map(cut).collect()
 }
 
-/// Splits planes into jobs. Every job computes the bits of one extra plane, so jobs are as long as balance allows; the
-/// result does not depend on the split.
+/// Splits planes into jobs. Every job computes the bits of one extra plane, so jobs are as long as
+/// balance allows; the result does not depend on the split.
 fn split_planes(planes: Range<usize>) -> Vec<Range<usize>> {
     let length = (planes.len() / (4 * rayon::current_num_threads())).clamp(1, 16);
     planes.clone().step_by(length).map(|a| a..(a + length).min(planes.end)).collect()
 }
 
 fn count_planes(block: &Block<'_>, cut: &Cut, planes: Range<usize>) -> Vec<PlaneCount> {
-    split_planes(planes).into_par_iter().flat_map_iter(|range| slab::count(block, cut, range)).collect()
+    split_planes(planes)
+        .into_par_iter()
+        .flat_map_iter(|range| slab::count(block, cut, range))
+        .collect()
 }
 
-/// Ids of every plane's first vertex, and one after the last plane; `next` goes on counting. Ids past u32 wrap here:
-/// [`Arrays::allocate`] refuses them before they are used.
+/// Ids of every plane's first vertex, and one after the last plane; `next` goes on counting. Ids
+/// past u32 wrap here: [`Arrays::allocate`] refuses them before they are used.
 fn prefix(counts: &[PlaneCount], next: &mut u64) -> Vec<u32> {
     let mut ids = Vec::with_capacity(counts.len() + 1);
     for c in counts {
@@ -238,7 +261,11 @@ impl Arrays {
         const LIMIT: u64 = u32::MAX as u64 - 1;
         for (what, found) in [("vertices", vertices), ("triangles", triangles)] {
             if found > LIMIT {
-                return Err(MeshError::TooLarge { what, found: found as usize, limit: LIMIT as usize });
+                return Err(MeshError::TooLarge {
+                    what,
+                    found: found as usize,
+                    limit: LIMIT as usize,
+                });
             }
         }
         let (vertices, triangles) = (vertices as usize, triangles as usize);
@@ -249,7 +276,11 @@ impl Arrays {
         Ok(())
     }
 
-    fn remaining_output(&mut self, first_vertex: usize, first_triangle: usize) -> RemainingOutput<'_> {
+    fn remaining_output(
+        &mut self,
+        first_vertex: usize,
+        first_triangle: usize,
+    ) -> RemainingOutput<'_> {
         RemainingOutput {
             positions: &mut self.positions[first_vertex..],
             normals: self.normals.as_mut().map(|n| &mut n[first_vertex..]),
@@ -284,8 +315,8 @@ fn split_off<'a, T>(rest: &mut &'a mut [T], n: usize) -> &'a mut [T] {
     head
 }
 
-/// Resizes with zeros. The first time this asks the allocator for zeroed memory, whose pages are first touched by
-/// the threads that fill them.
+/// Resizes with zeros. The first time this asks the allocator for zeroed memory, whose pages are
+/// first touched by the threads that fill them.
 fn grow<T: bytemuck::Zeroable + Clone>(v: &mut Vec<T>, n: usize) {
     if v.is_empty() {
         *v = bytemuck::allocation::zeroed_vec(n);

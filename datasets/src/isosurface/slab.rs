@@ -1,10 +1,11 @@
 //! Counting and emitting, one slab of cells (between two neighbouring planes) at a time.
 //!
-//! Ids are fixed by position, not by who computes them. Plane k owns, in this order: the vertices on its x and y edges
-//! (row by row, x before y), then those on the z edges up to plane k + 1; slab k owns its triangles. So two passes
-//! suffice: count every plane in parallel, take prefix sums, emit every plane in parallel into its own part of the result
-//! (the plan of flying edges, Schroeder, Maynard and Geveci 2015, with planes in place of rows). Because the in-plane
-//! vertices come first, slab k knows the ids on plane k + 1 from that plane alone, without plane k + 2.
+//! Ids are fixed by position, not by who computes them. Plane k owns, in this order: the vertices
+//! on its x and y edges (row by row, x before y), then those on the z edges up to plane k + 1; slab
+//! k owns its triangles. So two passes suffice: count every plane in parallel, take prefix sums,
+//! emit every plane in parallel into its own part of the result (the plan of flying edges,
+//! Schroeder, Maynard and Geveci 2015, with planes in place of rows). Because the in-plane vertices
+//! come first, slab k knows the ids on plane k + 1 from that plane alone, without plane k + 2.
 
 use super::case_table::{CASES, EDGES_AT_CORNERS};
 use super::gradient::normal_on_edge;
@@ -25,7 +26,8 @@ pub(crate) struct PlaneCount {
 #[derive(Clone, Copy)]
 pub(crate) struct Cut {
     pub(crate) iso: f64,
-    /// Smallest f32 that is at or above `iso`: comparing with it in f32 is comparing with `iso` in f64.
+    /// Smallest f32 that is at or above `iso`: comparing with it in f32 is comparing with `iso` in
+    /// f64.
     pub(crate) threshold: f32,
     /// Position of point (0,0,0) relative to the mesh's origin.
     pub(crate) base: DVec3,
@@ -39,13 +41,15 @@ pub(crate) struct Output<'a> {
     pub(crate) triangles: &'a mut [[u32; 3]],
 }
 
-/// Counts planes `range`, which must be in the block together with the plane after them (if the grid has one).
+/// Counts planes `range`, which must be in the block together with the plane after them (if the
+/// grid has one).
 pub(crate) fn count(block: &Block<'_>, cut: &Cut, range: Range<usize>) -> Vec<PlaneCount> {
     let mut counts = Vec::with_capacity(range.len());
     for_each_slab(block, cut.threshold, range, |_, below, above| {
         let mut c = PlaneCount { vertices: below.crossings(), ..Default::default() };
         if let Some(above) = above {
-            c.vertices += (0..below.inside.len()).map(|at| below.z(above, at).count_ones()).sum::<u32>();
+            c.vertices +=
+                (0..below.inside.len()).map(|at| below.z(above, at).count_ones()).sum::<u32>();
             for j in 0..block.dims[1] - 1 {
                 for_each_active_cell(block.dims[0], below, above, j, |_, case, missing| {
                     c.triangles += if missing == 0 { CASES[case].count as u32 } else { 0 };
@@ -60,12 +64,19 @@ pub(crate) fn count(block: &Block<'_>, cut: &Cut, range: Range<usize>) -> Vec<Pl
     counts
 }
 
-/// Emits planes `range`; `first_vertex[k - range.start]` is the id of plane k's first vertex, with one more entry for
-/// the plane after the range.
-pub(crate) fn emit(block: &Block<'_>, cut: &Cut, range: Range<usize>, first_vertex: &[u32], out: Output<'_>) {
+/// Emits planes `range`; `first_vertex[k - range.start]` is the id of plane k's first vertex, with
+/// one more entry for the plane after the range.
+pub(crate) fn emit(
+    block: &Block<'_>,
+    cut: &Cut,
+    range: Range<usize>,
+    first_vertex: &[u32],
+    out: Output<'_>,
+) {
     let start = range.start;
     let ny = block.dims[1];
-    let mut vertices = VertexWriter { block, cut, positions: out.positions, normals: out.normals, at: 0 };
+    let mut vertices =
+        VertexWriter { block, cut, positions: out.positions, normals: out.normals, at: 0 };
     let mut triangles = out.triangles.iter_mut();
     let (mut below_rows, mut above_rows, mut z_rows) = (Vec::new(), Vec::new(), Vec::new());
     for_each_slab(block, cut.threshold, range, |k, below, above| {
@@ -91,18 +102,22 @@ pub(crate) fn emit(block: &Block<'_>, cut: &Cut, range: Range<usize>, first_vert
         let mut id = end_of_xy;
         for j in 0..ny {
             z_rows.push(id);
-            id += (0..below.words).map(|w| below.z(above, j * below.words + w).count_ones()).sum::<u32>();
+            id += (0..below.words)
+                .map(|w| below.z(above, j * below.words + w).count_ones())
+                .sum::<u32>();
         }
 
-        // Triangles. Every crossed edge at or to the left of a cell belongs to an active cell, so running ids that
-        // only active cells advance are always right.
+        // Triangles. Every crossed edge at or to the left of a cell belongs to an active cell, so
+        // running ids that only active cells advance are always right.
         for j in 0..ny - 1 {
-            let mut x = [below_rows[j][0], below_rows[j + 1][0], above_rows[j][0], above_rows[j + 1][0]];
+            let mut x =
+                [below_rows[j][0], below_rows[j + 1][0], above_rows[j][0], above_rows[j + 1][0]];
             let mut y = [below_rows[j][1], above_rows[j][1]];
             let mut z = [z_rows[j], z_rows[j + 1]];
             for_each_active_cell(block.dims[0], below, above, j, |_, case, missing| {
                 let case = &CASES[case];
-                let crossed = case.crossed & !if missing == 0 { 0 } else { EDGES_AT_CORNERS[missing] };
+                let crossed =
+                    case.crossed & !if missing == 0 { 0 } else { EDGES_AT_CORNERS[missing] };
                 let bit = |e: u32| (crossed >> e & 1) as u32;
                 let ids = [
                     x[0],
@@ -133,7 +148,10 @@ pub(crate) fn emit(block: &Block<'_>, cut: &Cut, range: Range<usize>, first_vert
             });
         }
     });
-    debug_assert!(triangles.next().is_none() && vertices.at == vertices.positions.len(), "both passes agree");
+    debug_assert!(
+        triangles.next().is_none() && vertices.at == vertices.positions.len(),
+        "both passes agree"
+    );
 }
 
 struct VertexWriter<'a, 'b> {
@@ -153,7 +171,8 @@ impl VertexWriter<'_, '_> {
         let nx = self.block.dims[0];
         let value = |p: [usize; 3]| self.block.plane(p[2])[p[1] * nx + p[0]] as f64;
         let (va, vb) = (value(a), value(b));
-        // One value is at or above iso and the other below, so vb - va is not 0 and t is within 0..=1.
+        // One value is at or above iso and the other below, so vb - va is not 0 and t is within
+        // 0..=1.
         let t = (self.cut.iso - va) / (vb - va);
         let mut p = DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
         p[axis] += t;
@@ -165,7 +184,8 @@ impl VertexWriter<'_, '_> {
     }
 }
 
-/// Calls `f(k, plane k, plane k + 1)` for the planes of `range`; the grid's last plane has no plane above.
+/// Calls `f(k, plane k, plane k + 1)` for the planes of `range`; the grid's last plane has no plane
+/// above.
 fn for_each_slab(
     block: &Block<'_>,
     threshold: f32,
@@ -188,7 +208,8 @@ fn for_each_slab(
     }
 }
 
-/// Calls `f(i, inside corners, missing corners)` for the cells (i, j) between two planes that have corners on both sides.
+/// Calls `f(i, inside corners, missing corners)` for the cells (i, j) between two planes that have
+/// corners on both sides.
 #[inline]
 fn for_each_active_cell(
     nx: usize,
@@ -225,7 +246,8 @@ fn for_each_active_cell(
         if active == 0 {
             continue;
         }
-        let gather = |c: &[u64; 8], i: u32| (0..8).fold(0, |case, b| case | ((c[b] >> i & 1) as usize) << b);
+        let gather =
+            |c: &[u64; 8], i: u32| (0..8).fold(0, |case, b| case | ((c[b] >> i & 1) as usize) << b);
         if below.missing.is_empty() {
             while active != 0 {
                 let i = active.trailing_zeros();

@@ -1,9 +1,11 @@
-//! Isosurfaces of fields that do not fit into memory: planes are asked for a batch at a time, and only the batch and the
-//! result are ever held. The result equals that of the whole field in memory, id for id.
+//! Isosurfaces of fields that do not fit into memory: planes are asked for a batch at a time, and
+//! only the batch and the result are ever held. The result equals that of the whole field in
+//! memory, id for id.
 
 use super::inside_bits::Block;
 use super::{
-    Arrays, IsosurfaceError, Isosurfaces, Options, Placement, count_planes, cuts, prefix, slab, split_planes,
+    Arrays, IsosurfaceError, Isosurfaces, Options, Placement, count_planes, cuts, prefix, slab,
+    split_planes,
 };
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
@@ -16,7 +18,8 @@ pub trait PlaneSource: Sync {
     fn origin(&self) -> DVec3;
     /// World distance between neighbouring points.
     fn spacing(&self) -> DVec3;
-    /// Writes the `dims.x * dims.y` values of plane `k`, x fastest. Called once or twice a plane, from many threads.
+    /// Writes the `dims.x * dims.y` values of plane `k`, x fastest. Called once or twice a plane,
+    /// from many threads.
     fn fill_plane(&self, k: u32, values: &mut [f32]);
 }
 
@@ -35,8 +38,9 @@ impl PlaneSource for rt_core::grid::Grid {
     }
 }
 
-/// Extracts one surface, holding about `batch_planes` planes of the field in memory (at least 4). `progress` is told
-/// how many planes are done and may stop the work by returning false: then the surface ends at that plane.
+/// Extracts one surface, holding about `batch_planes` planes of the field in memory (at least 4).
+/// `progress` is told how many planes are done and may stop the work by returning false: then the
+/// surface ends at that plane.
 pub fn extract_streamed(
     source: &dyn PlaneSource,
     iso: f64,
@@ -46,7 +50,8 @@ pub fn extract_streamed(
 ) -> Result<Isosurfaces, IsosurfaceError> {
     let dims = source.dims();
     let points = dims.x as u64 * dims.y as u64 * dims.z as u64;
-    let placement = Placement::of(dims.as_u64vec3(), source.origin(), source.spacing(), points as usize)?;
+    let placement =
+        Placement::of(dims.as_u64vec3(), source.origin(), source.spacing(), points as usize)?;
     let mut result = Isosurfaces { triangles_per_iso: vec![0], ..Default::default() };
     result.mesh.origin = placement.mesh_origin;
     let cut = cuts(&[iso], &placement)?[0];
@@ -57,7 +62,8 @@ pub fn extract_streamed(
     let step = batch_planes.saturating_sub(3).max(1);
     let mut arrays = Arrays::new(options);
     let (mut vertices, mut triangles) = (0u64, 0u64);
-    // In memory: the planes of the batch, the one before and the two after (the gradient looks one plane further).
+    // In memory: the planes of the batch, the one before and the two after (the gradient looks one
+    // plane further).
     let mut values: Vec<f32> = Vec::new();
     let mut held = 0usize..0;
 
@@ -74,7 +80,8 @@ pub fn extract_streamed(
         held = needed;
 
         let has_missing = values.par_chunks(1 << 16).any(|c| c.iter().any(|v| !v.is_finite()));
-        let block = Block { dims: placement.dims, first_plane: held.start, values: &values, has_missing };
+        let block =
+            Block { dims: placement.dims, first_plane: held.start, values: &values, has_missing };
         let counts = count_planes(&block, &cut, range.clone());
         let (old_vertices, old_triangles) = (vertices as usize, triangles as usize);
         let first = prefix(&counts, &mut vertices);

@@ -6,8 +6,8 @@ use glam::UVec3;
 /// A grid of `n`³ points around zero with spacing 1 whose values come from the position.
 fn sampled(n: u32, mut f: impl FnMut(DVec3) -> f64) -> Grid {
     let half = (n - 1) as f64 / 2.0;
-    let points =
-        (0..n * n * n).map(|i| DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) - half);
+    let points = (0..n * n * n)
+        .map(|i| DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) - half);
     let values = points.map(|p| f(p) as f32).collect();
     Grid::new(UVec3::splat(n), DVec3::splat(-half), DVec3::ONE, values).unwrap()
 }
@@ -34,11 +34,13 @@ fn sphere_is_closed_outward_and_has_the_right_volume() {
     let mesh = extract(&grid, &[0.0], Options { normals: true, scalars: true }).unwrap().mesh;
     assert_eq!(open_or_flipped_edges(&mesh.indices), 0);
     let exact = 4.0 / 3.0 * std::f64::consts::PI * 15f64.powi(3);
-    // Inscribed triangles with circumradius c <= 1 are short by at most r - sqrt(r² - c²), 0.22 % of the radius.
+    // Inscribed triangles with circumradius c <= 1 are short by at most r - sqrt(r² - c²), 0.22 %
+    // of the radius.
     let ratio = volume(&mesh) / exact;
     assert!((1.0 - 3.0 * 0.0022..1.0).contains(&ratio), "volume is {ratio} of the sphere's");
     let normals = &mesh.normals.as_ref().unwrap().values;
-    let worst = mesh.positions.iter().zip(normals).map(|(p, n)| p.normalize().dot(*n)).fold(1f32, f32::min);
+    let worst =
+        mesh.positions.iter().zip(normals).map(|(p, n)| p.normalize().dot(*n)).fold(1f32, f32::min);
     assert!(worst > 0.999, "normals point outward: {worst}");
     assert_eq!(mesh.scalars.as_ref().unwrap().values, vec![0.0; mesh.positions.len()]);
     mesh.check().unwrap();
@@ -62,7 +64,8 @@ fn random_fields_are_watertight() {
 fn values_equal_to_the_isovalue_stay_watertight() {
     let mut grid = noise(14, 3);
     grid.values.iter_mut().for_each(|v| *v = (*v * 4.0).round() / 4.0);
-    let mesh = extract(&grid, &[0.5], Options { normals: true, ..Default::default() }).unwrap().mesh;
+    let mesh =
+        extract(&grid, &[0.5], Options { normals: true, ..Default::default() }).unwrap().mesh;
     assert_eq!(open_or_flipped_edges(&mesh.indices), 0);
     assert!(mesh.normals.unwrap().values.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
 }
@@ -80,8 +83,10 @@ fn counts_are_vtks_at_21_41_101() {
 #[test]
 fn counts_are_vtks_at_201() {
     let grid = Wavelet::with_points(201).grid().unwrap();
-    let isos = [100.0, 115.0, 130.0, 150.0, 170.0, 190.0, 200.0, 157.0909652709961, 160.14612197875977];
-    let expected = [283_696, 456_830, 592_216, 682_412, 630_156, 473_988, 412_780, 677_132, 672_748];
+    let isos =
+        [100.0, 115.0, 130.0, 150.0, 170.0, 190.0, 200.0, 157.0909652709961, 160.14612197875977];
+    let expected =
+        [283_696, 456_830, 592_216, 682_412, 630_156, 473_988, 412_780, 677_132, 672_748];
     assert_eq!(count_triangles(&grid, &isos).unwrap(), expected);
     let found = extract(&grid, &isos[8..], Options::default()).unwrap();
     assert_eq!((found.mesh.num_triangles(), found.mesh.positions.len()), (672_748, 337_792));
@@ -118,7 +123,8 @@ fn nested_surfaces_are_the_single_ones_in_order() {
 fn same_mesh_on_1_2_7_threads() {
     let grid = Wavelet::with_points(67).grid().unwrap();
     let options = Options { normals: true, scalars: true };
-    let mesh = |threads| with_threads(threads, || extract(&grid, &[120.0, 180.0], options).unwrap());
+    let mesh =
+        |threads| with_threads(threads, || extract(&grid, &[120.0, 180.0], options).unwrap());
     let one = mesh(1);
     assert!(one == mesh(2) && one == mesh(7));
 }
@@ -143,7 +149,8 @@ fn streamed_equals_in_memory_for_any_batch() {
 #[test]
 fn stopped_stream_keeps_a_valid_surface() {
     let grid = Wavelet::with_points(40).grid().unwrap();
-    let part = extract_streamed(&grid, 150.0, Options::default(), 10, |planes| planes < 20).unwrap();
+    let part =
+        extract_streamed(&grid, 150.0, Options::default(), 10, |planes| planes < 20).unwrap();
     assert!(part.mesh.num_triangles() > 1000);
     assert_eq!(part.mesh.validate().skipped(), 0);
     let top = part.mesh.bounds().max.z;
@@ -157,7 +164,9 @@ fn nan_and_infinity_leave_holes_of_counted_cells() {
     assert_eq!(whole.skipped_cells, 0);
     // One in the surface, one at the corner of the grid, one far inside.
     let on_surface = grid.index(10, 10, 3);
-    for (at, v) in [(on_surface, f32::NAN), (0, f32::INFINITY), (grid.index(10, 10, 10), f32::NEG_INFINITY)] {
+    for (at, v) in
+        [(on_surface, f32::NAN), (0, f32::INFINITY), (grid.index(10, 10, 10), f32::NEG_INFINITY)]
+    {
         grid.values[at] = v;
     }
     let holed = extract(&grid, &[0.0], Options { normals: true, ..Default::default() }).unwrap();
@@ -171,7 +180,10 @@ fn nan_and_infinity_leave_holes_of_counted_cells() {
 fn all_nan_is_empty_and_counted() {
     let grid = sampled(5, |_| f64::NAN);
     let found = extract(&grid, &[0.0], Options { normals: true, scalars: true }).unwrap();
-    assert_eq!((found.mesh.num_triangles(), found.mesh.positions.len(), found.skipped_cells), (0, 0, 64));
+    assert_eq!(
+        (found.mesh.num_triangles(), found.mesh.positions.len(), found.skipped_cells),
+        (0, 0, 64)
+    );
 }
 
 #[test]
@@ -190,7 +202,11 @@ fn one_point_axes_have_no_cells() {
         let values = (0..n).map(|i| i as f32).collect();
         let grid = Grid::new(dims, DVec3::ZERO, DVec3::ONE, values).unwrap();
         let iso = n as f64 / 2.0 + 0.1;
-        assert_eq!(extract(&grid, &[iso], Options::default()).unwrap().mesh.positions.len(), 0, "{dims}");
+        assert_eq!(
+            extract(&grid, &[iso], Options::default()).unwrap().mesh.positions.len(),
+            0,
+            "{dims}"
+        );
         assert_eq!(count_triangles(&grid, &[iso]).unwrap(), [0]);
         let streamed = extract_streamed(&grid, iso, Options::default(), 8, |_| true).unwrap();
         assert_eq!(streamed.mesh.num_triangles(), 0);

@@ -203,10 +203,13 @@ impl Values {
         with_values!(self, v => v.iter().flat_map(|x| x.to_le_bytes()).collect())
     }
 
-    /// The values written in `words`, or the first word that is not one.
-    /// Integers may be written with a fraction or exponent (`3.0`) if the value is whole, as some programs do.
+    /// The values written in `words`, or the first word that is not one. Integers may be written
+    /// with a fraction or exponent (`3.0`) if the value is whole, as some programs do.
     #[allow(clippy::unnecessary_cast, reason = "the macro covers f64 too")]
-    pub fn from_words<'a>(kind: ScalarType, words: impl Iterator<Item = &'a str>) -> Result<Self, &'a str> {
+    pub fn from_words<'a>(
+        kind: ScalarType,
+        words: impl Iterator<Item = &'a str>,
+    ) -> Result<Self, &'a str> {
         with_type!(kind, T, wrap => {
             let mut out = Vec::new();
             for w in words {
@@ -275,7 +278,8 @@ impl Values {
             (Values::F32(a), Values::F32(b)) => a.extend_from_slice(b),
             (Values::F64(a), Values::F64(b)) => a.extend_from_slice(b),
             (a, b) => {
-                let all = (0..a.len()).map(|i| a.get_f64(i)).chain((0..b.len()).map(|i| b.get_f64(i)));
+                let all =
+                    (0..a.len()).map(|i| a.get_f64(i)).chain((0..b.len()).map(|i| b.get_f64(i)));
                 *self = Values::F64(all.collect());
             }
         }
@@ -323,7 +327,8 @@ impl DataArray {
     }
 }
 
-/// The arrays of a data set. The names in the last fields say which array VTK regards as the normals and so on.
+/// The arrays of a data set. The names in the last fields say which array VTK regards as the
+/// normals and so on.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Attributes {
     /// One tuple per point.

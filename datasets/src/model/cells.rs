@@ -36,7 +36,10 @@ impl Cells {
     }
 
     /// Cells from the ends of each cell (VTK XML's `offsets`) and the ids.
-    pub fn from_ends(ends: impl Iterator<Item = i64>, connectivity: Vec<u32>) -> Result<Self, BadOffsets> {
+    pub fn from_ends(
+        ends: impl Iterator<Item = i64>,
+        connectivity: Vec<u32>,
+    ) -> Result<Self, BadOffsets> {
         let mut offsets = vec![0usize];
         let mut last = 0usize;
         for (cell, end) in ends.enumerate() {
@@ -72,10 +75,9 @@ impl Cells {
     pub fn append(&mut self, other: &Cells, shift: usize) {
         let start = self.connectivity.len();
         self.connectivity.extend(
-            other
-                .connectivity
-                .iter()
-                .map(|&k| if k == Self::NO_POINT { k } else { Self::id(i64::from(k) + shift as i64) }),
+            other.connectivity.iter().map(|&k| {
+                if k == Self::NO_POINT { k } else { Self::id(i64::from(k) + shift as i64) }
+            }),
         );
         self.offsets.extend(other.offsets[1..].iter().map(|o| o + start));
     }
@@ -107,8 +109,9 @@ impl Cells {
     }
 }
 
-/// What a cell of some VTK type looks like to a renderer (numbers of `vtkCellType.h`; orders of the VTK book, fig. 5-2).
-/// Cells of higher order are rendered by their linear corners, which VTK stores first.
+/// What a cell of some VTK type looks like to a renderer (numbers of `vtkCellType.h`; orders of the
+/// VTK book, fig. 5-2). Cells of higher order are rendered by their linear corners, which VTK
+/// stores first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellType {
     /// Nothing to draw (type 0).

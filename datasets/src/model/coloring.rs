@@ -2,7 +2,8 @@
 
 use super::{Attributes, DataArray, Dataset, ModelError, Values};
 
-/// An array and what to take of it. Written `pressure`, `velocity` (length of the vector), `velocity:x` or `velocity:0`.
+/// An array and what to take of it. Written `pressure`, `velocity` (length of the vector),
+/// `velocity:x` or `velocity:0`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColorBy {
     /// Name of the array.
@@ -14,8 +15,8 @@ pub struct ColorBy {
 }
 
 impl ColorBy {
-    /// Finds `wish` in `data` (in its blocks if it has some), point arrays first. A name that contains a colon is
-    /// tried as it stands before it is split.
+    /// Finds `wish` in `data` (in its blocks if it has some), point arrays first. A name that
+    /// contains a colon is tried as it stands before it is split.
     pub fn find(data: &Dataset, wish: &str) -> Result<ColorBy, ModelError> {
         let leaves = data.leaves();
         let attributes: Vec<&Attributes> = leaves.iter().filter_map(|d| d.attributes()).collect();
@@ -75,9 +76,12 @@ impl ColorBy {
         }
     }
 
-    /// True when the values are colours already: 8 bits, three or four components (VTK's "direct scalars").
+    /// True when the values are colours already: 8 bits, three or four components (VTK's "direct
+    /// scalars").
     pub fn is_direct_color(&self, array: &DataArray) -> bool {
-        self.component.is_none() && matches!(array.values, Values::U8(_)) && matches!(array.components, 3 | 4)
+        self.component.is_none()
+            && matches!(array.values, Values::U8(_))
+            && matches!(array.components, 3 | 4)
     }
 }
 

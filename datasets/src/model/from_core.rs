@@ -13,7 +13,8 @@ impl ImageData {
             point_scalars: Some(name.into()),
             ..Default::default()
         };
-        let extent = std::array::from_fn(|i| if i % 2 == 0 { 0 } else { grid.dims[i / 2] as i32 - 1 });
+        let extent =
+            std::array::from_fn(|i| if i % 2 == 0 { 0 } else { grid.dims[i / 2] as i32 - 1 });
         ImageData {
             extent,
             origin: grid.origin,
@@ -25,13 +26,15 @@ impl ImageData {
 }
 
 impl PolyData {
-    /// A mesh as polygons; scalars are named `scalars`, colours become the 8-bit sRGB array `RGBA`. Positions are double
-    /// precision when the mesh has an origin, so that none is rounded.
+    /// A mesh as polygons; scalars are named `scalars`, colours become the 8-bit sRGB array `RGBA`.
+    /// Positions are double precision when the mesh has an origin, so that none is rounded.
     pub fn from_trimesh(mesh: &TriMesh) -> Self {
         let points = if mesh.origin == glam::DVec3::ZERO {
             Points::F32(mesh.positions.iter().map(|p| p.to_array()).collect())
         } else {
-            Points::F64(mesh.positions.iter().map(|p| (mesh.origin + p.as_dvec3()).to_array()).collect())
+            Points::F64(
+                mesh.positions.iter().map(|p| (mesh.origin + p.as_dvec3()).to_array()).collect(),
+            )
         };
         let polys = Cells::uniform(3, mesh.indices.as_flattened().to_vec());
         let mut a = Attributes::default();
@@ -55,8 +58,9 @@ impl PolyData {
             put(PerElement::Vertex, DataArray::new("TCoords", 2, Values::F32(values)));
             a.point_texcoords = Some("TCoords".into());
         }
-        let has =
-            |list: &[DataArray], name: &str| list.iter().any(|x| x.name == name).then(|| name.to_string());
+        let has = |list: &[DataArray], name: &str| {
+            list.iter().any(|x| x.name == name).then(|| name.to_string())
+        };
         a.point_normals = has(&a.point, "Normals");
         a.cell_normals = has(&a.cell, "Normals");
         a.point_scalars = has(&a.point, "scalars").or_else(|| has(&a.point, "RGBA"));

@@ -5,8 +5,9 @@ use glam::{DMat3, DVec3, UVec3};
 use rt_core::grid::Grid;
 
 impl Dataset {
-    /// The scalar field `array` (see [`ColorBy`] for components) of image data, or of a rectilinear grid whose steps are
-    /// equal to single precision. Cell arrays become values at the cell centres. Axes that run backwards are turned round.
+    /// The scalar field `array` (see [`ColorBy`] for components) of image data, or of a rectilinear
+    /// grid whose steps are equal to single precision. Cell arrays become values at the cell
+    /// centres. Axes that run backwards are turned round.
     pub fn to_grid(&self, array: &str) -> Result<Grid, ModelError> {
         self.check()?;
         let cannot = |reason: String| ModelError::NotConvertible {
@@ -22,7 +23,8 @@ impl Dataset {
                     d.direction.z_axis.z,
                 ));
                 if axes != d.direction {
-                    let reason = "its axes are rotated (Direction); resample it along x, y, z, in ParaView with Resample To Image";
+                    let reason = "its axes are rotated (Direction); resample it along x, y, z, in \
+                                  ParaView with Resample To Image";
                     return Err(cannot(reason.into()));
                 }
                 (d.dims(), d.point(0, 0, 0), axes * d.spacing, &d.attributes)
@@ -36,16 +38,28 @@ impl Dataset {
                         Err(i) => {
                             let axis = ["x", "y", "z"][a];
                             return Err(cannot(format!(
-                                "its steps along {axis} are not equal (first at index {i}); resample it to image data"
+                                "its steps along {axis} are not equal (first at index {i}); \
+                                 resample it to image data"
                             )));
                         }
                     }
                 }
                 let first = |a: usize| d.coordinates[a].first().copied().unwrap_or(0.0);
-                (extent_dims(d.extent), DVec3::new(first(0), first(1), first(2)), spacing, &d.attributes)
+                (
+                    extent_dims(d.extent),
+                    DVec3::new(first(0), first(1), first(2)),
+                    spacing,
+                    &d.attributes,
+                )
             }
-            Dataset::MultiBlock(blocks) if blocks.len() == 1 => return blocks[0].data.to_grid(array),
-            _ => return Err(cannot("it has no uniform lattice; resample it to image data first".into())),
+            Dataset::MultiBlock(blocks) if blocks.len() == 1 => {
+                return blocks[0].data.to_grid(array);
+            }
+            _ => {
+                return Err(cannot(
+                    "it has no uniform lattice; resample it to image data first".into(),
+                ));
+            }
         };
         let color = ColorBy::find(self, array)?;
         let Some(data) = color.array(attributes) else {
@@ -70,7 +84,8 @@ impl Dataset {
     }
 }
 
-/// The values with axes of negative spacing turned round. Spacing 0 along an axis of one point becomes 1.
+/// The values with axes of negative spacing turned round. Spacing 0 along an axis of one point
+/// becomes 1.
 fn values_forward(
     data: &DataArray,
     color: &ColorBy,
@@ -109,8 +124,9 @@ fn values_forward(
     out
 }
 
-/// The common step of `x` if every coordinate is where that step puts it, to four roundings in f32 of the largest one
-/// (the precision most files store coordinates in); `None` for a single coordinate; else the first index that is off.
+/// The common step of `x` if every coordinate is where that step puts it, to four roundings in f32
+/// of the largest one (the precision most files store coordinates in); `None` for a single
+/// coordinate; else the first index that is off.
 fn uniform_step(x: &[f64]) -> Result<Option<f64>, usize> {
     let (Some(first), Some(last)) = (x.first(), x.last()) else { return Ok(None) };
     if x.len() == 1 {

@@ -9,7 +9,8 @@ use glam::DVec3;
 pub struct Polyline {
     /// At least two points, in world coordinates.
     pub points: Vec<DVec3>,
-    /// One value per point when an array was asked for. A cell array gives every point of the line its cell's value.
+    /// One value per point when an array was asked for. A cell array gives every point of the line
+    /// its cell's value.
     pub scalars: Option<Vec<f32>>,
 }
 
@@ -23,8 +24,8 @@ pub struct PointSet {
 }
 
 impl Dataset {
-    /// All line cells. The number is how many line cells were left out because they have fewer than two points or name
-    /// points that do not exist. Lattices have no lines.
+    /// All line cells. The number is how many line cells were left out because they have fewer than
+    /// two points or name points that do not exist. Lattices have no lines.
     pub fn to_lines(&self, color_by: Option<&str>) -> Result<(Vec<Polyline>, usize), ModelError> {
         self.check()?;
         let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
@@ -68,31 +69,47 @@ impl Dataset {
         Ok((lines, dropped))
     }
 
-    /// All points, whether cells use them or not (particles often come without cells). Cell arrays cannot colour points.
+    /// All points, whether cells use them or not (particles often come without cells). Cell arrays
+    /// cannot colour points.
     pub fn to_points(&self, color_by: Option<&str>) -> Result<PointSet, ModelError> {
         self.check()?;
         let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
         if let Some(c) = color.as_ref().filter(|c| !c.per_point) {
-            let reason = format!("`{}` has one value per cell; choose an array with one per point", c.name);
-            return Err(ModelError::NotConvertible { kind: self.kind(), target: "coloured points", reason });
+            let reason =
+                format!("`{}` has one value per cell; choose an array with one per point", c.name);
+            return Err(ModelError::NotConvertible {
+                kind: self.kind(),
+                target: "coloured points",
+                reason,
+            });
         }
         let mut out = PointSet { points: Vec::new(), scalars: color.is_some().then(Vec::new) };
         for leaf in self.leaves() {
             let before = out.points.len();
             match leaf {
-                Dataset::PolyData(d) => out.points.extend((0..d.points.len()).map(|i| d.points.get(i))),
+                Dataset::PolyData(d) => {
+                    out.points.extend((0..d.points.len()).map(|i| d.points.get(i)))
+                }
                 Dataset::UnstructuredGrid(d) => {
                     out.points.extend((0..d.points.len()).map(|i| d.points.get(i)))
                 }
-                Dataset::StructuredGrid(d) => out.points.extend((0..d.points.len()).map(|i| d.points.get(i))),
+                Dataset::StructuredGrid(d) => {
+                    out.points.extend((0..d.points.len()).map(|i| d.points.get(i)))
+                }
                 other => {
                     let reason = "its points fill a box; sample or threshold it first".into();
-                    return Err(ModelError::NotConvertible { kind: other.kind(), target: "points", reason });
+                    return Err(ModelError::NotConvertible {
+                        kind: other.kind(),
+                        target: "points",
+                        reason,
+                    });
                 }
             }
             if let (Some(c), Some(s), Some(a)) = (&color, &mut out.scalars, leaf.attributes()) {
                 match c.array(a) {
-                    Some(array) => s.extend((0..out.points.len() - before).map(|i| c.value(array, i))),
+                    Some(array) => {
+                        s.extend((0..out.points.len() - before).map(|i| c.value(array, i)))
+                    }
                     None => s.resize(out.points.len(), f32::NAN),
                 }
             }

@@ -1,15 +1,18 @@
 //! Pieces of one data set put together again.
 
 use super::{
-    Attributes, DataArray, Dataset, ModelError, Points, PolyData, UnstructuredGrid, Values, extent_dims,
-    lattice_counts,
+    Attributes, DataArray, Dataset, ModelError, Points, PolyData, UnstructuredGrid, Values,
+    extent_dims, lattice_counts,
 };
 
 impl Dataset {
-    /// One data set out of pieces of one kind. Lattice pieces must cover their common extent. Points that pieces share are
-    /// kept once for lattices and once per piece otherwise (VTK does the same). Arrays that not all pieces have are left out
-    /// and named in `warnings`.
-    pub fn merge(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Result<Dataset, ModelError> {
+    /// One data set out of pieces of one kind. Lattice pieces must cover their common extent.
+    /// Points that pieces share are kept once for lattices and once per piece otherwise (VTK does
+    /// the same). Arrays that not all pieces have are left out and named in `warnings`.
+    pub fn merge(
+        mut pieces: Vec<Dataset>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Dataset, ModelError> {
         // Pieces that a process had nothing to put in.
         if pieces.iter().any(|p| p.counts().0 > 0) {
             pieces.retain(|p| p.counts().0 > 0);
@@ -54,11 +57,14 @@ fn join_arrays(
     for first in lists[0] {
         let same: Vec<&DataArray> = lists
             .iter()
-            .filter_map(|l| l.iter().find(|a| a.name == first.name && a.components == first.components))
+            .filter_map(|l| {
+                l.iter().find(|a| a.name == first.name && a.components == first.components)
+            })
             .collect();
         match (same.len() == lists.len()).then(|| join(&same)).flatten() {
             Some(joined) => out.push(joined),
-            None => warnings.push(format!("{what} array `{}` left out: not all pieces have it", first.name)),
+            None => warnings
+                .push(format!("{what} array `{}` left out: not all pieces have it", first.name)),
         }
     }
     out
@@ -86,8 +92,10 @@ fn concatenate_points(pieces: &[Dataset], warnings: &mut Vec<String>) -> Vec<Dat
 }
 
 fn merge_poly(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset {
-    let parts: Vec<&PolyData> =
-        pieces.iter().filter_map(|p| if let Dataset::PolyData(d) = p { Some(d) } else { None }).collect();
+    let parts: Vec<&PolyData> = pieces
+        .iter()
+        .filter_map(|p| if let Dataset::PolyData(d) = p { Some(d) } else { None })
+        .collect();
     let point = concatenate_points(pieces, warnings);
     let mut out = PolyData { points: parts[0].points.clone(), ..Default::default() };
     let mut shift = 0;
@@ -101,16 +109,19 @@ fn merge_poly(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset {
         out.strips.append(&d.strips, shift);
         shift += d.points.len();
     }
-    // Cell data runs verts, lines, polys, strips: take the verts of all pieces first, then the lines of all, …
+    // Cell data runs verts, lines, polys, strips: take the verts of all pieces first, then the
+    // lines of all, …
     let all = attributes_of(pieces);
     let lists: Vec<&[DataArray]> = all.iter().map(|a| a.cell.as_slice()).collect();
     let cell = join_arrays(&lists, "cell", warnings, |arrays| {
-        let mut out = DataArray { values: Values::empty(arrays[0].values.kind()), ..arrays[0].clone() };
+        let mut out =
+            DataArray { values: Values::empty(arrays[0].values.kind()), ..arrays[0].clone() };
         for class in 0..4 {
             for (a, d) in arrays.iter().zip(&parts) {
                 let sizes = [d.verts.len(), d.lines.len(), d.polys.len(), d.strips.len()];
                 let start: usize = sizes[..class].iter().sum();
-                let values = a.values.slice(start * a.components..(start + sizes[class]) * a.components);
+                let values =
+                    a.values.slice(start * a.components..(start + sizes[class]) * a.components);
                 out.values.append(&values);
             }
         }
@@ -138,8 +149,9 @@ fn merge_unstructured(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset
             let faces = out.polyhedron_faces.len();
             out.polyhedron_faces.append(&d.polyhedron_faces, shift);
             out.faces_of_cell.extend(
-                (0..d.cells.len())
-                    .map(|c| d.faces_of_cell.get(c).map_or(0..0, |r| r.start + faces..r.end + faces)),
+                (0..d.cells.len()).map(|c| {
+                    d.faces_of_cell.get(c).map_or(0..0, |r| r.start + faces..r.end + faces)
+                }),
             );
         }
         shift += d.points.len();
@@ -161,19 +173,25 @@ fn extent_of(d: &Dataset) -> [i32; 6] {
     }
 }
 
-fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Result<Dataset, ModelError> {
+fn merge_lattices(
+    mut pieces: Vec<Dataset>,
+    warnings: &mut Vec<String>,
+) -> Result<Dataset, ModelError> {
     let extents: Vec<[i32; 6]> = pieces.iter().map(extent_of).collect();
     let whole: [i32; 6] = std::array::from_fn(|i| {
         let all = extents.iter().map(|e| e[i]);
         if i % 2 == 0 { all.min() } else { all.max() }.unwrap_or(0)
     });
     let dims = extent_dims(whole);
-    let has_arrays = |p: &Dataset| p.attributes().is_some_and(|a| !a.point.is_empty() || !a.cell.is_empty());
-    let gather_something = matches!(pieces[0], Dataset::StructuredGrid(_)) || pieces.iter().all(has_arrays);
+    let has_arrays =
+        |p: &Dataset| p.attributes().is_some_and(|a| !a.point.is_empty() || !a.cell.is_empty());
+    let gather_something =
+        matches!(pieces[0], Dataset::StructuredGrid(_)) || pieces.iter().all(has_arrays);
     if dims.contains(&0) {
         return Ok(pieces.swap_remove(0));
     }
-    // Pieces must cover the whole, or there would be values that no file gives. This also bounds the memory taken.
+    // Pieces must cover the whole, or there would be values that no file gives. This also bounds
+    // the memory taken.
     let covered: u64 = extents
         .iter()
         .map(|&e| lattice_counts(extent_dims(e)).map_or(0, |c| c.0))
@@ -187,7 +205,8 @@ fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Resul
     if covered < expected {
         return Err(gap(covered));
     }
-    // Without arrays an extent is only a claim; nothing of its size may be allocated, and there is nothing to put together.
+    // Without arrays an extent is only a claim; nothing of its size may be allocated, and there is
+    // nothing to put together.
     let (mut points_from, mut cells_from) = (Vec::new(), Vec::new());
     if gather_something {
         points_from = index_map(whole, &extents, false);
@@ -200,7 +219,8 @@ fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Resul
 
     let all = attributes_of(&pieces);
     let gather = |map: &[(u32, usize)], arrays: &[&DataArray]| -> Option<DataArray> {
-        // Piece by piece into one array first, so that the types agree; then the values in their order.
+        // Piece by piece into one array first, so that the types agree; then the values in their
+        // order.
         let joined = concatenate_arrays(arrays)?;
         let starts: Vec<usize> = arrays
             .iter()
@@ -219,7 +239,8 @@ fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Resul
             super::array::IntoValues::into_values(picked.collect::<Option<Vec<_>>>()?)
         });
         let mut out = DataArray { values, ..joined };
-        // Every point and cell is here once now: none is a copy of another process's any more (bit 1).
+        // Every point and cell is here once now: none is a copy of another process's any more (bit
+        // 1).
         if let ("vtkGhostType", Values::U8(v)) = (out.name.as_str(), &mut out.values) {
             v.iter_mut().for_each(|g| *g &= !1);
         }
@@ -231,24 +252,27 @@ fn merge_lattices(mut pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Resul
     let cell = join_arrays(&lists, "cell", warnings, |a| gather(&cells_from, a));
     let attributes = with_arrays(&all, point, cell);
 
-    let coordinates: Option<[Vec<f64>; 3]> = matches!(pieces[0], Dataset::RectilinearGrid(_)).then(|| {
-        std::array::from_fn(|a| {
-            let mut x = vec![f64::NAN; dims[a]];
-            for p in &pieces {
-                if let Dataset::RectilinearGrid(d) = p {
-                    let shift = (i64::from(d.extent[2 * a]) - i64::from(whole[2 * a])) as usize;
-                    for (i, v) in d.coordinates[a].iter().enumerate() {
-                        x[shift + i] = *v;
+    let coordinates: Option<[Vec<f64>; 3]> =
+        matches!(pieces[0], Dataset::RectilinearGrid(_)).then(|| {
+            std::array::from_fn(|a| {
+                let mut x = vec![f64::NAN; dims[a]];
+                for p in &pieces {
+                    if let Dataset::RectilinearGrid(d) = p {
+                        let shift = (i64::from(d.extent[2 * a]) - i64::from(whole[2 * a])) as usize;
+                        for (i, v) in d.coordinates[a].iter().enumerate() {
+                            x[shift + i] = *v;
+                        }
                     }
                 }
-            }
-            x
-        })
-    });
+                x
+            })
+        });
     let points: Option<Points> = matches!(pieces[0], Dataset::StructuredGrid(_)).then(|| {
         let arrays: Vec<DataArray> = pieces
             .iter()
-            .filter_map(|p| if let Dataset::StructuredGrid(d) = p { Some(d.points.to_array()) } else { None })
+            .filter_map(|p| {
+                if let Dataset::StructuredGrid(d) = p { Some(d.points.to_array()) } else { None }
+            })
             .collect();
         let list: Vec<&DataArray> = arrays.iter().collect();
         gather(&points_from, &list).and_then(|a| Points::from_array(a).ok()).unwrap_or_default()

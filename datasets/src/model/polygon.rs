@@ -1,12 +1,12 @@
 //! Polygons to triangles: fans for convex ones, ear clipping for the others.
 //!
-//! Sources: Newell's normal (Sutherland, Sproull and Schumacker 1974, p. 15); ear clipping (Meisters 1975; O'Rourke,
-//! "Computational Geometry in C", 1998, section 1.4).
+//! Sources: Newell's normal (Sutherland, Sproull and Schumacker 1974, p. 15); ear clipping
+//! (Meisters 1975; O'Rourke, "Computational Geometry in C", 1998, section 1.4).
 
 use glam::{DVec2, DVec3};
 
-/// Ear clipping takes time with the square of the corners; polygons with more corners than this are fanned instead,
-/// which [`super::SurfaceReport::fanned_polygons`] counts.
+/// Ear clipping takes time with the square of the corners; polygons with more corners than this are
+/// fanned instead, which [`super::SurfaceReport::fanned_polygons`] counts.
 pub const MAX_EAR_CORNERS: usize = 4096;
 
 /// How a polygon was divided.
@@ -14,13 +14,15 @@ pub const MAX_EAR_CORNERS: usize = 4096;
 pub enum Division {
     /// Exact: the triangles cover the polygon once.
     Exact,
-    /// A fan over a polygon that is not convex and could not be clipped (self-intersecting, or too many corners).
+    /// A fan over a polygon that is not convex and could not be clipped (self-intersecting, or too
+    /// many corners).
     Fanned,
     /// Fewer than three corners: nothing.
     Nothing,
 }
 
-/// Calls `emit` with the corner numbers of each triangle. Orientation is kept. Not-finite corners give a fan.
+/// Calls `emit` with the corner numbers of each triangle. Orientation is kept. Not-finite corners
+/// give a fan.
 pub fn triangulate(corners: &[DVec3], mut emit: impl FnMut([usize; 3])) -> Division {
     let n = corners.len();
     match n {
@@ -35,15 +37,21 @@ pub fn triangulate(corners: &[DVec3], mut emit: impl FnMut([usize; 3])) -> Divis
     let flat = project(corners, normal);
     let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp_dot(flat[c] - flat[b]);
 
-    // Convex: every turn goes the same way. (A star polygon that winds twice also passes; its fan covers what it covers.)
+    // Convex: every turn goes the same way. (A star polygon that winds twice also passes; its fan
+    // covers what it covers.)
     let convex = (0..n).all(|i| turn(i, (i + 1) % n, (i + 2) % n) >= 0.0);
     if n == 4 {
-        // The diagonal that lies inside, and the shorter one when both do, so that thin quads keep their shape.
+        // The diagonal that lies inside, and the shorter one when both do, so that thin quads keep
+        // their shape.
         let first = turn(0, 1, 2) > 0.0 && turn(2, 3, 0) > 0.0;
         let second = turn(1, 2, 3) > 0.0 && turn(3, 0, 1) > 0.0;
-        let shorter = corners[1].distance_squared(corners[3]) < corners[0].distance_squared(corners[2]);
-        let [a, b] =
-            if second && (!first || shorter) { [[0, 1, 3], [1, 2, 3]] } else { [[0, 1, 2], [0, 2, 3]] };
+        let shorter =
+            corners[1].distance_squared(corners[3]) < corners[0].distance_squared(corners[2]);
+        let [a, b] = if second && (!first || shorter) {
+            [[0, 1, 3], [1, 2, 3]]
+        } else {
+            [[0, 1, 2], [0, 2, 3]]
+        };
         emit(a);
         emit(b);
         return if first || second || convex { Division::Exact } else { Division::Fanned };
@@ -66,13 +74,16 @@ fn clip_ears(flat: &[DVec2], mut emit: impl FnMut([usize; 3])) -> Division {
         at %= m;
         let [a, b, c] = [ring[(at + m - 1) % m], ring[at], ring[(at + 1) % m]];
         let t = turn(a, b, c);
-        // A corner without area (a repeated or collinear point) can always go; it gives no triangle worth having,
-        // but emitting it keeps neighbours on shared edges watertight.
+        // A corner without area (a repeated or collinear point) can always go; it gives no triangle
+        // worth having, but emitting it keeps neighbours on shared edges watertight.
         let is_ear = t == 0.0
             || t > 0.0
                 && !ring.iter().any(|&p| {
                     let q = flat[p];
-                    q != flat[a] && q != flat[b] && q != flat[c] && inside(flat[a], flat[b], flat[c], q)
+                    q != flat[a]
+                        && q != flat[b]
+                        && q != flat[c]
+                        && inside(flat[a], flat[b], flat[c], q)
                 });
         if is_ear {
             emit([a, b, c]);
@@ -165,7 +176,8 @@ mod tests {
                         .iter()
                         .map(|&[x, y]| {
                             let mut q = [0.0; 3];
-                            (q[plane], q[(plane + 1) % 3], q[(plane + 2) % 3]) = (x + 1e6, y, 0.3 * x);
+                            (q[plane], q[(plane + 1) % 3], q[(plane + 2) % 3]) =
+                                (x + 1e6, y, 0.3 * x);
                             q
                         })
                         .collect();

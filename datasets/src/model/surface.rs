@@ -3,8 +3,8 @@
 use super::boundary_faces::{BoundaryFaces, Faces};
 use super::polygon::{Division, triangulate};
 use super::{
-    Attributes, CellType, Cells, ColorBy, DataArray, Dataset, ModelError, PolyData, UnstructuredGrid,
-    coloring::linear_from_srgb8, extent_dims, lattice_counts,
+    Attributes, CellType, Cells, ColorBy, DataArray, Dataset, ModelError, PolyData,
+    UnstructuredGrid, coloring::linear_from_srgb8, extent_dims, lattice_counts,
 };
 use glam::{DVec3, Vec2, Vec3};
 use rt_core::mesh::{Attribute, MeshError, TriMesh};
@@ -14,7 +14,8 @@ use rt_core::mesh::{Attribute, MeshError, TriMesh};
 pub struct SurfaceReport {
     /// Triangles in the mesh.
     pub triangles: usize,
-    /// Cells that are lines or points: not part of a surface, see [`Dataset::to_lines`] and [`Dataset::to_points`].
+    /// Cells that are lines or points: not part of a surface, see [`Dataset::to_lines`] and
+    /// [`Dataset::to_points`].
     pub line_and_point_cells: usize,
     /// Cells marked as hidden or as another process's copy (`vtkGhostType`), and left out for that.
     pub ghost_cells: usize,
@@ -24,7 +25,8 @@ pub struct SurfaceReport {
     pub too_few_points: usize,
     /// Cells left out because their type is unknown.
     pub unknown_type: usize,
-    /// Polygons that are not convex and were divided as a fan all the same (too many corners, or self-crossing).
+    /// Polygons that are not convex and were divided as a fan all the same (too many corners, or
+    /// self-crossing).
     pub fanned_polygons: usize,
     /// Cells of higher order drawn by their straight corners.
     pub straightened_cells: usize,
@@ -43,7 +45,10 @@ impl SurfaceReport {
             (self.bad_ids, "cells left out: they name points that do not exist"),
             (self.too_few_points, "cells left out: too few points for their type"),
             (self.unknown_type, "cells left out: unknown cell type"),
-            (self.fanned_polygons, "polygons that cross themselves or are too large were divided as a fan"),
+            (
+                self.fanned_polygons,
+                "polygons that cross themselves or are too large were divided as a fan",
+            ),
             (self.straightened_cells, "higher-order cells drawn with straight edges"),
             (self.blocks_without_array, "blocks lack the array to colour by; they get NaN"),
         ];
@@ -52,11 +57,15 @@ impl SurfaceReport {
 }
 
 impl Dataset {
-    /// The outer surface: polygons and strips, two-dimensional cells, and those faces of solid cells that belong to one
-    /// cell only; the outer faces of lattices. `color_by` fills [`TriMesh::scalars`], or [`TriMesh::colors`] when the
-    /// array is 8-bit sRGB(A); see [`ColorBy`] for how to name components. Normals and texture coordinates come along
-    /// when the file marks some. Vertices that no triangle uses are left out.
-    pub fn to_trimesh(&self, color_by: Option<&str>) -> Result<(TriMesh, SurfaceReport), ModelError> {
+    /// The outer surface: polygons and strips, two-dimensional cells, and those faces of solid
+    /// cells that belong to one cell only; the outer faces of lattices. `color_by` fills
+    /// [`TriMesh::scalars`], or [`TriMesh::colors`] when the array is 8-bit sRGB(A); see
+    /// [`ColorBy`] for how to name components. Normals and texture coordinates come along when the
+    /// file marks some. Vertices that no triangle uses are left out.
+    pub fn to_trimesh(
+        &self,
+        color_by: Option<&str>,
+    ) -> Result<(TriMesh, SurfaceReport), ModelError> {
         self.check()?;
         let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
         let mut out = Builder::new(color);
@@ -66,7 +75,12 @@ impl Dataset {
                 && leaf.attributes().is_some_and(|a| !a.point.is_empty() || !a.cell.is_empty())
             {
                 let limit = Cells::NO_POINT as usize - 1;
-                return Err(MeshError::TooLarge { what: "vertices", found: points as usize, limit }.into());
+                return Err(MeshError::TooLarge {
+                    what: "vertices",
+                    found: points as usize,
+                    limit,
+                }
+                .into());
             }
             out.begin(leaf);
             match leaf {
@@ -77,11 +91,15 @@ impl Dataset {
                 }
                 Dataset::RectilinearGrid(d) => {
                     let [x, y, z] = &d.coordinates;
-                    out.lattice(extent_dims(d.extent), &d.attributes, |i, j, k| DVec3::new(x[i], y[j], z[k]));
+                    out.lattice(extent_dims(d.extent), &d.attributes, |i, j, k| {
+                        DVec3::new(x[i], y[j], z[k])
+                    });
                 }
                 Dataset::StructuredGrid(d) => {
                     let dims = extent_dims(d.extent);
-                    out.lattice(dims, &d.attributes, |i, j, k| d.points.get(i + dims[0] * (j + dims[1] * k)));
+                    out.lattice(dims, &d.attributes, |i, j, k| {
+                        d.points.get(i + dims[0] * (j + dims[1] * k))
+                    });
                 }
                 Dataset::MultiBlock(_) => unreachable!("leaves() returns no collections"),
             }
@@ -144,7 +162,11 @@ impl Builder {
     }
 
     fn begin(&mut self, leaf: &Dataset) {
-        let array = self.color.as_ref().zip(leaf.attributes()).and_then(|(c, a)| c.array(a).map(|a| (c, a)));
+        let array = self
+            .color
+            .as_ref()
+            .zip(leaf.attributes())
+            .and_then(|(c, a)| c.array(a).map(|a| (c, a)));
         match array {
             Some((c, a)) => self.direct_color |= c.is_direct_color(a),
             None => self.report.blocks_without_array += self.color.is_some() as usize,
@@ -159,7 +181,10 @@ impl Builder {
         Source {
             color: self.color.as_ref().and_then(|c| c.array(a)),
             normals: named(&a.point_normals, "Normals", &|n| n == 3),
-            texcoords: a.point_texcoords.as_ref().and_then(|_| named(&a.point_texcoords, "", &|n| n >= 2)),
+            texcoords: a
+                .point_texcoords
+                .as_ref()
+                .and_then(|_| named(&a.point_texcoords, "", &|n| n >= 2)),
         }
     }
 
@@ -203,7 +228,13 @@ impl Builder {
     }
 
     /// One polygon of `cell`. Ids must be in range.
-    fn polygon(&mut self, ids: &[u32], cell: usize, at: &dyn Fn(usize) -> DVec3, from: &Source<'_>) {
+    fn polygon(
+        &mut self,
+        ids: &[u32],
+        cell: usize,
+        at: &dyn Fn(usize) -> DVec3,
+        from: &Source<'_>,
+    ) {
         if let [a, b, c] = *ids {
             let corners = [a, b, c].map(|k| self.vertex(k as usize, at(k as usize), from));
             return self.triangle(corners, cell, from);
@@ -313,7 +344,8 @@ impl Builder {
         }
     }
 
-    /// The faces of visible lattice cells that have no visible neighbour. A lattice one point thick is a sheet.
+    /// The faces of visible lattice cells that have no visible neighbour. A lattice one point thick
+    /// is a sheet.
     fn lattice(
         &mut self,
         dims: [usize; 3],
@@ -330,8 +362,12 @@ impl Builder {
             self.report.line_and_point_cells += cells as usize;
             return;
         }
-        // A box of huge declared size without a single array carries no information beyond its corners.
-        if attributes.point.is_empty() && attributes.cell.is_empty() && points > MAX_BARE_LATTICE_POINTS {
+        // A box of huge declared size without a single array carries no information beyond its
+        // corners.
+        if attributes.point.is_empty()
+            && attributes.cell.is_empty()
+            && points > MAX_BARE_LATTICE_POINTS
+        {
             let small = dims.map(|d| d.min(2));
             let end = |i: usize, a: usize| if i == 0 { 0 } else { dims[a] - 1 };
             self.vertex_of_point.clear();
@@ -393,16 +429,25 @@ impl Builder {
                             if sheet && !high {
                                 continue; // a sheet has one face, not two at the same place
                             }
-                            let at_rim = if high { index[axis] + 1 == cells[axis] } else { index[axis] == 0 };
+                            let at_rim = if high {
+                                index[axis] + 1 == cells[axis]
+                            } else {
+                                index[axis] == 0
+                            };
                             let open = at_rim || {
                                 let (c, l) = (cell_stride[axis], stride[axis]);
-                                if high { blank(cell + c, low + l) } else { blank(cell - c, low - l) }
+                                if high {
+                                    blank(cell + c, low + l)
+                                } else {
+                                    blank(cell - c, low - l)
+                                }
                             };
                             if !open {
                                 continue;
                             }
                             let base = low + if high && !sheet { stride[axis] } else { 0 };
-                            let (a, b) = if high { (stride[u], stride[v]) } else { (stride[v], stride[u]) };
+                            let (a, b) =
+                                if high { (stride[u], stride[v]) } else { (stride[v], stride[u]) };
                             let ids = [base, base + a, base + a + b, base + b].map(|k| k as u32);
                             self.polygon(&ids, cell, at, from);
                         }
@@ -427,12 +472,18 @@ impl Builder {
         if let Some(c) = &self.color {
             if self.direct_color {
                 let (v, f) = (self.vertex_colors, self.face_colors);
-                mesh.colors =
-                    Some(if c.per_point { Attribute::per_vertex(v) } else { Attribute::per_face(f) });
+                mesh.colors = Some(if c.per_point {
+                    Attribute::per_vertex(v)
+                } else {
+                    Attribute::per_face(f)
+                });
             } else {
                 let (v, f) = (self.vertex_scalars, self.face_scalars);
-                mesh.scalars =
-                    Some(if c.per_point { Attribute::per_vertex(v) } else { Attribute::per_face(f) });
+                mesh.scalars = Some(if c.per_point {
+                    Attribute::per_vertex(v)
+                } else {
+                    Attribute::per_face(f)
+                });
             }
         }
         mesh.check()?;
@@ -440,8 +491,8 @@ impl Builder {
     }
 }
 
-/// Lattices without arrays and with more points than this are drawn as their box: an extent in a file header costs a few
-/// bytes and must not make the program build billions of faces.
+/// Lattices without arrays and with more points than this are drawn as their box: an extent in a
+/// file header costs a few bytes and must not make the program build billions of faces.
 const MAX_BARE_LATTICE_POINTS: u64 = 1 << 20;
 
 /// The points and cells that `vtkGhostType` hides.

@@ -20,8 +20,8 @@ pub(super) struct ConvertArgs {
     /// A file of any format that can be read
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// The new file: .vti .vtp .vtu .vtr .vts .vtm, .ply, .obj or .glb. What has another kind becomes
-    /// its surface
+    /// The new file: .vti .vtp .vtu .vtr .vts .vtm, .ply, .obj or .glb. What has another kind
+    /// becomes its surface
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// The array that surfaces keep; `velocity` is a vector's length, `velocity:x` a component
@@ -49,7 +49,9 @@ pub(super) fn convert(common: CommonArgs, args: &ConvertArgs) -> anyhow::Result<
         (Content::Data(data), None) => output::Content::Data(data),
         (Content::Data(data), Some(value)) => isosurface_of(common, &data, args, value)?,
         (Content::Scene(_), Some(_)) => {
-            return Err(UsageError("--isovalue is for image data; the file holds meshes".into()).into());
+            return Err(
+                UsageError("--isovalue is for image data; the file holds meshes".into()).into()
+            );
         }
         (Content::Scene(mut scene), None) => {
             if !scene.materials.is_empty() {
@@ -62,7 +64,9 @@ pub(super) fn convert(common: CommonArgs, args: &ConvertArgs) -> anyhow::Result<
                     name: m.name,
                     data: Dataset::PolyData(PolyData::from_trimesh(&m.mesh)),
                 };
-                output::Content::Data(Dataset::MultiBlock(scene.meshes.into_iter().map(block).collect()))
+                output::Content::Data(Dataset::MultiBlock(
+                    scene.meshes.into_iter().map(block).collect(),
+                ))
             }
         }
     };
@@ -76,14 +80,16 @@ fn isosurface_of(
     args: &ConvertArgs,
     value: f64,
 ) -> anyhow::Result<output::Content> {
-    let attributes = data.attributes().context("a collection has no isosurface; convert its blocks")?;
+    let attributes =
+        data.attributes().context("a collection has no isosurface; convert its blocks")?;
     let marked = attributes.point_scalars.clone().or_else(|| attributes.cell_scalars.clone());
     let first = || attributes.point.iter().chain(&attributes.cell).next().map(|a| a.name.clone());
     let array = args.array.clone().or(marked).or_else(first).context("the file has no array")?;
     let grid = data.to_grid(&array)?;
     let surfaces = isosurface::extract(&grid, &[value], Options { normals: true, scalars: false })?;
     if surfaces.skipped_cells > 0 {
-        common.warn(format!("{} cells with a missing value are left empty", surfaces.skipped_cells));
+        common
+            .warn(format!("{} cells with a missing value are left empty", surfaces.skipped_cells));
     }
     if surfaces.mesh.indices.is_empty() {
         return Err(anyhow::anyhow!("no cell of `{array}` contains the value {value}"))

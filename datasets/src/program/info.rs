@@ -135,9 +135,15 @@ fn text(info: &Info) -> String {
             lines.push(format!("  {name}: {kind}, {} points, {} cells", part.points, part.cells));
         }
         for a in &part.arrays {
-            let range = a.range.map_or_else(|| "no finite value".into(), |(lo, hi)| format!("{lo} to {hi}"));
-            let times = if a.components == 1 { String::new() } else { format!(" x {}", a.components) };
-            lines.push(format!("    {} array `{}`: {}{times}, {range}", a.of, a.name, a.scalar_type));
+            let range = a
+                .range
+                .map_or_else(|| "no finite value".into(), |(lo, hi)| format!("{lo} to {hi}"));
+            let times =
+                if a.components == 1 { String::new() } else { format!(" x {}", a.components) };
+            lines.push(format!(
+                "    {} array `{}`: {}{times}, {range}",
+                a.of, a.name, a.scalar_type
+            ));
         }
     }
     lines.extend(info.warnings.iter().map(|w| format!("  warning: {w}")));

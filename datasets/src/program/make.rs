@@ -47,7 +47,11 @@ pub(super) fn make(common: CommonArgs, args: &MakeArgs) -> anyhow::Result<()> {
             let smallest = entry.sizes.first().map_or("", |s| s.name);
             let size = entry.size(args.size.as_deref().unwrap_or(smallest)).map_err(usage)?;
             if args.first_field {
-                return Err(UsageError(format!("--first-field is for flows; {} is none", entry.name)).into());
+                return Err(UsageError(format!(
+                    "--first-field is for flows; {} is none",
+                    entry.name
+                ))
+                .into());
             }
             let bar = common.progress(1, entry.name);
             let options = Options { normals: args.normals, scalars: args.scalars };
@@ -66,7 +70,10 @@ pub(super) fn make(common: CommonArgs, args: &MakeArgs) -> anyhow::Result<()> {
         Err(_) => {
             let entry = flows::find(&args.name).map_err(|_| unknown_name(&args.name))?;
             if args.normals || args.scalars {
-                let fault = format!("--normals and --scalars are for isosurfaces; {} is a flow", entry.name);
+                let fault = format!(
+                    "--normals and --scalars are for isosurfaces; {} is a flow",
+                    entry.name
+                );
                 return Err(UsageError(fault).into());
             }
             let wanted = args.size.as_deref().unwrap_or(flows::SIZES[0].0);

@@ -58,7 +58,10 @@ pub(super) fn check_name(path: &Path) -> Result<String, UsageError> {
     }
     let all: Vec<String> = VTK.iter().chain(&MESHES).map(|k| format!(".{k}")).collect();
     let name = path.display();
-    Err(UsageError(format!("{name}: no format that can be written; end the name in {}", all.join(", "))))
+    Err(UsageError(format!(
+        "{name}: no format that can be written; end the name in {}",
+        all.join(", ")
+    )))
 }
 
 /// Writes `content` in the format of the name's ending. A data set of another kind becomes its
@@ -109,7 +112,11 @@ pub(super) fn write(
     Ok(Output { file, kind: data.kind(), points, cells, warnings, ..Output::default() })
 }
 
-fn surface(data: &Dataset, color_by: Option<&str>, warnings: &mut Vec<String>) -> anyhow::Result<TriMesh> {
+fn surface(
+    data: &Dataset,
+    color_by: Option<&str>,
+    warnings: &mut Vec<String>,
+) -> anyhow::Result<TriMesh> {
     let (mesh, report) = data.to_trimesh(color_by)?;
     warnings.extend(report.warnings());
     let arrays = |d: &&Dataset| d.attributes().map_or(0, |a| a.point.len() + a.cell.len());
@@ -123,6 +130,9 @@ fn surface(data: &Dataset, color_by: Option<&str>, warnings: &mut Vec<String>) -
 pub(super) fn report(common: CommonArgs, output: &Output<'_>) -> anyhow::Result<()> {
     output.warnings.iter().for_each(|w| common.warn(w));
     common.result(output, || {
-        format!("{}: {}, {} points, {} cells", output.file, output.kind, output.points, output.cells)
+        format!(
+            "{}: {}, {} points, {} cells",
+            output.file, output.kind, output.points, output.cells
+        )
     })
 }

@@ -1,4 +1,5 @@
-//! Base64 (RFC 4648) as VTK and glTF write it: several padded pieces may follow each other, white space may lie between.
+//! Base64 (RFC 4648) as VTK and glTF write it: several padded pieces may follow each other, white
+//! space may lie between.
 
 /// Values of the letters; 64 marks a letter that does not belong.
 const TABLE: [u8; 256] = {
@@ -31,8 +32,8 @@ impl<'a> Decoder<'a> {
         Decoder { text, pos: 0 }
     }
 
-    /// Appends bytes to `out` until it holds `len` or the text ends. It may hold up to two bytes more than asked for:
-    /// quartets are not split.
+    /// Appends bytes to `out` until it holds `len` or the text ends. It may hold up to two bytes
+    /// more than asked for: quartets are not split.
     pub(crate) fn fill(&mut self, out: &mut Vec<u8>, len: usize) -> Result<(), BadByte> {
         while out.len() < len {
             let mut quartet = [0u8; 4];
@@ -81,7 +82,8 @@ mod tests {
 
     #[test]
     fn padded_pieces_one_after_the_other_are_read_through() {
-        // The test vectors of RFC 4648, then two pieces in a row with white space, as VTK writes header and data.
+        // The test vectors of RFC 4648, then two pieces in a row with white space, as VTK writes
+        // header and data.
         for (plain, coded) in [
             ("", ""),
             ("f", "Zg=="),
@@ -98,6 +100,9 @@ mod tests {
         let mut out = Vec::new();
         Decoder::new(b" Zg==\n Zm9v\tYg== ").fill(&mut out, usize::MAX).unwrap();
         assert_eq!(out, b"ffoob");
-        assert_eq!(Decoder::new(b"Zm9v?").fill(&mut out, usize::MAX), Err(BadByte { pos: 4, byte: b'?' }));
+        assert_eq!(
+            Decoder::new(b"Zm9v?").fill(&mut out, usize::MAX),
+            Err(BadByte { pos: 4, byte: b'?' })
+        );
     }
 }

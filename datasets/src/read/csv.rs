@@ -1,9 +1,12 @@
-//! Tables as text: a line of column names, then one row a line. Commas, or semicolons or tabs if the header has them instead.
+//! Tables as text: a line of column names, then one row a line. Commas, or semicolons or tabs if
+//! the header has them instead.
 //!
-//! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty lines and lines that begin with
-//! `#` are skipped. Columns are asked for by name, so their order does not matter.
+//! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty
+//! lines and lines that begin with `#` are skipped. Columns are asked for by name, so their order
+//! does not matter.
 //!
-//! The lexer is our own because the crate csv does not refuse broken quotes: the book, "Decisions and their reasons".
+//! The lexer is our own because the crate csv does not refuse broken quotes: the book, "Decisions
+//! and their reasons".
 
 use super::ReadError;
 use super::error::{At, Fault, read_bytes};
@@ -41,11 +44,16 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<CsvTable, ReadError>
 fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let line = bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count() as u64 + 1;
-        Fault::new(At::Line(line), "bytes that are not text (UTF-8)", "save the table as UTF-8 text")
+        Fault::new(
+            At::Line(line),
+            "bytes that are not text (UTF-8)",
+            "save the table as UTF-8 text",
+        )
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let numbered = text.lines().enumerate().map(|(i, l)| (i as u64 + 1, l));
-    let mut lines = numbered.filter(|(_, l)| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
+    let mut lines =
+        numbered.filter(|(_, l)| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
 
     // The header.
     let Some((header_line, header)) = lines.next() else {
@@ -57,10 +65,18 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
     for (i, name) in columns.iter().enumerate() {
         let at = At::Line(header_line);
         if name.is_empty() {
-            return Err(Fault::new(at, format!("column {} has no name", i + 1), "name every column"));
+            return Err(Fault::new(
+                at,
+                format!("column {} has no name", i + 1),
+                "name every column",
+            ));
         }
         if columns[..i].contains(name) {
-            return Err(Fault::new(at, format!("two columns are called `{name}`"), "rename one of them"));
+            return Err(Fault::new(
+                at,
+                format!("two columns are called `{name}`"),
+                "rename one of them",
+            ));
         }
     }
     if columns.iter().all(|c| c.parse::<f64>().is_ok()) {
@@ -92,7 +108,8 @@ fn unclosed(line: u64, cell: String) -> Fault {
     Fault::new(At::Line(line), what, "close the quote on the same line; double the quotes inside")
 }
 
-/// The cells of a line without surrounding space and quotes; `Err` with the cell whose quotes are wrong.
+/// The cells of a line without surrounding space and quotes; `Err` with the cell whose quotes are
+/// wrong.
 fn cells(line: &str, separator: char) -> Result<Vec<String>, String> {
     let mut out = Vec::new();
     let mut rest = line;
@@ -178,7 +195,8 @@ impl CsvTable {
         if let Some(i) = self.columns.iter().position(|c| c == name) {
             return Ok(i);
         }
-        let mut same = self.columns.iter().enumerate().filter(|(_, c)| c.eq_ignore_ascii_case(name));
+        let mut same =
+            self.columns.iter().enumerate().filter(|(_, c)| c.eq_ignore_ascii_case(name));
         if let (Some((i, _)), None) = (same.next(), same.next()) {
             return Ok(i);
         }
@@ -188,7 +206,8 @@ impl CsvTable {
         Err(Fault::new(At::Field("the header".into()), what, cure).in_file(&self.path, FORMAT))
     }
 
-    /// The numbers of a column. A cell that is not a finite number is an error with its line, column and content.
+    /// The numbers of a column. A cell that is not a finite number is an error with its line,
+    /// column and content.
     ///
     /// ```
     /// use datasets::read::csv;
@@ -249,7 +268,8 @@ mod tests {
     #[test]
     fn comments_quotes_separators_and_line_ends() {
         let t = table(
-            "\u{feff}# made by hand\r\n\"a;1\";B ; c\r\n\r\n\"say \"\"hi\"\"\" ;2; 3 \r\n#x\r\n ;4;\"5\"",
+            "\u{feff}# made by hand\r\n\"a;1\";B ; c\r\n\r\n\"say \"\"hi\"\"\" ;2; 3 \r\n#x\r\n \
+             ;4;\"5\"",
         )
         .unwrap();
         assert_eq!(
@@ -294,7 +314,10 @@ mod tests {
             assert!(text.contains(word), "{bad:?}: {text}");
         }
         assert!(
-            read_from_bytes(Path::new("t.csv"), b"a\n\xff\n").unwrap_err().to_string().contains("in line 2")
+            read_from_bytes(Path::new("t.csv"), b"a\n\xff\n")
+                .unwrap_err()
+                .to_string()
+                .contains("in line 2")
         );
         // Capitals do not matter unless they tell columns apart.
         assert!(table("A,a\n1,2\n").unwrap().numbers("a").is_ok());
@@ -312,7 +335,8 @@ mod tests {
         }
 
         #[test]
-        fn any_text_of_csv_characters_is_a_table_or_an_error(text in "[a-b\",;\t\n\r# 0-9.e-]{0,120}") {
+        fn any_text_of_csv_characters_is_a_table_or_an_error(text in "[a-b\",;\t\n\r# \
+                                                                      0-9.e-]{0,120}") {
             if let Ok(t) = table(&text) {
                 prop_assert!((0..t.len()).all(|r| (0..t.columns().len()).all(|c| t.cell(r, c).len() <= text.len())));
             }

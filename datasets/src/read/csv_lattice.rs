@@ -12,8 +12,8 @@ const COORDINATES: [&[&str]; 3] = [
     &["z", "z_m", "Points:2", "Points_2"],
 ];
 
-/// The table as a rectilinear grid: every combination of its x, y and z must occur once, in any order. All other columns of
-/// numbers become point arrays. A missing z (or y) is 0.
+/// The table as a rectilinear grid: every combination of its x, y and z must occur once, in any
+/// order. All other columns of numbers become point arrays. A missing z (or y) is 0.
 ///
 /// ```
 /// use datasets::read::{csv, csv_lattice};
@@ -31,7 +31,8 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
     let mut of_rows: Vec<Vec<f64>> = Vec::new();
     let mut coordinates: Vec<Vec<f64>> = Vec::new();
     for (axis, names) in COORDINATES.iter().enumerate() {
-        let found = table.columns().iter().position(|c| names.iter().any(|n| n.eq_ignore_ascii_case(c)));
+        let found =
+            table.columns().iter().position(|c| names.iter().any(|n| n.eq_ignore_ascii_case(c)));
         let values = match found {
             Some(i) => {
                 is_coordinate[i] = true;
@@ -39,7 +40,10 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
             }
             None if axis > 0 => vec![0.0; table.len()],
             None => {
-                return Err(fault("there is no column with coordinates".into(), "name those x, y and z"));
+                return Err(fault(
+                    "there is no column with coordinates".into(),
+                    "name those x, y and z",
+                ));
             }
         };
         let mut distinct = values.clone();
@@ -68,8 +72,11 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
         let at = [0, 1, 2].map(|a| coordinates[a].partition_point(|x| *x < of_rows[a][row]));
         let slot = &mut row_of[at[0] + dims[0] * (at[1] + dims[1] * at[2])];
         if *slot != usize::MAX {
-            let what =
-                format!("lines {} and {} have the same coordinates", table.line(*slot), table.line(row));
+            let what = format!(
+                "lines {} and {} have the same coordinates",
+                table.line(*slot),
+                table.line(row)
+            );
             return Err(fault(what, "remove one of them"));
         }
         *slot = row;
@@ -86,7 +93,8 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
         attributes.point.push(DataArray::new(name.clone(), 1, Values::F64(ordered)));
     }
     let extent = [0, dims[0] as i32 - 1, 0, dims[1] as i32 - 1, 0, dims[2] as i32 - 1];
-    let coordinates = coordinates.try_into().unwrap_or_else(|_| unreachable!("three axes were pushed"));
+    let coordinates =
+        coordinates.try_into().unwrap_or_else(|_| unreachable!("three axes were pushed"));
     Ok(Dataset::RectilinearGrid(RectilinearGrid { extent, coordinates, attributes }))
 }
 
@@ -97,14 +105,17 @@ mod tests {
     use std::path::Path;
 
     fn read(text: &str) -> Result<Dataset, String> {
-        let table = csv::read_from_bytes(Path::new("t.csv"), text.as_bytes()).map_err(|e| e.to_string())?;
+        let table =
+            csv::read_from_bytes(Path::new("t.csv"), text.as_bytes()).map_err(|e| e.to_string())?;
         dataset(&table).map_err(|e| e.to_string())
     }
 
     #[test]
     fn rows_in_any_order_and_text_columns() {
-        let data = read("T,name,Points:0,Points:1,Points:2\n4,d,1,0,5\n1,a,-0.0,0,3\n3,c,0,0,5\n2,b,1,0,3\n")
-            .unwrap();
+        let data = read(
+            "T,name,Points:0,Points:1,Points:2\n4,d,1,0,5\n1,a,-0.0,0,3\n3,c,0,0,5\n2,b,1,0,3\n",
+        )
+        .unwrap();
         let Dataset::RectilinearGrid(g) = &data else { panic!("{}", data.kind()) };
         assert_eq!(g.coordinates, [vec![0.0, 1.0], vec![0.0], vec![3.0, 5.0]]);
         assert_eq!(g.attributes.point.len(), 1);

@@ -52,7 +52,8 @@ pub enum ReadError {
         cure: String,
     },
     /// The content may be right, but this program does not read it.
-    #[error("{}: {format} file that uses something not read here: {at}: {what}; {cure}", path.display())]
+    #[error("{}: {format} file that uses something not read here: {at}: {what}; \
+             {cure}", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -101,7 +102,8 @@ pub(crate) struct Fault {
 /// The cure when a file is shorter than it says.
 pub(crate) const TRUNCATED: &str = "the file is probably truncated: copy or write it again";
 /// The cure when a file contradicts itself.
-pub(crate) const BROKEN: &str = "the file contradicts itself: write it again with the program that made it";
+pub(crate) const BROKEN: &str =
+    "the file contradicts itself: write it again with the program that made it";
 
 impl Fault {
     pub(crate) fn new(at: At, what: impl Into<String>, cure: impl Into<String>) -> Self {
@@ -135,9 +137,16 @@ impl From<crate::model::ModelError> for Fault {
     }
 }
 
-/// A declared number of items as a length, refused when `available` bytes cannot hold that many of at least `each` bytes.
-/// Everything whose size a file declares passes here before memory is taken for it.
-pub(crate) fn fits(count: u64, each: usize, available: usize, at: At, what: &str) -> Result<usize, Fault> {
+/// A declared number of items as a length, refused when `available` bytes cannot hold that many of
+/// at least `each` bytes. Everything whose size a file declares passes here before memory is taken
+/// for it.
+pub(crate) fn fits(
+    count: u64,
+    each: usize,
+    available: usize,
+    at: At,
+    what: &str,
+) -> Result<usize, Fault> {
     match count.checked_mul(each.max(1) as u64) {
         Some(bytes) if bytes <= available as u64 => Ok(count as usize),
         _ => {
@@ -167,8 +176,8 @@ pub(crate) fn io_error(path: &Path, source: std::io::Error) -> ReadError {
     ReadError::Io { path: path.to_path_buf(), source, cure: cure.into() }
 }
 
-/// A file that another file names, as a path beside it. A name that is absolute or climbs out of the directory is allowed:
-/// the formats allow it and the user opened the file.
+/// A file that another file names, as a path beside it. A name that is absolute or climbs out of
+/// the directory is allowed: the formats allow it and the user opened the file.
 pub(crate) fn sibling_path(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name.trim())
 }
@@ -211,7 +220,10 @@ impl<'a> Cursor<'a> {
     pub(crate) fn word(&mut self) -> Option<&'a [u8]> {
         let rest = &self.data[self.pos..];
         let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
-        let len = rest[start..].iter().position(|b| b.is_ascii_whitespace()).unwrap_or(rest.len() - start);
+        let len = rest[start..]
+            .iter()
+            .position(|b| b.is_ascii_whitespace())
+            .unwrap_or(rest.len() - start);
         self.pos += start + len;
         Some(&rest[start..start + len])
     }

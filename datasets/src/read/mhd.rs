@@ -24,8 +24,11 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let (header, body) = Header::parse(bytes).map_err(fault)?;
     let volume = header.volume(path).map_err(fault)?;
     let packing = if header.flag("CompressedData") { Packing::Deflate } else { Packing::Raw };
-    let packing =
-        if header.flag("BinaryData") || header.get("BinaryData").is_none() { packing } else { Packing::Text };
+    let packing = if header.flag("BinaryData") || header.get("BinaryData").is_none() {
+        packing
+    } else {
+        Packing::Text
+    };
     let name = header.need("ElementDataFile").map_err(fault)?;
     let read = |data: &[u8], warnings: &mut Vec<String>| {
         header.skip(data, &volume).and_then(|d| volume.clone().read(d, packing, warnings))
@@ -40,7 +43,12 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         let file = sibling_path(path, name);
         read(&read_bytes(&file)?, &mut warnings).map_err(|f| f.in_file(&file, FORMAT))?
     };
-    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile {
+        format: FORMAT,
+        content: Content::Data(data),
+        warnings,
+        time_steps: Vec::new(),
+    })
 }
 
 struct Header {
@@ -89,8 +97,9 @@ impl Header {
         let Some(text) = self.get(name) else { return Ok(None) };
         let list: Result<Vec<T>, _> = text.split_ascii_whitespace().map(str::parse).collect();
         let shown: String = text.chars().take(60).collect();
-        list.map(Some)
-            .map_err(|_| Fault::field(format!("field `{name}`"), format!("`{shown}` are not numbers")))
+        list.map(Some).map_err(|_| {
+            Fault::field(format!("field `{name}`"), format!("`{shown}` are not numbers"))
+        })
     }
 
     /// Skips HeaderSize bytes; -1 means: the values are the end of the file.
@@ -107,10 +116,14 @@ impl Header {
     }
 
     fn volume(&self, path: &Path) -> Result<Volume, Fault> {
-        let sizes: Vec<u64> =
-            self.numbers("DimSize")?.ok_or_else(|| Fault::field("field `DimSize`", "it is missing"))?;
+        let sizes: Vec<u64> = self
+            .numbers("DimSize")?
+            .ok_or_else(|| Fault::field("field `DimSize`", "it is missing"))?;
         if !(1..=3).contains(&sizes.len()) {
-            return Err(Fault::field("field `DimSize`", format!("{} sizes; 1 to 3 are read", sizes.len())));
+            return Err(Fault::field(
+                "field `DimSize`",
+                format!("{} sizes; 1 to 3 are read", sizes.len()),
+            ));
         }
         let axes = sizes.len();
         let mut dims = [1u64; 3];
@@ -136,11 +149,15 @@ impl Header {
             }
         }
         let big = ["BinaryDataByteOrderMSB", "ElementByteOrderMSB"].iter().any(|n| self.flag(n));
-        let components =
-            self.numbers::<u64>("ElementNumberOfChannels")?.and_then(|v| v.first().copied()).unwrap_or(1);
+        let components = self
+            .numbers::<u64>("ElementNumberOfChannels")?
+            .and_then(|v| v.first().copied())
+            .unwrap_or(1);
         let kind = element_type(self.need("ElementType")?)?;
-        let name =
-            path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_else(|| "values".into());
+        let name = path
+            .file_stem()
+            .map(|s| s.to_string_lossy().into_owned())
+            .unwrap_or_else(|| "values".into());
         Ok(Volume {
             name,
             dims,

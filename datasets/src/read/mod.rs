@@ -1,7 +1,8 @@
 //! Readers for the files that users have. [`open`] finds the format by the name and by the content.
 //!
-//! Rules all readers keep: input never makes them panic; memory is taken only for sizes that the bytes of the file can
-//! justify; what is left out is named in [`LoadedFile::warnings`]; every error names the file, the place and the cure.
+//! Rules all readers keep: input never makes them panic; memory is taken only for sizes that the
+//! bytes of the file can justify; what is left out is named in [`LoadedFile::warnings`]; every
+//! error names the file, the place and the cure.
 
 pub(crate) mod base64;
 pub mod csv;
@@ -39,7 +40,8 @@ pub struct LoadedFile {
     pub content: Content,
     /// What was left out or repaired, one sentence each; empty when all is well.
     pub warnings: Vec<String>,
-    /// For a time series: every file with its time, in order. `content` is the first time; open the others by their path.
+    /// For a time series: every file with its time, in order. `content` is the first time; open the
+    /// others by their path.
     pub time_steps: Vec<TimeStep>,
 }
 
@@ -77,13 +79,18 @@ impl LoadedFile {
         }
     }
 
-    /// Everything that has a surface, as triangle meshes with materials. A data set gives one mesh with no material.
-    /// `color_by` names an array of a data set; scenes carry their own colours and ignore it.
-    pub fn to_meshes(&self, color_by: Option<&str>) -> Result<(SceneModel, SurfaceReport), ModelError> {
+    /// Everything that has a surface, as triangle meshes with materials. A data set gives one mesh
+    /// with no material. `color_by` names an array of a data set; scenes carry their own colours
+    /// and ignore it.
+    pub fn to_meshes(
+        &self,
+        color_by: Option<&str>,
+    ) -> Result<(SceneModel, SurfaceReport), ModelError> {
         match &self.content {
-            Content::Scene(scene) => {
-                Ok((scene.clone(), SurfaceReport { triangles: scene.num_triangles(), ..Default::default() }))
-            }
+            Content::Scene(scene) => Ok((
+                scene.clone(),
+                SurfaceReport { triangles: scene.num_triangles(), ..Default::default() },
+            )),
             Content::Data(data) => {
                 let (mesh, report): (TriMesh, _) = data.to_trimesh(color_by)?;
                 let meshes = vec![SceneMesh { name: data.kind().into(), mesh, material: None }];

@@ -1,4 +1,5 @@
-//! NRRD volumes ("nearly raw raster data"), header and data in one file or two; raw, gzip and text encodings.
+//! NRRD volumes ("nearly raw raster data"), header and data in one file or two; raw, gzip and text
+//! encodings.
 //!
 //! Source: the definition of the format at teem.sourceforge.net/nrrd/format.html.
 
@@ -44,7 +45,12 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
             read.map_err(|f| f.in_file(&file, FORMAT))?
         }
     };
-    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile {
+        format: FORMAT,
+        content: Content::Data(data),
+        warnings,
+        time_steps: Vec::new(),
+    })
 }
 
 struct Header {
@@ -75,7 +81,11 @@ impl Header {
             }
             let Some((name, value)) = line.split_once(':') else {
                 let shown: String = line.chars().take(40).collect();
-                return Err(Fault::new(At::Line(number), format!("`{shown}` is not `field: value`"), BROKEN));
+                return Err(Fault::new(
+                    At::Line(number),
+                    format!("`{shown}` is not `field: value`"),
+                    BROKEN,
+                ));
             };
             fields.insert(name.trim().to_ascii_lowercase(), value.trim().to_string());
         }
@@ -96,14 +106,25 @@ impl Header {
             "gzip" | "gz" => Ok(Packing::Deflate),
             "ascii" | "text" | "txt" => Ok(Packing::Text),
             other => {
-                let cure = "write it again as raw or gzip, for example with `unu save -f nrrd -e gzip`";
-                Err(Fault::unsupported(At::Field("field `encoding`".into()), format!("`{other}`"), cure))
+                let cure =
+                    "write it again as raw or gzip, for example with `unu save -f nrrd -e gzip`";
+                Err(Fault::unsupported(
+                    At::Field("field `encoding`".into()),
+                    format!("`{other}`"),
+                    cure,
+                ))
             }
         }
     }
 
-    /// Skips lines, then bytes, as the header says. -1 bytes means: the values are the end of the file.
-    fn skip<'a>(&self, data: &'a [u8], volume: &Volume, packing: Packing) -> Result<&'a [u8], Fault> {
+    /// Skips lines, then bytes, as the header says. -1 bytes means: the values are the end of the
+    /// file.
+    fn skip<'a>(
+        &self,
+        data: &'a [u8],
+        volume: &Volume,
+        packing: Packing,
+    ) -> Result<&'a [u8], Fault> {
         let number = |names: &[&str]| -> Result<i64, Fault> {
             let Some(text) = self.get(names) else { return Ok(0) };
             text.parse().map_err(|_| {
@@ -134,13 +155,15 @@ impl Header {
             .map_err(|_| Fault::field("field `dimension`", "it is not a number"))?;
         let sizes: Result<Vec<u64>, _> =
             self.need("sizes")?.split_ascii_whitespace().map(str::parse).collect();
-        let sizes =
-            sizes.map_err(|_| Fault::field("field `sizes`", "it holds something that is not a number"))?;
+        let sizes = sizes.map_err(|_| {
+            Fault::field("field `sizes`", "it holds something that is not a number")
+        })?;
         if sizes.len() != dimension || !(1..=4).contains(&dimension) {
             let what = format!("{} sizes for {dimension} dimensions; 1 to 4 are read", sizes.len());
             return Err(Fault::field("field `sizes`", what));
         }
-        // With four axes, or when the kind of the first says so, the first axis holds the components.
+        // With four axes, or when the kind of the first says so, the first axis holds the
+        // components.
         const COMPONENT_KINDS: [&str; 16] = [
             "vector",
             "covariant-vector",
@@ -172,7 +195,10 @@ impl Header {
             Some("big") => Endian::Big,
             _ if kind.size() == 1 || self.packing()? == Packing::Text => Endian::Little,
             Some(other) => {
-                return Err(Fault::field("field `endian`", format!("`{other}` is neither little nor big")));
+                return Err(Fault::field(
+                    "field `endian`",
+                    format!("`{other}` is neither little nor big"),
+                ));
             }
             None => {
                 return Err(Fault::field(
@@ -197,7 +223,12 @@ impl Header {
                 match w.parse::<f64>() {
                     Ok(s) if s.is_finite() && s != 0.0 => spacing[a] = s,
                     Ok(_) => warnings.push(format!("spacing `{w}` along axis {a} taken as 1")),
-                    Err(_) => return Err(Fault::field("field `spacings`", format!("`{w}` is not a number"))),
+                    Err(_) => {
+                        return Err(Fault::field(
+                            "field `spacings`",
+                            format!("`{w}` is not a number"),
+                        ));
+                    }
                 }
             }
         }
@@ -210,8 +241,11 @@ impl Header {
                 .unwrap_or(DVec3::ZERO),
             None => DVec3::ZERO,
         };
-        let stem =
-            || path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_else(|| "values".into());
+        let stem = || {
+            path.file_stem()
+                .map(|s| s.to_string_lossy().into_owned())
+                .unwrap_or_else(|| "values".into())
+        };
         let name = self.get(&["content"]).map_or_else(stem, str::to_string);
         let components = if has_components { sizes[0] } else { 1 };
         Ok(Volume { name, dims, components, kind, endian, origin, spacing, direction })
@@ -246,8 +280,12 @@ fn scalar_type(name: &str) -> Result<ScalarType, Fault> {
     Ok(match name.to_ascii_lowercase().as_str() {
         "signed char" | "int8" | "int8_t" => ScalarType::I8,
         "uchar" | "unsigned char" | "uint8" | "uint8_t" => ScalarType::U8,
-        "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => ScalarType::I16,
-        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => ScalarType::U16,
+        "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
+            ScalarType::I16
+        }
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
+            ScalarType::U16
+        }
         "int" | "signed int" | "int32" | "int32_t" => ScalarType::I32,
         "uint" | "unsigned int" | "uint32" | "uint32_t" => ScalarType::U32,
         "longlong" | "long long" | "long long int" | "signed long long" | "int64" | "int64_t" => {
@@ -260,7 +298,11 @@ fn scalar_type(name: &str) -> Result<ScalarType, Fault> {
         "double" => ScalarType::F64,
         other => {
             let cure = "convert it with `unu convert -t float`";
-            return Err(Fault::unsupported(At::Field("field `type`".into()), format!("`{other}`"), cure));
+            return Err(Fault::unsupported(
+                At::Field("field `type`".into()),
+                format!("`{other}`"),
+                cure,
+            ));
         }
     })
 }

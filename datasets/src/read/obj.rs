@@ -30,7 +30,9 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         match std::fs::read(&file) {
             Ok(text) => tobj::load_mtl_buf(&mut text.as_slice()),
             Err(e) => {
-                warnings.borrow_mut().push(format!("materials of {} left out: {e}", file.display()));
+                warnings
+                    .borrow_mut()
+                    .push(format!("materials of {} left out: {e}", file.display()));
                 tobj::load_mtl_buf(&mut [].as_slice())
             }
         }
@@ -40,18 +42,23 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         return Err(Fault::new(At::Line(line), what, BROKEN).in_file(path, FORMAT));
     }
     let mut text = bytes;
-    let (models, materials) = tobj::load_obj_buf(&mut text, &options, load_material).map_err(|e| {
-        Fault::new(At::Field("the OBJ text".into()), e.to_string(), BROKEN).in_file(path, FORMAT)
-    })?;
+    let (models, materials) =
+        tobj::load_obj_buf(&mut text, &options, load_material).map_err(|e| {
+            Fault::new(At::Field("the OBJ text".into()), e.to_string(), BROKEN)
+                .in_file(path, FORMAT)
+        })?;
     let mut warnings = warnings.into_inner();
     let mut scene = SceneModel::default();
     match materials {
         Ok(list) => list.iter().for_each(|m| add_material(m, path, &mut scene, &mut warnings)),
         Err(e) => warnings.push(format!("materials left out: {e}")),
     }
-    // Points and lines would spoil the attributes of the faces around them, so `tobj` skips them: count them here.
-    let not_faces =
-        bytes.split(|&b| b == b'\n').filter(|l| l.starts_with(b"l ") || l.starts_with(b"p ")).count();
+    // Points and lines would spoil the attributes of the faces around them, so `tobj` skips them:
+    // count them here.
+    let not_faces = bytes
+        .split(|&b| b == b'\n')
+        .filter(|l| l.starts_with(b"l ") || l.starts_with(b"p "))
+        .count();
     let mut fanned = 0;
     for model in models {
         let material = model.mesh.material_id.filter(|&m| m < scene.materials.len());
@@ -68,13 +75,21 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         warnings.push(format!("{not_faces} points and lines left out: only faces are read"));
     }
     if fanned > 0 {
-        warnings.push(format!("{fanned} faces cross themselves or are too large, and were divided as a fan"));
+        warnings.push(format!(
+            "{fanned} faces cross themselves or are too large, and were divided as a fan"
+        ));
     }
-    Ok(LoadedFile { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile {
+        format: FORMAT,
+        content: Content::Scene(scene),
+        warnings,
+        time_steps: Vec::new(),
+    })
 }
 
-/// The first number of a face with more digits than 32 bits have, and its line. `tobj` 4.0.5 (`add_vertex`) multiplies
-/// indices before it compares them with the number of vertices: such ones overflow and may come out as others.
+/// The first number of a face with more digits than 32 bits have, and its line. `tobj` 4.0.5
+/// (`add_vertex`) multiplies indices before it compares them with the number of vertices: such ones
+/// overflow and may come out as others.
 fn oversized_index(bytes: &[u8]) -> Option<(u64, String)> {
     let digits_32_bits = 10;
     let lines = (1..).zip(bytes.split(|&b| b == b'\n'));
@@ -88,7 +103,8 @@ fn oversized_index(bytes: &[u8]) -> Option<(u64, String)> {
 
 fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>) -> TriMesh {
     let m = &model.mesh;
-    let positions: Vec<DVec3> = m.positions.as_chunks::<3>().0.iter().map(|&p| DVec3::from(p)).collect();
+    let positions: Vec<DVec3> =
+        m.positions.as_chunks::<3>().0.iter().map(|&p| DVec3::from(p)).collect();
     let mut indices = Vec::new();
     let (mut at, mut corners) = (0, Vec::new());
     // Without arities all faces are triangles.
@@ -100,7 +116,8 @@ fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>
         at += n;
 
         corners.clear();
-        corners.extend(ids.iter().map(|&k| positions.get(k as usize).copied().unwrap_or(DVec3::NAN)));
+        corners
+            .extend(ids.iter().map(|&k| positions.get(k as usize).copied().unwrap_or(DVec3::NAN)));
         let division = triangulate(&corners, |t| indices.push(t.map(|k| ids[k])));
         *fanned += usize::from(division == Division::Fanned);
     }
@@ -116,7 +133,8 @@ fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>
         mesh.texcoords = Some(pairs.map(|t| Vec2::new(t[0] as f32, t[1] as f32)).collect());
     }
     if m.vertex_color.len() == 3 * vertices && vertices > 0 {
-        let colors = m.vertex_color.as_chunks::<3>().0.iter().map(|c| narrow(c).extend(1.0).to_array());
+        let colors =
+            m.vertex_color.as_chunks::<3>().0.iter().map(|c| narrow(c).extend(1.0).to_array());
         mesh.colors = Some(Attribute::per_vertex(colors.collect()));
     }
 
@@ -126,18 +144,26 @@ fn triangles(model: &tobj::Model, fanned: &mut usize, warnings: &mut Vec<String>
         ("colours", m.vertex_color.len(), 3 * vertices),
     ] {
         if found != 0 && found != expected {
-            warnings
-                .push(format!("object `{}`: {what} left out: only some of its faces have them", model.name));
+            warnings.push(format!(
+                "object `{}`: {what} left out: only some of its faces have them",
+                model.name
+            ));
         }
     }
     mesh
 }
 
-fn add_material(m: &tobj::Material, path: &Path, scene: &mut SceneModel, warnings: &mut Vec<String>) {
+fn add_material(
+    m: &tobj::Material,
+    path: &Path,
+    scene: &mut SceneModel,
+    warnings: &mut Vec<String>,
+) {
     let color = |c: Option<[f64; 3]>, default: f32| c.map_or([default; 3], |c| c.map(|x| x as f32));
     let extra = |name: &str| m.unknown_param.get(name).and_then(|v| v.trim().parse::<f32>().ok());
     let [r, g, b] = color(m.diffuse, 0.8);
-    // Blinn-Phong exponent to GGX roughness: alpha² = 2/(n+2) (Walter et al. 2007, section 5.1) and roughness² = alpha.
+    // Blinn-Phong exponent to GGX roughness: alpha² = 2/(n+2) (Walter et al. 2007, section 5.1) and
+    // roughness² = alpha.
     let from_exponent = m.shininess.map(|n| (2.0 / (n.max(0.0) as f32 + 2.0)).powf(0.25));
     let mut material = SurfaceMaterial {
         name: m.name.clone(),
@@ -151,8 +177,9 @@ fn add_material(m: &tobj::Material, path: &Path, scene: &mut SceneModel, warning
     if let Some(name) = &m.diffuse_texture {
         // Options such as `-s 1 1 1` may come before the name.
         let file = sibling_path(path, name.split_whitespace().next_back().unwrap_or(name));
-        let picture =
-            std::fs::read(&file).map_err(|e| e.to_string()).and_then(|b| decode_texture(name, &b, true));
+        let picture = std::fs::read(&file)
+            .map_err(|e| e.to_string())
+            .and_then(|b| decode_texture(name, &b, true));
         match picture {
             Ok(t) => {
                 material.base_color_texture = Some(scene.textures.len());

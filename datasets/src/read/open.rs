@@ -1,13 +1,17 @@
 //! Finding out what a file is: by its first bytes, else by the ending of its name.
 
 use super::error::{io_error, read_bytes};
-use super::{LoadedFile, ReadError, gltf, mhd, nrrd, obj, plot3d, ply, raw, stl, vtk_legacy, vtk_xml};
+use super::{
+    LoadedFile, ReadError, gltf, mhd, nrrd, obj, plot3d, ply, raw, stl, vtk_legacy, vtk_xml,
+};
 use std::io::Read;
 use std::path::Path;
 
 /// The formats there are, for messages.
-pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm), VTK legacy (.vtk), \
-                         PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), raw with TOML (.raw), OBJ, glTF, PLY, STL";
+pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm), VTK \
+                         legacy (.vtk), \
+                         PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
+                         raw with TOML (.raw), OBJ, glTF, PLY, STL";
 
 /// Bytes looked at.
 const HEAD_BYTES: u64 = 1024;
@@ -26,8 +30,9 @@ enum Format {
     Stl,
 }
 
-/// Reads a file of any format that this crate knows. The content decides; where it does not tell (OBJ, raw, PLOT3D), the
-/// ending of the name does. A name that contradicts the content gives a warning, not an error.
+/// Reads a file of any format that this crate knows. The content decides; where it does not tell
+/// (OBJ, raw, PLOT3D), the ending of the name does. A name that contradicts the content gives a
+/// warning, not an error.
 ///
 /// ```
 /// let dir = tempfile::tempdir()?;
@@ -92,7 +97,8 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::Ply)
     } else if text.starts_with(b"glTF") || text.starts_with(b"{") && contains(b"\"asset\"") {
         Some(Format::Gltf)
-    } else if text.starts_with(b"ObjectType") || text.starts_with(b"NDims") && contains(b"DimSize") {
+    } else if text.starts_with(b"ObjectType") || text.starts_with(b"NDims") && contains(b"DimSize")
+    {
         Some(Format::MetaImage)
     } else if text.starts_with(b"solid") && contains(b"facet") || stl_size(head, length) {
         Some(Format::Stl)
@@ -110,8 +116,8 @@ fn stl_size(head: &[u8], length: u64) -> bool {
 fn from_name(path: &Path) -> Option<Format> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     Some(match extension.as_str() {
-        "vti" | "vtp" | "vtu" | "vtr" | "vts" | "pvti" | "pvtp" | "pvtu" | "pvtr" | "pvts" | "pvd"
-        | "vtm" => Format::VtkXml,
+        "vti" | "vtp" | "vtu" | "vtr" | "vts" | "pvti" | "pvtp" | "pvtu" | "pvtr" | "pvts"
+        | "pvd" | "vtm" => Format::VtkXml,
         "vtk" => Format::VtkLegacy,
         "xyz" | "x" | "g" | "grid" | "p3d" | "q" | "sol" => Format::Plot3d,
         "nrrd" | "nhdr" => Format::Nrrd,
@@ -126,11 +132,13 @@ fn from_name(path: &Path) -> Option<Format> {
 }
 
 fn unknown(path: &Path, head: &[u8]) -> ReadError {
-    let extension = path.extension().map_or_else(|| "none".into(), |e| format!(".{}", e.to_string_lossy()));
+    let extension =
+        path.extension().map_or_else(|| "none".into(), |e| format!(".{}", e.to_string_lossy()));
     let what = if head.is_empty() {
         "the file is empty".to_string()
     } else if head.starts_with(b"\x89HDF") || head.starts_with(b"CDF") {
-        "it is an HDF5 or netCDF file, perhaps Exodus or CGNS: save it as .vtu or .vti with ParaView"
+        "it is an HDF5 or netCDF file, perhaps Exodus or CGNS: save it as .vtu or .vti with \
+         ParaView"
             .to_string()
     } else {
         let shown: String = head.iter().take(8).map(|b| format!("{b:02x}")).collect();

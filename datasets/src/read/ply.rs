@@ -1,4 +1,5 @@
-//! PLY polygon files ("Stanford triangle format"), text and binary of either byte order, with all vertex properties.
+//! PLY polygon files ("Stanford triangle format"), text and binary of either byte order, with all
+//! vertex properties.
 //!
 //! Source: Greg Turk's description of the format (1994).
 
@@ -60,7 +61,9 @@ fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<PolyData, Fault> {
         match element.name.as_str() {
             "vertex" => vertices(element, columns, &mut out)?,
             "face" | "tristrips" => faces(element, columns, &mut out, warnings)?,
-            other => warnings.push(format!("element `{other}` ({} entries) left out", element.count)),
+            other => {
+                warnings.push(format!("element `{other}` ({} entries) left out", element.count))
+            }
         }
     }
     let n = out.points.len();
@@ -92,27 +95,40 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
         match (number, words.as_slice()) {
             (1, ["ply"]) => {}
             (1, _) => {
-                return Err(Fault::new(at, "the first line is not `ply`", "this is another kind of file"));
+                return Err(Fault::new(
+                    at,
+                    "the first line is not `ply`",
+                    "this is another kind of file",
+                ));
             }
             (_, ["format", "ascii", _]) => encoding = Some(Encoding::Text),
-            (_, ["format", "binary_little_endian", _]) => encoding = Some(Encoding::Binary(Endian::Little)),
-            (_, ["format", "binary_big_endian", _]) => encoding = Some(Encoding::Binary(Endian::Big)),
+            (_, ["format", "binary_little_endian", _]) => {
+                encoding = Some(Encoding::Binary(Endian::Little))
+            }
+            (_, ["format", "binary_big_endian", _]) => {
+                encoding = Some(Encoding::Binary(Endian::Big))
+            }
             (_, [] | ["comment", ..] | ["obj_info", ..]) => {}
             (_, ["element", name, count]) => {
-                let count =
-                    count.parse().map_err(|_| Fault::new(at, format!("`{count}` is not a count"), BROKEN))?;
+                let count = count
+                    .parse()
+                    .map_err(|_| Fault::new(at, format!("`{count}` is not a count"), BROKEN))?;
                 elements.push(Element { name: name.to_string(), count, properties: Vec::new() });
             }
             (_, ["property", rest @ ..]) => {
                 let (list, kind, name) = match rest {
-                    ["list", length, kind, name] => (Some(scalar_type(length)), scalar_type(kind), name),
+                    ["list", length, kind, name] => {
+                        (Some(scalar_type(length)), scalar_type(kind), name)
+                    }
                     [kind, name] => (None, scalar_type(kind), name),
                     _ => return Err(Fault::new(at, "a property needs a type and a name", BROKEN)),
                 };
-                let unknown =
-                    || Fault::new(At::Line(number), "unknown type of a property", "use char to double");
+                let unknown = || {
+                    Fault::new(At::Line(number), "unknown type of a property", "use char to double")
+                };
                 let list = list.map(|l| l.ok_or_else(unknown)).transpose()?;
-                let property = Property { name: name.to_string(), kind: kind.ok_or_else(unknown)?, list };
+                let property =
+                    Property { name: name.to_string(), kind: kind.ok_or_else(unknown)?, list };
                 let Some(element) = elements.last_mut() else {
                     return Err(Fault::new(at, "a property before the first element", BROKEN));
                 };
@@ -127,7 +143,9 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
     }
     match encoding {
         Some(e) => Ok((e, elements)),
-        None => Err(Fault::new(At::Field("the header".into()), "there is no `format` line", BROKEN)),
+        None => {
+            Err(Fault::new(At::Field("the header".into()), "there is no `format` line", BROKEN))
+        }
     }
 }
 
@@ -143,8 +161,13 @@ fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Resul
         return Ok(Columns { plain: Vec::new(), lists: Vec::new() });
     }
     let at = cursor.at();
-    let rows =
-        fits(element.count, least, cursor.remaining() + 1, at, &format!("rows of `{}`", element.name))?;
+    let rows = fits(
+        element.count,
+        least,
+        cursor.remaining() + 1,
+        at,
+        &format!("rows of `{}`", element.name),
+    )?;
     let mut columns = Columns { plain: Vec::new(), lists: Vec::new() };
     let mut plain: Vec<(ScalarType, Vec<u8>)> = Vec::new();
     let mut lists: Vec<(ScalarType, Vec<u8>, Vec<usize>)> = Vec::new();
@@ -159,20 +182,23 @@ fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Resul
         }
     }
     // One value as bytes, least significant first.
-    let value =
-        |cursor: &mut Cursor<'_>, kind: ScalarType, what: &str, out: &mut Vec<u8>| -> Result<(), Fault> {
-            match encoding {
-                Encoding::Text => out.extend(cursor.numbers(kind, 1, what)?.to_le_bytes()),
-                Encoding::Binary(endian) => {
-                    let start = out.len();
-                    out.extend_from_slice(cursor.take(1, kind.size(), what)?);
-                    if endian == Endian::Big {
-                        out[start..].reverse();
-                    }
+    let value = |cursor: &mut Cursor<'_>,
+                 kind: ScalarType,
+                 what: &str,
+                 out: &mut Vec<u8>|
+     -> Result<(), Fault> {
+        match encoding {
+            Encoding::Text => out.extend(cursor.numbers(kind, 1, what)?.to_le_bytes()),
+            Encoding::Binary(endian) => {
+                let start = out.len();
+                out.extend_from_slice(cursor.take(1, kind.size(), what)?);
+                if endian == Endian::Big {
+                    out[start..].reverse();
                 }
             }
-            Ok(())
-        };
+        }
+        Ok(())
+    };
     let mut scratch = Vec::new();
     for _ in 0..rows {
         for (p, &(slot, is_list)) in element.properties.iter().zip(&slots) {
@@ -189,7 +215,8 @@ fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Resul
                 return Err(Fault::new(at, format!("the length of a list is {length}"), BROKEN));
             }
             let each = if encoding == Encoding::Text { 2 } else { p.kind.size() };
-            let length = fits(length as u64, each, cursor.remaining() + 1, at, "entries of a list")?;
+            let length =
+                fits(length as u64, each, cursor.remaining() + 1, at, "entries of a list")?;
             let (_, bytes, ends) = &mut lists[slot];
             for _ in 0..length {
                 value(cursor, p.kind, &p.name, bytes)?;
@@ -198,9 +225,9 @@ fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Resul
         }
     }
     columns.plain.extend(plain.into_iter().map(|(k, b)| Values::from_bytes(k, &b, Endian::Little)));
-    columns
-        .lists
-        .extend(lists.into_iter().map(|(k, b, ends)| (Values::from_bytes(k, &b, Endian::Little), ends)));
+    columns.lists.extend(
+        lists.into_iter().map(|(k, b, ends)| (Values::from_bytes(k, &b, Endian::Little), ends)),
+    );
     Ok(columns)
 }
 
@@ -209,18 +236,23 @@ fn vertices(element: &Element, columns: Columns, out: &mut PolyData) -> Result<(
         element.properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
     let column = |name: &str| names.iter().position(|n| *n == name);
     let mut used = vec![false; names.len()];
-    // Columns side by side as one array; `None` when one is missing or (for colours) of another type.
+    // Columns side by side as one array; `None` when one is missing or (for colours) of another
+    // type.
     let mut joined = |title: &str, wanted: &[&str], bytes_only: bool| -> Option<DataArray> {
         let at: Vec<usize> = wanted.iter().map(|n| column(n)).collect::<Option<_>>()?;
         let first = columns.plain[at[0]].kind();
-        if at.iter().any(|&i| columns.plain[i].kind() != first) || bytes_only && first != ScalarType::U8 {
+        if at.iter().any(|&i| columns.plain[i].kind() != first)
+            || bytes_only && first != ScalarType::U8
+        {
             return None;
         }
         let rows = columns.plain[at[0]].len();
         let mut bytes = Vec::with_capacity(rows * at.len() * first.size());
         let each: Vec<Vec<u8>> = at.iter().map(|&i| columns.plain[i].to_le_bytes()).collect();
         for r in 0..rows {
-            each.iter().for_each(|b| bytes.extend_from_slice(&b[r * first.size()..(r + 1) * first.size()]));
+            each.iter().for_each(|b| {
+                bytes.extend_from_slice(&b[r * first.size()..(r + 1) * first.size()])
+            });
         }
         at.iter().for_each(|&i| used[i] = true);
         Some(DataArray::new(title, at.len(), Values::from_bytes(first, &bytes, Endian::Little)))
@@ -271,10 +303,13 @@ fn faces(
         }
         let ids: Vec<i64> = (0..values.len()).map(|i| values.get_f64(i) as i64).collect();
         if element.name == "face" {
-            let cells =
-                Cells::from_ends(ends.iter().map(|&e| e as i64), ids.iter().map(|&k| Cells::id(k)).collect());
-            out.polys =
-                cells.map_err(|b| Fault::field("element `face`", format!("face {} has no end", b.cell)))?;
+            let cells = Cells::from_ends(
+                ends.iter().map(|&e| e as i64),
+                ids.iter().map(|&k| Cells::id(k)).collect(),
+            );
+            out.polys = cells.map_err(|b| {
+                Fault::field("element `face`", format!("face {} has no end", b.cell))
+            })?;
         } else {
             // Strips follow each other with -1 between them.
             ids.split(|&k| k == -1)

@@ -76,7 +76,8 @@ fn one_component() -> u64 {
 /// Reads a raw volume; `path` is the file with the numbers or its description.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     let is_description = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    let description_path = if is_description { Some(path.to_path_buf()) } else { sibling_description(path) };
+    let description_path =
+        if is_description { Some(path.to_path_buf()) } else { sibling_description(path) };
     let Some(description_path) = description_path else {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let Some(description) = from_file_name(&name) else {
@@ -107,7 +108,9 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
 /// A description from TOML.
 pub(crate) fn parse_description(text: &str) -> Result<RawDescription, Fault> {
     toml::from_str(text).map_err(|e| {
-        let line = e.span().map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() as u64 + 1);
+        let line = e
+            .span()
+            .map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() as u64 + 1);
         Fault::new(
             At::Line(line),
             e.message().to_string(),
@@ -166,7 +169,11 @@ fn read_values(path: &Path, d: &RawDescription) -> Result<LoadedFile, ReadError>
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
     let Some(available) = length.checked_sub(d.skip_bytes) else {
         let what = format!("skip_bytes is {}, the file has {length} bytes", d.skip_bytes);
-        return Err(fault(Fault::new(At::Field("`skip_bytes` of the description".into()), what, BROKEN)));
+        return Err(fault(Fault::new(
+            At::Field("`skip_bytes` of the description".into()),
+            what,
+            BROKEN,
+        )));
     };
     file.seek(SeekFrom::Start(d.skip_bytes)).map_err(|e| io_error(path, e))?;
     let want = volume.count().map_err(fault)?.saturating_mul(kind.size() as u64);
@@ -178,7 +185,12 @@ fn read_values(path: &Path, d: &RawDescription) -> Result<LoadedFile, ReadError>
         ));
     }
     let data = volume.read_stream(file, available).map_err(fault)?;
-    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile {
+        format: FORMAT,
+        content: Content::Data(data),
+        warnings,
+        time_steps: Vec::new(),
+    })
 }
 
 fn scalar_type(name: &str) -> Option<ScalarType> {

@@ -59,7 +59,8 @@ pub struct SurfaceMaterial {
     pub metallic: f32,
     /// 0 = mirror, 1 = matt.
     pub roughness: f32,
-    /// Index of a texture whose green multiplies `roughness` and whose blue multiplies `metallic`; linear.
+    /// Index of a texture whose green multiplies `roughness` and whose blue multiplies `metallic`;
+    /// linear.
     pub metallic_roughness_texture: Option<usize>,
     /// Index of a texture of normals: 2 rgb - 1 along tangent, its partner and normal; linear.
     pub normal_texture: Option<usize>,
@@ -101,7 +102,8 @@ impl Default for SurfaceMaterial {
     }
 }
 
-/// A picture and how it is read: 8 bits a channel, first row at the top. Colours are sRGB with linear alpha; what else a material reads is linear.
+/// A picture and how it is read: 8 bits a channel, first row at the top. Colours are sRGB with
+/// linear alpha; what else a material reads is linear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// Its name or file.
@@ -112,7 +114,8 @@ pub struct Texture {
     pub height: u32,
     /// `width * height` pixels.
     pub rgba8: Vec<[u8; 4]>,
-    /// True when texture coordinate v = 0 is the lower edge (OBJ), false when it is the upper edge (glTF).
+    /// True when texture coordinate v = 0 is the lower edge (OBJ), false when it is the upper edge
+    /// (glTF).
     pub v_up: bool,
     /// Horizontal and vertical behaviour outside 0..=1.
     pub wrap: [Wrap; 2],
@@ -120,7 +123,8 @@ pub struct Texture {
     pub filter: Filter,
 }
 
-/// Pictures with more bytes than this when unpacked are refused: a few compressed bytes can declare any size.
+/// Pictures with more bytes than this when unpacked are refused: a few compressed bytes can declare
+/// any size.
 const MAX_TEXTURE_BYTES: u64 = 1 << 30;
 
 /// Decodes PNG or JPEG bytes.
@@ -130,7 +134,8 @@ pub(crate) fn decode_texture(name: &str, bytes: &[u8], v_up: bool) -> Result<Tex
         .map_err(|e| e.to_string())?;
     let mut limits = image::Limits::default();
     // A picture of one colour packs about 1:1000; leave room for small ones.
-    limits.max_alloc = Some(MAX_TEXTURE_BYTES.min((bytes.len() as u64).saturating_mul(2048) + (1 << 20)));
+    limits.max_alloc =
+        Some(MAX_TEXTURE_BYTES.min((bytes.len() as u64).saturating_mul(2048) + (1 << 20)));
     reader.limits(limits);
     let picture = reader.decode().map_err(|e| e.to_string())?.to_rgba8();
     let (width, height) = picture.dimensions();

@@ -1,6 +1,7 @@
 //! STL triangle files, text and binary. Corners at the same place (bit for bit) become one point.
 //!
-//! The format repeats every corner for each triangle; without welding no normal could be smooth and no edge shared.
+//! The format repeats every corner for each triangle; without welding no normal could be smooth and
+//! no edge shared.
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, read_bytes};
 use super::{Content, LoadedFile, ReadError};
@@ -64,7 +65,8 @@ impl Welder {
 
 fn binary_triangles(bytes: &[u8], warnings: &mut Vec<String>) -> Result<PolyData, Fault> {
     let Some(n) = declared_triangles(bytes) else {
-        let what = format!("{} bytes are too few for the header of {}", bytes.len(), HEADER_BYTES + 4);
+        let what =
+            format!("{} bytes are too few for the header of {}", bytes.len(), HEADER_BYTES + 4);
         return Err(Fault::new(At::Byte(0), what, TRUNCATED));
     };
     let mut cursor = Cursor { data: bytes, pos: HEADER_BYTES + 4 };
@@ -76,7 +78,8 @@ fn binary_triangles(bytes: &[u8], warnings: &mut Vec<String>) -> Result<PolyData
     let mut ids = Vec::with_capacity(n as usize * 3);
     let mut tags = Vec::with_capacity(n as usize);
     for record in body.as_chunks::<TRIANGLE_BYTES>().0 {
-        let real = |i: usize| f32::from_le_bytes([record[i], record[i + 1], record[i + 2], record[i + 3]]);
+        let real =
+            |i: usize| f32::from_le_bytes([record[i], record[i + 1], record[i + 2], record[i + 3]]);
         // The normal comes first; it follows from the corners.
         for corner in 0..3 {
             let at = 12 + 12 * corner;
@@ -84,8 +87,11 @@ fn binary_triangles(bytes: &[u8], warnings: &mut Vec<String>) -> Result<PolyData
         }
         tags.push(u16::from_le_bytes([record[48], record[49]]));
     }
-    let mut d =
-        PolyData { points: Points::F32(welder.points), polys: Cells::uniform(3, ids), ..Default::default() };
+    let mut d = PolyData {
+        points: Points::F32(welder.points),
+        polys: Cells::uniform(3, ids),
+        ..Default::default()
+    };
     if tags.iter().any(|&t| t != 0) {
         d.attributes.cell.push(DataArray::new("attribute", 1, Values::U16(tags)));
     }
@@ -112,7 +118,11 @@ fn text_triangles(bytes: &[u8]) -> Result<PolyData, Fault> {
             }
             Some("endloop") => {
                 if corners.len() < 3 {
-                    return Err(Fault::new(at, format!("a loop of {} corners", corners.len()), BROKEN));
+                    return Err(Fault::new(
+                        at,
+                        format!("a loop of {} corners", corners.len()),
+                        BROKEN,
+                    ));
                 }
                 polys.push(corners.drain(..));
             }
@@ -124,7 +134,11 @@ fn text_triangles(bytes: &[u8]) -> Result<PolyData, Fault> {
         }
     }
     if !corners.is_empty() {
-        return Err(Fault::new(At::Line(line_number), "the file ends inside a triangle", TRUNCATED));
+        return Err(Fault::new(
+            At::Line(line_number),
+            "the file ends inside a triangle",
+            TRUNCATED,
+        ));
     }
     Ok(PolyData { points: Points::F32(welder.points), polys, ..Default::default() })
 }

@@ -28,7 +28,8 @@ pub(crate) enum Packing {
 }
 
 impl Volume {
-    /// Number of values; a fault when it does not fit in 64 bits or an axis is too long for an extent.
+    /// Number of values; a fault when it does not fit in 64 bits or an axis is too long for an
+    /// extent.
     pub(crate) fn count(&self) -> Result<u64, Fault> {
         let n = self.dims.iter().try_fold(self.components.max(1), |n, &d| n.checked_mul(d));
         match n {
@@ -59,7 +60,8 @@ impl Volume {
                 let mut cursor = Cursor::new(data);
                 let bytes = cursor.take(count, size, "values")?;
                 if cursor.remaining() > 0 {
-                    warnings.push(format!("{} bytes after the last value ignored", cursor.remaining()));
+                    warnings
+                        .push(format!("{} bytes after the last value ignored", cursor.remaining()));
                 }
                 Values::from_bytes(self.kind, bytes, self.endian)
             }
@@ -71,9 +73,13 @@ impl Volume {
         self.with_values(values)
     }
 
-    /// The volume with the numbers read from `source` piece by piece, so that the file is never in memory as a whole.
-    /// `available` is how many bytes there are.
-    pub(crate) fn read_stream(self, mut source: impl Read, available: u64) -> Result<Dataset, Fault> {
+    /// The volume with the numbers read from `source` piece by piece, so that the file is never in
+    /// memory as a whole. `available` is how many bytes there are.
+    pub(crate) fn read_stream(
+        self,
+        mut source: impl Read,
+        available: u64,
+    ) -> Result<Dataset, Fault> {
         let count = self.count()?;
         let size = self.kind.size();
         crate::read::error::fits(
@@ -101,7 +107,11 @@ impl Volume {
         let mut image = ImageData::new(dims, self.origin, self.spacing);
         image.direction = self.direction;
         image.attributes.point_scalars = Some(self.name.clone());
-        image.attributes.point.push(DataArray::new(self.name, self.components.max(1) as usize, values));
+        image.attributes.point.push(DataArray::new(
+            self.name,
+            self.components.max(1) as usize,
+            values,
+        ));
         let data = Dataset::ImageData(image);
         data.check()?;
         Ok(data)
@@ -124,9 +134,11 @@ fn inflate(data: &[u8], want: u64) -> Result<Vec<u8>, Fault> {
     };
     match result {
         Ok(_) if out.len() as u64 == want => Ok(out),
-        Ok(_) => {
-            Err(Fault::new(at(), format!("they unpack to {} bytes instead of {want}", out.len()), TRUNCATED))
-        }
+        Ok(_) => Err(Fault::new(
+            at(),
+            format!("they unpack to {} bytes instead of {want}", out.len()),
+            TRUNCATED,
+        )),
         Err(e) => Err(Fault::new(at(), format!("they cannot be unpacked: {e}"), TRUNCATED)),
     }
 }

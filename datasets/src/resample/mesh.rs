@@ -1,4 +1,5 @@
-//! Any data set as points and solid cells, numbered through all blocks. Lattices keep their implicit cells.
+//! Any data set as points and solid cells, numbered through all blocks. Lattices keep their
+//! implicit cells.
 
 use super::ResampleError;
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
@@ -6,7 +7,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Bits of `vtkGhostType` (vtkDataSetAttributes.h): a hidden point, and cells that are refined elsewhere or hidden.
+/// Bits of `vtkGhostType` (vtkDataSetAttributes.h): a hidden point, and cells that are refined
+/// elsewhere or hidden.
 const HIDDEN_POINT: u8 = 2;
 const HIDDEN_CELL: u8 = 32 | 8;
 
@@ -75,7 +77,8 @@ pub enum Plane {
 }
 
 impl Mesh {
-    /// All cells of a data set that fill space. Lines, surfaces and vertices are counted in [`Self::left_out`].
+    /// All cells of a data set that fill space. Lines, surfaces and vertices are counted in
+    /// [`Self::left_out`].
     pub fn new(data: &Dataset) -> Result<Mesh, ResampleError> {
         Self::build(data, None)
     }
@@ -93,8 +96,14 @@ impl Mesh {
             let cure = "give a positive length in the unit of the mesh";
             return Err(ResampleError::Option { option: "span", value: span, cure });
         }
-        let mut mesh =
-            Mesh { points: vec![], parts: vec![], hidden: vec![], cells: 0, left_out: 0, higher_order: 0 };
+        let mut mesh = Mesh {
+            points: vec![],
+            parts: vec![],
+            hidden: vec![],
+            cells: 0,
+            left_out: 0,
+            higher_order: 0,
+        };
         let mut flat = 0;
         for (number, leaf) in data.leaves().into_iter().enumerate() {
             let before = mesh.parts.len();
@@ -103,7 +112,10 @@ impl Mesh {
         }
         if mesh.cells == 0 {
             let (found, cure) = if flat > 0 {
-                ("it is a plane".to_string(), "give it a depth: its span, for a two-dimensional flow")
+                (
+                    "it is a plane".to_string(),
+                    "give it a depth: its span, for a two-dimensional flow",
+                )
             } else {
                 (
                     format!("{} cells of other kinds", mesh.left_out),
@@ -132,7 +144,9 @@ impl Mesh {
             }
             Dataset::RectilinearGrid(d) => {
                 let (n, c) = (extent_dims(d.extent), &d.coordinates);
-                let at = |i: usize| DVec3::new(c[0][i % n[0]], c[1][i / n[0] % n[1]], c[2][i / n[0] / n[1]]);
+                let at = |i: usize| {
+                    DVec3::new(c[0][i % n[0]], c[1][i / n[0] % n[1]], c[2][i / n[0] / n[1]])
+                };
                 self.add_lattice(n, &at, &d.attributes, plane)
             }
             Dataset::StructuredGrid(d) => {
@@ -168,7 +182,8 @@ impl Mesh {
                 self.left_out += count;
                 return Ok(true);
             };
-            // A second layer of points along the missing axis; the layers lie half a span to either side.
+            // A second layer of points along the missing axis; the layers lie half a span to either
+            // side.
             let axis = flat_axis.unwrap_or(2);
             let flat: Vec<DVec3> = (0..count).map(at).collect();
             let normal = plane_normal(&flat, dims, axis);
@@ -215,19 +230,24 @@ impl Mesh {
                 self.left_out += 1;
                 continue;
             }
-            self.higher_order += usize::from(needed != usize::MAX && d.types[c] > 16 && d.types[c] != 42);
+            self.higher_order +=
+                usize::from(needed != usize::MAX && d.types[c] > 16 && d.types[c] != 42);
             cell.push(c as u32);
             hidden.push(
                 ghost_cells.is_some_and(|a| a.get(c, 0) as u8 & HIDDEN_CELL != 0)
-                    || ghost_points
-                        .is_some_and(|a| ids.iter().any(|&k| a.get(k as usize, 0) as u8 & HIDDEN_POINT != 0)),
+                    || ghost_points.is_some_and(|a| {
+                        ids.iter().any(|&k| a.get(k as usize, 0) as u8 & HIDDEN_POINT != 0)
+                    }),
             );
         }
         let first = self.points.len();
         self.points.extend((0..n).map(|i| d.points.get(i)));
         let cells = cell.len();
-        let grid =
-            UnstructuredGrid { points: Points::default(), attributes: Attributes::default(), ..d.clone() };
+        let grid = UnstructuredGrid {
+            points: Points::default(),
+            attributes: Attributes::default(),
+            ..d.clone()
+        };
         self.push(first, cells, PartKind::Cells(Box::new(Explicit { cell, grid })), &mut hidden)
     }
 
@@ -240,7 +260,8 @@ impl Mesh {
     ) -> Result<(), ResampleError> {
         if self.points.len() >= u32::MAX as usize || self.cells + cells >= u32::MAX as usize {
             let what =
-                "the mesh has more than 2^32 points or cells; resample its blocks one by one".to_string();
+                "the mesh has more than 2^32 points or cells; resample its blocks one by one"
+                    .to_string();
             return Err(ResampleError::Lattice { dims: [self.points.len(), 1, 1], what });
         }
         let range = self.cells..self.cells + cells;
@@ -295,14 +316,17 @@ impl Mesh {
         finite.fold(nothing, |(low, high), p| (low.min(*p), high.max(*p)))
     }
 
-    /// Side of a cube as large as the box of a typical cell: the median over at most 10 000 of them; NaN without cells.
+    /// Side of a cube as large as the box of a typical cell: the median over at most 10 000 of
+    /// them; NaN without cells.
     pub fn typical_cell(&self) -> f64 {
         let step = (self.cells / 10_000).max(1);
         let side = |cell: usize| {
             let ids = self.corners(cell).ids;
             let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            let (low, high) =
-                ids.iter().map(|&i| self.points[i as usize]).fold(nothing, |(l, h), p| (l.min(p), h.max(p)));
+            let (low, high) = ids
+                .iter()
+                .map(|&i| self.points[i as usize])
+                .fold(nothing, |(l, h), p| (l.min(p), h.max(p)));
             (high - low).element_product().cbrt()
         };
         let mut sides: Vec<f64> =
@@ -320,8 +344,9 @@ impl Mesh {
             PartKind::Lattice([nx, ny, _]) => {
                 let (cx, cy) = (nx - 1, ny - 1);
                 let (i, j, k) = (local % cx, local / cx % cy, local / cx / cy);
-                let at =
-                    |di: usize, dj: usize, dk: usize| (first + i + di + nx * (j + dj + ny * (k + dk))) as u32;
+                let at = |di: usize, dj: usize, dk: usize| {
+                    (first + i + di + nx * (j + dj + ny * (k + dk))) as u32
+                };
                 let ids = vec![
                     at(0, 0, 0),
                     at(1, 0, 0),
@@ -344,7 +369,8 @@ impl Mesh {
         c.ids.iter().map(|&i| self.points[i as usize]).sum::<DVec3>() / c.ids.len() as f64
     }
 
-    /// For each point the mean of the finite values of its cells that are not hidden; NaN where there is none.
+    /// For each point the mean of the finite values of its cells that are not hidden; NaN where
+    /// there is none.
     pub fn cells_to_points(&self, of_cells: &[f64]) -> Vec<f64> {
         let mut sum = vec![(0.0, 0u32); self.points.len()];
         for (cell, value) in of_cells.iter().enumerate().take(self.cells) {
@@ -358,8 +384,8 @@ impl Mesh {
         sum.into_iter().map(|(s, n)| if n == 0 { f64::NAN } else { s / f64::from(n) }).collect()
     }
 
-    /// Values per point in the order of [`Self::point`]. `value` is called with the arrays of each block and the number of
-    /// the point in it.
+    /// Values per point in the order of [`Self::point`]. `value` is called with the arrays of each
+    /// block and the number of the point in it.
     pub fn gather_points(
         &self,
         data: &Dataset,
@@ -379,7 +405,11 @@ impl Mesh {
     }
 
     /// Values per cell in the order of this mesh; as [`Self::gather_points`].
-    pub fn gather_cells(&self, data: &Dataset, mut value: impl FnMut(&Attributes, usize) -> f64) -> Vec<f64> {
+    pub fn gather_cells(
+        &self,
+        data: &Dataset,
+        mut value: impl FnMut(&Attributes, usize) -> f64,
+    ) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.cells);
         self.each_part(data, |part, attributes| {
             out.extend((0..part.cells.len()).map(|i| match &part.kind {
@@ -416,10 +446,14 @@ impl Explicit {
             (13 | 26 | 31 | 32 | 73 | 80, _) => {
                 Corners { ids: pick(&[0, 1, 2, 3, 4, 5]), shape: Shape::Wedge }
             }
-            (14 | 27 | 37 | 74 | 81, _) => Corners { ids: pick(&[0, 1, 2, 3, 4]), shape: Shape::Pyramid },
+            (14 | 27 | 37 | 74 | 81, _) => {
+                Corners { ids: pick(&[0, 1, 2, 3, 4]), shape: Shape::Pyramid }
+            }
             (_, CellType::Solid(faces)) => {
-                let corners = 1 + faces.iter().flat_map(|f| f.iter()).copied().max().unwrap_or(0) as usize;
-                let faces = faces.iter().map(|f| f.iter().map(|&i| u32::from(i)).collect()).collect();
+                let corners =
+                    1 + faces.iter().flat_map(|f| f.iter()).copied().max().unwrap_or(0) as usize;
+                let faces =
+                    faces.iter().map(|f| f.iter().map(|&i| u32::from(i)).collect()).collect();
                 Corners {
                     ids: ids[..corners].iter().map(|i| i + first).collect(),
                     shape: Shape::Faces(faces),
@@ -437,13 +471,17 @@ impl Explicit {
                     });
                     faces.push(face.collect());
                 }
-                Corners { ids: own.into_iter().map(|i| i + first).collect(), shape: Shape::Faces(faces) }
+                Corners {
+                    ids: own.into_iter().map(|i| i + first).collect(),
+                    shape: Shape::Faces(faces),
+                }
             }
         }
     }
 }
 
-/// In a lattice that was given a second layer along `axis`: which point of the flat one this was, and on which side.
+/// In a lattice that was given a second layer along `axis`: which point of the flat one this was,
+/// and on which side.
 fn flat_source(i: usize, dims: [usize; 3], axis: usize) -> (usize, usize) {
     let mut at = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]];
     let mut n = dims;
@@ -481,7 +519,8 @@ fn hidden_cells_of_lattice(dims: [usize; 3], a: &Attributes) -> Vec<bool> {
         for (i, h) in hidden.iter_mut().enumerate() {
             let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
             for corner in 0..8usize {
-                let q: [usize; 3] = std::array::from_fn(|c| (at[c] + (corner >> c & 1)).min(dims[c] - 1));
+                let q: [usize; 3] =
+                    std::array::from_fn(|c| (at[c] + (corner >> c & 1)).min(dims[c] - 1));
                 let id = q[0] + dims[0] * (q[1] + dims[1] * q[2]);
                 *h |= a.get(id, 0) as u8 & HIDDEN_POINT != 0;
             }

@@ -1,12 +1,13 @@
-//! Data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra, hexahedra, wedges, pyramids, prisms,
-//! polyhedra, and collections of them.
+//! Data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra, hexahedra,
+//! wedges, pyramids, prisms, polyhedra, and collections of them.
 //!
-//! Each cell finds the lattice nodes inside it (`rasterize`), so no search tree is needed and time goes with the number of
-//! nodes plus that of cells. Inside a cell values are those of the finite element (`shape`): Newton's method inverts the
-//! trilinear map of a hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
+//! Each cell finds the lattice nodes inside it (`rasterize`), so no search tree is needed and time
+//! goes with the number of nodes plus that of cells. Inside a cell values are those of the finite
+//! element (`shape`): Newton's method inverts the trilinear map of a hexahedron. Cells whose map
+//! cannot be inverted are divided into tetrahedra and counted.
 //!
-//! What a node is, is told by its [`Mark`]; what the resampling cost in accuracy, by the [`Report`]: the lattice is sampled back
-//! at the points of the mesh.
+//! What a node is, is told by its [`Mark`]; what the resampling cost in accuracy, by the
+//! [`Report`]: the lattice is sampled back at the points of the mesh.
 
 mod mesh;
 mod rasterize;
@@ -83,12 +84,15 @@ pub struct Lattice {
 /// How fine a lattice is to be.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Resolution {
-    /// Two nodes along the side of half of the cells or more, with 64 to 256 nodes along the longest axis.
+    /// Two nodes along the side of half of the cells or more, with 64 to 256 nodes along the
+    /// longest axis.
     #[default]
     Auto,
-    /// This many nodes along the longest axis, and equal spacing along the others as near as whole numbers allow.
+    /// This many nodes along the longest axis, and equal spacing along the others as near as whole
+    /// numbers allow.
     Longest(usize),
-    /// Nodes at this distance, in the unit of the mesh; what does not divide is left over on both sides.
+    /// Nodes at this distance, in the unit of the mesh; what does not divide is left over on both
+    /// sides.
     Spacing(f64),
     /// Nodes per axis.
     Dims([usize; 3]),
@@ -109,7 +113,8 @@ impl Lattice {
         let flat = |what: String| ResampleError::Lattice { dims: [0; 3], what };
         if !(size.is_finite() && low.is_finite() && size.min_element() > 0.0) {
             return Err(flat(format!(
-                "the box from {low} to {high} has no volume; give bounds that have, or a depth to plane data"
+                "the box from {low} to {high} has no volume; give bounds that have, or a depth to \
+                 plane data"
             )));
         }
         let even = |h: f64| -> [usize; 3] {
@@ -117,12 +122,15 @@ impl Lattice {
         };
         let (dims, spacing) = match resolution {
             Resolution::Auto => {
-                // Means of stretched meshes are those of their far field: the median is where the cells are.
+                // Means of stretched meshes are those of their far field: the median is where the
+                // cells are.
                 let wish = size.max_element() / (0.5 * typical_cell) + 1.0;
                 let longest = if wish.is_finite() { wish.clamp(64.0, 256.0).round() } else { 64.0 };
                 (even(size.max_element() / (longest - 1.0)), None)
             }
-            Resolution::Longest(n) => (even(size.max_element() / n.saturating_sub(1).max(1) as f64), None),
+            Resolution::Longest(n) => {
+                (even(size.max_element() / n.saturating_sub(1).max(1) as f64), None)
+            }
             Resolution::Dims(d) => (d, None),
             Resolution::Spacing(h) => {
                 if !(h > 0.0 && h.is_finite()) {
@@ -138,13 +146,16 @@ impl Lattice {
         };
         let nodes = dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
         if nodes.is_none_or(|n| n > MAX_NODES) || dims.iter().any(|&d| d < 2) {
-            let what = "every axis needs at least 2 nodes, and all together at most 2^31; change the resolution or the bounds";
+            let what = "every axis needs at least 2 nodes, and all together at most 2^31; change \
+                        the resolution or the bounds";
             return Err(ResampleError::Lattice { dims, what: what.into() });
         }
         let steps = DVec3::from_array(dims.map(|d| (d - 1) as f64));
         Ok(match spacing {
             None => Lattice { dims, origin: low, spacing: size / steps },
-            Some(h) => Lattice { dims, origin: low + 0.5 * (size - h * steps), spacing: DVec3::splat(h) },
+            Some(h) => {
+                Lattice { dims, origin: low + 0.5 * (size - h * steps), spacing: DVec3::splat(h) }
+            }
         })
     }
 
@@ -188,8 +199,8 @@ pub enum Samples<'a> {
 /// How to resample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// A node gets the mean over this many samples per axis of the box around it. 1 takes the value at the node; 2 or more
-    /// average what is finer than the lattice, such as shocks.
+    /// A node gets the mean over this many samples per axis of the box around it. 1 takes the value
+    /// at the node; 2 or more average what is finer than the lattice, such as shocks.
     pub samples_per_axis: usize,
 }
 

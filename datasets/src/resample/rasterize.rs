@@ -1,8 +1,9 @@
 //! Cells look for the nodes inside them, layer by layer of the lattice.
 //!
-//! A layer of nodes (one k) is one task. It goes through the cells that reach into it in the order of their numbers, so a node on
-//! a face that two cells share gets the same value whatever the number of threads. A node that lies in no cell, but within
-//! [`NEAR`] of one, takes the value of the nearest: curved faces of unlike cells do not match exactly.
+//! A layer of nodes (one k) is one task. It goes through the cells that reach into it in the order
+//! of their numbers, so a node on a face that two cells share gets the same value whatever the
+//! number of threads. A node that lies in no cell, but within [`NEAR`] of one, takes the value of
+//! the nearest: curved faces of unlike cells do not match exactly.
 
 use super::mesh::Mesh;
 use super::shape::Cell;
@@ -11,7 +12,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// A point this far outside, in units of the cell, is inside: rounding in the inversion, with 1e3 to spare.
+/// A point this far outside, in units of the cell, is inside: rounding in the inversion, with 1e3
+/// to spare.
 pub(super) const INSIDE_TOLERANCE: f64 = 1e-9;
 /// A point this far outside may lie in a gap between faces that do not match.
 const NEAR: f64 = 1e-3;
@@ -49,7 +51,8 @@ fn rank(mark: Mark) -> u8 {
     }
 }
 
-/// The samples of a lattice with `n` per axis and node: index `i` stands at `(i + 0.5)/n − 0.5` nodes from the first node.
+/// The samples of a lattice with `n` per axis and node: index `i` stands at `(i + 0.5)/n − 0.5`
+/// nodes from the first node.
 struct FineLattice<'a> {
     lattice: &'a Lattice,
     n: usize,
@@ -66,7 +69,8 @@ impl FineLattice<'_> {
     /// Samples between two coordinates, a hair more rather than less.
     fn between(&self, axis: usize, low: f64, high: f64) -> Option<(usize, usize)> {
         let n = self.n as f64;
-        let index = |x: f64| ((x - self.lattice.origin[axis]) / self.lattice.spacing[axis] + 0.5) * n - 0.5;
+        let index =
+            |x: f64| ((x - self.lattice.origin[axis]) / self.lattice.spacing[axis] + 0.5) * n - 0.5;
         let last = (self.count(axis) - 1) as f64;
         let (a, b) = ((index(low) - 1e-6).ceil().max(0.0), (index(high) + 1e-6).floor().min(last));
         // NaN compares false.
@@ -100,7 +104,8 @@ pub(super) fn rasterize(
             Some(((a / fine.n) as u32, (b / fine.n) as u32))
         })
         .collect();
-    let nowhere = (0..mesh.num_cells()).into_par_iter().filter(|&c| cell_box(mesh, c).is_none()).count();
+    let nowhere =
+        (0..mesh.num_cells()).into_par_iter().filter(|&c| cell_box(mesh, c).is_none()).count();
 
     // The cells of each layer, in order (counting sort).
     let layers = lattice.dims[2];
@@ -143,7 +148,10 @@ pub(super) fn rasterize(
                     folded[cell].store(true, Ordering::Relaxed);
                 }
             }
-            let gaps = samples.iter().filter(|s| s.outside > INSIDE_TOLERANCE && s.outside <= NEAR).count();
+            let gaps = samples
+                .iter()
+                .filter(|s| s.outside > INSIDE_TOLERANCE && s.outside <= NEAR)
+                .count();
             in_gaps.fetch_add(gaps, Ordering::Relaxed);
             reduce(&fine, k, &samples, values, marks);
         },
@@ -187,7 +195,8 @@ struct CellData<'a> {
 }
 
 impl CellData<'_> {
-    /// Fills in the samples of layer `k` that lie in the cell; whether any does, and whether the cell folds.
+    /// Fills in the samples of layer `k` that lie in the cell; whether any does, and whether the
+    /// cell folds.
     fn visit(
         &self,
         fine: &FineLattice<'_>,
@@ -197,7 +206,9 @@ impl CellData<'_> {
     ) -> (bool, bool) {
         let Some((low, high)) = cell_box(self.mesh, self.cell) else { return (false, false) };
         let ranges = [0, 1, 2].map(|a| fine.between(a, low[a], high[a]));
-        let [Some((x0, x1)), Some((y0, y1)), Some((z0, z1))] = ranges else { return (false, false) };
+        let [Some((x0, x1)), Some((y0, y1)), Some((z0, z1))] = ranges else {
+            return (false, false);
+        };
         let (z0, z1) = (z0.max(k * fine.n), z1.min(k * fine.n + fine.n - 1));
 
         let corners = self.mesh.corners(self.cell);
@@ -218,23 +229,33 @@ impl CellData<'_> {
         for z in z0..=z1 {
             for y in y0..=y1 {
                 for x in x0..=x1 {
-                    let slot = &mut samples[x + fine.count(0) * (y + fine.count(1) * (z - k * fine.n))];
+                    let slot =
+                        &mut samples[x + fine.count(0) * (y + fine.count(1) * (z - k * fine.n))];
                     if slot.mark == Mark::Inside && slot.outside == 0.0 {
-                        // Already inside another cell. Whether it would also be in this one matters to the count of cells
-                        // without samples only, and there cells that share faces with others are not missed.
+                        // Already inside another cell. Whether it would also be in this one matters
+                        // to the count of cells without samples only, and there cells that share
+                        // faces with others are not missed.
                         hit = true;
                         continue;
                     }
-                    let p = DVec3::new(fine.coordinate(0, x), fine.coordinate(1, y), fine.coordinate(2, z));
-                    let Some(place) = shape.place(p).filter(|at| at.outside <= NEAR) else { continue };
+                    let p = DVec3::new(
+                        fine.coordinate(0, x),
+                        fine.coordinate(1, y),
+                        fine.coordinate(2, z),
+                    );
+                    let Some(place) = shape.place(p).filter(|at| at.outside <= NEAR) else {
+                        continue;
+                    };
                     hit = true;
                     let mark = if own_mark == Mark::Inside && !place.value.is_finite() {
                         Mark::NotFinite
                     } else {
                         own_mark
                     };
-                    let outside = if place.outside <= INSIDE_TOLERANCE { 0.0 } else { place.outside };
-                    // Inside beats near; then what says more; then nearer; then the cell that came first.
+                    let outside =
+                        if place.outside <= INSIDE_TOLERANCE { 0.0 } else { place.outside };
+                    // Inside beats near; then what says more; then nearer; then the cell that came
+                    // first.
                     let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
                     let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
                     if new > old || new == old && outside < slot.outside {
@@ -247,9 +268,15 @@ impl CellData<'_> {
     }
 }
 
-/// Nodes of layer `k` from their samples: the mean of those with values when they are at least half, else what most of
-/// the others are.
-fn reduce(fine: &FineLattice<'_>, k: usize, samples: &[Sample], values: &mut [f32], marks: &mut [Mark]) {
+/// Nodes of layer `k` from their samples: the mean of those with values when they are at least
+/// half, else what most of the others are.
+fn reduce(
+    fine: &FineLattice<'_>,
+    k: usize,
+    samples: &[Sample],
+    values: &mut [f32],
+    marks: &mut [Mark],
+) {
     let n = fine.n;
     let width = fine.count(0);
     for (node, (value, mark)) in values.iter_mut().zip(marks).enumerate() {

@@ -6,7 +6,8 @@ use super::{Lattice, Mark, Samples};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Differences between the lattice, interpolated linearly, and the values the mesh has at its points (or cell centres).
+/// Differences between the lattice, interpolated linearly, and the values the mesh has at its
+/// points (or cell centres).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ResamplingError {
     /// Root mean square, in the unit of the values.
@@ -15,11 +16,13 @@ pub struct ResamplingError {
     pub max: f64,
     /// Where the largest is.
     pub max_at: DVec3,
-    /// Largest minus smallest value at the places compared: what the differences are to be seen against.
+    /// Largest minus smallest value at the places compared: what the differences are to be seen
+    /// against.
     pub range: f64,
     /// Places compared.
     pub compared: usize,
-    /// Places that could not be compared: beside nodes without value, off the lattice, hidden or not finite.
+    /// Places that could not be compared: beside nodes without value, off the lattice, hidden or
+    /// not finite.
     pub not_compared: usize,
 }
 
@@ -38,7 +41,8 @@ pub struct Report {
     pub in_gaps: usize,
     /// Cells of the mesh.
     pub cells: usize,
-    /// Cells finer than the lattice: no sample lies in them, so what is in them is seen only through their neighbours.
+    /// Cells finer than the lattice: no sample lies in them, so what is in them is seen only
+    /// through their neighbours.
     pub missed_cells: usize,
     /// Cells divided into tetrahedra because their map folds or collapses.
     pub folded_cells: usize,
@@ -85,7 +89,8 @@ impl Report {
         say(self.not_finite, "nodes are in cells whose values are not finite");
         if 4 * self.missed_cells > self.cells {
             out.push(format!(
-                "{} of {} cells are finer than the lattice; refine it, or average with more samples per axis",
+                "{} of {} cells are finer than the lattice; refine it, or average with more \
+                 samples per axis",
                 self.missed_cells, self.cells
             ));
         }
@@ -127,7 +132,9 @@ pub(super) fn resampling_error(
             };
             for (i, &value) in chunk.iter().enumerate() {
                 let p = place(c * CHUNK + i);
-                let Some(got) = trilinear(lattice, values, p).filter(|_| value.is_finite()) else { continue };
+                let Some(got) = trilinear(lattice, values, p).filter(|_| value.is_finite()) else {
+                    continue;
+                };
                 let error = (got - value).abs();
                 part.squares += error * error;
                 part.compared += 1;
@@ -143,7 +150,8 @@ pub(super) fn resampling_error(
     let squares: f64 = parts.iter().map(|p| p.squares).sum();
     let low = parts.iter().fold(f64::INFINITY, |a, p| a.min(p.range.0));
     let high = parts.iter().fold(f64::NEG_INFINITY, |a, p| a.max(p.range.1));
-    let worst = parts.iter().fold((0.0, DVec3::ZERO), |a, p| if p.worst.0 > a.0 { p.worst } else { a });
+    let worst =
+        parts.iter().fold((0.0, DVec3::ZERO), |a, p| if p.worst.0 > a.0 { p.worst } else { a });
     ResamplingError {
         rms: (squares / compared.max(1) as f64).sqrt(),
         max: worst.0,

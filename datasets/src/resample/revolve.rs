@@ -1,7 +1,8 @@
 //! Axisymmetric data: a plane of axial position (x) and radius (y), turned about the x axis.
 //!
-//! The plane is resampled to a fine image first, four times as fine as the lattice, and each node of the lattice reads it at its
-//! radius. Linear interpolation in the image then adds a sixteenth of the error that the lattice has anyway.
+//! The plane is resampled to a fine image first, four times as fine as the lattice, and each node
+//! of the lattice reads it at its radius. Linear interpolation in the image then adds a sixteenth
+//! of the error that the lattice has anyway.
 
 use super::mesh::Mesh;
 use super::report::{self, Report};
@@ -11,11 +12,12 @@ use rayon::prelude::*;
 
 /// Image samples per node of the lattice, along each axis.
 const FINER: f64 = 4.0;
-/// An inner radius below this part of the outer one is the first row of cells beside the axis, not a body: the values there
-/// reach to the axis, where by symmetry they have no slope.
+/// An inner radius below this part of the outer one is the first row of cells beside the axis, not
+/// a body: the values there reach to the axis, where by symmetry they have no slope.
 const TO_THE_AXIS: f64 = 0.1;
 
-/// Box of the body of revolution of a mesh whose points lie in the plane z = 0 but for a thin extrusion.
+/// Box of the body of revolution of a mesh whose points lie in the plane z = 0 but for a thin
+/// extrusion.
 pub fn revolved_bounds(mesh: &Mesh) -> Result<(DVec3, DVec3), ResampleError> {
     let (low, high) = mesh.bounds();
     if !(low.y >= -1e-6 * high.y && high.y > 0.0) {
@@ -28,7 +30,8 @@ pub fn revolved_bounds(mesh: &Mesh) -> Result<(DVec3, DVec3), ResampleError> {
     Ok((DVec3::new(low.x, -high.y, -high.y), DVec3::new(high.x, high.y, high.y)))
 }
 
-/// As [`resample`], for a mesh made by [`Mesh::with_plane`] with a span that is small against the lattice's spacing.
+/// As [`resample`], for a mesh made by [`Mesh::with_plane`] with a span that is small against the
+/// lattice's spacing.
 pub fn revolve(
     mesh: &Mesh,
     samples: Samples<'_>,
@@ -45,7 +48,8 @@ pub fn revolve(
     let steps = DVec3::new((dims[0] - 1) as f64, (dims[1] - 1) as f64, 1.0);
     let mut spacing = (high - low) / steps;
     spacing.z *= 0.5;
-    let image = Lattice { dims, origin: DVec3::new(low.x, low.y, low.z + 0.5 * spacing.z), spacing };
+    let image =
+        Lattice { dims, origin: DVec3::new(low.x, low.y, low.z + 0.5 * spacing.z), spacing };
     let flat = resample(mesh, samples, &image, options)?;
 
     // Each node reads the image at its radius.
@@ -107,10 +111,12 @@ fn look_up(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
     if complete {
         return (sum as f32, Mark::Inside);
     }
-    // At a border the nearest sample with a value stands for the node that lies within half a sample of it.
+    // At a border the nearest sample with a value stands for the node that lies within half a
+    // sample of it.
     match heaviest.1 {
         Mark::Inside => {
-            let at = corners.iter().fold(corners[0], |best, c| if c.1 > best.1 { *c } else { best }).0;
+            let at =
+                corners.iter().fold(corners[0], |best, c| if c.1 > best.1 { *c } else { best }).0;
             (flat.values[at], Mark::Inside)
         }
         other => (f32::NAN, other),

@@ -1,9 +1,10 @@
 //! Where a point lies in a cell, and the value there.
 //!
-//! Hexahedra, wedges and pyramids are isoparametric finite elements (orders of VTK; shape functions as in "The VTK User's Guide",
-//! and, for the pyramid, a hexahedron whose upper face is one point). Their maps are inverted by Newton's method.
-//! Where the map folds (corners with Jacobians of both signs, collapsed edges) or Newton fails, the cell is a fan of tetrahedra
-//! around its centre and those of its faces, which meets its neighbours at their corners and edges.
+//! Hexahedra, wedges and pyramids are isoparametric finite elements (orders of VTK; shape functions
+//! as in "The VTK User's Guide", and, for the pyramid, a hexahedron whose upper face is one point).
+//! Their maps are inverted by Newton's method. Where the map folds (corners with Jacobians of both
+//! signs, collapsed edges) or Newton fails, the cell is a fan of tetrahedra around its centre and
+//! those of its faces, which meets its neighbours at their corners and edges.
 
 use super::mesh::Shape;
 use glam::{DMat3, DVec3};
@@ -28,11 +29,13 @@ pub(super) struct Cell<'a> {
     size: f64,
 }
 
-/// Newton has converged when the step is this small, in units of the cell: far below [`super::rasterize::INSIDE_TOLERANCE`].
+/// Newton has converged when the step is this small, in units of the cell: far below
+/// [`super::rasterize::INSIDE_TOLERANCE`].
 const CONVERGED: f64 = 1e-12;
 /// From the centre of a convex cell it takes three to five steps; distorted ones need more.
 const MAX_STEPS: usize = 25;
-/// Ratio of the smallest to the largest Jacobian among corners below which a cell counts as folded or collapsed.
+/// Ratio of the smallest to the largest Jacobian among corners below which a cell counts as folded
+/// or collapsed.
 const MIN_JACOBIAN_RATIO: f64 = 1e-6;
 
 /// Shape functions and their derivatives along the three parameters.
@@ -93,7 +96,8 @@ fn basis(shape: &Shape, q: DVec3) -> Basis {
     (n, d)
 }
 
-/// Parameters of the corners where the Jacobian is looked at. That of a pyramid vanishes at its tip by construction.
+/// Parameters of the corners where the Jacobian is looked at. That of a pyramid vanishes at its tip
+/// by construction.
 fn corner_parameters(shape: &Shape) -> &'static [DVec3] {
     const fn v(x: f64, y: f64, z: f64) -> DVec3 {
         DVec3::new(x, y, z)
@@ -126,14 +130,15 @@ fn corner_parameters(shape: &Shape) -> &'static [DVec3] {
 
 impl<'a> Cell<'a> {
     pub(super) fn new(corners: &'a [DVec3], values: &'a [f64], shape: &'a Shape) -> Self {
-        let (low, high) =
-            corners.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+        let (low, high) = corners
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
         let mut cell = Cell { corners, values, shape, folded: false, size: (high - low).length() };
         let parameters = corner_parameters(shape);
         if !parameters.is_empty() {
             let jacobians = parameters.iter().map(|q| cell.map(*q).1.determinant());
-            let (low, high) =
-                jacobians.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), j| (l.min(j), h.max(j)));
+            let (low, high) = jacobians
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), j| (l.min(j), h.max(j)));
             let (small, large) = if low + high >= 0.0 { (low, high) } else { (-high, -low) };
             cell.folded = small.is_nan() || small <= MIN_JACOBIAN_RATIO * large;
         }
@@ -216,8 +221,10 @@ impl<'a> Cell<'a> {
             let (a, b) = (a as usize, b as usize);
             let (pa, pb) = (self.corners[a], self.corners[b]);
             let Some(w) = barycentric(centre, face, pa, pb, p, self.size) else { return };
-            let place =
-                cell_sample(&w, [centre_value, face_value, self.values[a], self.values[b]].into_iter());
+            let place = cell_sample(
+                &w,
+                [centre_value, face_value, self.values[a], self.values[b]].into_iter(),
+            );
             if best.is_none_or(|b| place.outside < b.outside) {
                 best = Some(place);
             }
@@ -229,15 +236,18 @@ impl<'a> Cell<'a> {
                 return consider(self.corners[a], self.values[a], ids[1], ids[2]);
             }
             let at = mean(ids.iter().map(|&i| self.corners[i as usize]));
-            let value = ids.iter().map(|&i| self.values[i as usize]).sum::<f64>() / ids.len().max(1) as f64;
+            let value =
+                ids.iter().map(|&i| self.values[i as usize]).sum::<f64>() / ids.len().max(1) as f64;
             for i in 0..ids.len() {
                 consider(at, value, ids[i], ids[(i + 1) % ids.len()]);
             }
         };
         const HEXA: [[u32; 4]; 6] =
             [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]];
-        const WEDGE: [&[u32]; 5] = [&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
-        const PYRAMID: [&[u32]; 5] = [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
+        const WEDGE: [&[u32]; 5] =
+            [&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
+        const PYRAMID: [&[u32]; 5] =
+            [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
         match self.shape {
             Shape::Faces(faces) => faces.iter().for_each(|f| each_face(&mut f.iter().copied())),
             Shape::Wedge => WEDGE.iter().for_each(|f| each_face(&mut f.iter().copied())),
@@ -298,9 +308,16 @@ mod tests {
         let mut warped = corners(&CUBE);
         warped[6] = DVec3::new(1.3, 1.2, 1.4);
         warped[3] = DVec3::new(-0.2, 1.1, 0.1);
-        let wedge =
-            corners(&[[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [1.1, 0., 1.], [0., 1., 1.4]]);
-        let pyramid = corners(&[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.4, 0.6, 1.]]);
+        let wedge = corners(&[
+            [0., 0., 0.],
+            [1., 0., 0.],
+            [0., 1., 0.],
+            [0., 0., 1.],
+            [1.1, 0., 1.],
+            [0., 1., 1.4],
+        ]);
+        let pyramid =
+            corners(&[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.4, 0.6, 1.]]);
         let tetra = corners(&[[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]]);
         let faces = Shape::Faces(vec![
             vec![0, 4, 7, 3],
@@ -337,9 +354,12 @@ mod tests {
         let points = corners(&CUBE);
         let values = vec![0.0; 8];
         let cell = Cell::new(&points, &values, &Shape::Hexa);
-        for (p, outside) in
-            [([0.5, 0.5, 0.5], 0.0), ([1.0, 1.0, 1.0], 0.0), ([1.1, 0.5, 0.5], 0.1), ([0.5, -0.2, 1.1], 0.2)]
-        {
+        for (p, outside) in [
+            ([0.5, 0.5, 0.5], 0.0),
+            ([1.0, 1.0, 1.0], 0.0),
+            ([1.1, 0.5, 0.5], 0.1),
+            ([0.5, -0.2, 1.1], 0.2),
+        ] {
             let got = cell.place(DVec3::from(p)).unwrap().outside;
             assert!((got - outside).abs() < 1e-12, "{p:?}: {got}");
         }
@@ -348,15 +368,18 @@ mod tests {
 
     #[test]
     fn collapsed_and_turned_hexahedra() {
-        // An edge collapsed to a point pair (a wedge stored as a hexahedron), as on the axis of an O-grid.
+        // An edge collapsed to a point pair (a wedge stored as a hexahedron), as on the axis of an
+        // O-grid.
         let mut collapsed = corners(&CUBE);
         collapsed[3] = collapsed[0];
         collapsed[7] = collapsed[4];
         // Inside out: a left-handed lattice.
-        let mirrored: Vec<DVec3> = corners(&CUBE).iter().map(|p| DVec3::new(-p.x, p.y, p.z)).collect();
-        for (points, folded, p) in
-            [(collapsed, true, DVec3::new(0.7, 0.3, 0.4)), (mirrored, false, DVec3::new(-0.7, 0.3, 0.4))]
-        {
+        let mirrored: Vec<DVec3> =
+            corners(&CUBE).iter().map(|p| DVec3::new(-p.x, p.y, p.z)).collect();
+        for (points, folded, p) in [
+            (collapsed, true, DVec3::new(0.7, 0.3, 0.4)),
+            (mirrored, false, DVec3::new(-0.7, 0.3, 0.4)),
+        ] {
             let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
             let cell = Cell::new(&points, &values, &Shape::Hexa);
             assert_eq!(cell.is_folded(), folded);
@@ -374,7 +397,8 @@ mod tests {
         let far = DVec3::splat(1e6);
         let points: Vec<DVec3> = corners(&CUBE).iter().map(|p| far + *p * 1e-3).collect();
         let values: Vec<f64> = corners(&CUBE).iter().map(|p| linear(*p)).collect();
-        let at = Cell::new(&points, &values, &Shape::Hexa).place(far + DVec3::splat(0.5e-3)).unwrap();
+        let at =
+            Cell::new(&points, &values, &Shape::Hexa).place(far + DVec3::splat(0.5e-3)).unwrap();
         // 1e6 has an ulp of 1.2e-10, which is 1.2e-7 of the cell.
         assert!((at.value - linear(DVec3::splat(0.5))).abs() < 1e-6);
     }

@@ -1,17 +1,18 @@
 //! Binomial smoothing of a lattice, for shocks that its spacing cannot resolve.
 //!
-//! A shock one cell wide is a staircase to any ray that crosses it at an angle, and deflections come out wrong by up to
-//! their own size. Smoothed over a node or so they come out right to a few per cent, because the deflection by a plane step does not
-//! depend on its thickness.
+//! A shock one cell wide is a staircase to any ray that crosses it at an angle, and deflections
+//! come out wrong by up to their own size. Smoothed over a node or so they come out right to a few
+//! per cent, because the deflection by a plane step does not depend on its thickness.
 
 use super::ResampleError;
 use rayon::prelude::*;
 
-/// Smooths the finite values by a binomial kernel with standard deviation `sigma_nodes` along each axis. Values that are
-/// not finite stay so, and take no part: the weights of the others are scaled up.
+/// Smooths the finite values by a binomial kernel with standard deviation `sigma_nodes` along each
+/// axis. Values that are not finite stay so, and take no part: the weights of the others are scaled
+/// up.
 ///
-/// A pass is the kernel (a, 1 − 2a, a), whose variance is 2a; passes are repeated with a ≤ 1/4 until the variance is reached,
-/// so every σ is exact. Border nodes are repeated outwards.
+/// A pass is the kernel (a, 1 − 2a, a), whose variance is 2a; passes are repeated with a ≤ 1/4
+/// until the variance is reached, so every σ is exact. Border nodes are repeated outwards.
 pub fn smooth(values: &mut [f32], dims: [usize; 3], sigma_nodes: f64) -> Result<(), ResampleError> {
     if !(0.0..=16.0).contains(&sigma_nodes) {
         let cure = "give a standard deviation from 0 to 16 nodes (1 to 1.4 is right for shocks)";

@@ -1,7 +1,7 @@
 use super::*;
 use crate::model::{
-    Attributes, Block, Cells, DataArray, Dataset, ImageData, Points, RectilinearGrid, StructuredGrid,
-    UnstructuredGrid, Values,
+    Attributes, Block, Cells, DataArray, Dataset, ImageData, Points, RectilinearGrid,
+    StructuredGrid, UnstructuredGrid, Values,
 };
 use crate::testing::with_threads;
 use glam::DVec3;
@@ -10,7 +10,8 @@ fn linear(p: DVec3) -> f64 {
     0.7 + 2.0 * p.x - 1.5 * p.y + 0.25 * p.z
 }
 
-/// A quarter of an annulus with radii 1 and 2, height 1: curvilinear, and its bounding box has corners outside.
+/// A quarter of an annulus with radii 1 and 2, height 1: curvilinear, and its bounding box has
+/// corners outside.
 fn annulus(n: [usize; 3]) -> StructuredGrid {
     let mut points = Vec::new();
     for k in 0..n[2] {
@@ -41,7 +42,11 @@ fn assert_field(r: &ResampledField, tolerance: f64, f: impl Fn(DVec3) -> f64) {
     for (n, (&v, &m)) in r.values.iter().zip(&r.marks).enumerate() {
         let p = r.lattice.node(n % nx, n / nx % ny, n / nx / ny);
         assert_eq!(m == Mark::Inside, v.is_finite());
-        assert!(m != Mark::Inside || (f64::from(v) - f(p)).abs() <= tolerance, "{v} at {p}, not {}", f(p));
+        assert!(
+            m != Mark::Inside || (f64::from(v) - f(p)).abs() <= tolerance,
+            "{v} at {p}, not {}",
+            f(p)
+        );
     }
 }
 
@@ -52,7 +57,8 @@ fn curvilinear_grids_give_linear_fields_exactly_and_a_mask() {
     let lattice = lattice_of(&mesh, Resolution::Dims([41, 41, 9]));
     let r = resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
     assert_field(&r, 1e-6, linear);
-    // The mask is the annulus but for the chords of its cells: 1 − cos(π/44) = 0.26 % of the radius.
+    // The mask is the annulus but for the chords of its cells: 1 − cos(π/44) = 0.26 % of the
+    // radius.
     for (n, m) in r.marks.iter().enumerate() {
         let p = lattice.node(n % 41, n / 41 % 41, n / 41 / 41);
         let radius = p.truncate().length();
@@ -73,7 +79,11 @@ fn the_error_falls_with_the_square_of_the_spacing() {
         let mesh = Mesh::new(&Dataset::StructuredGrid(annulus([40, 80, 40]))).unwrap();
         let values = at_points(&mesh, curved);
         let lattice = lattice_of(&mesh, Resolution::Longest(nodes));
-        resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap().report.back.rms
+        resample(&mesh, Samples::Points(&values), &lattice, &Options::default())
+            .unwrap()
+            .report
+            .back
+            .rms
     };
     let (coarse, fine) = (rms(11), rms(21));
     assert!((3.0..5.5).contains(&(coarse / fine)), "{coarse} {fine}");
@@ -115,9 +125,11 @@ fn cubes() -> Vec<(&'static str, UnstructuredGrid)> {
         &[0, 1, 2, 3, 8],
         &[4, 7, 6, 5, 8],
     ];
-    let tetras: [&[u32]; 5] = [&[0, 1, 2, 5], &[0, 2, 3, 7], &[0, 5, 7, 4], &[2, 7, 5, 6], &[0, 2, 7, 5]];
+    let tetras: [&[u32]; 5] =
+        [&[0, 1, 2, 5], &[0, 2, 3, 7], &[0, 5, 7, 4], &[2, 7, 5, 6], &[0, 2, 7, 5]];
     let mut polyhedron = unstructured(&[42], &[hexa], &CUBE);
-    for f in [[0u32, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]] {
+    for f in [[0u32, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]]
+    {
         polyhedron.polyhedron_faces.push(f);
     }
     polyhedron.faces_of_cell = std::iter::once(0..6).collect();
@@ -138,7 +150,11 @@ fn every_kind_of_cell_fills_its_space_without_gaps() {
         let values = at_points(&mesh, linear);
         let lattice = lattice_of(&mesh, Resolution::Dims([13, 17, 11]));
         let r = resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
-        assert_eq!((r.report.inside, r.report.outside, r.report.in_gaps), (13 * 17 * 11, 0, 0), "{name}");
+        assert_eq!(
+            (r.report.inside, r.report.outside, r.report.in_gaps),
+            (13 * 17 * 11, 0, 0),
+            "{name}"
+        );
         assert_field(&r, 2e-6, linear);
     }
 }
@@ -149,7 +165,8 @@ fn mixed_cells_beside_each_other_join() {
     let mut points = CUBE.to_vec();
     points.extend([[3., 1., 1.], [1., 3., 0.], [1., 3., 2.]]);
     let cells: [&[u32]; 3] = [&[0, 1, 2, 3, 4, 5, 6, 7], &[1, 5, 6, 2, 9], &[3, 2, 10, 7, 6, 11]];
-    let mesh = Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[12, 14, 13], &cells, &points))).unwrap();
+    let mesh = Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[12, 14, 13], &cells, &points)))
+        .unwrap();
     let values = at_points(&mesh, linear);
     let lattice = lattice_of(&mesh, Resolution::Dims([31, 31, 21]));
     let r = resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
@@ -215,7 +232,11 @@ fn hidden_and_nan_cells_are_told_apart() {
 #[test]
 fn overlapping_blocks_fill_each_others_holes() {
     let mut holed = ImageData::new([3, 3, 3], DVec3::ZERO, DVec3::ONE);
-    holed.attributes.cell.push(DataArray::new("vtkGhostType", 1, Values::U8(vec![0, 0, 0, 0, 0, 0, 0, 32])));
+    holed.attributes.cell.push(DataArray::new(
+        "vtkGhostType",
+        1,
+        Values::U8(vec![0, 0, 0, 0, 0, 0, 0, 32]),
+    ));
     let patch = ImageData::new([2, 2, 2], DVec3::splat(0.9), DVec3::splat(1.1));
     let block = |name: &str, d| Block { name: name.into(), data: Dataset::ImageData(d) };
     let mesh = Mesh::new(&Dataset::MultiBlock(vec![block("a", holed), block("b", patch)])).unwrap();
@@ -228,20 +249,27 @@ fn overlapping_blocks_fill_each_others_holes() {
 
 #[test]
 fn cell_values_are_averaged_and_the_smoothing_shows_in_the_report() {
-    let mesh = Mesh::new(&Dataset::ImageData(ImageData::new([9, 9, 9], DVec3::ZERO, DVec3::ONE))).unwrap();
+    let mesh =
+        Mesh::new(&Dataset::ImageData(ImageData::new([9, 9, 9], DVec3::ZERO, DVec3::ONE))).unwrap();
     let of_cells: Vec<f64> = (0..512).map(|c| if c % 8 < 4 { 0.0 } else { 1.0 }).collect();
     let lattice = lattice_of(&mesh, Resolution::Dims([17, 17, 17]));
     let r = resample(&mesh, Samples::Cells(&of_cells), &lattice, &Options::default()).unwrap();
     // Cells beside the step at x = 4 have their centres half a cell from the value 1/2 there.
-    assert!((r.report.back.max - 0.25).abs() < 1e-6 && r.report.back.range == 1.0, "{:?}", r.report.back);
+    assert!(
+        (r.report.back.max - 0.25).abs() < 1e-6 && r.report.back.range == 1.0,
+        "{:?}",
+        r.report.back
+    );
     assert_eq!((r.report.back.compared, r.report.inside), (512, 17 * 17 * 17));
     assert!((r.values[8] - 0.5).abs() < 1e-7 && r.values[0] == 0.0 && r.values[16] == 1.0);
 }
 
 #[test]
 fn samples_within_a_node_average_what_is_finer() {
-    // Layers one unit thick alternate between 0 and 1; nodes 8 apart see their mean, or whatever they hit.
-    let mesh = Mesh::new(&Dataset::ImageData(ImageData::new([65, 3, 3], DVec3::ZERO, DVec3::ONE))).unwrap();
+    // Layers one unit thick alternate between 0 and 1; nodes 8 apart see their mean, or whatever
+    // they hit.
+    let mesh = Mesh::new(&Dataset::ImageData(ImageData::new([65, 3, 3], DVec3::ZERO, DVec3::ONE)))
+        .unwrap();
     let values = at_points(&mesh, |p| if (p.x as usize).is_multiple_of(2) { 0.0 } else { 1.0 });
     let lattice = lattice_of(&mesh, Resolution::Dims([9, 2, 2]));
     let at = |samples_per_axis| {
@@ -251,7 +279,10 @@ fn samples_within_a_node_average_what_is_finer() {
     assert!(one.values.iter().all(|v| *v == 0.0));
     assert!(one.report.missed_cells > 0 && !one.report.warnings().is_empty());
     assert!(at(8).values.iter().all(|v| (*v - 0.5).abs() < 1e-6), "{:?}", at(8).values);
-    assert!(resample(&mesh, Samples::Points(&values), &lattice, &Options { samples_per_axis: 0 }).is_err());
+    assert!(
+        resample(&mesh, Samples::Points(&values), &lattice, &Options { samples_per_axis: 0 })
+            .is_err()
+    );
 }
 
 #[test]
@@ -261,8 +292,13 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
             let mesh = Mesh::new(&Dataset::StructuredGrid(annulus([7, 9, 5]))).unwrap();
             let values = at_points(&mesh, |p| (3.0 * p.x).sin());
             let lattice = lattice_of(&mesh, Resolution::Longest(30));
-            let r = resample(&mesh, Samples::Points(&values), &lattice, &Options { samples_per_axis: 2 })
-                .unwrap();
+            let r = resample(
+                &mesh,
+                Samples::Points(&values),
+                &lattice,
+                &Options { samples_per_axis: 2 },
+            )
+            .unwrap();
             (r.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), r.report)
         })
     };
@@ -276,7 +312,11 @@ fn plane_data_needs_a_span() {
     if let Points::F64(p) = &mut plane.points {
         p.truncate(54);
     }
-    plane.attributes.point.push(DataArray::new("id", 1, Values::F64((0..54).map(f64::from).collect())));
+    plane.attributes.point.push(DataArray::new(
+        "id",
+        1,
+        Values::F64((0..54).map(f64::from).collect()),
+    ));
     let data = Dataset::StructuredGrid(plane);
     let text = Mesh::new(&data).unwrap_err().to_string();
     assert!(text.contains("it is a plane") && text.contains("its span"), "{text}");
@@ -297,13 +337,15 @@ fn broken_meshes_give_errors_or_counts() {
     assert!(text.contains("1 cells of other kinds"), "{text}");
     // A point id that does not exist, too few points, and a good cell.
     let cells: [&[u32]; 3] = [&[0, 1, 2, 99], &[0, 1, 2], &[0, 1, 2, 5]];
-    let mesh = Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[10; 3], &cells, &CUBE))).unwrap();
+    let mesh =
+        Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[10; 3], &cells, &CUBE))).unwrap();
     assert_eq!((mesh.num_cells(), mesh.left_out()), (1, 2));
     // A point at infinity takes its cell with it.
     let mut points = CUBE;
     points[5][0] = f64::INFINITY;
     let cells: [&[u32]; 2] = [&[0, 1, 2, 5], &[0, 2, 3, 7]];
-    let mesh = Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[10; 2], &cells, &points))).unwrap();
+    let mesh =
+        Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[10; 2], &cells, &points))).unwrap();
     let lattice = lattice_of(&mesh, Resolution::Longest(5));
     let r = resample(&mesh, Samples::Points(&[1.0; 9]), &lattice, &Options::default()).unwrap();
     assert!(r.report.left_out_cells == 1 && r.report.inside > 0);
@@ -327,13 +369,18 @@ fn lattices_fit_their_box() {
     let odd = fit(Resolution::Spacing(0.3));
     assert_eq!(odd.dims, [4, 7, 14]);
     assert!((odd.origin - DVec3::new(0.05, 0.1, 0.05)).length() < 1e-12);
-    let auto = |typical| Lattice::fit(DVec3::ZERO, DVec3::ONE, typical, Resolution::Auto).unwrap().dims;
-    assert_eq!((auto(0.02), auto(0.5), auto(1e-9), auto(f64::NAN)), ([101; 3], [64; 3], [256; 3], [64; 3]));
+    let auto =
+        |typical| Lattice::fit(DVec3::ZERO, DVec3::ONE, typical, Resolution::Auto).unwrap().dims;
+    assert_eq!(
+        (auto(0.02), auto(0.5), auto(1e-9), auto(f64::NAN)),
+        ([101; 3], [64; 3], [256; 3], [64; 3])
+    );
 }
 
 #[test]
 fn revolved_planes_are_round() {
-    // A plane of x from 0 to 2 and radii from 0.02 to 1: the axis is half a cell below the first row, as with cell centres.
+    // A plane of x from 0 to 2 and radii from 0.02 to 1: the axis is half a cell below the first
+    // row, as with cell centres.
     let n = [9, 26];
     let plane = RectilinearGrid {
         extent: [0, 8, 0, 25, 0, 0],
@@ -344,7 +391,8 @@ fn revolved_planes_are_round() {
         ],
         attributes: Attributes::default(),
     };
-    let mesh = Mesh::with_plane(&Dataset::RectilinearGrid(plane), Plane::Extrude { span: 1e-4 }).unwrap();
+    let mesh =
+        Mesh::with_plane(&Dataset::RectilinearGrid(plane), Plane::Extrude { span: 1e-4 }).unwrap();
     let (low, high) = revolved_bounds(&mesh).unwrap();
     assert_eq!((low, high), (DVec3::new(0.0, -1.0, -1.0), DVec3::new(2.0, 1.0, 1.0)));
     let bell = |x: f64, r: f64| (1.0 + x) * (-4.0 * r * r).exp();
@@ -363,6 +411,7 @@ fn revolved_planes_are_round() {
     assert!(r.report.back.compared > 300 && r.report.back.rms < 5e-3, "{:?}", r.report.back);
     // Radii below zero are no radii.
     let below =
-        Mesh::new(&Dataset::ImageData(ImageData::new([3; 3], DVec3::splat(-1.0), DVec3::ONE))).unwrap();
+        Mesh::new(&Dataset::ImageData(ImageData::new([3; 3], DVec3::splat(-1.0), DVec3::ONE)))
+            .unwrap();
     assert!(revolved_bounds(&below).unwrap_err().to_string().contains("radii from 0 on"));
 }

@@ -1,4 +1,5 @@
-//! Meshes as GLB: glTF 2.0 (Khronos, 2021) in one binary file, which browsers, Blender, PowerPoint and CAD viewers show.
+//! Meshes as GLB: glTF 2.0 (Khronos, 2021) in one binary file, which browsers, Blender, PowerPoint
+//! and CAD viewers show.
 
 use super::{WriteError, write_file};
 use glam::{DVec3, Vec3};
@@ -6,7 +7,8 @@ use rt_core::mesh::{PerElement, TriMesh};
 use serde_json::{Value, json};
 use std::path::Path;
 
-// Numbers of the specification: section 3.6 (component types, buffer targets) and 4.4 (the container).
+// Numbers of the specification: section 3.6 (component types, buffer targets) and 4.4 (the
+// container).
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const VERTICES: u32 = 34962;
@@ -15,15 +17,17 @@ const MAGIC: u32 = 0x4654_6C67;
 const CHUNK_JSON: u32 = 0x4E4F_534A;
 const CHUNK_BIN: u32 = 0x004E_4942;
 
-/// Normals whose squared length is off by no more than this are written as they are; the Khronos validator allows more.
+/// Normals whose squared length is off by no more than this are written as they are; the Khronos
+/// validator allows more.
 const UNIT_LENGTH_SQUARED: f32 = 1e-5;
 
-/// Writes positions, triangles, and per-vertex normals, colours (linear, as they are) and texture coordinates, with one
-/// matt two-sided material. The mesh's origin becomes the node's translation, which glTF keeps in 32 bits: what does not
-/// fit goes into the positions.
+/// Writes positions, triangles, and per-vertex normals, colours (linear, as they are) and texture
+/// coordinates, with one matt two-sided material. The mesh's origin becomes the node's translation,
+/// which glTF keeps in 32 bits: what does not fit goes into the positions.
 ///
-/// glTF has y up: other programs show data with z up lying on their back. What glTF cannot hold is refused: scalars (map
-/// them to colours first), values per triangle, coordinates that are not finite, normals without a direction.
+/// glTF has y up: other programs show data with z up lying on their back. What glTF cannot hold is
+/// refused: scalars (map them to colours first), values per triangle, coordinates that are not
+/// finite, normals without a direction.
 ///
 /// ```
 /// use datasets::{generate::shapes, read, write::write_glb};
@@ -42,12 +46,14 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
         return refused(what, cure);
     }
 
-    // The translation that 32 bits can hold; the rest, at most half a step of it, moves into the positions.
+    // The translation that 32 bits can hold; the rest, at most half a step of it, moves into the
+    // positions.
     let translation = mesh.origin.as_vec3();
     let rest = mesh.origin - translation.as_dvec3();
     let place = |p: &Vec3| if rest == DVec3::ZERO { *p } else { (rest + p.as_dvec3()).as_vec3() };
     let far = Vec3::INFINITY;
-    let (lo, hi) = mesh.positions.iter().map(place).fold((far, -far), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let (lo, hi) =
+        mesh.positions.iter().map(place).fold((far, -far), |(lo, hi), p| (lo.min(p), hi.max(p)));
 
     // Layout of the binary chunk: one view and one accessor after the other.
     let mut parts = Layout::default();
@@ -101,13 +107,16 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
         f.write_all(bytemuck::bytes_of(&words.map(u32::to_le_bytes)))?;
         f.write_all(text.as_bytes())?;
         f.write_all(bytemuck::bytes_of(&[bytes as u32, CHUNK_BIN].map(u32::to_le_bytes)))?;
-        let mut floats = |values: &[f32]| values.iter().try_for_each(|v| f.write_all(&v.to_le_bytes()));
+        let mut floats =
+            |values: &[f32]| values.iter().try_for_each(|v| f.write_all(&v.to_le_bytes()));
         mesh.positions.iter().try_for_each(|p| floats(&place(p).to_array()))?;
         let normals = mesh.normals.iter().flat_map(|a| &a.values);
         normals.into_iter().try_for_each(|v| floats(&unit(*v).to_array()))?;
         mesh.texcoords.iter().flatten().try_for_each(|t| floats(&t.to_array()))?;
         mesh.colors.iter().flat_map(|a| &a.values).try_for_each(|c| floats(c))?;
-        mesh.indices.iter().try_for_each(|t| f.write_all(bytemuck::bytes_of(&t.map(u32::to_le_bytes))))
+        mesh.indices
+            .iter()
+            .try_for_each(|t| f.write_all(bytemuck::bytes_of(&t.map(u32::to_le_bytes))))
     })
 }
 
@@ -118,16 +127,24 @@ fn unsupported_content(mesh: &TriMesh) -> Option<(String, &'static str)> {
     }
     let n = mesh.positions.len();
     if mesh.indices.is_empty() {
-        return Some(("glTF has no meshes without triangles".into(), "write VTP or PLY, or leave it out"));
+        return Some((
+            "glTF has no meshes without triangles".into(),
+            "write VTP or PLY, or leave it out",
+        ));
     }
     if let Some(k) = mesh.indices.iter().flatten().find(|&&k| k as usize >= n) {
         return Some((format!("a triangle names vertex {k} of {n}"), "leave that triangle out"));
     }
     if mesh.scalars.is_some() {
-        return Some(("glTF cannot hold scalars".into(), "write PLY or VTP, or map them to colours first"));
+        return Some((
+            "glTF cannot hold scalars".into(),
+            "write PLY or VTP, or map them to colours first",
+        ));
     }
     let per_face = |per: Option<PerElement>| per == Some(PerElement::Face);
-    if per_face(mesh.normals.as_ref().map(|a| a.per)) || per_face(mesh.colors.as_ref().map(|a| a.per)) {
+    if per_face(mesh.normals.as_ref().map(|a| a.per))
+        || per_face(mesh.colors.as_ref().map(|a| a.per))
+    {
         let cure = "write PLY or VTP, or give each triangle vertices of its own";
         return Some(("glTF cannot hold normals or colours per triangle".into(), cure));
     }
@@ -135,7 +152,8 @@ fn unsupported_content(mesh: &TriMesh) -> Option<(String, &'static str)> {
         return Some((format!("its origin is {}", mesh.origin), "give it a finite origin"));
     }
     if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
-        let what = format!("vertex {i} lies at {}, and glTF demands finite numbers", mesh.positions[i]);
+        let what =
+            format!("vertex {i} lies at {}, and glTF demands finite numbers", mesh.positions[i]);
         return Some((what, "leave out the vertex and its triangles"));
     }
     let normals = mesh.normals.as_ref().map_or(&[][..], |a| &a.values);
@@ -181,8 +199,9 @@ impl Layout {
         self.views
             .push(json!({ "buffer": 0, "byteOffset": self.bytes, "byteLength": length, "target": target }));
         let view = self.views.len() - 1;
-        self.accessors
-            .push(json!({ "bufferView": view, "componentType": component, "count": count, "type": kind }));
+        self.accessors.push(
+            json!({ "bufferView": view, "componentType": component, "count": count, "type": kind }),
+        );
         self.bytes += length;
         view
     }
@@ -199,8 +218,10 @@ mod tests {
     /// A sphere with everything that glTF can hold.
     fn full() -> TriMesh {
         let mut mesh = icosphere(2);
-        let of = |f: &dyn Fn(Vec3) -> [f32; 4]| mesh.positions.iter().map(|&p| f(p)).collect::<Vec<_>>();
-        let colors = of(&|p| [0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y, 0.25, 1.0].map(|v: f32| v.clamp(0.0, 1.0)));
+        let of =
+            |f: &dyn Fn(Vec3) -> [f32; 4]| mesh.positions.iter().map(|&p| f(p)).collect::<Vec<_>>();
+        let colors =
+            of(&|p| [0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y, 0.25, 1.0].map(|v: f32| v.clamp(0.0, 1.0)));
         let normals = mesh.positions.iter().map(|p| p.normalize()).collect();
         mesh.texcoords = Some(mesh.positions.iter().map(|p| Vec2::new(p.x, p.z)).collect());
         mesh.colors = Some(Attribute::per_vertex(colors));
@@ -250,8 +271,12 @@ mod tests {
         colors.values[0][3] = 0.5;
         let back = round_trip(&mesh);
         assert_eq!(back.meshes[0].mesh.colors, mesh.colors);
-        for (a, b) in
-            full().normals.unwrap().values.iter().zip(&back.meshes[0].mesh.normals.as_ref().unwrap().values)
+        for (a, b) in full()
+            .normals
+            .unwrap()
+            .values
+            .iter()
+            .zip(&back.meshes[0].mesh.normals.as_ref().unwrap().values)
         {
             assert!(a.distance(*b) < 1e-6, "{a} became {b}");
         }
@@ -267,7 +292,10 @@ mod tests {
             m
         };
         for (word, mesh) in [
-            ("scalars", change(&|m| m.scalars = Some(Attribute::per_vertex(vec![0.0; m.positions.len()])))),
+            (
+                "scalars",
+                change(&|m| m.scalars = Some(Attribute::per_vertex(vec![0.0; m.positions.len()]))),
+            ),
             ("vertex 99999", change(&|m| m.indices[3] = [0, 1, 99_999])),
             ("vertex 7 lies", change(&|m| m.positions[7] = nan)),
             ("normal of vertex 5", change(&|m| m.normals.as_mut().unwrap().values[5] = Vec3::ZERO)),
@@ -295,6 +323,9 @@ mod tests {
         let json_length = word(12) as usize;
         assert_eq!((json_length % 4, &bytes[16..20]), (0, &b"JSON"[..]));
         let bin = 20 + json_length;
-        assert_eq!((word(bin) as usize, &bytes[bin + 4..bin + 8]), (bytes.len() - bin - 8, &b"BIN\0"[..]));
+        assert_eq!(
+            (word(bin) as usize, &bytes[bin + 4..bin + 8]),
+            (bytes.len() - bin - 8, &b"BIN\0"[..])
+        );
     }
 }

@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The operating system refuses.
-    #[error("{}: cannot be written; check that the directory exists, may be written and has room", path.display())]
+    #[error("{}: cannot be written; check that the directory exists, may be written and has \
+             room", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -41,7 +42,8 @@ impl WriteError {
     }
 }
 
-/// Writes a file by way of `body`; a file that could not be finished is removed, so that no half file is left behind.
+/// Writes a file by way of `body`; a file that could not be finished is removed, so that no half
+/// file is left behind.
 pub(crate) fn write_file(
     path: &Path,
     body: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
@@ -50,7 +52,8 @@ pub(crate) fn write_file(
     let mut out = std::io::BufWriter::new(std::fs::File::create(path).map_err(io)?);
     let written = body(&mut out).and_then(|()| std::io::Write::flush(&mut out));
     written.map_err(|source| {
-        // The error that matters is the one of writing; a file that cannot be removed either changes nothing.
+        // The error that matters is the one of writing; a file that cannot be removed either
+        // changes nothing.
         let _ = std::fs::remove_file(path);
         io(source)
     })

@@ -4,8 +4,8 @@ use super::{WriteError, write_file};
 use rt_core::mesh::{PerElement, TriMesh};
 use std::path::Path;
 
-/// Writes positions, vertex normals, texture coordinates and triangles. Colours and scalars have no place in OBJ: a mesh with
-/// some is refused, so that they are not lost unseen.
+/// Writes positions, vertex normals, texture coordinates and triangles. Colours and scalars have no
+/// place in OBJ: a mesh with some is refused, so that they are not lost unseen.
 pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteError> {
     let path = path.as_ref();
     if mesh.colors.is_some() || mesh.scalars.is_some() {
@@ -15,8 +15,9 @@ pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
             "write PLY or VTP, or drop them first",
         ));
     }
-    mesh.check()
-        .map_err(|e| WriteError::refused(path, e.to_string(), "make the attributes as long as the mesh"))?;
+    mesh.check().map_err(|e| {
+        WriteError::refused(path, e.to_string(), "make the attributes as long as the mesh")
+    })?;
     let normals = mesh.normals.as_ref().filter(|n| n.per == PerElement::Vertex);
     write_file(path, |f| {
         for p in &mesh.positions {

@@ -5,12 +5,14 @@ use crate::model::from_core::srgb8_from_linear;
 use rt_core::mesh::{PerElement, TriMesh};
 use std::path::Path;
 
-/// Writes a mesh as binary little-endian PLY: positions (double precision when the mesh has an origin), normals, colours
-/// as 8-bit sRGB, texture coordinates `s t`, scalars as the property `scalar`; values per face go to the faces.
+/// Writes a mesh as binary little-endian PLY: positions (double precision when the mesh has an
+/// origin), normals, colours as 8-bit sRGB, texture coordinates `s t`, scalars as the property
+/// `scalar`; values per face go to the faces.
 pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteError> {
     let path = path.as_ref();
-    mesh.check()
-        .map_err(|e| WriteError::refused(path, e.to_string(), "make the attributes as long as the mesh"))?;
+    mesh.check().map_err(|e| {
+        WriteError::refused(path, e.to_string(), "make the attributes as long as the mesh")
+    })?;
     if let Some(t) = mesh.indices.iter().flatten().find(|&&k| k as usize >= mesh.positions.len()) {
         let what = format!("a triangle names vertex {t} of {}", mesh.positions.len());
         return Err(WriteError::refused(path, what, "leave that triangle out"));
@@ -37,7 +39,10 @@ pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
             names.iter().for_each(|n| head.push_str(&format!("property {kind} {n}\n")));
         }
     }
-    head.push_str(&format!("element face {}\nproperty list uchar uint vertex_indices\n", mesh.indices.len()));
+    head.push_str(&format!(
+        "element face {}\nproperty list uchar uint vertex_indices\n",
+        mesh.indices.len()
+    ));
     if colors(face).is_some() {
         rgba.iter().for_each(|n| head.push_str(&format!("property uchar {n}\n")));
     }

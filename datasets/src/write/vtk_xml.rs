@@ -1,10 +1,13 @@
 //! VTK's XML files: `.vtp .vti .vtu .vtr .vts`, collections as `.vtm`, time series as `.pvd`.
 //!
-//! Data is written as ascii or as appended base64, never as appended raw: raw bytes make the file no XML at all, which
-//! VTK 9.1 to 9.2.6 with newer versions of libexpat refuse (VTK commit db8f9efc).
+//! Data is written as ascii or as appended base64, never as appended raw: raw bytes make the file
+//! no XML at all, which VTK 9.1 to 9.2.6 with newer versions of libexpat refuse (VTK commit
+//! db8f9efc).
 
 use super::{WriteError, write_file};
-use crate::model::{Attributes, Cells, DataArray, Dataset, PolyData, ScalarType, UnstructuredGrid, Values};
+use crate::model::{
+    Attributes, Cells, DataArray, Dataset, PolyData, ScalarType, UnstructuredGrid, Values,
+};
 use crate::read::base64::encode;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,7 +15,8 @@ use std::path::{Path, PathBuf};
 /// How numbers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Encoding {
-    /// Text that people can read; larger, and cannot hold NaN or infinity, which VTK does not read back.
+    /// Text that people can read; larger, and cannot hold NaN or infinity, which VTK does not read
+    /// back.
     Ascii,
     /// Base64 in one block at the end of the file.
     #[default]
@@ -31,9 +35,13 @@ pub struct VtkOptions {
 /// Bytes per compressed block. Readers can unpack blocks one at a time.
 const BLOCK_BYTES: usize = 1 << 20;
 
-/// Writes a data set; the ending of `path` must be that of its kind (`.vtp` for PolyData and so on). A collection becomes a
-/// `.vtm` file and a directory of the same name with its blocks.
-pub fn write_vtk(path: impl AsRef<Path>, data: &Dataset, options: VtkOptions) -> Result<(), WriteError> {
+/// Writes a data set; the ending of `path` must be that of its kind (`.vtp` for PolyData and so
+/// on). A collection becomes a `.vtm` file and a directory of the same name with its blocks.
+pub fn write_vtk(
+    path: impl AsRef<Path>,
+    data: &Dataset,
+    options: VtkOptions,
+) -> Result<(), WriteError> {
     let path = path.as_ref();
     if options.compress && options.encoding == Encoding::Ascii {
         return Err(WriteError::refused(
@@ -58,27 +66,39 @@ pub fn write_vtk(path: impl AsRef<Path>, data: &Dataset, options: VtkOptions) ->
             format!("name it {}", path.with_extension(wanted).display()),
         ));
     }
-    data.check()
-        .map_err(|e| WriteError::refused(path, e.to_string(), "make the arrays as long as the geometry"))?;
+    data.check().map_err(|e| {
+        WriteError::refused(path, e.to_string(), "make the arrays as long as the geometry")
+    })?;
     if let Dataset::MultiBlock(blocks) = data {
         return write_blocks(path, blocks, options);
     }
-    let mut out =
-        Document { xml: String::new(), appended: Vec::new(), appended_len: 0, options, non_finite: None };
+    let mut out = Document {
+        xml: String::new(),
+        appended: Vec::new(),
+        appended_len: 0,
+        options,
+        non_finite: None,
+    };
     out.data_set(data).map_err(|what| {
-        WriteError::refused(path, what, "leave those cells out: VTK would read past the end of the points")
+        WriteError::refused(
+            path,
+            what,
+            "leave those cells out: VTK would read past the end of the points",
+        )
     })?;
     if let Some(name) = out.non_finite {
         let what = format!("array `{name}` holds NaN or infinity, which VTK cannot read from text");
         return Err(WriteError::refused(path, what, "write it with base64 encoding"));
     }
     write_file(path, |f| {
-        let compressor = if options.compress { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
+        let compressor =
+            if options.compress { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
         writeln!(f, "<?xml version=\"1.0\"?>")?;
         let kind = data.kind();
         writeln!(
             f,
-            "<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"{compressor}>"
+            "<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\"{compressor}>"
         )?;
         f.write_all(out.xml.as_bytes())?;
         if !out.appended.is_empty() {
@@ -92,12 +112,16 @@ pub fn write_vtk(path: impl AsRef<Path>, data: &Dataset, options: VtkOptions) ->
     })
 }
 
-/// Writes a time series: a list of files with their times. Names are written relative to the directory of `path`.
+/// Writes a time series: a list of files with their times. Names are written relative to the
+/// directory of `path`.
 pub fn write_pvd(path: impl AsRef<Path>, steps: &[(f64, PathBuf)]) -> Result<(), WriteError> {
     let path = path.as_ref();
     let directory = path.parent().unwrap_or(Path::new(""));
     write_file(path, |f| {
-        writeln!(f, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>")?;
+        writeln!(
+            f,
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>"
+        )?;
         for (time, file) in steps {
             let name = file.strip_prefix(directory).unwrap_or(file).to_string_lossy().into_owned();
             writeln!(f, "<DataSet timestep=\"{time}\" part=\"0\" file=\"{}\"/>", escaped(&name))?;
@@ -106,7 +130,11 @@ pub fn write_pvd(path: impl AsRef<Path>, steps: &[(f64, PathBuf)]) -> Result<(),
     })
 }
 
-fn write_blocks(path: &Path, blocks: &[crate::model::Block], options: VtkOptions) -> Result<(), WriteError> {
+fn write_blocks(
+    path: &Path,
+    blocks: &[crate::model::Block],
+    options: VtkOptions,
+) -> Result<(), WriteError> {
     let directory = path.with_extension("");
     std::fs::create_dir_all(&directory)
         .map_err(|source| WriteError::Io { path: directory.clone(), source })?;
@@ -135,7 +163,8 @@ fn write_blocks(path: &Path, blocks: &[crate::model::Block], options: VtkOptions
     write_file(path, |f| {
         write!(
             f,
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\" \
+             byte_order=\"LittleEndian\">\n\
              <vtkMultiBlockDataSet>\n{lines}</vtkMultiBlockDataSet>\n</VTKFile>\n"
         )
     })
@@ -149,7 +178,8 @@ fn escaped(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // Line ends in attributes would be read as spaces; other control characters are not allowed at all.
+            // Line ends in attributes would be read as spaces; other control characters are not
+            // allowed at all.
             '\n' | '\r' | '\t' => {
                 let _ = write!(out, "&#{};", c as u32);
             }
@@ -183,7 +213,8 @@ impl Document {
             Dataset::PolyData(d) => {
                 let [v, l, p, s] = [&d.verts, &d.lines, &d.polys, &d.strips].map(|c| c.len());
                 let piece = format!(
-                    "NumberOfPoints=\"{points}\" NumberOfVerts=\"{v}\" NumberOfLines=\"{l}\" NumberOfStrips=\"{s}\" NumberOfPolys=\"{p}\""
+                    "NumberOfPoints=\"{points}\" NumberOfVerts=\"{v}\" NumberOfLines=\"{l}\" \
+                     NumberOfStrips=\"{s}\" NumberOfPolys=\"{p}\""
                 );
                 (String::new(), piece)
             }
@@ -193,7 +224,8 @@ impl Document {
             Dataset::ImageData(d) => {
                 let e = extent(d.extent);
                 let three = |v: glam::DVec3| format!("{:e} {:e} {:e}", v.x, v.y, v.z);
-                let rows = d.direction.transpose().to_cols_array().map(|x| format!("{x:e}")).join(" ");
+                let rows =
+                    d.direction.transpose().to_cols_array().map(|x| format!("{x:e}")).join(" ");
                 let set = format!(
                     " WholeExtent=\"{e}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{rows}\"",
                     three(d.origin),
@@ -263,7 +295,8 @@ impl Document {
                 texts.iter().flat_map(|t| t.bytes().chain([0])).map(|b| b.to_string()).collect();
             let (name, n) = (escaped(name), texts.len());
             self.line(format!(
-                "<Array type=\"String\" Name=\"{name}\" NumberOfTuples=\"{n}\" format=\"ascii\">{}</Array>",
+                "<Array type=\"String\" Name=\"{name}\" NumberOfTuples=\"{n}\" \
+                 format=\"ascii\">{}</Array>",
                 letters.join(" ")
             ));
         }
@@ -319,7 +352,8 @@ impl Document {
         self.cells(&d.cells, d.points.len(), "Cells")?;
         self.array(&DataArray::new("types", 1, Values::U8(d.types.clone())), "");
         if d.faces_of_cell.iter().any(|r| !r.is_empty()) {
-            // The layout that all versions of VTK read: per polyhedron its number of faces, then each face's size and ids.
+            // The layout that all versions of VTK read: per polyhedron its number of faces, then
+            // each face's size and ids.
             let (mut stream, mut ends) = (Vec::new(), Vec::new());
             for faces in &d.faces_of_cell {
                 if faces.is_empty() {
@@ -343,7 +377,8 @@ impl Document {
 
     fn array(&mut self, a: &DataArray, more: &str) {
         let (kind, name, n) = (a.values.kind().vtk_name(), escaped(&a.name), a.components);
-        let head = format!("<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{n}\"{more}");
+        let head =
+            format!("<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{n}\"{more}");
         if self.options.encoding == Encoding::Ascii {
             let is_real = matches!(a.values.kind(), ScalarType::F32 | ScalarType::F64);
             if is_real && (0..a.values.len()).any(|i| !a.values.get_f64(i).is_finite()) {
@@ -384,7 +419,8 @@ fn packed(bytes: &[u8], compress: bool) -> Vec<String> {
     for block in bytes.chunks(BLOCK_BYTES) {
         let mut z = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
         // Writing to memory does not fail.
-        let packed = std::io::Write::write_all(&mut z, block).and_then(|()| z.finish()).unwrap_or_default();
+        let packed =
+            std::io::Write::write_all(&mut z, block).and_then(|()| z.finish()).unwrap_or_default();
         sizes.push(packed.len());
         data.extend(packed);
     }

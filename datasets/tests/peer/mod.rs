@@ -1,7 +1,8 @@
-//! Finds a Python that has VTK, so that tests can compare with the original instead of with remembered numbers.
+//! Finds a Python that has VTK, so that tests can compare with the original instead of with
+//! remembered numbers.
 //!
-//! Order: `RTSV_PYTHON`, `python3`, `$RTSV_PEERS/venv/bin/python`. Without one the test says why it is skipped; with
-//! `RTSV_REQUIRE_PEERS=1` that is a failure.
+//! Order: `RTSV_PYTHON`, `python3`, `$RTSV_PEERS/venv/bin/python`. Without one the test says why it
+//! is skipped; with `RTSV_REQUIRE_PEERS=1` that is a failure.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -21,7 +22,11 @@ pub(crate) fn python_with_vtk(test: &str) -> Option<PathBuf> {
             Ok(out) if out.status.success() => return Some(python),
             Ok(out) => {
                 let stderr = String::from_utf8_lossy(&out.stderr);
-                tried.push(format!("{}: {}", python.display(), stderr.lines().last().unwrap_or("failed")));
+                tried.push(format!(
+                    "{}: {}",
+                    python.display(),
+                    stderr.lines().last().unwrap_or("failed")
+                ));
             }
             Err(e) => tried.push(format!("{}: {e}", python.display())),
         }
@@ -32,14 +37,17 @@ pub(crate) fn python_with_vtk(test: &str) -> Option<PathBuf> {
     None
 }
 
-/// Says on stderr why a test does nothing. `println!` and `eprintln!` would not do: libtest swallows both in tests that pass.
+/// Says on stderr why a test does nothing. `println!` and `eprintln!` would not do: libtest
+/// swallows both in tests that pass.
 pub(crate) fn say_skipped(reason: &str) {
     writeln!(std::io::stderr(), "skipped: {reason}").expect("stderr can be written");
 }
 
-/// Runs `script` with `args` and gives back what it printed. Panics with its error output when it fails.
+/// Runs `script` with `args` and gives back what it printed. Panics with its error output when it
+/// fails.
 pub(crate) fn run(python: &PathBuf, script: &str, args: &[&str]) -> String {
-    let out = Command::new(python).arg("-c").arg(script).args(args).output().expect("python starts");
+    let out =
+        Command::new(python).arg("-c").arg(script).args(args).output().expect("python starts");
     assert!(out.status.success(), "python failed:\n{}", String::from_utf8_lossy(&out.stderr));
     String::from_utf8(out.stdout).expect("python prints UTF-8")
 }

@@ -1,4 +1,5 @@
-//! Small files of every format, made here byte by byte or by the writers, for the tests of the readers.
+//! Small files of every format, made here byte by byte or by the writers, for the tests of the
+//! readers.
 #![allow(dead_code, reason = "each test uses some of them")]
 
 use datasets::model::*;
@@ -29,7 +30,13 @@ pub(crate) fn image() -> ImageData {
 
 pub(crate) fn poly() -> PolyData {
     let mut d = PolyData {
-        points: Points::F64(vec![[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0.5, 0.5, 1.]]),
+        points: Points::F64(vec![
+            [0., 0., 0.],
+            [1., 0., 0.],
+            [1., 1., 0.],
+            [0., 1., 0.],
+            [0.5, 0.5, 1.],
+        ]),
         ..Default::default()
     };
     d.verts.push([4]);
@@ -59,8 +66,11 @@ pub(crate) fn unstructured() -> UnstructuredGrid {
             points.push([x + shift, y, z]);
         }
     }
-    let mut d =
-        UnstructuredGrid { points: Points::F32(points), types: vec![10, 12, 42], ..Default::default() };
+    let mut d = UnstructuredGrid {
+        points: Points::F32(points),
+        types: vec![10, 12, 42],
+        ..Default::default()
+    };
     d.cells.push(0..4);
     d.cells.push(4..12);
     d.cells.push(12..20);
@@ -91,7 +101,11 @@ pub(crate) fn structured() -> StructuredGrid {
         points: Points::F64(points),
         attributes: Attributes::default(),
     };
-    d.attributes.point.push(DataArray::new("p", 1, Values::F32((0..12).map(|i| i as f32).collect())));
+    d.attributes.point.push(DataArray::new(
+        "p",
+        1,
+        Values::F32((0..12).map(|i| i as f32).collect()),
+    ));
     d
 }
 
@@ -123,9 +137,12 @@ pub(crate) fn raw_appended(compressor: &str, pack: impl Fn(&[u8]) -> Vec<u8>) ->
     }
     blocks.iter().for_each(|b| data.extend(b));
     let mut file = format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\" header_type=\"UInt32\" \
-         compressor=\"{compressor}\">\n<ImageData WholeExtent=\"0 1 0 1 0 1\" Origin=\"0 0 0\" Spacing=\"1 1 1\">\n\
-         <Piece Extent=\"0 1 0 1 0 1\"><PointData Scalars=\"p\"><DataArray type=\"Float32\" Name=\"p\" format=\"appended\" offset=\"0\"/>\
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" \
+         byte_order=\"LittleEndian\" header_type=\"UInt32\" \
+         compressor=\"{compressor}\">\n<ImageData WholeExtent=\"0 1 0 1 0 1\" Origin=\"0 0 0\" \
+         Spacing=\"1 1 1\">\n\
+         <Piece Extent=\"0 1 0 1 0 1\"><PointData Scalars=\"p\"><DataArray type=\"Float32\" \
+         Name=\"p\" format=\"appended\" offset=\"0\"/>\
          </PointData></Piece></ImageData>\n<AppendedData encoding=\"raw\">\n_"
     )
     .into_bytes();
@@ -151,7 +168,10 @@ pub(crate) fn vtk_xml() -> Vec<Sample> {
     let base64 = VtkOptions::default();
     let names = ["a.vti", "a.vtp", "a.vtu", "a.vtr", "a.vts"];
     for (name, (_, data)) in names.into_iter().zip(data_sets()) {
-        list.push((name, written(name, &data, VtkOptions { encoding: Encoding::Ascii, compress: false })));
+        list.push((
+            name,
+            written(name, &data, VtkOptions { encoding: Encoding::Ascii, compress: false }),
+        ));
         list.push((name, written(name, &data, base64)));
         list.push((name, written(name, &data, VtkOptions { compress: true, ..base64 })));
     }
@@ -160,13 +180,19 @@ pub(crate) fn vtk_xml() -> Vec<Sample> {
     list
 }
 
-pub(crate) const LEGACY_GRID: &str = "# vtk DataFile Version 3.0\ntwo cells\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n\
-    0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\nCELLS 2 9\n4 0 1 2 3\n3 1 2 4\nCELL_TYPES 2\n10 5\nPOINT_DATA 5\nSCALARS s float 1\n\
-    LOOKUP_TABLE default\n1 2 3 4 5\nVECTORS v double\n0 0 1 0 0 1 0 0 1 0 0 1 0 0 1\nCELL_DATA 2\nFIELD f 1\nid 1 2 int\n7 8\n";
+pub(crate) const LEGACY_GRID: &str = "# vtk DataFile Version 3.0\ntwo cells\nASCII\nDATASET \
+                                      UNSTRUCTURED_GRID\nPOINTS 5 float\n\
+    0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\nCELLS 2 9\n4 0 1 2 3\n3 1 2 4\nCELL_TYPES 2\n10 5\nPOINT_DATA \
+    5\nSCALARS s float 1\n\
+    LOOKUP_TABLE default\n1 2 3 4 5\nVECTORS v double\n0 0 1 0 0 1 0 0 1 0 0 1 0 0 1\nCELL_DATA \
+    2\nFIELD f 1\nid 1 2 int\n7 8\n";
 
 pub(crate) fn legacy_binary() -> Vec<u8> {
-    let mut b = b"# vtk DataFile Version 5.1\nbinary\nBINARY\nDATASET POLYDATA\nPOINTS 4 float\n".to_vec();
-    [0f32, 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.].iter().for_each(|x| b.extend(x.to_be_bytes()));
+    let mut b =
+        b"# vtk DataFile Version 5.1\nbinary\nBINARY\nDATASET POLYDATA\nPOINTS 4 float\n".to_vec();
+    [0f32, 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]
+        .iter()
+        .for_each(|x| b.extend(x.to_be_bytes()));
     b.extend(b"\nPOLYGONS 3 6\nOFFSETS vtktypeint64\n");
     [0i64, 3, 6].iter().for_each(|x| b.extend(x.to_be_bytes()));
     b.extend(b"\nCONNECTIVITY vtktypeint64\n");
@@ -177,7 +203,8 @@ pub(crate) fn legacy_binary() -> Vec<u8> {
     b
 }
 
-pub(crate) const LEGACY_IMAGE: &str = "# vtk DataFile Version 2.0\nv\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n\
+pub(crate) const LEGACY_IMAGE: &str = "# vtk DataFile Version 2.0\nv\nASCII\nDATASET \
+                                       STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n\
     SPACING 1 1 1\nPOINT_DATA 8\nSCALARS d int\nLOOKUP_TABLE default\n0 1 2 3 4 5 6 7\n";
 
 /// A PLOT3D grid and solution of `dims` points in the layout that the arguments describe.
@@ -228,7 +255,8 @@ pub(crate) fn plot3d(
 
 pub(crate) fn nrrd(encoding: &str, data: Vec<u8>) -> Vec<u8> {
     let mut b = format!(
-        "NRRD0004\n# made here\ntype: short\ndimension: 3\nsizes: 3 2 2\nspace directions: (0.5,0,0) (0,2,0) (0,0,1)\n\
+        "NRRD0004\n# made here\ntype: short\ndimension: 3\nsizes: 3 2 2\nspace directions: \
+         (0.5,0,0) (0,2,0) (0,0,1)\n\
          space origin: (1,2,3)\nendian: big\nencoding: {encoding}\ncontent: ct\n\n"
     )
     .into_bytes();
@@ -241,22 +269,28 @@ pub(crate) fn shorts() -> Vec<u8> {
 }
 
 pub(crate) fn mha() -> Vec<u8> {
-    let mut b = b"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = True\nCompressedData = False\n\
-                  TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 0.5 2 1\nDimSize = 3 2 2\n\
+    let mut b = b"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = \
+                  True\nCompressedData = False\n\
+                  TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 0.5 2 \
+                  1\nDimSize = 3 2 2\n\
                   ElementType = MET_SHORT\nElementDataFile = LOCAL\n"
         .to_vec();
     b.extend(shorts());
     b
 }
 
-pub(crate) const STL_TEXT: &str = "solid a\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1 0\n  endloop\n \
-    endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 1 0 0\n   vertex 1 1 0\n   vertex 0 1 0\n  endloop\n endfacet\nendsolid a\n";
+pub(crate) const STL_TEXT: &str = "solid a\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   \
+                                   vertex 1 0 0\n   vertex 0 1 0\n  endloop\n \
+    endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 1 0 0\n   vertex 1 1 0\n   vertex 0 1 \
+    0\n  endloop\n endfacet\nendsolid a\n";
 
 pub(crate) fn stl_binary() -> Vec<u8> {
     let mut b = b"solid that is binary all the same".to_vec();
     b.resize(80, b' ');
     b.extend(2u32.to_le_bytes());
-    for t in [[[0f32, 0., 0.], [1., 0., 0.], [-0.0, 1., 0.]], [[1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]] {
+    for t in
+        [[[0f32, 0., 0.], [1., 0., 0.], [-0.0, 1., 0.]], [[1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]]
+    {
         b.extend([0u8; 12]);
         t.iter().flatten().for_each(|x| b.extend(x.to_le_bytes()));
         b.extend([0, 0]);
@@ -264,15 +298,19 @@ pub(crate) fn stl_binary() -> Vec<u8> {
     b
 }
 
-pub(crate) const PLY_TEXT: &str = "ply\nformat ascii 1.0\ncomment made here\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
-    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\nelement face 2\nproperty list uchar int vertex_indices\n\
-    property int part\nelement edge 1\nproperty int a\nend_header\n0 0 0 255 0 0 0.5\n1 0 0 0 255 0 0.25\n1 1 0 0 0 255 1\n0 1 0 255 255 255 2\n\
+pub(crate) const PLY_TEXT: &str = "ply\nformat ascii 1.0\ncomment made here\nelement vertex \
+                                   4\nproperty float x\nproperty float y\nproperty float z\n\
+    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\nelement \
+    face 2\nproperty list uchar int vertex_indices\n\
+    property int part\nelement edge 1\nproperty int a\nend_header\n0 0 0 255 0 0 0.5\n1 0 0 0 255 \
+    0 0.25\n1 1 0 0 0 255 1\n0 1 0 255 255 255 2\n\
     3 0 1 2 7\n4 0 1 2 3 8\n5\n";
 
 pub(crate) fn ply_binary(big: bool) -> Vec<u8> {
     let order = if big { "big" } else { "little" };
     let mut b = format!(
-        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\nproperty double x\nproperty \
+         double y\nproperty double z\n\
          element face 1\nproperty list uchar uint vertex_index\nend_header\n"
     )
     .into_bytes();
@@ -286,7 +324,8 @@ pub(crate) fn ply_binary(big: bool) -> Vec<u8> {
     b
 }
 
-pub(crate) const OBJ: &str = "mtllib none.mtl\no a\nv 0 0 0 1 0 0\nv 2 0 0 0 1 0\nv 2 2 0 0 0 1\nv 1 0.5 0 1 1 1\nv 0 2 0 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+pub(crate) const OBJ: &str = "mtllib none.mtl\no a\nv 0 0 0 1 0 0\nv 2 0 0 0 1 0\nv 2 2 0 0 0 1\nv \
+                              1 0.5 0 1 1 1\nv 0 2 0 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
     vn 0 0 1\nusemtl red\nf 1/1/1 2/2/1 3/3/1 4/4/1 5/4/1\nl 1 2\n";
 
 /// A triangle with a doubled and mirrored node, as `.gltf` with its buffer inside.
@@ -337,7 +376,11 @@ fn base64(bytes: &[u8]) -> String {
     for c in bytes.chunks(3) {
         let n = c.iter().fold(0u32, |n, &b| n << 8 | u32::from(b)) << (8 * (3 - c.len()));
         for i in 0..4 {
-            out.push(if i <= c.len() { LETTERS[(n >> (18 - 6 * i) & 63) as usize] as char } else { '=' });
+            out.push(if i <= c.len() {
+                LETTERS[(n >> (18 - 6 * i) & 63) as usize] as char
+            } else {
+                '='
+            });
         }
     }
     out
@@ -346,8 +389,9 @@ fn base64(bytes: &[u8]) -> String {
 fn unbase64(text: &str) -> Vec<u8> {
     let mut out = Vec::new();
     for q in text.as_bytes().chunks(4) {
-        let n =
-            q.iter().fold(0u32, |n, &b| n << 6 | LETTERS.iter().position(|&l| l == b).unwrap_or(0) as u32);
+        let n = q
+            .iter()
+            .fold(0u32, |n, &b| n << 6 | LETTERS.iter().position(|&l| l == b).unwrap_or(0) as u32);
         let bytes = [(n >> 16) as u8, (n >> 8) as u8, n as u8];
         out.extend(&bytes[..3 - q.iter().filter(|&&b| b == b'=').count()]);
     }

@@ -5,7 +5,8 @@ use crate::interpose::client_memory::{ActiveCall, ArraySource, Elements};
 use crate::interpose::context::{Context, ImmediateModeTarget};
 
 impl Context {
-    /// Values of element `i` become current, and a vertex of the primitive that is recorded or compiled.
+    /// Values of element `i` become current, and a vertex of the primitive that is recorded or
+    /// compiled.
     pub(crate) fn array_element(&mut self, call: &ActiveCall<'_>) -> bool {
         match self.immediate_target {
             ImmediateModeTarget::Trace => {}
@@ -47,7 +48,8 @@ impl Context {
         };
         let [normal, color, tex] = [arrays.normal, arrays.color, arrays.tex];
         let position = value(arrays.position, &element)?;
-        let [normal, color, tex] = [of(normal, &element)?, of(color, &element)?, of(tex, &element)?];
+        let [normal, color, tex] =
+            [of(normal, &element)?, of(color, &element)?, of(tex, &element)?];
         if let Some([x, y, z, _]) = normal {
             self.normal([x, y, z]);
         }

@@ -1,6 +1,8 @@
-//! Vertex attributes that are there already: arrays in the program's memory come again each frame and rarely with other contents.
+//! Vertex attributes that are there already: arrays in the program's memory come again each frame
+//! and rarely with other contents.
 //!
-//! Reading an array is half the price of copying it, and the copy's fresh memory costs as much again; so arrays are hashed where they are.
+//! Reading an array is half the price of copying it, and the copy's fresh memory costs as much
+//! again; so arrays are hashed where they are.
 
 use crate::capture::draw::PackedArray;
 use crate::capture::geometry_cache::hash;

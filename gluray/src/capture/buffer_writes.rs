@@ -1,4 +1,5 @@
-//! When buffer objects were written: geometry in buffers is read once, and again only after somebody wrote to them.
+//! When buffer objects were written: geometry in buffers is read once, and again only after
+//! somebody wrote to them.
 
 use crate::interpose::client_memory::ArraySource;
 use crate::interpose::context::{Context, ImmediateModeTarget};
@@ -26,7 +27,8 @@ impl BufferWrites {
     }
 
     fn to(&mut self, buffer: u32) {
-        /// Names of buffers come again; a program that counts them upwards must not fill our memory.
+        /// Names of buffers come again; a program that counts them upwards must not fill our
+        /// memory.
         const MOST: usize = 1 << 16;
         if self.named.len() >= MOST {
             return self.any();

@@ -1,8 +1,11 @@
-//! Display lists: our own streams of immediate mode, with the driver's lists for everything else between them.
+//! Display lists: our own streams of immediate mode, with the driver's lists for everything else
+//! between them.
 //!
-//! While a list is compiled, attribute and vertex calls go into our stream and all other calls into a list of the driver's. Where they
-//! alternate, the driver's list is closed and another begun; calling the list plays both in order, through the same methods that the
-//! program calls. So state is what it is at the time of the call, nested lists work, and the driver gets a primitive only when it is to draw it.
+//! While a list is compiled, attribute and vertex calls go into our stream and all other calls into
+//! a list of the driver's. Where they alternate, the driver's list is closed and another begun;
+//! calling the list plays both in order, through the same methods that the program calls. So state
+//! is what it is at the time of the call, nested lists work, and the driver gets a primitive only
+//! when it is to draw it.
 
 pub(crate) mod names;
 
@@ -19,7 +22,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ListOp {
     Begin(u32),
-    /// The beginning of a draw of arrays, which is an error between Begin and End: then nothing of it is drawn.
+    /// The beginning of a draw of arrays, which is an error between Begin and End: then nothing of
+    /// it is drawn.
     BeginArrays(u32),
     End,
     Vertex([f32; 4]),
@@ -28,7 +32,8 @@ pub(crate) enum ListOp {
     Tex([f32; 4]),
     /// Index into the list's materials.
     Material(u32),
-    /// A list of the driver's, whether it draws things whose order matters, and whether it sets maps of evaluators and nothing else.
+    /// A list of the driver's, whether it draws things whose order matters, and whether it sets
+    /// maps of evaluators and nothing else.
     Driver {
         list: u32,
         draws: bool,
@@ -114,7 +119,8 @@ impl ListRecording {
     fn end_segment(&mut self) {
         gl::end_list();
         if self.used {
-            let (list, draws, only_maps, textures) = (self.segment, self.draws, !self.more, self.textures);
+            let (list, draws, only_maps, textures) =
+                (self.segment, self.draws, !self.more, self.textures);
             self.list.ops.push(ListOp::Driver { list, draws, only_maps, textures });
         }
         (self.used, self.draws, self.more, self.textures) = (false, false, false, false);
@@ -133,8 +139,9 @@ impl Context {
         if self.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glNewList between Begin and End");
         }
-        let wrong =
-            name == 0 || self.recording.is_some() || self.immediate_target == ImmediateModeTarget::Pass;
+        let wrong = name == 0
+            || self.recording.is_some()
+            || self.immediate_target == ImmediateModeTarget::Pass;
         if wrong || !(mode == COMPILE || mode == COMPILE_AND_EXECUTE) || self.capabilities.core {
             return false;
         }
@@ -332,7 +339,9 @@ impl Context {
                     self.execute_in_driver_or_call(gl::word(LIST_BASE).wrapping_add(name))
                 }
                 ListOp::Rect(v) => gl::rectf(v[0], v[1], v[2], v[3]),
-                ListOp::EvalCoord(..) | ListOp::EvalPoint(..) | ListOp::EvalMesh(_) => evaluate_in_driver(op),
+                ListOp::EvalCoord(..) | ListOp::EvalPoint(..) | ListOp::EvalMesh(_) => {
+                    evaluate_in_driver(op)
+                }
             }
         }
         self.depth_of_lists -= 1;
@@ -347,7 +356,8 @@ impl Context {
 
     fn call_driver(&mut self, list: u32, draws: bool, textures: bool) {
         if draws {
-            self.counters.count_driver_draws("text, lines by arrays, or curves of a display list", 1);
+            self.counters
+                .count_driver_draws("text, lines by arrays, or curves of a display list", 1);
         }
         self.before_driver_list(draws, textures);
         gl::call_list(list);
@@ -442,7 +452,9 @@ impl Context {
                     self.invalidate_maps();
                     gl::call_list(list);
                 }
-                ListOp::Driver { list, draws, textures, .. } => self.call_driver(list, draws, textures),
+                ListOp::Driver { list, draws, textures, .. } => {
+                    self.call_driver(list, draws, textures)
+                }
                 ListOp::Call(name) => {
                     self.call_list(name);
                 }
@@ -492,8 +504,9 @@ impl Context {
         }
     }
 
-    /// Quads of a list that the driver draws, as the triangles that it makes of quads in lists: it splits those of immediate mode along the
-    /// other diagonal. Gives how many steps that were; `None` where a quad is more than two filled triangles, or more than vertices come.
+    /// Quads of a list that the driver draws, as the triangles that it makes of quads in lists: it
+    /// splits those of immediate mode along the other diagonal. Gives how many steps that were;
+    /// `None` where a quad is more than two filled triangles, or more than vertices come.
     fn execute_quads(&mut self, mode: u32, list: &DisplayList, ops: &[ListOp]) -> Option<usize> {
         let filled = self.state.polygon_mode == [FILL; 2];
         if mode != QUADS
@@ -588,9 +601,11 @@ impl Context {
             let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
             // Few steps, whether the program names few lists or many that are not there.
             match lists.lists.len() < range.len() {
-                true => {
-                    lists.lists.extract_if(|name, _| range.contains(name)).map(|(_, list)| list).collect()
-                }
+                true => lists
+                    .lists
+                    .extract_if(|name, _| range.contains(name))
+                    .map(|(_, list)| list)
+                    .collect(),
                 false => range.filter_map(|name| lists.lists.remove(&name)).collect(),
             }
         };

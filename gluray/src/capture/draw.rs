@@ -39,9 +39,11 @@ pub(crate) fn component_bytes(kind: u32) -> usize {
     }
 }
 
-/// One component. Signed normalised values are c / (2^(b-1) - 1), at least -1 (OpenGL 4.2, equation 2.2), as Mesa's arrays have it.
+/// One component. Signed normalised values are c / (2^(b-1) - 1), at least -1 (OpenGL 4.2, equation
+/// 2.2), as Mesa's arrays have it.
 pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
-    let signed = |v: f64, most: f64| if normalized { (v / most).max(-1.0) as f32 } else { v as f32 };
+    let signed =
+        |v: f64, most: f64| if normalized { (v / most).max(-1.0) as f32 } else { v as f32 };
     let unsigned = |v: f64, most: f64| if normalized { (v / most) as f32 } else { v as f32 };
     match (kind, b) {
         (FLOAT, &[a, b, c, d]) => f32::from_ne_bytes([a, b, c, d]),
@@ -50,7 +52,9 @@ pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
         (UNSIGNED_BYTE, &[a]) => unsigned(f64::from(a), 255.0),
         (SHORT, &[a, b]) => signed(f64::from(i16::from_ne_bytes([a, b])), 32767.0),
         (UNSIGNED_SHORT, &[a, b]) => unsigned(f64::from(u16::from_ne_bytes([a, b])), 65535.0),
-        (INT, &[a, b, c, d]) => signed(f64::from(i32::from_ne_bytes([a, b, c, d])), 2_147_483_647.0),
+        (INT, &[a, b, c, d]) => {
+            signed(f64::from(i32::from_ne_bytes([a, b, c, d])), 2_147_483_647.0)
+        }
         (UNSIGNED_INT, &[a, b, c, d]) => {
             unsigned(f64::from(u32::from_ne_bytes([a, b, c, d])), 4_294_967_295.0)
         }
@@ -145,10 +149,15 @@ impl Draw {
     /// True when no part of the draw lets light through.
     pub(crate) fn has_full_alpha(&self) -> bool {
         let (s, a) = (&self.state, &self.attributes);
-        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        let tracked =
+            s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
         match (&self.shading, &a.colors) {
-            (Shading::Program(program), _) => program.is_opaque(a, self.geometry.mesh.positions.len()),
-            _ if s.lighting && !tracked => a.materials.iter().flatten().all(|m| m.diffuse[3] == 1.0),
+            (Shading::Program(program), _) => {
+                program.is_opaque(a, self.geometry.mesh.positions.len())
+            }
+            _ if s.lighting && !tracked => {
+                a.materials.iter().flatten().all(|m| m.diffuse[3] == 1.0)
+            }
             (_, Values::Constant(c)) => c[3] == 1.0,
             (_, Values::PerVertex(all)) => all.iter().all(|c| c[3] == 1.0),
             (_, Values::Packed(_)) => {
@@ -172,9 +181,15 @@ mod tests {
 
     #[test]
     fn byte_normals_are_read_as_arrays_have_them() {
-        let p = PackedArray { bytes: vec![127, 129, 128, 0], kind: BYTE, size: 3, normalized: true };
+        let p =
+            PackedArray { bytes: vec![127, 129, 128, 0], kind: BYTE, size: 3, normalized: true };
         assert_eq!(p.at::<3>(0, [0.0; 3]), [1.0, -1.0, -1.0]);
-        let p = PackedArray { bytes: vec![255, 0, 51, 255], kind: UNSIGNED_BYTE, size: 4, normalized: true };
+        let p = PackedArray {
+            bytes: vec![255, 0, 51, 255],
+            kind: UNSIGNED_BYTE,
+            size: 4,
+            normalized: true,
+        };
         assert_eq!(p.at::<4>(0, [0.0; 4]), [1.0, 0.0, 0.2, 1.0]);
     }
 }

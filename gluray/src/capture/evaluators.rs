@@ -1,7 +1,9 @@
-//! Evaluators: vertices that the driver makes of maps of control points (OpenGL 1.1, section 5.1), made by us.
+//! Evaluators: vertices that the driver makes of maps of control points (OpenGL 1.1, section 5.1),
+//! made by us.
 //!
-//! The driver keeps the maps. It is asked for those that are on when vertices come of them, and again after calls that may have changed them. What comes out
-//! goes the way of other vertices of immediate mode, and leaves what is current alone.
+//! The driver keeps the maps. It is asked for those that are on when vertices come of them, and
+//! again after calls that may have changed them. What comes out goes the way of other vertices of
+//! immediate mode, and leaves what is current alone.
 
 mod bernstein;
 mod casteljau;
@@ -138,7 +140,8 @@ impl Context {
         true
     }
 
-    /// Records a vertex. When that cannot be, the driver has what there is of the primitive, and false comes back.
+    /// Records a vertex. When that cannot be, the driver has what there is of the primitive, and
+    /// false comes back.
     fn take_evaluated(&mut self, e: &EvaluatedVertex) -> bool {
         let [x, y, z, w] = e.position;
         let mut with = self.current;
@@ -210,7 +213,10 @@ impl Context {
             ImmediateModeTarget::Outside => {}
         }
         let [i1, i2, j1, j2] = range.map(i64::from);
-        if !matches!(mode, POINT | LINE | FILL) || i1 > i2 || j1 > j2 || !self.has_vertices(MapKind::Surface)
+        if !matches!(mode, POINT | LINE | FILL)
+            || i1 > i2
+            || j1 > j2
+            || !self.has_vertices(MapKind::Surface)
         {
             return false;
         }
@@ -240,7 +246,8 @@ impl Context {
         true
     }
 
-    /// Rows of a mesh as Mesa draws them: parameters are summed up, and quads are split as strips of triangles are.
+    /// Rows of a mesh as Mesa draws them: parameters are summed up, and quads are split as strips
+    /// of triangles are.
     fn trace_mesh(&mut self, [i1, i2, j1, j2]: [i32; 4]) {
         let EvaluatorGrid { first, step } = self.evaluators.grid(MapKind::Surface);
         let mut along = Vec::new();

@@ -1,5 +1,6 @@
-//! Geometry that is there already: keyed by positions and connectivity alone, so that a moved camera, other colours or flipped normals
-//! (geomview turns them to the viewer each frame) rebuild nothing.
+//! Geometry that is there already: keyed by positions and connectivity alone, so that a moved
+//! camera, other colours or flipped normals (geomview turns them to the viewer each frame) rebuild
+//! nothing.
 
 mod refit;
 
@@ -69,13 +70,15 @@ impl Geometry {
         if let Some(world) = self.kept().clone() {
             return Some(world);
         }
-        // Nothing is locked meanwhile. Several frames' jobs are on the pool that builds: a thread of it
-        // which waits for a part of the build takes another job, and that may want the same structure.
+        // Nothing is locked meanwhile. Several frames' jobs are on the pool that builds: a thread
+        // of it which waits for a part of the build takes another job, and that may want the same
+        // structure.
         let moved = self.before.upgrade().and_then(|before| refit::structure(&before, &self.mesh));
         let refitted = moved.is_some();
         let world = moved.or_else(|| build(&self.mesh, BuildQuality::Fast));
         let mut kept = self.kept();
-        // Another may have come first: all take that one. A mesh that cannot be built is tried again.
+        // Another may have come first: all take that one. A mesh that cannot be built is tried
+        // again.
         if kept.is_none() {
             made.refitted += u64::from(refitted);
             made.built += u64::from(!refitted);
@@ -84,7 +87,8 @@ impl Geometry {
         kept.clone()
     }
 
-    /// What there is of the quick structures. To be held for an instant, and not while rays are traced or trees are built.
+    /// What there is of the quick structures. To be held for an instant, and not while rays are
+    /// traced or trees are built.
     fn kept(&self) -> MutexGuard<'_, Option<Arc<World>>> {
         self.world.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -107,9 +111,10 @@ impl Geometry {
 
 fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
     let start = std::time::Instant::now();
-    let world = World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() })
-        .ok()
-        .map(Arc::new);
+    let world =
+        World::from_mesh(mesh.clone(), &BuildOptions { quality, ..BuildOptions::default() })
+            .ok()
+            .map(Arc::new);
     let phase = if matches!(quality, BuildQuality::Fast) { "fast build" } else { "best build" };
     crate::host::report::span("builds", phase, 0, start.elapsed());
     world
@@ -153,7 +158,9 @@ impl GeometryCache {
             key = mix(key, u64::from(r.mode) << 32 | u64::from(r.count));
             key = mix(
                 key,
-                u64::from(r.times) << 2 | u64::from(split.first_provokes) << 1 | u64::from(split.all_turned),
+                u64::from(r.times) << 2
+                    | u64::from(split.first_provokes) << 1
+                    | u64::from(split.all_turned),
             );
         }
         for [from, to] in &split.turned {
@@ -173,7 +180,11 @@ impl GeometryCache {
     }
 
     /// The geometry of an indexed draw.
-    pub(crate) fn of_indices(&mut self, positions: &[[f32; 3]], indices: &[[u32; 3]]) -> Arc<Geometry> {
+    pub(crate) fn of_indices(
+        &mut self,
+        positions: &[[f32; 3]],
+        indices: &[[u32; 3]],
+    ) -> Arc<Geometry> {
         let key = hash(&[bytes_of(positions), bytes_of(indices)]);
         self.find(key, || TriMesh::new(vectors(positions), indices.to_vec()))
     }
@@ -209,8 +220,12 @@ impl GeometryCache {
         self.misses += 1;
         let before = self.before(&mesh);
         let geometry = Arc::new(Geometry::new(key, mesh, before));
-        let entry =
-            CacheEntry { geometry: geometry.clone(), last_used: self.frame, frames: 1, improving: false };
+        let entry = CacheEntry {
+            geometry: geometry.clone(),
+            last_used: self.frame,
+            frames: 1,
+            improving: false,
+        };
         self.entries.insert(key, entry);
         geometry
     }
@@ -226,7 +241,8 @@ impl GeometryCache {
             .entries
             .iter()
             .filter(|(_, e)| e.last_used < self.frame && size(&e.geometry.mesh) == size(mesh));
-        // Indices are compared with those of one alone: a program may have a thousand shapes of one size.
+        // Indices are compared with those of one alone: a program may have a thousand shapes of one
+        // size.
         match was.max_by_key(|(key, e)| (e.last_used, **key)) {
             Some((_, e)) if e.geometry.mesh.indices == mesh.indices => Arc::downgrade(&e.geometry),
             _ => Weak::new(),
@@ -236,8 +252,12 @@ impl GeometryCache {
     /// Geometry that was found another way is in use.
     pub(crate) fn touch(&mut self, geometry: &Arc<Geometry>) {
         let frame = self.frame;
-        let fresh =
-            || CacheEntry { geometry: geometry.clone(), last_used: frame, frames: 0, improving: false };
+        let fresh = || CacheEntry {
+            geometry: geometry.clone(),
+            last_used: frame,
+            frames: 0,
+            improving: false,
+        };
         let e = self.entries.entry(geometry.key).or_insert_with(fresh);
         e.frames += u32::from(e.last_used != frame);
         e.last_used = frame;
@@ -250,7 +270,8 @@ impl GeometryCache {
         self.entries.retain(|_, e| now - e.last_used <= KEPT_FRAMES);
         #[expect(clippy::iter_over_hash_type, reason = "each entry for itself")]
         for e in self.entries.values_mut() {
-            let rests = e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
+            let rests =
+                e.frames >= RESTING_FRAMES && e.geometry.mesh.num_triangles() >= WORTH_IMPROVING;
             if rests && !e.improving {
                 e.improving = improve(e.geometry.clone());
             }
@@ -258,8 +279,7 @@ impl GeometryCache {
     }
 }
 
-// ---- Content hash ---------------------------------------------------------------------------------------------------
-
+// ---- Content hash -------------------------------------------------------------------------------
 /// Arrays of 4-byte values as 12-byte records.
 fn bytes_of<T: bytemuck::Pod>(v: &[T]) -> &[u8] {
     bytemuck::cast_slice(v)
@@ -276,7 +296,8 @@ fn mix(h: u128, v: u64) -> u128 {
     u128::from(a2 ^ b.rotate_left(17)) | u128::from(b2 ^ a.rotate_left(31)) << 64
 }
 
-/// A 128-bit hash of the arrays' bytes, on all threads. Not meant against malice: a collision shows another frame's shape.
+/// A 128-bit hash of the arrays' bytes, on all threads. Not meant against malice: a collision shows
+/// another frame's shape.
 pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
     use rayon::prelude::*;
     const CHUNK: usize = 1 << 18;
@@ -290,7 +311,9 @@ pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
         let parts: Vec<u128> = match crate::host::config::current().settings.asynchronous {
             // The pool is busy with the frame before.
             true => a.chunks(CHUNK).map(hash_chunk).collect(),
-            false => crate::trace::thread_pool::on_pool(|| a.par_chunks(CHUNK).map(hash_chunk).collect()),
+            false => {
+                crate::trace::thread_pool::on_pool(|| a.par_chunks(CHUNK).map(hash_chunk).collect())
+            }
         };
         h = parts.iter().fold(h, |h, p| mix2(h, *p));
     }
@@ -303,8 +326,12 @@ fn mix2(h: u128, v: u128) -> u128 {
 
 /// Four lanes, so that multiplications overlap.
 fn hash_chunk(bytes: &[u8]) -> u128 {
-    let mut lanes =
-        [0x243f_6a88_85a3_08d3_u64, 0x1319_8a2e_0370_7344, 0xa409_3822_299f_31d0, 0x082e_fa98_ec4e_6c89];
+    let mut lanes = [
+        0x243f_6a88_85a3_08d3_u64,
+        0x1319_8a2e_0370_7344,
+        0xa409_3822_299f_31d0,
+        0x082e_fa98_ec4e_6c89,
+    ];
     let mut blocks = bytes.chunks_exact(32);
     for block in &mut blocks {
         for (lane, w) in lanes.iter_mut().zip(block.chunks_exact(8)) {
@@ -354,7 +381,8 @@ mod tests {
         assert_eq!((cache.hits, cache.misses), (1, 3));
     }
 
-    /// A thread that waits for a part of a build takes the next job of the pool, which wants the same.
+    /// A thread that waits for a part of a build takes the next job of the pool, which wants the
+    /// same.
     #[test]
     fn jobs_of_one_pool_that_want_the_same_structure_do_not_wait_for_each_other() {
         use std::sync::mpsc::channel;
@@ -362,10 +390,12 @@ mod tests {
         const JOBS: usize = 20;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
         for round in 0..40 {
-            let positions: Vec<Vec3> =
-                (0..60_000_u32).map(|i| Vec3::new(i as f32, (i * i % 173) as f32, (i % 5) as f32)).collect();
+            let positions: Vec<Vec3> = (0..60_000_u32)
+                .map(|i| Vec3::new(i as f32, (i * i % 173) as f32, (i % 5) as f32))
+                .collect();
             let triangles = (0..20_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-            let geometry = Arc::new(Geometry::new(round, TriMesh::new(positions, triangles), Weak::new()));
+            let geometry =
+                Arc::new(Geometry::new(round, TriMesh::new(positions, triangles), Weak::new()));
             let (sender, receiver) = channel();
             for _ in 0..JOBS {
                 let (geometry, sender) = (geometry.clone(), sender.clone());
@@ -377,7 +407,8 @@ mod tests {
                 // So that a build is under way, in parts, when the next job comes.
                 std::thread::sleep(Duration::from_micros(200));
             }
-            let next = |_| receiver.recv_timeout(Duration::from_secs(60)).expect("no job waits for ever");
+            let next =
+                |_| receiver.recv_timeout(Duration::from_secs(60)).expect("no job waits for ever");
             let all: Vec<_> = (0..JOBS).map(next).collect();
             assert!(all.iter().all(|(w, _)| Arc::ptr_eq(w, &all[0].0)), "all have one structure");
             assert_eq!(all.iter().map(|(_, made)| made.built).sum::<u64>(), 1);

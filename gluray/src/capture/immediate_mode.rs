@@ -7,8 +7,9 @@ use crate::state::current_attributes::{set_material, stale};
 use crate::state::enums::*;
 use crate::state::material_properties::MaterialProperties;
 
-/// What the short way of a call came to. It takes values and calls nothing, so that they stay in registers: a value that has been put into
-/// memory in parts and is read back whole costs more than all the rest of a call.
+/// What the short way of a call came to. It takes values and calls nothing, so that they stay in
+/// registers: a value that has been put into memory in parts and is read back whole costs more than
+/// all the rest of a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FastPathResult {
     /// That was all.
@@ -23,8 +24,10 @@ impl Context {
     /// The short way of `glBegin`.
     #[inline(always)]
     pub(crate) fn begin_fast(&mut self, mode: u32) -> FastPathResult {
-        const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
-        let ready = self.immediate_target == ImmediateModeTarget::Outside && self.dirty & DRAWS == 0;
+        const DRAWS: u8 =
+            class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
+        let ready =
+            self.immediate_target == ImmediateModeTarget::Outside && self.dirty & DRAWS == 0;
         if ready
             && self.classification == Classification::Trace
             && self.state.program == 0
@@ -55,7 +58,8 @@ impl Context {
     #[inline]
     pub(crate) fn is_opaque_with(&self, color: [f32; 4]) -> bool {
         let s = &*self.state;
-        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        let tracked =
+            s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
         match s.lighting {
             true if !tracked => self.current.materials.iter().all(|m| m.diffuse[3] == 1.0),
             _ => color[3] == 1.0,
@@ -89,11 +93,15 @@ impl Context {
         let filled = crate::capture::primitives::is_filled(mode);
         let fixed = self.state.program == 0;
         let classification = match classification {
-            Classification::TraceIfOpaque(why) if !self.is_opaque_now() => Classification::Pass(why),
+            Classification::TraceIfOpaque(why) if !self.is_opaque_now() => {
+                Classification::Pass(why)
+            }
             v => v,
         };
         match classification {
-            Classification::Trace | Classification::TraceInOrder | Classification::TraceIfOpaque(_)
+            Classification::Trace
+            | Classification::TraceInOrder
+            | Classification::TraceIfOpaque(_)
                 if filled && fixed =>
             {
                 if classification == Classification::TraceInOrder {
@@ -212,7 +220,8 @@ impl Context {
         }
     }
 
-    /// The short way of `glNormal`. Outside of Begin and End it is only remembered: what vertices take counts, and the next Begin looks.
+    /// The short way of `glNormal`. Outside of Begin and End it is only remembered: what vertices
+    /// take counts, and the next Begin looks.
     #[inline(always)]
     pub(crate) fn normal_fast(&mut self, v: [f32; 3]) -> FastPathResult {
         match self.immediate_target {
@@ -271,7 +280,9 @@ impl Context {
 
     pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
         match self.color_fast(v) {
-            FastPathResult::Slow if self.immediate_target == ImmediateModeTarget::List => self.list_color(v),
+            FastPathResult::Slow if self.immediate_target == ImmediateModeTarget::List => {
+                self.list_color(v)
+            }
             FastPathResult::Slow => {
                 self.current.color = v;
                 self.recorder.set_color(v);

@@ -1,5 +1,5 @@
-//! Draw calls become meshes with attributes: immediate mode, vertex arrays, display lists and evaluators,
-//! and the caches that recognise geometry and attributes of earlier frames.
+//! Draw calls become meshes with attributes: immediate mode, vertex arrays, display lists and
+//! evaluators, and the caches that recognise geometry and attributes of earlier frames.
 
 mod array_element;
 pub(crate) mod attribute_cache;

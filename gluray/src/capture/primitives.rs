@@ -1,5 +1,6 @@
-//! From OpenGL's primitives to triangles, split and turned as the driver does it: colours across a quad, and the flat colour of a
-//! triangle, depend on it (compatibility profile specification, section 10.1; Mesa's vertex order).
+//! From OpenGL's primitives to triangles, split and turned as the driver does it: colours across a
+//! quad, and the flat colour of a triangle, depend on it (compatibility profile specification,
+//! section 10.1; Mesa's vertex order).
 
 use crate::state::enums::*;
 
@@ -10,8 +11,9 @@ pub(crate) fn is_filled(mode: u32) -> bool {
 
 /// How primitives become triangles.
 ///
-/// OpenGL leaves open along which diagonal a quad is split, and Mesa does it along either: from the second vertex to the fourth when the quads
-/// are flat, indexed, or in a display list, and when it has to clip any vertex of the up to 4096 that it draws at once; else from the first to the
+/// OpenGL leaves open along which diagonal a quad is split, and Mesa does it along either: from the
+/// second vertex to the fourth when the quads are flat, indexed, or in a display list, and when it
+/// has to clip any vertex of the up to 4096 that it draws at once; else from the first to the
 /// third. Colours and bent quads show which.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(crate) struct QuadSplit {
@@ -28,9 +30,16 @@ impl QuadSplit {
         self.all_turned || self.turned.iter().any(|[first, end]| (*first..*end).contains(&vertex))
     }
 
-    /// Finds what is clipped: `outside` says for a range of vertices whether any of them is. `first..end` is one draw of quads to the driver.
-    pub(crate) fn find_clipped_quads(&mut self, first: u32, end: u32, outside: impl Fn(u32, u32) -> bool) {
-        // Beyond, geometry would be built anew for what nobody sees: quads of that number are small.
+    /// Finds what is clipped: `outside` says for a range of vertices whether any of them is.
+    /// `first..end` is one draw of quads to the driver.
+    pub(crate) fn find_clipped_quads(
+        &mut self,
+        first: u32,
+        end: u32,
+        outside: impl Fn(u32, u32) -> bool,
+    ) {
+        // Beyond, geometry would be built anew for what nobody sees: quads of that number are
+        // small.
         const MOST: u32 = 1 << 16;
         const AT_ONCE: u32 = 4096;
         if self.all_turned || end - first > MOST {
@@ -45,15 +54,23 @@ impl QuadSplit {
     }
 }
 
-/// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that gives the flat colour comes
-/// last. Incomplete primitives give nothing, as OpenGL has it.
-pub(crate) fn triangulate(mode: u32, first: u32, count: u32, split: &QuadSplit, out: &mut Vec<[u32; 3]>) {
+/// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that
+/// gives the flat colour comes last. Incomplete primitives give nothing, as OpenGL has it.
+pub(crate) fn triangulate(
+    mode: u32,
+    first: u32,
+    count: u32,
+    split: &QuadSplit,
+    out: &mut Vec<[u32; 3]>,
+) {
     let v = |i: u32| first + i;
     let first_provokes = split.first_provokes;
     // Rotates so that vertex 0 (the first) comes last; the orientation stays.
     let provoked = |t: [u32; 3]| if first_provokes { [t[1], t[2], t[0]] } else { t };
     match mode {
-        TRIANGLES => out.extend((0..count / 3).map(|i| provoked([v(3 * i), v(3 * i + 1), v(3 * i + 2)]))),
+        TRIANGLES => {
+            out.extend((0..count / 3).map(|i| provoked([v(3 * i), v(3 * i + 1), v(3 * i + 2)])))
+        }
         TRIANGLE_STRIP => {
             out.extend((0..count.saturating_sub(2)).map(|i| match (i % 2 == 0, first_provokes) {
                 (true, _) => provoked([v(i), v(i + 1), v(i + 2)]),
@@ -65,9 +82,11 @@ pub(crate) fn triangulate(mode: u32, first: u32, count: u32, split: &QuadSplit, 
             false => [v(0), v(i), v(i + 1)],
             true => [v(i + 1), v(0), v(i)],
         })),
-        // Mesa's quads do not follow the provoking vertex convention: their last vertex gives the colour.
+        // Mesa's quads do not follow the provoking vertex convention: their last vertex gives the
+        // colour.
         QUADS => out.extend(
-            (0..count / 4).flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), split.turns(v(4 * i)))),
+            (0..count / 4)
+                .flat_map(|i| quad([0, 1, 2, 3].map(|k| v(4 * i + k)), split.turns(v(4 * i)))),
         ),
         QUAD_STRIP => out.extend((0..(count / 2).saturating_sub(1)).flat_map(|i| {
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| v(2 * i + k));
@@ -108,7 +127,8 @@ mod tests {
         out
     }
 
-    /// Signed area of a triangle of a convex polygon whose corners are numbered counter-clockwise, or of a strip's zigzag.
+    /// Signed area of a triangle of a convex polygon whose corners are numbered counter-clockwise,
+    /// or of a strip's zigzag.
     fn turns_left(t: [u32; 3], place: impl Fn(u32) -> [f64; 2]) -> bool {
         let [a, b, c] = t.map(|i| place(i - 10));
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
@@ -118,7 +138,11 @@ mod tests {
     fn degenerate_strips_and_incomplete_primitives_give_nothing() {
         for mode in TRIANGLES..=POLYGON {
             for count in 0..3 {
-                assert_eq!(triangles(mode, count), Vec::<[u32; 3]>::new(), "mode {mode}, {count} vertices");
+                assert_eq!(
+                    triangles(mode, count),
+                    Vec::<[u32; 3]>::new(),
+                    "mode {mode}, {count} vertices"
+                );
             }
         }
         assert_eq!(triangles(QUADS, 7).len(), 2);
@@ -136,8 +160,11 @@ mod tests {
                 let mut out = Vec::new();
                 triangulate(mode, 10, 8, &split(first, true), &mut out);
                 assert_eq!(out.len(), 6);
-                let place =
-                    if mode == QUAD_STRIP { |i: u32| [f64::from(i / 2), -f64::from(i % 2)] } else { zigzag };
+                let place = if mode == QUAD_STRIP {
+                    |i: u32| [f64::from(i / 2), -f64::from(i % 2)]
+                } else {
+                    zigzag
+                };
                 let turns: Vec<bool> = out.iter().map(|t| turns_left(*t, place)).collect();
                 assert!(turns.iter().all(|t| *t == turns[0]), "mode {mode}: {out:?} {turns:?}");
             }

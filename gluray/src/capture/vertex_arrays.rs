@@ -1,14 +1,16 @@
 //! Vertex arrays: client memory or buffer objects, indexed or not, to meshes.
 //!
-//! The driver is asked which arrays are on when the draw comes. Client memory is copied then and there, because the program may change
-//! it as soon as the call returns.
+//! The driver is asked which arrays are on when the draw comes. Client memory is copied then and
+//! there, because the program may change it as soon as the call returns.
 
 use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
 use crate::capture::geometry_cache::hash;
 use crate::capture::primitives::{QuadSplit, is_filled, triangulate};
 use crate::classify::rules::Classification;
 use crate::classify::vtk::DrawCall;
-use crate::interpose::client_memory::{ActiveCall, ArraySource, ComponentCount, DrawArguments, Elements};
+use crate::interpose::client_memory::{
+    ActiveCall, ArraySource, ComponentCount, DrawArguments, Elements,
+};
 use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
@@ -45,19 +47,30 @@ impl VertexArrays {
         if !gl::is_enabled(VERTEX_ARRAY) {
             return Err("no vertex array");
         }
-        for (cap, least) in [(SECONDARY_COLOR_ARRAY, 14), (FOG_COORD_ARRAY, 14), (INDEX_ARRAY, 11)] {
+        for (cap, least) in [(SECONDARY_COLOR_ARRAY, 14), (FOG_COORD_ARRAY, 14), (INDEX_ARRAY, 11)]
+        {
             if version >= least && gl::is_enabled(cap) {
                 return Err("arrays of secondary colours, fog coordinates or colour indices");
             }
         }
-        if version >= 20 && (0..8).any(|i| gl::vertex_attrib_i::<1>(i, VERTEX_ATTRIB_ARRAY_ENABLED)[0] != 0) {
+        if version >= 20
+            && (0..8).any(|i| gl::vertex_attrib_i::<1>(i, VERTEX_ATTRIB_ARRAY_ENABLED)[0] != 0)
+        {
             return Err("generic attributes without a program");
         }
-        let position =
-            ArraySource::of_fixed(ComponentCount::Asked(VERTEX_ARRAY_SIZE), POSITION, false, buffers);
+        let position = ArraySource::of_fixed(
+            ComponentCount::Asked(VERTEX_ARRAY_SIZE),
+            POSITION,
+            false,
+            buffers,
+        );
         let normal = gl::is_enabled(NORMAL_ARRAY).then(|| {
-            let asked =
-                [NORMAL_ARRAY_TYPE, NORMAL_ARRAY_STRIDE, NORMAL_ARRAY_POINTER, NORMAL_ARRAY_BUFFER_BINDING];
+            let asked = [
+                NORMAL_ARRAY_TYPE,
+                NORMAL_ARRAY_STRIDE,
+                NORMAL_ARRAY_POINTER,
+                NORMAL_ARRAY_BUFFER_BINDING,
+            ];
             ArraySource::of_fixed(ComponentCount::Three, asked, true, buffers)
         });
         let color = match gl::is_enabled(COLOR_ARRAY) {
@@ -65,9 +78,18 @@ impl VertexArrays {
                 if gl::word(COLOR_ARRAY_SIZE) == BGRA {
                     return Err("colours in the order BGRA");
                 }
-                let asked =
-                    [COLOR_ARRAY_TYPE, COLOR_ARRAY_STRIDE, COLOR_ARRAY_POINTER, COLOR_ARRAY_BUFFER_BINDING];
-                Some(ArraySource::of_fixed(ComponentCount::Asked(COLOR_ARRAY_SIZE), asked, true, buffers))
+                let asked = [
+                    COLOR_ARRAY_TYPE,
+                    COLOR_ARRAY_STRIDE,
+                    COLOR_ARRAY_POINTER,
+                    COLOR_ARRAY_BUFFER_BINDING,
+                ];
+                Some(ArraySource::of_fixed(
+                    ComponentCount::Asked(COLOR_ARRAY_SIZE),
+                    asked,
+                    true,
+                    buffers,
+                ))
             }
             false => None,
         };
@@ -82,7 +104,12 @@ impl VertexArrays {
                 TEXTURE_COORD_ARRAY_POINTER,
                 TEXTURE_COORD_ARRAY_BUFFER_BINDING,
             ];
-            ArraySource::of_fixed(ComponentCount::Asked(TEXTURE_COORD_ARRAY_SIZE), asked, false, buffers)
+            ArraySource::of_fixed(
+                ComponentCount::Asked(TEXTURE_COORD_ARRAY_SIZE),
+                asked,
+                false,
+                buffers,
+            )
         });
         Ok(VertexArrays { position, normal, color, tex })
     }
@@ -126,12 +153,14 @@ impl VertexSelection {
             _ => raw.wrapping_add_signed(base),
         };
         let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| place(decode(b))).collect();
-        let real = || indices.iter().filter(|i| restart.is_none() || **i != VertexSelection::RESTART);
+        let real =
+            || indices.iter().filter(|i| restart.is_none() || **i != VertexSelection::RESTART);
         let (Some(&least), Some(&most)) = (real().min(), real().max()) else {
             return Ok(VertexSelection::Indexed { indices, least: 0, count: 0 });
         };
         let count = (most - least) as usize + 1;
-        // Client arrays of unknown length: an index that is out of order must not make us read gigabytes.
+        // Client arrays of unknown length: an index that is out of order must not make us read
+        // gigabytes.
         if count > 1 << 28 {
             return Err("indices that are too far apart");
         }
@@ -139,14 +168,23 @@ impl VertexSelection {
     }
 
     /// Names the geometry of these elements of an array of positions, whose bytes are given.
-    fn key(&self, mode: u32, bytes: &[u8], layout: (usize, u32, usize, bool), split: &QuadSplit) -> u128 {
+    fn key(
+        &self,
+        mode: u32,
+        bytes: &[u8],
+        layout: (usize, u32, usize, bool),
+        split: &QuadSplit,
+    ) -> u128 {
         let (stride, kind, size, _) = layout;
         let rules = u64::from(split.first_provokes) << 1 | u64::from(split.all_turned);
         let (_, count) = self.span();
-        let tail = [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
+        let tail =
+            [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
         let tail = bytemuck::cast_slice(&tail);
         match self {
-            VertexSelection::Range { .. } => hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)]),
+            VertexSelection::Range { .. } => {
+                hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)])
+            }
             VertexSelection::Indexed { indices, least, .. } => {
                 hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
             }
@@ -172,7 +210,8 @@ impl VertexSelection {
             VertexSelection::Range { first, .. } => (first + i) as u32,
             VertexSelection::Indexed { indices, .. } => indices[i],
         };
-        let mut out: Vec<u32> = (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
+        let mut out: Vec<u32> =
+            (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
         out.sort_unstable();
         out.dedup();
         out
@@ -188,20 +227,29 @@ impl VertexSelection {
     }
 
     /// How the driver would split quads: see [`QuadSplit`].
-    pub(crate) fn split(&self, mode: u32, s: &Snapshot, position: &ArraySource, bytes: &[u8]) -> QuadSplit {
+    pub(crate) fn split(
+        &self,
+        mode: u32,
+        s: &Snapshot,
+        position: &ArraySource,
+        bytes: &[u8],
+    ) -> QuadSplit {
         let mut split = self.plain_split(s.first_vertex_provokes);
         split.all_turned |= s.flat;
         let (_, count) = self.span();
         if mode == QUADS && !split.all_turned {
             let clipped = s.clips();
-            let (step, one, size) = (position.step(), component_bytes(position.kind), position.size.min(3));
+            let (step, one, size) =
+                (position.step(), component_bytes(position.kind), position.size.min(3));
             split.find_clipped_quads(0, count as u32, |from, to| {
                 (from..to).any(|i| {
                     let at = i as usize * step;
                     let mut p = [0.0; 3];
                     for (k, v) in p.iter_mut().enumerate().take(size) {
                         let b = bytes.get(at + k * one..at + (k + 1) * one);
-                        *v = b.map_or(0.0, |b| crate::capture::draw::component(b, position.kind, false));
+                        *v = b.map_or(0.0, |b| {
+                            crate::capture::draw::component(b, position.kind, false)
+                        });
                     }
                     clipped(p)
                 })
@@ -214,7 +262,9 @@ impl VertexSelection {
     pub(crate) fn triangles(&self, mode: u32, split: &QuadSplit) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
-            VertexSelection::Range { count, .. } => triangulate(mode, 0, *count as u32, split, &mut out),
+            VertexSelection::Range { count, .. } => {
+                triangulate(mode, 0, *count as u32, split, &mut out)
+            }
             VertexSelection::Indexed { indices, least, .. } => {
                 triangulate(mode, 0, indices.len() as u32, split, &mut out);
                 let vertex = |i: u32| indices[i as usize] - *least as u32;
@@ -224,13 +274,18 @@ impl VertexSelection {
         out
     }
 
-    /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and another begins.
+    /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and
+    /// another begins.
     fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
         match self {
             VertexSelection::Range { count, .. } => Box::new((0..*count).map(Some)),
             VertexSelection::Indexed { indices, least, .. } => {
                 let place = move |i: &u32| (*i as usize).checked_sub(*least);
-                Box::new(indices.iter().map(move |i| place(i).filter(|_| *i != VertexSelection::RESTART)))
+                Box::new(
+                    indices
+                        .iter()
+                        .map(move |i| place(i).filter(|_| *i != VertexSelection::RESTART)),
+                )
             }
         }
     }
@@ -368,7 +423,8 @@ impl Context {
             let bytes = s.view(&elements)?;
             Ok(Some(self.attribute_cache.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
         };
-        let (normal, color, tex) = (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
+        let (normal, color, tex) =
+            (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
         if let Classification::TraceIfOpaque(why) = classification {
             let by_color = !self.state.lighting
                 || self
@@ -399,10 +455,12 @@ impl Context {
             attributes.tex = Values::Packed(p);
         }
         let state = self.state.clone();
-        let clip_from_object = crate::trace::lighting::product(&state.projection, &state.model_view);
+        let clip_from_object =
+            crate::trace::lighting::product(&state.projection, &state.model_view);
         let (attributes, shading, ray_material) =
             (Arc::new(attributes), Shading::Fixed, RayMaterial::default());
-        let draw = Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, ray_material };
+        let draw =
+            Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, ray_material };
         self.add(draw, classification == Classification::TraceInOrder);
         Ok(())
     }
@@ -414,7 +472,8 @@ impl Context {
         }
     }
 
-    /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of it.
+    /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of
+    /// it.
     fn array_into_list<'c>(
         &mut self,
         mode: u32,
@@ -431,7 +490,13 @@ impl Context {
             let elements = elements()?;
             let read = |s: &Option<ArraySource>| s.map(|s| s.read(&elements)).transpose();
             let position = arrays.position.read(&elements)?;
-            Ok((position, read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?, elements))
+            Ok((
+                position,
+                read(&arrays.normal)?,
+                read(&arrays.color)?,
+                read(&arrays.tex)?,
+                elements,
+            ))
         };
         let Ok((position, normal, color, tex, elements)) = read() else {
             if let Some(r) = &mut self.recording {

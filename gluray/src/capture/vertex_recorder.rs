@@ -1,7 +1,9 @@
-//! Immediate mode, recorded: positions, attributes that cost nothing while they do not change, and how vertices make primitives.
+//! Immediate mode, recorded: positions, attributes that cost nothing while they do not change, and
+//! how vertices make primitives.
 //!
-//! A call only puts its values into a ring. Whenever it is full, its vertices are compared, all at once and bit for bit, with those that came at the same
-//! place of the frame before, and written down where they are others.
+//! A call only puts its values into a ring. Whenever it is full, its vertices are compared, all at
+//! once and bit for bit, with those that came at the same place of the frame before, and written
+//! down where they are others.
 
 mod attribute_stream;
 mod earlier_frames;
@@ -55,13 +57,15 @@ pub(crate) struct VertexRecorder {
     more: bool,
     /// Positions, unless they are those of `expected` so far.
     pub(crate) positions: Vec<[f32; 3]>,
-    /// What this batch seems to be. While it is right no position is written down, and in the end nothing has to be hashed.
+    /// What this batch seems to be. While it is right no position is written down, and in the end
+    /// nothing has to be hashed.
     expected: Option<Arc<TriMesh>>,
     /// Batches of earlier frames by their first position.
     earlier: HashMap<[u32; 3], EarlierBatch>,
     frame: u64,
     normals: AttributeStream<3>,
-    /// The values of `normals` are those of a whole earlier batch: of this version, unless one was changed.
+    /// The values of `normals` are those of a whole earlier batch: of this version, unless one was
+    /// changed.
     kept: Option<u64>,
     changed: bool,
     /// The latest vertex' normal.
@@ -264,13 +268,17 @@ impl VertexRecorder {
         let new = &self.ring.positions[new];
         if let Some(mesh) = &self.expected {
             let all: &[[f32; 3]] = bytemuck::cast_slice(&mesh.positions);
-            if all.get(self.flushed..self.flushed + new.len()).is_some_and(|old| same_bits(old, new)) {
+            if all
+                .get(self.flushed..self.flushed + new.len())
+                .is_some_and(|old| same_bits(old, new))
+            {
                 return;
             }
             self.copy_followed_vertices();
         }
-        self.positions
-            .extend_from_slice(&self.ring.positions[self.flushed % RING..][..self.count - self.flushed]);
+        self.positions.extend_from_slice(
+            &self.ring.positions[self.flushed % RING..][..self.count - self.flushed],
+        );
     }
 
     fn flush_normals(&mut self, new: std::ops::Range<usize>) {
@@ -366,7 +374,8 @@ impl VertexRecorder {
         }
         self.material_of.truncate(self.open);
         (self.count, self.flushed) = (self.open, self.open);
-        self.last_normal = if self.open > 0 { all.normals.at(self.open - 1) } else { self.normals.constant };
+        self.last_normal =
+            if self.open > 0 { all.normals.at(self.open - 1) } else { self.normals.constant };
         self.ring.set = 0;
         self.set_limit();
         (self.mode, out)
@@ -374,7 +383,11 @@ impl VertexRecorder {
 
     fn attributes_now(&self) -> Attributes {
         fn values<const N: usize>(s: &AttributeStream<N>) -> Values<N> {
-            if s.varying { Values::PerVertex(s.values.clone()) } else { Values::Constant(s.constant) }
+            if s.varying {
+                Values::PerVertex(s.values.clone())
+            } else {
+                Values::Constant(s.constant)
+            }
         }
         Attributes {
             normals: values(&self.normals),
@@ -386,8 +399,9 @@ impl VertexRecorder {
         }
     }
 
-    /// All attributes of the batch, which is of this geometry; the recorder is empty then but for positions and runs, which stay for the caller to look at
-    /// and clear. The batch must be settled.
+    /// All attributes of the batch, which is of this geometry; the recorder is empty then but for
+    /// positions and runs, which stay for the caller to look at and clear. The batch must be
+    /// settled.
     pub(crate) fn take_attributes(&mut self, geometry: &Arc<Geometry>) -> Attributes {
         let version = self.version(geometry);
         self.more = false;

@@ -1,8 +1,11 @@
-//! Programs whose shaders are not understood, in mode `enhance`: what their vertex shader does to positions is found by asking it.
+//! Programs whose shaders are not understood, in mode `enhance`: what their vertex shader does to
+//! positions is found by asking it.
 //!
-//! The program is linked so that `gl_Position` can be captured. At a draw, some of its vertices go through its own vertex shader with rasterization off; the
-//! attribute of which clip coordinates are an affine function is the position, and that function is the matrix. So positions stay in object space, hierarchies
-//! are used again, and no shader has to be read. The driver draws the colours; rays find out how dark corners and shadows make them.
+//! The program is linked so that `gl_Position` can be captured. At a draw, some of its vertices go
+//! through its own vertex shader with rasterization off; the attribute of which clip coordinates
+//! are an affine function is the position, and that function is the matrix. So positions stay in
+//! object space, hierarchies are used again, and no shader has to be read. The driver draws the
+//! colours; rays find out how dark corners and shadows make them.
 
 use crate::capture::draw::{Attributes, Draw, Shading};
 use crate::capture::geometry_cache::{Geometry, hash};
@@ -23,7 +26,8 @@ use std::sync::Arc;
 
 /// Vertices that are asked about.
 const ASKED: usize = 48;
-/// Share of the largest clip coordinate by which an affine function may miss the shader's: a few roundings of f32.
+/// Share of the largest clip coordinate by which an affine function may miss the shader's: a few
+/// roundings of f32.
 const RESIDUAL: f64 = 3e-5;
 
 /// Draws whose shapes are kept.
@@ -41,7 +45,8 @@ pub(crate) struct AffineProbes {
     pub(crate) draws: Vec<Draw>,
 }
 
-/// Finds `clip = M (x, y, z, 1)` by least squares; the residual is relative to the largest clip coordinate. `None` when the points lie in a plane.
+/// Finds `clip = M (x, y, z, 1)` by least squares; the residual is relative to the largest clip
+/// coordinate. `None` when the points lie in a plane.
 fn fit(points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<(DMat4, f64)> {
     let vector = |p: &[f32; 3]| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
     let n = points.len() as f64;
@@ -88,13 +93,15 @@ fn by_uniforms(program: u32, points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<D
         .filter(|(_, kind)| *kind == FLOAT_MAT4)
         .filter_map(|(name, _)| {
             let at = gl::uniform_location(program, &name);
-            (at >= 0).then(|| DMat4::from_cols_array(&gl::uniform_f::<16>(program, at).map(f64::from)))
+            (at >= 0)
+                .then(|| DMat4::from_cols_array(&gl::uniform_f::<16>(program, at).map(f64::from)))
         })
         .find(|m| residual(m, points, clip) < RESIDUAL)
 }
 
 impl Context {
-    /// Links `program` once more so that its positions can be captured, where nobody captures anything else.
+    /// Links `program` once more so that its positions can be captured, where nobody captures
+    /// anything else.
     pub(crate) fn prepare_probe(&mut self, program: u32) {
         let possible = self.config.settings.mode == Mode::Enhance
             && self.capabilities.version >= 30
@@ -115,7 +122,8 @@ impl Context {
         self.probes.ready.insert(program, free);
     }
 
-    /// Takes the shape of a draw that the driver is about to draw with a program that is not understood; why not, in words.
+    /// Takes the shape of a draw that the driver is about to draw with a program that is not
+    /// understood; why not, in words.
     pub(crate) fn take_shape<'c>(
         &mut self,
         mode: u32,
@@ -152,8 +160,11 @@ impl Context {
             return Err("positions that are not finite");
         }
         for source in sources {
-            let written = self.writes().last(&[Some(source), None, None, None, None, None, None], indices);
-            let key = hash(&[format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()]);
+            let written =
+                self.writes().last(&[Some(source), None, None, None, None, None, None], indices);
+            let key = hash(&[
+                format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()
+            ]);
             let geometry = match self.probes.made.get(&key) {
                 // Client memory may have other contents by now.
                 Some(made) if source.buffer != 0 => made.clone(),
@@ -165,7 +176,8 @@ impl Context {
                     self.geometry_cache.of_indices(&positions, &triangles)
                 }
             };
-            let of = |i: &u32| geometry.mesh.positions.get(*i as usize - first).map(|p| p.to_array());
+            let of =
+                |i: &u32| geometry.mesh.positions.get(*i as usize - first).map(|p| p.to_array());
             let Some(points) = numbers.iter().map(of).collect::<Option<Vec<_>>>() else { continue };
             let found = match fit(&points, &clip) {
                 Some((m, residual)) => (residual < RESIDUAL).then_some(m),
@@ -212,9 +224,13 @@ impl Context {
             color_material: None,
             ..(*self.state).clone()
         };
-        let white = Material { emission: [1.0; 4], diffuse: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
-        let current =
-            CurrentAttributes { color: [1.0; 4], materials: [white; 2], ..CurrentAttributes::default() };
+        let white =
+            Material { emission: [1.0; 4], diffuse: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
+        let current = CurrentAttributes {
+            color: [1.0; 4],
+            materials: [white; 2],
+            ..CurrentAttributes::default()
+        };
         self.end_batch();
         self.probes.draws.push(Draw {
             geometry,
@@ -305,8 +321,9 @@ mod tests {
     fn matrices_are_found_from_what_a_shader_makes_of_points() {
         // glFrustum(-1, 1, -1, 1, 1, 300) after a translation.
         let (a, b) = (-301.0 / 299.0, -600.0 / 299.0);
-        let frustum =
-            DMat4::from_cols_array(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.]);
+        let frustum = DMat4::from_cols_array(&[
+            1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.,
+        ]);
         let m = frustum * DMat4::from_translation(DVec3::new(-100.0, 1.0, -9.0));
         let points = cloud();
         let (found, residual) = fit(&points, &through(&m, &points)).expect("points in space");

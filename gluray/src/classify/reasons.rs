@@ -1,6 +1,7 @@
 //! Why draws are left to the driver, in more words, and what can be done about it.
 
-/// What a reason in a report means, and the cure, if there is one. `None` for a reason that speaks for itself.
+/// What a reason in a report means, and the cure, if there is one. `None` for a reason that speaks
+/// for itself.
 pub fn advice(reason: &str) -> Option<&'static str> {
     TABLE.iter().find(|(start, _)| reason.starts_with(start)).map(|(_, text)| *text)
 }
@@ -9,7 +10,8 @@ pub fn advice(reason: &str) -> Option<&'static str> {
 const TABLE: &[(&str, &str)] = &[
     (
         "a surface of VTK's",
-        "normal maps, environments, ambient occlusion and the like of VTK's own; --mode enhance needs no understanding",
+        "normal maps, environments, ambient occlusion and the like of VTK's own; --mode enhance \
+         needs no understanding",
     ),
     (
         "a picture on",
@@ -17,30 +19,42 @@ const TABLE: &[(&str, &str)] = &[
     ),
     (
         "surfaces that VTK draws again",
-        "VTK draws them twice, the second time over themselves with shadow maps; --mode rich makes shadows without these",
+        "VTK draws them twice, the second time over themselves with shadow maps; --mode rich makes \
+         shadows without these",
     ),
     (
         "a shadow map",
-        "depths as a light sees them, for VTK's own shadows; --mode rich makes shadows without these",
+        "depths as a light sees them, for VTK's own shadows; --mode rich makes shadows without \
+         these",
     ),
     (
         "translucent surfaces that VTK sums up",
         "traced in modes match, phong and rich, where VTK blends their sums as it does of itself",
     ),
-    ("a buffer texture", "what VTK has for each cell comes in colours of bytes or floats; this one does not"),
+    (
+        "a buffer texture",
+        "what VTK has for each cell comes in colours of bytes or floats; this one does not",
+    ),
     ("lines", "lines and points are drawn by the driver and joined with the picture by depth"),
     ("points", "lines and points are drawn by the driver and joined with the picture by depth"),
     ("polygons drawn as lines", "a wireframe; show surfaces to have them traced"),
-    ("selection or feedback", "the program finds out what is under the mouse; nothing is seen of that"),
+    (
+        "selection or feedback",
+        "the program finds out what is under the mouse; nothing is seen of that",
+    ),
     ("tracing is off", "mode off, or `enabled = false`: switch it on with --mode or on the panel"),
-    ("an assembly program", "ARB programs are not understood; --mode enhance needs no understanding"),
+    (
+        "an assembly program",
+        "ARB programs are not understood; --mode enhance needs no understanding",
+    ),
     (
         "several colour buffers",
         "as in dual depth peeling or deferred shading; try the program's settings for translucency",
     ),
     (
         "a vertex shader that is no matrix",
-        "positions are bent, displaced or projected by hand; only the driver knows where they end up",
+        "positions are bent, displaced or projected by hand; only the driver knows where they end \
+         up",
     ),
     ("positions that", "the vertex shader makes numbers that are no points"),
     ("a matrix that rays", "the matrix maps the scene onto a line or a point"),
@@ -50,16 +64,25 @@ const TABLE: &[(&str, &str)] = &[
         "many samples along the longer side of a footprint, which is not followed",
     ),
     ("a texture with its components", "swizzled components are not followed"),
-    ("masks or coverage of samples", "which samples of a pixel are written is the driver's to decide"),
+    (
+        "masks or coverage of samples",
+        "which samples of a pixel are written is the driver's to decide",
+    ),
     ("a sampler object", "filters of sampler objects are not followed"),
-    ("a texture with mipmaps or two filters", "in VTK's shaders, whose colour maps have one filter"),
+    (
+        "a texture with mipmaps or two filters",
+        "in VTK's shaders, whose colour maps have one filter",
+    ),
     ("a texture too large", "more than 67 million texels"),
     ("a texture of", "depths and integers are compared or cast, not sampled"),
     ("OpenGL ES", "programs for OpenGL ES are the driver's in every mode"),
     ("several texture units", "more than one texture at once is not traced"),
     ("a texture that is neither", "cube maps and volumes are not traced"),
     ("texture combiners", "GL_COMBINE is not traced"),
-    ("texture without lighting", "labels and pictures on the screen mostly; --trace all traces them, too"),
+    (
+        "texture without lighting",
+        "labels and pictures on the screen mostly; --trace all traces them, too",
+    ),
     (
         "stippled or smoothed",
         "a pattern of holes, or edges smoothed by blending, which the driver knows best",
@@ -67,14 +90,26 @@ const TABLE: &[(&str, &str)] = &[
     ("fog coordinates", "fog by coordinate or by distance in space is not traced; fog by depth is"),
     ("transform feedback", "the program reads vertices back; nothing is seen of that"),
     ("depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
-    ("no depth test", "such draws are mostly text, legends and menus; --trace all traces them, too"),
-    ("blending", "translucent in a way that is not followed; --trace all traces it in the order drawn"),
-    ("clip control", "another origin of the window or another range of depth than OpenGL had of old"),
+    (
+        "no depth test",
+        "such draws are mostly text, legends and menus; --trace all traces them, too",
+    ),
+    (
+        "blending",
+        "translucent in a way that is not followed; --trace all traces it in the order drawn",
+    ),
+    (
+        "clip control",
+        "another origin of the window or another range of depth than OpenGL had of old",
+    ),
     (
         "a colour buffer of floats",
         "colours beyond black and white are kept there, and traced ones have eight bits",
     ),
-    ("a framebuffer in sRGB", "colours are encoded after they were blended, and traced ones before"),
+    (
+        "a framebuffer in sRGB",
+        "colours are encoded after they were blended, and traced ones before",
+    ),
     ("an alpha test for equality", "traced alphas have eight bits, which may miss the reference"),
     ("a program pipeline", "shaders of separate programs are the driver's"),
     (
@@ -85,7 +120,8 @@ const TABLE: &[(&str, &str)] = &[
     ("a shader", "not of a family that is recognised; --mode enhance needs no understanding"),
     (
         "a program",
-        "not of a family that is recognised; --mode enhance needs no understanding, only OpenGL 3 and a program linked in that mode",
+        "not of a family that is recognised; --mode enhance needs no understanding, only OpenGL 3 \
+         and a program linked in that mode",
     ),
     ("a forked process", "a child made by fork has none of our threads"),
 ];

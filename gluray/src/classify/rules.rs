@@ -1,5 +1,5 @@
-//! Which draws are traced, and which the driver draws: by state, never by the type of projection (an orthographic main view is the rule in
-//! scientific programs).
+//! Which draws are traced, and which the driver draws: by state, never by the type of projection
+//! (an orthographic main view is the rule in scientific programs).
 
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
@@ -9,9 +9,11 @@ use crate::state::snapshot::Snapshot;
 pub(crate) enum Classification {
     /// Traced with the frame's others; the nearest wins, as with any depth test.
     Trace,
-    /// Traced as long as every vertex has alpha 1: blending and alpha test then change nothing. Otherwise passed, for the reason.
+    /// Traced as long as every vertex has alpha 1: blending and alpha test then change nothing.
+    /// Otherwise passed, for the reason.
     TraceIfOpaque(&'static str),
-    /// Traced at once, every layer in the order of the primitives: for states in which order matters.
+    /// Traced at once, every layer in the order of the primitives: for states in which order
+    /// matters.
     TraceInOrder,
     /// The driver draws it, for the reason given.
     Pass(&'static str),
@@ -23,7 +25,8 @@ pub(crate) enum TraceFilter {
     /// Opaque surfaces with a depth test: see the rules below.
     #[default]
     Surfaces,
-    /// Those, and translucent ones whose order a depth test and blending over decide: rays sort them.
+    /// Those, and translucent ones whose order a depth test and blending over decide: rays sort
+    /// them.
     Translucent,
     /// Every filled primitive that can be.
     All,
@@ -140,7 +143,8 @@ pub(crate) fn classify(s: &Snapshot, trace: TraceFilter) -> Classification {
     }
 }
 
-/// True when lines and points drawn now may come before or after traced surfaces: the depth test decides.
+/// True when lines and points drawn now may come before or after traced surfaces: the depth test
+/// decides.
 pub(crate) fn commutes(s: &Snapshot) -> bool {
     s.depth_test
         && s.depth_mask
@@ -172,7 +176,10 @@ mod tests {
     #[test]
     fn opaque_surfaces_with_a_depth_test_are_traced() {
         assert_eq!(classify(&surface(), TraceFilter::Surfaces), Classification::Trace);
-        assert_eq!(classify(&surface(), TraceFilter::Nothing), Classification::Pass("tracing is off"));
+        assert_eq!(
+            classify(&surface(), TraceFilter::Nothing),
+            Classification::Pass("tracing is off")
+        );
     }
 
     #[test]

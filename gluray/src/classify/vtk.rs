@@ -1,8 +1,10 @@
-//! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised, all others are the driver's.
+//! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised,
+//! all others are the driver's.
 //!
-//! VTK assembles its shaders from pieces. A program counts as recognised only when its sources are such pieces, whose meaning is written down in `blocks` and
-//! `signature`, in VTK's order and with nothing else among them: a shader with anything else in it (picking, lights from pictures, what a script has replaced) is
-//! left to the driver.
+//! VTK assembles its shaders from pieces. A program counts as recognised only when its sources are
+//! such pieces, whose meaning is written down in `blocks` and `signature`, in VTK's order and with
+//! nothing else among them: a shader with anything else in it (picking, lights from pictures, what
+//! a script has replaced) is left to the driver.
 
 mod actor_texture;
 mod blocks;
@@ -54,7 +56,8 @@ struct DrawCacheKey {
     written: [u64; 8],
 }
 
-/// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of pictures where they are apart.
+/// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of
+/// pictures where they are apart.
 type Sources = [Option<ArraySource>; 7];
 
 /// The programs of a context.
@@ -86,7 +89,8 @@ impl VtkPrograms {
     }
 }
 
-/// A generic attribute's array by name; `None` when the program has no such attribute or its array is off.
+/// A generic attribute's array by name; `None` when the program has no such attribute or its array
+/// is off.
 pub(crate) fn attribute(program: u32, name: &str) -> Option<ArraySource> {
     let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
     ArraySource::of_attribute(at)
@@ -129,9 +133,16 @@ impl Context {
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<ArrayDrawOutcome, &'static str> {
         let program = self.state.program;
-        let signature =
-            self.programs.signatures.get(&program).copied().unwrap_or(Err("a program linked before us"));
-        if signature.is_err() && self.config.settings.mode == Mode::Enhance && self.config.settings.enabled {
+        let signature = self
+            .programs
+            .signatures
+            .get(&program)
+            .copied()
+            .unwrap_or(Err("a program linked before us"));
+        if signature.is_err()
+            && self.config.settings.mode == Mode::Enhance
+            && self.config.settings.enabled
+        {
             return self.take_shape(mode, call, elements).map(|()| ArrayDrawOutcome::Shape);
         }
         if !matches!(signature, Ok(t) if t.peel != TranslucencyPass::No) {
@@ -157,7 +168,9 @@ impl Context {
             return Err("a program with arrays in client memory");
         }
         let map = match signature.colors {
-            ColorSource::Map => Some(self.image_of(program, "colortexture", texturing::check_sampling)?),
+            ColorSource::Map => {
+                Some(self.image_of(program, "colortexture", texturing::check_sampling)?)
+            }
             _ => None,
         };
         let picture = match signature.actor_texture {
@@ -218,8 +231,15 @@ impl Context {
             let clip_from_object = recognised.clip_from_object;
             let shading = Shading::Program(Arc::new(recognised));
             let (state, ray_material) = (Arc::new(state), RayMaterial::default());
-            let draw =
-                Draw { geometry, attributes, state, shading, clip_from_object, calls: 1, ray_material };
+            let draw = Draw {
+                geometry,
+                attributes,
+                state,
+                shading,
+                clip_from_object,
+                calls: 1,
+                ray_material,
+            };
             match signature.peel {
                 TranslucencyPass::Weighted => self.take_weighted(draw),
                 _ => self.take_peeled(draw),
@@ -252,15 +272,20 @@ impl Context {
         Ok(ArrayDrawOutcome::Traced)
     }
 
-    fn picture_of(&mut self, program: u32, actor_texture: ActorTexture) -> Result<Arc<Image>, &'static str> {
+    fn picture_of(
+        &mut self,
+        program: u32,
+        actor_texture: ActorTexture,
+    ) -> Result<Arc<Image>, &'static str> {
         let sampler = if actor_texture.is_over_all() { "actortexture" } else { "albedoTex" };
         let version = self.capabilities.version;
-        let image = self.image_of(program, sampler, |target| {
-            match texturing::unsupported_sampling(target, version) {
-                Some(why) => Err(why),
-                None => Ok(()),
-            }
-        })?;
+        let image =
+            self.image_of(program, sampler, |target| {
+                match texturing::unsupported_sampling(target, version) {
+                    Some(why) => Err(why),
+                    None => Ok(()),
+                }
+            })?;
         // Only there do all samplers see what is stored.
         if image.is_of_colors() { Ok(image) } else { Err("a picture of luminance or alpha alone") }
     }
@@ -296,7 +321,8 @@ impl Context {
         let read = |s: &Option<ArraySource>| s.map(|s| s.read(&elements)).transpose();
         let [position, normal, color, tex, _, _, picture] = sources;
         let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
-        let triangles = elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
+        let triangles =
+            elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
         let geometry = self.geometry_cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&CurrentAttributes::default());
         if let Some(p) = read(normal)? {

@@ -42,12 +42,17 @@ fn in_words(f: &Finding) -> String {
 
 fn variables(common: &CommonArgs) -> anyhow::Result<Status> {
     let settings = FIELDS.iter().map(|f| (variable_of(f.path), f.about));
-    let objects = (OBJECTS.to_owned(), "materials of single objects: KEY.color=#ff0000 KEY.mirror=0.3");
+    let objects =
+        (OBJECTS.to_owned(), "materials of single objects: KEY.color=#ff0000 KEY.mirror=0.3");
     let others = OTHER_VARIABLES.iter().map(|(n, about)| ((*n).to_owned(), *about));
     let list: Vec<(String, &str)> = settings.chain([objects]).chain(others).collect();
-    let value: Vec<_> = list.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect();
+    let value: Vec<_> =
+        list.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect();
     common.result(&value, || {
-        list.iter().map(|(name, about)| format!("{name:<42} {about}")).collect::<Vec<_>>().join("\n")
+        list.iter()
+            .map(|(name, about)| format!("{name:<42} {about}"))
+            .collect::<Vec<_>>()
+            .join("\n")
     })?;
     Ok(Status::Success)
 }

@@ -46,7 +46,11 @@ fn in_words(r: &Report) -> String {
     };
     line(format!("{}: mode {}, driver {}", r.program, or_none(&r.mode), or_none(&r.driver)));
     let per_frame = |n: u64| {
-        if r.frames > 0 { format!(" ({:.1} a frame)", n as f64 / r.frames as f64) } else { String::new() }
+        if r.frames > 0 {
+            format!(" ({:.1} a frame)", n as f64 / r.frames as f64)
+        } else {
+            String::new()
+        }
     };
     line(format!("{} frames", r.frames));
 
@@ -55,11 +59,15 @@ fn in_words(r: &Report) -> String {
     if r.traced_draws > 0 {
         line(format!("        {:>12} triangles, {} pixels", r.triangles, r.pixels));
         line(format!(
-            "        {:>12} geometries were there already, {} were new, {} structures built, {} refitted",
+            "        {:>12} geometries were there already, {} were new, {} structures built, {} \
+             refitted",
             r.cache_hits, r.cache_misses, r.builds, r.refits
         ));
         if r.pictures_again > 0 {
-            line(format!("        {:>12} pictures shown again, as nothing had changed", r.pictures_again));
+            line(format!(
+                "        {:>12} pictures shown again, as nothing had changed",
+                r.pictures_again
+            ));
         }
         for (kind, n) in by_size(&r.rays) {
             line(format!("        {n:>12} rays: {kind}"));
@@ -71,7 +79,8 @@ fn in_words(r: &Report) -> String {
         let of = if rank.rank == 0 { "the program" } else { "helper" };
         let lost = rank.lost.as_ref().map_or(String::new(), |why| format!("; lost: {why}"));
         line(format!(
-            "        {:>12} pictures by rank {} ({of}): {:.1} ms each, {} rays, {} structures built, {} refitted, {} kB sent to it, {} kB of rows back{lost}",
+            "        {:>12} pictures by rank {} ({of}): {:.1} ms each, {} rays, {} structures \
+             built, {} refitted, {} kB sent to it, {} kB of rows back{lost}",
             rank.pictures,
             rank.rank,
             rank.trace_ms / rank.pictures.max(1) as f64,
@@ -93,7 +102,8 @@ fn in_words(r: &Report) -> String {
     }
     if r.traced_draws + r.passed_draws == 0 {
         line(
-            "        nothing was drawn: the library did not reach the program, or the program uses no OpenGL"
+            "        nothing was drawn: the library did not reach the program, or the program uses \
+             no OpenGL"
                 .into(),
         );
         line("                     → `gluray doctor` says how programs are reached".into());
@@ -102,15 +112,20 @@ fn in_words(r: &Report) -> String {
     // When pictures were finished, and the time.
     if !r.flushes.is_empty() {
         line("\npictures were finished before".into());
-        by_size(&r.flushes).into_iter().for_each(|(before, n)| line(format!("        {n:>12} {before}")));
+        by_size(&r.flushes)
+            .into_iter()
+            .for_each(|(before, n)| line(format!("        {n:>12} {before}")));
     }
     if !r.milliseconds.is_empty() {
         line("\ntime".into());
         let mut phases: Vec<_> = r.milliseconds.iter().collect();
         phases.sort_by(|a, b| b.1.total_cmp(a.1));
         for (phase, ms) in phases {
-            let each =
-                if r.frames > 0 { format!(", {:.2} a frame", ms / r.frames as f64) } else { String::new() };
+            let each = if r.frames > 0 {
+                format!(", {:.2} a frame", ms / r.frames as f64)
+            } else {
+                String::new()
+            };
             line(format!("        {ms:>12.1} ms {phase}{each}"));
         }
     }

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// Options of `gluray export`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "A program writes its scene when the panel's `export the scene` is pressed, or to the file that GLURAY_DUMP names.
+    after_help = "A program writes its scene when the panel's `export the scene` is pressed, or to \
+                  the file that GLURAY_DUMP names.
 
 Examples:
   gluray export -o scene.glb                          the newest scene
@@ -52,21 +53,24 @@ pub(super) fn export(common: CommonArgs, args: &ExportArgs) -> anyhow::Result<()
     let path = match &args.scene {
         Some(path) => path.clone(),
         None => newest().context("no scene is named, and no program has written one").cure(
-            "press `export the scene` on the panel, or run the program with GLURAY_DUMP=scene.gluray",
+            "press `export the scene` on the panel, or run the program with \
+             GLURAY_DUMP=scene.gluray",
         )?,
     };
     let scene = read_scene(&path)?;
     if let Some(key) = args.objects.iter().find(|k| !scene.objects.iter().any(|o| o.key == **k)) {
-        return Err(
-            UsageError(format!("{}: there is no object `{key}`; --list shows them", path.display())).into()
-        );
+        return Err(UsageError(format!(
+            "{}: there is no object `{key}`; --list shows them",
+            path.display()
+        ))
+        .into());
     }
     if args.list {
         return list(common, &scene);
     }
     for file in &args.output {
-        let report =
-            write(common, file, &scene, &args.objects).with_context(|| format!("from {}", path.display()))?;
+        let report = write(common, file, &scene, &args.objects)
+            .with_context(|| format!("from {}", path.display()))?;
         report.warnings().iter().for_each(|w| common.warn(w));
         let written = json!({ "file": file, "scene": path, "program": scene.program, "frame": scene.frame, "left_out_triangles": report.nowhere });
         common.result(&written, || format!("{}", file.display()))?;
@@ -114,7 +118,9 @@ fn write(
 fn list(common: CommonArgs, scene: &Scene) -> anyhow::Result<()> {
     for o in &scene.objects {
         let value = json!({ "key": o.key, "name": o.name, "vertices": o.positions.len(), "triangles": o.indices.len(), "color": o.color });
-        common.result(&value, || format!("{:<20} {:>10} triangles  {}", o.key, o.indices.len(), o.name))?;
+        common.result(&value, || {
+            format!("{:<20} {:>10} triangles  {}", o.key, o.indices.len(), o.name)
+        })?;
     }
     Ok(())
 }

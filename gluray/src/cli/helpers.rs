@@ -15,7 +15,11 @@ pub(super) struct Helpers(Vec<Child>);
 
 impl Helpers {
     /// Starts `ranks - 1` helpers with sockets in `folder`, and tells `program` of them.
-    pub(super) fn start(ranks: u32, folder: &Path, program: &mut Command) -> anyhow::Result<Helpers> {
+    pub(super) fn start(
+        ranks: u32,
+        folder: &Path,
+        program: &mut Command,
+    ) -> anyhow::Result<Helpers> {
         let mut helpers = Helpers(Vec::new());
         if ranks < 2 {
             return Ok(helpers);
@@ -23,9 +27,11 @@ impl Helpers {
         let threads = variable_of("threads");
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
         // All ranks are on this machine, so each gets its part of it.
-        let asked = program.get_envs().find(|(name, _)| *name == threads.as_str()).and_then(|(_, v)| v);
+        let asked =
+            program.get_envs().find(|(name, _)| *name == threads.as_str()).and_then(|(_, v)| v);
         let asked = asked.map(|v| v.to_string_lossy().into_owned());
-        let each = asked.or_else(|| std::env::var(&threads).ok()).filter(|t| t != "0" && !t.is_empty());
+        let each =
+            asked.or_else(|| std::env::var(&threads).ok()).filter(|t| t != "0" && !t.is_empty());
         let each = each.unwrap_or_else(|| (cores / ranks).max(1).to_string());
         program.env(&threads, &each);
         let me = std::env::current_exe().context("this program has no name")?;

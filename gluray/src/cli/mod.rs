@@ -54,7 +54,8 @@ enum Command {
     Completions(CompletionsArgs),
 }
 
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted; with `run`, that of the program that was run.
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted; with `run`, that
+/// of the program that was run.
 pub fn main() -> ExitCode {
     let mut code = None;
     let status = run_main(|| execute(Cli::try_parse()?, &mut code));
@@ -81,13 +82,18 @@ fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
 
 /// Where the account of the last run is kept.
 fn last_report() -> PathBuf {
-    crate::host::folders::state(crate::host::folders::variable).unwrap_or_default().join("last.json")
+    crate::host::folders::state(crate::host::folders::variable)
+        .unwrap_or_default()
+        .join("last.json")
 }
 
-/// The shared library that belongs to this program: the one that is named, else the newest of those near it. `cargo test` leaves it in `deps`, `cargo
-/// build` beside the program, and either may be of another day.
+/// The shared library that belongs to this program: the one that is named, else the newest of those
+/// near it. `cargo test` leaves it in `deps`, `cargo build` beside the program, and either may be
+/// of another day.
 fn library() -> Option<PathBuf> {
-    if let Some(named) = std::env::var_os("GLURAY_LIBRARY").map(PathBuf::from).filter(|p| p.is_file()) {
+    if let Some(named) =
+        std::env::var_os("GLURAY_LIBRARY").map(PathBuf::from).filter(|p| p.is_file())
+    {
         return Some(named);
     }
     let exe = std::env::current_exe().ok()?;

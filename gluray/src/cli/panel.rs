@@ -9,7 +9,8 @@ use std::net::SocketAddr;
 /// Options of `gluray panel`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "The page works for every program that `gluray run` started, before or after the panel. Only this user on this machine can open it.
+    after_help = "The page works for every program that `gluray run` started, before or after the \
+                  panel. Only this user on this machine can open it.
 
 Examples:
   gluray panel

@@ -36,21 +36,26 @@ Examples:
   gluray run -- gmsh model.stl
   gluray run --ranks 4 -- paraview
   gluray run --mode rich --report r.json -- geomview bunny.off
-  gluray run --mode rich --set effects.ambient_occlusion_samples=32 --set objects.3f2a.surface=glass -- paraview")]
+  gluray run --mode rich --set effects.ambient_occlusion_samples=32 --set \
+  objects.3f2a.surface=glass -- paraview")]
 pub(super) struct RunArgs {
-    /// Look of traced surfaces: match (the driver's picture), phong, rich, enhance, path, or off (nothing is traced).
+    /// Look of traced surfaces: match (the driver's picture), phong, rich, enhance, path, or off
+    /// (nothing is traced).
     #[arg(long, value_parser = ["match", "phong", "rich", "enhance", "path", "off"])]
     mode: Option<String>,
-    /// `all` traces every filled primitive, in the order drawn, also without a depth test or with blending.
+    /// `all` traces every filled primitive, in the order drawn, also without a depth test or with
+    /// blending.
     #[arg(long, value_parser = ["all", "scene"])]
     trace: Option<String>,
     /// Write the account of the run here, as JSON.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Settings by program name, TOML; without it `gluray/gluray.toml` in the folder for settings, if there is one.
+    /// Settings by program name, TOML; without it `gluray/gluray.toml` in the folder for settings,
+    /// if there is one.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// A setting by name, over the file's; several times for several. `gluray doctor --variables` lists them.
+    /// A setting by name, over the file's; several times for several. `gluray doctor --variables`
+    /// lists them.
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
     /// Processes that trace one picture: the program, and N - 1 helpers that this starts and ends.
@@ -60,16 +65,23 @@ pub(super) struct RunArgs {
     #[arg(long, value_enum, default_value = "auto")]
     via: Via,
     /// The program and its arguments.
-    #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true, value_name = "PROGRAM")]
+    #[arg(
+        required = true,
+        trailing_var_arg = true,
+        allow_hyphen_values = true,
+        value_name = "PROGRAM"
+    )]
     program: Vec<OsString>,
 }
 
 /// The settings of the command line as the variables that carry them, if they make sense.
 fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
-    let usage =
-        |e: &[SettingError]| UsageError(e.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n  "));
+    let usage = |e: &[SettingError]| {
+        UsageError(e.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n  "))
+    };
     if let Some(file) = &args.config {
-        let read = ConfigFile::read(file).map_err(|e| UsageError(datasets::cli::report(&e.into())))?;
+        let read =
+            ConfigFile::read(file).map_err(|e| UsageError(datasets::cli::report(&e.into())))?;
         let (_, errors) = assign(&Settings::default(), &read.all_assignments());
         if !errors.is_empty() {
             return Err(usage(&errors));
@@ -77,7 +89,8 @@ fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
     }
     // The program's part of us would not obey them, nor could it say so before the end.
     let (_, no_text) = texts(std::env::vars_os());
-    let ours: Vec<SettingError> = no_text.into_iter().filter(|e| e.path.starts_with("GLURAY_")).collect();
+    let ours: Vec<SettingError> =
+        no_text.into_iter().filter(|e| e.path.starts_with("GLURAY_")).collect();
     if !ours.is_empty() {
         return Err(usage(&ours));
     }
@@ -116,7 +129,8 @@ fn has_glvnd() -> bool {
 /// A folder for reports and sockets that goes when the run is over; nobody else may enter it.
 struct RunFolder(PathBuf);
 
-/// Folders of a process that was killed stay behind, and its number comes again: so many may be in the way.
+/// Folders of a process that was killed stay behind, and its number comes again: so many may be in
+/// the way.
 const MOST_LEFT_BEHIND: u32 = 1000;
 
 impl RunFolder {
@@ -133,7 +147,8 @@ impl RunFolder {
                 // Not ours, whoever made it.
                 Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
                 Err(e) => {
-                    return Err(e).with_context(|| format!("cannot make the folder {}", path.display()));
+                    return Err(e)
+                        .with_context(|| format!("cannot make the folder {}", path.display()));
                 }
             }
         }
@@ -157,14 +172,16 @@ fn with_first(variable: &str, first: &Path) -> OsString {
     value
 }
 
-/// Variables for the library: what GLVND's had, which are ours now. `__GLX_FORCE_VENDOR_LIBRARY_n` goes before the name for all screens.
+/// Variables for the library: what GLVND's had, which are ours now. `__GLX_FORCE_VENDOR_LIBRARY_n`
+/// goes before the name for all screens.
 fn vendors_in_front_of() -> Vec<(String, OsString)> {
     let get = crate::host::folders::variable;
     let screen = crate::interpose::glvnd::screen_of(&get("DISPLAY").unwrap_or_default());
     let forced = format!("__GLX_FORCE_VENDOR_LIBRARY_{screen}");
     let names = ["GLURAY_GLX_VENDOR", forced.as_str(), "__GLX_VENDOR_LIBRARY_NAME"];
     let named = names.iter().find_map(|n| get(n)).filter(|v| v != "gluray").unwrap_or_default();
-    let egl: Vec<String> = crate::interpose::glvnd::egl_vendors(get).into_iter().map(|v| v.name).collect();
+    let egl: Vec<String> =
+        crate::interpose::glvnd::egl_vendors(get).into_iter().map(|v| v.name).collect();
     let mut out = vec![
         ("GLURAY_GLX_VENDOR".to_owned(), named.into()),
         ("GLURAY_EGL_VENDOR".to_owned(), egl.join(":").into()),
@@ -179,9 +196,10 @@ fn vendors_in_front_of() -> Vec<(String, OsString)> {
 
 /// Runs the program; the result is its exit code.
 pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
-    let library = library()
-        .context("libgluray.so is not beside this program")
-        .cure("build it with `cargo build --release -p gluray`, or name it in the variable GLURAY_LIBRARY")?;
+    let library = library().context("libgluray.so is not beside this program").cure(
+        "build it with `cargo build --release -p gluray`, or name it in the variable \
+               GLURAY_LIBRARY",
+    )?;
     let library = fs::canonicalize(&library)?;
     let variables = settings(args)?;
     let folder = RunFolder::new()?;
@@ -208,10 +226,9 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     let name = args.program[0].to_string_lossy().into_owned();
     // Before there is a program, so that no signal finds one of us without the other.
     let signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).context("cannot watch for signals")?;
-    let mut child = command
-        .spawn()
-        .with_context(|| format!("cannot start {name}"))
-        .cure("check the name and the PATH; everything behind `--` is the program and its arguments")?;
+    let mut child = command.spawn().with_context(|| format!("cannot start {name}")).cure(
+        "check the name and the PATH; everything behind `--` is the program and its arguments",
+    )?;
     pass_to(&child, signals);
     let status = child.wait()?;
     drop(helpers);
@@ -229,8 +246,9 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     Ok(u8::try_from(code).unwrap_or(1))
 }
 
-/// From now on signals end the program and not us, who stay to write the report. Ctrl-C goes to both by the terminal; a TERM or HUP
-/// (of batch systems, `timeout`, a closed terminal) goes to us alone and is passed on.
+/// From now on signals end the program and not us, who stay to write the report. Ctrl-C goes to
+/// both by the terminal; a TERM or HUP (of batch systems, `timeout`, a closed terminal) goes to us
+/// alone and is passed on.
 fn pass_to(child: &Child, mut signals: Signals) {
     let program = rustix::process::Pid::from_child(child);
     std::thread::spawn(move || {
@@ -259,7 +277,8 @@ fn collect(folder: &Path, program: &str) -> Report {
             sum.add(&r);
             sum.mode.clone_from(&r.mode);
             sum.pid = r.pid;
-            // What was started may be `timeout` or a script; the account is that of the program that drew.
+            // What was started may be `timeout` or a script; the account is that of the program
+            // that drew.
             if r.traced_draws + r.passed_draws > drew {
                 drew = r.traced_draws + r.passed_draws;
                 sum.program.clone_from(&r.program);

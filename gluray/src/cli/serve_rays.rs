@@ -1,4 +1,5 @@
-//! `gluray serve-rays`: a helper that traces its share of other programs' pictures, or an MPI job of helpers.
+//! `gluray serve-rays`: a helper that traces its share of other programs' pictures, or an MPI job
+//! of helpers.
 
 use crate::cluster::SOCKETS;
 use crate::cluster::helper::serve;
@@ -20,10 +21,13 @@ use std::time::Duration;
 /// Options of `gluray serve-rays`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "`gluray run --ranks N` starts helpers by itself; this is for helpers with other rights, priorities or cores than the program, and, with --mpi,
-on other machines. Whoever can write to the socket can have pictures traced here: put it into a folder of your own.
+    after_help = "`gluray run --ranks N` starts helpers by itself; this is for helpers with other \
+                  rights, priorities or cores than the program, and, with --mpi,
+on other machines. Whoever can write to the socket can have pictures traced here: put it into a \
+folder of your own.
 
-With --mpi there is a socket for each rank, FILE, FILE.1, FILE.2 and so on, all on the machine of the first rank; programs there are no ranks of the job.
+With --mpi there is a socket for each rank, FILE, FILE.1, FILE.2 and so on, all on the machine of \
+the first rank; programs there are no ranks of the job.
 
 Examples:
   taskset -c 8-15 gluray serve-rays --socket ~/rays/a &
@@ -58,10 +62,16 @@ impl BoundSocket {
         // That of a helper that was killed: nobody answers there.
         let dead = bound.as_ref().is_err_and(|e| e.kind() == ErrorKind::AddrInUse)
             && UnixStream::connect(path).is_err_and(|e| e.kind() == ErrorKind::ConnectionRefused);
-        let bound = if dead && std::fs::remove_file(path).is_ok() { UnixListener::bind(path) } else { bound };
-        let listener = bound
-            .with_context(|| format!("cannot make the socket {}", path.display()))
-            .cure("name a file that is not there yet, in a folder that you can write to, with fewer than 108 bytes in all")?;
+        let bound = if dead && std::fs::remove_file(path).is_ok() {
+            UnixListener::bind(path)
+        } else {
+            bound
+        };
+        let listener =
+            bound.with_context(|| format!("cannot make the socket {}", path.display())).cure(
+                "name a file that is not there yet, in a folder that you can write to, with \
+                   fewer than 108 bytes in all",
+            )?;
         listener.set_nonblocking(true).context("the socket")?;
         Ok((listener, BoundSocket(path.to_owned())))
     }
@@ -112,27 +122,35 @@ fn accept(listener: &UnixListener, over: &Arc<AtomicBool>) -> anyhow::Result<()>
             Ok((stream, _)) => {
                 let over = over.clone();
                 std::thread::spawn(move || {
-                    // A program that goes away, or sends what is no message, ends this talk and no other.
+                    // A program that goes away, or sends what is no message, ends this talk and no
+                    // other.
                     if let Ok(mut comm) = SocketComm::helper(stream) {
                         serve(&mut comm, &over).ok();
                     }
                 });
             }
-            Err(e) if e.kind() == ErrorKind::WouldBlock => std::thread::sleep(Duration::from_millis(5)),
+            Err(e) if e.kind() == ErrorKind::WouldBlock => {
+                std::thread::sleep(Duration::from_millis(5))
+            }
             Err(e) => return Err(e).context("the socket"),
         }
     }
     Ok(())
 }
 
-// ---- An MPI job ------------------------------------------------------------------------------------------------------
-
+// ---- An MPI job ---------------------------------------------------------------------------------
 /// The part of this process in an MPI job of helpers.
-fn serve_job(common: &CommonArgs, args: &ServeRaysArgs, over: &Arc<AtomicBool>) -> anyhow::Result<()> {
+fn serve_job(
+    common: &CommonArgs,
+    args: &ServeRaysArgs,
+    over: &Arc<AtomicBool>,
+) -> anyhow::Result<()> {
     let variable = |name: &str| std::env::var(name).ok();
     if !launcher::launched(variable) {
         return Err(UsageError(
-            "--mpi is for ranks of an MPI job: start them with `mpirun -n N gluray serve-rays --mpi --socket FILE`".into(),
+            "--mpi is for ranks of an MPI job: start them with `mpirun -n N gluray serve-rays \
+             --mpi --socket FILE`"
+                .into(),
         )
         .into());
     }
@@ -156,11 +174,13 @@ fn share_machine(variable: impl Fn(&str) -> Option<String>) {
     if variable(&variable_of("threads")).is_some_and(|t| t != "0" && !t.is_empty()) {
         return;
     }
-    let here =
-        ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"].iter().find_map(|v| variable(v)?.parse().ok());
+    let here = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS"]
+        .iter()
+        .find_map(|v| variable(v)?.parse().ok());
     let here: usize = here.unwrap_or(1).max(1);
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let settings = Settings { threads: (cores / here).max(1) as u32, ..config::current().settings.clone() };
+    let settings =
+        Settings { threads: (cores / here).max(1) as u32, ..config::current().settings.clone() };
     config::replace(settings);
 }
 

@@ -17,7 +17,8 @@ use std::path::PathBuf;
 pub(super) struct TimelineArgs {
     /// A report of `gluray run --report`; without it that of the last run
     report: Option<PathBuf>,
-    /// Where to draw: .svg for a chart, .json for Chrome's trace viewer; several times for several files
+    /// Where to draw: .svg for a chart, .json for Chrome's trace viewer; several times for several
+    /// files
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     /// First millisecond of a chart
@@ -33,13 +34,20 @@ pub(super) struct TimelineArgs {
 
 pub(super) fn timeline(common: CommonArgs, args: &TimelineArgs) -> anyhow::Result<()> {
     let ending = |p: &PathBuf| p.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    if let Some(other) = args.output.iter().find(|p| !matches!(ending(p).as_deref(), Some("svg" | "json"))) {
-        return Err(UsageError(format!("{}: no known ending; give .svg or .json", other.display())).into());
+    if let Some(other) =
+        args.output.iter().find(|p| !matches!(ending(p).as_deref(), Some("svg" | "json")))
+    {
+        return Err(UsageError(format!(
+            "{}: no known ending; give .svg or .json",
+            other.display()
+        ))
+        .into());
     }
     let (path, report) = read_report(args.report.as_deref())?;
     let spans = &report.timeline;
     let first = spans.iter().map(|s| s.start_ms).fold(f64::INFINITY, f64::min);
-    let last = spans.iter().map(crate::host::timeline::Span::end_ms).fold(f64::NEG_INFINITY, f64::max);
+    let last =
+        spans.iter().map(crate::host::timeline::Span::end_ms).fold(f64::NEG_INFINITY, f64::max);
     let window = [args.from.unwrap_or(first), args.to.unwrap_or(last)];
     let asked = args.from.is_some() || args.to.is_some();
     if asked && (window[0] >= window[1] || window.iter().any(|v| v.is_nan())) {
@@ -50,8 +58,10 @@ pub(super) fn timeline(common: CommonArgs, args: &TimelineArgs) -> anyhow::Resul
         .into());
     }
     if spans.is_empty() {
-        common
-            .warn(format_args!("{}: no phase was recorded; nothing was traced in that run", path.display()));
+        common.warn(format_args!(
+            "{}: no phase was recorded; nothing was traced in that run",
+            path.display()
+        ));
     }
     for file in &args.output {
         let text = match ending(file).as_deref() {
@@ -65,7 +75,9 @@ pub(super) fn timeline(common: CommonArgs, args: &TimelineArgs) -> anyhow::Resul
             _ => chrome_trace(&report.program, spans).to_string(),
         };
         std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))?;
-        common.result(&json!({ "file": file, "spans": spans.len() }), || file.display().to_string())?;
+        common.result(&json!({ "file": file, "spans": spans.len() }), || {
+            file.display().to_string()
+        })?;
     }
     Ok(())
 }

@@ -1,8 +1,11 @@
-//! The folder in which GLVND finds us: names of vendor libraries that lead to our library, and EGL's description of it.
+//! The folder in which GLVND finds us: names of vendor libraries that lead to our library, and
+//! EGL's description of it.
 //!
-//! It is the same for all runs with the same library and is never removed: a child of the program may live on after `gluray run` has ended, with variables that name the
-//! folder, and must find a vendor there when it first uses OpenGL. So it lies where the user's files of running programs lie, and only the user may write to
-//! it and to what it lies in, because programs load code from there.
+//! It is the same for all runs with the same library and is never removed: a child of the program
+//! may live on after `gluray run` has ended, with variables that name the folder, and must find a
+//! vendor there when it first uses OpenGL. So it lies where the user's files of running programs
+//! lie, and only the user may write to it and to what it lies in, because programs load code from
+//! there.
 
 use crate::host::folders;
 use anyhow::{Context as _, bail};
@@ -19,7 +22,8 @@ pub(super) struct VendorFolder {
 }
 
 impl VendorFolder {
-    /// The folder for `library`, an absolute path: with the files of running programs, or in the cache where that cannot be.
+    /// The folder for `library`, an absolute path: with the files of running programs, or in the
+    /// cache where that cannot be.
     pub(super) fn of(library: &Path) -> anyhow::Result<VendorFolder> {
         let places = [folders::runtime(folders::variable), folders::cache(folders::variable)];
         let mut made = Err(anyhow::anyhow!("there is no folder for running programs"));
@@ -29,8 +33,10 @@ impl VendorFolder {
                 break;
             }
         }
-        made.context("cannot make the folder in which OpenGL finds gluray")
-            .cure("set XDG_RUNTIME_DIR to a folder of your own that others may not write to, or run with `--via preload`")
+        made.context("cannot make the folder in which OpenGL finds gluray").cure(
+            "set XDG_RUNTIME_DIR to a folder of your own that others may not write to, or \
+                   run with `--via preload`",
+        )
     }
 
     fn within(place: &Path, library: &Path) -> anyhow::Result<VendorFolder> {
@@ -46,9 +52,11 @@ impl VendorFolder {
         }
         let egl = folder.join("egl.json");
         let icd = folder.join("libEGL_gluray.so.0");
-        let text = serde_json::json!({ "file_format_version": "1.0.0", "ICD": { "library_path": icd } });
+        let text =
+            serde_json::json!({ "file_format_version": "1.0.0", "ICD": { "library_path": icd } });
         let text = text.to_string();
-        let there = folders::open_own(&egl).and_then(|(file, _)| std::io::read_to_string(file).ok());
+        let there =
+            folders::open_own(&egl).and_then(|(file, _)| std::io::read_to_string(file).ok());
         if there.as_ref() != Some(&text) {
             put(&egl, |new| fs::write(new, &text))?;
         }
@@ -70,14 +78,16 @@ fn private(folder: &Path) -> anyhow::Result<()> {
         .mode(0o700)
         .create(folder)
         .with_context(|| format!("{shown}: cannot be made"))?;
-    let about = fs::symlink_metadata(folder).with_context(|| format!("{shown}: cannot be looked at"))?;
+    let about =
+        fs::symlink_metadata(folder).with_context(|| format!("{shown}: cannot be looked at"))?;
     if !about.is_dir() || Some(about.uid()) != folders::user_id() || about.mode() & 0o022 != 0 {
         bail!("{shown}: is no folder of yours, or others may write to it");
     }
     Ok(())
 }
 
-/// Makes a file under another name and gives it its own when it is whole: other runs, and programs, may be looking.
+/// Makes a file under another name and gives it its own when it is whole: other runs, and programs,
+/// may be looking.
 fn put(file: &Path, make: impl FnOnce(&Path) -> std::io::Result<()>) -> anyhow::Result<()> {
     let mut new = file.as_os_str().to_owned();
     new.push(format!(".{}", std::process::id()));
@@ -112,7 +122,8 @@ mod tests {
 
         // What is there and wrong is put right.
         fs::remove_file(one.folder.join("libEGL_gluray.so.0")).expect("it was there");
-        std::os::unix::fs::symlink("/nowhere", one.folder.join("libEGL_gluray.so.0")).expect("a link");
+        std::os::unix::fs::symlink("/nowhere", one.folder.join("libEGL_gluray.so.0"))
+            .expect("a link");
         fs::write(&one.egl, "{}").expect("written");
         of(library).expect("a folder");
         assert_eq!(fs::read_link(one.folder.join("libEGL_gluray.so.0")).expect("a link"), library);
@@ -127,6 +138,9 @@ mod tests {
         }
         let link = place.path().join("link");
         std::os::unix::fs::symlink(&inside, &link).expect("a link");
-        assert!(VendorFolder::within(&link, library).is_err(), "a link may lead to another place later");
+        assert!(
+            VendorFolder::within(&link, library).is_err(),
+            "a link may lead to another place later"
+        );
     }
 }

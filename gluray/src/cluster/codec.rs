@@ -1,4 +1,5 @@
-//! Values as bytes and back, bit by bit: colours and depths must not change on the way, and what comes is believed only when it is whole.
+//! Values as bytes and back, bit by bit: colours and depths must not change on the way, and what
+//! comes is believed only when it is whole.
 
 use bytemuck::Pod;
 
@@ -37,7 +38,8 @@ impl<'a> Reader<'a> {
     /// A list of plain numbers.
     pub(crate) fn pods<T: Pod>(&mut self) -> Result<Vec<T>, MalformedMessage> {
         let n = usize::try_from(u64::get(self)?).unwrap_or(usize::MAX);
-        let bytes = n.checked_mul(size_of::<T>()).ok_or_else(|| self.fault("a list without end"))?;
+        let bytes =
+            n.checked_mul(size_of::<T>()).ok_or_else(|| self.fault("a list without end"))?;
         let bytes = self.take(bytes)?;
         let mut out = vec![T::zeroed(); n];
         bytemuck::cast_slice_mut(&mut out).copy_from_slice(bytes);
@@ -129,7 +131,9 @@ impl<T: Wire> Wire for Vec<T> {
         let n = usize::get(from)?;
         // Whoever says that there are more values than bytes is not made room for.
         if n > from.bytes.len() - from.at {
-            return Err(from.fault(format!("a list of {n} values in {} bytes", from.bytes.len() - from.at)));
+            return Err(
+                from.fault(format!("a list of {n} values in {} bytes", from.bytes.len() - from.at))
+            );
         }
         (0..n).map(|_| T::get(from)).collect()
     }
@@ -222,12 +226,16 @@ mod tests {
         );
         let bytes = bytes_of(&value);
         let mut from = Reader::new(&bytes);
-        let back = <(Vec<f32>, (Option<[u32; 2]>, (String, Vec<bool>)))>::get(&mut from).expect("whole");
+        let back =
+            <(Vec<f32>, (Option<[u32; 2]>, (String, Vec<bool>)))>::get(&mut from).expect("whole");
         from.end().expect("nothing more");
         assert_eq!(bytes_of(&back), bytes);
         for n in 0..bytes.len() {
             let mut from = Reader::new(&bytes[..n]);
-            assert!(<(Vec<f32>, (Option<[u32; 2]>, (String, Vec<bool>)))>::get(&mut from).is_err(), "{n}");
+            assert!(
+                <(Vec<f32>, (Option<[u32; 2]>, (String, Vec<bool>)))>::get(&mut from).is_err(),
+                "{n}"
+            );
         }
         let lie = bytes_of(&u64::MAX);
         assert!(Vec::<u64>::get(&mut Reader::new(&lie)).is_err());

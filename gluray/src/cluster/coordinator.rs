@@ -1,12 +1,15 @@
-//! The first rank, in the program: it tells helpers what is new, makes its own share meanwhile, and puts theirs beside it.
+//! The first rank, in the program: it tells helpers what is new, makes its own share meanwhile, and
+//! puts theirs beside it.
 //!
-//! Who does not answer, or answers what cannot be, is left alone from then on, and its share is made here: a frame is never lost.
+//! Who does not answer, or answers what cannot be, is left alone from then on, and its share is
+//! made here: a frame is never lost.
 
 use super::codec::{Reader, Wire};
 use super::draw_message::{DrawMessage, images_of, name_of_attributes, name_of_image};
 use super::rank_stats::RankStatsTable;
 use super::requests::{
-    REPLY, REQUEST, ReplyHeader, ViewParameters, Work, numbers, put_end, put_geometry, put_head, rect,
+    REPLY, REQUEST, ReplyHeader, ViewParameters, Work, numbers, put_end, put_geometry, put_head,
+    rect,
 };
 use super::row_share::{RowShare, get_rows, most_bytes};
 use crate::capture::draw::{Attributes, Shading};
@@ -179,11 +182,17 @@ impl Coordinator {
             let parcel = DrawMessage {
                 geometry: draw.geometry.key,
                 attributes: attributes.of(&draw.attributes, name_of_attributes),
-                images: [p.image.as_ref().map(&mut name), map.map(&mut name), picture.map(&mut name)],
+                images: [
+                    p.image.as_ref().map(&mut name),
+                    map.map(&mut name),
+                    picture.map(&mut name),
+                ],
                 state: (*draw.state).clone(),
                 program: match &draw.shading {
                     Shading::Fixed => None,
-                    Shading::Program(program) => Some((**program).clone().with_images([None, None])),
+                    Shading::Program(program) => {
+                        Some((**program).clone().with_images([None, None]))
+                    }
                 },
                 clip_from_object: draw.clip_from_object,
                 ray_material: draw.ray_material,
@@ -199,8 +208,12 @@ impl Coordinator {
     /// Names that nobody asked for lately.
     fn stale(&mut self) -> Vec<u128> {
         let now = self.number;
-        let mut out: Vec<u128> =
-            self.used.iter().filter(|(_, at)| now - **at > KEPT_ORDERS).map(|(name, _)| *name).collect();
+        let mut out: Vec<u128> = self
+            .used
+            .iter()
+            .filter(|(_, at)| now - **at > KEPT_ORDERS)
+            .map(|(name, _)| *name)
+            .collect();
         out.sort_unstable();
         out.iter().for_each(|name| {
             self.used.remove(name);
@@ -298,7 +311,11 @@ impl Coordinator {
 }
 
 /// A share that was made here into the picture.
-fn put_in<A: Copy, B: Copy>(made: &mut PartialImage<A, B>, part: PartialImage<A, B>, share: RowShare) {
+fn put_in<A: Copy, B: Copy>(
+    made: &mut PartialImage<A, B>,
+    part: PartialImage<A, B>,
+    share: RowShare,
+) {
     for range in share.pixels(made.rect.w.max(0) as usize, made.rect.h.max(0) as usize) {
         made.first[range.clone()].copy_from_slice(&part.first[range.clone()]);
         if !made.second.is_empty() {

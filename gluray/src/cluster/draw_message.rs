@@ -1,4 +1,5 @@
-//! Draws as messages. What is large (shapes, attributes, images) goes by name, and its content once.
+//! Draws as messages. What is large (shapes, attributes, images) goes by name, and its content
+//! once.
 
 use super::codec::{MalformedMessage, Reader, Wire, bytes_of, put_pods, wire_enum, wire_struct};
 use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
@@ -127,9 +128,16 @@ where
                 let (kind, size) = Wire::get(from)?;
                 let normalized = bool::get(from)?;
                 if component_bytes(kind) == 0 || !(1..=4).contains(&size) {
-                    return Err(from.fault(format!("attributes of {size} components of type {kind:#x}")));
+                    return Err(
+                        from.fault(format!("attributes of {size} components of type {kind:#x}"))
+                    );
                 }
-                Values::Packed(Arc::new(PackedArray { bytes: from.pods()?, kind, size, normalized }))
+                Values::Packed(Arc::new(PackedArray {
+                    bytes: from.pods()?,
+                    kind,
+                    size,
+                    normalized,
+                }))
             }
             n => return Err(from.fault(format!("{n} is no kind of attribute"))),
         })
@@ -187,7 +195,8 @@ pub(super) fn name_of_image(image: &Image) -> u128 {
     hash(&[b"image", &bytes_of(image)])
 }
 
-/// The images of a draw's program: with which it maps values to colours, and which it puts on surfaces.
+/// The images of a draw's program: with which it maps values to colours, and which it puts on
+/// surfaces.
 pub(super) fn images_of(draw: &Draw) -> [Option<&Arc<Image>>; 2] {
     match &draw.shading {
         Shading::Fixed => [None; 2],
@@ -207,7 +216,15 @@ pub(super) struct DrawMessage {
     pub(super) ray_material: RayMaterial,
 }
 
-wire_struct!(DrawMessage { geometry, attributes, images, state, program, clip_from_object, ray_material });
+wire_struct!(DrawMessage {
+    geometry,
+    attributes,
+    images,
+    state,
+    program,
+    clip_from_object,
+    ray_material
+});
 
 impl DrawMessage {
     /// Refuses what the tracer could not bear.

@@ -2,8 +2,8 @@
 
 use super::draw_message::DrawMessage;
 use super::requests::{
-    MAX_REQUEST_BYTES, REPLY, REQUEST, ReplyHeader, TraceCost, TraceRequest, ViewParameters, Work, numbers,
-    pixels, rect,
+    MAX_REQUEST_BYTES, REPLY, REQUEST, ReplyHeader, TraceCost, TraceRequest, ViewParameters, Work,
+    numbers, pixels, rect,
 };
 use super::row_share::{RowShare, put_rows};
 use crate::capture::draw::{Attributes, Draw, Shading};
@@ -116,7 +116,8 @@ impl Helper {
         (cost.builds, cost.refits) = (structures.built, structures.refitted);
         let (area, rows, warnings) = match order.work {
             Work::Nearest => {
-                // Views that are small each may lie so far apart that no memory holds all between them.
+                // Views that are small each may lie so far apart that no memory holds all between
+                // them.
                 let Rect { x, y, w, h } = ready.iter().fold(Rect::default(), |r, p| r.or(p.rect));
                 if pixels(w, h) > MOST_BETWEEN {
                     return Err(format!("a picture of {w} x {h} pixels at ({x}, {y})"));
@@ -147,7 +148,8 @@ impl Helper {
                 let view = view(&view_parameters)?;
                 let number = usize::try_from(number).map_err(|_| "a view without end")?;
                 let (at, share) = (rect(view_parameters.rect), order.share);
-                let colors = self.path_tracer.picture(&ready, &view, number, at, &settings, picture, share);
+                let colors =
+                    self.path_tracer.picture(&ready, &view, number, at, &settings, picture, share);
                 (colors.rect, self::colors(&colors, order.share, &mut cost), colors.warnings)
             }
         };

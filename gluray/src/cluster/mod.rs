@@ -1,8 +1,11 @@
-//! Ray-parallel mode with replicated data (dissertation, sections 4.1.3 and 6.2): several processes make one program's picture.
+//! Ray-parallel mode with replicated data (dissertation, sections 4.1.3 and 6.2): several processes
+//! make one program's picture.
 //!
-//! The program is the first rank. Helpers (`gluray serve-rays`) have the whole scene, of which they are told what is new, and make every so many rows of each
-//! picture. They talk by composite's communicator. `group` does the same for helpers that are an MPI job. Every rank sends the packets of rays that one process would, so pictures are the same bit by bit
-//! whatever the number of ranks.
+//! The program is the first rank. Helpers (`gluray serve-rays`) have the whole scene, of which they
+//! are told what is new, and make every so many rows of each picture. They talk by composite's
+//! communicator. `group` does the same for helpers that are an MPI job. Every rank sends the
+//! packets of rays that one process would, so pictures are the same bit by bit whatever the number
+//! of ranks.
 
 pub(crate) mod codec;
 mod coordinator;
@@ -93,7 +96,9 @@ fn with_coordinator<R>(rect: Rect, f: impl FnOnce(&mut Coordinator) -> R) -> Opt
         *state = begin();
     }
     match &mut *state {
-        State::Together(pid, coordinator) if *pid == std::process::id() && coordinator.has_helpers() => {
+        State::Together(pid, coordinator)
+            if *pid == std::process::id() && coordinator.has_helpers() =>
+        {
             let made = f(coordinator);
             ACCOUNTS
                 .lock()
@@ -137,7 +142,8 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
         made
     });
     let Some(made) = made else { return trace::nearest(draws, settings, RowShare::WHOLE) };
-    let sum = |kind: &str| made.rays.iter().filter(|(k, _)| *k == kind).map(|(_, n)| n).sum::<u64>();
+    let sum =
+        |kind: &str| made.rays.iter().filter(|(k, _)| *k == kind).map(|(_, n)| n).sum::<u64>();
     // Our own primary rays are counted already, draw by draw.
     draws[0].rays.fetch_add(sum("primary"), Relaxed);
     let extra = [sum("shadow"), sum("ambient occlusion")];
@@ -146,7 +152,13 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
 }
 
 fn of_colors(c: ColorImage) -> PartialImage<[f32; 4], u8> {
-    PartialImage { rect: c.rect, first: c.rgba, second: Vec::new(), rays: c.rays, warnings: c.warnings }
+    PartialImage {
+        rect: c.rect,
+        first: c.rgba,
+        second: Vec::new(),
+        rays: c.rays,
+        warnings: c.warnings,
+    }
 }
 
 fn to_colors(made: PartialImage<[f32; 4], u8>) -> ColorImage {

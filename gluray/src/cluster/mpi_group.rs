@@ -1,7 +1,9 @@
-//! Helpers that are an MPI job: the first of them stands between programs, which know sockets alone, and the others, who may be on other machines.
+//! Helpers that are an MPI job: the first of them stands between programs, which know sockets
+//! alone, and the others, who may be on other machines.
 //!
-//! There is a socket for each rank, so that a program finds as many helpers as the job has ranks, and loses one when one is lost. Orders and answers are handed on as they are. The
-//! program itself is no rank of the job.
+//! There is a socket for each rank, so that a program finds as many helpers as the job has ranks,
+//! and loses one when one is lost. Orders and answers are handed on as they are. The program itself
+//! is no rank of the job.
 
 use super::helper::Helper;
 use super::requests::{MAX_REQUEST_BYTES, REPLY, REQUEST};
@@ -48,7 +50,8 @@ fn header(kind: MessageKind, program: u32, length: usize) -> Vec<u8> {
 /// The parts of a head; `None` for what is none.
 fn read_header(bytes: &[u8]) -> Option<(MessageKind, u32, usize)> {
     let bytes: &[u8; HEADER_BYTES] = bytes.try_into().ok()?;
-    let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let word =
+        |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
     let kind = [MessageKind::Work, MessageKind::Close, MessageKind::End]
         .into_iter()
         .find(|k| *k as u32 == word(0))?;
@@ -56,8 +59,7 @@ fn read_header(bytes: &[u8]) -> Option<(MessageKind, u32, usize)> {
     Some((kind, word(4), usize::try_from(length).ok().filter(|n| *n <= MAX_REQUEST_BYTES)?))
 }
 
-// ---- The others ------------------------------------------------------------------------------------------------------
-
+// ---- The others ---------------------------------------------------------------------------------
 /// Serves programs through the first rank, until that ends or `over` is set.
 ///
 /// # Errors
@@ -110,8 +112,7 @@ pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Res
     }
 }
 
-// ---- The first -------------------------------------------------------------------------------------------------------
-
+// ---- The first ----------------------------------------------------------------------------------
 /// A program's socket to one rank.
 struct ProgramConnection {
     program: u32,
@@ -160,7 +161,8 @@ struct JobCoordinator<'a> {
     programs: u32,
 }
 
-/// Hands programs' orders on to the other ranks, and their answers back, until `over` is set. `listeners[i]` is where programs find rank i + 1.
+/// Hands programs' orders on to the other ranks, and their answers back, until `over` is set.
+/// `listeners[i]` is where programs find rank i + 1.
 ///
 /// # Errors
 /// What ended the job.
@@ -295,12 +297,14 @@ impl JobCoordinator<'_> {
             if arrival.tag == BODY {
                 let program = self.coming[rank].take();
                 // Nobody, when the program has gone meanwhile.
-                if let Some(line) = self.connections.iter_mut().find(|l| Some(l.program) == program) {
+                if let Some(line) = self.connections.iter_mut().find(|l| Some(l.program) == program)
+                {
                     line.answer(&arrival.message);
                 }
                 self.comm.recycle(arrival.message);
                 self.expect(rank, HEADER, HEADER_BYTES)?;
-            } else if let Some((MessageKind::Work, program, length)) = read_header(&arrival.message) {
+            } else if let Some((MessageKind::Work, program, length)) = read_header(&arrival.message)
+            {
                 self.coming[rank] = Some(program);
                 self.expect(rank, BODY, length)?;
             } else {
@@ -330,7 +334,8 @@ impl JobCoordinator<'_> {
     }
 }
 
-/// Waits until a program says something, at most `time`: MPI cannot be waited for together with sockets.
+/// Waits until a program says something, at most `time`: MPI cannot be waited for together with
+/// sockets.
 fn rest(connections: &[ProgramConnection], listeners: &[Option<UnixListener>], time: Duration) {
     let said = connections.iter().map(|l| {
         let more = if l.out.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT };
@@ -349,9 +354,11 @@ mod tests {
 
     #[test]
     fn heads_come_back_as_they_were_and_what_is_none_is_refused() {
-        for (kind, program, length) in
-            [(MessageKind::Work, 7, 5 << 30), (MessageKind::Close, 0, 0), (MessageKind::End, u32::MAX, 1)]
-        {
+        for (kind, program, length) in [
+            (MessageKind::Work, 7, 5 << 30),
+            (MessageKind::Close, 0, 0),
+            (MessageKind::End, u32::MAX, 1),
+        ] {
             assert_eq!(read_header(&header(kind, program, length)), Some((kind, program, length)));
         }
         let mut unknown = header(MessageKind::End, 1, 1);

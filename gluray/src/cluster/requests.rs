@@ -86,10 +86,10 @@ impl ViewParameters {
         let fits = |r: &[i32; 4]| r[2] > 0 && r[3] > 0 && is_traced(r);
         match fits(&view_parameters.viewport) && fits(&view_parameters.rect) {
             true => Ok(view_parameters),
-            false => {
-                Err(from
-                    .fault(format!("a view {:?} of {:?}", view_parameters.rect, view_parameters.viewport)))
-            }
+            false => Err(from.fault(format!(
+                "a view {:?} of {:?}",
+                view_parameters.rect, view_parameters.viewport
+            ))),
         }
     }
 }
@@ -106,7 +106,8 @@ pub(super) fn pixels(w: i32, h: i32) -> i64 {
     i64::from(w.max(0)) * i64::from(h.max(0))
 }
 
-/// One picture's order. News come first, so that an order that is refused later still leaves a helper with what it was told.
+/// One picture's order. News come first, so that an order that is refused later still leaves a
+/// helper with what it was told.
 pub(super) struct TraceRequest {
     pub(super) number: u64,
     pub(super) forget: Vec<u128>,
@@ -126,7 +127,12 @@ pub(super) fn put_head(out: &mut Vec<u8>, number: u64, forget: &[u128]) {
 }
 
 /// A shape.
-pub(super) fn put_geometry(out: &mut Vec<u8>, name: u128, positions: &[Vec3], triangles: &[[u32; 3]]) {
+pub(super) fn put_geometry(
+    out: &mut Vec<u8>,
+    name: u128,
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+) {
     name.put(out);
     put_pods(out, positions);
     put_pods(out, triangles);
@@ -137,8 +143,10 @@ impl TraceRequest {
         let from = &mut Reader::new(bytes);
         let greeting = String::get(from)?;
         if greeting != GREETING {
-            return Err(from
-                .fault(format!("`{}` is not `{GREETING}`", greeting.chars().take(80).collect::<String>())));
+            return Err(from.fault(format!(
+                "`{}` is not `{GREETING}`",
+                greeting.chars().take(80).collect::<String>()
+            )));
         }
         if u32::get(from)? != BYTE_ORDER {
             return Err(from.fault("numbers of another kind of machine"));

@@ -1,12 +1,15 @@
-//! Which rows of a picture are whose, and rows as messages: what is covered, without the pixels between.
+//! Which rows of a picture are whose, and rows as messages: what is covered, without the pixels
+//! between.
 
 use super::codec::{MalformedMessage, Reader, put_pods};
 use bytemuck::Pod;
 
-/// Rows that go together: a row of the packets that rays are sent in, so that every rank sends the packets that one process would.
+/// Rows that go together: a row of the packets that rays are sent in, so that every rank sends the
+/// packets that one process would.
 pub(crate) const BAND: usize = 16;
 
-/// The part of a picture that one rank makes: every `count`-th band from `index` on, so that everybody has a little of everything.
+/// The part of a picture that one rank makes: every `count`-th band from `index` on, so that
+/// everybody has a little of everything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RowShare {
     pub(crate) index: u32,
@@ -27,7 +30,9 @@ impl RowShare {
     /// Its bands in a picture of `w` x `h` pixels, as ranges of pixels.
     pub(crate) fn pixels(self, w: usize, h: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
         let bands = h.div_ceil(BAND);
-        (0..bands).filter(move |b| self.has(*b)).map(move |b| b * BAND * w..((b + 1) * BAND).min(h) * w)
+        (0..bands)
+            .filter(move |b| self.has(*b))
+            .map(move |b| b * BAND * w..((b + 1) * BAND).min(h) * w)
     }
 }
 
@@ -83,7 +88,10 @@ pub(crate) fn get_rows<A: Pod, B: Pod>(
         }
     }
     let fits = |have: usize, want: bool| have == if want { done } else { 0 };
-    if runs.next().is_some() || !fits(first.len(), !a.is_empty()) || !fits(second.len(), !b.is_empty()) {
+    if runs.next().is_some()
+        || !fits(first.len(), !a.is_empty())
+        || !fits(second.len(), !b.is_empty())
+    {
         return Err(from.fault("more rows than were asked for"));
     }
     Ok(done)
@@ -112,7 +120,8 @@ mod tests {
     fn picture() -> (Vec<[u8; 4]>, Vec<f32>) {
         let n = SIZE[0] * SIZE[1];
         let there = |i: usize| i % 7 < 3 || (200..260).contains(&i);
-        let depth: Vec<f32> = (0..n).map(|i| if there(i) { i as f32 * 0.001 } else { 2.0 }).collect();
+        let depth: Vec<f32> =
+            (0..n).map(|i| if there(i) { i as f32 * 0.001 } else { 2.0 }).collect();
         let color = (0..n).map(|i| if there(i) { [i as u8, 1, 2, 3] } else { [0; 4] }).collect();
         (color, depth)
     }
@@ -133,7 +142,11 @@ mod tests {
                 from.end().expect("nothing more");
                 pixels += share.pixels(SIZE[0], SIZE[1]).map(|r| r.len()).sum::<usize>();
             }
-            assert_eq!((c, d, pixels), (color.clone(), depth.clone(), color.len()), "{count} ranks");
+            assert_eq!(
+                (c, d, pixels),
+                (color.clone(), depth.clone(), color.len()),
+                "{count} ranks"
+            );
         }
     }
 
@@ -147,7 +160,9 @@ mod tests {
         let other = RowShare { index: 1, count: 2 };
         assert!(get_rows(&mut Reader::new(&bytes), other, SIZE, (&mut c, &mut d)).is_err());
         for n in 0..bytes.len() {
-            assert!(get_rows(&mut Reader::new(&bytes[..n]), share, SIZE, (&mut c, &mut d)).is_err());
+            assert!(
+                get_rows(&mut Reader::new(&bytes[..n]), share, SIZE, (&mut c, &mut d)).is_err()
+            );
         }
         let mut zeros = Vec::new();
         put_pods(&mut zeros, &[0_u32; 64]);

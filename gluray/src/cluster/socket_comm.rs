@@ -1,4 +1,5 @@
-//! Ranks as processes of one machine: composite's communicator over Unix sockets, between a first rank and its helpers. Helpers do not talk to each other.
+//! Ranks as processes of one machine: composite's communicator over Unix sockets, between a first
+//! rank and its helpers. Helpers do not talk to each other.
 
 use composite::comm::{Arrival, CommError, Communicator, Receive};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -11,7 +12,8 @@ use std::time::{Duration, Instant};
 const HEADER: usize = 16;
 /// How long a peer may take none of what is sent.
 const STALLED: Duration = Duration::from_secs(20);
-/// Bytes that are made room for at once: about what a socket holds, and a peer that announces more has to send it.
+/// Bytes that are made room for at once: about what a socket holds, and a peer that announces more
+/// has to send it.
 const ROOM: usize = 1 << 18;
 
 /// What goes before a message of `length` bytes.
@@ -117,7 +119,9 @@ impl SocketComm {
     fn check(&self, peer: usize) -> Result<(), CommError> {
         match &self.aborted {
             Some((by, reason)) => Err(CommError::Aborted { by: *by, reason: reason.clone() }),
-            None if peer >= self.peers.len() => Err(CommError::NoSuchRank { peer, size: self.peers.len() }),
+            None if peer >= self.peers.len() => {
+                Err(CommError::NoSuchRank { peer, size: self.peers.len() })
+            }
             None => Ok(()),
         }
     }
@@ -139,7 +143,9 @@ impl Communicator for SocketComm {
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
         self.check(destination)?;
         let lost = CommError::PeerLost { rank: self.rank, peer: destination };
-        let Some(peer) = self.peers[destination].as_mut().filter(|p| !p.lost) else { return Err(lost) };
+        let Some(peer) = self.peers[destination].as_mut().filter(|p| !p.lost) else {
+            return Err(lost);
+        };
         let header = header_of(tag, message.len());
         for part in [&header[..], &message] {
             let (mut at, mut moved) = (0, Instant::now());
@@ -161,13 +167,22 @@ impl Communicator for SocketComm {
         Ok(())
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.check(source)?;
         self.next_id += 1;
         Ok(Receive { id: self.next_id, source, tag, capacity })
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         let rank = self.rank;
         let Some(first) = posted.first() else { return Err(CommError::NothingPosted { rank }) };
         let (peer, tag) = (first.source, first.tag);
@@ -198,7 +213,8 @@ impl Communicator for SocketComm {
                 return Err(CommError::Timeout { rank, peer, tag, waited_ms });
             }
             let sources = posted.iter().filter_map(|p| self.peers[p.source].as_ref());
-            let mut sockets: Vec<_> = sources.map(|p| PollFd::new(&p.stream, PollFlags::IN)).collect();
+            let mut sockets: Vec<_> =
+                sources.map(|p| PollFd::new(&p.stream, PollFlags::IN)).collect();
             let time = Timespec::try_from(left).ok();
             // Interrupted or not: what is there is looked at again.
             let _ = poll(&mut sockets, time.as_ref());
@@ -232,7 +248,8 @@ mod tests {
             first.send(1, 8, vec![9]).expect("sent");
             first
         });
-        let mut take = |tag| helper.recv(0, tag, 1 << 22, Duration::from_secs(20)).expect("a message");
+        let mut take =
+            |tag| helper.recv(0, tag, 1 << 22, Duration::from_secs(20)).expect("a message");
         // Another tag first: what came before it waits.
         assert_eq!(take(8), [9]);
         assert_eq!(take(7), long);

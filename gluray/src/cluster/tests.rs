@@ -72,19 +72,24 @@ fn draws(turn: f32) -> Vec<Draw> {
         color_mask: true,
         ..Snapshot::default()
     });
-    let draw =
-        |positions: &[[f32; 3]], triangles: &[[u32; 3]], cache: &mut GeometryCache, a: &Attributes| Draw {
-            geometry: cache.of_indices(positions, triangles),
-            attributes: Arc::new(a.clone()),
-            state: state.clone(),
-            shading: Shading::Fixed,
-            clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
-            calls: 1,
-            ray_material: RayMaterial::default(),
-        };
+    let draw = |positions: &[[f32; 3]],
+                triangles: &[[u32; 3]],
+                cache: &mut GeometryCache,
+                a: &Attributes| Draw {
+        geometry: cache.of_indices(positions, triangles),
+        attributes: Arc::new(a.clone()),
+        state: state.clone(),
+        shading: Shading::Fixed,
+        clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
+        calls: 1,
+        ray_material: RayMaterial::default(),
+    };
     let cut = [[-0.7, -0.8, 0.3], [0.8, 0.1, -0.3], [-0.2, 0.9, 0.1]];
     let plain = Attributes::constant(&current);
-    vec![draw(&positions, &triangles, &mut cache, &attributes), draw(&cut, &[[0, 1, 2]], &mut cache, &plain)]
+    vec![
+        draw(&positions, &triangles, &mut cache, &attributes),
+        draw(&cut, &[[0, 1, 2]], &mut cache, &plain),
+    ]
 }
 
 fn settings(mode: Mode) -> Settings {
@@ -105,7 +110,8 @@ fn pictures(
             .iter()
             .map(|d| Prepared::new(d, None, &mut BuildCounts::default()).expect("seen"))
             .collect();
-        let made = coordinator.make(&ready, settings, &Work::Nearest, |share| own(&ready, settings, share));
+        let made = coordinator
+            .make(&ready, settings, &Work::Nearest, |share| own(&ready, settings, share));
         sent.push(coordinator.rank_stats.all().iter().map(|a| a.sent_bytes).sum());
         out.push((made.first, made.second.iter().map(|d| d.to_bits()).collect()));
     }
@@ -150,7 +156,10 @@ fn honest(_: usize, comm: &mut dyn Communicator) {
 fn any_number_of_ranks_makes_the_bits_of_one() {
     for mode in [Mode::Match, Mode::Phong, Mode::Rich] {
         let (one, ..) = with_helpers(1, &[0.1, 0.4], mode, honest);
-        assert!(one[0].1.iter().filter(|d| f32::from_bits(**d) < 1.5).count() > 20_000, "nothing is seen");
+        assert!(
+            one[0].1.iter().filter(|d| f32::from_bits(**d) < 1.5).count() > 20_000,
+            "nothing is seen"
+        );
         for ranks in [2, 3, 4, 7] {
             let (many, _, lost) = with_helpers(ranks, &[0.1, 0.4], mode, honest);
             assert!(lost.iter().all(Option::is_none), "{lost:?}");
@@ -164,7 +173,8 @@ fn helpers_are_told_of_what_is_new_and_of_nothing_else() {
     let frames = [0.1, 0.1, 0.1, 0.3];
     let (_, sent, _) = with_helpers(2, &frames, Mode::Match, honest);
     let each: Vec<u64> = (0..4).map(|i| sent[i] - if i == 0 { 0 } else { sent[i - 1] }).collect();
-    // 3600 vertices and 6962 triangles; normals; then states alone; then other normals of the same shape.
+    // 3600 vertices and 6962 triangles; normals; then states alone; then other normals of the same
+    // shape.
     assert!(each[0] > 160_000, "{each:?}");
     assert!(each[1] < 8_000 && each[2] < 8_000, "{each:?}");
     assert!((43_200..60_000).contains(&each[3]), "{each:?}");
@@ -174,7 +184,8 @@ fn helpers_are_told_of_what_is_new_and_of_nothing_else() {
 fn whoever_does_not_answer_or_answers_nonsense_is_replaced_and_named() {
     let frames = [0.1, 0.2, 0.3];
     let (one, ..) = with_helpers(1, &frames, Mode::Match, honest);
-    let order = |comm: &mut dyn Communicator| comm.recv(0, REQUEST, 1 << 30, Duration::from_secs(20));
+    let order =
+        |comm: &mut dyn Communicator| comm.recv(0, REQUEST, 1 << 30, Duration::from_secs(20));
     type Fault = fn(&mut dyn Communicator) -> Result<(), CommError>;
     let nonsense: [(&str, Fault); 4] = [
         ("left the group", |_| Err(CommError::NothingPosted { rank: 0 })),
@@ -219,7 +230,8 @@ fn orders_that_are_none_are_refused_and_the_next_is_obeyed() {
                 first.send(1, REQUEST, bytes).expect("sent");
                 first.recv(1, REPLY, 1 << 30, Duration::from_secs(20)).expect("answered")
             };
-            // Cut short anywhere, or with any byte of the scene's or the states' changed: never a hang or a panic.
+            // Cut short anywhere, or with any byte of the scene's or the states' changed: never a
+            // hang or a panic.
             for n in [0, 1, 8, 30, order.len() / 2, order.len() - 1] {
                 assert_eq!(ask(order[..n].to_vec())[8], 1, "cut to {n} bytes");
             }
@@ -250,8 +262,10 @@ fn said_of(work: Work, viewports: [[i32; 4]; 2]) -> Option<String> {
     }
     let mut coordinator = Coordinator::new(Box::new(first));
     coordinator.patience = Duration::ZERO;
-    let ready: Vec<Prepared<'_>> =
-        draws.iter().map(|d| Prepared::new(d, None, &mut BuildCounts::default()).expect("seen")).collect();
+    let ready: Vec<Prepared<'_>> = draws
+        .iter()
+        .map(|d| Prepared::new(d, None, &mut BuildCounts::default()).expect("seen"))
+        .collect();
     coordinator.make(&ready, &settings(Mode::Match), &work, |_| PartialImage {
         rect: trace::Rect::default(),
         first: Vec::<[u8; 4]>::new(),
@@ -292,7 +306,8 @@ fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named(
     let (one, ..) = with_helpers(1, &[0.1, 0.4, 0.2], Mode::Match, honest);
     let folder = tempfile::tempdir().expect("a folder");
     let places: Vec<_> = (1..4).map(|rank| folder.path().join(rank.to_string())).collect();
-    let listeners: Vec<UnixListener> = places.iter().map(|p| UnixListener::bind(p).expect("bound")).collect();
+    let listeners: Vec<UnixListener> =
+        places.iter().map(|p| UnixListener::bind(p).expect("bound")).collect();
     listeners.iter().for_each(|l| l.set_nonblocking(true).expect("a socket"));
     let over: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
     let group = threads::group(4);
@@ -309,8 +324,10 @@ fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named(
             })
             .collect();
         let connect = || {
-            let streams = places.iter().map(|p| UnixStream::connect(p).expect("a rank is there")).collect();
-            let mut coordinator = Coordinator::new(Box::new(SocketComm::first(streams).expect("sockets")));
+            let streams =
+                places.iter().map(|p| UnixStream::connect(p).expect("a rank is there")).collect();
+            let mut coordinator =
+                Coordinator::new(Box::new(SocketComm::first(streams).expect("sockets")));
             coordinator.patience = Duration::from_secs(600);
             coordinator
         };
@@ -326,8 +343,14 @@ fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named(
         while !ranks[2].is_finished() {
             std::thread::sleep(Duration::from_millis(2));
         }
-        many.extend(pictures(&mut coordinator, &[0.4, 0.2], &settings(Mode::Match), &mut Vec::new()));
-        let lost: Vec<bool> = coordinator.rank_stats.all().iter().map(|a| a.lost.is_some()).collect();
+        many.extend(pictures(
+            &mut coordinator,
+            &[0.4, 0.2],
+            &settings(Mode::Match),
+            &mut Vec::new(),
+        ));
+        let lost: Vec<bool> =
+            coordinator.rank_stats.all().iter().map(|a| a.lost.is_some()).collect();
         assert_eq!(lost, [false, false, true, false]);
         assert!(one == many, "the pictures differ");
         // The head's end is everybody's.
@@ -336,6 +359,9 @@ fn a_group_behind_one_head_makes_the_bits_of_one_and_ranks_that_leave_are_named(
             rank.join().expect("no panic").expect("no fault");
         }
         let again = pictures(&mut coordinator, &[0.2], &settings(Mode::Match), &mut Vec::new());
-        assert!(again[0] == one[2] && coordinator.rank_stats.all()[1..].iter().all(|a| a.lost.is_some()));
+        assert!(
+            again[0] == one[2]
+                && coordinator.rank_stats.all()[1..].iter().all(|a| a.lost.is_some())
+        );
     });
 }

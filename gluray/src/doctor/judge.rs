@@ -34,9 +34,14 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
     });
     let vendors = m.glx_vendors.join(", ");
     out.push(match (&m.glvnd, m.glx_vendors.is_empty()) {
-        (Some(_), false) => finding("reach", Good, format!("GLVND with GLX vendors {vendors}: programs get the library as a vendor, however they load OpenGL")),
-        (Some(_), true) => finding("reach", Bad, "GLVND without a GLX vendor").cure("install a driver: on Debian `apt-get install libglx-mesa0`"),
-        (None, _) => finding("reach", Note, "no GLVND: LD_PRELOAD is used, which set-user-id and statically linked programs ignore"),
+        (Some(_), false) => finding("reach", Good, format!("GLVND with GLX vendors {vendors}: \
+                                                            programs get the library as a vendor, \
+                                                            however they load OpenGL")),
+        (Some(_), true) => finding("reach", Bad, "GLVND without a GLX vendor").cure("install a \
+                                                                                     driver: on \
+                                                                                     Debian `apt-get install libglx-mesa0`"),
+        (None, _) => finding("reach", Note, "no GLVND: LD_PRELOAD is used, which set-user-id and \
+                                             statically linked programs ignore"),
     });
     if m.glvnd.is_some() && m.egl_vendors.is_empty() {
         out.push(
@@ -71,22 +76,34 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
                     "indirect rendering: the X server draws, and the library is not asked",
                 )
                 .cure(
-                    "run the program on the machine with the display, or with Xvfb or VirtualGL on this one",
+                    "run the program on the machine with the display, or with Xvfb or VirtualGL on \
+                     this one",
                 ),
             );
         }
         if gl.version.is_empty() {
-            out.push(finding("driver", Note, "no compatibility profile: programs with glBegin and display lists will not start, with or without us"));
+            out.push(finding(
+                "driver",
+                Note,
+                "no compatibility profile: programs with glBegin and \
+                                              display lists will not start, with or without us",
+            ));
         }
         let software = ["llvmpipe", "softpipe", "swrast"].iter().any(|s| gl.renderer.contains(s));
         if software {
             out.push(finding(
                 "speed",
                 Good,
-                "a software driver: what is traced is not rasterized, so large scenes become faster",
+                "a software driver: what is traced is not rasterized, so large scenes become \
+                 faster",
             ));
         } else {
-            out.push(finding("speed", Note, "a hardware driver: pictures of rays travel to the card each frame, and small scenes become slower"));
+            out.push(finding(
+                "speed",
+                Note,
+                "a hardware driver: pictures of rays travel to the \
+                                             card each frame, and small scenes become slower",
+            ));
         }
     }
 
@@ -105,10 +122,15 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
                 .cure("use `gluray run --via vendor`: as a vendor library we sit below VirtualGL"),
         );
     }
-    if let Some(v) = set("LD_PRELOAD").filter(|v| v.contains("apitrace") || v.contains("glxtrace")) {
+    if let Some(v) = set("LD_PRELOAD").filter(|v| v.contains("apitrace") || v.contains("glxtrace"))
+    {
         out.push(
-            finding("environment", Note, format!("LD_PRELOAD={v}: two libraries take the same calls"))
-                .cure("trace with apitrace without us, or with --via vendor"),
+            finding(
+                "environment",
+                Note,
+                format!("LD_PRELOAD={v}: two libraries take the same calls"),
+            )
+            .cure("trace with apitrace without us, or with --via vendor"),
         );
     }
     for (name, what) in [("SNAP", "a snap"), ("FLATPAK_ID", "a flatpak")] {
@@ -117,7 +139,8 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
                 "environment",
                 Note,
                 format!(
-                    "this is inside {what}: programs outside are not reached, and its OpenGL may be its own"
+                    "this is inside {what}: programs outside are not reached, and its OpenGL may \
+                     be its own"
                 ),
             ));
         }
@@ -127,7 +150,8 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
             finding(
                 "environment",
                 Note,
-                "Wayland without X: programs that use EGL are reached, those that need GLX do not start",
+                "Wayland without X: programs that use EGL are reached, those that need GLX do not \
+                 start",
             )
             .cure("install and start Xwayland"),
         );
@@ -135,22 +159,23 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
 
     // Threads, settings, panel.
     let grade = if m.threads > 1 { Good } else { Note };
-    let threads = finding("threads", grade, format!("{} (`threads` says how many trace rays)", m.threads));
+    let threads =
+        finding("threads", grade, format!("{} (`threads` says how many trace rays)", m.threads));
     out.push(if m.threads > 1 {
         threads
     } else {
         threads.cure("with one core the program waits for its own pictures")
     });
     match &m.settings {
-        None => out.push(finding("settings", Good, "no file; defaults, environment and command line")),
+        None => {
+            out.push(finding("settings", Good, "no file; defaults, environment and command line"))
+        }
         Some((path, problems)) if problems.is_empty() => {
             out.push(finding("settings", Good, path.display().to_string()))
         }
-        Some((_, problems)) => out.extend(
-            problems
-                .iter()
-                .map(|p| finding("settings", Bad, p.clone()).cure("the rest of the file is used as it is")),
-        ),
+        Some((_, problems)) => out.extend(problems.iter().map(|p| {
+            finding("settings", Bad, p.clone()).cure("the rest of the file is used as it is")
+        })),
     }
     let (_, unknown) = crate::host::config::environment::assignments(&m.variables);
     out.extend(unknown.iter().map(|e| finding("settings", Note, e.to_string())));
@@ -170,8 +195,12 @@ fn glx_vendor(m: &Machine) -> Finding {
         None => {
             let names: Vec<&str> = tried.iter().map(|v| v.name.as_str()).collect();
             let (wanted, here) = (names.join(", "), m.glx_vendors.join(", "));
-            finding("vendor", Grade::Bad, format!("GLX: {wanted} would be taken, and there is {here}"))
-                .cure(format!("set GLURAY_GLX_VENDOR={}", m.glx_vendors[0]))
+            finding(
+                "vendor",
+                Grade::Bad,
+                format!("GLX: {wanted} would be taken, and there is {here}"),
+            )
+            .cure(format!("set GLURAY_GLX_VENDOR={}", m.glx_vendors[0]))
         }
     }
 }
@@ -189,22 +218,27 @@ fn egl_vendor(m: &Machine) -> Option<Finding> {
 }
 
 fn display(m: &Machine) -> Option<Finding> {
-    const START: &str = "start one, for example `Xvfb :77 -screen 0 1280x1024x24 +extension GLX -noreset &`, and set DISPLAY=:77";
+    const START: &str = "start one, for example `Xvfb :77 -screen 0 1280x1024x24 +extension GLX \
+                         -noreset &`, and set DISPLAY=:77";
     let Some(display) = &m.display[0] else {
         let wayland = m.display[1].is_some();
-        return (!wayland).then(|| finding("display", Grade::Bad, "DISPLAY is not set").cure(START));
+        return (!wayland)
+            .then(|| finding("display", Grade::Bad, "DISPLAY is not set").cure(START));
     };
     Some(match (&m.opengl, m.display_answers) {
         (Some(Err(why)), answers) if answers == Some(false) || !why.contains("not installed") => {
-            finding("display", Grade::Bad, format!("{display} does not give OpenGL: {why}")).cure(START)
+            finding("display", Grade::Bad, format!("{display} does not give OpenGL: {why}"))
+                .cure(START)
         }
         (_, Some(false)) => {
             finding("display", Grade::Bad, format!("there is no X server at {display}")).cure(START)
         }
-        (Some(Err(why)), _) => {
-            finding("display", Grade::Note, format!("{display}; {why}, so the driver was not asked"))
-                .cure("on Debian `apt-get install mesa-utils`")
-        }
+        (Some(Err(why)), _) => finding(
+            "display",
+            Grade::Note,
+            format!("{display}; {why}, so the driver was not asked"),
+        )
+        .cure("on Debian `apt-get install mesa-utils`"),
         _ => finding("display", Grade::Good, display.clone()),
     })
 }
@@ -233,7 +267,10 @@ mod tests {
             display: [Some(":77".into()), None],
             in_front_of: [
                 vec![Vendor { name: "mesa".into(), why: "the X server at :77 names it".into() }],
-                vec![Vendor { name: "libEGL_mesa.so.0".into(), why: "50_mesa.json names it".into() }],
+                vec![Vendor {
+                    name: "libEGL_mesa.so.0".into(),
+                    why: "50_mesa.json names it".into(),
+                }],
             ],
             display_answers: Some(true),
             opengl: Some(Ok(gl)),
@@ -246,7 +283,13 @@ mod tests {
         let of = findings(m);
         let bad = of.iter().filter(|f| f.grade != Grade::Good);
         bad.map(|f| {
-            format!("{} {:?}: {} [{}]", f.about, f.grade, f.found, f.cure.clone().unwrap_or_default())
+            format!(
+                "{} {:?}: {} [{}]",
+                f.about,
+                f.grade,
+                f.found,
+                f.cure.clone().unwrap_or_default()
+            )
         })
         .collect()
     }
@@ -266,11 +309,14 @@ mod tests {
         m.in_front_of[0].insert(0, vendor("gone", "the variable X names it"));
         m.in_front_of[1].insert(0, vendor("libEGL_nvidia.so.0", "10_nvidia.json names it"));
         let of = findings(&m);
-        let said: Vec<&str> = of.iter().filter(|f| f.about == "vendor").map(|f| f.found.as_str()).collect();
+        let said: Vec<&str> =
+            of.iter().filter(|f| f.about == "vendor").map(|f| f.found.as_str()).collect();
         assert_eq!(said.len(), 2, "{said:?}");
         assert_eq!(said[0], "GLX: nvidia, because the X server at :0 names it for the screen");
         assert!(said[1].starts_with("EGL: libEGL_nvidia.so.0, because 10_nvidia.json"), "{said:?}");
-        assert!(said[1].ends_with("no such display: libEGL_mesa.so.0, because 50_mesa.json names it"));
+        assert!(
+            said[1].ends_with("no such display: libEGL_mesa.so.0, because 50_mesa.json names it")
+        );
     }
 
     #[test]
@@ -284,11 +330,17 @@ mod tests {
             move |m: &mut Machine| m.variables.push((name.into(), value.into()))
         };
         for (text, expected) in [
-            (with(&|m| m.library = None), "library Bad: libgluray.so is not beside this program [build it"),
+            (
+                with(&|m| m.library = None),
+                "library Bad: libgluray.so is not beside this program [build it",
+            ),
             (with(&|m| m.lib_gl = None), "OpenGL Bad"),
             (with(&|m| m.glvnd = None), "reach Note: no GLVND: LD_PRELOAD"),
             (with(&|m| m.glx_vendors = vec!["nvidia".into()]), "set GLURAY_GLX_VENDOR=nvidia"),
-            (with(&|m| m.display[0] = None), "display Bad: DISPLAY is not set [start one, for example `Xvfb"),
+            (
+                with(&|m| m.display[0] = None),
+                "display Bad: DISPLAY is not set [start one, for example `Xvfb",
+            ),
             (
                 with(&|m| m.opengl = Some(Err("Error: unable to open display :77".into()))),
                 "unable to open display :77 [start one",
@@ -316,7 +368,8 @@ mod tests {
             }
         });
         assert!(
-            indirect.contains("indirect rendering") && indirect.contains("no compatibility profile"),
+            indirect.contains("indirect rendering")
+                && indirect.contains("no compatibility profile"),
             "{indirect}"
         );
     }

@@ -1,4 +1,5 @@
-//! Looking around. Nothing is loaded into this process: `glxinfo`, if there is one, asks the driver in a process of its own.
+//! Looking around. Nothing is loaded into this process: `glxinfo`, if there is one, asks the driver
+//! in a process of its own.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -74,15 +75,20 @@ pub fn inspect(library: Option<PathBuf>) -> Machine {
     let display = get("DISPLAY");
     let mut variables: Vec<(String, String)> =
         MATTER.iter().filter_map(|n| Some(((*n).to_owned(), get(n)?))).collect();
-    variables
-        .extend(texts().filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()));
+    variables.extend(
+        texts()
+            .filter(|(n, v)| n.starts_with("GLURAY_") && !n.ends_with("SECRET") && !v.is_empty()),
+    );
     Machine {
         library,
         lib_gl: find("libGL.so.1"),
         glvnd: find("libGLdispatch.so.0"),
         glx_vendors: glx_vendors(&folders),
         egl_vendors: egl_vendors(),
-        in_front_of: [crate::interpose::glvnd::glx_vendors(get), crate::interpose::glvnd::egl_vendors(get)],
+        in_front_of: [
+            crate::interpose::glvnd::glx_vendors(get),
+            crate::interpose::glvnd::egl_vendors(get),
+        ],
         display_answers: display
             .as_deref()
             .and_then(local_display)
@@ -137,8 +143,11 @@ fn glx_vendors(folders: &[PathBuf]) -> Vec<String> {
 
 fn egl_vendors() -> Vec<String> {
     let folders = ["/usr/share/glvnd/egl_vendor.d", "/etc/glvnd/egl_vendor.d"];
-    let mut out: Vec<String> =
-        folders.iter().flat_map(|f| names_in(Path::new(f))).filter(|n| n.ends_with(".json")).collect();
+    let mut out: Vec<String> = folders
+        .iter()
+        .flat_map(|f| names_in(Path::new(f)))
+        .filter(|n| n.ends_with(".json"))
+        .collect();
     out.sort();
     out
 }
@@ -148,7 +157,8 @@ fn local_display(text: &str) -> Option<u32> {
     text.strip_prefix("unix").unwrap_or(text).strip_prefix(':')?.split('.').next()?.parse().ok()
 }
 
-/// What `glxinfo -B` says, within some seconds: a display that does not answer must not hang the doctor.
+/// What `glxinfo -B` says, within some seconds: a display that does not answer must not hang the
+/// doctor.
 fn ask_driver() -> Result<OpenGl, String> {
     const PATIENCE: Duration = Duration::from_secs(15);
     let mut command = Command::new("glxinfo");
@@ -183,7 +193,9 @@ fn ask_driver() -> Result<OpenGl, String> {
 /// The lines of `glxinfo -B` (Mesa demos).
 pub(super) fn parse_glxinfo(text: &str) -> OpenGl {
     let value = |name: &str| {
-        let found = text.lines().find_map(|l| l.trim().strip_prefix(name)?.strip_prefix(':').map(str::trim));
+        let found = text
+            .lines()
+            .find_map(|l| l.trim().strip_prefix(name)?.strip_prefix(':').map(str::trim));
         found.unwrap_or_default().to_owned()
     };
     OpenGl {
@@ -206,9 +218,11 @@ fn settings() -> Option<(PathBuf, Vec<String>)> {
     let sources = Sources::new(texts().collect(), Vec::new());
     let path = sources.file.clone().filter(|p| sources.file_is_required || p.exists())?;
     let problems = match ConfigFile::read(&path) {
-        Ok(file) => {
-            assign(&Settings::default(), &file.all_assignments()).1.iter().map(ToString::to_string).collect()
-        }
+        Ok(file) => assign(&Settings::default(), &file.all_assignments())
+            .1
+            .iter()
+            .map(ToString::to_string)
+            .collect(),
         Err(e) => vec![datasets::cli::report(&e.into())],
     };
     Some((path, problems))
@@ -228,7 +242,11 @@ mod tests {
 
     #[test]
     fn the_lines_of_glxinfo_are_found() {
-        let text = "name of display: :99\ndirect rendering: Yes\nExtended renderer info (GLX_MESA_query_renderer):\n    Vendor: Mesa (0xffffffff)\nOpenGL vendor string: Mesa/X.org\nOpenGL renderer string: llvmpipe (LLVM 15.0.6, 256 bits)\nOpenGL core profile version string: 4.5 (Core Profile) Mesa 22.3.6\nOpenGL version string: 4.5 (Compatibility Profile) Mesa 22.3.6\n";
+        let text = "name of display: :99\ndirect rendering: Yes\nExtended renderer info \
+                    (GLX_MESA_query_renderer):\n    Vendor: Mesa (0xffffffff)\nOpenGL vendor \
+                    string: Mesa/X.org\nOpenGL renderer string: llvmpipe (LLVM 15.0.6, 256 \
+                    bits)\nOpenGL core profile version string: 4.5 (Core Profile) Mesa \
+                    22.3.6\nOpenGL version string: 4.5 (Compatibility Profile) Mesa 22.3.6\n";
         let gl = parse_glxinfo(text);
         assert!(
             gl.direct

@@ -1,7 +1,7 @@
 //! What there is to work with, and what will not work: everything `gluray doctor` says.
 //!
-//! A [`Machine`] is what was seen (files, variables, the answer of `glxinfo`), plain data; [`findings`] judges it. So each judgement is
-//! tested without the machine that it is about.
+//! A [`Machine`] is what was seen (files, variables, the answer of `glxinfo`), plain data;
+//! [`findings`] judges it. So each judgement is tested without the machine that it is about.
 
 mod judge;
 mod machine;

@@ -3,10 +3,16 @@
 use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
 
-fn base(variable: impl Fn(&str) -> Option<String>, name: &str, below_home: &str) -> Option<PathBuf> {
-    // "All paths set in these environment variables must be absolute. If ... relative ... consider the path invalid."
+fn base(
+    variable: impl Fn(&str) -> Option<String>,
+    name: &str,
+    below_home: &str,
+) -> Option<PathBuf> {
+    // "All paths set in these environment variables must be absolute. If ... relative ... consider
+    // the path invalid."
     let set = variable(name).map(PathBuf::from).filter(|p| p.is_absolute());
-    set.or_else(|| Some(PathBuf::from(variable("HOME")?).join(below_home))).map(|p| p.join("gluray"))
+    set.or_else(|| Some(PathBuf::from(variable("HOME")?).join(below_home)))
+        .map(|p| p.join("gluray"))
 }
 
 /// An environment variable of this process, when set and text.
@@ -29,15 +35,16 @@ pub fn state(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     base(variable, "XDG_STATE_HOME", ".local/state")
 }
 
-/// Where running processes meet: `$XDG_RUNTIME_DIR/gluray`. Without that variable `gluray-UID` in the folder for temporary files, which
-/// only its owner may enter (whoever makes it checks that).
+/// Where running processes meet: `$XDG_RUNTIME_DIR/gluray`. Without that variable `gluray-UID` in
+/// the folder for temporary files, which only its owner may enter (whoever makes it checks that).
 pub fn runtime(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     let set = variable("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|p| p.is_absolute());
     set.map(|p| p.join("gluray"))
         .or_else(|| Some(std::env::temp_dir().join(format!("gluray-{}", user_id()?))))
 }
 
-/// Reads a plain text file that somebody named. It never waits: a FIFO or a device in its place is an error.
+/// Reads a plain text file that somebody named. It never waits: a FIFO or a device in its place is
+/// an error.
 pub(crate) fn read_plain(path: &Path) -> std::io::Result<String> {
     use std::os::unix::fs::OpenOptionsExt;
     let flags = libc::O_NONBLOCK | libc::O_CLOEXEC | libc::O_NOCTTY;
@@ -48,8 +55,9 @@ pub(crate) fn read_plain(path: &Path) -> std::io::Result<String> {
     }
 }
 
-/// Opens a plain file of this user's for reading, with what is known of it; `None` for anything else. It never waits, whatever lies there: a FIFO of somebody else's in a
-/// folder that is shared, a device, a link to one.
+/// Opens a plain file of this user's for reading, with what is known of it; `None` for anything
+/// else. It never waits, whatever lies there: a FIFO of somebody else's in a folder that is shared,
+/// a device, a link to one.
 pub(crate) fn open_own(path: &Path) -> Option<(File, Metadata)> {
     use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
     let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK | libc::O_CLOEXEC | libc::O_NOCTTY;
@@ -75,7 +83,10 @@ mod tests {
         let with = |set: &'static [(&'static str, &'static str)]| {
             move |n: &str| set.iter().find(|(k, _)| *k == n).map(|(_, v)| (*v).to_owned())
         };
-        assert_eq!(config(with(&[("XDG_CONFIG_HOME", "/c"), ("HOME", "/h")])), Some("/c/gluray".into()));
+        assert_eq!(
+            config(with(&[("XDG_CONFIG_HOME", "/c"), ("HOME", "/h")])),
+            Some("/c/gluray".into())
+        );
         assert_eq!(
             config(with(&[("XDG_CONFIG_HOME", "c"), ("HOME", "/h")])),
             Some("/h/.config/gluray".into())
@@ -83,6 +94,13 @@ mod tests {
         assert_eq!(state(with(&[("HOME", "/h")])), Some("/h/.local/state/gluray".into()));
         assert_eq!(state(with(&[])), None);
         assert_eq!(runtime(with(&[("XDG_RUNTIME_DIR", "/r")])), Some("/r/gluray".into()));
-        assert!(runtime(with(&[])).unwrap().file_name().unwrap().to_string_lossy().starts_with("gluray-"));
+        assert!(
+            runtime(with(&[]))
+                .unwrap()
+                .file_name()
+                .unwrap()
+                .to_string_lossy()
+                .starts_with("gluray-")
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! The library's side of the control panel: once a frame, what the panel wants and what it is told.
 //!
-//! One link for the process, made when the first frame ends. Contexts take up new settings at the end of their own frame.
+//! One link for the process, made when the first frame ends. Contexts take up new settings at the
+//! end of their own frame.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::capture::geometry_cache::Geometry;
@@ -82,12 +83,17 @@ impl FrameTelemetry {
         self.problem.take()
     }
 
-    /// A frame has ended; `report` counts since the context was made. The objects of the frame for the report, largest first.
+    /// A frame has ended; `report` counts since the context was made. The objects of the frame for
+    /// the report, largest first.
     pub(crate) fn frame_done(&mut self, report: &Report, size: [u32; 2]) -> Vec<ObjectInfo> {
         let now = Instant::now();
-        let took = self.frame_ended.replace(now).map_or(0.0, |t| now.duration_since(t).as_secs_f64() * 1e3);
+        let took = self
+            .frame_ended
+            .replace(now)
+            .map_or(0.0, |t| now.duration_since(t).as_secs_f64() * 1e3);
         let mut objects = self.take_objects();
-        // Never waits: another thread talks to the panel just now, or did so when this process was forked.
+        // Never waits: another thread talks to the panel just now, or did so when this process was
+        // forked.
         let mut slot = match LINK.try_lock() {
             Ok(slot) => slot,
             Err(TryLockError::Poisoned(slot)) => slot.into_inner(),
@@ -137,7 +143,8 @@ impl FrameTelemetry {
     }
 }
 
-/// The file that `GLURAY_DUMP` names. Read once: the program may change its environment while we look.
+/// The file that `GLURAY_DUMP` names. Read once: the program may change its environment while we
+/// look.
 fn dump_file() -> Option<&'static Path> {
     static FILE: OnceLock<Option<PathBuf>> = OnceLock::new();
     FILE.get_or_init(|| crate::host::folders::variable("GLURAY_DUMP").map(PathBuf::from)).as_deref()
@@ -160,7 +167,8 @@ fn between(before: &Report, now: &Report) -> FrameStats {
         now: &BTreeMap<String, V>,
         before: &BTreeMap<String, V>,
     ) -> BTreeMap<String, V> {
-        let one = |(k, v): (&String, &V)| (k.clone(), *v - before.get(k).copied().unwrap_or_default());
+        let one =
+            |(k, v): (&String, &V)| (k.clone(), *v - before.get(k).copied().unwrap_or_default());
         now.iter().map(one).filter(|(_, v)| *v > V::default()).collect()
     }
     FrameStats {
@@ -189,8 +197,9 @@ fn rgba(d: &Draw, vertex: usize) -> [f32; 4] {
     }
 }
 
-/// The draws as a scene in one frame for all of them: the viewer's axes, which OpenGL's fixed function names; the first object's own axes where shaders only
-/// say how positions get to the screen.
+/// The draws as a scene in one frame for all of them: the viewer's axes, which OpenGL's fixed
+/// function names; the first object's own axes where shaders only say how positions get to the
+/// screen.
 fn scene<'a>(frame: u64, draws: impl Iterator<Item = &'a Draw> + Clone) -> Scene {
     let clip = |d: &Draw| DMat4::from_cols_array(&d.clip_from_object.map(f64::from));
     let shaded = |d: &&Draw| matches!(d.shading, Shading::Program(_));
@@ -199,8 +208,9 @@ fn scene<'a>(frame: u64, draws: impl Iterator<Item = &'a Draw> + Clone) -> Scene
         None => "the viewer's axes: x right, y up, z towards the viewer, in the program's unit",
         Some(_) => "the axes of the first object that a shader draws, in the program's unit",
     };
-    let objects =
-        draws.map(|d| object(d, first.filter(|_| shaded(&d)).map(|first| first * clip(d)))).collect();
+    let objects = draws
+        .map(|d| object(d, first.filter(|_| shaded(&d)).map(|first| first * clip(d))))
+        .collect();
     Scene { program: config::program_name(), frame, space: space.into(), objects }
 }
 
@@ -211,12 +221,19 @@ fn object(d: &Draw, placed: Option<DMat4>) -> Object {
     Object {
         key: key_of(&d.geometry),
         name: calls(d.calls),
-        world_from_object: placed.map_or_else(|| d.state.model_view.map(f64::from), |m| m.to_cols_array()),
+        world_from_object: placed
+            .map_or_else(|| d.state.model_view.map(f64::from), |m| m.to_cols_array()),
         color: rgba(d, 0),
         positions: mesh.positions.iter().map(|p| p.to_array()).collect(),
         indices: mesh.indices.clone(),
-        normals: if has_normals { (0..n).map(|i| d.attributes.normals.at(i)).collect() } else { Vec::new() },
-        colors: (0..n).map(|i| rgba(d, i).map(|c| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8)).collect(),
+        normals: if has_normals {
+            (0..n).map(|i| d.attributes.normals.at(i)).collect()
+        } else {
+            Vec::new()
+        },
+        colors: (0..n)
+            .map(|i| rgba(d, i).map(|c| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8))
+            .collect(),
     }
 }
 
@@ -225,8 +242,8 @@ fn calls(n: u64) -> String {
 }
 
 fn write_to_scenes_folder(scene: &Scene) -> Result<PathBuf, String> {
-    let folder =
-        scenes_folder(crate::host::folders::variable).ok_or("neither XDG_STATE_HOME nor HOME is set")?;
+    let folder = scenes_folder(crate::host::folders::variable)
+        .ok_or("neither XDG_STATE_HOME nor HOME is set")?;
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let program: String =
         scene.program.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
@@ -259,6 +276,10 @@ mod tests {
         };
         let stats = between(&before, &now);
         assert_eq!((stats.frame, stats.traced, stats.phases_ms["trace"]), (4, 12, 2.5));
-        assert_eq!(stats.rays, [("primary".to_owned(), 10)].into(), "kinds without rays are left out");
+        assert_eq!(
+            stats.rays,
+            [("primary".to_owned(), 10)].into(),
+            "kinds without rays are left out"
+        );
     }
 }

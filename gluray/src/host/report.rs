@@ -1,5 +1,6 @@
-//! What was traced, what was passed and why: a JSON file per process, rewritten once a second while frames come, because many programs end without
-//! running any of their exit handlers, and when a context or the program ends.
+//! What was traced, what was passed and why: a JSON file per process, rewritten once a second while
+//! frames come, because many programs end without running any of their exit handlers, and when a
+//! context or the program ends.
 
 use crate::host::timeline::SpanRecorder;
 use serde::{Deserialize, Serialize};
@@ -46,7 +47,8 @@ pub struct Report {
     pub cache_misses: u64,
     /// Pictures that were shown once more without a ray, because nothing had changed.
     pub pictures_again: u64,
-    /// Images of textures read from the driver: one for each texture that is drawn with after it changed.
+    /// Images of textures read from the driver: one for each texture that is drawn with after it
+    /// changed.
     pub textures_read: u64,
     /// Pixels that traced surfaces covered.
     pub pixels: u64,
@@ -115,7 +117,8 @@ struct WriteSchedule {
     written: Option<Instant>,
     /// Something has changed since.
     behind: bool,
-    /// The process that has a thread which writes when the time has come. A child that was forked has none of its parent's threads.
+    /// The process that has a thread which writes when the time has come. A child that was forked
+    /// has none of its parent's threads.
     waiting: Option<u32>,
 }
 
@@ -140,8 +143,8 @@ impl WriteSchedule {
         WriteSchedule { begun: None, written: None, behind: false, waiting: None }
     }
 
-    /// Time between two writings: a tenth of the program's life so far, within the limits. Nothing of
-    /// ours runs in a program that is killed, and this is what its report lacks then.
+    /// Time between two writings: a tenth of the program's life so far, within the limits. Nothing
+    /// of ours runs in a program that is killed, and this is what its report lacks then.
     fn pause(&self, now: Instant) -> Duration {
         let life = self.begun.map_or(Duration::ZERO, |b| now.saturating_duration_since(b));
         (life / 10).clamp(Self::SHORTEST, Self::LONGEST)
@@ -174,7 +177,8 @@ impl WriteSchedule {
     }
 }
 
-/// The process that drew: a child that was forked and draws nothing has its parent's numbers, and nothing to tell.
+/// The process that drew: a child that was forked and draws nothing has its parent's numbers, and
+/// nothing to tell.
 static DRAWING: AtomicU32 = AtomicU32::new(0);
 static SCHEDULE: Mutex<WriteSchedule> = Mutex::new(WriteSchedule::new());
 /// One writing at a time.
@@ -211,7 +215,8 @@ fn write_spans(file: &Path) {
     if new.is_empty() || SPANS_WRITTEN.fetch_add(new.len(), Relaxed) > MOST_SPANS {
         return;
     }
-    let lines = new.iter().filter_map(|s| Some(serde_json::to_string(s).ok()? + "\n")).collect::<String>();
+    let lines =
+        new.iter().filter_map(|s| Some(serde_json::to_string(s).ok()? + "\n")).collect::<String>();
     // A report that cannot be written must not trouble the program.
     if let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(file) {
         file.write_all(lines.as_bytes()).ok();
@@ -291,7 +296,8 @@ impl Counters {
                         crate::interpose::panic_guard::guard(|| write(&dir));
                     }
                 };
-                let spawned = std::thread::Builder::new().name("gluray report".to_owned()).spawn(wait);
+                let spawned =
+                    std::thread::Builder::new().name("gluray report".to_owned()).spawn(wait);
                 if spawned.is_err() {
                     // The next frame tries again.
                     schedule().waited();
@@ -330,7 +336,8 @@ fn write(dir: &Path) {
     }
     sum.problems.extend(crate::cluster::problems());
     write_spans(&dir.join(format!("{}.spans", sum.pid)));
-    let (file, fresh) = (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
+    let (file, fresh) =
+        (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
     // A report that cannot be written must not trouble the program.
     if let Ok(text) = serde_json::to_vec(&sum)
         && std::fs::write(&fresh, text).is_ok()
@@ -377,12 +384,23 @@ mod tests {
                 }
             }
             let later = writings - after_ten_secs;
-            assert!((9..=11).contains(&later), "{later} in ten seconds at {frames_per_sec} a second");
-            // 20 ms apart up to 0.2 s, then each a tenth of its time after the other: ln 50 / ln 1.1.
-            assert!(after_ten_secs <= 10 + 42, "{after_ten_secs} at first, at {frames_per_sec} a second");
+            assert!(
+                (9..=11).contains(&later),
+                "{later} in ten seconds at {frames_per_sec} a second"
+            );
+            // 20 ms apart up to 0.2 s, then each a tenth of its time after the other: ln 50 / ln
+            // 1.1.
+            assert!(
+                after_ten_secs <= 10 + 42,
+                "{after_ten_secs} at first, at {frames_per_sec} a second"
+            );
             // The program sits idle, or ends.
             assert!(!schedule.behind || due.is_some(), "the last frame comes into the file");
-            assert_eq!(schedule.changed(at(frames), true, 7), WriteDecision::Write, "an end is not put off");
+            assert_eq!(
+                schedule.changed(at(frames), true, 7),
+                WriteDecision::Write,
+                "an end is not put off"
+            );
         }
     }
 

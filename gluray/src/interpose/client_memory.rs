@@ -1,11 +1,14 @@
 //! The program's own memory: vertex arrays, index arrays, parameters behind pointers.
 //!
-//! A program that calls OpenGL promises that what the call names can be read; the driver would read it just so. Two things have to come together before anything is read, and neither can be
-//! made outside of the rooms for unsafe code:
+//! A program that calls OpenGL promises that what the call names can be read; the driver would read
+//! it just so. Two things have to come together before anything is read, and neither can be made
+//! outside of the rooms for unsafe code:
 //!
-//! - [`ActiveCall`], with the arguments of the draw call that the program is in. Hooks make it. [`Elements`] come from it alone, so they are the vertices which that call names, and
-//!   what is read of them lives as long as the call.
-//! - [`ArraySource`], an array as the driver has it, asked of the driver here. Nobody else can make one of client memory, or change one.
+//! - [`ActiveCall`], with the arguments of the draw call that the program is in. Hooks make it.
+//!   [`Elements`] come from it alone, so they are the vertices which that call names, and what is
+//!   read of them lives as long as the call.
+//! - [`ArraySource`], an array as the driver has it, asked of the driver here. Nobody else can make
+//!   one of client memory, or change one.
 //!
 //! This is a room for unsafe code.
 #![allow(unsafe_code, reason = "a room: vertex arrays live in the program's memory")]
@@ -21,8 +24,9 @@ use std::borrow::Cow;
 /// Bytes of the program's memory.
 ///
 /// # Safety
-/// The program is in a call that promises that `length` bytes from `address` on can be read (with null: that nothing is), and nobody writes to them or frees them while `'a` lasts,
-/// which must end with the call.
+/// The program is in a call that promises that `length` bytes from `address` on can be read (with
+/// null: that nothing is), and nobody writes to them or frees them while `'a` lasts, which must end
+/// with the call.
 pub(crate) unsafe fn view<'a>(address: usize, length: usize) -> &'a [u8] {
     if address == 0 || length == 0 {
         return &[];
@@ -60,8 +64,7 @@ pub(crate) unsafe fn ints<const N: usize>(address: usize) -> [i32; N] {
     unsafe { floats::<N>(address) }.map(|f| f.to_bits().cast_signed())
 }
 
-// ---- The vertices that a call names ----------------------------------------------------------------------------------
-
+// ---- The vertices that a call names -------------------------------------------------------------
 /// What a draw call names.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum DrawArguments {
@@ -81,7 +84,8 @@ pub(crate) struct ActiveCall<'c> {
 
 impl ActiveCall<'_> {
     /// # Safety
-    /// The program is in a call of OpenGL's with these arguments, which does not return before this goes.
+    /// The program is in a call of OpenGL's with these arguments, which does not return before this
+    /// goes.
     pub(crate) unsafe fn new(named: DrawArguments) -> Self {
         ActiveCall { named, call: PhantomData }
     }
@@ -103,7 +107,10 @@ impl Deref for Elements<'_> {
 
 impl<'c> Elements<'c> {
     /// Of a call, and the index that restarts primitives.
-    pub(crate) fn of(call: &'c ActiveCall<'_>, restart: Option<u32>) -> Result<Elements<'c>, &'static str> {
+    pub(crate) fn of(
+        call: &'c ActiveCall<'_>,
+        restart: Option<u32>,
+    ) -> Result<Elements<'c>, &'static str> {
         const NEGATIVE: &str = "a negative count";
         let which = match call.named {
             DrawArguments::Arrays { first, count } => {
@@ -125,7 +132,8 @@ impl<'c> Elements<'c> {
                 let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
                 let bytes: Cow<'_, [u8]> = match buffer {
                     0 if at == 0 => return Err("indices without an address"),
-                    // SAFETY: the call names so many indices there, and it lasts longer than `call` is lent.
+                    // SAFETY: the call names so many indices there, and it lasts longer than `call`
+                    // is lent.
                     0 => Cow::Borrowed(unsafe { view(at, n * width) }),
                     buffer => Cow::Owned(read_buffer(buffer, at, n * width)?),
                 };
@@ -136,8 +144,7 @@ impl<'c> Elements<'c> {
     }
 }
 
-// ---- Arrays ----------------------------------------------------------------------------------------------------------
-
+// ---- Arrays -------------------------------------------------------------------------------------
 /// Where an array is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ArrayLayout {
@@ -182,17 +189,21 @@ impl ArrayLayout {
         PackedArray { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
     }
 
-    /// Offset and length of vertices `first..first + count`; an error in words when they cannot be read.
+    /// Offset and length of vertices `first..first + count`; an error in words when they cannot be
+    /// read.
     fn range(&self, first: usize, count: usize) -> Result<(usize, usize), &'static str> {
         const FAR: &str = "arrays beyond the end of memory";
         let element = self.element();
         if element == 0 || self.size > 4 {
             return Err("an array of a type that is not read");
         }
-        let start = first.checked_mul(self.step()).and_then(|o| o.checked_add(self.address)).ok_or(FAR)?;
+        let start =
+            first.checked_mul(self.step()).and_then(|o| o.checked_add(self.address)).ok_or(FAR)?;
         let length = match count.checked_sub(1) {
             None => 0,
-            Some(more) => more.checked_mul(self.step()).and_then(|n| n.checked_add(element)).ok_or(FAR)?,
+            Some(more) => {
+                more.checked_mul(self.step()).and_then(|n| n.checked_add(element)).ok_or(FAR)?
+            }
         };
         match start.checked_add(length).is_some_and(|end| isize::try_from(end).is_ok()) {
             true => Ok((start, length)),
@@ -222,7 +233,8 @@ impl Deref for ArraySource {
 }
 
 impl ArraySource {
-    /// A fixed-function array, asked of the driver by these names. Where there are no buffers all arrays are in client memory.
+    /// A fixed-function array, asked of the driver by these names. Where there are no buffers all
+    /// arrays are in client memory.
     pub(crate) fn of_fixed(
         size: ComponentCount,
         [kind, stride, pointer, buffer]: [u32; 4],
@@ -263,14 +275,15 @@ impl ArraySource {
         (layout.buffer != 0).then_some(ArraySource(layout))
     }
 
-    /// The vertices that a call names where they are, with gaps; an error in words when they cannot be read.
+    /// The vertices that a call names where they are, with gaps; an error in words when they cannot
+    /// be read.
     pub(crate) fn view<'c>(&self, elements: &Elements<'c>) -> Result<Cow<'c, [u8]>, &'static str> {
         let (first, count) = elements.span();
         let (start, length) = self.range(first, count)?;
         match self.buffer {
             0 if self.address == 0 => Err("an array without an address"),
-            // SAFETY: the program has given this array to OpenGL (`of_fixed`, `of_attribute`), and is in a call that names these of its elements (`Elements::of`), for
-            // the time of `'c`.
+            // SAFETY: the program has given this array to OpenGL (`of_fixed`, `of_attribute`), and
+            // is in a call that names these of its elements (`Elements::of`), for the time of `'c`.
             0 => Ok(Cow::Borrowed(unsafe { view(start, length) })),
             buffer => read_buffer(buffer, start, length).map(Cow::Owned),
         }
@@ -282,7 +295,11 @@ impl ArraySource {
     }
 
     /// Elements `first..first + count` of an array in a buffer, tightly packed.
-    pub(crate) fn read_range(&self, first: usize, count: usize) -> Result<PackedArray, &'static str> {
+    pub(crate) fn read_range(
+        &self,
+        first: usize,
+        count: usize,
+    ) -> Result<PackedArray, &'static str> {
         let (start, length) = self.range(first, count)?;
         match self.buffer {
             0 => Err("an array in client memory"),

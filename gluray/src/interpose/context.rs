@@ -1,10 +1,11 @@
 //! The books of contexts: which is current where, and what each knows.
 //!
-//! A context is owned by the thread it is current on (see `symbols/current_context.rs`) or, while it is current nowhere, by the register. So no call needs a
-//! lock, and a context that is destroyed in flight lives on until its thread leaves it, as OpenGL says.
+//! A context is owned by the thread it is current on (see `symbols/current_context.rs`) or, while
+//! it is current nowhere, by the register. So no call needs a lock, and a context that is destroyed
+//! in flight lives on until its thread leaves it, as OpenGL says.
 //!
-//! It goes into the register before the driver lets go of it, and out of it after the driver has taken it: in between another thread may make it
-//! current, and must find it.
+//! It goes into the register before the driver lets go of it, and out of it after the driver has
+//! taken it: in between another thread may make it current, and must find it.
 
 use crate::capture::attribute_cache::AttributeCache;
 use crate::capture::buffer_writes::BufferWrites;
@@ -102,8 +103,13 @@ struct ContextRegistry {
 static CONTEXT_REGISTRY: OnceLock<Mutex<ContextRegistry>> = OnceLock::new();
 
 fn registry() -> std::sync::MutexGuard<'static, ContextRegistry> {
-    let new =
-        || Mutex::new(ContextRegistry { idle: HashMap::new(), shared: HashMap::new(), seen: HashSet::new() });
+    let new = || {
+        Mutex::new(ContextRegistry {
+            idle: HashMap::new(),
+            shared: HashMap::new(),
+            seen: HashSet::new(),
+        })
+    };
     CONTEXT_REGISTRY.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -113,7 +119,8 @@ pub(crate) fn created(handle: usize, share: usize) {
         return;
     }
     let mut r = registry();
-    let shared = if share == 0 { ShareGroup::default() } else { r.shared.entry(share).or_default().clone() };
+    let shared =
+        if share == 0 { ShareGroup::default() } else { r.shared.entry(share).or_default().clone() };
     r.shared.insert(handle, shared);
     r.seen.insert(handle);
     // The address of a context that was destroyed may come again.
@@ -149,7 +156,8 @@ pub(crate) enum PreviousContext {
     Doomed(Box<Context>),
 }
 
-/// Before the current context changes: what is pending is drawn, and the context is there for other threads.
+/// Before the current context changes: what is pending is drawn, and the context is there for other
+/// threads.
 pub(crate) fn release_current() -> PreviousContext {
     crate::interpose::panic_guard::hand_over_to_driver();
     let wrote = symbols::with_context(|c| {
@@ -163,7 +171,10 @@ pub(crate) fn release_current() -> PreviousContext {
     if old.destroyed_while_current {
         return PreviousContext::Doomed(old);
     }
-    let left = PreviousContext::Idle(old.handle, (wrote == Some(true)).then(|| old.texture_writes.clone()));
+    let left = PreviousContext::Idle(
+        old.handle,
+        (wrote == Some(true)).then(|| old.texture_writes.clone()),
+    );
     let before = registry().idle.insert(old.handle, old);
     drop(before);
     left
@@ -219,7 +230,8 @@ fn install_current(context: Box<Context>) {
     symbols::thread_enters();
     match symbols::install(context) {
         Ok(()) => symbols::arm(),
-        // Some programs change contexts in exit handlers, when the thread's storage is gone already.
+        // Some programs change contexts in exit handlers, when the thread's storage is gone
+        // already.
         Err(context) => {
             symbols::thread_leaves();
             let before = registry().idle.insert(context.handle, context);
@@ -242,14 +254,18 @@ fn swaps() -> &'static [usize] {
     static SWAPS: OnceLock<Vec<usize>> = OnceLock::new();
     SWAPS.get_or_init(|| {
         let damage = ["eglSwapBuffersWithDamageKHR", "eglSwapBuffersWithDamageEXT"];
-        indices_of(&[&["glXSwapBuffers", "eglSwapBuffers", "glXSwapBuffersMscOML"][..], &damage].concat())
+        indices_of(
+            &[&["glXSwapBuffers", "eglSwapBuffers", "glXSwapBuffersMscOML"][..], &damage].concat(),
+        )
     })
 }
 
 /// Calls by which a program looks at what it drew.
 fn reads() -> &'static [usize] {
     static READS: OnceLock<Vec<usize>> = OnceLock::new();
-    READS.get_or_init(|| indices_of(&["glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glGetTexImage"]))
+    READS.get_or_init(|| {
+        indices_of(&["glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glGetTexImage"])
+    })
 }
 
 /// Calls that show something only when the front buffer is drawn to.
@@ -340,8 +356,7 @@ impl Context {
         }
     }
 
-    // ---- Errors: ours must not be seen, the program's must not be lost ------------------------------------------------
-
+    // ---- Errors: ours must not be seen, the program's must not be lost --------------------------
     /// Takes the driver's pending errors into our keeping.
     pub(crate) fn keep_errors(&mut self) {
         for _ in 0..8 {
@@ -370,8 +385,7 @@ impl Context {
         if self.errors.is_empty() { None } else { Some(self.errors.remove(0)) }
     }
 
-    // ---- Watched calls ------------------------------------------------------------------------------------------------
-
+    // ---- Watched calls --------------------------------------------------------------------------
     pub(crate) fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
         if self.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("another call between Begin and End");
@@ -382,8 +396,9 @@ impl Context {
             r.note_driver_call(class, flushes, draws);
         }
         if flushes {
-            let invisible =
-                front_only().contains(&index) && self.capabilities.double_buffered && !self.draws_to_front();
+            let invisible = front_only().contains(&index)
+                && self.capabilities.double_buffered
+                && !self.draws_to_front();
             if !invisible && self.recording.is_none() {
                 self.flush(symbols::NAMES[index].to_str().unwrap_or("a call"));
             }
@@ -431,7 +446,9 @@ impl Context {
     }
 
     fn draws_to_front(&self) -> bool {
-        self.state.draw_buffer != BACK && self.state.draw_buffer != BACK_LEFT && self.state.framebuffer == 0
+        self.state.draw_buffer != BACK
+            && self.state.draw_buffer != BACK_LEFT
+            && self.state.framebuffer == 0
     }
 
     /// Tells the driver the current attributes it does not know.
@@ -442,11 +459,11 @@ impl Context {
         }
     }
 
-    // ---- State --------------------------------------------------------------------------------------------------------
-
+    // ---- State ----------------------------------------------------------------------------------
     /// The state now. Ends the batch of immediate mode when it changed.
     pub(crate) fn refresh(&mut self) {
-        const DRAWS: u8 = class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
+        const DRAWS: u8 =
+            class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
         self.on_watched_call = 0;
         symbols::arm();
         self.finish_redraw();
@@ -470,7 +487,8 @@ impl Context {
         }
         if self.dirty & class::CURRENT != 0 && !self.capabilities.core {
             let now = CurrentAttributes::query();
-            self.untracked_color = now.untracked_color(fresh.color_material.filter(|_| fresh.lighting));
+            self.untracked_color =
+                now.untracked_color(fresh.color_material.filter(|_| fresh.lighting));
             if now != self.current {
                 self.end_batch();
                 self.current = now;

@@ -42,7 +42,8 @@ pub fn glx_vendors(get: impl Fn(&str) -> Option<String>) -> Vec<Vendor> {
         Err("DISPLAY is not set".into())
     } else {
         let authority = get("XAUTHORITY").map(PathBuf::from);
-        let authority = authority.or_else(|| get("HOME").map(|h| Path::new(&h).join(".Xauthority")));
+        let authority =
+            authority.or_else(|| get("HOME").map(|h| Path::new(&h).join(".Xauthority")));
         server::vendor_names(&display, authority.as_deref())
     };
     glx_order(get, &display, names)
@@ -56,8 +57,10 @@ fn glx_order(
     // `gluray run` keeps in ours what it replaces in GLVND's.
     let forced = format!("__GLX_FORCE_VENDOR_LIBRARY_{}", screen_of(display));
     let variables = ["GLURAY_GLX_VENDOR", forced.as_str(), "__GLX_VENDOR_LIBRARY_NAME"];
-    let mut out: Vec<Vendor> =
-        variables.iter().filter_map(|v| vendor(&get(v)?, format!("the variable {v} names it"))).collect();
+    let mut out: Vec<Vendor> = variables
+        .iter()
+        .filter_map(|v| vendor(&get(v)?, format!("the variable {v} names it")))
+        .collect();
     let without = match names {
         Ok(names) => {
             let why = format!("the X server at {display} names it for the screen");
@@ -83,7 +86,8 @@ pub fn egl_vendors(get: impl Fn(&str) -> Option<String>) -> Vec<Vendor> {
     let files: Vec<PathBuf> = match of_variable("__EGL_VENDOR_LIBRARY_FILENAMES") {
         Some(files) => files.split(':').map(PathBuf::from).collect(),
         None => {
-            let folders = of_variable("__EGL_VENDOR_LIBRARY_DIRS").unwrap_or_else(|| EGL_FOLDERS.to_owned());
+            let folders =
+                of_variable("__EGL_VENDOR_LIBRARY_DIRS").unwrap_or_else(|| EGL_FOLDERS.to_owned());
             folders.split(':').flat_map(|folder| files_in(Path::new(folder))).collect()
         }
     };
@@ -114,7 +118,11 @@ fn of_file(file: &Path) -> Option<Vendor> {
 
 /// The library of an EGL vendor by name (`mesa`), or by itself.
 pub(crate) fn egl_library(name: &str) -> String {
-    if name.contains('/') || name.contains(".so") { name.to_owned() } else { format!("libEGL_{name}.so.0") }
+    if name.contains('/') || name.contains(".so") {
+        name.to_owned()
+    } else {
+        format!("libEGL_{name}.so.0")
+    }
 }
 
 #[cfg(test)]
@@ -143,7 +151,8 @@ mod tests {
         let by_server = glx_order(of(&[]), ":3", server());
         assert_eq!(names(&by_server), ["nvidia", "mesa", "indirect", "mesa"]);
         assert!(by_server[0].why.contains("X server at :3"), "{}", by_server[0].why);
-        let alone = glx_order(of(&[("__GLX_VENDOR_LIBRARY_NAME", "gluray")]), ":3", Err("no GLX".into()));
+        let alone =
+            glx_order(of(&[("__GLX_VENDOR_LIBRARY_NAME", "gluray")]), ":3", Err("no GLX".into()));
         assert_eq!(names(&alone), ["indirect", "mesa"]);
         assert!(alone[0].why.contains("no GLX"), "{}", alone[0].why);
         let ours = glx_order(of(&[("GLURAY_GLX_VENDOR", "asked")]), ":3", server());
@@ -173,8 +182,10 @@ mod tests {
         assert_eq!(names(&found), ["libEGL_nvidia.so.0", "libEGL_mesa.so.0", beside.as_str()]);
         assert!(found[0].why.contains("10_nvidia.json"), "{}", found[0].why);
         let files = format!("{}:{}", at("b/00_first.json"), at("a/10_nvidia.json"));
-        let both =
-            [("__EGL_VENDOR_LIBRARY_DIRS", folders.as_str()), ("__EGL_VENDOR_LIBRARY_FILENAMES", &files)];
+        let both = [
+            ("__EGL_VENDOR_LIBRARY_DIRS", folders.as_str()),
+            ("__EGL_VENDOR_LIBRARY_FILENAMES", &files),
+        ];
         assert_eq!(names(&egl_vendors(of(&both))), [beside.as_str(), "libEGL_nvidia.so.0"]);
         let named = egl_vendors(of(&[("GLURAY_EGL_VENDOR", "mesa:/opt/libEGL_x.so")]));
         assert_eq!(names(&named), ["mesa", "/opt/libEGL_x.so"]);

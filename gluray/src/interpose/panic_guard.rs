@@ -1,7 +1,9 @@
-//! A fault of ours must never become a fault of the program: it is logged, and from then on the driver draws everything.
+//! A fault of ours must never become a fault of the program: it is logged, and from then on the
+//! driver draws everything.
 //!
-//! Everything that the program can call is run under [`caught`], which costs nothing while there is no fault. After one each thread hands over what its context has swallowed
-//! and not drawn ([`Context::stop_tracing`]), at once or at its next call.
+//! Everything that the program can call is run under [`caught`], which costs nothing while there is
+//! no fault. After one each thread hands over what its context has swallowed and not drawn
+//! ([`Context::stop_tracing`]), at once or at its next call.
 
 use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
@@ -30,14 +32,14 @@ pub(crate) fn messages() -> Vec<String> {
     MESSAGES.lock().map_or_else(|e| e.into_inner().clone(), |m| m.clone())
 }
 
-// ---- Faults that tests ask for --------------------------------------------------------------------------------------
-
+// ---- Faults that tests ask for ------------------------------------------------------------------
 fn asked_for() -> Option<&'static str> {
     static PLACE: OnceLock<Option<String>> = OnceLock::new();
     PLACE.get_or_init(|| crate::host::folders::variable("GLURAY_INJECT_FAULT")).as_deref()
 }
 
-/// Panics when `GLURAY_INJECT_FAULT` names this place: so that tests see what programs get when something of ours breaks.
+/// Panics when `GLURAY_INJECT_FAULT` names this place: so that tests see what programs get when
+/// something of ours breaks.
 pub(crate) fn injected(place: &str) {
     assert!(!is_asked_for(place), "a fault in {place}, as GLURAY_INJECT_FAULT asks");
 }
@@ -51,7 +53,8 @@ pub(crate) fn is_asked_for(place: &str) -> bool {
 static ENTRY: AtomicUsize = AtomicUsize::new(usize::MAX);
 static CALLS_BEFORE: AtomicU32 = AtomicU32::new(0);
 
-/// `GLURAY_INJECT_FAULT=glEnd` fails in the first call of `glEnd` that is run by us, `glEnd:3` in the third.
+/// `GLURAY_INJECT_FAULT=glEnd` fails in the first call of `glEnd` that is run by us, `glEnd:3` in
+/// the third.
 fn plan_injection() {
     let Some(text) = asked_for() else { return };
     let (name, call) = text.split_once(':').unwrap_or((text, "1"));
@@ -78,8 +81,7 @@ fn inject_now(index: usize) {
     }
 }
 
-// ---- Catching -------------------------------------------------------------------------------------------------------
-
+// ---- Catching -----------------------------------------------------------------------------------
 /// The program has called us for the first time.
 #[cold]
 pub(crate) fn in_program() {
@@ -98,7 +100,8 @@ pub(crate) fn silence() {
     std::panic::set_hook(Box::new(move |info| {
         // The library has a standard library of its own, so no panic of the program comes here.
         if IN_PROGRAM.load(Relaxed) || GUARDED.load(Relaxed) > 0 {
-            let (mut messages, text) = (MESSAGES.lock().unwrap_or_else(|e| e.into_inner()), info.to_string());
+            let (mut messages, text) =
+                (MESSAGES.lock().unwrap_or_else(|e| e.into_inner()), info.to_string());
             // What is tried again may fail again.
             if !messages.contains(&text) {
                 messages.push(text);
@@ -144,7 +147,8 @@ fn end() {
     hand_over_to_driver();
 }
 
-/// After a fault: the context of this thread hands over what it has swallowed, unless it has done so.
+/// After a fault: the context of this thread hands over what it has swallowed, unless it has done
+/// so.
 pub(crate) fn hand_over_to_driver() {
     if happened() {
         attempt(|| symbols::with_context(Context::stop_tracing));
@@ -152,8 +156,9 @@ pub(crate) fn hand_over_to_driver() {
 }
 
 impl Context {
-    /// A fault of ours has ended the tracing: what was swallowed is drawn, by rays if they still can be sent, and the driver gets to know what it was not told.
-    /// Between Begin and End of a primitive that the driver draws nothing of this is possible; then it waits.
+    /// A fault of ours has ended the tracing: what was swallowed is drawn, by rays if they still
+    /// can be sent, and the driver gets to know what it was not told. Between Begin and End of a
+    /// primitive that the driver draws nothing of this is possible; then it waits.
     pub(crate) fn stop_tracing(&mut self) {
         if self.tracing_stopped || self.immediate_target == ImmediateModeTarget::Pass {
             return;
@@ -164,12 +169,14 @@ impl Context {
         self.immediate_target = ImmediateModeTarget::Outside;
         if let Some(r) = &mut self.recording {
             r.stop_tracing();
-            // What was swallowed before the list cannot be drawn while the driver compiles it: the first call after its end does.
+            // What was swallowed before the list cannot be drawn while the driver compiles it: the
+            // first call after its end does.
             self.tracing_stopped = false;
         } else {
             let mode = self.recorder.mode();
-            let primitive =
-                open.then(|| attempt(|| self.recorder.take_open_primitive()).unwrap_or((mode, Vec::new())));
+            let primitive = open.then(|| {
+                attempt(|| self.recorder.take_open_primitive()).unwrap_or((mode, Vec::new()))
+            });
             attempt(|| self.flush_now("a fault of ours"));
             attempt(|| self.sync());
             if let Some((mode, vertices)) = primitive {
@@ -181,7 +188,11 @@ impl Context {
     }
 
     /// Begin, and the vertices that were recorded since, for the driver.
-    pub(crate) fn replay_primitive(&mut self, mode: u32, vertices: Vec<([f32; 3], CurrentAttributes)>) {
+    pub(crate) fn replay_primitive(
+        &mut self,
+        mode: u32,
+        vertices: Vec<([f32; 3], CurrentAttributes)>,
+    ) {
         let end = self.current;
         if let Some((_, first)) = vertices.first() {
             first.send(0xf, MaterialProperties::ALL);

@@ -1,11 +1,16 @@
-//! What the contexts of a share group have in common, and when one of them sees what another has done to a texture.
+//! What the contexts of a share group have in common, and when one of them sees what another has
+//! done to a texture.
 //!
-//! Images of textures are read again when the group's count of writes is another. A context counts before the driver makes a write. That is enough for itself, but not
-//! for the others: one of them may read between the count and the write, or before the write has got out of the writer's queue. OpenGL promises a write to another
-//! context after the writer has finished (or flushed, or the reader has waited for a fence) and the reader has bound the texture again (OpenGL 4.6, section 5.3), so at these
-//! points the writer (or the reader that waited) counts once more: what was read before has another number then.
+//! Images of textures are read again when the group's count of writes is another. A context counts
+//! before the driver makes a write. That is enough for itself, but not for the others: one of them
+//! may read between the count and the write, or before the write has got out of the writer's queue.
+//! OpenGL promises a write to another context after the writer has finished (or flushed, or the
+//! reader has waited for a fence) and the reader has bound the texture again (OpenGL 4.6, section
+//! 5.3), so at these points the writer (or the reader that waited) counts once more: what was read
+//! before has another number then.
 //!
-//! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound those same points count it.
+//! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound
+//! those same points count it.
 
 use crate::capture::buffer_writes::BufferWrites;
 use crate::capture::display_lists::DisplayLists;
@@ -43,7 +48,8 @@ impl TextureWrites {
     }
 }
 
-/// Some texture has its texels from elsewhere (another API, another process, a group that shares the image alone): nobody tells of writes.
+/// Some texture has its texels from elsewhere (another API, another process, a group that shares
+/// the image alone): nobody tells of writes.
 static FOREIGN_TEXELS: AtomicBool = AtomicBool::new(false);
 
 /// Calls that give textures such texels.
@@ -95,12 +101,15 @@ impl Context {
         if class & symbols::class::TEXTURE != 0 && foreign(index) {
             FOREIGN_TEXELS.store(true, Ordering::Relaxed);
         }
-        if FOREIGN_TEXELS.load(Ordering::Relaxed) || self.texture_writes.are_shared() && waits(index) {
+        if FOREIGN_TEXELS.load(Ordering::Relaxed)
+            || self.texture_writes.are_shared() && waits(index)
+        {
             self.texture_writes.change();
         }
     }
 
-    /// What this context has written, others can see from now on. True when it has written anything.
+    /// What this context has written, others can see from now on. True when it has written
+    /// anything.
     pub(crate) fn publish_textures(&mut self) -> bool {
         if self.immediate_target == ImmediateModeTarget::Pass || !self.texture_writes.are_shared() {
             return false;

@@ -1,7 +1,8 @@
-//! Pictures that more than the nearest surface of each pixel goes into: mode `path`, and `rich` with mirrors, glass, translucency, a lens or several samples.
+//! Pictures that more than the nearest surface of each pixel goes into: mode `path`, and `rich`
+//! with mirrors, glass, translucency, a lens or several samples.
 //!
-//! Depths stay those of the rasterizer's fragments, so that lines and text of the driver meet the same surfaces as in every mode; colours come premultiplied
-//! and are put over what is there.
+//! Depths stay those of the rasterizer's fragments, so that lines and text of the driver meet the
+//! same surfaces as in every mode; colours come premultiplied and are put over what is there.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::capture::geometry_cache::BuildCounts;
@@ -32,7 +33,8 @@ pub(crate) fn is_needed(settings: &Settings) -> bool {
     }
 }
 
-/// Whether the mode's own rays smooth silhouettes as well as `samples` of a pixel do: then all samples of a pixel get one colour.
+/// Whether the mode's own rays smooth silhouettes as well as `samples` of a pixel do: then all
+/// samples of a pixel get one colour.
 pub(crate) fn has_samples_for(settings: &Settings, samples: u32) -> bool {
     settings.mode == Mode::Path || is_needed(settings) && settings.samples > samples
 }
@@ -87,12 +89,22 @@ impl Context {
             for (number, (view, members)) in groups.iter().enumerate() {
                 let ready: Vec<Prepared<'_>> = members
                     .iter()
-                    .filter_map(|i| Prepared::new(&pending[*i].0, pending[*i].1.clone(), &mut structures))
+                    .filter_map(|i| {
+                        Prepared::new(&pending[*i].0, pending[*i].1.clone(), &mut structures)
+                    })
                     .collect();
                 if ready.is_empty() {
                     continue;
                 }
-                made.push(make(&ready, view, number, settings, [r, g, b], path_tracer, &mut warnings));
+                made.push(make(
+                    &ready,
+                    view,
+                    number,
+                    settings,
+                    [r, g, b],
+                    path_tracer,
+                    &mut warnings,
+                ));
                 primary += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
             }
         });
@@ -137,8 +149,10 @@ impl Context {
         let mut layers = Vec::new();
         thread_pool::on_pool(|| {
             for (_, members) in &groups {
-                let ready: Vec<Prepared<'_>> =
-                    members.iter().filter_map(|i| Prepared::new(&draws[*i], None, &mut structures)).collect();
+                let ready: Vec<Prepared<'_>> = members
+                    .iter()
+                    .filter_map(|i| Prepared::new(&draws[*i], None, &mut structures))
+                    .collect();
                 let (mut layer, extra) = cluster::nearest(&ready, &settings);
                 // The driver's own depth may be some roundings nearer.
                 layer
@@ -179,7 +193,10 @@ fn make(
 ) -> ViewImage {
     if settings.mode != Mode::Path && !whitted::is_needed(ready, settings) {
         let (layer, extra) = cluster::nearest(ready, settings);
-        return ViewImage::Surfaces(layer, vec![("shadow", extra[0]), ("ambient occlusion", extra[1])]);
+        return ViewImage::Surfaces(
+            layer,
+            vec![("shadow", extra[0]), ("ambient occlusion", extra[1])],
+        );
     }
     let all = depths(ready, settings);
     let mut colors = match settings.mode {
@@ -193,7 +210,12 @@ fn make(
     let clear: Vec<bool> =
         ready.iter().map(|p| p.draw.state.blend && whitted::is_clear(p, settings)).collect();
     let opaque = match clear.contains(&true) {
-        false => Layer { rect: all.rect, color: Vec::new(), depth: all.depth.clone(), covered: all.covered },
+        false => Layer {
+            rect: all.rect,
+            color: Vec::new(),
+            depth: all.depth.clone(),
+            covered: all.covered,
+        },
         true => {
             // Blended surfaces write no depth, as programs have it.
             let mut depth = vec![UNCOVERED; all.depth.len()];
@@ -208,17 +230,26 @@ fn make(
 }
 
 /// Puts each draw's fog over a path-traced picture.
-fn fogged(colors: &mut ColorImage, ready: &[Prepared<'_>], view: &View, all: &Layer, settings: &Settings) {
+fn fogged(
+    colors: &mut ColorImage,
+    ready: &[Prepared<'_>],
+    view: &View,
+    all: &Layer,
+    settings: &Settings,
+) {
     let mut done: Vec<(Fog, [f64; 2])> = Vec::new();
     for p in ready {
         let s = &p.draw.state;
-        let Some(fog) = s.fog.filter(|_| matches!(p.draw.shading, Shading::Fixed)) else { continue };
+        let Some(fog) = s.fog.filter(|_| matches!(p.draw.shading, Shading::Fixed)) else {
+            continue;
+        };
         let this = (fog, s.depth_range);
         if done.contains(&this) {
             continue;
         }
         done.push(this);
-        let has = |p: &Prepared<'_>| p.draw.state.fog == Some(fog) && p.draw.state.depth_range == this.1;
+        let has =
+            |p: &Prepared<'_>| p.draw.state.fog == Some(fog) && p.draw.state.depth_range == this.1;
         if ready.iter().all(has) {
             return fog::over(colors, view, &fog, this.1, all, all);
         }
@@ -262,7 +293,8 @@ fn split(colors: &ColorImage, opaque: &Layer, all: &Layer) -> [Layer; 2] {
         let (layer, depth) = if depth < 1.5 {
             (&mut solid, depth)
         } else {
-            // A silhouette has the depth of the surface beside it; a blurred one that is far from any is before everything.
+            // A silhouette has the depth of the surface beside it; a blurred one that is far from
+            // any is before everything.
             let mut near = UNCOVERED;
             for dy in -1..=1 {
                 for dx in -1..=1 {

@@ -90,8 +90,11 @@ impl Context {
             }
             None => {
                 self.recorder.copy_followed_vertices();
-                let geometry =
-                    self.geometry_cache.of_runs(&self.recorder.positions, &self.recorder.runs, kind);
+                let geometry = self.geometry_cache.of_runs(
+                    &self.recorder.positions,
+                    &self.recorder.runs,
+                    kind,
+                );
                 self.recorder.remember_batch(&geometry, kind);
                 geometry
             }
@@ -126,7 +129,8 @@ impl Context {
         let s = &self.state;
         // Lists end batches with quads before and after them.
         let all_turned = s.flat || self.depth_of_lists > 0;
-        let mut split = QuadSplit { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
+        let mut split =
+            QuadSplit { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
         if std::mem::take(&mut self.recorder.quads) && !all_turned {
             let clipped = self.state.clips();
             let outside = |from, to| self.recorder.any_position(from, to, &clipped);
@@ -160,7 +164,8 @@ impl Context {
         }
         crate::trace::overrides::apply(&mut draw, &self.config.settings);
         if !trace::has_rays(&draw.clip_from_object) {
-            // A model-view that flattens everything (a shadow on a floor): rays need the flattened triangles themselves.
+            // A model-view that flattens everything (a shadow on a floor): rays need the flattened
+            // triangles themselves.
             self.flatten(&mut draw);
         }
         if draw.state.blend && self.config.settings.sees_through() && draw.has_full_alpha() {
@@ -192,11 +197,12 @@ impl Context {
         };
         let positions: Vec<[f32; 3]> = draw.geometry.mesh.positions.iter().map(eye).collect();
         let indices = draw.geometry.mesh.indices.clone();
-        // Lit where the program lit it: normals cannot be found again from a singular matrix, colours are lit beforehand.
+        // Lit where the program lit it: normals cannot be found again from a singular matrix,
+        // colours are lit beforehand.
         let setup = crate::trace::lighting::LightingSetup::new(&draw.state);
         let object = &draw.geometry.mesh.positions;
-        let colors =
-            (0..object.len()).map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
+        let colors = (0..object.len())
+            .map(|i| setup.vertex(&draw.attributes, i, object[i].to_array()).primary[0]);
         let colors = crate::capture::draw::Values::PerVertex(colors.collect());
         Arc::make_mut(&mut draw.attributes).colors = colors;
         let mut state = (*draw.state).clone();
@@ -244,18 +250,22 @@ impl Context {
         self.counters.count_flush(before);
         // Also of contexts that never end a frame.
         self.counters.report.textures_read = self.presenter.images.read;
-        self.frame.telemetry.traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
-        // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it drew before loses them.
+        self.frame
+            .telemetry
+            .traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
+        // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it
+        // drew before loses them.
         let func = if others { LESS } else { pending[0].0.state.depth_func };
         let mut pending = pending;
         if !matches!(self.config.settings.mode, Mode::Match | Mode::Phong) {
             crate::trace::view::assign_eye_spaces(&mut pending);
         }
         let samples = pending[0].0.state.samples.max(1).cast_unsigned();
-        let places = match crate::present::effect_image::has_samples_for(&self.config.settings, samples) {
-            true => None,
-            false => self.sample_places(pending.iter().map(|(d, _)| d)),
-        };
+        let places =
+            match crate::present::effect_image::has_samples_for(&self.config.settings, samples) {
+                true => None,
+                false => self.sample_places(pending.iter().map(|(d, _)| d)),
+            };
         if let Some(places) = places {
             return self.flush_samples(&pending, func, &places);
         }
@@ -282,7 +292,8 @@ impl Context {
     fn warn_of_samples<'a>(&mut self, draws: impl Iterator<Item = &'a Draw>) {
         if let Some(n) = draws.map(|d| d.state.samples).find(|n| *n > 1) {
             self.counters.warn(format!(
-                "the program has {n} samples a pixel: one ray stands for all of them, so silhouettes are not smoothed as the driver's are"
+                "the program has {n} samples a pixel: one ray stands for all of them, so \
+                 silhouettes are not smoothed as the driver's are"
             ));
         }
     }
@@ -432,10 +443,11 @@ impl Context {
         }
     }
 
-    /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that draw into framebuffer objects alone.
+    /// What was traced is cleared: a frame is over that nobody swapped or read, as in programs that
+    /// draw into framebuffer objects alone.
     fn end_unswapped_frame(&mut self) {
-        // Only then is the state asked for: windows have their frames when they are swapped, and to ask for materials heals what Mesa holds
-        // of them (osgbillboard, osgtessellate).
+        // Only then is the state asked for: windows have their frames when they are swapped, and to
+        // ask for materials heals what Mesa holds of them (osgbillboard, osgtessellate).
         if !self.frame.pending.is_empty()
             || self.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0)
         {
@@ -452,7 +464,8 @@ impl Context {
         }
     }
 
-    /// `glClear`. A clear of everything makes what is pending invisible; a clear of a part comes after it.
+    /// `glClear`. A clear of everything makes what is pending invisible; a clear of a part comes
+    /// after it.
     pub(crate) fn clear(&mut self, mask: u32) -> bool {
         if self.recording.is_some() {
             if let Some(r) = &mut self.recording {
@@ -479,7 +492,11 @@ impl Context {
                 && self.state.scissor.is_none()
                 && self.state.color_mask
                 && self.state.depth_mask
-                && self.frame.pending.iter().all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
+                && self
+                    .frame
+                    .pending
+                    .iter()
+                    .all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
             if whole {
                 self.frame.pending.clear();
                 self.probes.draws.clear();

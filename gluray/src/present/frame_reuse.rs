@@ -1,11 +1,15 @@
-//! Pictures that are asked for again: programs draw the same once more when a window is uncovered, when two events come for one change (geomview), or because
-//! they draw all the time. What was traced is kept until the frame after it is over.
+//! Pictures that are asked for again: programs draw the same once more when a window is uncovered,
+//! when two events come for one change (geomview), or because they draw all the time. What was
+//! traced is kept until the frame after it is over.
 //!
-//! Two frames are the same when everything that rays and lighting read is: geometry by its key, attributes by their version or bit by bit, state, matrices,
-//! textures, settings. Nothing is taken for the same by samples.
+//! Two frames are the same when everything that rays and lighting read is: geometry by its key,
+//! attributes by their version or bit by bit, state, matrices, textures, settings. Nothing is taken
+//! for the same by samples.
 //!
-//! Draws whose order matters are kept one by one, with all their layers: programs that draw a stencil's values, shadows or user interfaces draw the same
-//! rectangle again and again, some in another colour. Where that colour is all there is to it (no light, texture or fog), the layers get the new one.
+//! Draws whose order matters are kept one by one, with all their layers: programs that draw a
+//! stencil's values, shadows or user interfaces draw the same rectangle again and again, some in
+//! another colour. Where that colour is all there is to it (no light, texture or fog), the layers
+//! get the new one.
 
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
 use crate::capture::vertex_recorder::same_bits;
@@ -47,7 +51,10 @@ enum AttributesKey {
 /// The colour of all fragments of a draw, where it depends on nothing else.
 fn plain_color(d: &Draw) -> Option<[u8; 4]> {
     let s = &*d.state;
-    let plain = matches!(d.shading, Shading::Fixed) && !s.lighting && s.texture.is_none() && s.fog.is_none();
+    let plain = matches!(d.shading, Shading::Fixed)
+        && !s.lighting
+        && s.texture.is_none()
+        && s.fog.is_none();
     match d.attributes.colors {
         Values::Constant(color) if plain => Some(bytes_of(color)),
         _ => None,
@@ -115,7 +122,11 @@ fn bytes(a: &Attributes) -> usize {
             }
         }
     }
-    of(&a.normals) + of(&a.colors) + of(&a.tex) + size_of_val(&a.materials[..]) + 4 * a.material_of.len()
+    of(&a.normals)
+        + of(&a.colors)
+        + of(&a.tex)
+        + size_of_val(&a.materials[..])
+        + 4 * a.material_of.len()
 }
 
 /// Without a texture its coordinates are whatever was drawn last had.
@@ -205,14 +216,16 @@ impl FrameReuse {
         self.ordered.retain(|o| o.age < 2);
     }
 
-    /// The layers of a draw whose order matters, in its colour, lent until [`FrameReuse::keep_ordered`] has them again.
+    /// The layers of a draw whose order matters, in its colour, lent until
+    /// [`FrameReuse::keep_ordered`] has them again.
     pub(crate) fn find_ordered(
         &mut self,
         draw: &Draw,
         image: Option<&Arc<Image>>,
         config: &Arc<Config>,
     ) -> Option<Vec<Layer>> {
-        let is = |o: &ReusableLayers| Arc::ptr_eq(&o.config, config) && o.drawn.matches(draw, image);
+        let is =
+            |o: &ReusableLayers| Arc::ptr_eq(&o.config, config) && o.drawn.matches(draw, image);
         let i = self.ordered.iter().position(is)?;
         let mut layers = self.ordered.remove(i).layers;
         if let Some(color) = plain_color(draw) {
@@ -239,8 +252,9 @@ impl FrameReuse {
             drawn.attributes = AttributesKey::Plain;
         }
         self.ordered.push(ReusableLayers { drawn, config: config.clone(), layers, age: 0 });
-        let pixels =
-            |all: &[ReusableLayers]| all.iter().flat_map(|o| &o.layers).map(|l| l.depth.len()).sum::<usize>();
+        let pixels = |all: &[ReusableLayers]| {
+            all.iter().flat_map(|o| &o.layers).map(|l| l.depth.len()).sum::<usize>()
+        };
         while self.ordered.len() > MOST_ORDERED || pixels(&self.ordered) > MOST_PIXELS {
             self.ordered.remove(0);
         }
@@ -316,7 +330,8 @@ mod tests {
         for (i, change) in changes.into_iter().enumerate() {
             let mut d = draw(positions);
             change(&mut d);
-            // A version is compared with a version: here there is none, and the content is the same. Nor is there a texture.
+            // A version is compared with a version: here there is none, and the content is the
+            // same. Nor is there a texture.
             assert_eq!(same(d), matches!(i, 4 | 5), "change {i}");
         }
         assert!(same(draw(positions)), "back to what it was");
@@ -338,8 +353,9 @@ mod tests {
             Arc::make_mut(&mut d.state).lighting = lit;
             d
         };
-        let layers =
-            |color| vec![Layer { color: vec![color, [0; 4]], depth: vec![0.5, UNCOVERED], ..layer() }];
+        let layers = |color| {
+            vec![Layer { color: vec![color, [0; 4]], depth: vec![0.5, UNCOVERED], ..layer() }]
+        };
         let [red, green] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]];
         for lit in [false, true] {
             let mut again = FrameReuse::default();

@@ -1,8 +1,9 @@
-//! Traced fragments into the program's framebuffer: one triangle-strip pass of the driver's whose shader takes colour and depth from
-//! textures.
+//! Traced fragments into the program's framebuffer: one triangle-strip pass of the driver's whose
+//! shader takes colour and depth from textures.
 //!
-//! The fragments meet the program's own depth test (and blending, stencil, logic operation, when it is that draw's turn), so whatever the driver drew
-//! before and after is composited by the driver, in any kind of framebuffer, without reading anything back.
+//! The fragments meet the program's own depth test (and blending, stencil, logic operation, when it
+//! is that draw's turn), so whatever the driver drew before and after is composited by the driver,
+//! in any kind of framebuffer, without reading anything back.
 
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
@@ -15,9 +16,11 @@ use crate::trace::{Layer, Rect};
 pub(crate) enum CompositeMode {
     /// The depth test with this function, nothing else: the nearest surfaces of a frame.
     Surface(u32),
-    /// The same with premultiplied colours over what is there: several samples a pixel, or surfaces that let light through.
+    /// The same with premultiplied colours over what is there: several samples a pixel, or surfaces
+    /// that let light through.
     Over(u32),
-    /// What is there times the colours, where it has this depth or is behind: no depths are written.
+    /// What is there times the colours, where it has this depth or is behind: no depths are
+    /// written.
     Multiply,
     /// The same again without depths: pixels whose centre sees no opaque surface.
     Fringe(u32),
@@ -58,8 +61,9 @@ enum PassSupport {
 /// Why draws are left to a driver that refuses our pass.
 pub(crate) const REFUSED: &str = "the driver refuses our shader or its textures";
 
-// Where a fragment lies in the layer comes from the corners, not from gl_FragCoord: for that Mesa keeps a constant which says whether rows are turned
-// over, and forgets to renew it when between a pass into a framebuffer object and one into the window there was only a clear.
+// Where a fragment lies in the layer comes from the corners, not from gl_FragCoord: for that Mesa
+// keeps a constant which says whether rows are turned over, and forgets to renew it when between a
+// pass into a framebuffer object and one into the window there was only a clear.
 const VERTEX_120: &str = "#version 120
 uniform vec4 part;
 varying vec2 at;
@@ -113,7 +117,8 @@ impl Presenter {
         self.vertex_array
     }
 
-    /// Compiles the shader and asks for the kinds of its textures, without changing what is current, bound or compiled into a list. The driver's words when it refuses.
+    /// Compiles the shader and asks for the kinds of its textures, without changing what is
+    /// current, bound or compiled into a list. The driver's words when it refuses.
     fn check_support(&mut self, core: bool) -> Result<(), String> {
         self.support = PassSupport::Refused;
         let (vertex, mut fragment) =
@@ -191,7 +196,8 @@ impl Presenter {
     }
 }
 
-/// The part of core state that the pass changes; in compatibility contexts the attribute stacks keep the rest.
+/// The part of core state that the pass changes; in compatibility contexts the attribute stacks
+/// keep the rest.
 struct SavedState {
     program: i32,
     vertex_array: i32,
@@ -213,8 +219,14 @@ struct SavedState {
     samplers_exist: bool,
 }
 
-const BLENDING: [u32; 6] =
-    [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA, BLEND_EQUATION, BLEND_EQUATION_ALPHA];
+const BLENDING: [u32; 6] = [
+    BLEND_SRC_RGB,
+    BLEND_DST_RGB,
+    BLEND_SRC_ALPHA,
+    BLEND_DST_ALPHA,
+    BLEND_EQUATION,
+    BLEND_EQUATION_ALPHA,
+];
 const UNPACK: [u32; 6] = [
     UNPACK_ALIGNMENT,
     UNPACK_ROW_LENGTH,
@@ -282,7 +294,9 @@ impl SavedState {
         gl::use_program(self.program.cast_unsigned());
         if self.core {
             gl::bind_vertex_array(self.vertex_array.cast_unsigned());
-            self.caps.iter().for_each(|(cap, on)| if *on { gl::enable(*cap) } else { gl::disable(*cap) });
+            self.caps
+                .iter()
+                .for_each(|(cap, on)| if *on { gl::enable(*cap) } else { gl::disable(*cap) });
             gl::depth_func(self.depth_func.cast_unsigned());
             gl::depth_mask(self.depth_mask as u8);
             let [r, g, b, a] = self.color_mask.map(|v| v as u8);
@@ -300,8 +314,9 @@ impl SavedState {
 }
 
 impl Context {
-    /// True when the driver has refused the pass: then nothing may be swallowed. It is tried when it is first asked for, which is before anything of the context is
-    /// swallowed; programs of which nothing is traced pay nothing. Not to be asked between Begin and End.
+    /// True when the driver has refused the pass: then nothing may be swallowed. It is tried when
+    /// it is first asked for, which is before anything of the context is swallowed; programs of
+    /// which nothing is traced pay nothing. Not to be asked between Begin and End.
     pub(crate) fn is_refused(&mut self) -> bool {
         if self.presenter.support == PassSupport::NotYet {
             self.keep_errors();
@@ -330,7 +345,10 @@ impl Context {
             if c.presenter.prepare(c.capabilities.core) {
                 c.draw_pass(layers, composite_mode);
             } else {
-                c.counters.count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
+                c.counters.count_driver_draws(
+                    "the driver refuses our shader: what was traced is lost",
+                    1,
+                );
             }
             if let Some(mask) = mask {
                 gl::all_samples(mask);
@@ -338,7 +356,8 @@ impl Context {
         });
     }
 
-    /// Runs `f` with plain unpacking of pixels, and leaves no trace of what it does to the driver's state.
+    /// Runs `f` with plain unpacking of pixels, and leaves no trace of what it does to the driver's
+    /// state.
     pub(crate) fn with_saved_state(&mut self, f: impl FnOnce(&mut Context)) {
         self.keep_errors();
         let core = self.capabilities.core;
@@ -347,7 +366,9 @@ impl Context {
             gl::push_attrib(0x000f_ffff);
             gl::reset_pixel_transfer();
         }
-        UNPACK.into_iter().for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
+        UNPACK
+            .into_iter()
+            .for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
         if kept.unpack_buffer != 0 {
             gl::bind_buffer(PIXEL_UNPACK_BUFFER, 0);
         }
@@ -405,8 +426,9 @@ impl Context {
             gl::blend_func(ONE, ONE_MINUS_SRC_ALPHA);
             gl::color_mask(1, 1, 1, 1);
         }
-        if let CompositeMode::Surface(func) | CompositeMode::Over(func) | CompositeMode::Fringe(func) =
-            composite_mode
+        if let CompositeMode::Surface(func)
+        | CompositeMode::Over(func)
+        | CompositeMode::Fringe(func) = composite_mode
         {
             OPERATIONS.into_iter().for_each(gl::disable);
             if !matches!(composite_mode, CompositeMode::Surface(_)) {

@@ -1,9 +1,10 @@
-//! Framebuffers with several samples a pixel: each sample has rays of its own, and is written by itself through the sample mask; the driver resolves
-//! them as it resolves its own.
+//! Framebuffers with several samples a pixel: each sample has rays of its own, and is written by
+//! itself through the sample mask; the driver resolves them as it resolves its own.
 //!
-//! The samples' places are the driver's (`glGetMultisamplefv`). A scene that is moved so that a sample lies in the middle of its pixel is a scene like any
-//! other: rays, coverage by the fill rule and depths need not know. Colours are those of the middle of the pixel, as the driver shades once for all samples
-//! of a triangle.
+//! The samples' places are the driver's (`glGetMultisamplefv`). A scene that is moved so that a
+//! sample lies in the middle of its pixel is a scene like any other: rays, coverage by the fill
+//! rule and depths need not know. Colours are those of the middle of the pixel, as the driver
+//! shades once for all samples of a triangle.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::host::config::Settings;
@@ -41,8 +42,9 @@ fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
 }
 
 impl Context {
-    /// Where the samples of what `draws` are drawn into lie, from the middle of the pixel. `None` for one sample, and where they cannot be written one by one:
-    /// before OpenGL 3.2 there is no sample mask.
+    /// Where the samples of what `draws` are drawn into lie, from the middle of the pixel. `None`
+    /// for one sample, and where they cannot be written one by one: before OpenGL 3.2 there is no
+    /// sample mask.
     pub(crate) fn sample_places<'a>(
         &mut self,
         draws: impl IntoIterator<Item = &'a Draw>,

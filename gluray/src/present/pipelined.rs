@@ -1,8 +1,11 @@
-//! One frame late (section 4.1.2): what the program drew last is shown while what it draws now is traced beside it.
+//! One frame late (section 4.1.2): what the program drew last is shown while what it draws now is
+//! traced beside it.
 //!
-//! Each time pending draws have to be in the window, the layer that the same place of the frame before came to is put there, and the rays for these
-//! draws are sent by other threads until the program comes here again. Lines and text of the driver's are those of the new frame. Only windows are late:
-//! what is drawn into framebuffer objects is drawn to be used at once, and a program that reads its window is not made to read an old picture twice.
+//! Each time pending draws have to be in the window, the layer that the same place of the frame
+//! before came to is put there, and the rays for these draws are sent by other threads until the
+//! program comes here again. Lines and text of the driver's are those of the new frame. Only
+//! windows are late: what is drawn into framebuffer objects is drawn to be used at once, and a
+//! program that reads its window is not made to read an old picture twice.
 
 use crate::capture::geometry_cache::BuildCounts;
 use crate::interpose::context::Context;
@@ -32,8 +35,10 @@ pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::host::config::Setting
     let start = Instant::now();
     let mut structures = BuildCounts::default();
     let (layer, extra, primary) = {
-        let ready: Vec<Prepared<'_>> =
-            draws.iter().filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut structures)).collect();
+        let ready: Vec<Prepared<'_>> = draws
+            .iter()
+            .filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut structures))
+            .collect();
         let (layer, extra) = crate::cluster::nearest(&ready, settings);
         (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum())
     };
@@ -80,7 +85,8 @@ impl Context {
             && !thread_pool::forked()
     }
 
-    /// Sends `draws` off and shows what came of those of the last frame; without such, waits for these.
+    /// Sends `draws` off and shows what came of those of the last frame; without such, waits for
+    /// these.
     pub(crate) fn flush_pipelined(&mut self, draws: Vec<Pending>, func: u32) {
         let (sender, receiver) = channel();
         let settings = self.config.settings.clone();
@@ -100,7 +106,9 @@ impl Context {
                 let (sender, again) = channel();
                 if let Some(t) = &first {
                     let layer = t.layer.clone();
-                    sender.send(TracedFrame { layer, took: Duration::ZERO, ..TracedFrame::default() }).ok();
+                    sender
+                        .send(TracedFrame { layer, took: Duration::ZERO, ..TracedFrame::default() })
+                        .ok();
                 }
                 (first, again)
             }

@@ -84,8 +84,9 @@ impl CurrentAttributes {
         }
     }
 
-    /// The colour, where the driver's material is not what colour material makes of it. Mesa compares colours: set the same colour again after
-    /// `glMaterial`, and the material stays, which then lights what has no colours of its own.
+    /// The colour, where the driver's material is not what colour material makes of it. Mesa
+    /// compares colours: set the same colour again after `glMaterial`, and the material stays,
+    /// which then lights what has no colours of its own.
     pub(crate) fn untracked_color(&self, color_material: Option<(u32, u32)>) -> Option<[f32; 4]> {
         let (face, what) = color_material?;
         let mut followed = self.materials;

@@ -66,7 +66,8 @@ constants! {
     UNPACK_ALIGNMENT = 0x0cf5, UNPACK_ROW_LENGTH = 0x0cf2, UNPACK_SKIP_ROWS = 0x0cf3, UNPACK_SKIP_PIXELS = 0x0cf4, UNPACK_SWAP_BYTES = 0x0cf0, UNPACK_LSB_FIRST = 0x0cf1,
 }
 
-/// What a stencil test asks and does, for front and for back faces: function, reference, masks, and the three outcomes.
+/// What a stencil test asks and does, for front and for back faces: function, reference, masks, and
+/// the three outcomes.
 pub(crate) const STENCIL_FRONT_AND_BACK: [(u32, u32); 7] = [
     (0x0b92, 0x8800),
     (0x0b97, 0x8ca3),

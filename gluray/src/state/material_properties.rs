@@ -1,8 +1,11 @@
-//! Sets of the ten properties of both sides' materials: which of them a program set, and which of them the driver has to be told.
+//! Sets of the ten properties of both sides' materials: which of them a program set, and which of
+//! them the driver has to be told.
 //!
-//! Mesa keeps what `glMaterial` sets back until it has to know it, at a draw or a query, and then writes it over whatever colour material made of the colour
-//! meanwhile. So a program that sets a material at the end of a frame, and switches colour material on at the beginning of the next (OpenSceneGraph), is drawn
-//! with the material. Whoever asks or draws in between takes that away from it; and so does one who tells Mesa of more than the program set.
+//! Mesa keeps what `glMaterial` sets back until it has to know it, at a draw or a query, and then
+//! writes it over whatever colour material made of the colour meanwhile. So a program that sets a
+//! material at the end of a frame, and switches colour material on at the beginning of the next
+//! (OpenSceneGraph), is drawn with the material. Whoever asks or draws in between takes that away
+//! from it; and so does one who tells Mesa of more than the program set.
 
 use super::current_attributes::{Materials, sides};
 use crate::interpose::driver::gl;
@@ -106,7 +109,10 @@ mod tests {
             assert_eq!(MaterialProperties::changed(&before, &after), of, "{face:x} {what:x}");
             assert!(!of.is_empty());
         }
-        assert!(MaterialProperties::of(7, AMBIENT).is_empty() && MaterialProperties::of(FRONT, 7).is_empty());
+        assert!(
+            MaterialProperties::of(7, AMBIENT).is_empty()
+                && MaterialProperties::of(FRONT, 7).is_empty()
+        );
         let mut all = MaterialProperties::default();
         NAMES.iter().for_each(|n| all.add(MaterialProperties::of(FRONT_AND_BACK, *n)));
         assert_eq!(all, MaterialProperties::ALL);

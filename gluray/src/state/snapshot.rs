@@ -66,7 +66,8 @@ pub(crate) struct Snapshot {
     /// Eye-space planes.
     pub(crate) clip_planes: Vec<[f64; 4]>,
     pub(crate) polygon_offset: Option<(f32, f32)>,
-    /// The slope that the factor multiplies is the gradient's length, as in VTK's shaders; else the greater of its components, as OpenGL has it.
+    /// The slope that the factor multiplies is the gradient's length, as in VTK's shaders; else the
+    /// greater of its components, as OpenGL has it.
     pub(crate) offset_by_length: bool,
     pub(crate) depth_test: bool,
     pub(crate) depth_func: u32,
@@ -197,8 +198,9 @@ impl Snapshot {
         self.depth_range = gl::doubles(DEPTH_RANGE);
         self.cull = gl::is_enabled(CULL_FACE).then(|| gl::word(CULL_FACE_MODE));
         self.front_is_ccw = gl::word(FRONT_FACE) == CCW;
-        self.polygon_offset = gl::is_enabled(POLYGON_OFFSET_FILL)
-            .then(|| (gl::floats::<1>(POLYGON_OFFSET_FACTOR)[0], gl::floats::<1>(POLYGON_OFFSET_UNITS)[0]));
+        self.polygon_offset = gl::is_enabled(POLYGON_OFFSET_FILL).then(|| {
+            (gl::floats::<1>(POLYGON_OFFSET_FACTOR)[0], gl::floats::<1>(POLYGON_OFFSET_UNITS)[0])
+        });
         self.depth_test = gl::is_enabled(DEPTH_TEST);
         self.depth_func = gl::word(DEPTH_FUNC);
         self.depth_mask = gl::int(DEPTH_WRITEMASK) != 0;
@@ -226,10 +228,12 @@ impl Snapshot {
         self.program = if capabilities.version >= 20 { gl::word(CURRENT_PROGRAM) } else { 0 };
         self.pipeline =
             capabilities.pipelines && self.program == 0 && gl::word(PROGRAM_PIPELINE_BINDING) != 0;
-        self.framebuffer = if capabilities.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
+        self.framebuffer =
+            if capabilities.version >= 30 { gl::word(FRAMEBUFFER_BINDING) } else { 0 };
         self.draw_buffer = gl::word(DRAW_BUFFER);
         self.clip_control = capabilities.clip_control
-            && (gl::word(CLIP_ORIGIN) != LOWER_LEFT || gl::word(CLIP_DEPTH_MODE) != NEGATIVE_ONE_TO_ONE);
+            && (gl::word(CLIP_ORIGIN) != LOWER_LEFT
+                || gl::word(CLIP_DEPTH_MODE) != NEGATIVE_ONE_TO_ONE);
         self.unclamped_colors = self.framebuffer != 0
             && self.draw_buffer != 0
             && !matches!(gl::component_type(self.draw_buffer), UNSIGNED_NORMALIZED | 0);
@@ -241,9 +245,12 @@ impl Snapshot {
         };
         const MASKS: [u32; 4] = [0x809e, 0x809f, 0x80a0, 0x8e51];
         self.masked_samples = self.samples > 1
-            && MASKS.iter().any(|c| (*c != 0x8e51 || capabilities.version >= 32) && gl::is_enabled(*c));
+            && MASKS
+                .iter()
+                .any(|c| (*c != 0x8e51 || capabilities.version >= 32) && gl::is_enabled(*c));
         self.discard = capabilities.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
-        self.feedback_active = capabilities.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
+        self.feedback_active =
+            capabilities.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
         self.first_vertex_provokes =
             capabilities.version >= 32 && gl::word(PROVOKING_VERTEX) == FIRST_VERTEX_CONVENTION;
         self.smooth_polygons = gl::is_enabled(POLYGON_SMOOTH);
@@ -260,7 +267,8 @@ impl Snapshot {
                 _ => false,
             }
         };
-        self.alpha_test_of_equality = self.alpha_test && matches!(gl::word(0x0bc1), EQUAL | NOTEQUAL);
+        self.alpha_test_of_equality =
+            self.alpha_test && matches!(gl::word(0x0bc1), EQUAL | NOTEQUAL);
         self.stipple = gl::is_enabled(POLYGON_STIPPLE);
         self.render_mode = gl::word(RENDER_MODE);
         self.arb_program = capabilities.arb_programs
@@ -291,7 +299,8 @@ impl Snapshot {
         });
     }
 
-    /// Says of points in object space whether they are outside of what is seen, so that the driver has to clip.
+    /// Says of points in object space whether they are outside of what is seen, so that the driver
+    /// has to clip.
     pub(crate) fn clips(&self) -> impl Fn([f32; 3]) -> bool {
         let m = crate::trace::lighting::product(&self.projection, &self.model_view);
         let (model_view, planes) = (self.model_view, self.clip_planes.clone());
@@ -347,18 +356,21 @@ impl Snapshot {
             if units > 1 {
                 gl::active_texture(TEXTURE0 + unit);
             }
-            let enabled: Vec<u32> = targets.iter().copied().filter(|t| gl::is_enabled(*t)).collect();
-            let Some(&target) = enabled.iter().max_by_key(|t| targets.iter().position(|x| x == *t)) else {
+            let enabled: Vec<u32> =
+                targets.iter().copied().filter(|t| gl::is_enabled(*t)).collect();
+            let Some(&target) = enabled.iter().max_by_key(|t| targets.iter().position(|x| x == *t))
+            else {
                 continue;
             };
             if unit > 0 {
                 self.foreign_texturing = Some("several texture units");
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
-                // The names say what is bound; where its image comes from is asked for when it is used.
-                self.foreign_texturing = self
-                    .foreign_texturing
-                    .or(crate::trace::texturing::unsupported_sampling(target, capabilities.version));
+                // The names say what is bound; where its image comes from is asked for when it is
+                // used.
+                self.foreign_texturing = self.foreign_texturing.or(
+                    crate::trace::texturing::unsupported_sampling(target, capabilities.version),
+                );
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

@@ -68,8 +68,12 @@ impl FragmentBatch {
             let (mut rgba, secondary) = match s.flat {
                 true => (c.primary[side], c.secondary[side]),
                 false => {
-                    let primary = mixed([a.primary[side], b.primary[side], c.primary[side]], weights);
-                    (primary, mixed([a.secondary[side], b.secondary[side], c.secondary[side]], weights))
+                    let primary =
+                        mixed([a.primary[side], b.primary[side], c.primary[side]], weights);
+                    (
+                        primary,
+                        mixed([a.secondary[side], b.secondary[side], c.secondary[side]], weights),
+                    )
                 }
             };
             for k in 0..3 {

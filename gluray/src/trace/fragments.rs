@@ -1,7 +1,7 @@
 //! Fragments of a tile's hits, a block of 16 at a time: what [`Prepared::fragment`] does for one.
 //!
-//! Every step is the one of the scalar code, in the same order; what is rare (clip planes, corners behind the viewer, triangles that cover no
-//! centre) is left to it.
+//! Every step is the one of the scalar code, in the same order; what is rare (clip planes, corners
+//! behind the viewer, triangles that cover no centre) is left to it.
 
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
 use crate::state::enums::*;
@@ -89,7 +89,8 @@ impl FragmentBlock {
                 }
             }
         }
-        // Near a plane, and where a shader clips in the middle of pixels but rays are those of samples, the scalar code decides.
+        // Near a plane, and where a shader clips in the middle of pixels but rays are those of
+        // samples, the scalar code decides.
         if p.discards && s.sample_place != [0.0; 2] {
             return;
         }
@@ -199,10 +200,13 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
     }
     let mut out = [false; LANES];
     for l in 0..LANES {
-        let (cx, cy) =
-            (f64::from(x + l as i32 % 4) * 256.0 + 128.0, f64::from(y + l as i32 / 4) * 256.0 + 128.0);
+        let (cx, cy) = (
+            f64::from(x + l as i32 % 4) * 256.0 + 128.0,
+            f64::from(y + l as i32 / 4) * 256.0 + 128.0,
+        );
         let edge = |a: usize, b: usize, x: f64, y: f64| {
-            (s[b][0][l] - s[a][0][l]) * (y - s[a][1][l]) - (s[b][1][l] - s[a][1][l]) * (x - s[a][0][l])
+            (s[b][0][l] - s[a][0][l]) * (y - s[a][1][l])
+                - (s[b][1][l] - s[a][1][l]) * (x - s[a][0][l])
         };
         let area = edge(0, 1, s[2][0][l], s[2][1][l]);
         // Clockwise triangles: the same edges the other way round.
@@ -219,7 +223,8 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
     out
 }
 
-/// As [`crate::trace::raster::steepness`] or [`polygon_offset`], whichever the state asks for: what the factor of polygon offset multiplies, and what comes to it.
+/// As [`crate::trace::raster::steepness`] or [`polygon_offset`], whichever the state asks for: what
+/// the factor of polygon offset multiplies, and what comes to it.
 #[inline(always)]
 fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
     let depth_scale = s.depth_range[1] - s.depth_range[0];
@@ -257,7 +262,9 @@ mod tests {
     fn triangles() -> Vec<[[f32; 4]; 3]> {
         let mut state = 1_u64;
         let mut random = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f32 / (1_u64 << 24) as f32
         };
         (0..4000)
@@ -296,7 +303,11 @@ mod tests {
                 ..Snapshot::default()
             };
             let [greater, nothing] = slopes(&c, &state(false));
-            assert_eq!([greater[0], nothing[0]], [raster::steepness(&t, viewport, 1.0), 0.0], "{t:?}");
+            assert_eq!(
+                [greater[0], nothing[0]],
+                [raster::steepness(&t, viewport, 1.0), 0.0],
+                "{t:?}"
+            );
             let [length, shift] = slopes(&c, &state(true));
             assert_eq!(
                 [length[0], shift[0]],

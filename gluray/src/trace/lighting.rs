@@ -1,4 +1,5 @@
-//! OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in f32 and in the order of Mesa's vertex programs.
+//! OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in f32 and in
+//! the order of Mesa's vertex programs.
 
 mod gouraud;
 mod powers;
@@ -75,19 +76,24 @@ impl<'a> LightingSetup<'a> {
         let inverse = inverse_3(&state.model_view);
         // GL_RESCALE_NORMAL: one over the length of the third row of the inverse.
         let row = [inverse[2][0], inverse[2][1], inverse[2][2]];
-        let rescale = if state.rescale_normal && !state.normalize { 1.0 / dot(row, row).sqrt() } else { 1.0 };
+        let rescale =
+            if state.rescale_normal && !state.normalize { 1.0 / dot(row, row).sqrt() } else { 1.0 };
         let lights = state
             .lights
             .iter()
             .map(|light| {
                 let p = light.position;
                 let directional = p[3] == 0.0;
-                let at =
-                    if directional { [p[0], p[1], p[2]] } else { [p[0] / p[3], p[1] / p[3], p[2] / p[3]] };
+                let at = if directional {
+                    [p[0], p[1], p[2]]
+                } else {
+                    [p[0] / p[3], p[1] / p[3], p[2] / p[3]]
+                };
                 let to_light = if directional { normalized(at) } else { at };
                 let half = normalized(add(to_light, [0.0, 0.0, 1.0]));
-                let spot = (light.spot_cutoff_deg != 180.0)
-                    .then(|| (normalized(light.spot_direction), light.spot_cutoff_deg.to_radians().cos()));
+                let spot = (light.spot_cutoff_deg != 180.0).then(|| {
+                    (normalized(light.spot_direction), light.spot_cutoff_deg.to_radians().cos())
+                });
                 PreparedLight { light, directional, to_light, half, spot }
             })
             .collect();
@@ -117,13 +123,16 @@ impl<'a> LightingSetup<'a> {
         let full = &Visibility::FULL;
         let front = self.side(&self.tracked(&materials[0], 0, color), eye, normal, full);
         let back = match self.state.two_side {
-            true => self.side(&self.tracked(&materials[1], 1, color), eye, scaled(normal, -1.0), full),
+            true => {
+                self.side(&self.tracked(&materials[1], 1, color), eye, scaled(normal, -1.0), full)
+            }
             false => front,
         };
         VertexColors { primary: [front.0, back.0], secondary: [front.1, back.1] }
     }
 
-    /// Colours of a point lit by itself: primary and secondary. `normal` and `color` are interpolated, the normal in eye space.
+    /// Colours of a point lit by itself: primary and secondary. `normal` and `color` are
+    /// interpolated, the normal in eye space.
     pub(crate) fn point(
         &self,
         materials: &[Material; 2],
@@ -167,8 +176,10 @@ impl<'a> LightingSetup<'a> {
     fn side(&self, m: &Material, eye: V3, normal: V3, reaches: &Visibility) -> ([f32; 4], V3) {
         let rgb = |v: [f32; 4]| [v[0], v[1], v[2]];
         let times = |a: [f32; 4], b: [f32; 4]| [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
-        let mut primary =
-            add(rgb(m.emission), scaled(times(m.ambient, self.state.model_ambient), reaches.ambient));
+        let mut primary = add(
+            rgb(m.emission),
+            scaled(times(m.ambient, self.state.model_ambient), reaches.ambient),
+        );
         let mut specular = [0.0; 3];
         for (p, visible) in self.lights.iter().zip(&reaches.lights) {
             let (to_light, mut strength, distance) = if p.directional {
@@ -181,12 +192,14 @@ impl<'a> LightingSetup<'a> {
             };
             if let Some((direction, cutoff)) = p.spot {
                 let cosine = -dot(to_light, direction);
-                strength *= if cosine < cutoff { 0.0 } else { power(cosine, p.light.spot_exponent) };
+                strength *=
+                    if cosine < cutoff { 0.0 } else { power(cosine, p.light.spot_exponent) };
             }
             if strength == 0.0 || distance.is_nan() {
                 continue;
             }
-            primary = add(primary, scaled(times(m.ambient, p.light.ambient), strength * reaches.ambient));
+            primary =
+                add(primary, scaled(times(m.ambient, p.light.ambient), strength * reaches.ambient));
             strength *= visible;
             let cosine = dot(normal, to_light);
             if cosine <= 0.0 {
@@ -219,8 +232,8 @@ fn power(x: f32, e: f32) -> f32 {
     if e == 0.0 { 1.0 } else { x.powf(e) }
 }
 
-/// Inverse of the upper left 3 x 3 of a column-major matrix, row by row; the identity's when it is singular (Mesa then leaves
-/// normals as they are, too).
+/// Inverse of the upper left 3 x 3 of a column-major matrix, row by row; the identity's when it is
+/// singular (Mesa then leaves normals as they are, too).
 fn inverse_3(m: &[f32; 16]) -> [[f32; 3]; 3] {
     let a = |r: usize, c: usize| f64::from(m[4 * c + r]);
     let cofactor = |r: usize, c: usize| {

@@ -1,7 +1,9 @@
-//! Rays through pixel centres: which triangle each pixel sees, and its colour and depth as the driver would have made them.
+//! Rays through pixel centres: which triangle each pixel sees, and its colour and depth as the
+//! driver would have made them.
 //!
-//! Rays only find the triangle. Depth and attributes are then evaluated on it at the pixel centre with the rasterizer's own arithmetic
-//! (homogeneous edge functions after Olano and Greer 1997), so they agree with what the driver makes of neighbouring lines and text.
+//! Rays only find the triangle. Depth and attributes are then evaluated on it at the pixel centre
+//! with the rasterizer's own arithmetic (homogeneous edge functions after Olano and Greer 1997), so
+//! they agree with what the driver makes of neighbouring lines and text.
 
 mod fragment_batch;
 mod fragments;
@@ -71,7 +73,12 @@ impl Rect {
             return self;
         }
         let (x, y) = (self.x.min(o.x), self.y.min(o.y));
-        Rect { x, y, w: (self.x + self.w).max(o.x + o.w) - x, h: (self.y + self.h).max(o.y + o.h) - y }
+        Rect {
+            x,
+            y,
+            w: (self.x + self.w).max(o.x + o.w) - x,
+            h: (self.y + self.h).max(o.y + o.h) - y,
+        }
     }
 }
 
@@ -93,7 +100,8 @@ const TILE: i32 = 16;
 /// A depth buffer of 24 bits.
 pub(crate) const DEPTH_STEPS: f64 = 16_777_215.0;
 
-/// Share of w by which a point may be beyond the near or far plane: the driver clips in f32, and a plane that lies in the far plane is seen.
+/// Share of w by which a point may be beyond the near or far plane: the driver clips in f32, and a
+/// plane that lies in the far plane is seen.
 const SLACK: f64 = 1e-6;
 
 /// A draw made ready for rays.
@@ -168,8 +176,9 @@ impl<'a> Prepared<'a> {
             planes.push((row(3) * (1.0 + SLACK) - row(2)).to_array());
         }
         let eye_from_object = matrix(&s.model_view);
-        let object =
-            |p: &[f64; 4]| (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array();
+        let object = |p: &[f64; 4]| {
+            (eye_from_object.transpose() * rt_core::glam::DVec4::from_array(*p)).to_array()
+        };
         let mut clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
         let mut discards = false;
         if let Shading::Program(program) = &draw.shading {
@@ -226,7 +235,8 @@ impl<'a> Prepared<'a> {
         &self.clip_planes
     }
 
-    /// The ray through a point of the window, with the part of it that is not clipped; `None` when all of it is.
+    /// The ray through a point of the window, with the part of it that is not clipped; `None` when
+    /// all of it is.
     fn ray(&self, x: f64, y: f64) -> Option<(Ray, f64)> {
         let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
         let ndc = [2.0 * (x - vx) / vw - 1.0, 2.0 * (y - vy) / vh - 1.0];
@@ -248,7 +258,8 @@ impl<'a> Prepared<'a> {
         if t0.partial_cmp(&t1) != Some(std::cmp::Ordering::Less) {
             return None;
         }
-        // Rays of a parallel projection begin where the program's near plane is; a plane before it may be the first.
+        // Rays of a parallel projection begin where the program's near plane is; a plane before it
+        // may be the first.
         let back = if t0 < 0.0 && t0.is_finite() { t0 } else { 0.0 };
         let origin = origin + dir * back;
         let (ray, moved) = self.world.ray_from_world(origin, dir);
@@ -256,7 +267,11 @@ impl<'a> Prepared<'a> {
         let t_min = ((t0 - shift) as f32).max(0.0);
         let t_max = (t1 - shift) as f32;
         Some((
-            Ray { t_min, t_max: if t_max.is_finite() { t_max.next_up() } else { f32::INFINITY }, ..ray },
+            Ray {
+                t_min,
+                t_max: if t_max.is_finite() { t_max.next_up() } else { f32::INFINITY },
+                ..ray
+            },
             shift,
         ))
     }
@@ -266,19 +281,23 @@ impl<'a> Prepared<'a> {
         mesh.triangle(prim).map(|p| transform(&self.draw.clip_from_object, p.to_array()))
     }
 
-    /// Weights of a triangle's corners where its plane is seen at the centre of a pixel, be it inside or not; `None` where that is nowhere.
+    /// Weights of a triangle's corners where its plane is seen at the centre of a pixel, be it
+    /// inside or not; `None` where that is nowhere.
     pub(crate) fn weights_at(&self, prim: usize, x: i32, y: i32) -> Option<[f32; 3]> {
         let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
         let [dx, dy] = self.draw.state.sample_place.map(f64::from);
         let (px, py) = (f64::from(x) + 0.5 - dx, f64::from(y) + 0.5 - dy);
         let at = DVec3::new(2.0 * (px - vx) / vw - 1.0, 2.0 * (py - vy) / vh - 1.0, 1.0);
-        let h = self.corners(prim).map(|v| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[3])));
+        let h = self
+            .corners(prim)
+            .map(|v| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[3])));
         let l = [h[1].cross(h[2]).dot(at), h[2].cross(h[0]).dot(at), h[0].cross(h[1]).dot(at)];
         let sum = l[0] + l[1] + l[2];
         (sum != 0.0 && sum.is_finite()).then(|| l.map(|v| (v / sum) as f32))
     }
 
-    /// The fragment as it is shaded: one of several samples takes the colour of the middle of its pixel.
+    /// The fragment as it is shaded: one of several samples takes the colour of the middle of its
+    /// pixel.
     pub(crate) fn centred(&self, prim: usize, f: Fragment, x: i32, y: i32) -> Fragment {
         if self.draw.state.sample_place == [0.0; 2] {
             return f;
@@ -287,7 +306,8 @@ impl<'a> Prepared<'a> {
         Fragment { weights, ..f }
     }
 
-    /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer makes one.
+    /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer makes
+    /// one.
     fn fragment(&self, prim: usize, x: i32, y: i32) -> Option<Fragment> {
         let s = &*self.draw.state;
         let c = self.corners(prim);
@@ -339,7 +359,8 @@ impl<'a> Prepared<'a> {
                 return None;
             }
             if height <= slack && !self.discards {
-                // The driver cuts the triangle along the plane: a centre on the cut belongs to what is above or to the right of it.
+                // The driver cuts the triangle along the plane: a centre on the cut belongs to what
+                // is above or to the right of it.
                 let across = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
                 let slope = (0..3).map(|i| across[i] * corner(i)).sum::<DVec3>() * sum.signum();
                 let upright = slope.x.abs() > 1e-9 * slope.y.abs();
@@ -388,7 +409,8 @@ impl<'a> Prepared<'a> {
                     found
                 });
             }
-            // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray saw beside it.
+            // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray
+            // saw beside it.
             if step == 0
                 && let Some(found) = self.hit_beside_center(h.t, x, y)
             {
@@ -401,7 +423,8 @@ impl<'a> Prepared<'a> {
         None
     }
 
-    /// Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw: the nearest *with* offset counts.
+    /// Polygon offset pushes steep triangles far back, at silhouettes behind others of the same
+    /// draw: the nearest *with* offset counts.
     fn nearest_with_offset(
         &self,
         first: (usize, Fragment),
@@ -435,12 +458,16 @@ impl<'a> Prepared<'a> {
         let s = &*self.draw.state;
         let [n, f] = s.depth_range;
         let [vx, vy, vw, vh] = s.viewport.map(f64::from);
-        let ndc = [2.0 * (f64::from(x) + 0.5 - vx) / vw - 1.0, 2.0 * (f64::from(y) + 0.5 - vy) / vh - 1.0];
+        let ndc = [
+            2.0 * (f64::from(x) + 0.5 - vx) / vw - 1.0,
+            2.0 * (f64::from(y) + 0.5 - vy) / vh - 1.0,
+        ];
         let (origin, dir) = self.camera.world_ray(ndc);
         let clip = matrix(&self.draw.clip_from_object);
         let z = ((depth - n) / (f - n) - 0.5) * 2.0;
         let (o, d) = (origin.extend(1.0), dir.extend(0.0));
-        let (a, b, aw, bw) = (clip.row(2).dot(o), clip.row(2).dot(d), clip.row(3).dot(o), clip.row(3).dot(d));
+        let (a, b, aw, bw) =
+            (clip.row(2).dot(o), clip.row(2).dot(d), clip.row(3).dot(o), clip.row(3).dot(d));
         let t = (z * aw - a) / (b - z * bw);
         let (_, shift) = self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5)?;
         let t = (t - shift) as f32;

@@ -52,63 +52,88 @@ impl TileScratch {
 }
 
 /// The nearest fragment of all draws at every pixel of a share of the rows.
-pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings, share: RowShare) -> (Layer, [u64; 2]) {
+pub(crate) fn nearest(
+    draws: &[Prepared<'_>],
+    settings: &Settings,
+    share: RowShare,
+) -> (Layer, [u64; 2]) {
     let ray_scene = RayScene::new(draws, settings);
     let mode = settings.mode;
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
     let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
-    let mut layer = Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
+    let mut layer =
+        Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
     if w * h == 0 {
         return (layer, [0; 2]);
     }
     let band = w * TILE as usize;
     let covered = AtomicU64::new(0);
     let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
-    bands.filter(|(i, _)| share.has(*i)).for_each_init(TileScratch::new, |scratch, (i, (color, depth))| {
-        let y = rect.y + i as i32 * TILE;
-        let tile_h = (color.len() / w) as i32;
-        let mut n = 0;
-        let mut batch = FragmentBatch::default();
-        // Tile by tile: what was seen of one stays in the first cache until it is shaded.
-        for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
-            let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
-            let mut any = false;
-            for (d, p) in draws.iter().enumerate() {
-                any |= trace_draw(p, d as u32, tile, scratch, any);
-            }
-            if !any {
-                continue;
-            }
-            for (j, s) in scratch.seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
-                let (tx, ty) = (j % TILE as usize, j / TILE as usize);
-                let k = ty * w + (x - rect.x) as usize + tx;
-                depth[k] = s.fragment.depth as f32;
-                n += 1;
-                let p = &draws[s.draw as usize];
-                let at = (x + tx as i32, y + ty as i32);
-                let s = &PixelHit { fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1), ..*s };
-                if p.blocks && mode == Mode::Match {
-                    if batch.count > 0 && batch.draw != s.draw {
-                        batch.shade(&draws[batch.draw as usize], color);
-                    }
-                    batch.add(p, s.draw, k, s, color);
+    bands.filter(|(i, _)| share.has(*i)).for_each_init(
+        TileScratch::new,
+        |scratch, (i, (color, depth))| {
+            let y = rect.y + i as i32 * TILE;
+            let tile_h = (color.len() / w) as i32;
+            let mut n = 0;
+            let mut batch = FragmentBatch::default();
+            // Tile by tile: what was seen of one stays in the first cache until it is shaded.
+            for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
+                let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
+                let mut any = false;
+                for (d, p) in draws.iter().enumerate() {
+                    any |= trace_draw(p, d as u32, tile, scratch, any);
+                }
+                if !any {
                     continue;
                 }
-                color[k] = to_bytes(p.shaded(s.prim as usize, &s.fragment, mode, ray_scene.as_ref(), at));
+                for (j, s) in scratch.seen.iter().enumerate().filter(|(_, s)| s.draw != u32::MAX) {
+                    let (tx, ty) = (j % TILE as usize, j / TILE as usize);
+                    let k = ty * w + (x - rect.x) as usize + tx;
+                    depth[k] = s.fragment.depth as f32;
+                    n += 1;
+                    let p = &draws[s.draw as usize];
+                    let at = (x + tx as i32, y + ty as i32);
+                    let s = &PixelHit {
+                        fragment: p.centred(s.prim as usize, s.fragment, at.0, at.1),
+                        ..*s
+                    };
+                    if p.blocks && mode == Mode::Match {
+                        if batch.count > 0 && batch.draw != s.draw {
+                            batch.shade(&draws[batch.draw as usize], color);
+                        }
+                        batch.add(p, s.draw, k, s, color);
+                        continue;
+                    }
+                    color[k] = to_bytes(p.shaded(
+                        s.prim as usize,
+                        &s.fragment,
+                        mode,
+                        ray_scene.as_ref(),
+                        at,
+                    ));
+                }
             }
-        }
-        if batch.count > 0 {
-            batch.shade(&draws[batch.draw as usize], color);
-        }
-        covered.fetch_add(n, Relaxed);
-    });
+            if batch.count > 0 {
+                batch.shade(&draws[batch.draw as usize], color);
+            }
+            covered.fetch_add(n, Relaxed);
+        },
+    );
     layer.covered = covered.into_inner() as usize;
-    let extra = ray_scene.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
+    let extra =
+        ray_scene.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()]);
     (layer, extra)
 }
 
-/// One draw against what was seen so far in a tile, row by row; false when none of it is there. Unless `begun` nothing was seen so far.
-fn trace_draw(p: &Prepared<'_>, index: u32, area: Rect, scratch: &mut TileScratch, begun: bool) -> bool {
+/// One draw against what was seen so far in a tile, row by row; false when none of it is there.
+/// Unless `begun` nothing was seen so far.
+fn trace_draw(
+    p: &Prepared<'_>,
+    index: u32,
+    area: Rect,
+    scratch: &mut TileScratch,
+    begun: bool,
+) -> bool {
     let TileScratch { rays, fragments, moved, seen } = scratch;
     let tile = area.and(p.rect);
     if tile.is_empty() || !rays.send(p, tile) {
@@ -121,7 +146,8 @@ fn trace_draw(p: &Prepared<'_>, index: u32, area: Rect, scratch: &mut TileScratc
     let (hits, range) = (&rays.hits, p.draw.state.depth_range);
     let (blocks, targets) = (&mut *fragments, &mut *moved);
     dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
-    // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same draw.
+    // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same
+    // draw.
     let has_candidates =
         p.draw.state.polygon_offset.is_some() && rays.trace_offset_candidates(p, tile, moved);
     for y in 0..tile.h {

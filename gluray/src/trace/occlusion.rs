@@ -1,8 +1,10 @@
-//! What rays add to OpenGL's lighting: lights that are hidden, and corners that see little of the surroundings.
+//! What rays add to OpenGL's lighting: lights that are hidden, and corners that see little of the
+//! surroundings.
 //!
-//! Only what is asked for and can change a pixel is computed: no shadow rays from what the eye sees to a point light at the eye, none
-//! where a surface faces away, and no occlusion rays when none are set. Rays are made in eye space, where all draws of a frame meet, and go
-//! through each draw's own structure.
+//! Only what is asked for and can change a pixel is computed: no shadow rays from what the eye sees
+//! to a point light at the eye, none where a surface faces away, and no occlusion rays when none
+//! are set. Rays are made in eye space, where all draws of a frame meet, and go through each draw's
+//! own structure.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::host::config::{Mode, Settings};
@@ -65,9 +67,10 @@ impl Eye {
 }
 
 impl LightPosition {
-    /// Whether its light goes along the rays of this eye: what it misses the eye cannot see. That is
-    /// so of a point at the eye of a perspective, and of parallel light along parallel rays. Parallel
-    /// light along the view is no such light in perspective: its shadows show beside what casts them.
+    /// Whether its light goes along the rays of this eye: what it misses the eye cannot see. That
+    /// is so of a point at the eye of a perspective, and of parallel light along parallel rays.
+    /// Parallel light along the view is no such light in perspective: its shadows show beside what
+    /// casts them.
     pub(crate) fn follows_rays_of(self, eye: Eye) -> bool {
         // What is left of f32 matrices moves a shadow by much less than a pixel.
         const SLACK: f64 = 1e-5;
@@ -121,8 +124,9 @@ impl<'a> RayScene<'a> {
         for p in draws {
             let (m, b) = (eye_from_object(p.draw), p.draw.geometry.bounds());
             for corner in 0..8 {
-                let pick =
-                    |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+                let pick = |bit: i32, k: usize| {
+                    f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] })
+                };
                 let c = m.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)));
                 (lo, hi) = (lo.min(c), hi.max(c));
             }
@@ -153,7 +157,10 @@ impl<'a> RayScene<'a> {
             let (origin, dir) = (m.transform_point3(from), m.transform_vector3(dir));
             let (ray, moved) = p.world.ray_from_world(origin, dir);
             let t_max = (most - moved) as f32;
-            p.world.occluded(&Ray { t_max: if t_max.is_finite() { t_max } else { f32::INFINITY }, ..ray })
+            p.world.occluded(&Ray {
+                t_max: if t_max.is_finite() { t_max } else { f32::INFINITY },
+                ..ray
+            })
         })
     }
 
@@ -168,7 +175,8 @@ impl<'a> RayScene<'a> {
         pixel: (i32, i32),
     ) -> Visibility {
         let mut v = Visibility::FULL;
-        // Off the surface by a share of the scene that f32 positions in any of its parts cannot reach.
+        // Off the surface by a share of the scene that f32 positions in any of its parts cannot
+        // reach.
         let from = point + normal * (self.diagonal * 2e-5);
         let effects = &self.settings.effects;
         let mut random = PixelRng::new((pixel.0 ^ self.sample, pixel.1));
@@ -180,7 +188,9 @@ impl<'a> RayScene<'a> {
                 }
                 let (dir, most) = match *light {
                     LightPosition::Directional(d) => (d.normalize_or_zero(), f64::INFINITY),
-                    LightPosition::Positional(p) => ((p - from).normalize_or_zero(), (p - from).length()),
+                    LightPosition::Positional(p) => {
+                        ((p - from).normalize_or_zero(), (p - from).length())
+                    }
                 };
                 if dir.dot(normal) <= 0.0 {
                     continue;
@@ -190,7 +200,11 @@ impl<'a> RayScene<'a> {
                 let seen = (0..rays).filter(|_| {
                     let (x, y) = random.on_disk();
                     let (u, w) = dir.any_orthonormal_pair();
-                    let dir = if spread > 0.0 { (dir + (u * x + w * y) * spread).normalize() } else { dir };
+                    let dir = if spread > 0.0 {
+                        (dir + (u * x + w * y) * spread).normalize()
+                    } else {
+                        dir
+                    };
                     !self.hidden(from, dir, most)
                 });
                 *share = seen.count() as f32 / rays as f32;
@@ -254,7 +268,9 @@ mod tests {
     fn lights_that_go_along_the_rays_of_an_eye_are_known() {
         let point = |at| Eye::Point(at, 10.0);
         assert!(LightPosition::Positional(DVec3::ZERO).follows_rays_of(point(DVec3::ZERO)));
-        assert!(LightPosition::Positional(DVec3::X).follows_rays_of(point(DVec3::new(1.0, 1e-6, 0.0))));
+        assert!(
+            LightPosition::Positional(DVec3::X).follows_rays_of(point(DVec3::new(1.0, 1e-6, 0.0)))
+        );
         assert!(!LightPosition::Positional(DVec3::ZERO).follows_rays_of(point(DVec3::X)));
         assert!(!LightPosition::Directional(DVec3::Z).follows_rays_of(point(DVec3::ZERO)));
         let parallel = Eye::Parallel(DVec3::Z);

@@ -1,4 +1,5 @@
-//! What the user changes about materials and lights: applied to a draw before it is traced. The driver never sees it.
+//! What the user changes about materials and lights: applied to a draw before it is traced. The
+//! driver never sees it.
 //!
 //! Mode `match` shows the driver's picture, so nothing is changed there.
 
@@ -63,7 +64,9 @@ pub(crate) fn apply(draw: &mut Draw, settings: &Settings) {
     if settings.lights != Lights::default() && draw.state.lighting {
         relight(Arc::make_mut(&mut draw.state), &settings.lights);
     }
-    if let (Shading::Program(program), true) = (&mut draw.shading, settings.lights != Lights::default()) {
+    if let (Shading::Program(program), true) =
+        (&mut draw.shading, settings.lights != Lights::default())
+    {
         relight_program(Arc::make_mut(program), &settings.lights);
     }
     if settings.material.is_empty() && settings.objects.is_empty() {
@@ -126,7 +129,10 @@ fn repaint_program(p: &mut VtkProgram, m: &Material) {
 
 fn relight(s: &mut Snapshot, l: &Lights) {
     for light in &mut s.lights {
-        light.diffuse[..3].iter_mut().chain(&mut light.specular[..3]).for_each(|v| *v *= l.program as f32);
+        light.diffuse[..3]
+            .iter_mut()
+            .chain(&mut light.specular[..3])
+            .for_each(|v| *v *= l.program as f32);
         light.ambient[..3].iter_mut().for_each(|v| *v *= l.ambient as f32);
     }
     s.model_ambient[..3].iter_mut().for_each(|v| *v *= l.ambient as f32);
@@ -197,7 +203,8 @@ mod tests {
     #[test]
     fn lights_are_dimmed_and_one_is_added_where_there_is_room() {
         let light = GlLight { diffuse: [1.0; 4], ambient: [0.5; 4], ..GlLight::default() };
-        let mut s = Snapshot { lights: vec![light], model_ambient: [0.2; 4], ..Snapshot::default() };
+        let mut s =
+            Snapshot { lights: vec![light], model_ambient: [0.2; 4], ..Snapshot::default() };
         let l = Lights {
             program: 0.5,
             ambient: 0.0,

@@ -1,8 +1,11 @@
-//! A draw whose order matters, as a stack: each triangle lies in the window's plane, as high as its place in the order.
+//! A draw whose order matters, as a stack: each triangle lies in the window's plane, as high as its
+//! place in the order.
 //!
-//! Layers of such draws often lie in one plane (user interfaces, pictures), where a ray from the eye cannot tell which comes after which. Above the window the
-//! last triangle is the highest, and a ray from above meets them in the reverse order, each by itself. Where the last one replaces all others, it is the
-//! only one that is looked for. Corners are rounded to 1/256 pixel as the rasterizer does, so slivers are met where it draws them.
+//! Layers of such draws often lie in one plane (user interfaces, pictures), where a ray from the
+//! eye cannot tell which comes after which. Above the window the last triangle is the highest, and
+//! a ray from above meets them in the reverse order, each by itself. Where the last one replaces
+//! all others, it is the only one that is looked for. Corners are rounded to 1/256 pixel as the
+//! rasterizer does, so slivers are met where it draws them.
 
 use super::{Prepared, Rect, slot};
 use crate::trace::raster::snapped;
@@ -34,7 +37,8 @@ impl PaintersStack {
         let mut positions = Vec::with_capacity(3 * n);
         for prim in 0..n {
             for c in p.corners(prim) {
-                if c[3].partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) || !c[3].is_finite() {
+                if c[3].partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) || !c[3].is_finite()
+                {
                     return None;
                 }
                 let at = snapped(&c, p.draw.state.viewport);
@@ -50,15 +54,24 @@ impl PaintersStack {
         Some(PaintersStack { world: World::from_mesh(mesh, &options).ok()?, triangles: n })
     }
 
-    /// For each pixel of a tile the triangles over its centre, the last first, until `take` has enough of them.
-    pub(super) fn each(&self, p: &Prepared<'_>, tile: Rect, mut take: impl FnMut(usize, usize) -> bool) {
+    /// For each pixel of a tile the triangles over its centre, the last first, until `take` has
+    /// enough of them.
+    pub(super) fn each(
+        &self,
+        p: &Prepared<'_>,
+        tile: Rect,
+        mut take: impl FnMut(usize, usize) -> bool,
+    ) {
         let mut blocks = vec![RayBlock::INACTIVE; 16];
         let mut hits = vec![HitBlock::MISS; 16];
         let mut active = Vec::new();
         for i in 0..(tile.w * tile.h) as usize {
             let (x, y) = (i as i32 % tile.w, i as i32 / tile.w);
-            let above =
-                DVec3::new(f64::from(tile.x + x) + 0.5, f64::from(tile.y + y) + 0.5, self.triangles as f64);
+            let above = DVec3::new(
+                f64::from(tile.x + x) + 0.5,
+                f64::from(tile.y + y) + 0.5,
+                self.triangles as f64,
+            );
             let (ray, _) = self.world.ray_from_world(above, DVec3::NEG_Z);
             let (b, l) = slot(x, y);
             blocks[b].set(l, &ray);
@@ -67,7 +80,9 @@ impl PaintersStack {
         while !active.is_empty() {
             p.rays.fetch_add(active.len() as u64, Relaxed);
             hits.fill(HitBlock::MISS);
-            self.world.closest_coherent(&blocks, &mut hits).expect("one block of hits for each of rays");
+            self.world
+                .closest_coherent(&blocks, &mut hits)
+                .expect("one block of hits for each of rays");
             active.retain(|&(i, b, l)| {
                 let mut ray = blocks[b].get(l);
                 let more = hits[b].get(l).filter(|hit| take(i, hit.prim as usize));

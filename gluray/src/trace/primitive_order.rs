@@ -1,8 +1,10 @@
 //! Every fragment of one draw, for states in which the order of triangles matters.
 //!
-//! Where all of the draw is before the eye its triangles are stacked by their order ([`PaintersStack`]), and one ray a layer finds them. Elsewhere rays go through
-//! each pixel's centre from surface to surface, 256 at a time; where an edge comes near a centre, four more rays beside it find the triangles that the fill
-//! rule may give the pixel to. Of layers in one plane those rays see the first alone.
+//! Where all of the draw is before the eye its triangles are stacked by their order
+//! ([`PaintersStack`]), and one ray a layer finds them. Elsewhere rays go through each pixel's
+//! centre from surface to surface, 256 at a time; where an edge comes near a centre, four more rays
+//! beside it find the triangles that the fill rule may give the pixel to. Of layers in one plane
+//! those rays see the first alone.
 
 use super::painters_stack::PaintersStack;
 use super::{Layer, MOST_STEPS, Prepared, Rect, TILE, UNCOVERED, slot, to_bytes};
@@ -50,12 +52,17 @@ pub(crate) fn ordered_layers(p: &Prepared<'_>) -> Vec<Layer> {
     let layers = made.iter().flatten().map(Vec::len).max().unwrap_or(0);
     (0..layers)
         .map(|n| {
-            let mut layer =
-                Layer { rect, color: vec![[0; 4]; w * h], depth: vec![UNCOVERED; w * h], covered: 0 };
+            let mut layer = Layer {
+                rect,
+                color: vec![[0; 4]; w * h],
+                depth: vec![UNCOVERED; w * h],
+                covered: 0,
+            };
             for (tile, pixels) in tiles.iter().zip(&made) {
                 for (i, found) in pixels.iter().enumerate() {
                     let Some((color, depth)) = found.get(n) else { continue };
-                    let (x, y) = (tile.x + i as i32 % tile.w - rect.x, tile.y + i as i32 / tile.w - rect.y);
+                    let (x, y) =
+                        (tile.x + i as i32 % tile.w - rect.x, tile.y + i as i32 / tile.w - rect.y);
                     let k = y as usize * w + x as usize;
                     (layer.color[k], layer.depth[k]) = (*color, *depth);
                     layer.covered += 1;
@@ -66,7 +73,8 @@ pub(crate) fn ordered_layers(p: &Prepared<'_>) -> Vec<Layer> {
         .collect()
 }
 
-/// True when a fragment replaces whatever is there, so that the last of a pixel is all that is seen.
+/// True when a fragment replaces whatever is there, so that the last of a pixel is all that is
+/// seen.
 fn last_is_all(p: &Prepared<'_>) -> bool {
     let s = &*p.draw.state;
     let untested = !s.depth_test || (s.depth_func == ALWAYS && s.depth_mask);
@@ -120,7 +128,9 @@ fn of_tile(p: &Prepared<'_>, tile: Rect, near: &EdgePixels) -> Vec<Vec<OrderedFr
             }
             p.rays.fetch_add(active.len() as u64, Relaxed);
             hits.fill(HitBlock::MISS);
-            p.world.closest_coherent(&blocks, &mut hits).expect("one block of hits for each of rays");
+            p.world
+                .closest_coherent(&blocks, &mut hits)
+                .expect("one block of hits for each of rays");
             active.retain(|&(i, b, l)| {
                 let Some(hit) = hits[b].get(l) else {
                     let mut done = blocks[b].get(l);
@@ -191,7 +201,8 @@ fn near_edges(p: &Prepared<'_>) -> EdgePixels {
     EdgePixels { rect, marks: Some(marks) }
 }
 
-/// Marks the pixels whose centres are near the line from `a` to `b`: where it crosses the rows of centres, and the columns.
+/// Marks the pixels whose centres are near the line from `a` to `b`: where it crosses the rows of
+/// centres, and the columns.
 fn mark(marks: &mut [bool], size: [i32; 2], a: [f64; 2], b: [f64; 2]) {
     for (along, across) in [(1, 0), (0, 1)] {
         let (lo, hi) = (a[along].min(b[along]) - NEAR - 0.5, a[along].max(b[along]) + NEAR - 0.5);
@@ -202,7 +213,8 @@ fn mark(marks: &mut [bool], size: [i32; 2], a: [f64; 2], b: [f64; 2]) {
             let t = if length == 0.0 { 0.0 } else { (f64::from(i) + 0.5 - a[along]) / length };
             let place = a[across] + (b[across] - a[across]) * t.clamp(0.0, 1.0) - 0.5;
             let nearest = place.round();
-            if (place - nearest).abs() > NEAR || nearest < 0.0 || nearest >= f64::from(size[across]) {
+            if (place - nearest).abs() > NEAR || nearest < 0.0 || nearest >= f64::from(size[across])
+            {
                 continue;
             }
             let (x, y) = if along == 1 { (nearest as i32, i) } else { (i, nearest as i32) };

@@ -10,12 +10,14 @@ pub(crate) fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
     [x, y].map(|v| (v * 256.0).round().clamp(-5e8, 5e8) as i64)
 }
 
-/// Whether the triangle covers the pixel's centre. A centre on an edge belongs to the triangle above or to the right of it.
+/// Whether the triangle covers the pixel's centre. A centre on an edge belongs to the triangle
+/// above or to the right of it.
 pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> bool {
     let p = c.each_ref().map(|v| snapped(v, viewport));
     let (cx, cy) = (i64::from(x) * 256 + 128, i64::from(y) * 256 + 128);
-    let edge =
-        |a: [i64; 2], b: [i64; 2], x: i64, y: i64| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+    let edge = |a: [i64; 2], b: [i64; 2], x: i64, y: i64| {
+        (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
+    };
     let area = edge(p[0], p[1], p[2][0], p[2][1]);
     if area == 0 {
         return false;
@@ -24,7 +26,8 @@ pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> b
     (0..3).all(|i| {
         let (a, b) = (p[i], p[(i + 1) % 3]);
         let e = edge(a, b, cx, cy);
-        // Counter-clockwise: an edge that goes down has the triangle on its right side in x, one that goes right has it above.
+        // Counter-clockwise: an edge that goes down has the triangle on its right side in x, one
+        // that goes right has it above.
         let inclusive = b[1] < a[1] || (b[1] == a[1] && b[0] > a[0]);
         e > 0 || (e == 0 && inclusive)
     })
@@ -57,8 +60,9 @@ pub(crate) fn gradient(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) 
     [dx, dy]
 }
 
-/// How VTK's shaders move depths back: by the gradient's length. The depth that they start from, and write for all samples, is that of the pixel's middle: how
-/// far that is from the depth at a sample is the second number.
+/// How VTK's shaders move depths back: by the gradient's length. The depth that they start from,
+/// and write for all samples, is that of the pixel's middle: how far that is from the depth at a
+/// sample is the second number.
 pub(crate) fn polygon_offset([dx, dy]: [f64; 2], sample_place: [f32; 2]) -> [f64; 2] {
     let [x, y] = sample_place.map(f64::from);
     [(dx * dx + dy * dy).sqrt(), -(dx * x + dy * y)]

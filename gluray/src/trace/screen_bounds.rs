@@ -29,16 +29,19 @@ pub(super) fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
             let pixel = |ndc: f64, at: i32, size: i32| {
                 (f64::from(at) + (ndc + 1.0) * 0.5 * f64::from(size)).clamp(-1e9, 1e9)
             };
-            let (x0, y0) = (pixel(lo[0], x, w).floor() as i32 - 1, pixel(lo[1], y, h).floor() as i32 - 1);
-            let (x1, y1) = (pixel(hi[0], x, w).ceil() as i32 + 1, pixel(hi[1], y, h).ceil() as i32 + 1);
+            let (x0, y0) =
+                (pixel(lo[0], x, w).floor() as i32 - 1, pixel(lo[1], y, h).floor() as i32 - 1);
+            let (x1, y1) =
+                (pixel(hi[0], x, w).ceil() as i32 + 1, pixel(hi[1], y, h).ceil() as i32 + 1);
             rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
         }
     }
 }
 
-/// Where a box is in normalised device coordinates, of which `corners` are the clip coordinates (bit k of the number: the greater end of
-/// axis k); `None` when all of it is beyond one plane of the view volume. What is behind the viewer is cut off: without that, all draws around
-/// the viewer would be looked for in every pixel.
+/// Where a box is in normalised device coordinates, of which `corners` are the clip coordinates
+/// (bit k of the number: the greater end of axis k); `None` when all of it is beyond one plane of
+/// the view volume. What is behind the viewer is cut off: without that, all draws around the viewer
+/// would be looked for in every pixel.
 fn on_screen(corners: &[DVec4; 8], depth_clamp: bool) -> Option<[[f64; 2]; 2]> {
     // Room for what roundings do, as the exact tests are those of each fragment.
     const SLACK: f64 = 1e-4;
@@ -50,7 +53,8 @@ fn on_screen(corners: &[DVec4; 8], depth_clamp: bool) -> Option<[[f64; 2]; 2]> {
         || beyond(&|c| c.w * room + SLACK * size)
         || !depth_clamp && beyond(&|c| c.w * room - c.z + SLACK * size)
         || (0..2).any(|k| {
-            beyond(&|c| c.w * room + c[k] + SLACK * size) || beyond(&|c| c.w * room - c[k] + SLACK * size)
+            beyond(&|c| c.w * room + c[k] + SLACK * size)
+                || beyond(&|c| c.w * room - c[k] + SLACK * size)
         });
     if outside {
         return None;
@@ -95,10 +99,12 @@ mod tests {
 
     #[test]
     fn what_is_around_the_viewer_covers_no_more_than_its_part_in_front() {
-        let b = on_screen(&corners([-1.0, -1.0, -10.0], [1.0, 1.0, -5.0]), false).expect("before the viewer");
+        let b = on_screen(&corners([-1.0, -1.0, -10.0], [1.0, 1.0, -5.0]), false)
+            .expect("before the viewer");
         assert!((b[0][0] + 0.2).abs() < 1e-9 && (b[1][1] - 0.2).abs() < 1e-9, "{b:?}");
         // From behind the viewer to before it, at the right side.
-        let b = on_screen(&corners([0.5, -0.1, -10.0], [0.6, 0.1, 10.0]), false).expect("partly before");
+        let b = on_screen(&corners([0.5, -0.1, -10.0], [0.6, 0.1, 10.0]), false)
+            .expect("partly before");
         assert!((b[0][0] - 0.05).abs() < 1e-9, "{b:?}");
         assert!(b[1][0] > 0.599 && b[1][0] < 0.65 && b[1][1] < 0.11, "{b:?}");
         for (lo, hi) in [
@@ -109,7 +115,10 @@ mod tests {
         ] {
             assert_eq!(on_screen(&corners(lo, hi), false), None, "{lo:?} {hi:?}");
         }
-        assert!(on_screen(&corners([-1.0, -1.0, -300.0], [1.0, 1.0, -200.0]), true).is_some(), "depth clamp");
+        assert!(
+            on_screen(&corners([-1.0, -1.0, -300.0], [1.0, 1.0, -200.0]), true).is_some(),
+            "depth clamp"
+        );
         assert_eq!(
             on_screen(&corners([-1.0, -1.0, -0.5], [1.0, 1.0, 0.5]), true),
             Some([[-1.0; 2], [1.0; 2]])

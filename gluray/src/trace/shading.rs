@@ -1,4 +1,5 @@
-//! The colour of a fragment: vertex colours, texture, fog; or lighting at the fragment itself with what rays found out about it.
+//! The colour of a fragment: vertex colours, texture, fog; or lighting at the fragment itself with
+//! what rays found out about it.
 
 use crate::capture::draw::Shading;
 use crate::classify::vtk::FragmentSample;
@@ -25,7 +26,8 @@ impl Prepared<'_> {
             [v[0] / v[3], v[1] / v[3], v[2] / v[3]]
         });
         let normal = |i: usize| self.lighting.eye_normal(self.draw.attributes.normals.at(i));
-        let normal = if self.draw.state.flat { normal(corners[2]) } else { mixed(corners.map(normal), w) };
+        let normal =
+            if self.draw.state.flat { normal(corners[2]) } else { mixed(corners.map(normal), w) };
         (mixed(eye, w), crate::trace::lighting::normalized(normal))
     }
 
@@ -45,7 +47,8 @@ impl Prepared<'_> {
         }
     }
 
-    /// The colour of the surface itself, without lights: the diffuse one, with vertex colours and texture.
+    /// The colour of the surface itself, without lights: the diffuse one, with vertex colours and
+    /// texture.
     pub(crate) fn base_color(&self, prim: usize, f: &Fragment) -> [f32; 4] {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
@@ -67,7 +70,8 @@ impl Prepared<'_> {
     /// The diffuse colour of fixed function at a vertex.
     pub(crate) fn base_of_vertex(&self, i: usize) -> [f32; 4] {
         let (s, a) = (&*self.draw.state, &self.draw.attributes);
-        let tracked = s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        let tracked =
+            s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
         let c = if s.lighting && !tracked { a.materials_at(i)[0].diffuse } else { a.colors.at(i) };
         c.map(|v| v.clamp(0.0, 1.0))
     }
@@ -78,9 +82,11 @@ impl Prepared<'_> {
         texturing::coordinates(unit, &self.draw.state, &self.draw.attributes, &self.lighting, i, p)
     }
 
-    /// How many texels of a texture of `size` the fragment of triangle `prim` covers at a pixel; `None` where the triangle's plane goes through the eye there.
+    /// How many texels of a texture of `size` the fragment of triangle `prim` covers at a pixel;
+    /// `None` where the triangle's plane goes through the eye there.
     ///
-    /// The driver's way: the differences of two by two pixels, from the upper left one to its neighbours.
+    /// The driver's way: the differences of two by two pixels, from the upper left one to its
+    /// neighbours.
     fn footprint(
         &self,
         prim: usize,
@@ -130,7 +136,8 @@ impl Prepared<'_> {
         }
         let (eye, _) = self.eye_point(prim, f.weights.map(|w| w as f32));
         let clip = matrix(&self.draw.state.projection);
-        let parallel = matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
+        let parallel =
+            matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
         let towards = if parallel { DVec3::Z } else { -vector(eye) };
         self.lit_from(prim, f, mode, ray_scene, (pixel, true), towards)
     }
@@ -164,17 +171,24 @@ impl Prepared<'_> {
         let (Some(ray_scene), true) = (ray_scene, lit) else {
             return self.color(prim, f, per_pixel, &Visibility::FULL, own);
         };
-        // The plane of the triangle, turned to the viewer: what is in front of it is what the eye sees.
+        // The plane of the triangle, turned to the viewer: what is in front of it is what the eye
+        // sees.
         let weights = f.weights.map(|w| w as f32);
         let (eye, _) = self.eye_point(prim, weights);
         let at = |w| vector(self.eye_point(prim, w).0);
         let [a, b, c] = [at([1.0, 0.0, 0.0]), at([0.0, 1.0, 0.0]), at([0.0, 0.0, 1.0])];
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
-        let reaches =
-            ray_scene.visibility(vector(eye), normal, &self.light_positions, seen.then_some(self.eye), pixel);
+        let reaches = ray_scene.visibility(
+            vector(eye),
+            normal,
+            &self.light_positions,
+            seen.then_some(self.eye),
+            pixel,
+        );
         if mode != Mode::Enhance {
-            // Point lights at the eye cast no shadow that it could see; corners dim them all the same.
+            // Point lights at the eye cast no shadow that it could see; corners dim them all the
+            // same.
             let mut r = reaches;
             r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
             return self.color(prim, f, per_pixel, &r, own);
@@ -201,7 +215,8 @@ impl Prepared<'_> {
         if let Shading::Program(program) = &self.draw.shading {
             let picture = program.picture().filter(|image| image.needs_footprint());
             let texels = picture.zip(pixel).and_then(|(image, at)| {
-                let coordinates = corners.map(|i| program.picture_coordinates(&self.draw.attributes, i));
+                let coordinates =
+                    corners.map(|i| program.picture_coordinates(&self.draw.attributes, i));
                 self.footprint(prim, coordinates.map(|[s, t]| [s, t, 0.0, 1.0]), image.size(), at)
             });
             let at = FragmentSample {
@@ -234,7 +249,9 @@ impl Prepared<'_> {
                 self.lighting.point(materials, color, eye, normal, !f.front, reaches)
             }
             true => (lit[2].primary[side], lit[2].secondary[side]),
-            false => (mixed(lit.map(|l| l.primary[side]), w), mixed(lit.map(|l| l.secondary[side]), w)),
+            false => {
+                (mixed(lit.map(|l| l.primary[side]), w), mixed(lit.map(|l| l.secondary[side]), w))
+            }
         };
         if let (Some(unit), Some(image)) = (&s.texture, &self.image) {
             let coords = corners.map(|i| self.texture_coordinates(unit, i));

@@ -1,5 +1,6 @@
-//! Texture unit 0 of fixed function: coordinates at a vertex, texels at a fragment, and the environment that brings both together
-//! (compatibility profile specification, sections 12.1.3, 8.14 and 16.1).
+//! Texture unit 0 of fixed function: coordinates at a vertex, texels at a fragment, and the
+//! environment that brings both together (compatibility profile specification, sections 12.1.3,
+//! 8.14 and 16.1).
 
 mod image;
 mod sampling;
@@ -25,7 +26,8 @@ pub(crate) fn check_sampling(target: u32) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or when the texture is incomplete and so left out.
+/// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or
+/// when the texture is incomplete and so left out.
 pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static str> {
     const TEXTURE_BASE_LEVEL: u32 = 0x813c;
     const TEXTURE_MAX_ANISOTROPY: u32 = 0x84fe;
@@ -43,7 +45,9 @@ pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static
         return Some("a texture too large to read");
     }
     match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
-        0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => return Some("a texture of depths"),
+        0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => {
+            return Some("a texture of depths");
+        }
         0x8d70..=0x8d8f => return Some("a texture of integers"),
         _ => {}
     }
@@ -75,7 +79,8 @@ pub(crate) fn coordinates(
         let toward = normalized([eye[0], eye[1], eye[2]]);
         let twice = 2.0 * (normal[0] * toward[0] + normal[1] * toward[1] + normal[2] * toward[2]);
         let reflected: [f32; 3] = std::array::from_fn(|k| toward[k] - normal[k] * twice);
-        let m = 2.0 * (reflected[0].powi(2) + reflected[1].powi(2) + (reflected[2] + 1.0).powi(2)).sqrt();
+        let m = 2.0
+            * (reflected[0].powi(2) + reflected[1].powi(2) + (reflected[2] + 1.0).powi(2)).sqrt();
         for (k, (mode, plane)) in unit.generate.iter().enumerate() {
             let dot = |v: [f32; 4]| (0..4).map(|j| plane[j] * v[j]).sum::<f32>();
             c[k] = match *mode {
@@ -98,7 +103,8 @@ pub(crate) fn divided(coords: [f32; 4]) -> [f32; 2] {
     [coords[0] / q, coords[1] / q]
 }
 
-/// The fragment's colour after the texture environment. `rho` is how many texels its pixel covers, where that is known.
+/// The fragment's colour after the texture environment. `rho` is how many texels its pixel covers,
+/// where that is known.
 pub(crate) fn apply(
     unit: &TextureUnit,
     image: &Image,
@@ -114,7 +120,13 @@ pub(crate) fn apply(
     environment(unit.env_mode, unit.env_color, image.base, f, t)
 }
 
-fn environment(mode: u32, constant: [f32; 4], base: BaseFormat, f: [f32; 4], t: [f32; 4]) -> [f32; 4] {
+fn environment(
+    mode: u32,
+    constant: [f32; 4],
+    base: BaseFormat,
+    f: [f32; 4],
+    t: [f32; 4],
+) -> [f32; 4] {
     // What GetTexImage gives for luminance and intensity is in the first component.
     let (ct, at) = match base {
         BaseFormat::Alpha => ([0.0; 3], t[3]),

@@ -1,4 +1,5 @@
-//! The threads that trace: a pool of our own, made when the first frame comes, so that a program that draws nothing gets no threads.
+//! The threads that trace: a pool of our own, made when the first frame comes, so that a program
+//! that draws nothing gets no threads.
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,7 +8,8 @@ static PROCESS: AtomicU32 = AtomicU32::new(0);
 /// The pool with the number of threads that was asked for.
 static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
 
-/// True in a child that was forked after the pool was made: it has none of the pool's threads, so the driver draws there.
+/// True in a child that was forked after the pool was made: it has none of the pool's threads, so
+/// the driver draws there.
 pub(crate) fn forked() -> bool {
     let made = PROCESS.load(Relaxed);
     made != 0 && made != std::process::id()
@@ -57,7 +59,8 @@ pub(crate) fn in_background(f: impl FnOnce() + Send + 'static) {
     if forked() {
         return;
     }
-    // A thread of its own with a low priority would be better still; one builder at a time keeps the pool free.
+    // A thread of its own with a low priority would be better still; one builder at a time keeps
+    // the pool free.
     let spawned = std::thread::Builder::new().name("gluray build".to_owned()).spawn(move || {
         crate::interpose::panic_guard::guard(f);
     });

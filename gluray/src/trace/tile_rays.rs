@@ -1,8 +1,9 @@
 //! Rays of a tile: through the centres of 16 x 16 pixels, made 16 at a time.
 //!
-//! Origins and directions are affine in window coordinates, and so are the numerators and denominators of where planes cut a ray; so what costs a
-//! matrix product and a sum of magnitudes per plane for one ray ([`Prepared::ray`]) costs a few multiplications here. Rays only find triangles,
-//! so the last bits of both ways need not agree.
+//! Origins and directions are affine in window coordinates, and so are the numerators and
+//! denominators of where planes cut a ray; so what costs a matrix product and a sum of magnitudes
+//! per plane for one ray ([`Prepared::ray`]) costs a few multiplications here. Rays only find
+//! triangles, so the last bits of both ways need not agree.
 
 use super::{Prepared, Rect, TILE};
 use crate::capture::draw::Draw;
@@ -16,7 +17,8 @@ use std::sync::atomic::Ordering::Relaxed;
 /// Blocks of a tile.
 pub(super) const BLOCKS: usize = 16;
 
-/// A number that is affine in window coordinates: its value at the window's origin, its change with x, with y.
+/// A number that is affine in window coordinates: its value at the window's origin, its change with
+/// x, with y.
 #[derive(Debug, Clone, Copy, Default)]
 struct AffineFunction([f64; 3]);
 
@@ -49,7 +51,8 @@ struct HalfBlock<S: Simd> {
 pub(super) struct AffineRays {
     origin: [AffineFunction; 3],
     dir: [AffineFunction; 3],
-    /// How far above each plane the origin is (a little more than it is), and how that grows along the ray.
+    /// How far above each plane the origin is (a little more than it is), and how that grows along
+    /// the ray.
     planes: Vec<[AffineFunction; 2]>,
     /// Parameter at which rays begin when the scene is far away, so that f32 loses nothing.
     start: f64,
@@ -81,7 +84,8 @@ impl AffineRays {
             .map(|plane| {
                 let plane = DVec4::from_array(*plane);
                 let n = plane.truncate();
-                // The exact test is that of the fragment: the most that rounding may be anywhere in the rectangle.
+                // The exact test is that of the fragment: the most that rounding may be anywhere in
+                // the rectangle.
                 let size = corners.map(|(x, y)| {
                     let o = axes.map(|k| origin[k].at(x, y) + center[k]);
                     (0..3).map(|k| (n[k] * o[k]).abs()).sum::<f64>() + plane.w.abs()
@@ -103,11 +107,13 @@ impl AffineRays {
         affine_rays
     }
 
-    /// Where the bounds begin along the rays, when they are so far off that f32 would lose bits; else 0. The parameter is clip w or the share of
-    /// the way from the near plane to the far one: both are the same for all points of a plane before the viewer.
+    /// Where the bounds begin along the rays, when they are so far off that f32 would lose bits;
+    /// else 0. The parameter is clip w or the share of the way from the near plane to the far one:
+    /// both are the same for all points of a plane before the viewer.
     fn beginning(&self, p: &Prepared<'_>, corners: &[(f64, f64); 4]) -> f64 {
         let bounds = p.draw.geometry.bounds();
-        let (middle, radius) = (bounds.center().as_dvec3() - p.world.origin(), f64::from(bounds.radius()));
+        let (middle, radius) =
+            (bounds.center().as_dvec3() - p.world.origin(), f64::from(bounds.radius()));
         let far = |(x, y): (f64, f64)| {
             let o = DVec3::from_array(self.origin.map(|a| a.at(x, y)));
             (o - middle).abs().max_element() > 64.0 * radius
@@ -129,7 +135,8 @@ impl AffineRays {
         (nearest - nearest.abs() * 1e-6).max(0.0)
     }
 
-    /// The rays of one block, whose pixels begin at (`x`, `y`); `used` has a bit for each lane that is wanted.
+    /// The rays of one block, whose pixels begin at (`x`, `y`); `used` has a bit for each lane that
+    /// is wanted.
     #[inline(always)]
     fn block<S: Simd>(
         &self,
@@ -178,7 +185,8 @@ impl AffineRays {
             t1 = (b.simd_lt(zero) & t.simd_lt(t1)).select(t, t1);
             none |= (b.simd_eq(zero) & a.simd_lt(zero)).to_bitmask();
         }
-        // Rays of a parallel projection begin where the program's near plane is; a plane before it may be the first.
+        // Rays of a parallel projection begin where the program's near plane is; a plane before it
+        // may be the first.
         let before = t0.simd_lt(zero) & t0.simd_gt(before_all);
         let back = before.select(t0, splat(self.start));
         let (mut origin, mut dir) = ([zero; 3], [zero; 3]);
@@ -196,7 +204,8 @@ impl AffineRays {
         }
     }
 
-    /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z by w.
+    /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z
+    /// by w.
     #[inline]
     fn parameter(&self, x: f64, y: f64, z_by_w: f64, shift: f64) -> f32 {
         let [[z, w], [dz, dw]] = self.depth.map(|d| d.map(|a| a.at(x, y)));
@@ -204,7 +213,8 @@ impl AffineRays {
     }
 }
 
-/// The rays and hits of a tile: pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x / 4 + 4 (y / 4)`.
+/// The rays and hits of a tile: pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x /
+/// 4 + 4 (y / 4)`.
 pub(super) struct TileRays {
     level: Level,
     pub(super) blocks: Vec<RayBlock>,
@@ -227,18 +237,22 @@ impl TileRays {
         }
     }
 
-    /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing was hit.
+    /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing
+    /// was hit.
     pub(super) fn send(&mut self, p: &Prepared<'_>, area: Rect) -> bool {
         let (level, blocks, shift) = (self.level, &mut self.blocks, &mut self.shift);
         dispatch!(level, simd => make(simd, &p.affine_rays, area, blocks, shift));
         self.hits.fill(HitBlock::MISS);
-        p.world.closest_coherent(&self.blocks, &mut self.hits).expect("one block of hits for each of rays");
+        p.world
+            .closest_coherent(&self.blocks, &mut self.hits)
+            .expect("one block of hits for each of rays");
         p.rays.fetch_add(area.w as u64 * area.h as u64, Relaxed);
         self.hits.iter().any(|h| h.prim.iter().any(|p| *p != rt_core::ray::NO_HIT))
     }
 
-    /// Looks behind first hits that polygon offset moved back: is there anything up to where it moved them? `depth` is that place (z by w) for
-    /// each pixel; NaN for those that were not moved.
+    /// Looks behind first hits that polygon offset moved back: is there anything up to where it
+    /// moved them? `depth` is that place (z by w) for each pixel; NaN for those that were not
+    /// moved.
     pub(super) fn trace_offset_candidates(
         &mut self,
         p: &Prepared<'_>,
@@ -302,10 +316,12 @@ fn make<S: Simd>(
 pub(super) fn slab(draw: &Draw, z: DVec4) -> [[f64; 4]; 2] {
     let b = draw.geometry.bounds();
     let at = |corner: i32| {
-        let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+        let pick =
+            |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
         z.dot(DVec4::new(pick(1, 0), pick(2, 1), pick(4, 2), 1.0))
     };
-    let (lo, hi) = (0..8).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (lo, hi) =
+        (0..8).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let more = 1e-3 * (hi - lo) + 1e-6 * (hi.abs() + lo.abs());
     [(z - DVec4::W * (lo - more)).to_array(), (DVec4::W * (hi + more) - z).to_array()]
 }

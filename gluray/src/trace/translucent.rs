@@ -1,10 +1,13 @@
-//! Translucent surfaces in one go: all fragments of a pixel before its opaque surface, blended in the order of their depths.
+//! Translucent surfaces in one go: all fragments of a pixel before its opaque surface, blended in
+//! the order of their depths.
 //!
-//! Rays go from surface to surface, 256 at a time. Where a hit is none of the rasterizer's fragments, an edge is near, and four rays beside the centre
-//! find the triangle that the fill rule gives the pixel to.
+//! Rays go from surface to surface, 256 at a time. Where a hit is none of the rasterizer's
+//! fragments, an edge is near, and four rays beside the centre find the triangle that the fill rule
+//! gives the pixel to.
 
 use super::{
-    DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot, to_bytes,
+    DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot,
+    to_bytes,
 };
 use crate::host::config::Settings;
 use crate::trace::occlusion::RayScene;
@@ -18,7 +21,8 @@ pub(crate) struct DepthLimits {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) depth: Vec<f32>,
-    /// Depths of other surfaces, as a depth buffer has them; otherwise those of the farthest fragments that count themselves.
+    /// Depths of other surfaces, as a depth buffer has them; otherwise those of the farthest
+    /// fragments that count themselves.
     pub(crate) exact: bool,
 }
 
@@ -33,9 +37,11 @@ pub(crate) struct WeightedSums {
     pub(crate) covered: usize,
 }
 
-/// How far behind its limit a fragment still counts, as VTK has it: the limit is a depth that the driver computed for such a fragment.
+/// How far behind its limit a fragment still counts, as VTK has it: the limit is a depth that the
+/// driver computed for such a fragment.
 const EPSILON: f64 = 1e-7;
-/// Roundings of a driver that interpolates in f32 from the window's corner on, per depth that a triangle gains from one pixel to the next.
+/// Roundings of a driver that interpolates in f32 from the window's corner on, per depth that a
+/// triangle gains from one pixel to the next.
 const ROUNDINGS: f64 = 4096.0 / 16_777_216.0;
 /// What comes through behind this changes no pixel of eight bits.
 const LEAST: f32 = 1.0 / 1024.0;
@@ -58,7 +64,8 @@ fn occlusion_scene<'a>(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Opt
     })
 }
 
-/// Gives each pixel's fragments to `put`, with the places that it has in `out`, row by row. Returns how many pixels have any.
+/// Gives each pixel's fragments to `put`, with the places that it has in `out`, row by row. Returns
+/// how many pixels have any.
 fn each_pixel<T: Send>(
     draws: &[Prepared<'_>],
     limit: &DepthLimits,
@@ -68,22 +75,25 @@ fn each_pixel<T: Send>(
 ) -> usize {
     let w = rect.w as usize;
     let covered = AtomicU64::new(0);
-    out.par_chunks_mut(w * TILE as usize).enumerate().for_each_init(TileRays::new, |rays, (i, out)| {
-        let y = rect.y + i as i32 * TILE;
-        let rows = (out.len() / w) as i32;
-        for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
-            let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: rows };
-            let mut found: [Vec<LayerFragment>; 256] = [const { Vec::new() }; 256];
-            for (number, p) in draws.iter().enumerate() {
-                through(p, number, tile, limit, rays, &mut found);
+    out.par_chunks_mut(w * TILE as usize).enumerate().for_each_init(
+        TileRays::new,
+        |rays, (i, out)| {
+            let y = rect.y + i as i32 * TILE;
+            let rows = (out.len() / w) as i32;
+            for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
+                let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: rows };
+                let mut found: [Vec<LayerFragment>; 256] = [const { Vec::new() }; 256];
+                for (number, p) in draws.iter().enumerate() {
+                    through(p, number, tile, limit, rays, &mut found);
+                }
+                for (k, found) in found.iter_mut().enumerate().filter(|(_, f)| !f.is_empty()) {
+                    let at = (x + (k % 16) as i32, y + (k / 16) as i32);
+                    put(&mut out[(at.1 - y) as usize * w + (at.0 - rect.x) as usize], found, at);
+                    covered.fetch_add(1, Relaxed);
+                }
             }
-            for (k, found) in found.iter_mut().enumerate().filter(|(_, f)| !f.is_empty()) {
-                let at = (x + (k % 16) as i32, y + (k / 16) as i32);
-                put(&mut out[(at.1 - y) as usize * w + (at.0 - rect.x) as usize], found, at);
-                covered.fetch_add(1, Relaxed);
-            }
-        }
-    });
+        },
+    );
     covered.into_inner() as usize
 }
 
@@ -198,7 +208,9 @@ fn through(
         }
         p.rays.fetch_add(on, Relaxed);
         rays.hits.fill(HitBlock::MISS);
-        p.world.closest_coherent(&rays.blocks, &mut rays.hits).expect("one block of hits for each of rays");
+        p.world
+            .closest_coherent(&rays.blocks, &mut rays.hits)
+            .expect("one block of hits for each of rays");
     }
     for b in &mut rays.blocks {
         b.t_max = [-1.0; LANES];
@@ -224,7 +236,8 @@ fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: DepthLimit) -> b
     let s = &*p.draw.state;
     let scale = s.depth_range[1] - s.depth_range[0];
     f.plain_depth > most.depth
-        && f.plain_depth - most.depth > EPSILON + ROUNDINGS * steepness(&p.corners(prim), s.viewport, scale)
+        && f.plain_depth - most.depth
+            > EPSILON + ROUNDINGS * steepness(&p.corners(prim), s.viewport, scale)
 }
 
 /// Fragments of triangles that rays beside the centre meet.
@@ -236,7 +249,9 @@ fn hit_beside_center(
     found: &mut Vec<LayerFragment>,
 ) {
     for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {
-        let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else { continue };
+        let Some((mut ray, _)) = p.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy) else {
+            continue;
+        };
         for _ in 0..MOST_STEPS {
             p.rays.fetch_add(1, Relaxed);
             let Some(hit) = p.world.closest(&ray) else { break };

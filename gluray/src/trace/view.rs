@@ -1,7 +1,8 @@
-//! The views of a frame: draws that share a projection and a viewport, and so one picture that rays can be sent into.
+//! The views of a frame: draws that share a projection and a viewport, and so one picture that rays
+//! can be sent into.
 //!
-//! Programs with several viewports, or with a small set of axes under a projection of its own, have several a frame. Light does not pass from
-//! one to another.
+//! Programs with several viewports, or with a small set of axes under a projection of its own, have
+//! several a frame. Light does not pass from one to another.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::trace::{Rect, matrix};
@@ -71,11 +72,15 @@ impl View {
     /// Normalised device coordinates of a point of the window.
     pub(crate) fn ndc(&self, x: f64, y: f64) -> [f64; 2] {
         let v = self.viewport;
-        [2.0 * (x - f64::from(v.x)) / f64::from(v.w) - 1.0, 2.0 * (y - f64::from(v.y)) / f64::from(v.h) - 1.0]
+        [
+            2.0 * (x - f64::from(v.x)) / f64::from(v.w) - 1.0,
+            2.0 * (y - f64::from(v.y)) / f64::from(v.h) - 1.0,
+        ]
     }
 }
 
-/// Numbers of the draws of each view, in the order of their first draws. Draws that rays cannot be made for are left out.
+/// Numbers of the draws of each view, in the order of their first draws. Draws that rays cannot be
+/// made for are left out.
 pub(crate) fn views<'a>(draws: impl Iterator<Item = &'a Draw>) -> Vec<(View, Vec<usize>)> {
     let mut out: Vec<(View, Vec<usize>)> = Vec::new();
     for (i, d) in draws.enumerate() {
@@ -87,15 +92,17 @@ pub(crate) fn views<'a>(draws: impl Iterator<Item = &'a Draw>) -> Vec<(View, Vec
     out
 }
 
-/// Eye space of a camera: right, up, backward, with the eye (of parallel projections: a point in the middle) as origin.
+/// Eye space of a camera: right, up, backward, with the eye (of parallel projections: a point in
+/// the middle) as origin.
 fn eye_space(camera: &Camera) -> DMat4 {
     let axes = camera.world_from_view().transpose();
     let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
     DMat4::from_mat3(axes) * DMat4::from_translation(-eye)
 }
 
-/// Eye from object for a draw of which only clip from object (`clip`) is known. `reference` is both matrices of another draw: when the two differ by an affine
-/// map, both are in one space. `None` for matrices that rays cannot be made for.
+/// Eye from object for a draw of which only clip from object (`clip`) is known. `reference` is both
+/// matrices of another draw: when the two differ by an affine map, both are in one space. `None`
+/// for matrices that rays cannot be made for.
 pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> Option<DMat4> {
     let placed = reference.and_then(|(other, eye)| {
         let here = other.inverse() * clip;
@@ -113,7 +120,8 @@ pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> O
     placed.or_else(|| Camera::from_matrix(clip).ok().map(|c| eye_space(&c)))
 }
 
-/// Gives eye spaces to draws whose shaders do without: VTK's, where a light at the eye needs normals alone.
+/// Gives eye spaces to draws whose shaders do without: VTK's, where a light at the eye needs
+/// normals alone.
 pub(crate) fn assign_eye_spaces<T>(draws: &mut [(Draw, T)]) {
     let matrices = |d: &Draw| match &d.shading {
         Shading::Program(p) => Some((matrix(&p.clip_from_object), matrix(&p.view_from_object))),
@@ -139,9 +147,11 @@ mod tests {
     #[test]
     fn a_matrix_alone_tells_where_the_eye_is_and_a_second_draw_is_placed_by_the_first() {
         let (a, b) = (-301.0 / 299.0, -600.0 / 299.0);
-        let frustum =
-            DMat4::from_cols_array(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.]);
-        let eye = DMat4::from_rotation_y(0.3) * DMat4::from_translation(DVec3::new(1.0, -2.0, -9.0));
+        let frustum = DMat4::from_cols_array(&[
+            1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.,
+        ]);
+        let eye =
+            DMat4::from_rotation_y(0.3) * DMat4::from_translation(DVec3::new(1.0, -2.0, -9.0));
         let first = frustum * eye;
         let found = eye_from_clip(first, None).expect("a camera");
         assert!((found - eye).to_cols_array().iter().all(|v| v.abs() < 1e-9), "{found} {eye}");

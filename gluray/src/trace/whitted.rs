@@ -1,8 +1,9 @@
-//! Rays beyond the first surface, for modes `rich` and `enhance`: mirrors, metals, glass, what is seen through translucent surfaces, a lens, and several
-//! samples a pixel (Whitted 1980; Cook, Porter and Carpenter 1984).
+//! Rays beyond the first surface, for modes `rich` and `enhance`: mirrors, metals, glass, what is
+//! seen through translucent surfaces, a lens, and several samples a pixel (Whitted 1980; Cook,
+//! Porter and Carpenter 1984).
 //!
-//! Surfaces are lit as everywhere in these modes, by OpenGL's lighting at the point with shadows and occlusion. Each kind of ray is sent only where a
-//! material or a setting asks for it.
+//! Surfaces are lit as everywhere in these modes, by OpenGL's lighting at the point with shadows
+//! and occlusion. Each kind of ray is sent only where a material or a setting asks for it.
 
 use crate::cluster::row_share::{BAND, RowShare};
 use crate::host::config::{Mode, Settings, Surface};
@@ -26,7 +27,8 @@ pub(crate) struct ColorImage {
 /// True when a draw's surface is not opaque, by the program or by the user.
 pub(crate) fn is_clear(p: &Prepared<'_>, settings: &Settings) -> bool {
     let ray_material = &p.draw.ray_material;
-    let through = settings.effects.transparency && (ray_material.opacity < 1.0 || p.draw.state.blend);
+    let through =
+        settings.effects.transparency && (ray_material.opacity < 1.0 || p.draw.state.blend);
     through || (ray_material.surface == Surface::Glass && settings.effects.refraction)
 }
 
@@ -35,7 +37,8 @@ pub(crate) fn is_needed(draws: &[Prepared<'_>], settings: &Settings) -> bool {
     let (e, rich) = (&settings.effects, settings.mode == Mode::Rich);
     let answers = |p: &Prepared<'_>| {
         let ray_material = &p.draw.ray_material;
-        let mirrors = e.reflections && (ray_material.mirror > 0.0 || ray_material.surface == Surface::Metal);
+        let mirrors =
+            e.reflections && (ray_material.mirror > 0.0 || ray_material.surface == Surface::Metal);
         mirrors || is_clear(p, settings)
     };
     (rich || settings.mode == Mode::Enhance) && settings.samples > 1
@@ -83,7 +86,8 @@ const LEAST_WEIGHT: f32 = 1.0 / 512.0;
 /// Layers of translucent surfaces, and culled or clipped triangles, on one ray.
 const MOST_LAYERS: usize = 256;
 
-/// Colours of every pixel of `rect` that is in the share. `background` is what the program cleared to, which mirrors and glass see.
+/// Colours of every pixel of `rect` that is in the share. `background` is what the program cleared
+/// to, which mirrors and glass see.
 pub(crate) fn colors(
     draws: &[Prepared<'_>],
     view: &View,
@@ -123,16 +127,23 @@ pub(crate) fn colors(
         ("refraction", &beyond.refraction),
         ("transparency", &beyond.transparency),
     ];
-    ColorImage { rect, rgba, rays: rays.map(|(name, n)| (name, n.load(Relaxed))).to_vec(), warnings }
+    ColorImage {
+        rect,
+        rgba,
+        rays: rays.map(|(name, n)| (name, n.load(Relaxed))).to_vec(),
+        warnings,
+    }
 }
 
-/// Distances along the viewing direction of the nearest and the farthest point of the draws, at least a little before the eye.
+/// Distances along the viewing direction of the nearest and the farthest point of the draws, at
+/// least a little before the eye.
 pub(crate) fn distances(draws: &[Prepared<'_>]) -> [f64; 2] {
     let (mut near, mut far) = (f64::INFINITY, 0.0_f64);
     for p in draws {
         let (m, b) = (eye_from_object(p.draw), p.draw.geometry.bounds());
         for corner in 0..8 {
-            let pick = |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
+            let pick =
+                |bit: i32, k: usize| f64::from(if corner & bit == 0 { b.min[k] } else { b.max[k] });
             let z = -m.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2))).z;
             (near, far) = (near.min(z), far.max(z));
         }
@@ -154,7 +165,9 @@ pub(crate) fn lens(
     }
     if view.parallel {
         return Err(
-            "`effects.aperture_radius` is set, but a view is a parallel projection, which has no lens".into(),
+            "`effects.aperture_radius` is set, but a view is a parallel projection, which has no \
+             lens"
+                .into(),
         );
     }
     let [near, far] = distances(draws);
@@ -163,7 +176,8 @@ pub(crate) fn lens(
 
 impl WhittedTracer<'_> {
     fn lens(&self, warnings: &mut Vec<String>) -> Option<[f64; 2]> {
-        let found = lens(self.ray_scene.draws, self.view, self.ray_scene.settings, self.ray_scene.diagonal);
+        let found =
+            lens(self.ray_scene.draws, self.view, self.ray_scene.settings, self.ray_scene.diagonal);
         found.unwrap_or_else(|why| {
             warnings.push(why);
             None
@@ -177,7 +191,8 @@ impl WhittedTracer<'_> {
         let mut sum = [0.0_f32; 4];
         for sample in 0..n {
             // Sample 0 of an ordinary picture goes through the centre; the cells of a grid else.
-            let seed = (x.wrapping_add((sample as i32).wrapping_mul(0x1_0001)), y ^ (sample as i32) << 16);
+            let seed =
+                (x.wrapping_add((sample as i32).wrapping_mul(0x1_0001)), y ^ (sample as i32) << 16);
             let mut random = PixelRng::new(seed);
             let (cx, cy) = (f64::from(sample % side), f64::from(sample / side));
             let (dx, dy) = match n {
@@ -187,7 +202,9 @@ impl WhittedTracer<'_> {
                     (cy + random.next()) / f64::from(n.div_ceil(side)),
                 ),
             };
-            let Some(mut path) = self.primary(f64::from(x) + dx, f64::from(y) + dy, seed) else { continue };
+            let Some(mut path) = self.primary(f64::from(x) + dx, f64::from(y) + dy, seed) else {
+                continue;
+            };
             if let Some([radius, focus]) = lens {
                 // Where the pinhole's ray meets the plane in focus, all rays of the lens meet.
                 let sharp = path.origin + path.dir * (focus / -path.dir.z);
@@ -219,9 +236,19 @@ impl WhittedTracer<'_> {
         }
         let back = if span[0].is_finite() { span[0] } else { 0.0 };
         // From the near plane on, so that parallel projections see what is before their origin.
-        let (origin, span) =
-            if self.view.parallel { (origin + dir * back, [0.0, span[1] - back]) } else { (origin, span) };
-        Some(WhittedRay { origin, dir, span: [span[0].max(0.0), span[1]], bounce: 0, weight: 1.0, pixel })
+        let (origin, span) = if self.view.parallel {
+            (origin + dir * back, [0.0, span[1] - back])
+        } else {
+            (origin, span)
+        };
+        Some(WhittedRay {
+            origin,
+            dir,
+            span: [span[0].max(0.0), span[1]],
+            bounce: 0,
+            weight: 1.0,
+            pixel,
+        })
     }
 
     /// The nearest surface on a ray; with `pixel` only draws that may cover it.
@@ -248,7 +275,13 @@ impl WhittedTracer<'_> {
     }
 
     /// The first triangle of a draw on a ray that is neither culled nor clipped.
-    fn first_visible(&self, draw: usize, path: &WhittedRay, mut ray: Ray, moved: f64) -> Option<SurfaceHit> {
+    fn first_visible(
+        &self,
+        draw: usize,
+        path: &WhittedRay,
+        mut ray: Ray,
+        moved: f64,
+    ) -> Option<SurfaceHit> {
         let p = &self.ray_scene.draws[draw];
         for _ in 0..MOST_LAYERS {
             let hit = p.world.closest(&ray)?;
@@ -327,7 +360,8 @@ impl WhittedTracer<'_> {
         let ray_material = &p.draw.ray_material;
         let rgb = |c: [f32; 4]| [c[0], c[1], c[2]];
         let weight = path.weight * left;
-        let more = path.bounce < e.max_bounces && weight > LEAST_WEIGHT && settings.mode == Mode::Rich;
+        let more =
+            path.bounce < e.max_bounces && weight > LEAST_WEIGHT && settings.mode == Mode::Rich;
         let dir = path.dir.normalize();
         let cosine = -hit.normal.dot(dir);
         let eye_normal = self.shading_normal(hit);
@@ -337,14 +371,26 @@ impl WhittedTracer<'_> {
         if ray_material.surface == Surface::Glass && e.refraction && more {
             return (self.glass(hit, path, dir, weight), 1.0);
         }
-        let lit =
-            || p.shaded_from(hit.prim, &hit.fragment, settings.mode, Some(&self.ray_scene), path.pixel, -dir);
+        let lit = || {
+            p.shaded_from(
+                hit.prim,
+                &hit.fragment,
+                settings.mode,
+                Some(&self.ray_scene),
+                path.pixel,
+                -dir,
+            )
+        };
         if ray_material.surface == Surface::Metal && e.reflections && more {
             let base = rgb(p.base_color(hit.prim, &hit.fragment));
             let grazing = (1.0 - cosine.clamp(0.0, 1.0)).powi(5) as f32;
             let share: [f32; 3] = std::array::from_fn(|k| base[k] + (1.0 - base[k]) * grazing);
-            let rays =
-                if ray_material.roughness > 0.0 && path.bounce == 0 && settings.samples < 16 { 8 } else { 1 };
+            let rays = if ray_material.roughness > 0.0 && path.bounce == 0 && settings.samples < 16
+            {
+                8
+            } else {
+                1
+            };
             let mut random = PixelRng::new((path.pixel.0 ^ 0x5bd1, path.pixel.1));
             let mut sum = [0.0_f32; 3];
             for _ in 0..rays {

@@ -14,7 +14,8 @@ pub(crate) fn read(file: &Path) -> Vec<Seen> {
     while at < bytes.len() {
         let (width, height) = (word(at) as usize, word(at + 4) as usize);
         let (n, colors) = (width * height, at + 8);
-        let pixels = bytes[colors..colors + 4 * n].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+        let pixels =
+            bytes[colors..colors + 4 * n].chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
         let depths = colors + 4 * n;
         let depth = (0..n).map(|i| f32::from_bits(word(depths + 4 * i))).collect();
         all.push((Picture { width, height, pixels }, depth));
@@ -32,7 +33,8 @@ pub(crate) struct Expected {
 /// Cases whose triangles the driver has to clip.
 const CLIPPED: [&str; 2] = ["vertices_behind_the_eye", "levels_and_limits_of_textures"];
 
-/// Asserts that colours are the driver's but for pixels on edges, and depths likewise to `steps` of 24 bits.
+/// Asserts that colours are the driver's but for pixels on edges, and depths likewise to `steps` of
+/// 24 bits.
 pub(crate) fn assert_agrees(
     what: &str,
     (native, native_depth): &Seen,
@@ -51,7 +53,8 @@ pub(crate) fn assert_agrees(
     m
 }
 
-/// Runs `case` of `script` (in `tests/programs`) both ways and compares; `None` without the peers, which is said.
+/// Runs `case` of `script` (in `tests/programs`) both ways and compares; `None` without the peers,
+/// which is said.
 pub(crate) fn check(
     script: &str,
     case: &str,
@@ -73,8 +76,9 @@ pub(crate) fn check(
     let (native, _) = run(None, "native");
     let (ours, report) = run(Some(options), "ours");
     assert_eq!(report.traced_draws > 0, expected.traced, "{case}: {report:?}");
-    // Where both pictures have the same surface its depth is the driver's to four steps of 24 bits. Of triangles that it had to clip
-    // llvmpipe interpolates from rounded new corners: up to seven steps off the plane were measured, where ours is on it.
+    // Where both pictures have the same surface its depth is the driver's to four steps of 24 bits.
+    // Of triangles that it had to clip llvmpipe interpolates from rounded new corners: up to seven
+    // steps off the plane were measured, where ours is on it.
     let steps = if CLIPPED.contains(&case) { 8.0 } else { 4.0 };
     Some(assert_agrees(case, &native, &ours, steps))
 }

@@ -1,5 +1,6 @@
-//! How far a traced picture is from a rasterized one. One number alone misses some error (a shift by a pixel, a hole, a tint), so there are
-//! four, each with a bar that two valid rasterizers keep between them.
+//! How far a traced picture is from a rasterized one. One number alone misses some error (a shift
+//! by a pixel, a hole, a tint), so there are four, each with a bar that two valid rasterizers keep
+//! between them.
 
 use super::Picture;
 
@@ -41,7 +42,11 @@ fn contrast(p: &Picture, x: usize, y: usize) -> i32 {
 }
 
 /// Compares pictures of one size; `counts` says which pixels are looked at.
-pub(crate) fn compare_where(a: &Picture, b: &Picture, counts: impl Fn(usize, usize) -> bool) -> Metrics {
+pub(crate) fn compare_where(
+    a: &Picture,
+    b: &Picture,
+    counts: impl Fn(usize, usize) -> bool,
+) -> Metrics {
     assert_eq!((a.width, a.height), (b.width, b.height), "sizes of the pictures");
     let (mut n, mut raw, mut tolerant, mut both, mut either) = (0, 0, 0, 0, 0);
     let mut interior = Vec::new();
@@ -73,7 +78,8 @@ pub(crate) fn compare_where(a: &Picture, b: &Picture, counts: impl Fn(usize, usi
     Metrics {
         raw: percent(raw),
         tolerant: percent(tolerant),
-        interior: interior.iter().map(|v| f64::from(*v)).sum::<f64>() / interior.len().max(1) as f64,
+        interior: interior.iter().map(|v| f64::from(*v)).sum::<f64>()
+            / interior.len().max(1) as f64,
         interior_p99: interior.get(interior.len() * 99 / 100).map_or(0.0, |v| f64::from(*v)),
         overlap: if either == 0 { 1.0 } else { both as f64 / either as f64 },
     }
@@ -84,23 +90,34 @@ pub(crate) fn compare(a: &Picture, b: &Picture) -> Metrics {
     compare_where(a, b, |_, _| true)
 }
 
-/// Pixels that no difference of two rasterizers explains, in words. Where an edge goes by the middle of a pixel, one of them may draw
-/// what the other draws in the next pixel. So both colours have to be there among the neighbours in the other picture, which those of a
-/// lost or added triangle are not, and what differs may be a line but no area.
+/// Pixels that no difference of two rasterizers explains, in words. Where an edge goes by the
+/// middle of a pixel, one of them may draw what the other draws in the next pixel. So both colours
+/// have to be there among the neighbours in the other picture, which those of a lost or added
+/// triangle are not, and what differs may be a line but no area.
 pub(crate) fn wrong_beyond_edges(native: &Picture, ours: &Picture) -> Vec<String> {
     const LEVELS: i32 = 8;
     let mut out = Vec::new();
     let (w, h) = (native.width, native.height);
-    let is_off = |x: usize, y: usize| off(native.pixels[y * w + x], ours.pixels[y * w + x]) > LEVELS;
+    let is_off =
+        |x: usize, y: usize| off(native.pixels[y * w + x], ours.pixels[y * w + x]) > LEVELS;
     for y in 0..h {
         for x in (0..w).filter(|x| is_off(*x, y)) {
             let (p, q) = (native.pixels[y * w + x], ours.pixels[y * w + x]);
             let is_near = |all: &Picture, one| neighbours(all, x, y).any(|v| off(v, one) <= LEVELS);
             if !is_near(ours, p) {
-                out.push(format!("({x}, {y}): the driver's {p:?} is nowhere around, ours is {q:?}"));
+                out.push(format!(
+                    "({x}, {y}): the driver's {p:?} is nowhere around, ours is {q:?}"
+                ));
             } else if !is_near(native, q) {
-                out.push(format!("({x}, {y}): {q:?} is nowhere around in the driver's picture, {p:?}"));
-            } else if x + 1 < w && y + 1 < h && is_off(x + 1, y) && is_off(x, y + 1) && is_off(x + 1, y + 1) {
+                out.push(format!(
+                    "({x}, {y}): {q:?} is nowhere around in the driver's picture, {p:?}"
+                ));
+            } else if x + 1 < w
+                && y + 1 < h
+                && is_off(x + 1, y)
+                && is_off(x, y + 1)
+                && is_off(x + 1, y + 1)
+            {
                 out.push(format!("({x}, {y}) and the pixels beside and above it: an area differs"));
             }
         }
@@ -108,8 +125,14 @@ pub(crate) fn wrong_beyond_edges(native: &Picture, ours: &Picture) -> Vec<String
     out
 }
 
-/// The same for depths in rows of `w`: those of edges are between those of their neighbours, both ways.
-pub(crate) fn depths_beyond_edges(w: usize, native: &[f32], ours: &[f32], slack: f32) -> Vec<String> {
+/// The same for depths in rows of `w`: those of edges are between those of their neighbours, both
+/// ways.
+pub(crate) fn depths_beyond_edges(
+    w: usize,
+    native: &[f32],
+    ours: &[f32],
+    slack: f32,
+) -> Vec<String> {
     let h = native.len() / w;
     let is_off = |x: usize, y: usize| (native[y * w + x] - ours[y * w + x]).abs() > slack;
     let is_between = |all: &[f32], x: usize, y: usize, one: f32| {
@@ -124,10 +147,16 @@ pub(crate) fn depths_beyond_edges(w: usize, native: &[f32], ours: &[f32], slack:
     for y in 0..h {
         for x in (0..w).filter(|x| is_off(*x, y)) {
             let (p, q) = (native[y * w + x], ours[y * w + x]);
-            let area = x + 1 < w && y + 1 < h && is_off(x + 1, y) && is_off(x, y + 1) && is_off(x + 1, y + 1);
+            let area = x + 1 < w
+                && y + 1 < h
+                && is_off(x + 1, y)
+                && is_off(x, y + 1)
+                && is_off(x + 1, y + 1);
             if area || !is_between(ours, x, y, p) || !is_between(native, x, y, q) {
                 let steps = (p - q) / slack;
-                out.push(format!("({x}, {y}): {p} and {q}, {steps:.1} times what may be, an area: {area}"));
+                out.push(format!(
+                    "({x}, {y}): {p} and {q}, {steps:.1} times what may be, an area: {area}"
+                ));
             }
         }
     }

@@ -1,4 +1,5 @@
-//! What tests of real programs share: an X server of their own, running a program natively and through us, comparing pictures.
+//! What tests of real programs share: an X server of their own, running a program natively and
+//! through us, comparing pictures.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 pub(crate) mod cases;
@@ -11,12 +12,16 @@ use std::process::{Child, Command, Output, Stdio};
 
 /// Says that a test does not run and why, or fails where peers are required.
 pub(crate) fn skip(why: &str) {
-    assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{why}, and peers are required");
+    assert!(
+        std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"),
+        "{why}, and peers are required"
+    );
     // libtest swallows what `eprintln!` says in a test that passes.
     writeln!(std::io::stderr(), "skipped: {why}").ok();
 }
 
-/// A peer by the variable that `cargo xtask test` sets. Without it: `None` and a loud word, or a failure where peers are required.
+/// A peer by the variable that `cargo xtask test` sets. Without it: `None` and a loud word, or a
+/// failure where peers are required.
 pub(crate) fn peer(variable: &str) -> Option<PathBuf> {
     let found = std::env::var_os(variable).map(PathBuf::from).filter(|p| p.exists());
     if found.is_none() {
@@ -95,7 +100,11 @@ impl Run<'_> {
             None => Command::new(program),
             Some(options) => {
                 let mut c = Command::new(env!("CARGO_BIN_EXE_gluray"));
-                c.args(["--quiet", "run", "--report"]).arg(&report).args(options).arg("--").arg(program);
+                c.args(["--quiet", "run", "--report"])
+                    .arg(&report)
+                    .args(options)
+                    .arg("--")
+                    .arg(program);
                 c
             }
         };
@@ -138,7 +147,8 @@ impl Picture {
         if file.extension().is_some_and(|e| e == "ppm") {
             return Picture::read_ppm(file);
         }
-        let image = image::open(file).unwrap_or_else(|e| panic!("{}: {e}", file.display())).to_rgb8();
+        let image =
+            image::open(file).unwrap_or_else(|e| panic!("{}: {e}", file.display())).to_rgb8();
         let (width, height) = (image.width() as usize, image.height() as usize);
         Picture { width, height, pixels: image.pixels().map(|p| p.0).collect() }
     }

@@ -1,4 +1,5 @@
-//! A running `gluray panel`, HTTP over a plain socket, and a program that speaks the link with the library's own end of it.
+//! A running `gluray panel`, HTTP over a plain socket, and a program that speaks the link with the
+//! library's own end of it.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use gluray::config::Settings;
@@ -88,7 +89,8 @@ impl Panel {
     pub(crate) fn ask_with(&self, method: &str, path: &str, head: &str, body: &str) -> Answer {
         let (base, length) = (&self.base, body.len());
         let request = format!(
-            "{method} {base}{path} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: {length}\r\n\r\n{body}"
+            "{method} {base}{path} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: \
+             {length}\r\n\r\n{body}"
         );
         self.raw(request.as_bytes()).unwrap_or_else(|| panic!("{method} {path}: no answer"))
     }
@@ -162,7 +164,13 @@ impl Drop for Fake {
     }
 }
 
-fn run(name: &str, endpoint: PanelEndpoint, scenes: &Path, settings: &Mutex<Settings>, stop: &AtomicBool) {
+fn run(
+    name: &str,
+    endpoint: PanelEndpoint,
+    scenes: &Path,
+    settings: &Mutex<Settings>,
+    stop: &AtomicBool,
+) {
     let hello = Hello { program: name.into(), process: std::process::id(), ..Hello::default() };
     let mut link = Link::connect(endpoint, hello);
     let objects: Vec<ObjectInfo> = (0..30u64)
@@ -229,5 +237,10 @@ fn triangle(program: &str, frame: u64) -> Scene {
         indices: vec![[0, 1, 2]],
         ..Object::default()
     };
-    Scene { program: program.into(), frame, space: "the viewer's axes".into(), objects: vec![object] }
+    Scene {
+        program: program.into(),
+        frame,
+        space: "the viewer's axes".into(),
+        objects: vec![object],
+    }
 }

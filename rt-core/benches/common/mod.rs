@@ -8,7 +8,8 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
 use std::f32::consts::{PI, TAU};
 
-/// Four wavy shells inside one another, about 260,000 triangles: small triangles, some of them hidden, as nested isosurfaces have. Normals and scalars per vertex.
+/// Four wavy shells inside one another, about 260,000 triangles: small triangles, some of them
+/// hidden, as nested isosurfaces have. Normals and scalars per vertex.
 pub fn shells() -> TriMesh {
     let (n, m) = (128, 256);
     let mut mesh = TriMesh::default();
@@ -63,8 +64,8 @@ pub fn camera() -> Camera {
     Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 100.0]).expect("a sound camera")
 }
 
-/// Rays through the centres of `size` x `size` pixels along a Z-order curve, so that 16 are 4 x 4 pixels and 256 are 16 x 16. `size` is a
-/// power of two.
+/// Rays through the centres of `size` x `size` pixels along a Z-order curve, so that 16 are 4 x 4
+/// pixels and 256 are 16 x 16. `size` is a power of two.
 pub fn primary_rays(world: &World, size: u32) -> Vec<RayBlock> {
     let (eye, corner) = camera().world_ray([-1.0, 1.0]);
     let right = camera().world_ray([1.0, 1.0]).1 - corner;
@@ -80,11 +81,13 @@ pub fn primary_rays(world: &World, size: u32) -> Vec<RayBlock> {
     RayBlock::from_rays(&rays)
 }
 
-/// Points that rays met, a little off the surface on the side they came from, with the normal there.
+/// Points that rays met, a little off the surface on the side they came from, with the normal
+/// there.
 pub fn points_met(world: &World, mesh: &TriMesh, rays: &[RayBlock]) -> Vec<(Vec3, Vec3)> {
     let mut hits = vec![HitBlock::MISS; rays.len()];
     world.closest_coherent(rays, &mut hits).expect("one each");
-    let lanes = rays.iter().zip(&hits).flat_map(|(r, h)| (0..LANES).map(move |l| (r.get(l), h.get(l))));
+    let lanes =
+        rays.iter().zip(&hits).flat_map(|(r, h)| (0..LANES).map(move |l| (r.get(l), h.get(l))));
     lanes
         .filter_map(|(ray, hit)| {
             let [a, b, c] = mesh.triangle(hit?.prim as usize);

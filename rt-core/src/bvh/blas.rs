@@ -1,8 +1,10 @@
 //! The structure of one geometry, in coordinates chosen for precision.
 //!
-//! Local space is object space moved to the geometry's centre when it lies far from zero, and scaled by a power of two when it is tiny or huge.
-//! Both are exact for the data: f32 positions near one another differ exactly, and a power of two changes only exponents. What is gained: rays
-//! that start near the geometry have small coordinates, and products of three lengths in the triangle test neither overflow nor underflow.
+//! Local space is object space moved to the geometry's centre when it lies far from zero, and
+//! scaled by a power of two when it is tiny or huge. Both are exact for the data: f32 positions
+//! near one another differ exactly, and a power of two changes only exponents. What is gained: rays
+//! that start near the geometry have small coordinates, and products of three lengths in the
+//! triangle test neither overflow nor underflow.
 
 use super::build::{PrimRef, build_wide};
 use super::layout::local_frame::LocalFrame;
@@ -64,12 +66,21 @@ impl Blas {
         options: &BuildOptions,
         given: Option<(LocalFrame, Aabb)>,
     ) -> Blas {
-        let frame = given.map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
+        let frame = given
+            .map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
         let whole = given.map(|(_, bounds)| bounds);
         let mut tris = TriBvh::build(mesh, &frame, options.quality);
         let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
         let primitives = mesh.indices.len() - skipped;
-        Blas { frame, whole, primitives, skipped, cost_growth: 1.0, notes, content: Content::Triangles(tris) }
+        Blas {
+            frame,
+            whole,
+            primitives,
+            skipped,
+            cost_growth: 1.0,
+            notes,
+            content: Content::Triangles(tris),
+        }
     }
 
     pub(crate) fn for_shape(
@@ -83,7 +94,8 @@ impl Blas {
             .with_min_len(1 << 12)
             .filter_map(|i| {
                 let b = shape.bounds(i);
-                (!b.is_empty() && b.min.is_finite() && b.max.is_finite()).then(|| PrimRef::new(widened(b), i))
+                (!b.is_empty() && b.min.is_finite() && b.max.is_finite())
+                    .then(|| PrimRef::new(widened(b), i))
             })
             .collect();
         let primitives = refs.len();
@@ -101,7 +113,8 @@ impl Blas {
         }
     }
 
-    /// The tree of a shape that has the same primitives, bounds and hits: shared when it is the same shape, else copied.
+    /// The tree of a shape that has the same primitives, bounds and hits: shared when it is the
+    /// same shape, else copied.
     pub(crate) fn with_shape(this: &Arc<Blas>, shape: &Arc<dyn Shape>) -> Arc<Blas> {
         match &this.content {
             Content::Shape { bvh, shape: old } if !Arc::ptr_eq(old, shape) => {
@@ -167,7 +180,8 @@ impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
     #[inline(always)]
     fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         for &prim in leaf_primitive_ids(units, leaf) {
-            // Up to and including the best so far: a tie goes to the lower number, as with triangles.
+            // Up to and including the best so far: a tie goes to the lower number, as with
+            // triangles.
             let ray = Ray { t_max: self.best.t.next_up(), ..self.ray };
             let Some(h) = self.shape.closest(prim, &ray) else { continue };
             let b = &mut self.best;
@@ -189,7 +203,9 @@ struct ShapeAny<'a> {
 impl<S: Simd> LeafTest<S> for ShapeAny<'_> {
     #[inline(always)]
     fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
-        self.found = leaf_primitive_ids(units, leaf).iter().any(|&prim| self.shape.occluded(prim, &self.ray));
+        self.found = leaf_primitive_ids(units, leaf)
+            .iter()
+            .any(|&prim| self.shape.occluded(prim, &self.ray));
         self.found
     }
 }

@@ -3,11 +3,13 @@
 use super::build::{BuilderConfig, Method, SahConfig};
 use std::time::Duration;
 
-/// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing geometry, full builds for
-/// exploring). The measured trade-off is bench's experiment `accuracy-build`.
+/// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing
+/// geometry, full builds for exploring). The measured trade-off is bench's experiment
+/// `accuracy-build`.
 ///
-/// For nested isosurfaces of 1 M and 4 M triangles, as guidance: CPU time of the build relative to `Balanced`, time of single primary rays
-/// likewise, bytes a triangle. Coherent packets differ by 0 to 8 %.
+/// For nested isosurfaces of 1 M and 4 M triangles, as guidance: CPU time of the build relative to
+/// `Balanced`, time of single primary rays likewise, bytes a triangle. Coherent packets differ by 0
+/// to 8 %.
 ///
 /// | | build | single rays | bytes |
 /// |---|---|---|---|
@@ -21,13 +23,15 @@ pub enum BuildQuality {
     /// SAH with up to 16 bins along all three axes.
     #[default]
     Balanced,
-    /// Balanced, then obvhs' reinsertion optimiser: for geometry that is explored for long, and single rays.
+    /// Balanced, then obvhs' reinsertion optimiser: for geometry that is explored for long, and
+    /// single rays.
     Best,
 }
 
 impl BuildQuality {
     /// Every preset, from fast to good: tests and benchmarks loop over it.
-    pub const ALL: [BuildQuality; 3] = [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
+    pub const ALL: [BuildQuality; 3] =
+        [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
 
     /// What the builders do for this preset.
     pub(crate) fn config(self) -> BuilderConfig {
@@ -81,12 +85,13 @@ impl std::fmt::Display for UnknownQuality {
 /// What happens to rays through shared edges and vertices.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Robustness {
-    /// Edge functions in f32 alone, zeros count as inside. Of 2.5·10⁷ rays aimed at vertices and edges of closed meshes none slipped through, but
-    /// nothing rules it out: a triangle whose edge functions all round to zero is missed. The other way round, a triangle 10⁷ times smaller than its
-    /// distance from the ray may be hit falsely when a large one shares its leaf.
+    /// Edge functions in f32 alone, zeros count as inside. Of 2.5·10⁷ rays aimed at vertices and
+    /// edges of closed meshes none slipped through, but nothing rules it out: a triangle whose edge
+    /// functions all round to zero is missed. The other way round, a triangle 10⁷ times smaller
+    /// than its distance from the ray may be hit falsely when a large one shares its leaf.
     Fast,
-    /// No ray passes between two triangles that share an edge or a vertex (Woop, Benthin and Wald 2013, with conservative boxes
-    /// after Ize 2013).
+    /// No ray passes between two triangles that share an edge or a vertex (Woop, Benthin and Wald
+    /// 2013, with conservative boxes after Ize 2013).
     #[default]
     Watertight,
 }

@@ -1,8 +1,11 @@
-//! Worlds that hold a part of a larger world's primitives and answer for them as the larger world would.
+//! Worlds that hold a part of a larger world's primitives and answer for them as the larger world
+//! would.
 //!
-//! What a ray's hit is, to the last bit, depends on more than the primitive: rays are moved to the geometry's local space, those from far away
-//! are first moved along themselves, and render space has an origin. All of that is chosen from bounds. A part therefore takes
-//! over the choices of the whole ([`GlobalLayout`]), and the nearest of the hits of all parts, ties to the lowest id, is the whole's hit.
+//! What a ray's hit is, to the last bit, depends on more than the primitive: rays are moved to the
+//! geometry's local space, those from far away are first moved along themselves, and render space
+//! has an origin. All of that is chosen from bounds. A part therefore takes over the choices of the
+//! whole ([`GlobalLayout`]), and the nearest of the hits of all parts, ties to the lowest id, is
+//! the whole's hit.
 
 use super::blas::Blas;
 use super::layout::local_frame::LocalFrame;
@@ -33,15 +36,17 @@ impl World {
         }
     }
 
-    /// Bounds in render space of what this world holds itself: less than [`World::bounds`] for a part.
+    /// Bounds in render space of what this world holds itself: less than [`World::bounds`] for a
+    /// part.
     pub fn own_bounds(&self) -> Aabb {
         self.tlas.bounds
     }
 
-    /// A world of some of another world's primitives. `geometries` and `instances` are in number and order those of the whole (a geometry may
-    /// have no primitive left), meshes have the origin they have there, and primitives keep their order. Then for every ray
-    /// [`World::closest`] of the whole is the nearest of those of any parts that together have all primitives, ties to the lowest
-    /// instance and then the lowest primitive of the whole, in the same bits.
+    /// A world of some of another world's primitives. `geometries` and `instances` are in number
+    /// and order those of the whole (a geometry may have no primitive left), meshes have the origin
+    /// they have there, and primitives keep their order. Then for every ray [`World::closest`] of
+    /// the whole is the nearest of those of any parts that together have all primitives, ties to
+    /// the lowest instance and then the lowest primitive of the whole, in the same bits.
     ///
     /// ```
     /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::{DAffine3, Vec3}};
@@ -64,7 +69,10 @@ impl World {
         options: &BuildOptions,
     ) -> Result<World, BuildError> {
         if geometries.len() != whole.geometries.len() {
-            return Err(BuildError::NotAPart { expected: whole.geometries.len(), found: geometries.len() });
+            return Err(BuildError::NotAPart {
+                expected: whole.geometries.len(),
+                found: geometries.len(),
+            });
         }
         World::build_in_layout(geometries, instances, options, Some(whole), None)
     }
@@ -85,7 +93,8 @@ pub(super) fn blas_of(
     }
 }
 
-/// Some primitives of a shape, in the order of their numbers there. The shape's data stay where they are and are shared.
+/// Some primitives of a shape, in the order of their numbers there. The shape's data stay where
+/// they are and are shared.
 #[derive(Clone)]
 pub struct ShapePart {
     shape: Arc<dyn Shape>,
@@ -93,7 +102,8 @@ pub struct ShapePart {
 }
 
 impl ShapePart {
-    /// The primitives of `shape` whose numbers are in `primitives`; numbers that it does not have are left out.
+    /// The primitives of `shape` whose numbers are in `primitives`; numbers that it does not have
+    /// are left out.
     pub fn new(shape: Arc<dyn Shape>, mut primitives: Vec<u32>) -> ShapePart {
         let count = shape.num_primitives();
         primitives.retain(|&p| (p as usize) < count);

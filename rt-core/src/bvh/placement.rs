@@ -8,8 +8,8 @@ use crate::ray::{Ray, RayBlock};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-/// Beyond this many radii from the geometry a ray's origin is first moved along the ray in f64: there, f32 coordinates relative to the
-/// geometry would be coarser than 4·10⁻⁶ of its size.
+/// Beyond this many radii from the geometry a ray's origin is first moved along the ray in f64:
+/// there, f32 coordinates relative to the geometry would be coarser than 4·10⁻⁶ of its size.
 const FAR_RADII: f64 = 64.0;
 
 /// The way into one instance's local space.
@@ -23,7 +23,8 @@ pub(crate) struct Placement {
     /// Sphere around the local bounds.
     center: DVec3,
     radius: f64,
-    /// The centre, and the distance up to which an origin is near, in f32 with a margin that covers its rounding.
+    /// The centre, and the distance up to which an origin is near, in f32 with a margin that covers
+    /// its rounding.
     center_f32: Vec3,
     near_f32: f32,
     /// Bounds in render space.
@@ -31,8 +32,9 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
-    /// `world_origin` is the world position of render space's origin. `reach` are the local bounds of the whole geometry, `local_bounds` those of
-    /// what is here of it. `None` when the transform cannot be inverted.
+    /// `world_origin` is the world position of render space's origin. `reach` are the local bounds
+    /// of the whole geometry, `local_bounds` those of what is here of it. `None` when the transform
+    /// cannot be inverted.
     pub(crate) fn new(
         geometry: usize,
         world_from_object: &DAffine3,
@@ -42,7 +44,8 @@ impl Placement {
     ) -> Option<Placement> {
         let inverse = world_from_object.inverse();
         let det = world_from_object.matrix3.determinant();
-        if !(det.is_finite() && det != 0.0 && inverse.is_finite() && world_from_object.is_finite()) {
+        if !(det.is_finite() && det != 0.0 && inverse.is_finite() && world_from_object.is_finite())
+        {
             return None;
         }
         // local = (inverse(render + world_origin) − center) · scale
@@ -50,8 +53,8 @@ impl Placement {
             matrix3: inverse.matrix3 * frame.scale,
             translation: (inverse.transform_point3(world_origin) - frame.center) * frame.scale,
         };
-        let identity =
-            local_from_render.matrix3 == DMat3::IDENTITY && local_from_render.translation == DVec3::ZERO;
+        let identity = local_from_render.matrix3 == DMat3::IDENTITY
+            && local_from_render.translation == DVec3::ZERO;
         let (center, radius) = if reach.is_empty() {
             (DVec3::ZERO, 0.0)
         } else {
@@ -65,9 +68,11 @@ impl Placement {
                 let object = p.as_dvec3() / frame.scale + frame.center;
                 world_from_object.transform_point3(object) - world_origin
             };
-            // Rays are rounded to f32 in local space, from up to 64 radii away in each axis, and so is their direction: off by at most 2⁻¹⁵ radii.
+            // Rays are rounded to f32 in local space, from up to 64 radii away in each axis, and so
+            // is their direction: off by at most 2⁻¹⁵ radii.
             let rows = world_from_object.matrix3.transpose();
-            let stretch = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+            let stretch =
+                DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
             let margin = stretch / frame.scale * radius * (-15f64).exp2();
             let mut b = Aabb::EMPTY;
             for c in local_bounds.corners() {
@@ -105,7 +110,8 @@ impl Placement {
         })
     }
 
-    /// True when these rays need no transformation: local and render space agree and no origin is far away.
+    /// True when these rays need no transformation: local and render space agree and no origin is
+    /// far away.
     #[inline(never)]
     pub(crate) fn accepts_blocks<S: Simd>(&self, simd: S, rays: &[RayBlock]) -> bool {
         if !self.identity {
@@ -117,10 +123,13 @@ impl Placement {
                 let limit = f32x16::splat(simd, self.near_f32);
                 let mut largest = f32x16::splat(simd, 0.0);
                 for r in rays {
-                    for (row, c) in
-                        [(&r.ox, self.center_f32.x), (&r.oy, self.center_f32.y), (&r.oz, self.center_f32.z)]
-                    {
-                        largest = largest.max((f32x16::from_slice(simd, row) - f32x16::splat(simd, c)).abs());
+                    for (row, c) in [
+                        (&r.ox, self.center_f32.x),
+                        (&r.oy, self.center_f32.y),
+                        (&r.oz, self.center_f32.z),
+                    ] {
+                        largest = largest
+                            .max((f32x16::from_slice(simd, row) - f32x16::splat(simd, c)).abs());
                     }
                 }
                 largest.simd_le(limit).all_true()
@@ -128,7 +137,8 @@ impl Placement {
         )
     }
 
-    /// The ray in local space, and how far along it its origin was moved (in units of its direction: `t` is the same in both spaces).
+    /// The ray in local space, and how far along it its origin was moved (in units of its
+    /// direction: `t` is the same in both spaces).
     #[inline]
     pub(crate) fn enter(&self, ray: &Ray) -> (Ray, f64) {
         if self.accepts(ray) {
@@ -141,7 +151,8 @@ impl Placement {
         let (t_min, t_max) = if moved == 0.0 {
             (ray.t_min, ray.t_max)
         } else {
-            // A moved ray starts before the geometry, so that nothing of it is lost when t_min lies behind.
+            // A moved ray starts before the geometry, so that nothing of it is lost when t_min lies
+            // behind.
             (moved_limit(ray.t_min, moved).max(0.0), moved_limit(ray.t_max, moved))
         };
         let local = Ray { origin: (o + d * moved).as_vec3(), dir: d.as_vec3(), t_min, t_max };
@@ -149,19 +160,22 @@ impl Placement {
     }
 }
 
-/// A limit on a moved ray: x below it are those with `(x as f64 + moved) as f32 < t`, so that the range is half-open in the numbers that callers see.
+/// A limit on a moved ray: x below it are those with `(x as f64 + moved) as f32 < t`, so that the
+/// range is half-open in the numbers that callers see.
 fn moved_limit(t: f32, moved: f64) -> f32 {
     if t == f32::INFINITY {
         return t;
     }
-    // Sums below the middle between t and its predecessor round to less than t; 2⁻⁵¹ for the rounding of the sum in f64.
+    // Sums below the middle between t and its predecessor round to less than t; 2⁻⁵¹ for the
+    // rounding of the sum in f64.
     let middle = 0.5 * (t as f64 + t.next_down() as f64);
     let x = middle - moved - middle.abs() * 2.0 * f64::EPSILON;
     let f = x as f32;
     if (f as f64) < x { f.next_up() } else { f }
 }
 
-/// The parameter just before the line meets the sphere, or of its closest approach when it does not; at least 0.
+/// The parameter just before the line meets the sphere, or of its closest approach when it does
+/// not; at least 0.
 pub(crate) fn distance_to_sphere(o: DVec3, d: DVec3, center: DVec3, radius: f64) -> f64 {
     let dd = d.length_squared();
     if dd == 0.0 {
@@ -174,11 +188,15 @@ pub(crate) fn distance_to_sphere(o: DVec3, d: DVec3, center: DVec3, radius: f64)
 /// The largest f32 point not above `p` in any axis.
 pub(crate) fn round_down(p: DVec3) -> Vec3 {
     let f = p.as_vec3();
-    Vec3::from_array(std::array::from_fn(|a| if f[a] as f64 > p[a] { f[a].next_down() } else { f[a] }))
+    Vec3::from_array(std::array::from_fn(
+        |a| if f[a] as f64 > p[a] { f[a].next_down() } else { f[a] },
+    ))
 }
 
 /// The smallest f32 point not below `p` in any axis.
 pub(crate) fn round_up(p: DVec3) -> Vec3 {
     let f = p.as_vec3();
-    Vec3::from_array(std::array::from_fn(|a| if (f[a] as f64) < p[a] { f[a].next_up() } else { f[a] }))
+    Vec3::from_array(std::array::from_fn(
+        |a| if (f[a] as f64) < p[a] { f[a].next_up() } else { f[a] },
+    ))
 }

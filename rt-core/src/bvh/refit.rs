@@ -1,13 +1,16 @@
 //! Moving the vertices of a mesh without building its tree anew.
 //!
-//! Leaves get the new vertices and boxes are recomputed from the bottom up; which triangles share a leaf stays. A time step of a deforming mesh
-//! then costs a seventh of a build (42 ms of CPU against 290 for 1 M triangles), and rays become slower the further the vertices move from
-//! where the tree was built: the report says how much to expect.
+//! Leaves get the new vertices and boxes are recomputed from the bottom up; which triangles share a
+//! leaf stays. A time step of a deforming mesh then costs a seventh of a build (42 ms of CPU
+//! against 290 for 1 M triangles), and rays become slower the further the vertices move from where
+//! the tree was built: the report says how much to expect.
 
 use super::blas::{Blas, Content};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::{TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids};
-use super::layout::wide::{CHILD_ROW, ChildRef, LeafWriter, NODE_UNITS, Unit, WIDTH, get_box, set_box};
+use super::layout::wide::{
+    CHILD_ROW, ChildRef, LeafWriter, NODE_UNITS, Unit, WIDTH, get_box, set_box,
+};
 use super::world::{Geometry, World};
 use crate::math::Aabb;
 use crate::mesh::{MeshError, TriMesh};
@@ -20,13 +23,16 @@ use std::time::{Duration, Instant};
 pub struct RefitReport {
     /// Time from the new vertices to a traversable structure.
     pub elapsed: Duration,
-    /// Triangles that cannot be hit because a vertex is NaN or infinite now. They return when their vertices become finite again.
+    /// Triangles that cannot be hit because a vertex is NaN or infinite now. They return when their
+    /// vertices become finite again.
     pub unusable: usize,
-    /// Triangles that could be hit, but were left out when the tree was built. Only a new build brings them in.
+    /// Triangles that could be hit, but were left out when the tree was built. Only a new build
+    /// brings them in.
     pub absent: usize,
-    /// Expected box and leaf tests of a ray that meets the mesh (the surface area heuristic's cost), relative to when the tree was built.
-    /// Predicts single rays well: 1 M triangles twisted until this was 1.14, 1.32, 1.57, 1.89 took 1.15, 1.33, 1.47, 1.69 times as long as in
-    /// a new tree, coherent packets 1.04, 1.16, 1.26, 1.37 times.
+    /// Expected box and leaf tests of a ray that meets the mesh (the surface area heuristic's
+    /// cost), relative to when the tree was built. Predicts single rays well: 1 M triangles twisted
+    /// until this was 1.14, 1.32, 1.57, 1.89 took 1.15, 1.33, 1.47, 1.69 times as long as in a new
+    /// tree, coherent packets 1.04, 1.16, 1.26, 1.37 times.
     pub cost_growth: f64,
 }
 
@@ -49,7 +55,8 @@ pub enum RefitError {
     },
     /// The world is a part of another one, whose bounds would have to be chosen anew as well.
     #[error(
-        "geometry {geometry} is a part of a larger one; move the vertices of the whole, and build its parts again"
+        "geometry {geometry} is a part of a larger one; move the vertices of the whole, and build \
+         its parts again"
     )]
     OfAPart {
         /// The index given.
@@ -65,7 +72,8 @@ pub enum RefitError {
     },
     /// The new mesh has other triangles.
     #[error(
-        "geometry {geometry}: the new mesh has {found} {what}, the tree was built for {expected}; refit only moves vertices, build a new world"
+        "geometry {geometry}: the new mesh has {found} {what}, the tree was built for {expected}; \
+         refit only moves vertices, build a new world"
     )]
     Topology {
         /// The index given.
@@ -79,7 +87,8 @@ pub enum RefitError {
     },
     /// The new mesh joins its vertices differently.
     #[error(
-        "geometry {geometry}: triangle {triangle} has other vertex indices than when the tree was built; refit only moves vertices, build a new world"
+        "geometry {geometry}: triangle {triangle} has other vertex indices than when the tree was \
+         built; refit only moves vertices, build a new world"
     )]
     Indices {
         /// The index given.
@@ -90,8 +99,9 @@ pub enum RefitError {
 }
 
 impl World {
-    /// Replaces the vertices (and attributes) of a mesh that has the same triangles as before. All instances of it follow. Hits are those of a
-    /// new build; the origin of render space is chosen anew as there, so convert points again afterwards.
+    /// Replaces the vertices (and attributes) of a mesh that has the same triangles as before. All
+    /// instances of it follow. Hits are those of a new build; the origin of render space is chosen
+    /// anew as there, so convert points again afterwards.
     ///
     /// ```
     /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::Vec3};
@@ -105,7 +115,11 @@ impl World {
     /// assert!((hit.t - 2.0).abs() < 1e-6);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn refit(&mut self, geometry: usize, mesh: Arc<TriMesh>) -> Result<RefitReport, RefitError> {
+    pub fn refit(
+        &mut self,
+        geometry: usize,
+        mesh: Arc<TriMesh>,
+    ) -> Result<RefitReport, RefitError> {
         let start = Instant::now();
         let count = self.geometries.len();
         let old = match self.geometries.get(geometry) {
@@ -153,8 +167,10 @@ fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
     // Both sums per area of the whole: the ratio of expected tests per ray.
     let growth = (root.new_area / after) / (root.old_area / before);
     blas.cost_growth *= if growth.is_finite() && growth > 0.0 { growth } else { 1.0 };
-    let usable =
-        (0..mesh.indices.len()).into_par_iter().with_min_len(1 << 14).filter(|&i| mesh.is_renderable(i));
+    let usable = (0..mesh.indices.len())
+        .into_par_iter()
+        .with_min_len(1 << 14)
+        .filter(|&i| mesh.is_renderable(i));
     let absent = usable.count() - root.usable;
     blas.frame = frame;
     blas.primitives = root.usable;
@@ -174,14 +190,15 @@ struct RefitTotals {
 }
 
 impl RefitTotals {
-    const NOTHING: RefitTotals = RefitTotals { bounds: Aabb::EMPTY, old_area: 0.0, new_area: 0.0, usable: 0 };
+    const NOTHING: RefitTotals =
+        RefitTotals { bounds: Aabb::EMPTY, old_area: 0.0, new_area: 0.0, usable: 0 };
 }
 
 /// Subtrees of at least this many units are tasks of their own.
 const PARALLEL_UNITS: usize = 1 << 14;
 
-/// Refits the subtree that `units` is, whose first unit has the number `base` in the arena. A subtree is one piece of the arena: its node, then
-/// its children's pieces one after the other.
+/// Refits the subtree that `units` is, whose first unit has the number `base` in the arena. A
+/// subtree is one piece of the arena: its node, then its children's pieces one after the other.
 fn refit_node(units: &mut [Unit], base: usize, writer: &TriWriter<'_>) -> RefitTotals {
     let children = *units[CHILD_ROW].bits();
     let (node, mut rest) = units.split_at_mut(NODE_UNITS);
@@ -191,22 +208,31 @@ fn refit_node(units: &mut [Unit], base: usize, writer: &TriWriter<'_>) -> RefitT
     let used = children.iter().filter(|&&c| ChildRef(c) != ChildRef::NONE).count();
     // Unused slots have the largest number.
     slots.sort_unstable_by_key(|&s| {
-        if ChildRef(children[s]) == ChildRef::NONE { usize::MAX } else { ChildRef(children[s]).unit() }
+        if ChildRef(children[s]) == ChildRef::NONE {
+            usize::MAX
+        } else {
+            ChildRef(children[s]).unit()
+        }
     });
     let whole = rest.len();
     let mut at = base + NODE_UNITS;
     let mut pieces: Vec<(usize, ChildRef, usize, &mut [Unit])> = Vec::with_capacity(WIDTH);
     for (k, &slot) in slots[..used].iter().enumerate() {
         let child = ChildRef(children[slot]);
-        let end =
-            slots[..used].get(k + 1).map_or(base + NODE_UNITS + whole, |&s| ChildRef(children[s]).unit());
+        let end = slots[..used]
+            .get(k + 1)
+            .map_or(base + NODE_UNITS + whole, |&s| ChildRef(children[s]).unit());
         let (mine, others) = rest.split_at_mut(end - at);
         pieces.push((slot, child, at, mine));
         (at, rest) = (end, others);
     }
 
     let refit_child = |(slot, child, at, mine): (usize, ChildRef, usize, &mut [Unit])| {
-        let r = if child.is_leaf() { refit_leaf(mine, child, writer) } else { refit_node(mine, at, writer) };
+        let r = if child.is_leaf() {
+            refit_leaf(mine, child, writer)
+        } else {
+            refit_node(mine, at, writer)
+        };
         (slot, r)
     };
     let done: Vec<(usize, RefitTotals)> = if whole >= PARALLEL_UNITS {

@@ -1,4 +1,5 @@
-//! Many rays in one call: packets for rays that go the same way, shared beginnings for rays that do not.
+//! Many rays in one call: packets for rays that go the same way, shared beginnings for rays that do
+//! not.
 
 use super::blas::{Blas, Content, leaf_primitive_ids};
 use super::layout::wide::ChildRef;
@@ -14,8 +15,9 @@ use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
 
-/// With more instances than this in a packet's way its rays go one by one: most of them meet only a few each. Measured on glyphs, 512² primary rays,
-/// packets against one by one: 41 and 47 ms with 216 instances, 88 and 60 with 1,000, 4104 and 112 with 125,000.
+/// With more instances than this in a packet's way its rays go one by one: most of them meet only a
+/// few each. Measured on glyphs, 512² primary rays, packets against one by one: 41 and 47 ms with
+/// 216 instances, 88 and 60 with 1,000, 4104 and 112 with 125,000.
 const MOST_CANDIDATES: usize = 16;
 
 /// Per-thread buffers: a packet is 24 KiB, too much to clear for every call.
@@ -45,7 +47,9 @@ thread_local! {
 
 /// Slices of different lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{rays} blocks of rays, but room for the answers of {answers}: give as many of these as of rays")]
+#[error(
+    "{rays} blocks of rays, but room for the answers of {answers}: give as many of these as of rays"
+)]
 pub struct StreamError {
     /// Blocks of rays.
     pub rays: usize,
@@ -67,14 +71,19 @@ pub(crate) enum Coherence {
 }
 
 impl World {
-    /// The closest hits of many rays, in order. Neighbouring rays should be similar (a tile of pixels, rays to one light): they are
-    /// traced as packets of up to 256, cut where rays differ too much. Lanes with `t_max <= t_min` are left alone as misses.
+    /// The closest hits of many rays, in order. Neighbouring rays should be similar (a tile of
+    /// pixels, rays to one light): they are traced as packets of up to 256, cut where rays differ
+    /// too much. Lanes with `t_max <= t_min` are left alone as misses.
     ///
     /// The answers are those of [`World::closest`], bit for bit.
     ///
     /// # Errors
     /// When the slices differ in length; then no ray is traced.
-    pub fn closest_coherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) -> Result<(), StreamError> {
+    pub fn closest_coherent(
+        &self,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+    ) -> Result<(), StreamError> {
         same_length(rays.len(), hits.len())?;
         self.closest_stream(rays, hits, Coherence::Coherent, InstanceFilter::All);
         Ok(())
@@ -90,12 +99,17 @@ impl World {
         Ok(())
     }
 
-    /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path tracing). Rays of one block should start close to
-    /// one another: they share the way through the tree as long as it is the same.
+    /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path
+    /// tracing). Rays of one block should start close to one another: they share the way through
+    /// the tree as long as it is the same.
     ///
     /// # Errors
     /// When the slices differ in length; then no ray is traced.
-    pub fn closest_incoherent(&self, rays: &[RayBlock], hits: &mut [HitBlock]) -> Result<(), StreamError> {
+    pub fn closest_incoherent(
+        &self,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+    ) -> Result<(), StreamError> {
         same_length(rays.len(), hits.len())?;
         self.closest_stream(rays, hits, Coherence::Incoherent, InstanceFilter::All);
         Ok(())
@@ -105,7 +119,11 @@ impl World {
     ///
     /// # Errors
     /// When the slices differ in length; then no ray is traced.
-    pub fn occluded_incoherent(&self, rays: &[RayBlock], out: &mut [u16]) -> Result<(), StreamError> {
+    pub fn occluded_incoherent(
+        &self,
+        rays: &[RayBlock],
+        out: &mut [u16],
+    ) -> Result<(), StreamError> {
         same_length(rays.len(), out.len())?;
         self.occluded_stream(rays, out, Coherence::Incoherent, InstanceFilter::All);
         Ok(())
@@ -169,7 +187,8 @@ impl World {
         });
     }
 
-    /// The only geometry, when it is a mesh that stands where the rays are: packets then go straight to it.
+    /// The only geometry, when it is a mesh that stands where the rays are: packets then go
+    /// straight to it.
     fn single_mesh(&self) -> Option<(&TriBvh, PacketLimits)> {
         let [only] = self.placements.as_slice() else { return None };
         match &self.blas[only.geometry].content {
@@ -401,7 +420,8 @@ fn all_resolved<const ANY: bool>(rays: &[RayBlock], hits: &[HitBlock], distance:
     })
 }
 
-/// Whether an active ray's direction is so short or long that single rays rescale it; NaN is not, it is left to the packet.
+/// Whether an active ray's direction is so short or long that single rays rescale it; NaN is not,
+/// it is left to the packet.
 #[inline(never)]
 fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
     simd.vectorize(
@@ -435,7 +455,8 @@ fn to_local_space(
             let mut ray = r.get(lane);
             let found = h.prim[lane] != NO_HIT;
             if found {
-                // One step beyond the best: a tie may go to this instance. Blocked shadow rays are finished.
+                // One step beyond the best: a tie may go to this instance. Blocked shadow rays are
+                // finished.
                 ray.t_max = if any { -1.0 } else { h.t[lane].next_up().min(ray.t_max) };
             }
             if !ray.is_valid() {
@@ -450,8 +471,8 @@ fn to_local_space(
     }
 }
 
-/// Blocks in local space against one geometry: as one packet when the rays agree in octant and dominant axis, else in smaller packets, else one by
-/// one.
+/// Blocks in local space against one geometry: as one packet when the rays agree in octant and
+/// dominant axis, else in smaller packets, else one by one.
 fn trace_blas<S: Simd, const EXACT: bool, const ANY: bool>(
     simd: S,
     blas: &Blas,
@@ -478,7 +499,14 @@ fn trace_blas<S: Simd, const EXACT: bool, const ANY: bool>(
                 continue;
             }
             for (r, h) in r.iter().zip(h) {
-                hybrid::trace::<S, EXACT, ANY>(simd, &tris.bvh, r, hybrid::active_lanes(r), h, instance);
+                hybrid::trace::<S, EXACT, ANY>(
+                    simd,
+                    &tris.bvh,
+                    r,
+                    hybrid::active_lanes(r),
+                    h,
+                    instance,
+                );
             }
         }
     }

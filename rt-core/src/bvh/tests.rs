@@ -1,4 +1,5 @@
-//! The traversal against the brute-force reference, on every preset, instruction set and robustness mode.
+//! The traversal against the brute-force reference, on every preset, instruction set and robustness
+//! mode.
 
 use super::*;
 use crate::mesh::TriMesh;
@@ -44,12 +45,20 @@ fn closest_hits_equal_brute_force() {
             match (world.closest(ray), e) {
                 (None, None) => {}
                 (Some(h), Some((t, prim))) => {
-                    assert!((h.t as f64 - t).abs() <= 4e-6 * t, "{options:?} {ray:?}: t {} is not {t}", h.t);
+                    assert!(
+                        (h.t as f64 - t).abs() <= 4e-6 * t,
+                        "{options:?} {ray:?}: t {} is not {t}",
+                        h.t
+                    );
                     assert_eq!(h.prim, *prim, "{options:?} {ray:?}");
                     // The hit point from the barycentrics is the point on the ray.
                     let [a, b, c] = mesh.triangle(h.prim as usize);
                     let p = a + (b - a) * h.u + (c - a) * h.v;
-                    assert!((p - ray.at(h.t)).length() < 1e-4, "{options:?}: {p} is not {}", ray.at(h.t));
+                    assert!(
+                        (p - ray.at(h.t)).length() < 1e-4,
+                        "{options:?}: {p} is not {}",
+                        ray.at(h.t)
+                    );
                 }
                 (found, _) => panic!("{options:?} {ray:?}: found {found:?}, expected {e:?}"),
             }
@@ -58,7 +67,8 @@ fn closest_hits_equal_brute_force() {
     }
 }
 
-/// Tiles of a camera (one origin), the same rays reversed (many origins), and rays in all directions.
+/// Tiles of a camera (one origin), the same rays reversed (many origins), and rays in all
+/// directions.
 fn ray_sets() -> Vec<(&'static str, Vec<Ray>)> {
     let eye = Vec3::new(0.3, -2.0, 2.9);
     let mut camera = Vec::new();
@@ -69,8 +79,10 @@ fn ray_sets() -> Vec<(&'static str, Vec<Ray>)> {
             camera.push(Ray::new(eye, target - eye));
         }
     }
-    let reversed =
-        camera.iter().map(|r| Ray { origin: r.at(1.9), dir: -r.dir, t_min: 0.01, t_max: 1.9 }).collect();
+    let reversed = camera
+        .iter()
+        .map(|r| Ray { origin: r.at(1.9), dir: -r.dir, t_min: 0.01, t_max: 1.9 })
+        .collect();
     vec![("camera", camera), ("reversed", reversed), ("all directions", random_rays(2000, 11, 1.2))]
 }
 
@@ -93,10 +105,12 @@ fn packets_equal_single_rays_bit_for_bit_at_every_level() {
             }
             for (what, found) in [("packet", &coherent), ("sorted", &sorted)] {
                 for (i, r) in rays.iter().enumerate() {
-                    let (a, b) = (single[i / LANES].get(i % LANES), found[i / LANES].get(i % LANES));
+                    let (a, b) =
+                        (single[i / LANES].get(i % LANES), found[i / LANES].get(i % LANES));
                     assert_eq!(
                         a, b,
-                        "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, {r:?}"
+                        "{name} {simd:?}: single ray (left) and {what} (right) differ for ray {i}, \
+                         {r:?}"
                     );
                 }
             }
@@ -109,7 +123,11 @@ fn packets_equal_single_rays_bit_for_bit_at_every_level() {
             world.occluded_incoherent(&blocks, &mut b).expect("one each");
             for (i, h) in single.iter().enumerate() {
                 let expected = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
-                assert_eq!((a[i], b[i]), (expected, expected), "{name} {simd:?}: occlusion of block {i}");
+                assert_eq!(
+                    (a[i], b[i]),
+                    (expected, expected),
+                    "{name} {simd:?}: occlusion of block {i}"
+                );
             }
         }
     }
@@ -121,10 +139,13 @@ fn empty_worlds_and_missing_rays() {
         let empty = World::build(Vec::new(), Vec::new(), &options).expect("nothing is allowed");
         let ray = Ray::new(Vec3::ZERO, Vec3::Z);
         assert_eq!(empty.closest(&ray), None);
-        let no_triangles = World::from_mesh(TriMesh::default(), &options).expect("no triangles are allowed");
+        let no_triangles =
+            World::from_mesh(TriMesh::default(), &options).expect("no triangles are allowed");
         assert_eq!(no_triangles.closest(&ray), None);
         let mut hits = [HitBlock::MISS; 3];
-        no_triangles.closest_coherent(&RayBlock::from_rays(&[ray; 40]), &mut hits).expect("one each");
+        no_triangles
+            .closest_coherent(&RayBlock::from_rays(&[ray; 40]), &mut hits)
+            .expect("one each");
         assert!(hits.iter().all(|h| h.prim == [NO_HIT; LANES]));
     }
 }
@@ -138,7 +159,8 @@ fn worlds_share_the_trees_of_geometries_they_have_in_common() {
         world_from_object: glam::DAffine3::from_translation(glam::DVec3::X * x),
     };
     let options = BuildOptions::default();
-    let build = |g: Vec<Geometry>, i, p| World::build_sharing(g, i, &options, p).expect("valid meshes");
+    let build =
+        |g: Vec<Geometry>, i, p| World::build_sharing(g, i, &options, p).expect("valid meshes");
     let mut first = build(vec![changed, kept.clone()], vec![at(0, 0.0), at(1, 1.0)], None);
     let geometries = vec![kept, new];
     let instances = vec![at(1, 0.25), at(0, -0.5)];
@@ -148,7 +170,8 @@ fn worlds_share_the_trees_of_geometries_they_have_in_common() {
         "the kept geometry has another index, but the same tree"
     );
     let fresh = build(geometries.clone(), instances.clone(), None);
-    let hits = |w: &World| random_rays(800, 5, 1.0).iter().map(|r| w.closest(r)).collect::<Vec<_>>();
+    let hits =
+        |w: &World| random_rays(800, 5, 1.0).iter().map(|r| w.closest(r)).collect::<Vec<_>>();
     let expected = hits(&fresh);
     assert!(expected.iter().flatten().count() > 100, "the rays must hit something");
     assert_eq!(hits(&second), expected);
@@ -160,13 +183,15 @@ fn worlds_share_the_trees_of_geometries_they_have_in_common() {
 
     // Other options: nothing of the old tree fits.
     let other = BuildOptions { quality: BuildQuality::Fast, ..options };
-    let third = World::build_sharing(geometries, instances, &other, Some(&second)).expect("valid meshes");
+    let third =
+        World::build_sharing(geometries, instances, &other, Some(&second)).expect("valid meshes");
     assert!(!Arc::ptr_eq(&third.blas[0], &second.blas[0]));
 }
 
 // ---- Some of the instances
 
-/// Few instances are traced in packets, many one by one; all sides of a mesh, a mirrored one, and a shape.
+/// Few instances are traced in packets, many one by one; all sides of a mesh, a mirrored one, and a
+/// shape.
 fn many_places(n: usize) -> (Vec<Geometry>, Vec<Instance>) {
     use crate::shapes::{Radii, Spheres};
     use glam::{DAffine3, DVec3};
@@ -198,11 +223,17 @@ fn rays_among_some_instances_meet_what_is_met_when_all_others_are_gone() {
         let (geometries, instances) = many_places(n);
         for simd in SimdLevel::available() {
             let options = BuildOptions { simd: Some(simd), ..BuildOptions::default() };
-            let world = World::build(geometries.clone(), instances.clone(), &options).expect("sound");
+            let world =
+                World::build(geometries.clone(), instances.clone(), &options).expect("sound");
             for marks in [0u64, u64::MAX, 0x5555_5555_5555_5555, 0x0f0f_3c3c_0f0f_3c3c] {
                 let marked: Vec<bool> = (0..n).map(|i| marks >> i & 1 != 0).collect();
                 for (name, rays) in ray_sets() {
-                    check_among(&world, &marked, &rays[..600], &format!("{n} instances, {name}, {simd:?}"));
+                    check_among(
+                        &world,
+                        &marked,
+                        &rays[..600],
+                        &format!("{n} instances, {name}, {simd:?}"),
+                    );
                 }
             }
         }

@@ -1,8 +1,11 @@
-//! Checks of finished trees, for tests and for hunting faults: slow, and not needed by correct programs.
+//! Checks of finished trees, for tests and for hunting faults: slow, and not needed by correct
+//! programs.
 
 use super::blas::{Blas, Content, leaf_primitive_ids};
 use super::layout::triangles::{TriWriter, leaf_floats, leaf_triangle_ids};
-use super::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, get_box};
+use super::layout::wide::{
+    CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, get_box,
+};
 use super::world::{Geometry, World};
 use crate::math::Aabb;
 
@@ -32,8 +35,8 @@ pub struct InvalidTree {
 }
 
 impl World {
-    /// Checks that every box contains what is below it, that every primitive is in exactly one leaf, and that no tree is deeper than
-    /// traversal allows.
+    /// Checks that every box contains what is below it, that every primitive is in exactly one
+    /// leaf, and that no tree is deeper than traversal allows.
     pub fn validate(&self) -> Result<TreeStats, InvalidTree> {
         let mut stats = TreeStats::default();
         for (i, (blas, geometry)) in self.blas.iter().zip(&self.geometries).enumerate() {
@@ -70,14 +73,17 @@ fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> 
         (Content::Triangles(tris), Geometry::Mesh(mesh)) => {
             let writer = TriWriter::new(mesh, &blas.frame);
             let mut seen = vec![false; mesh.indices.len()];
-            let stats = TreeWalker { bvh: &tris.bvh, leaf_units: super::layout::triangles::TRI_LEAF_UNITS }
-                .run(|leaf| {
-                let ids = &leaf_triangle_ids(leaf_floats(&tris.bvh.units, leaf))[..leaf.count()];
-                mark(&mut seen, ids)?;
-                Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
-            })?;
+            let stats =
+                TreeWalker { bvh: &tris.bvh, leaf_units: super::layout::triangles::TRI_LEAF_UNITS }
+                    .run(|leaf| {
+                        let ids =
+                            &leaf_triangle_ids(leaf_floats(&tris.bvh.units, leaf))[..leaf.count()];
+                        mark(&mut seen, ids)?;
+                        Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
+                    })?;
             let lost = (0..seen.len()).find(|&i| !seen[i] && mesh.is_renderable(i));
-            // A refit can make a triangle usable that the build had to leave out; it counts as skipped.
+            // A refit can make a triangle usable that the build had to leave out; it counts as
+            // skipped.
             if let Some(i) = lost
                 && blas.skipped == 0
             {
@@ -93,10 +99,15 @@ fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> 
                 Ok(ids.iter().map(|&i| shape.bounds(i)).collect())
             })?
         }
-        (Content::Triangles(_), Geometry::Shape(_)) => return Err("a tree of triangles for a shape".into()),
+        (Content::Triangles(_), Geometry::Shape(_)) => {
+            return Err("a tree of triangles for a shape".into());
+        }
     };
     if stats.primitives < blas.primitives {
-        return Err(format!("{} primitives in leaves, {} expected", stats.primitives, blas.primitives));
+        return Err(format!(
+            "{} primitives in leaves, {} expected",
+            stats.primitives, blas.primitives
+        ));
     }
     Ok(stats)
 }
@@ -118,7 +129,8 @@ struct TreeWalker<'b> {
 }
 
 impl TreeWalker<'_> {
-    /// Visits every leaf; `contents` gives the boxes of its primitives (empty boxes for those that cannot be hit).
+    /// Visits every leaf; `contents` gives the boxes of its primitives (empty boxes for those that
+    /// cannot be hit).
     fn run(
         &self,
         mut contents: impl FnMut(ChildRef) -> Result<Vec<Aabb>, String>,
@@ -158,7 +170,9 @@ impl TreeWalker<'_> {
                     continue;
                 }
                 if !inside(b) {
-                    return Err(format!("node {at}: child {slot}, {b:?}, sticks out of {bounds:?}"));
+                    return Err(format!(
+                        "node {at}: child {slot}, {b:?}, sticks out of {bounds:?}"
+                    ));
                 }
                 if c.unit() <= at {
                     return Err(format!("node {at}: child {slot} at {} lies before it", c.unit()));

@@ -29,8 +29,8 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Where the shared data lie: the same for two clones of one geometry and for two looks of one shape, and never for two others that are
-    /// both alive.
+    /// Where the shared data lie: the same for two clones of one geometry and for two looks of one
+    /// shape, and never for two others that are both alive.
     fn address(&self) -> usize {
         let of_shape = |s: &Arc<dyn Shape>| Arc::as_ptr(s) as *const () as usize;
         match self {
@@ -54,7 +54,11 @@ impl Geometry {
         mesh.check().map_err(error)?;
         if mesh.indices.len() >= MAX_PRIMS {
             let found = mesh.indices.len();
-            return Err(error(MeshError::TooLarge { what: "triangles", found, limit: MAX_PRIMS - 1 }));
+            return Err(error(MeshError::TooLarge {
+                what: "triangles",
+                found,
+                limit: MAX_PRIMS - 1,
+            }));
         }
         Ok(())
     }
@@ -92,7 +96,8 @@ pub enum BuildError {
     },
     /// A part does not match its whole.
     #[error(
-        "a part has {found} geometries, the whole {expected}: give the part one for each, with no primitives where it has none"
+        "a part has {found} geometries, the whole {expected}: give the part one for each, with no \
+         primitives where it has none"
     )]
     NotAPart {
         /// Geometries of the whole.
@@ -105,7 +110,8 @@ pub enum BuildError {
     Level(#[from] UnavailableLevel),
     /// An instance's transform cannot be inverted.
     #[error(
-        "instance {instance}: its transform has determinant {determinant}; give one that is finite and not singular, or leave the instance out"
+        "instance {instance}: its transform has determinant {determinant}; give one that is finite \
+         and not singular, or leave the instance out"
     )]
     SingularTransform {
         /// Index of the instance.
@@ -163,10 +169,11 @@ impl World {
         World::build_sharing(geometries, instances, options, None)
     }
 
-    /// As [`World::build`], but a geometry that `previous` has as well (the same [`Arc`], whatever its index) keeps its acceleration
-    /// structure: when one of five hundred meshes changes, or only transforms do, the others cost nothing. The options must be those of
-    /// `previous`, or everything is built anew. The hits are those of a world built from nothing (after a [`World::refit`] of `previous`: those
-    /// of the refitted one).
+    /// As [`World::build`], but a geometry that `previous` has as well (the same [`Arc`], whatever
+    /// its index) keeps its acceleration structure: when one of five hundred meshes changes, or
+    /// only transforms do, the others cost nothing. The options must be those of `previous`, or
+    /// everything is built anew. The hits are those of a world built from nothing (after a
+    /// [`World::refit`] of `previous`: those of the refitted one).
     pub fn build_sharing(
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
@@ -176,7 +183,8 @@ impl World {
         World::build_in_layout(geometries, instances, options, None, previous)
     }
 
-    /// Builds a world, or a part of one, with the structures of `previous` where it has the same geometries.
+    /// Builds a world, or a part of one, with the structures of `previous` where it has the same
+    /// geometries.
     pub(super) fn build_in_layout(
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
@@ -190,7 +198,11 @@ impl World {
         for (i, inst) in instances.iter().enumerate() {
             if inst.geometry >= geometries.len() {
                 let count = geometries.len();
-                return Err(BuildError::NoSuchGeometry { instance: i, geometry: inst.geometry, count });
+                return Err(BuildError::NoSuchGeometry {
+                    instance: i,
+                    geometry: inst.geometry,
+                    count,
+                });
             }
         }
         let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
@@ -213,7 +225,8 @@ impl World {
             .enumerate()
             .flat_map(|(i, b)| b.notes.iter().map(move |n| format!("geometry {i}: {n}")))
             .collect();
-        let TopLevel { origin, placements, tlas } = build_top_level(&instances, &blas, whole, &mut notes)?;
+        let TopLevel { origin, placements, tlas } =
+            build_top_level(&instances, &blas, whole, &mut notes)?;
         phases.push(("instances", start.elapsed() - phases[0].1));
         let report = BuildReport {
             total: start.elapsed(),
@@ -241,7 +254,10 @@ impl World {
     }
 
     /// A world of one mesh at its place.
-    pub fn from_mesh(mesh: impl Into<Arc<TriMesh>>, options: &BuildOptions) -> Result<World, BuildError> {
+    pub fn from_mesh(
+        mesh: impl Into<Arc<TriMesh>>,
+        options: &BuildOptions,
+    ) -> Result<World, BuildError> {
         let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
         World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
     }
@@ -253,7 +269,8 @@ impl World {
     /// Makes the upper level anew after a geometry has changed.
     pub(super) fn rebuild_top_level(&mut self) {
         let placed = build_top_level(&self.instances, &self.blas, None, &mut self.report.notes);
-        let TopLevel { origin, placements, tlas } = placed.expect("the build accepted these transforms");
+        let TopLevel { origin, placements, tlas } =
+            placed.expect("the build accepted these transforms");
         self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
         self.report.skipped = self.blas.iter().map(|b| b.skipped).sum();
         (self.origin, self.bounds) = (origin, tlas.bounds);
@@ -295,9 +312,10 @@ impl World {
         (p - self.origin).as_vec3()
     }
 
-    /// A render-space ray from f64 world coordinates. When the origin is far outside the bounds it is first moved along the ray,
-    /// in f64, to where the ray can first meet them, so that a camera 10⁹ away loses nothing. Returns the ray and how far its
-    /// origin was moved (add it to a hit's `t`). `dir` need not be of unit length.
+    /// A render-space ray from f64 world coordinates. When the origin is far outside the bounds it
+    /// is first moved along the ray, in f64, to where the ray can first meet them, so that a camera
+    /// 10⁹ away loses nothing. Returns the ray and how far its origin was moved (add it to a hit's
+    /// `t`). `dir` need not be of unit length.
     pub fn ray_from_world(&self, origin: DVec3, dir: DVec3) -> (Ray, f64) {
         let o = origin - self.origin;
         let moved = if self.bounds.is_empty() {
@@ -310,7 +328,8 @@ impl World {
         (Ray::new((o + dir * moved).as_vec3(), dir.as_vec3()), moved)
     }
 
-    /// The closest hit along `ray`. Ties (coplanar layers) go to the lowest instance, then the lowest primitive.
+    /// The closest hit along `ray`. Ties (coplanar layers) go to the lowest instance, then the
+    /// lowest primitive.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         if !ray.is_valid() {
             return None;
@@ -395,7 +414,12 @@ impl World {
         leaves.found
     }
 
-    fn instance_occluded<S: Simd, const EXACT: bool>(&self, simd: S, instance: usize, ray: &Ray) -> bool {
+    fn instance_occluded<S: Simd, const EXACT: bool>(
+        &self,
+        simd: S,
+        instance: usize,
+        ray: &Ray,
+    ) -> bool {
         let p = &self.placements[instance];
         let (local, _) = p.enter(ray);
         local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, EXACT>(simd, &local)
@@ -405,8 +429,8 @@ impl World {
 /// Largest components of directions that are traced as they are.
 pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
 
-/// Rays whose direction is neither tiny nor huge pass unchanged; others are scaled by a power of two. The second value turns the scaled
-/// ray's `t` back.
+/// Rays whose direction is neither tiny nor huge pass unchanged; others are scaled by a power of
+/// two. The second value turns the scaled ray's `t` back.
 pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     let m = max_abs(ray.dir);
     if ORDINARY_LENGTHS.contains(&m) {
@@ -420,7 +444,15 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
         if x * k < t { x.next_up() } else { x }
     };
     // Hits whose t is beyond f32 are none.
-    (Ray { dir: ray.dir * k, t_min: limit(ray.t_min), t_max: limit(ray.t_max.min(f32::MAX)), ..*ray }, k)
+    (
+        Ray {
+            dir: ray.dir * k,
+            t_min: limit(ray.t_min),
+            t_max: limit(ray.t_max.min(f32::MAX)),
+            ..*ray
+        },
+        k,
+    )
 }
 
 /// Geometries of more primitives are built one after the other, each by all threads. Their cuts are
@@ -428,7 +460,10 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
 const LARGE_GEOMETRY: usize = 1 << 17;
 
 /// `build(i)` for every geometry, in order. What is built does not depend on who builds it when.
-fn build_in_parallel<T: Send>(geometries: &[Geometry], build: impl Fn(usize) -> T + Sync) -> Vec<T> {
+fn build_in_parallel<T: Send>(
+    geometries: &[Geometry],
+    build: impl Fn(usize) -> T + Sync,
+) -> Vec<T> {
     let (large, small): (Vec<usize>, Vec<usize>) =
         (0..geometries.len()).partition(|&i| geometries[i].num_primitives() > LARGE_GEOMETRY);
     // The small ones fill the gaps that the first, serial cut of a large one leaves. Each is a task
@@ -450,7 +485,8 @@ struct TopLevel {
     tlas: WideBvh,
 }
 
-/// Chooses render space (world space, moved when everything is far from zero) and places the instances in it.
+/// Chooses render space (world space, moved when everything is far from zero) and places the
+/// instances in it.
 fn build_top_level(
     instances: &[Instance],
     blas: &[Arc<Blas>],
@@ -469,20 +505,24 @@ fn build_top_level(
         )
     };
     // Of several errors the first is told, whoever finds one first.
-    let placed: Vec<_> = instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
+    let placed: Vec<_> =
+        instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
     let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
     let refs = placements
         .iter()
         .enumerate()
-        .filter(|(_, p)| !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite())
+        .filter(|(_, p)| {
+            !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite()
+        })
         .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
         .collect();
     let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.config(), notes);
     Ok(TopLevel { origin, placements, tlas })
 }
 
-/// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A single geometry without rotation gets its own
-/// centre, so that its local space and render space coincide.
+/// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A
+/// single geometry without rotation gets its own centre, so that its local space and render space
+/// coincide.
 fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     if let [only] = instances
         && only.world_from_object.matrix3 == DMat3::IDENTITY
@@ -506,8 +546,10 @@ fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
         bounds.corners().map(of_corner).into_iter().fold(nothing(), join)
     };
     // Pieces of a fixed size, joined in order: the sign of a zero does not depend on the threads.
-    let pieces: Vec<_> =
-        instances.par_chunks(1024).map(|piece| piece.iter().map(of_instance).fold(nothing(), join)).collect();
+    let pieces: Vec<_> = instances
+        .par_chunks(1024)
+        .map(|piece| piece.iter().map(of_instance).fold(nothing(), join))
+        .collect();
     let (lo, hi) = pieces.into_iter().fold(nothing(), join);
     let center = 0.5 * lo + 0.5 * hi;
     let far = center.abs().max_element() > 4.0 * (hi - lo).max_element();

@@ -1,7 +1,9 @@
-//! What varies over a surface besides its colour: the shading normal, metalness, roughness, emission, how much light gets into its pores.
+//! What varies over a surface besides its colour: the shading normal, metalness, roughness,
+//! emission, how much light gets into its pores.
 //!
-//! A material with a [`MaterialMaps`] is asked once for each point that is shaded; materials without one cost nothing more than before. [`TextureMaps`] reads
-//! textures; programs with other ideas (attributes, procedures) write their own.
+//! A material with a [`MaterialMaps`] is asked once for each point that is shaded; materials
+//! without one cost nothing more than before. [`TextureMaps`] reads textures; programs with other
+//! ideas (attributes, procedures) write their own.
 
 mod texture_maps;
 
@@ -24,7 +26,8 @@ pub struct BsdfParameters {
     pub specular: f32,
     /// Radiance given off, linear RGB.
     pub emission: Vec3,
-    /// Share of ambient and reflected light that gets here (glTF's occlusion). Path tracing finds out for itself.
+    /// Share of ambient and reflected light that gets here (glTF's occlusion). Path tracing finds
+    /// out for itself.
     pub ambient: f32,
     /// Share of the lamps' light that gets here.
     pub direct: f32,
@@ -38,7 +41,8 @@ pub struct MaterialEvalContext<'a> {
     pub uv: [f32; 2],
     /// The point in the geometry's coordinates, before the instance's transform.
     pub point: DVec3,
-    /// Unit shading normal in the geometry's coordinates, as the geometry has it: not turned to anybody.
+    /// Unit shading normal in the geometry's coordinates, as the geometry has it: not turned to
+    /// anybody.
     pub object_normal: Vec3,
     /// Whether the material's sides turn it over.
     pub flipped: bool,
@@ -58,7 +62,8 @@ impl MaterialEvalContext<'_> {
         [1.0 - self.uv[0] - self.uv[1], self.uv[0], self.uv[1]]
     }
 
-    /// The same place, seen as one of `mesh`: for shapes that stand for a mesh's triangles, with the same primitives and hits.
+    /// The same place, seen as one of `mesh`: for shapes that stand for a mesh's triangles, with
+    /// the same primitives and hits.
     pub fn with_mesh<'m>(&self, mesh: &'m TriMesh) -> MaterialEvalContext<'m> {
         let MaterialEvalContext {
             primitive,
@@ -86,7 +91,8 @@ impl MaterialEvalContext<'_> {
         }
     }
 
-    /// A direction along the surface, in the geometry's coordinates, as one in world axes (of any length).
+    /// A direction along the surface, in the geometry's coordinates, as one in world axes (of any
+    /// length).
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         (self.linear * v.as_dvec3()).normalize_or_zero().as_vec3()
     }
@@ -106,8 +112,9 @@ impl MaterialEvalContext<'_> {
         Some(x * w + y * u + z * v)
     }
 
-    /// The direction in which the first texture coordinate grows and the sense of the second one (1 when normal, tangent and it are right-handed, else -1):
-    /// the mesh's own tangents, else from the triangle's texture coordinates.
+    /// The direction in which the first texture coordinate grows and the sense of the second one (1
+    /// when normal, tangent and it are right-handed, else -1): the mesh's own tangents, else from
+    /// the triangle's texture coordinates.
     pub fn tangent(&self) -> Option<(Vec3, f32)> {
         let (mesh, corners) = self.corners()?;
         if let Some(tangents) = &mesh.tangents {
@@ -120,11 +127,13 @@ impl MaterialEvalContext<'_> {
         self.tangent_of(corners.map(|k| uv[k]))
     }
 
-    /// As [`MaterialEvalContext::tangent`], for other texture coordinates at the triangle's corners; `None` where they do not span an area.
+    /// As [`MaterialEvalContext::tangent`], for other texture coordinates at the triangle's
+    /// corners; `None` where they do not span an area.
     pub fn tangent_of(&self, uv: [Vec2; 3]) -> Option<(Vec3, f32)> {
         let (mesh, corners) = self.corners()?;
         let [a, b, c] = corners.map(|k| mesh.positions[k].as_dvec3());
-        let ([e1, e2], [s, t]) = ([b - a, c - a], [(uv[1] - uv[0]).as_dvec2(), (uv[2] - uv[0]).as_dvec2()]);
+        let ([e1, e2], [s, t]) =
+            ([b - a, c - a], [(uv[1] - uv[0]).as_dvec2(), (uv[2] - uv[0]).as_dvec2()]);
         let det = s.x * t.y - t.x * s.y;
         // dP/du and dP/dv solve e1 = s.x dP/du + s.y dP/dv and the same with e2 and t.
         let (du, dv) = ((e1 * t.y - e2 * s.y) / det, (e2 * s.x - e1 * t.x) / det);
@@ -136,20 +145,24 @@ impl MaterialEvalContext<'_> {
         Some((du.as_vec3(), if sense < 0.0 { -1.0 } else { 1.0 }))
     }
 
-    /// The world normal for `bend`, a normal in the space of (tangent, its partner, shading normal), as glTF defines it: the whole frame belongs to the
-    /// geometry's outside and is turned over with it. `None` where there is no such frame. Normals in which the viewer would see a mirror reflect what is below
-    /// the face are bent less: such points would be black (Keller et al., "The Iray Light Transport Simulation and Rendering System", 2017, appendix A.3).
+    /// The world normal for `bend`, a normal in the space of (tangent, its partner, shading
+    /// normal), as glTF defines it: the whole frame belongs to the geometry's outside and is turned
+    /// over with it. `None` where there is no such frame. Normals in which the viewer would see a
+    /// mirror reflect what is below the face are bent less: such points would be black (Keller et
+    /// al., "The Iray Light Transport Simulation and Rendering System", 2017, appendix A.3).
     pub fn perturbed_normal(&self, (tangent, sense): (Vec3, f32), bend: Vec3) -> Option<Vec3> {
         let normal = self.frame(self.outward, tangent, sense, bend)?;
         Some(self.limited_to_visible(if self.flipped { -normal } else { normal }))
     }
 
-    /// As [`MaterialEvalContext::perturbed_normal`], as VTK's shader does it: the normal is turned to the viewer first, the tangent stays, and its partner is their cross product.
+    /// As [`MaterialEvalContext::perturbed_normal`], as VTK's shader does it: the normal is turned
+    /// to the viewer first, the tangent stays, and its partner is their cross product.
     pub fn perturbed_normal_after_flip(&self, tangent: Vec3, bend: Vec3) -> Option<Vec3> {
         self.frame(if self.flipped { -self.outward } else { self.outward }, tangent, 1.0, bend)
     }
 
-    /// `n`, or the nearest normal in the plane of it and the view in which the mirrored view just leaves the face.
+    /// `n`, or the nearest normal in the plane of it and the view in which the mirrored view just
+    /// leaves the face.
     fn limited_to_visible(&self, n: Vec3) -> Vec3 {
         let mirrored = n * (2.0 * n.dot(self.view)) - self.view;
         let below = mirrored.dot(self.face_normal);
@@ -192,16 +205,26 @@ impl BsdfParameters {
     /// The material's own, with a normal.
     pub(crate) fn of(material: &Material, normal: Vec3) -> BsdfParameters {
         let (metallic, roughness, specular) = match material.model {
-            SurfaceModel::Pbr { metallic, roughness, specular, .. } => (metallic, roughness, specular),
+            SurfaceModel::Pbr { metallic, roughness, specular, .. } => {
+                (metallic, roughness, specular)
+            }
             SurfaceModel::Metal { roughness } => (1.0, roughness, 0.0),
             _ => (0.0, 1.0, 0.0),
         };
         let emission = material.emission.into();
-        BsdfParameters { normal, metallic, roughness, specular, emission, ambient: 1.0, direct: 1.0 }
+        BsdfParameters {
+            normal,
+            metallic,
+            roughness,
+            specular,
+            emission,
+            ambient: 1.0,
+            direct: 1.0,
+        }
     }
 
-    /// `model` with these numbers. What is no number, or outside of its range, becomes the nearest that is inside, so that data cannot
-    /// put NaN into a picture.
+    /// `model` with these numbers. What is no number, or outside of its range, becomes the nearest
+    /// that is inside, so that data cannot put NaN into a picture.
     pub(crate) fn apply(&self, mut model: SurfaceModel) -> SurfaceParameters {
         let unit = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
         match &mut model {

@@ -1,4 +1,5 @@
-//! Detail from textures by the mesh's texture coordinates: glTF 2.0's, which are also `vtkProperty`'s.
+//! Detail from textures by the mesh's texture coordinates: glTF 2.0's, which are also
+//! `vtkProperty`'s.
 
 use super::{BsdfParameters, MaterialEvalContext, MaterialMaps};
 use crate::mesh::TriMesh;
@@ -9,11 +10,12 @@ use std::sync::Arc;
 /// Whose reading of the same textures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum MapConvention {
-    /// glTF 2.0: occlusion dims ambient light only; the tangent frame belongs to the outside; tangents come from the texture coordinates where the mesh has none.
+    /// glTF 2.0: occlusion dims ambient light only; the tangent frame belongs to the outside;
+    /// tangents come from the texture coordinates where the mesh has none.
     #[default]
     Gltf,
-    /// VTK 9's shader: occlusion dims lamps too, but not emission; the frame stands on the normal that is turned to the viewer; without tangents in the mesh
-    /// the normal map is left out.
+    /// VTK 9's shader: occlusion dims lamps too, but not emission; the frame stands on the normal
+    /// that is turned to the viewer; without tangents in the mesh the normal map is left out.
     Vtk,
 }
 
@@ -34,18 +36,28 @@ pub struct TextureMaps {
     pub emission: Option<Arc<Texture>>,
     /// How they are read.
     pub convention: MapConvention,
-    /// The second texture coordinate grows from the picture's upper edge downwards, as in glTF's files. Green points up in the picture, so the partner of a
-    /// tangent that is made from such coordinates points against them. Tangents of the mesh say that themselves.
+    /// The second texture coordinate grows from the picture's upper edge downwards, as in glTF's
+    /// files. Green points up in the picture, so the partner of a tangent that is made from such
+    /// coordinates points against them. Tangents of the mesh say that themselves.
     pub rows_from_top: bool,
 }
 
 impl TextureMaps {
     /// No textures, full scale and strength.
     pub fn new(convention: MapConvention) -> TextureMaps {
-        TextureMaps { normal_scale: 1.0, occlusion_strength: 1.0, convention, ..TextureMaps::default() }
+        TextureMaps {
+            normal_scale: 1.0,
+            occlusion_strength: 1.0,
+            convention,
+            ..TextureMaps::default()
+        }
     }
 
-    fn perturbed_normal(&self, place: &MaterialEvalContext<'_>, [r, g, b, _]: [f32; 4]) -> Option<Vec3> {
+    fn perturbed_normal(
+        &self,
+        place: &MaterialEvalContext<'_>,
+        [r, g, b, _]: [f32; 4],
+    ) -> Option<Vec3> {
         let scale = Vec3::new(self.normal_scale, self.normal_scale, 1.0);
         let bend = ((Vec3::new(r, g, b) * 2.0 - 1.0) * scale).try_normalize()?;
         match self.convention {

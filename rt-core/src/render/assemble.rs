@@ -1,4 +1,5 @@
-//! From tiles to rows of pixels: all at once from tiles that collect samples, or tile by tile while each is still in the cache.
+//! From tiles to rows of pixels: all at once from tiles that collect samples, or tile by tile while
+//! each is still in the cache.
 
 use super::RenderOptions;
 use crate::camera::Camera;
@@ -33,8 +34,9 @@ pub(super) fn tiles(options: &RenderOptions, camera: &Camera, old: Vec<Tile>) ->
             let used = old.next().map(|t| t.layers).and_then(|mut layers| {
                 layers.reset(options.layers, background_depth, estimate_error).then_some(layers)
             });
-            let layers =
-                used.unwrap_or_else(|| TileLayers::new(options.layers, background_depth, estimate_error));
+            let layers = used.unwrap_or_else(|| {
+                TileLayers::new(options.layers, background_depth, estimate_error)
+            });
             out.push(Tile { area, layers, samples: 0 });
         }
     }
@@ -59,14 +61,20 @@ pub(super) fn assemble(options: &RenderOptions, tiles: &[Tile], old: Frame) -> F
         width: crop.width,
         height: crop.height,
         color: grid.plane(old.color, has(|l| !l.color.is_empty()), n, [0.0; 4], mean),
-        depth: grid.plane(old.depth, has(|l| !l.depth.is_empty()), n, 0.0, |t, i| t.layers.depth[i]),
-        distance: grid
-            .plane(old.distance, has(|l| !l.distance.is_empty()), n, 0.0, |t, i| t.layers.distance[i]),
-        normal: grid.plane(old.normal, has(|l| !l.normal.is_empty()), n, [0.0; 3], |t, i| t.layers.normal[i]),
-        instance: grid
-            .plane(old.instance, has(|l| !l.instance.is_empty()), n, 0, |t, i| t.layers.instance[i]),
-        primitive: grid
-            .plane(old.primitive, has(|l| !l.primitive.is_empty()), n, 0, |t, i| t.layers.primitive[i]),
+        depth: grid
+            .plane(old.depth, has(|l| !l.depth.is_empty()), n, 0.0, |t, i| t.layers.depth[i]),
+        distance: grid.plane(old.distance, has(|l| !l.distance.is_empty()), n, 0.0, |t, i| {
+            t.layers.distance[i]
+        }),
+        normal: grid.plane(old.normal, has(|l| !l.normal.is_empty()), n, [0.0; 3], |t, i| {
+            t.layers.normal[i]
+        }),
+        instance: grid.plane(old.instance, has(|l| !l.instance.is_empty()), n, 0, |t, i| {
+            t.layers.instance[i]
+        }),
+        primitive: grid.plane(old.primitive, has(|l| !l.primitive.is_empty()), n, 0, |t, i| {
+            t.layers.primitive[i]
+        }),
         cost: grid.plane(old.cost, has(|l| !l.cost.is_empty()), n, 0.0, |t, i| t.layers.cost[i]),
     }
 }
@@ -98,7 +106,9 @@ impl TileGrid<'_> {
             for (k, tile) in tiles.iter().enumerate() {
                 for y in 0..tile.area.height {
                     let start = y as usize * self.width + k * TILE as usize;
-                    for (x, out) in band[start..start + tile.area.width as usize].iter_mut().enumerate() {
+                    for (x, out) in
+                        band[start..start + tile.area.width as usize].iter_mut().enumerate()
+                    {
                         *out = value(tile, TileArea::slot(x as u32, y));
                     }
                 }
@@ -108,7 +118,8 @@ impl TileGrid<'_> {
     }
 }
 
-/// A picture of blank pixels, in the memory of `old` where it fits (whose pixels then stay what they were).
+/// A picture of blank pixels, in the memory of `old` where it fits (whose pixels then stay what
+/// they were).
 pub(super) fn blank_frame(options: &RenderOptions, camera: &Camera, old: Frame) -> Frame {
     let crop = options.area();
     let n = crop.width as usize * crop.height as usize;
@@ -133,7 +144,8 @@ pub(super) fn blank_frame(options: &RenderOptions, camera: &Camera, old: Frame) 
     }
 }
 
-/// The pixels of a picture that belong to one row of tiles, or to one tile: of each layer the rows' pieces.
+/// The pixels of a picture that belong to one row of tiles, or to one tile: of each layer the rows'
+/// pieces.
 pub(super) struct FrameSlices<'a> {
     pub(super) area: TileArea,
     color: Vec<&'a mut [[f32; 4]]>,
@@ -154,8 +166,10 @@ pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<Fr
         chunks.next().into_iter().collect()
     }
     let (mut color, mut depth) = (frame.color.chunks_mut(size), frame.depth.chunks_mut(size));
-    let (mut distance, mut normal) = (frame.distance.chunks_mut(size), frame.normal.chunks_mut(size));
-    let (mut instance, mut primitive) = (frame.instance.chunks_mut(size), frame.primitive.chunks_mut(size));
+    let (mut distance, mut normal) =
+        (frame.distance.chunks_mut(size), frame.normal.chunks_mut(size));
+    let (mut instance, mut primitive) =
+        (frame.instance.chunks_mut(size), frame.primitive.chunks_mut(size));
     let mut cost = frame.cost.chunks_mut(size);
     (0..crop.height)
         .step_by(TILE as usize)
@@ -195,7 +209,11 @@ impl<'a> FrameSlices<'a> {
                 cost: Vec::new(),
             })
             .collect();
-        fn distribute<'a, T>(band: Vec<&'a mut [T]>, width: u32, mut give: impl FnMut(usize, &'a mut [T])) {
+        fn distribute<'a, T>(
+            band: Vec<&'a mut [T]>,
+            width: u32,
+            mut give: impl FnMut(usize, &'a mut [T]),
+        ) {
             for rows in band {
                 for row in rows.chunks_mut(width as usize) {
                     row.chunks_mut(TILE as usize).enumerate().for_each(|(k, piece)| give(k, piece));

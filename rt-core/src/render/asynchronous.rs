@@ -1,8 +1,9 @@
 //! Rendering beside the program that asks for it, one frame behind.
 //!
-//! The thesis (section 4.1.2) hides the time a program needs to prepare a frame behind the time the ray tracer needs for the
-//! frame before: at each buffer swap the program hands over frame N and gets frame N-1. The price is one frame of lag; the frame
-//! time becomes the larger of the two times instead of their sum.
+//! The thesis (section 4.1.2) hides the time a program needs to prepare a frame behind the time the
+//! ray tracer needs for the frame before: at each buffer swap the program hands over frame N and
+//! gets frame N-1. The price is one frame of lag; the frame time becomes the larger of the two
+//! times instead of their sum.
 
 use super::{RenderError, RenderOptions, RenderOutput, Renderer};
 use crate::camera::Camera;
@@ -28,8 +29,8 @@ pub struct AsyncRenderer {
 }
 
 impl AsyncRenderer {
-    /// Starts the thread. `threads` gives it a pool of its own, so that the program keeps the other cores; `None` shares rayon's
-    /// global pool.
+    /// Starts the thread. `threads` gives it a pool of its own, so that the program keeps the other
+    /// cores; `None` shares rayon's global pool.
     pub fn new(threads: Option<usize>) -> Result<AsyncRenderer, RenderError> {
         let no_worker = |e: &dyn std::fmt::Display| RenderError::NoWorker { reason: e.to_string() };
         let pool = threads
@@ -45,8 +46,14 @@ impl AsyncRenderer {
             .spawn(move || {
                 let mut renderer = Renderer::new();
                 for job in incoming {
-                    let mut run =
-                        || renderer.render_unless(&job.scene, &job.camera, &job.options, Some(&stop_worker));
+                    let mut run = || {
+                        renderer.render_unless(
+                            &job.scene,
+                            &job.camera,
+                            &job.options,
+                            Some(&stop_worker),
+                        )
+                    };
                     let result = match &pool {
                         Some(pool) => pool.install(run),
                         None => run(),
@@ -58,11 +65,17 @@ impl AsyncRenderer {
                 }
             })
             .map_err(|e| no_worker(&e))?;
-        Ok(AsyncRenderer { jobs: Some(jobs), results, worker: Some(worker), in_flight: false, stop })
+        Ok(AsyncRenderer {
+            jobs: Some(jobs),
+            results,
+            worker: Some(worker),
+            in_flight: false,
+            stop,
+        })
     }
 
-    /// Hands over frame N. Waits for frame N-1, starts frame N and returns frame N-1; `None` for the first frame. An error
-    /// belongs to frame N-1; frame N has been started all the same.
+    /// Hands over frame N. Waits for frame N-1, starts frame N and returns frame N-1; `None` for
+    /// the first frame. An error belongs to frame N-1; frame N has been started all the same.
     pub fn submit(
         &mut self,
         scene: Arc<Scene>,
@@ -71,7 +84,11 @@ impl AsyncRenderer {
     ) -> Result<Option<RenderOutput>, RenderError> {
         let previous = self.wait();
         let gone = || RenderError::NoWorker { reason: "its thread has ended".into() };
-        self.jobs.as_ref().ok_or_else(gone)?.send(Job { scene, camera, options }).map_err(|_| gone())?;
+        self.jobs
+            .as_ref()
+            .ok_or_else(gone)?
+            .send(Job { scene, camera, options })
+            .map_err(|_| gone())?;
         self.in_flight = true;
         previous
     }

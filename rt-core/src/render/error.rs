@@ -34,7 +34,8 @@ pub enum RenderError {
     },
     /// A bug: the renderer panicked. Nothing else of the process is affected.
     #[error(
-        "internal error at pixel ({x}, {y}), sample {sample}: {message}; it repeats with crop: Crop {{ x: {x}, y: {y}, width: 1, height: 1 }}, please report it"
+        "internal error at pixel ({x}, {y}), sample {sample}: {message}; it repeats with crop: \
+         Crop {{ x: {x}, y: {y}, width: 1, height: 1 }}, please report it"
     )]
     Panicked {
         /// Column.
@@ -47,7 +48,9 @@ pub enum RenderError {
         message: String,
     },
     /// The thread of an asynchronous renderer is gone.
-    #[error("the rendering thread could not be started or has ended: {reason}; make a new AsyncRenderer")]
+    #[error(
+        "the rendering thread could not be started or has ended: {reason}; make a new AsyncRenderer"
+    )]
     NoWorker {
         /// What happened.
         reason: String,

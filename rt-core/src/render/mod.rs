@@ -1,7 +1,8 @@
 //! Scene and camera in, picture and report out.
 //!
-//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`ProgressiveRenderer`] gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while
-//! the program prepares frame N+1 (thesis section 4.1.2).
+//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`ProgressiveRenderer`]
+//! gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while the program
+//! prepares frame N+1 (thesis section 4.1.2).
 
 mod assemble;
 mod asynchronous;
@@ -31,8 +32,13 @@ pub struct RenderOutput {
     pub report: RenderReport,
 }
 
-/// Draws `scene` as seen by `camera`, on rayon's current thread pool, until the options' samples, time or error are reached. The same
-/// arguments and seed give the same picture bit for bit on any number of threads (unless time or cancelling cuts it short).
-pub fn render(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<RenderOutput, RenderError> {
+/// Draws `scene` as seen by `camera`, on rayon's current thread pool, until the options' samples,
+/// time or error are reached. The same arguments and seed give the same picture bit for bit on any
+/// number of threads (unless time or cancelling cuts it short).
+pub fn render(
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Result<RenderOutput, RenderError> {
     Renderer::new().render(scene, camera, options)
 }

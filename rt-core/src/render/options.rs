@@ -29,15 +29,18 @@ pub struct RenderOptions {
     pub width: u32,
     /// Rows of the whole picture.
     pub height: u32,
-    /// Draw only this part (its pixels are those of the whole picture, bit for bit). The frame has the part's size.
+    /// Draw only this part (its pixels are those of the whole picture, bit for bit). The frame has
+    /// the part's size.
     pub crop: Option<Crop>,
     /// What to compute.
     pub layers: Layers,
-    /// Effects that may run. `None`: those that scene and camera need. An effect named here that changes no pixel is reported.
+    /// Effects that may run. `None`: those that scene and camera need. An effect named here that
+    /// changes no pixel is reported.
     pub effects: Option<Effects>,
     /// Light over many bounces in place of ambient light and ambient occlusion.
     pub path_tracing: bool,
-    /// Samples per pixel, at most. One sample goes through the pixel's centre, several are spread over its square (box filter).
+    /// Samples per pixel, at most. One sample goes through the pixel's centre, several are spread
+    /// over its square (box filter).
     pub samples: u32,
     /// Shadow rays per sample to each light that has a size.
     pub light_rays: u32,
@@ -59,23 +62,26 @@ pub struct RenderOptions {
     /// missing, and less than this radiance of each ray. 0 for everything. Path tracing leaves
     /// nothing out.
     pub min_contribution: f32,
-    /// Depth, distance, normal and ids belong to the first surface of at least this opacity: 0 for any surface that is not
-    /// invisible, 1 for opaque surfaces only, as OpenGL's depth buffer has it.
+    /// Depth, distance, normal and ids belong to the first surface of at least this opacity: 0 for
+    /// any surface that is not invisible, 1 for opaque surfaces only, as OpenGL's depth buffer has
+    /// it.
     pub depth_min_opacity: f32,
     /// Accuracy of direct volume rendering.
     pub volume_quality: VolumeQuality,
     /// Stop when this much time has passed. The first sample of every pixel is always finished.
     pub time_limit: Option<Duration>,
-    /// Stop when the standard error of a pixel (root mean square over the picture, luminance) is estimated below this, in 8-bit
-    /// grey levels of linear light (1 = 1/255 of white). Low-discrepancy samples do better than the estimate, which assumes
-    /// independent ones. Looked at from 4 samples on.
+    /// Stop when the standard error of a pixel (root mean square over the picture, luminance) is
+    /// estimated below this, in 8-bit grey levels of linear light (1 = 1/255 of white).
+    /// Low-discrepancy samples do better than the estimate, which assumes independent ones. Looked
+    /// at from 4 samples on.
     pub max_error_levels: Option<f32>,
     /// Set to true to stop as soon as the tiles in work are done.
     pub cancel: Option<Arc<AtomicBool>>,
 }
 
 impl RenderOptions {
-    /// Colour of a picture of `width` x `height`, one sample per pixel, with the effects that the scene needs.
+    /// Colour of a picture of `width` x `height`, one sample per pixel, with the effects that the
+    /// scene needs.
     pub fn new(width: u32, height: u32) -> RenderOptions {
         RenderOptions {
             width,
@@ -108,19 +114,22 @@ impl RenderOptions {
         let mut out = Vec::new();
         if self.depth_min_opacity != 0.0 && !self.layers.intersects(Layers::GEOMETRY) {
             out.push(format!(
-                "depth_min_opacity {} changes nothing: no layer of depth, distance, normals or ids is asked for",
+                "depth_min_opacity {} changes nothing: no layer of depth, distance, normals or ids \
+                 is asked for",
                 self.depth_min_opacity
             ));
         }
         if self.max_error_levels.is_some() && self.samples <= 4 {
             out.push(format!(
-                "max_error_levels changes nothing: it is looked at from 4 samples on, and `samples` is {}; raise `samples`",
+                "max_error_levels changes nothing: it is looked at from 4 samples on, and \
+                 `samples` is {}; raise `samples`",
                 self.samples
             ));
         }
         if self.time_limit.is_some() && self.samples == 1 {
             out.push(
-                "time_limit changes nothing: the first sample is always finished, and `samples` is 1; raise `samples`, or use \
+                "time_limit changes nothing: the first sample is always finished, and `samples` is \
+                 1; raise `samples`, or use \
                  `cancel`"
                     .into(),
             );
@@ -138,8 +147,9 @@ impl RenderOptions {
             }
         }
         if let Some(c) = self.crop {
-            let inside =
-                |start: u32, n: u32, all: u32| n > 0 && start.checked_add(n).is_some_and(|end| end <= all);
+            let inside = |start: u32, n: u32, all: u32| {
+                n > 0 && start.checked_add(n).is_some_and(|end| end <= all)
+            };
             if !inside(c.x, c.width, self.width) || !inside(c.y, c.height, self.height) {
                 return error("crop", format!("{c:?}"), "at least one pixel, inside the picture");
             }
@@ -156,11 +166,16 @@ impl RenderOptions {
         if let Some(most) = self.max_bounces
             && most > u32::from(u16::MAX)
         {
-            return error("max_bounces", most.to_string(), "at most 65535; leave it out for the default");
+            return error(
+                "max_bounces",
+                most.to_string(),
+                "at most 65535; leave it out for the default",
+            );
         }
-        for (field, v) in
-            [("min_contribution", self.min_contribution), ("depth_min_opacity", self.depth_min_opacity)]
-        {
+        for (field, v) in [
+            ("min_contribution", self.min_contribution),
+            ("depth_min_opacity", self.depth_min_opacity),
+        ] {
             if !(0.0..=1.0).contains(&v) {
                 return error(field, v.to_string(), "between 0 and 1");
             }

@@ -1,4 +1,5 @@
-//! From what is asked for and what the scene needs to what runs, with a word about every difference.
+//! From what is asked for and what the scene needs to what runs, with a word about every
+//! difference.
 
 use super::{RenderError, RenderOptions};
 use crate::camera::Camera;
@@ -14,7 +15,11 @@ pub(crate) struct Plan {
     pub(crate) warnings: Vec<String>,
 }
 
-pub(super) fn plan(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Plan, RenderError> {
+pub(super) fn plan(
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Result<Plan, RenderError> {
     plan_for(scene, Effects::required_by(scene), camera, options)
 }
 
@@ -30,7 +35,8 @@ pub(crate) fn plan_for(
     camera.check()?;
     let mut warnings = scene.warnings();
     warnings.extend(options.warnings());
-    let asked = options.effects.map(|e| e.with_if(e.contains(Effects::SOFT_SHADOWS), Effects::SHADOWS));
+    let asked =
+        options.effects.map(|e| e.with_if(e.contains(Effects::SOFT_SHADOWS), Effects::SHADOWS));
     let path = options.path_tracing || asked.is_some_and(|e| e.contains(Effects::PATH_TRACING));
     let mut needed = by_scene | Effects::required_by_camera(camera);
     if path {
@@ -54,16 +60,20 @@ pub(crate) fn plan_for(
             warnings.push(format!("{name} changes no pixel: {}", why_not_needed(effect, path)));
         }
     }
-    if effects.contains(Effects::VOLUMES) && effects.intersects(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION)
+    if effects.contains(Effects::VOLUMES)
+        && effects.intersects(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION)
     {
         warnings.push(
-            "volumes cast no shadows and no ambient occlusion: light rays pass through them undimmed".into(),
+            "volumes cast no shadows and no ambient occlusion: light rays pass through them \
+             undimmed"
+                .into(),
         );
     }
     let left_out = needed.without(effects);
     for (effect, name) in Effects::ALL {
         if left_out.contains(effect) {
-            warnings.push(format!("{name} left out: the scene has it, the options do not ask for it"));
+            warnings
+                .push(format!("{name} left out: the scene has it, the options do not ask for it"));
         }
     }
     Ok(Plan { effects, left_out, warnings })
@@ -88,7 +98,8 @@ fn why_not_needed(effect: Effects, path: bool) -> &'static str {
         Effects::SOFT_SHADOWS => "no light that casts shadows has a size",
         Effects::AMBIENT_OCCLUSION if path => "path tracing computes what it stands for",
         Effects::AMBIENT_OCCLUSION => {
-            "the scene has no ambient occlusion settings, no ambient light or environment, or no surface that answers it"
+            "the scene has no ambient occlusion settings, no ambient light or environment, or no \
+             surface that answers it"
         }
         Effects::REFLECTION => "no material is a mirror or a dielectric",
         Effects::GLOSSY_REFLECTION => "no material reflects with roughness",
@@ -112,26 +123,30 @@ pub(super) fn warn_without_effect(
     let path = ran.contains(Effects::PATH_TRACING);
     for (effect, name) in Effects::ALL {
         // A path tracer's bounces are not told apart by kind.
-        let told_apart =
-            !path || matches!(effect, Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
+        let told_apart = !path
+            || matches!(effect, Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
         if asked.contains(effect)
             && ran.contains(effect)
             && told_apart
             && rays.times_effective(effect) == Some(0)
         {
-            out.push(format!("{name} changed no pixel of this picture: nothing in view is affected by it"));
+            out.push(format!(
+                "{name} changed no pixel of this picture: nothing in view is affected by it"
+            ));
         }
     }
     if rays.opacity_ignored > 0 && !left_out.contains(Effects::TRANSPARENCY) {
         out.push(format!(
-            "{} hits on surfaces with opacity below 1 were drawn opaque: the scene did not show that it has any; \
+            "{} hits on surfaces with opacity below 1 were drawn opaque: the scene did not show \
+             that it has any; \
              give a material an opacity below 1, or let the shape's `has_transparency` say so",
             rays.opacity_ignored
         ));
     }
     if rays.cut_at_max_bounces > 0 {
         out.push(format!(
-            "{} paths were cut at `max_bounces`; what they would have added is missing: raise it if dark spots show",
+            "{} paths were cut at `max_bounces`; what they would have added is missing: raise it \
+             if dark spots show",
             rays.cut_at_max_bounces
         ));
     }

@@ -45,8 +45,8 @@ pub struct RenderReport {
     pub samples: u32,
     /// Why it ended.
     pub stopped: StopReason,
-    /// Estimated standard error of a pixel (root mean square over the picture, luminance), in 8-bit grey levels of linear light.
-    /// `None` below two samples.
+    /// Estimated standard error of a pixel (root mean square over the picture, luminance), in 8-bit
+    /// grey levels of linear light. `None` below two samples.
     pub error_levels: Option<f32>,
     /// Wall time since the start.
     pub elapsed: Duration,
@@ -72,8 +72,9 @@ struct ThreadScratch {
 /// A picture in the making.
 pub struct ProgressiveRenderer<'a> {
     context: FrameContext<'a>,
-    /// Tiles that collect samples. Pictures of one sample have none: each tile goes to its place while it is still in the cache, which saves writing and
-    /// reading 32 bytes per pixel of main memory (measured: 5 of 50 ms at 1024 x 1024).
+    /// Tiles that collect samples. Pictures of one sample have none: each tile goes to its place
+    /// while it is still in the cache, which saves writing and reading 32 bytes per pixel of main
+    /// memory (measured: 5 of 50 ms at 1024 x 1024).
     tiles: Vec<Tile>,
     /// Buffers of threads that are not rendering now.
     spare: Mutex<Vec<ThreadScratch>>,
@@ -110,7 +111,11 @@ impl<'a> ProgressiveRenderer<'a> {
         let plan = plan(scene, camera, options)?;
         Ok(ProgressiveRenderer {
             context: FrameContext::new(scene, camera, options, plan.effects),
-            tiles: if one_pass(options) { buffers.tiles } else { tiles(options, camera, buffers.tiles) },
+            tiles: if one_pass(options) {
+                buffers.tiles
+            } else {
+                tiles(options, camera, buffers.tiles)
+            },
             spare: Mutex::new(buffers.spare),
             old_frame: buffers.frame,
             rays: RayStats::default(),
@@ -123,7 +128,8 @@ impl<'a> ProgressiveRenderer<'a> {
         })
     }
 
-    /// Adds one sample to every pixel. Returns whether there is more to do; does nothing once there is not.
+    /// Adds one sample to every pixel. Returns whether there is more to do; does nothing once there
+    /// is not.
     pub fn step(&mut self) -> Result<bool, RenderError> {
         if self.stopped != StopReason::Running {
             return Ok(false);
@@ -132,7 +138,8 @@ impl<'a> ProgressiveRenderer<'a> {
         let (context, spare, started) = (&self.context, &self.spare, self.started);
         let also_cancel = self.also_cancel;
         let options = context.options;
-        // A pass may be cut short between tiles: at once when cancelled, for lack of time only after the first pass.
+        // A pass may be cut short between tiles: at once when cancelled, for lack of time only
+        // after the first pass.
         let cut = || {
             let is_set = |f: &AtomicBool| f.load(Ordering::Relaxed);
             if options.cancel.as_deref().is_some_and(is_set) || also_cancel.is_some_and(is_set) {
@@ -158,7 +165,8 @@ impl<'a> ProgressiveRenderer<'a> {
             let old = std::mem::take(&mut self.old_frame);
             self.old_frame = blank_frame(options, &context.camera, old);
             let frame = &mut self.old_frame;
-            let pieces = bands(options, frame).into_par_iter().flat_map(|b| b.tiles().into_par_iter());
+            let pieces =
+                bands(options, frame).into_par_iter().flat_map(|b| b.tiles().into_par_iter());
             let draw_piece = |mut piece: FrameSlices<'_>| {
                 let mut scratch = take_scratch(spare);
                 let mut layers = ready_layers(context, scratch.layers.take());
@@ -218,7 +226,8 @@ impl<'a> ProgressiveRenderer<'a> {
             && !one_pass(self.context.options)
             && self.tiles.iter().all(|t| !t.layers.luminance_sq.is_empty());
         usable.then(|| {
-            let sum: f64 = self.tiles.iter().map(|t| t.layers.squared_error(&t.area, t.samples)).sum();
+            let sum: f64 =
+                self.tiles.iter().map(|t| t.layers.squared_error(&t.area, t.samples)).sum();
             let area = self.context.options.area();
             (255.0 * (sum / (area.width as f64 * area.height as f64)).sqrt()) as f32
         })
@@ -246,7 +255,10 @@ impl<'a> ProgressiveRenderer<'a> {
         }
         let report = self.report();
         let spare = self.spare.into_inner().unwrap_or_default();
-        (RenderOutput { frame, report }, Buffers { tiles: self.tiles, spare, frame: Frame::default() })
+        (
+            RenderOutput { frame, report },
+            Buffers { tiles: self.tiles, spare, frame: Frame::default() },
+        )
     }
 
     /// The account so far.
@@ -299,7 +311,12 @@ fn return_scratch(spare: &Mutex<Vec<ThreadScratch>>, scratch: ThreadScratch) {
 }
 
 /// Renders the tile's pixels one by one until one panics again.
-fn locate_panic(context: &FrameContext<'_>, tile: TileArea, sample: u32, message: String) -> RenderError {
+fn locate_panic(
+    context: &FrameContext<'_>,
+    tile: TileArea,
+    sample: u32,
+    message: String,
+) -> RenderError {
     for y in tile.y..tile.y + tile.height {
         for x in tile.x..tile.x + tile.width {
             let area = TileArea { x, y, width: 1, height: 1, sample };
@@ -312,8 +329,10 @@ fn locate_panic(context: &FrameContext<'_>, tile: TileArea, sample: u32, message
             }
         }
     }
-    let message =
-        format!("{message} (only with the whole tile of {} x {} pixels from here)", tile.width, tile.height);
+    let message = format!(
+        "{message} (only with the whole tile of {} x {} pixels from here)",
+        tile.width, tile.height
+    );
     RenderError::Panicked { x: tile.x, y: tile.y, sample, message }
 }
 

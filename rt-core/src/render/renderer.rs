@@ -7,8 +7,9 @@ use crate::frame::Frame;
 use crate::scene::Scene;
 use std::sync::atomic::AtomicBool;
 
-/// Draws frames as [`super::render`] does and keeps the buffers for the next one: at interactive rates, getting fresh pages from the
-/// operating system for every frame costs about as much as a sixth of the rays.
+/// Draws frames as [`super::render`] does and keeps the buffers for the next one: at interactive
+/// rates, getting fresh pages from the operating system for every frame costs about as much as a
+/// sixth of the rays.
 #[derive(Default)]
 pub struct Renderer {
     buffers: Buffers,
@@ -30,7 +31,8 @@ impl Renderer {
         self.render_unless(scene, camera, options, None)
     }
 
-    /// Takes back a picture that is no longer needed: the next one of the same size and layers is written into its memory.
+    /// Takes back a picture that is no longer needed: the next one of the same size and layers is
+    /// written into its memory.
     pub fn recycle(&mut self, frame: Frame) {
         self.buffers.frame = frame;
     }

@@ -1,8 +1,8 @@
 //! Rays that slip between the triangles of a closed mesh.
 //!
-//! A ray that starts inside a closed surface must hit it. Random rays almost never find the places where a tracer fails, so these are aimed
-//! there: exactly at vertices and edges, beside edges by a few roundings, and from close to the surface, where a triangle is large against
-//! its distance.
+//! A ray that starts inside a closed surface must hit it. Random rays almost never find the places
+//! where a tracer fails, so these are aimed there: exactly at vertices and edges, beside edges by a
+//! few roundings, and from close to the surface, where a triangle is large against its distance.
 
 use super::SplitMix64;
 use crate::bvh::{Coherence, InstanceFilter, World};
@@ -18,7 +18,8 @@ pub enum RayTarget {
     Vertex,
     /// A point on an edge, rounded to f32.
     Edge,
-    /// A point beside an edge, off by up to 10⁻⁶ of its length: there the edge test and the box test may disagree.
+    /// A point beside an edge, off by up to 10⁻⁶ of its length: there the edge test and the box
+    /// test may disagree.
     NearEdge,
     /// Any point of a triangle.
     Anywhere,
@@ -50,9 +51,10 @@ pub enum RayOrigins {
         /// Its radius.
         radius: f64,
     },
-    /// Between the centre, from which every point of the surface can be seen, and a point of the triangle that the ray is aimed at: mostly
-    /// close to the surface, down to 10⁻⁶ of the way or eight steps of f32, whichever is more. (Nearer than that `t` may round to below zero,
-    /// and the ray counts as having started behind the surface.)
+    /// Between the centre, from which every point of the surface can be seen, and a point of the
+    /// triangle that the ray is aimed at: mostly close to the surface, down to 10⁻⁶ of the way or
+    /// eight steps of f32, whichever is more. (Nearer than that `t` may round to below zero, and
+    /// the ray counts as having started behind the surface.)
     NearSurface {
         /// World coordinates.
         center: DVec3,
@@ -122,7 +124,8 @@ pub struct LeakTest<'a> {
 
 /// Rays made and traced by one task.
 const BATCH: usize = 4096;
-/// Rays that share an origin and go to neighbouring triangles; every other such group has unrelated rays.
+/// Rays that share an origin and go to neighbouring triangles; every other such group has unrelated
+/// rays.
 const TILE: usize = 256;
 
 impl LeakTest<'_> {
@@ -148,16 +151,22 @@ impl LeakTest<'_> {
             ),
             QueryKind::Coherent | QueryKind::Incoherent => {
                 let blocks = RayBlock::from_rays(&rays);
-                let (mut hits, mut any) = (vec![HitBlock::MISS; blocks.len()], vec![0u16; blocks.len()]);
+                let (mut hits, mut any) =
+                    (vec![HitBlock::MISS; blocks.len()], vec![0u16; blocks.len()]);
                 let alike = query == QueryKind::Coherent;
                 let coherence = if alike { Coherence::Coherent } else { Coherence::Incoherent };
                 self.world.closest_stream(&blocks, &mut hits, coherence, InstanceFilter::All);
                 self.world.occluded_stream(&blocks, &mut any, coherence, InstanceFilter::All);
-                let found = hits.iter().map(|h| h.prim.iter().filter(|&&p| p != NO_HIT).count()).sum();
+                let found =
+                    hits.iter().map(|h| h.prim.iter().filter(|&&p| p != NO_HIT).count()).sum();
                 (found, any.iter().map(|a| a.count_ones() as usize).sum())
             }
         };
-        LeakCount { rays: n as u64, leaks: (n - hits) as u64, occlusion_leaks: (n - blocked) as u64 }
+        LeakCount {
+            rays: n as u64,
+            leaks: (n - hits) as u64,
+            occlusion_leaks: (n - blocked) as u64,
+        }
     }
 
     /// The rays of batch `batch`, in render space: 4096, each starting inside.
@@ -181,7 +190,8 @@ impl LeakTest<'_> {
                 let corners = self.mesh.triangle(triangle).map(to_render);
                 let (on_surface, target) = self.target(corners, &mut random);
                 let new_origin = i % TILE == 0 || !tile;
-                let origin = if new_origin { self.origin(corners, on_surface, &mut random) } else { common };
+                let origin =
+                    if new_origin { self.origin(corners, on_surface, &mut random) } else { common };
                 common = origin;
                 Ray::new(origin, target - origin)
             })

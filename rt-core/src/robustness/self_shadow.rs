@@ -17,8 +17,9 @@ pub struct SelfShadowCount {
     pub blocked: u64,
 }
 
-/// Cameras around a convex closed surface, the first instance of a scene, and from every visible point a ray outwards (cosine-distributed about
-/// the face normal), started as shading starts them. A ray leaving a convex surface never meets it again.
+/// Cameras around a convex closed surface, the first instance of a scene, and from every visible
+/// point a ray outwards (cosine-distributed about the face normal), started as shading starts them.
+/// A ray leaving a convex surface never meets it again.
 #[derive(Clone, Copy)]
 pub struct SelfShadowTest<'a> {
     /// The scene.

@@ -50,7 +50,11 @@ impl Scene {
                 rule,
             };
             if ao.distance.is_nan() || ao.distance <= 0.0 {
-                return Err(error("distance", ao.distance.to_string(), "positive (infinity for no limit)"));
+                return Err(error(
+                    "distance",
+                    ao.distance.to_string(),
+                    "positive (infinity for no limit)",
+                ));
             }
             if ao.rays == 0 {
                 return Err(error(
@@ -63,8 +67,11 @@ impl Scene {
         for (index, v) in self.volumes.iter().enumerate() {
             let determinant = v.world_from_object.matrix3.determinant();
             if !(v.world_from_object.is_finite() && determinant != 0.0 && determinant.is_finite()) {
-                let (field, value, rule) =
-                    ("world_from_object", format!("{:?}", v.world_from_object), "finite and invertible");
+                let (field, value, rule) = (
+                    "world_from_object",
+                    format!("{:?}", v.world_from_object),
+                    "finite and invertible",
+                );
                 return Err(SceneError::OutOfRange { what: "volume", index, field, value, rule });
             }
         }
@@ -90,7 +97,9 @@ impl Scene {
                 return Err(unusable_color("appearance", appearance, i, c.values[i]));
             }
         }
-        for (index, (facts, g)) in self.geometry_colors.iter().zip(self.world.geometries()).enumerate() {
+        for (index, (facts, g)) in
+            self.geometry_colors.iter().zip(self.world.geometries()).enumerate()
+        {
             if let (Some(i), Geometry::Mesh(mesh)) = (facts.unusable, g)
                 && let Some(c) = mesh.colors.as_ref().and_then(|c| c.values.get(i))
             {
@@ -103,7 +112,13 @@ impl Scene {
     /// The environment and the background.
     fn check_surroundings(&self) -> Result<(), SceneError> {
         let error = |what| {
-            move |(field, value, rule): Fault| SceneError::OutOfRange { what, index: 0, field, value, rule }
+            move |(field, value, rule): Fault| SceneError::OutOfRange {
+                what,
+                index: 0,
+                field,
+                value,
+                rule,
+            }
         };
         if let Some(e) = &self.environment {
             e.check().map_err(error("environment"))?;
@@ -169,7 +184,11 @@ fn check_light(l: &Light) -> Result<(), Fault> {
                 return Err(("cutoff_rad", cutoff_rad.to_string(), "above 0 and at most pi"));
             }
             let ok = exponent >= 0.0 && exponent.is_finite();
-            if ok { Ok(()) } else { Err(("exponent", exponent.to_string(), "0 or positive, finite")) }
+            if ok {
+                Ok(())
+            } else {
+                Err(("exponent", exponent.to_string(), "0 or positive, finite"))
+            }
         }
         K::Cone { position, direction, inner_rad, outer_rad } => {
             point(position)?;
@@ -187,7 +206,11 @@ fn check_light(l: &Light) -> Result<(), Fault> {
                 return Err(("radius", radius.to_string(), "positive: a ring needs an area"));
             }
             if !(0.0..radius).contains(&inner_radius) {
-                return Err(("inner_radius", inner_radius.to_string(), "0 or positive, below the radius"));
+                return Err((
+                    "inner_radius",
+                    inner_radius.to_string(),
+                    "0 or positive, below the radius",
+                ));
             }
             if !(outer_rad > 0.0 && outer_rad <= std::f64::consts::FRAC_PI_2) {
                 return Err(("outer_rad", outer_rad.to_string(), "above 0 and at most pi/2"));

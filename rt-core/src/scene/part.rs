@@ -6,9 +6,10 @@ use crate::mesh::{Attribute, PerElement};
 use std::sync::Arc;
 
 impl Scene {
-    /// This scene with only the primitives `kept[g]` of each geometry g (numbers in ascending order; others are sorted and repeated ones left
-    /// out). Everything else is as it is here, instances and materials keep their numbers, and rays meet what they meet here:
-    /// see [`World::build_part`]. Primitive k of geometry g of the part is primitive `kept[g][k]` here.
+    /// This scene with only the primitives `kept[g]` of each geometry g (numbers in ascending
+    /// order; others are sorted and repeated ones left out). Everything else is as it is here,
+    /// instances and materials keep their numbers, and rays meet what they meet here: see
+    /// [`World::build_part`]. Primitive k of geometry g of the part is primitive `kept[g][k]` here.
     ///
     /// # Errors
     /// [`SceneError::Build`] when a mesh is unusable or `kept` has not one list for each geometry.
@@ -30,9 +31,9 @@ impl Scene {
                 Geometry::Shape(shape) => {
                     vertices_kept.push(Vec::new());
                     Geometry::Shape(
-                        shape
-                            .part(&kept)
-                            .unwrap_or_else(|| Arc::new(ShapePart::new(shape.clone(), kept.clone()))),
+                        shape.part(&kept).unwrap_or_else(|| {
+                            Arc::new(ShapePart::new(shape.clone(), kept.clone()))
+                        }),
                     )
                 }
             });
@@ -49,8 +50,14 @@ impl Scene {
                 let (vertices, triangles) =
                     (&vertices_kept[instance.geometry], &triangles_kept[instance.geometry]);
                 Appearance {
-                    colors: a.colors.as_ref().map(|c| Arc::new(attribute_part(c, vertices, triangles))),
-                    scalars: a.scalars.as_ref().map(|s| Arc::new(attribute_part(s, vertices, triangles))),
+                    colors: a
+                        .colors
+                        .as_ref()
+                        .map(|c| Arc::new(attribute_part(c, vertices, triangles))),
+                    scalars: a
+                        .scalars
+                        .as_ref()
+                        .map(|s| Arc::new(attribute_part(s, vertices, triangles))),
                     ..a.clone()
                 }
             })
@@ -59,7 +66,8 @@ impl Scene {
     }
 }
 
-/// The values of the vertices or triangles that are kept. Shapes have one value per primitive, given as either.
+/// The values of the vertices or triangles that are kept. Shapes have one value per primitive,
+/// given as either.
 pub(crate) fn attribute_part<T: Copy>(
     attribute: &Attribute<T>,
     vertices: &[u32],

@@ -57,7 +57,11 @@ fn opacity_classes(materials: &[Material]) -> Vec<OpacityClass> {
             ColorSource::Texture(t) if t.has_transparency() => OpacityClass::Transparent,
             ColorSource::Texture(_) => OpacityClass::Opaque,
         };
-        opacity_classes.push(if m.opacity < 1.0 || m.culls() { OpacityClass::Transparent } else { by_color });
+        opacity_classes.push(if m.opacity < 1.0 || m.culls() {
+            OpacityClass::Transparent
+        } else {
+            by_color
+        });
     }
     opacity_classes
 }
@@ -66,7 +70,8 @@ fn opacity_classes(materials: &[Material]) -> Vec<OpacityClass> {
 pub(crate) fn transmits_light(scene: &Scene, effects: Effects) -> Vec<bool> {
     let opacity_classes = opacity_classes(&scene.materials);
     let count = scene.appearances.len().min(scene.world.instances().len());
-    let (glass, alpha) = (effects.contains(Effects::REFRACTION), effects.contains(Effects::TRANSPARENCY));
+    let (glass, alpha) =
+        (effects.contains(Effects::REFRACTION), effects.contains(Effects::TRANSPARENCY));
     let passes = |i: usize| {
         let material = scene.appearances[i].material;
         let dielectric = matches!(scene.materials[material].model, SurfaceModel::Dielectric { .. });
@@ -89,7 +94,8 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
         }
     }
     let used = || scene.materials.iter().zip(&used).filter(|(_, u)| **u).map(|(m, _)| m);
-    let lit = used().any(|m| !matches!(m.model, SurfaceModel::Unlit | SurfaceModel::Dielectric { .. }));
+    let lit =
+        used().any(|m| !matches!(m.model, SurfaceModel::Unlit | SurfaceModel::Dielectric { .. }));
     let lights = || scene.lights.iter().filter(|l| lit && l.casts_shadows());
     let dielectric = used().any(|m| matches!(m.model, SurfaceModel::Dielectric { .. }));
     // Where roughness varies, it may be anything somewhere.
@@ -99,9 +105,18 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
     Effects::NONE
         .with_if(lights().next().is_some(), Effects::SHADOWS)
         .with_if(lights().any(|l| l.size() > 0.0), Effects::SOFT_SHADOWS)
-        .with_if(lit && scene.ambient_occlusion.is_some() && scene.has_ambient(), Effects::AMBIENT_OCCLUSION)
-        .with_if(dielectric || used().any(|m| reflects(m, Effects::REFLECTION)), Effects::REFLECTION)
-        .with_if(used().any(|m| reflects(m, Effects::GLOSSY_REFLECTION)), Effects::GLOSSY_REFLECTION)
+        .with_if(
+            lit && scene.ambient_occlusion.is_some() && scene.has_ambient(),
+            Effects::AMBIENT_OCCLUSION,
+        )
+        .with_if(
+            dielectric || used().any(|m| reflects(m, Effects::REFLECTION)),
+            Effects::REFLECTION,
+        )
+        .with_if(
+            used().any(|m| reflects(m, Effects::GLOSSY_REFLECTION)),
+            Effects::GLOSSY_REFLECTION,
+        )
         .with_if(dielectric, Effects::REFRACTION)
         .with_if(transparent, Effects::TRANSPARENCY)
         .with_if(!scene.volumes.is_empty(), Effects::VOLUMES)
@@ -135,7 +150,8 @@ mod tests {
         let before = Texture::scans();
         let scene = b.build().unwrap();
         let eye = DVec3::new(0.0, 0.0, 9.0);
-        let camera = Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.6, 1.0, [0.1, 100.0]).unwrap();
+        let camera =
+            Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.6, 1.0, [0.1, 100.0]).unwrap();
         for _ in 0..3 {
             render(&scene, &camera, &RenderOptions::new(8, 8)).unwrap();
         }

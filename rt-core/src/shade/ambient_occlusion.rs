@@ -1,4 +1,5 @@
-//! Ambient and environment light, dimmed by what is near: cosine-weighted rays over the hemisphere, limited in length.
+//! Ambient and environment light, dimmed by what is near: cosine-weighted rays over the hemisphere,
+//! limited in length.
 
 use super::frame_context::FrameContext;
 use super::lobes::ambient_albedo;
@@ -18,7 +19,8 @@ use crate::surface::SurfacePoint;
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
-/// Rays per batch: enough for the tracer to sort by direction, few enough to stay in the second-level cache.
+/// Rays per batch: enough for the tracer to sort by direction, few enough to stay in the
+/// second-level cache.
 const BATCH_RAYS: usize = 4096;
 
 /// Adds ambient and environment light to `points`.
@@ -36,8 +38,10 @@ pub(crate) fn add_ambient_light(
     let Some(mean) = &context.irradiance else { return };
     let ambient = if parameters.is_empty() { ambient_at::<false> } else { ambient_at::<true> };
     let ambient = |p: &Point| ambient(context, mean, parameters, p);
-    let occlusion =
-        context.scene.ambient_occlusion.filter(|_| context.effects.contains(Effects::AMBIENT_OCCLUSION));
+    let occlusion = context
+        .scene
+        .ambient_occlusion
+        .filter(|_| context.effects.contains(Effects::AMBIENT_OCCLUSION));
     let Some(occlusion) = occlusion else {
         for p in points.iter_mut().filter(|p| p.lit) {
             p.radiance += ambient(p);
@@ -104,7 +108,8 @@ fn ambient_at<const MAPS: bool>(
     parameters: &[SurfaceParameters],
     p: &Point,
 ) -> Vec3 {
-    let albedo = ambient_albedo(p.model::<MAPS>(context, parameters), p.surface.color, context.effects);
+    let albedo =
+        ambient_albedo(p.model::<MAPS>(context, parameters), p.surface.color, context.effects);
     let light = albedo * mean.for_normal(p.surface.normal);
     p.parameters::<MAPS>(parameters).map_or(light, |v| light * v.ambient)
 }
@@ -122,7 +127,8 @@ impl Hemisphere {
         // The lobe stands on the side that is seen, whatever side the shading normal is lit from.
         let normal = if s.normal.dot(s.face_normal) < 0.0 { -s.normal } else { s.normal };
         let (x, y) = orthonormal_basis(normal);
-        // A direction that leaves through the back of the face is never sent, so there is one origin.
+        // A direction that leaves through the back of the face is never sent, so there is one
+        // origin.
         let origin = s.point + s.face_normal * s.point_error;
         Hemisphere { axes: [x, y, normal], origin, face_normal: s.face_normal }
     }
@@ -140,7 +146,8 @@ impl Hemisphere {
         let [x, y, normal] = self.axes;
         let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
         // A smooth normal's hemisphere dips below the face: no sky there to be hidden.
-        (dir.dot(self.face_normal) > 0.0).then(|| Ray::new(self.origin, dir).with_t_max(distance as f32))
+        (dir.dot(self.face_normal) > 0.0)
+            .then(|| Ray::new(self.origin, dir).with_t_max(distance as f32))
     }
 }
 

@@ -1,4 +1,5 @@
-//! Primary rays in render space: the camera's f64 rays, moved next to the scene before they are rounded to f32.
+//! Primary rays in render space: the camera's f64 rays, moved next to the scene before they are
+//! rounded to f32.
 
 use crate::camera::{Camera, Projection};
 use crate::math::Aabb;
@@ -6,8 +7,9 @@ use crate::ray::{LANES, Ray, RayBlock};
 use fearless_simd::Simd;
 use glam::DVec3;
 
-/// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the scene instead of at the eye.
-/// Up to here the eye's f32 rounding is no worse than that of the vertices; rays with one origin are traced faster.
+/// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the
+/// scene instead of at the eye. Up to here the eye's f32 rounding is no worse than that of the
+/// vertices; rays with one origin are traced faster.
 const EYE_WITHIN_RADII: f64 = 8.0;
 
 /// Makes the rays of one frame.
@@ -33,20 +35,26 @@ pub(crate) struct CameraRays {
 enum ClipRange {
     /// At the same parameter everywhere: every usual matrix.
     Same([f64; 2]),
-    /// Somewhere else for each ray (oblique near planes); panoramas, whose rays have nothing in common.
+    /// Somewhere else for each ray (oblique near planes); panoramas, whose rays have nothing in
+    /// common.
     PerRay(Box<(Camera, DVec3)>),
 }
 
 impl CameraRays {
-    pub(crate) fn new(camera: &Camera, world_origin: DVec3, bounds: Aabb, with_lens: bool) -> CameraRays {
+    pub(crate) fn new(
+        camera: &Camera,
+        world_origin: DVec3,
+        bounds: Aabb,
+        with_lens: bool,
+    ) -> CameraRays {
         let ray = |x, y| camera.world_ray([x, y]);
         let (o, d) = ray(0.0, 0.0);
         let (ox, dx) = ray(1.0, 0.0);
         let (oy, dy) = ray(0.0, 1.0);
         let parallel = matches!(camera.projection, Projection::Parallel { .. });
 
-        // Start at the scene's bounds when the eye is far from them. Ray parameters are depths, so the nearest corner is in
-        // front of everything for every pixel.
+        // Start at the scene's bounds when the eye is far from them. Ray parameters are depths, so
+        // the nearest corner is in front of everything for every pixel.
         let depth_of = |p: DVec3| {
             let m = camera.clip_from_world;
             if parallel {
@@ -64,8 +72,9 @@ impl CameraRays {
         let far_away = !panorama
             && (o - world_origin - bounds.center().as_dvec3()).length()
                 > EYE_WITHIN_RADII * 0.5 * (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length();
-        let move_start =
-            !bounds.is_empty() && nearest.is_finite() && (parallel || (far_away && nearest - margin > 0.0));
+        let move_start = !bounds.is_empty()
+            && nearest.is_finite()
+            && (parallel || (far_away && nearest - margin > 0.0));
         let start = if move_start { nearest - margin } else { 0.0 };
 
         let clip_range = {
@@ -84,7 +93,11 @@ impl CameraRays {
             let axes = camera.world_from_view();
             // Clip w grows by this much per unit of distance along the view.
             let scale = camera.clip_from_world.row(3).truncate().length();
-            (axes.x_axis * l.aperture_radius, axes.y_axis * l.aperture_radius, l.focus_distance * scale)
+            (
+                axes.x_axis * l.aperture_radius,
+                axes.y_axis * l.aperture_radius,
+                l.focus_distance * scale,
+            )
         });
         CameraRays {
             parallel,
@@ -100,8 +113,8 @@ impl CameraRays {
         }
     }
 
-    /// The ray through NDC (`x`, `y`); `lens` is a point of the unit disk. Hits outside the near and far planes are excluded by the
-    /// ray's range.
+    /// The ray through NDC (`x`, `y`); `lens` is a point of the unit disk. Hits outside the near
+    /// and far planes are excluded by the ray's range.
     #[inline]
     pub(crate) fn ray(&self, x: f64, y: f64, lens: [f32; 2]) -> Ray {
         if let ClipRange::PerRay(c) = &self.clip_range
@@ -134,8 +147,8 @@ impl CameraRays {
         }
     }
 
-    /// The rays through sixteen NDC points, see [`CameraRays::ray`]; through the middle of a lens. False, without rays, where each has its
-    /// own near and far plane.
+    /// The rays through sixteen NDC points, see [`CameraRays::ray`]; through the middle of a lens.
+    /// False, without rays, where each has its own near and far plane.
     #[inline(never)]
     pub(crate) fn fill_block<S: Simd>(
         &self,

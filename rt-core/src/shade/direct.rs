@@ -65,9 +65,16 @@ impl LightSampling {
     }
 }
 
-/// Point of the unit square that ray `k` of `count` to light `number` belongs to; round lights spread it over their disk.
+/// Point of the unit square that ray `k` of `count` to light `number` belongs to; round lights
+/// spread it over their disk.
 #[inline]
-pub(super) fn light_point(sampler: &Sampler, stream: u32, number: usize, k: u32, count: u32) -> [f32; 2] {
+pub(super) fn light_point(
+    sampler: &Sampler,
+    stream: u32,
+    number: usize,
+    k: u32,
+    count: u32,
+) -> [f32; 2] {
     sampler.square_of(stream.wrapping_add(SampleDimension::LIGHTS + number as u32), k, count)
 }
 
@@ -113,15 +120,23 @@ fn direct_lighting<const MAPS: bool>(
             let model = p.model::<MAPS>(context, parameters);
             let arriving = p.parameters::<MAPS>(parameters).map_or(1.0, |v| v.direct);
             for k in 0..count {
-                let at = spread
-                    .then(|| light_point(&area.sampler(context, state.slot), state.stream, number, k, count));
+                let at = spread.then(|| {
+                    light_point(&area.sampler(context, state.slot), state.stream, number, k, count)
+                });
                 let incident = incident_from(light, p.surface.point, at);
                 if incident.strength <= 0.0 {
                     continue;
                 }
                 let (normal, color) = (p.surface.normal, p.surface.color);
-                let answer =
-                    response(model, normal, color, p.view, incident.dir, light.color, light.highlight);
+                let answer = response(
+                    model,
+                    normal,
+                    color,
+                    p.view,
+                    incident.dir,
+                    light.color,
+                    light.highlight,
+                );
                 let strength = if MAPS { arriving * incident.strength } else { incident.strength };
                 let radiance = answer * (strength / count as f32);
                 if radiance == Vec3::ZERO {
@@ -153,10 +168,12 @@ fn direct_lighting<const MAPS: bool>(
     }
 }
 
-/// Direction and strength of `light` at `p`; `at` is a point of the unit square for lights with a size.
+/// Direction and strength of `light` at `p`; `at` is a point of the unit square for lights with a
+/// size.
 ///
-/// Parallel light without size, which nearly every scene has, is decided in the caller; the rest is a call. As one function it is
-/// too long to be inlined, and untextured frames with shadows took 1.8 % more instructions.
+/// Parallel light without size, which nearly every scene has, is decided in the caller; the rest is
+/// a call. As one function it is too long to be inlined, and untextured frames with shadows took
+/// 1.8 % more instructions.
 #[inline(always)]
 pub(super) fn incident_from(light: &ResolvedLight, p: Vec3, at: Option<[f32; 2]>) -> Incident {
     match (light.kind, at) {
@@ -255,7 +272,8 @@ fn off_plane(normal: Vec3, to_light: Vec3, reach: f32) -> Vec3 {
     towards_point * (PLACE_ULPS * f32::EPSILON * reach)
 }
 
-/// A point of the unit disk spread over the ring that is left around a light's hole, with the same density everywhere.
+/// A point of the unit disk spread over the ring that is left around a light's hole, with the same
+/// density everywhere.
 #[inline]
 fn in_ring(at: [f32; 2], kind: ResolvedLightKind) -> [f32; 2] {
     let ResolvedLightKind::Ring { hole, .. } = kind else { return at };
@@ -275,8 +293,8 @@ const PLACE_ULPS: f32 = 4.0;
 /// before it.
 const MOST_ERRORS: f32 = 32.0;
 
-/// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of a light then share it and are
-/// traced as one packet.
+/// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of
+/// a light then share it and are traced as one packet.
 ///
 /// A ray is exact where it starts; where it ends, the arithmetic has an error of some ulp of its
 /// length. So rays start at the surface, and that error is at the light, where it is no more than

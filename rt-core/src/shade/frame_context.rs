@@ -1,4 +1,5 @@
-//! A scene made ready for the tiles of one frame: instances resolved, lights in render space, rays set up.
+//! A scene made ready for the tiles of one frame: instances resolved, lights in render space, rays
+//! set up.
 
 use super::camera_rays::CameraRays;
 use super::direct::LightSampling;
@@ -85,8 +86,12 @@ impl<'a> FrameContext<'a> {
             .filter(|l| l.color != [0.0; 3] || l.highlight_color.is_some())
             .filter_map(|l| ResolvedLight::new(l, camera, lens, origin))
             .collect();
-        let ambient =
-            scene.lights.iter().filter(|l| l.kind == LightKind::Ambient).map(|l| Vec3::from(l.color)).sum();
+        let ambient = scene
+            .lights
+            .iter()
+            .filter(|l| l.kind == LightKind::Ambient)
+            .map(|l| Vec3::from(l.color))
+            .sum();
         let count = scene.world.instances().len();
         let (light_sampling, sky_number) = LightSampling::of(&lights, effects, options.light_rays);
         FrameContext {
@@ -106,7 +111,11 @@ impl<'a> FrameContext<'a> {
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, lens),
             level: Level::new(),
-            transmissive: if passes_surfaces(effects) { transmits_light(scene, effects) } else { Vec::new() },
+            transmissive: if passes_surfaces(effects) {
+                transmits_light(scene, effects)
+            } else {
+                Vec::new()
+            },
             has_maps: scene.materials.iter().any(|m| m.maps.is_some()),
             volumes,
             origin,
@@ -162,7 +171,8 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// What a mirrored or refracted ray sees that leaves the scene: the environment, else the background.
+    /// What a mirrored or refracted ray sees that leaves the scene: the environment, else the
+    /// background.
     pub(crate) fn surroundings(&self, dir: Vec3) -> Vec3 {
         let dir = dir.normalize_or_zero();
         if let Some(e) = &self.scene.environment {
@@ -177,7 +187,8 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// Window depth of the surface met by the ray through NDC `ndc`, and its distance from where the ray begins: see [`point_on_ray`].
+    /// Window depth of the surface met by the ray through NDC `ndc`, and its distance from where
+    /// the ray begins: see [`point_on_ray`].
     pub(crate) fn depth_and_distance(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (f32, f32) {
         let (on_surface, n) = self.instance_at(hit).plane(ray, hit, self.origin);
         let ray = self.camera.world_ray(ndc);
@@ -196,15 +207,17 @@ fn passes_surfaces(effects: Effects) -> bool {
     effects.intersects(Effects::TRANSPARENCY.union(Effects::REFRACTION))
 }
 
-/// World point where a pixel's f64 ray (origin, direction) meets the plane through `on_surface` with normal `n` (any length), so that neither the f32
-/// ray nor its hit parameter limits the accuracy.
+/// World point where a pixel's f64 ray (origin, direction) meets the plane through `on_surface`
+/// with normal `n` (any length), so that neither the f32 ray nor its hit parameter limits the
+/// accuracy.
 #[inline(always)]
 pub(crate) fn point_on_ray((origin, dir): (DVec3, DVec3), on_surface: DVec3, n: DVec3) -> DVec3 {
     let along = n.dot(dir);
     let t = n.dot(on_surface - origin) / along;
     let on_ray = origin + dir * t;
-    // Edge-on planes meet the exact ray anywhere: keep the hit itself then. A pixel's f32 ray and exact ray differ by some
-    // 1e-7 of the distance; a far larger step along the plane is not an improvement but a division by almost 0.
+    // Edge-on planes meet the exact ray anywhere: keep the hit itself then. A pixel's f32 ray and
+    // exact ray differ by some 1e-7 of the distance; a far larger step along the plane is not an
+    // improvement but a division by almost 0.
     let step = (on_ray - on_surface).length_squared();
     let limit = 1e-8 * (on_surface - origin).length_squared();
     if step <= limit { on_ray } else { on_surface }

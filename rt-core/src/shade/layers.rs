@@ -1,4 +1,5 @@
-//! Depth, distance and ids of sixteen hits at once: [`TileLayers::record`] in loops over plain f64 arrays, which become vector code. Same functions, same bits.
+//! Depth, distance and ids of sixteen hits at once: [`TileLayers::record`] in loops over plain f64
+//! arrays, which become vector code. Same functions, same bits.
 
 use super::frame_context::{FrameContext, point_on_ray};
 use super::tile::{TileArea, TileLayers, block_place, lane_pixel};
@@ -7,7 +8,8 @@ use crate::surface::Planes;
 use fearless_simd::Simd;
 use glam::DVec3;
 
-/// Fills depth, distance and ids of block `b` where it was hit. The rays go through the pixels' centres; normals are left to the caller.
+/// Fills depth, distance and ids of block `b` where it was hit. The rays go through the pixels'
+/// centres; normals are left to the caller.
 pub(super) fn record_block<S: Simd>(
     simd: S,
     context: &FrameContext<'_>,
@@ -96,14 +98,16 @@ fn depth_and_distance<S: Simd>(
     let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
     for lane in 0..LANES {
         let [i, j] = lane_pixel(lane);
-        [x[lane], y[lane]] = context.ndc(area.x + (column + i) as u32, area.y + (row + j) as u32, [0.5; 2]);
+        [x[lane], y[lane]] =
+            context.ndc(area.x + (column + i) as u32, area.y + (row + j) as u32, [0.5; 2]);
     }
     // A copy whose fields no store can change.
     let camera = context.camera;
     simd.vectorize(
         #[inline(always)]
         || {
-            // ---- The rays, as Camera::world_ray has them; perspective ones spelled out, because a loop with a choice in it does not become vector code.
+            // ---- The rays, as Camera::world_ray has them; perspective ones spelled out, because a
+            // loop with a choice in it does not become vector code.
             let (mut origins, mut dirs) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             if let Some(eye) = camera.eye() {
                 let m = camera.inverse;
@@ -126,7 +130,8 @@ fn depth_and_distance<S: Simd>(
             let (mut depth, mut distance) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
                 let (origin, dir) = (at(&origins, l), at(&dirs, l));
-                let point = point_on_ray((origin, dir), at(&planes.point, l), at(&planes.normal, l));
+                let point =
+                    point_on_ray((origin, dir), at(&planes.point, l), at(&planes.normal, l));
                 depth[l] = camera.window_depth(point) as f32;
                 distance[l] = (point - origin).length() as f32;
             }

@@ -7,12 +7,14 @@ use crate::material::{PbrForm, PhongForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
 
-/// Smallest GGX α that a light without size is shaded with: below, its highlight is a point that no pixel would find.
+/// Smallest GGX α that a light without size is shaded with: below, its highlight is a point that no
+/// pixel would find.
 const MIN_HIGHLIGHT_ALPHA: f32 = 1e-3;
 
-/// Light sent to `view` per unit of light colour from direction `l` (unit): BRDF · π · cosine, as the unit of lights wants it.
-/// `highlight` is the light's own colour for Phong highlights. Matte and Phong are decided in the caller; microfacets, which cost more than
-/// a call, are not, so that loops over lights stay short.
+/// Light sent to `view` per unit of light colour from direction `l` (unit): BRDF · π · cosine, as
+/// the unit of lights wants it. `highlight` is the light's own colour for Phong highlights. Matte
+/// and Phong are decided in the caller; microfacets, which cost more than a call, are not, so that
+/// loops over lights stay short.
 #[inline(always)]
 pub(crate) fn response(
     model: &SurfaceModel,
@@ -60,16 +62,23 @@ fn microfacet_response(
     color: Vec3,
 ) -> Vec3 {
     match *model {
-        SurfaceModel::Metal { roughness } => microfacets(surface_color, roughness, normal, view, l) * color,
+        SurfaceModel::Metal { roughness } => {
+            microfacets(surface_color, roughness, normal, view, l) * color
+        }
         SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Vtk } => {
-            let [matte, lobe] = vtk_pbr([metallic, roughness, specular], surface_color, normal, view, l);
+            let [matte, lobe] =
+                vtk_pbr([metallic, roughness, specular], surface_color, normal, view, l);
             (matte + lobe) * color
         }
         SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Gltf } => {
             let f0 = Vec3::splat(specular).lerp(surface_color, metallic);
-            let matte = surface_color * pbr_transmitted(specular, normal.dot(view)) * (1.0 - metallic);
-            let lobe =
-                if f0 == Vec3::ZERO { Vec3::ZERO } else { microfacets(f0, roughness, normal, view, l) };
+            let matte =
+                surface_color * pbr_transmitted(specular, normal.dot(view)) * (1.0 - metallic);
+            let lobe = if f0 == Vec3::ZERO {
+                Vec3::ZERO
+            } else {
+                microfacets(f0, roughness, normal, view, l)
+            };
             (matte + lobe) * color
         }
         SurfaceModel::Unlit
@@ -85,8 +94,8 @@ pub(crate) fn pbr_transmitted(specular: f32, cos_view: f32) -> f32 {
     if specular > 0.0 { 1.0 - schlick(Vec3::splat(specular), cos_view).x } else { 1.0 }
 }
 
-/// x^n for x in 0..=1. Whole exponents, which nearly all materials have, by squaring: a few multiplications, and the same bits on
-/// every platform.
+/// x^n for x in 0..=1. Whole exponents, which nearly all materials have, by squaring: a few
+/// multiplications, and the same bits on every platform.
 #[inline]
 pub(crate) fn power(x: f32, n: f32) -> f32 {
     if n.fract() != 0.0 || n > 1024.0 {
@@ -109,8 +118,15 @@ fn microfacets(f0: Vec3, roughness: f32, n: Vec3, v: Vec3, l: Vec3) -> Vec3 {
     schlick(f0, h.dot(v)) * (ggx(n, v, l, alpha) * PI)
 }
 
-/// [`PbrForm::Vtk`], times π: matte layer and highlight (`vtkOpenGLPolyDataMapper`'s shader, VTK 9.1).
-fn vtk_pbr([metallic, roughness, specular]: [f32; 3], albedo: Vec3, n: Vec3, v: Vec3, l: Vec3) -> [Vec3; 2] {
+/// [`PbrForm::Vtk`], times π: matte layer and highlight (`vtkOpenGLPolyDataMapper`'s shader, VTK
+/// 9.1).
+fn vtk_pbr(
+    [metallic, roughness, specular]: [f32; 3],
+    albedo: Vec3,
+    n: Vec3,
+    v: Vec3,
+    l: Vec3,
+) -> [Vec3; 2] {
     // As the shader has them: never 0.
     let cosine = |a: Vec3, b: Vec3| a.dot(b).clamp(1e-5, 1.0);
     let h = (v + l).normalize_or_zero();
@@ -126,8 +142,9 @@ fn vtk_pbr([metallic, roughness, specular]: [f32; 3], albedo: Vec3, n: Vec3, v: 
     let d = (nh * a2 - nh) * nh + 1.0;
     // A mirror is a point that no pixel would find; the shader divides 0 by 0 there.
     let distribution = a2 / (PI * d * d).max(f32::MIN_POSITIVE);
-    let visibility =
-        0.5 / (nl * (a + nv * (nv - a * nv)).max(0.0).sqrt() + nv * (a + nl * (nl - a * nl)).max(0.0).sqrt());
+    let visibility = 0.5
+        / (nl * (a + nv * (nv - a * nv)).max(0.0).sqrt()
+            + nv * (a + nl * (nl - a * nl)).max(0.0).sqrt());
     [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (distribution * visibility * PI)]
 }
 
@@ -147,8 +164,11 @@ pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects
                 color
             }
         }
-        // VTK's physically based shader knows no ambient light; where occlusion is asked for, there must be something to occlude.
-        SurfaceModel::Pbr { form: PbrForm::Vtk, .. } if !effects.contains(Effects::AMBIENT_OCCLUSION) => {
+        // VTK's physically based shader knows no ambient light; where occlusion is asked for, there
+        // must be something to occlude.
+        SurfaceModel::Pbr { form: PbrForm::Vtk, .. }
+            if !effects.contains(Effects::AMBIENT_OCCLUSION) =>
+        {
             Vec3::ZERO
         }
         SurfaceModel::Pbr { metallic, roughness, .. } => {

@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-/// Share of unpolarised light that a smooth dielectric interface reflects (Fresnel 1823). `cos_i` is the cosine on the incident
-/// side, `eta` the incident index over the transmitted one. Returns 1 beyond the critical angle.
+/// Share of unpolarised light that a smooth dielectric interface reflects (Fresnel 1823). `cos_i`
+/// is the cosine on the incident side, `eta` the incident index over the transmitted one. Returns 1
+/// beyond the critical angle.
 #[inline]
 pub(crate) fn fresnel_dielectric(cos_i: f32, eta: f32) -> f32 {
     let cos_i = cos_i.clamp(0.0, 1.0);
@@ -18,7 +19,8 @@ pub(crate) fn fresnel_dielectric(cos_i: f32, eta: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// Direction of the refracted ray for unit direction `dir` and unit normal `n` against it; `None` at total internal reflection.
+/// Direction of the refracted ray for unit direction `dir` and unit normal `n` against it; `None`
+/// at total internal reflection.
 #[inline]
 pub(crate) fn refract(dir: Vec3, n: Vec3, eta: f32) -> Option<Vec3> {
     let cos_i = -dir.dot(n);
@@ -29,7 +31,8 @@ pub(crate) fn refract(dir: Vec3, n: Vec3, eta: f32) -> Option<Vec3> {
     Some((dir * eta + n * (eta * cos_i - (1.0 - sin2_t).sqrt())).normalize_or_zero())
 }
 
-/// Reflectance towards grazing angles from the reflectance `f0` at normal incidence (Schlick 1994, eq. 15).
+/// Reflectance towards grazing angles from the reflectance `f0` at normal incidence (Schlick 1994,
+/// eq. 15).
 #[inline]
 pub(crate) fn schlick(f0: Vec3, cos: f32) -> Vec3 {
     let m = (1.0 - cos).clamp(0.0, 1.0);
@@ -37,7 +40,8 @@ pub(crate) fn schlick(f0: Vec3, cos: f32) -> Vec3 {
     f0 + (Vec3::ONE - f0) * (m2 * m2 * m)
 }
 
-/// D·V of GGX with the height-correlated Smith term (Walter et al. 2007; Heitz 2014): the microfacet BRDF without Fresnel.
+/// D·V of GGX with the height-correlated Smith term (Walter et al. 2007; Heitz 2014): the
+/// microfacet BRDF without Fresnel.
 #[inline]
 pub(crate) fn ggx(n: Vec3, v: Vec3, l: Vec3, alpha: f32) -> f32 {
     let h = (v + l).normalize_or_zero();
@@ -53,7 +57,8 @@ pub(crate) fn ggx(n: Vec3, v: Vec3, l: Vec3, alpha: f32) -> f32 {
     d * 0.5 / g
 }
 
-/// A microfacet normal visible from `v`, around +z (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
+/// A microfacet normal visible from `v`, around +z (Dupuy and Benyoub, "Sampling Visible GGX
+/// Normals with Spherical Caps", 2023).
 #[inline]
 pub(crate) fn sample_visible_normal(v: Vec3, alpha: f32, [a, b]: [f32; 2]) -> Vec3 {
     let s = Vec3::new(v.x * alpha, v.y * alpha, v.z).normalize_or_zero();
@@ -110,14 +115,17 @@ mod tests {
 
     #[test]
     fn ggx_lobe_integrates_to_at_most_one() {
-        // White furnace of a single lobe: sampled weight and direct integral agree, and lose a little to shadowing.
+        // White furnace of a single lobe: sampled weight and direct integral agree, and lose a
+        // little to shadowing.
         let v = Vec3::new(0.6, 0.0, 0.8);
         for alpha in [0.1f32, 0.4, 0.8] {
             let n = 256;
             let (mut sampled, mut integral) = (0.0f64, 0.0f64);
             for i in 0..n * n {
-                let u =
-                    [(i % n) as f32 / n as f32 + 0.5 / n as f32, (i / n) as f32 / n as f32 + 0.5 / n as f32];
+                let u = [
+                    (i % n) as f32 / n as f32 + 0.5 / n as f32,
+                    (i / n) as f32 / n as f32 + 0.5 / n as f32,
+                ];
                 let h = sample_visible_normal(v, alpha, u);
                 let l = h * (2.0 * h.dot(v)) - v;
                 sampled += masking_ratio(v.z, l.z, alpha) as f64;

@@ -1,9 +1,11 @@
-//! The life of a tile of rays: trace a wave, light what it met, send the next waves, until none is left.
+//! The life of a tile of rays: trace a wave, light what it met, send the next waves, until none is
+//! left.
 //!
-//! Each effect is a pass over the whole wave, entered once per wave and only if the frame's [`Effects`] has it:
-//! [`direct`] light with its shadow rays, [`ambient_occlusion`], then [`specular`] (mirror, gloss, glass) or [`path`] and
-//! transparency, which send rays into the next waves. Rays behind transparent surfaces stay coherent and form a wave of their own.
-//! Frames without any of these take a loop of their own, [`local`].
+//! Each effect is a pass over the whole wave, entered once per wave and only if the frame's
+//! [`Effects`] has it: [`direct`] light with its shadow rays, [`ambient_occlusion`], then
+//! [`specular`] (mirror, gloss, glass) or [`path`] and transparency, which send rays into the next
+//! waves. Rays behind transparent surfaces stay coherent and form a wave of their own. Frames
+//! without any of these take a loop of their own, [`local`].
 
 mod ambient_occlusion;
 mod camera_rays;
@@ -42,7 +44,8 @@ use point::NO_PARAMETERS;
 use tile::{PIXELS, block_place, lane_pixel};
 use wavefront::{LightRays, RayKind, RayState, Wavefront};
 
-/// Opacity from which on a surface is opaque: corners of alpha 1 come out some roundings below 1 between them.
+/// Opacity from which on a surface is opaque: corners of alpha 1 come out some roundings below 1
+/// between them.
 const OPAQUE: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Sampler dimensions, counted from a ray's own stream.
@@ -65,14 +68,16 @@ pub(crate) struct Workspace {
     behind: Wavefront,
     scattered: Wavefront,
     hits: Vec<HitBlock>,
-    /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this scene's world is asked.
+    /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this
+    /// scene's world is asked.
     surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
     /// Finishes of points whose material has detail.
     parameters: Vec<SurfaceParameters>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
-    /// Of each ray what it collects in the volume up to its hit, where others hold the volume's bricks; empty where it is whole here.
+    /// Of each ray what it collects in the volume up to its hit, where others hold the volume's
+    /// bricks; empty where it is whole here.
     volume_samples: Vec<crate::volume::VolumeSample>,
     /// One ray in the object spaces of all volumes.
     object_rays: Vec<Ray>,
@@ -90,10 +95,12 @@ pub(crate) fn render_tile(
 ) -> RayStats {
     let mut stats = RayStats::default();
     let layers = context.options.layers;
-    let centered = context.options.samples <= 1 && !context.effects.contains(Effects::DEPTH_OF_FIELD);
+    let centered =
+        context.options.samples <= 1 && !context.effects.contains(Effects::DEPTH_OF_FIELD);
     let wants_geometry = layers.intersects(Layers::GEOMETRY) && sample == 0;
 
-    // Depth, normals and ids belong to the pixel centre: rays of their own unless the colour's rays go there anyway.
+    // Depth, normals and ids belong to the pixel centre: rays of their own unless the colour's rays
+    // go there anyway.
     if wants_geometry && !(centered && layers.contains(Layers::COLOR)) {
         trace_geometry_layers(context, area, out, work, &mut stats);
     }
@@ -173,8 +180,8 @@ fn generate_camera_wavefront(
     generate_camera_rays(context, area, &mut wave.blocks, sample, stats, cost);
 }
 
-/// Rays of every pixel of the tile, in Morton order; lanes outside the picture are inactive. `sample` of `None` aims at pixel
-/// centres through the middle of the lens.
+/// Rays of every pixel of the tile, in Morton order; lanes outside the picture are inactive.
+/// `sample` of `None` aims at pixel centres through the middle of the lens.
 fn generate_camera_rays(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -216,7 +223,8 @@ fn generate_pinhole_rays<S: Simd>(
     for k in 0..TILE as usize / 4 {
         for lane in 0..LANES {
             let [i, j] = lane_pixel(lane);
-            let [x, y] = context.ndc(area.x + (4 * k + i) as u32, area.y + (4 * k + j) as u32, [0.5; 2]);
+            let [x, y] =
+                context.ndc(area.x + (4 * k + i) as u32, area.y + (4 * k + j) as u32, [0.5; 2]);
             (centres[0][k][lane], centres[1][k][lane]) = (x, y);
         }
     }
@@ -229,13 +237,21 @@ fn generate_pinhole_rays<S: Simd>(
                 let (mut px, mut py) = ([0; LANES], [0; LANES]);
                 for lane in 0..LANES {
                     let [i, j] = lane_pixel(lane);
-                    (px[lane], py[lane]) = (area.x + (4 * column + i) as u32, area.y + (4 * row + j) as u32);
+                    (px[lane], py[lane]) =
+                        (area.x + (4 * column + i) as u32, area.y + (4 * row + j) as u32);
                 }
-                sampler.set_pixels(simd, context.options.seed, (&px, &py), sample, SampleDimension::PIXEL);
+                sampler.set_pixels(
+                    simd,
+                    context.options.seed,
+                    (&px, &py),
+                    sample,
+                    SampleDimension::PIXEL,
+                );
                 let at = sampler.squares(simd);
                 let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
                 for lane in 0..LANES {
-                    [x[lane], y[lane]] = context.ndc(px[lane], py[lane], [at[0][lane], at[1][lane]]);
+                    [x[lane], y[lane]] =
+                        context.ndc(px[lane], py[lane], [at[0][lane], at[1][lane]]);
                 }
                 context.camera_rays.fill_block(simd, &x, &y, block)
             }
@@ -283,8 +299,9 @@ fn trace(context: &FrameContext<'_>, work: &mut Workspace, coherent: bool) {
     prefetch_surfaces(context, &work.hits);
 }
 
-/// Asks for everything that looking at the hits will read, first the triangles and then what they name: one after the other, these waits were
-/// half of the time of shading (measured on a million triangles).
+/// Asks for everything that looking at the hits will read, first the triangles and then what they
+/// name: one after the other, these waits were half of the time of shading (measured on a million
+/// triangles).
 fn prefetch_surfaces(context: &FrameContext<'_>, hits: &[HitBlock]) {
     fn each(context: &FrameContext<'_>, hits: &[HitBlock], f: impl Fn(&ResolvedInstance<'_>, u32)) {
         for h in hits {
@@ -336,12 +353,18 @@ fn trace_geometry_layers(
 }
 
 /// Geometry layers of the first surfaces of all pixels, opaque or not.
-fn record_camera_hits(context: &FrameContext<'_>, area: &TileArea, out: &mut TileLayers, work: &Workspace) {
+fn record_camera_hits(
+    context: &FrameContext<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &Workspace,
+) {
     for (b, (rays, hits)) in work.current.blocks.iter().zip(&work.hits).enumerate() {
         dispatch!(context.level, simd => layers::record_block(simd, context, area, b, rays, hits, out));
         if context.options.layers.contains(Layers::NORMAL) {
             let hit = (0..LANES).fold(0u16, |m, l| m | ((hits.prim[l] != NO_HIT) as u16) << l);
-            let normal = |l| hits.get(l).map_or(Vec3::ZERO, |h| context.surface(&rays.get(l), &h).normal);
+            let normal =
+                |l| hits.get(l).map_or(Vec3::ZERO, |h| context.surface(&rays.get(l), &h).normal);
             out.record_normals(b, hit, normal);
         }
     }
@@ -390,7 +413,12 @@ fn process_hits_with<const MAPS: bool>(
                 Some(collected_elsewhere) => *collected_elsewhere,
                 None => volumes::integrate_volumes(context, &ray, t_end, &mut work.object_rays),
             };
-            volumes::composite_volume(&sample, &mut work.current.states[i], &mut work.pixels, stats);
+            volumes::composite_volume(
+                &sample,
+                &mut work.current.states[i],
+                &mut work.pixels,
+                stats,
+            );
         }
         let Some(hit) = hit else {
             add_miss(context, area, &work.current.states[i], ray.dir, &mut work.pixels);
@@ -401,7 +429,8 @@ fn process_hits_with<const MAPS: bool>(
             Some(seen_elsewhere) => *seen_elsewhere,
             None => resolved.surface(&ray, &hit),
         };
-        let parameters = if MAPS { resolved.parameters(&ray, &hit, &mut surface.normal) } else { None };
+        let parameters =
+            if MAPS { resolved.parameters(&ray, &hit, &mut surface.normal) } else { None };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;
@@ -413,7 +442,8 @@ fn process_hits_with<const MAPS: bool>(
             state.throughput *= (-state.absorption * ((hit.t - ray.t_min) * length)).exp();
         }
         if record && transparent && state.kind == RayKind::Camera {
-            let shown = surface.opacity > 0.0 && surface.opacity >= context.options.depth_min_opacity;
+            let shown =
+                surface.opacity > 0.0 && surface.opacity >= context.options.depth_min_opacity;
             if shown && !out.is_recorded(state.slot) {
                 out.record(context, area, state.slot, &ray, &hit, || surface.normal);
             }
@@ -426,7 +456,8 @@ fn process_hits_with<const MAPS: bool>(
         work.points.push(Point {
             surface,
             view: ray.dir * (-1.0 / length),
-            radiance: radiance + parameters.map_or(resolved.material.emission.into(), |v| v.emission),
+            radiance: radiance
+                + parameters.map_or(resolved.material.emission.into(), |v| v.emission),
             t: hit.t,
             lane: i as u32,
             instance: hit.instance,
@@ -457,7 +488,8 @@ fn add_miss(
         RayKind::Reflected | RayKind::Refracted => context.surroundings(dir),
         RayKind::Diffuse => {
             let environment = context.scene.environment.as_ref();
-            context.ambient + environment.map_or(Vec3::ZERO, |e| e.radiance(dir.normalize_or_zero()))
+            context.ambient
+                + environment.map_or(Vec3::ZERO, |e| e.radiance(dir.normalize_or_zero()))
         }
     };
     let added = state.throughput * radiance;
@@ -488,7 +520,16 @@ fn add_light(
     let Workspace { current, points, parameters, light_rays, occlusion, .. } = work;
     if !context.lights.is_empty() {
         let cost = cost.as_deref_mut();
-        direct::add_direct_light(context, area, points, parameters, &current.states, light_rays, stats, cost);
+        direct::add_direct_light(
+            context,
+            area,
+            points,
+            parameters,
+            &current.states,
+            light_rays,
+            stats,
+            cost,
+        );
     }
     if context.irradiance.is_some() && !context.effects.contains(Effects::PATH_TRACING) {
         ambient_occlusion::add_ambient_light(
@@ -551,14 +592,17 @@ fn spawn_rays(
         }
     }
     if let Some(cost) = out.cost_mut() {
-        for s in work.behind.states[before_behind..].iter().chain(&work.scattered.states[before_scattered..])
+        for s in work.behind.states[before_behind..]
+            .iter()
+            .chain(&work.scattered.states[before_scattered..])
         {
             cost[s.slot as usize] += 1.0;
         }
     }
 }
 
-/// Continues rays behind transparent surfaces: the same ray with a later start, so that packets stay packets.
+/// Continues rays behind transparent surfaces: the same ray with a later start, so that packets
+/// stay packets.
 fn spawn_transparent_rays(context: &FrameContext<'_>, work: &mut Workspace, stats: &mut RayStats) {
     for p in work.points.iter().filter(|p| p.surface.opacity < 1.0) {
         let state = work.current.states[p.lane as usize];

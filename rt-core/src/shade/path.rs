@@ -1,5 +1,6 @@
-//! Path tracing (Kajiya 1986): one continued ray per point, chosen with the probabilities of the material's lobes; lamps by shadow
-//! rays at every point, environment and emission by hitting them. No light is counted twice: lamps have no surface to be hit.
+//! Path tracing (Kajiya 1986): one continued ray per point, chosen with the probabilities of the
+//! material's lobes; lamps by shadow rays at every point, environment and emission by hitting them.
+//! No light is counted twice: lamps have no surface to be hit.
 
 use super::frame_context::FrameContext;
 use super::lobes::pbr_transmitted;
@@ -22,9 +23,15 @@ const ROULETTE_FROM: u16 = 4;
 /// would not do above ρ = 0.975, this one does up to 0.9995.
 const MOST_SURVIVAL: f32 = 1.0 - 1.0 / 1024.0;
 
-/// Whether the path scatters at `p` rather than passing through it: by chance, with the surface's opacity.
+/// Whether the path scatters at `p` rather than passing through it: by chance, with the surface's
+/// opacity.
 #[inline]
-pub(super) fn scatters(context: &FrameContext<'_>, area: &TileArea, state: &RayState, p: &Point) -> bool {
+pub(super) fn scatters(
+    context: &FrameContext<'_>,
+    area: &TileArea,
+    state: &RayState,
+    p: &Point,
+) -> bool {
     p.surface.opacity >= 1.0 || choice(context, area, state)[0] < p.surface.opacity
 }
 
@@ -52,11 +59,14 @@ pub(super) fn continue_paths(
             continue;
         }
         let model = p.model::<true>(context, &work.parameters);
-        let Some((dir, weight, mut next)) = scatter(context, area, p, model, &state) else { continue };
+        let Some((dir, weight, mut next)) = scatter(context, area, p, model, &state) else {
+            continue;
+        };
         let mut throughput = state.throughput * weight;
         if state.bounce >= ROULETTE_FROM {
             let survive = throughput.max_element().min(MOST_SURVIVAL);
-            let [_, u] = choice(context, area, &RayState { stream: state.stream ^ 0x2545_f491, ..state });
+            let [_, u] =
+                choice(context, area, &RayState { stream: state.stream ^ 0x2545_f491, ..state });
             if u >= survive {
                 continue;
             }
@@ -86,15 +96,19 @@ fn scatter(
 ) -> Option<(Vec3, Vec3, RayState)> {
     let sampler = area.sampler(context, state.slot);
     let u = sampler.square(state.stream.wrapping_add(SampleDimension::SCATTER));
-    // The first number of this pair decided about opacity; stretch what is left of it to a fresh one.
+    // The first number of this pair decided about opacity; stretch what is left of it to a fresh
+    // one.
     let [_, lobe] = choice(context, area, state);
     let material = context.instances[p.instance as usize].material;
     let color = p.surface.color;
     let n = facing(p);
     let kind = |kind| RayState { kind, ..*state };
     let diffuse = |weight: Vec3| {
-        let n =
-            if matches!(material.sides, crate::material::Sides::LitOutside) { p.surface.normal } else { n };
+        let n = if matches!(material.sides, crate::material::Sides::LitOutside) {
+            p.surface.normal
+        } else {
+            n
+        };
         let (s, t) = orthonormal_basis(n);
         let d = cosine_hemisphere(u);
         let dir = s * d.x + t * d.y + n * d.z;
@@ -113,7 +127,8 @@ fn scatter(
         SurfaceModel::Unlit => None,
         SurfaceModel::Matte => diffuse(color),
         SurfaceModel::Phong { diffuse: kd, mirror, .. } => {
-            // The highlight is for lamps only: it is no physical lobe, and has no share of indirect light.
+            // The highlight is for lamps only: it is no physical lobe, and has no share of indirect
+            // light.
             let matte = color * kd;
             let total = mirror + matte.max_element();
             if total <= 0.0 {
@@ -129,7 +144,8 @@ fn scatter(
         SurfaceModel::Metal { roughness } => gloss(color, roughness, 1.0),
         SurfaceModel::Pbr { metallic, roughness, specular, .. } => {
             let f0 = Vec3::splat(specular).lerp(color, metallic);
-            let at_view = schlick(f0, n.dot(p.view)).max_element() * (f0 != Vec3::ZERO) as u32 as f32;
+            let at_view =
+                schlick(f0, n.dot(p.view)).max_element() * (f0 != Vec3::ZERO) as u32 as f32;
             let matte = color * (1.0 - metallic);
             let transmitted = pbr_transmitted(specular, n.dot(p.view));
             let total = at_view + (matte * transmitted).max_element();

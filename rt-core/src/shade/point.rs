@@ -27,7 +27,8 @@ pub(crate) struct Point {
 pub(super) const NO_PARAMETERS: u32 = u32::MAX;
 
 impl Point {
-    /// What differs from the material here. `MAPS`: whether anything in the wave does; code for waves in which nothing does is made without the question.
+    /// What differs from the material here. `MAPS`: whether anything in the wave does; code for
+    /// waves in which nothing does is made without the question.
     #[inline(always)]
     pub(super) fn parameters<'v, const MAPS: bool>(
         &self,

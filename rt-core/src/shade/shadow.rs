@@ -1,5 +1,6 @@
-//! Which light rays arrive. Opaque instances end a ray: the any-hit kernels say whether one is in the way. Only what is left of the rays is
-//! taken through the instances that may let light through, layer by layer.
+//! Which light rays arrive. Opaque instances end a ray: the any-hit kernels say whether one is in
+//! the way. Only what is left of the rays is taken through the instances that may let light
+//! through, layer by layer.
 
 use super::frame_context::FrameContext;
 use super::microfacet::fresnel_dielectric;
@@ -38,7 +39,8 @@ pub(crate) fn trace_light_rays(
     coherence: Coherence,
     mut arrived: impl FnMut(u32, Vec3),
 ) -> LightRayCounts {
-    let mut counts = LightRayCounts { rays: rays.targets.len() as u64, ..LightRayCounts::default() };
+    let mut counts =
+        LightRayCounts { rays: rays.targets.len() as u64, ..LightRayCounts::default() };
     if rays.targets.is_empty() {
         return counts;
     }
@@ -91,12 +93,18 @@ pub(crate) fn trace_light_rays(
         }
     }
 
-    // ---- The others through their layers; transmittance is a product, so only the set of layers matters.
+    // ---- The others through their layers; transmittance is a product, so only the set of layers
+    // matters.
     while open > 0 {
         counts.closest += open as u64;
         rays.hits.clear();
         rays.hits.resize(rays.blocks.len(), HitBlock::MISS);
-        world.closest_stream(&rays.blocks, &mut rays.hits, coherence, InstanceFilter::Marked(marks));
+        world.closest_stream(
+            &rays.blocks,
+            &mut rays.hits,
+            coherence,
+            InstanceFilter::Marked(marks),
+        );
         open = 0;
         for i in 0..rays.targets.len() {
             let (block, lane) = (&mut rays.blocks[i / LANES], i % LANES);
@@ -107,7 +115,13 @@ pub(crate) fn trace_light_rays(
             let behind = rays.hits[i / LANES].get(lane).and_then(|hit| {
                 counts.lookups += 1;
                 let resolved = context.instance_at(&hit);
-                states[i].pass(context, resolved.material, &resolved.surface(&ray, &hit), &ray, hit.t)
+                states[i].pass(
+                    context,
+                    resolved.material,
+                    &resolved.surface(&ray, &hit),
+                    &ray,
+                    hit.t,
+                )
             });
             match behind {
                 Some(t_min) => {
@@ -129,7 +143,8 @@ pub(crate) fn trace_light_rays(
     counts
 }
 
-/// A light ray on its way through layers; transmittance is a product, so only the set of layers matters.
+/// A light ray on its way through layers; transmittance is a product, so only the set of layers
+/// matters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LightRayState {
     transmittance: Vec3,
@@ -147,8 +162,11 @@ impl LightRayState {
     /// right, are followed until nothing is left.
     pub(crate) fn new(context: &FrameContext<'_>, radiance: Vec3) -> LightRayState {
         let exact = context.effects.contains(Effects::PATH_TRACING);
-        let cutoff =
-            if exact { 0.0 } else { context.options.min_contribution / radiance.max_element().max(1.0) };
+        let cutoff = if exact {
+            0.0
+        } else {
+            context.options.min_contribution / radiance.max_element().max(1.0)
+        };
         LightRayState {
             transmittance: Vec3::ONE,
             optical_depth: Vec3::ZERO,
@@ -177,8 +195,15 @@ impl LightRayState {
         t: f32,
     ) -> Option<f32> {
         self.hit = true;
-        let behind =
-            pass(context, material, surface, ray, t, &mut self.transmittance, &mut self.optical_depth);
+        let behind = pass(
+            context,
+            material,
+            surface,
+            ray,
+            t,
+            &mut self.transmittance,
+            &mut self.optical_depth,
+        );
         let goes_on = self.transmittance.max_element() > self.cutoff && behind < ray.t_max;
         self.continued += goes_on as u32;
         goes_on.then_some(behind)
@@ -188,14 +213,18 @@ impl LightRayState {
     pub(crate) fn result(&self) -> LightRayResult {
         let LightRayState { transmittance, optical_depth, hit, continued, cutoff } = *self;
         let followed = transmittance.max_element() > cutoff;
-        let transmittance =
-            if followed { transmittance * (-optical_depth.max(Vec3::ZERO)).exp() } else { Vec3::ZERO };
+        let transmittance = if followed {
+            transmittance * (-optical_depth.max(Vec3::ZERO)).exp()
+        } else {
+            Vec3::ZERO
+        };
         LightRayResult { transmittance, hit, continued }
     }
 }
 
-/// Light through `surface`, met at `t`: multiplies `transmittance`, adds to the optical `optical_depth`, and returns where the ray goes on. Light is
-/// taken straight through dielectrics (no caustics): Fresnel loss at each interface and absorption in between.
+/// Light through `surface`, met at `t`: multiplies `transmittance`, adds to the optical
+/// `optical_depth`, and returns where the ray goes on. Light is taken straight through dielectrics
+/// (no caustics): Fresnel loss at each interface and absorption in between.
 fn pass(
     context: &FrameContext<'_>,
     material: &Material,
@@ -206,7 +235,9 @@ fn pass(
     optical_depth: &mut Vec3,
 ) -> f32 {
     match material.model {
-        SurfaceModel::Dielectric { ior, absorption } if context.effects.contains(Effects::REFRACTION) => {
+        SurfaceModel::Dielectric { ior, absorption }
+            if context.effects.contains(Effects::REFRACTION) =>
+        {
             let length = length(ray.dir);
             let cos = surface.face_normal.dot(ray.dir).abs() / length;
             let eta = if surface.outside { 1.0 / ior } else { ior };
@@ -220,7 +251,9 @@ fn pass(
             let sign = if surface.outside { -1.0 } else { 1.0 };
             *optical_depth += Vec3::from(absorption) * (sign * t * length);
         }
-        _ if context.effects.contains(Effects::TRANSPARENCY) => *transmittance *= 1.0 - surface.opacity,
+        _ if context.effects.contains(Effects::TRANSPARENCY) => {
+            *transmittance *= 1.0 - surface.opacity
+        }
         _ => *transmittance = Vec3::ZERO,
     }
     surface.t_behind(ray, t)

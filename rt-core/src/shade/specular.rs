@@ -1,7 +1,10 @@
-//! Mirror, gloss and glass: the rays of Whitted (1980), with microfacet directions for gloss (Cook, Porter and Carpenter 1984).
+//! Mirror, gloss and glass: the rays of Whitted (1980), with microfacet directions for gloss (Cook,
+//! Porter and Carpenter 1984).
 
 use super::frame_context::FrameContext;
-use super::microfacet::{fresnel_dielectric, masking_ratio, refract, sample_visible_normal, schlick};
+use super::microfacet::{
+    fresnel_dielectric, masking_ratio, refract, sample_visible_normal, schlick,
+};
 use super::wavefront::{RayKind, RayState, Wavefront};
 use super::{Point, SampleDimension, TileArea, Workspace};
 use crate::effects::Effects;
@@ -47,18 +50,48 @@ pub(super) fn spawn_specular_rays(
         }
         match *p.model::<true>(context, &work.parameters) {
             SurfaceModel::Phong { mirror: share, .. } if share > 0.0 && mirror => {
-                reflect_at(context, p, facing(p), weight * share, &state, &mut work.scattered, stats);
+                reflect_at(
+                    context,
+                    p,
+                    facing(p),
+                    weight * share,
+                    &state,
+                    &mut work.scattered,
+                    stats,
+                );
             }
             SurfaceModel::Metal { roughness } => {
                 let f0 = p.surface.color;
                 if sent(roughness) {
-                    reflect_lobe(context, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
+                    reflect_lobe(
+                        context,
+                        area,
+                        p,
+                        f0,
+                        roughness,
+                        weight,
+                        &state,
+                        &mut work.scattered,
+                        stats,
+                    );
                 }
             }
-            SurfaceModel::Pbr { metallic, roughness, specular, .. } if metallic > 0.0 || specular > 0.0 => {
+            SurfaceModel::Pbr { metallic, roughness, specular, .. }
+                if metallic > 0.0 || specular > 0.0 =>
+            {
                 let f0 = Vec3::splat(specular).lerp(p.surface.color, metallic);
                 if sent(roughness) {
-                    reflect_lobe(context, area, p, f0, roughness, weight, &state, &mut work.scattered, stats);
+                    reflect_lobe(
+                        context,
+                        area,
+                        p,
+                        f0,
+                        roughness,
+                        weight,
+                        &state,
+                        &mut work.scattered,
+                        stats,
+                    );
                 }
             }
             SurfaceModel::Dielectric { ior, absorption } if e.contains(Effects::REFRACTION) => {
@@ -66,13 +99,30 @@ pub(super) fn spawn_specular_rays(
                 if let Some(t) = through {
                     let next = RayState { absorption: t.medium, kind: RayKind::Refracted, ..state };
                     let throughput = weight * p.surface.color * t.share;
-                    stats.refraction +=
-                        spawn_ray(context, p, t.dir, throughput, next, 2, &mut work.scattered, stats);
+                    stats.refraction += spawn_ray(
+                        context,
+                        p,
+                        t.dir,
+                        throughput,
+                        next,
+                        2,
+                        &mut work.scattered,
+                        stats,
+                    );
                 }
-                // Total internal reflection belongs to refraction: without it, glass would leak light.
+                // Total internal reflection belongs to refraction: without it, glass would leak
+                // light.
                 if mirror || reflected == 1.0 {
                     let n = facing(p);
-                    reflect_at(context, p, n, weight * reflected, &state, &mut work.scattered, stats);
+                    reflect_at(
+                        context,
+                        p,
+                        n,
+                        weight * reflected,
+                        &state,
+                        &mut work.scattered,
+                        stats,
+                    );
                 }
             }
             _ => {}
@@ -146,7 +196,9 @@ fn reflect_lobe(
     if roughness <= MIRROR_ROUGHNESS {
         return reflect_at(context, p, n, weight * schlick(f0, n.dot(p.view)), state, wave, stats);
     }
-    let u = area.sampler(context, state.slot).square(state.stream.wrapping_add(SampleDimension::SCATTER));
+    let u = area
+        .sampler(context, state.slot)
+        .square(state.stream.wrapping_add(SampleDimension::SCATTER));
     if let Some((dir, share)) = sample_lobe(p, n, f0, roughness, u) {
         let next = RayState { kind: RayKind::Reflected, ..*state };
         stats.reflection += spawn_ray(context, p, dir, weight * share, next, 1, wave, stats);
@@ -155,7 +207,13 @@ fn reflect_lobe(
 
 /// A direction of the GGX lobe and its weight.
 #[inline]
-pub(super) fn sample_lobe(p: &Point, n: Vec3, f0: Vec3, roughness: f32, u: [f32; 2]) -> Option<(Vec3, Vec3)> {
+pub(super) fn sample_lobe(
+    p: &Point,
+    n: Vec3,
+    f0: Vec3,
+    roughness: f32,
+    u: [f32; 2],
+) -> Option<(Vec3, Vec3)> {
     let alpha = roughness * roughness;
     let (s, t) = orthonormal_basis(n);
     let v = Vec3::new(s.dot(p.view), t.dot(p.view), n.dot(p.view));

@@ -23,7 +23,8 @@ pub(crate) struct TileArea {
 }
 
 impl TileArea {
-    /// Pixel of a slot. Slots follow a Morton curve: 16 of them are 4 x 4 pixels, so a block of rays is as square as can be.
+    /// Pixel of a slot. Slots follow a Morton curve: 16 of them are 4 x 4 pixels, so a block of
+    /// rays is as square as can be.
     #[inline]
     pub(crate) fn pixel(&self, slot: u16) -> Option<[u32; 2]> {
         let (x, y) = (even_bits(slot), even_bits(slot >> 1));
@@ -37,7 +38,8 @@ impl TileArea {
             let (mut table, mut v) = ([0; TILE as usize], 0);
             while v < table.len() {
                 let v16 = v as u16;
-                table[v] = v16 & 1 | (v16 & 2) << 1 | (v16 & 4) << 2 | (v16 & 8) << 3 | (v16 & 16) << 4;
+                table[v] =
+                    v16 & 1 | (v16 & 2) << 1 | (v16 & 4) << 2 | (v16 & 8) << 3 | (v16 & 16) << 4;
                 v += 1;
             }
             table
@@ -115,8 +117,14 @@ impl TileLayers {
         self.color.fill([0.0; 4]);
     }
 
-    /// As new, in the same memory; false when other layers are wanted. Sums are not cleared: the first sample replaces them.
-    pub(crate) fn reset(&mut self, layers: Layers, background_depth: f32, estimate_error: bool) -> bool {
+    /// As new, in the same memory; false when other layers are wanted. Sums are not cleared: the
+    /// first sample replaces them.
+    pub(crate) fn reset(
+        &mut self,
+        layers: Layers,
+        background_depth: f32,
+        estimate_error: bool,
+    ) -> bool {
         if self.made_for != (layers, estimate_error) {
             return false;
         }
@@ -153,7 +161,8 @@ impl TileLayers {
         self.recorded[i] = true;
         if !self.depth.is_empty() || !self.distance.is_empty() {
             let [x, y] = area.pixel(slot).unwrap_or_default();
-            let (depth, distance) = context.depth_and_distance(context.ndc(x, y, [0.5; 2]), ray, hit);
+            let (depth, distance) =
+                context.depth_and_distance(context.ndc(x, y, [0.5; 2]), ray, hit);
             if let Some(d) = self.depth.get_mut(i) {
                 *d = depth;
             }
@@ -169,8 +178,15 @@ impl TileLayers {
         }
     }
 
-    /// Fills the geometry layers of a pixel with what somebody else has found there: depth and distance, normal, instance and primitive.
-    pub(crate) fn record_given(&mut self, slot: u16, numbers: [f32; 2], normal: Vec3, ids: [u32; 2]) {
+    /// Fills the geometry layers of a pixel with what somebody else has found there: depth and
+    /// distance, normal, instance and primitive.
+    pub(crate) fn record_given(
+        &mut self,
+        slot: u16,
+        numbers: [f32; 2],
+        normal: Vec3,
+        ids: [u32; 2],
+    ) {
         let i = slot as usize;
         // There are no marks when no geometry layer is wanted.
         if let Some(r) = self.recorded.get_mut(i) {

@@ -26,7 +26,10 @@ pub(super) fn integrate_volumes(
 ) -> VolumeSample {
     object_rays.clear();
     object_rays.extend(
-        context.volumes.iter().map(|(_, object_from_render)| in_object_space(ray, object_from_render)),
+        context
+            .volumes
+            .iter()
+            .map(|(_, object_from_render)| in_object_space(ray, object_from_render)),
     );
     let quality = &context.options.volume_quality;
     if let [(volume, _)] = context.volumes[..] {

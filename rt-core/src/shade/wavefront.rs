@@ -72,7 +72,8 @@ impl Wavefront {
     }
 }
 
-/// Rays towards light, each with the point and the radiance it brings there if nothing is in the way.
+/// Rays towards light, each with the point and the radiance it brings there if nothing is in the
+/// way.
 #[derive(Default)]
 pub(crate) struct LightRays {
     pub(crate) blocks: Vec<RayBlock>,
@@ -155,7 +156,8 @@ impl LightRays {
     /// Writes the batch down for somebody else to trace.
     pub(crate) fn record(&mut self) {
         let OcclusionSource::Recording(list) = &mut self.source else { return };
-        for (i, (&(point, radiance), &number)) in self.targets.iter().zip(&self.numbers).enumerate() {
+        for (i, (&(point, radiance), &number)) in self.targets.iter().zip(&self.numbers).enumerate()
+        {
             let ray = self.blocks[i / LANES].get(i % LANES);
             list.push(RecordedRay { ray, point: self.first_point + point, number, radiance });
         }

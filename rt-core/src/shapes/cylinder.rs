@@ -1,18 +1,20 @@
-//! Cylinders and truncated cones with flat, capped or open ends: what OpenGL's quadrics, VTK's glyphs and arrows are made of.
+//! Cylinders and truncated cones with flat, capped or open ends: what OpenGL's quadrics, VTK's
+//! glyphs and arrows are made of.
 
 use super::error::{check_count, check_length};
 use super::frustum::{End, Frustum};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
-    rounded_point,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range,
+    outward_box, picked, rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Cylinders between pairs of points; with two radii, truncated cones (a radius of 0 makes a full cone). Open ones show
-/// their inside. `u` of a hit is the position along the axis (0 to 1), `v` is 1 on a cap and 0 on the side.
+/// Cylinders between pairs of points; with two radii, truncated cones (a radius of 0 makes a full
+/// cone). Open ones show their inside. `u` of a hit is the position along the axis (0 to 1), `v` is
+/// 1 on a cap and 0 on the side.
 #[derive(Debug, Clone)]
 pub struct Cylinders {
     origin: DVec3,
@@ -25,10 +27,17 @@ pub struct Cylinders {
 }
 
 impl Cylinders {
-    /// Cylinder i goes from `points[2i]` to `points[2i + 1]`; the radius is common or given per point.
+    /// Cylinder i goes from `points[2i]` to `points[2i + 1]`; the radius is common or given per
+    /// point.
     pub fn new(points: Vec<Vec3>, radii: Radii, capped: bool) -> Result<Self, ShapeError> {
         check_count("cylinders", points.len() / 2)?;
-        check_length("cylinders", "points", "end of a cylinder", points.len() / 2 * 2, points.len())?;
+        check_length(
+            "cylinders",
+            "points",
+            "end of a cylinder",
+            points.len() / 2 * 2,
+            points.len(),
+        )?;
         radii.check("cylinders", "point", points.len())?;
         Ok(Cylinders { origin: DVec3::ZERO, points, radii, capped, scalars: None, colors: None })
     }
@@ -138,7 +147,8 @@ impl Shape for Cylinders {
         if !usable {
             return Aabb::EMPTY;
         }
-        // A disc of radius r across the unit vector e reaches r·√(1 − e_i²) along axis i; the sum form does not cancel near 1.
+        // A disc of radius r across the unit vector e reaches r·√(1 − e_i²) along axis i; the sum
+        // form does not cancel near 1.
         let e2 = (c.v / c.v.length()).powf(2.0);
         let disc = DVec3::new(e2.y + e2.z, e2.x + e2.z, e2.x + e2.y).map(f64::sqrt);
         let b = c.a + c.v;
@@ -185,7 +195,8 @@ impl Shape for Cylinders {
             let z = z.clamp(0.0, length);
             (c.a + z * e + (c.ra - slope * z) * outward, (outward + slope * e).normalize())
         };
-        let (point, point_error) = rounded_point(on_surface, 8.0 * f64::EPSILON * (length + c.ra.max(c.rb)));
+        let (point, point_error) =
+            rounded_point(on_surface, 8.0 * f64::EPSILON * (length + c.ra.max(c.rb)));
         let w = (z / length).clamp(0.0, 1.0) as f32;
         let (i, j) = (2 * prim as usize, 2 * prim as usize + 1);
         let mix = |a: f32, b: f32| a + (b - a) * w;

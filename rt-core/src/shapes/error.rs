@@ -29,7 +29,8 @@ pub enum ShapeError {
     },
     /// The offsets of the polylines do not describe consecutive runs of points.
     #[error(
-        "tubes: offsets[{index}] is {value}; offsets start at 0, never decrease and end at the number of points, {points}"
+        "tubes: offsets[{index}] is {value}; offsets start at 0, never decrease and end at the \
+         number of points, {points}"
     )]
     Offsets {
         /// Where in the offsets.
@@ -40,7 +41,9 @@ pub enum ShapeError {
         points: usize,
     },
     /// A grid without cells.
-    #[error("{shape}: the grid has {dims} points; it needs at least 2 along each axis to have cells")]
+    #[error(
+        "{shape}: the grid has {dims} points; it needs at least 2 along each axis to have cells"
+    )]
     NoCells {
         /// Which shape.
         shape: &'static str,
@@ -70,8 +73,9 @@ pub struct ShapeReport {
     pub non_finite: usize,
     /// Left out: a negative radius, or nothing but radii of zero.
     pub no_radius: usize,
-    /// Rendered, but degenerate: tube segments of zero length or with one end inside the other (drawn as one sphere),
-    /// polylines of a single point (no segment at all), cylinders of zero length (left out).
+    /// Rendered, but degenerate: tube segments of zero length or with one end inside the other
+    /// (drawn as one sphere), polylines of a single point (no segment at all), cylinders of zero
+    /// length (left out).
     pub degenerate: usize,
 }
 
@@ -89,7 +93,11 @@ pub(super) fn check_length(
     expected: usize,
     found: usize,
 ) -> Result<(), ShapeError> {
-    if found == expected { Ok(()) } else { Err(ShapeError::Length { shape, field, per, expected, found }) }
+    if found == expected {
+        Ok(())
+    } else {
+        Err(ShapeError::Length { shape, field, per, expected, found })
+    }
 }
 
 pub(super) fn check_count(shape: &'static str, found: usize) -> Result<(), ShapeError> {

@@ -1,9 +1,11 @@
-//! Where a line is inside the lateral surface of a truncated cone, between two planes across its axis: the common part of
-//! [`super::Tubes`] (round ends) and [`super::Cylinders`] (flat or open ends).
+//! Where a line is inside the lateral surface of a truncated cone, between two planes across its
+//! axis: the common part of [`super::Tubes`] (round ends) and [`super::Cylinders`] (flat or open
+//! ends).
 
 use glam::DVec3;
 
-/// A solid of revolution around the axis through a point `a` along `v`: points p with z₀ ≤ (p−a)·v ≤ z₁ and
+/// A solid of revolution around the axis through a point `a` along `v`: points p with z₀ ≤ (p−a)·v
+/// ≤ z₁ and
 /// |(p−a) × v| ≤ w_a + w_z·(p−a)·v. Everything is scaled by |v|, so that nothing needs normalising.
 pub(super) struct Frustum {
     pub(super) v: DVec3,
@@ -22,10 +24,12 @@ pub(super) struct End {
 }
 
 impl Frustum {
-    /// The interval of the line `q + t·d` (`q` relative to the frustum's point `a`) inside the solid.
+    /// The interval of the line `q + t·d` (`q` relative to the frustum's point `a`) inside the
+    /// solid.
     ///
-    /// The lateral surface is f(t) = |P + t·D|² − (W₀ + t·W₁)² = 0 with P = q × v and D = d × v. Written with cross products, the
-    /// radius of a tube a million times longer than thick keeps ten digits; expanded into |p|²|v|² − (p·v)² it keeps four.
+    /// The lateral surface is f(t) = |P + t·D|² − (W₀ + t·W₁)² = 0 with P = q × v and D = d × v.
+    /// Written with cross products, the radius of a tube a million times longer than thick keeps
+    /// ten digits; expanded into |p|²|v|² − (p·v)² it keeps four.
     #[inline]
     pub(super) fn interval(&self, q: DVec3, d: DVec3) -> Option<[End; 2]> {
         // Between the planes.
@@ -40,8 +44,9 @@ impl Frustum {
             if x < y { (x, y) } else { (y, x) }
         };
 
-        // The parabola f, expanded around the point of the slab that is nearest to its vertex: there the constant term is the
-        // difference of two nearly equal lengths and nothing larger, however far the ray's origin is.
+        // The parabola f, expanded around the point of the slab that is nearest to its vertex:
+        // there the constant term is the difference of two nearly equal lengths and nothing larger,
+        // however far the ray's origin is.
         let (p, dd) = (q.cross(self.v), d.cross(self.v));
         let w0 = self.w_a + self.w_z * qv;
         let w1 = self.w_z * dv;
@@ -81,10 +86,15 @@ impl Frustum {
                 if a > 0.0 {
                     (side(x.min(y)), side(x.max(y)))
                 } else if a < 0.0 {
-                    // Steeper than the cone: inside before the first root (one nappe) and after the second (the other). The slab
-                    // holds one nappe only; take the part it has more of.
+                    // Steeper than the cone: inside before the first root (one nappe) and after the
+                    // second (the other). The slab holds one nappe only; take the part it has more
+                    // of.
                     let (lo, hi) = (s + x.min(y), s + x.max(y));
-                    if lo - ta > tb - hi { (plane(ta), side(x.min(y))) } else { (side(x.max(y)), plane(tb)) }
+                    if lo - ta > tb - hi {
+                        (plane(ta), side(x.min(y)))
+                    } else {
+                        (side(x.max(y)), plane(tb))
+                    }
                 } else if b > 0.0 {
                     (plane(ta), side(y))
                 } else {

@@ -1,9 +1,12 @@
-//! Isosurfaces of a uniform grid without any geometry: rays meet the trilinear interpolant itself (thesis chapter 6; Parker et al. 1998).
+//! Isosurfaces of a uniform grid without any geometry: rays meet the trilinear interpolant itself
+//! (thesis chapter 6; Parker et al. 1998).
 //!
-//! Primitives are the blocks of cells (bricks) that contain part of a surface. Inside a brick a ray walks from cell to cell
-//! ([`crate::grid_walk`]) and finds the first root of the cubic along it ([`crate::ray_cubic`], Marmitt et al. 2004). Neighbouring cells,
-//! also in different bricks, evaluate the same value with the same bits at the same point of their common face, and a change of sign between
-//! a cell's ends always yields a root: a ray cannot pass a closed surface between two cells.
+//! Primitives are the blocks of cells (bricks) that contain part of a surface. Inside a brick a ray
+//! walks from cell to cell ([`crate::grid_walk`]) and finds the first root of the cubic along it
+//! ([`crate::ray_cubic`], Marmitt et al. 2004). Neighbouring cells, also in different bricks,
+//! evaluate the same value with the same bits at the same point of their common face, and a change
+//! of sign between a cell's ends always yields a root: a ray cannot pass a closed surface between
+//! two cells.
 //!
 //! "Inside" is value ≥ isovalue: a plateau exactly at the isovalue is solid, not a thick surface.
 
@@ -20,18 +23,20 @@ use std::sync::Arc;
 /// Where normals come from. Both point to smaller values.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum IsosurfaceNormals {
-    /// The gradient of the trilinear interpolant: exactly the surface that is hit, so it shows the cells' edges.
+    /// The gradient of the trilinear interpolant: exactly the surface that is hit, so it shows the
+    /// cells' edges.
     #[default]
     Surface,
-    /// Central differences at the grid points, interpolated (as contouring programs do): smooth, but not the normal of the surface
-    /// at grazing angles.
+    /// Central differences at the grid points, interpolated (as contouring programs do): smooth,
+    /// but not the normal of the surface at grazing angles.
     Smooth,
 }
 
 /// How to make an [`Isosurface`].
 #[derive(Debug, Clone, Copy)]
 pub struct IsosurfaceOptions {
-    /// Cells per edge of a brick, 1 to 255: smaller ones fit the surface closer and take more memory.
+    /// Cells per edge of a brick, 1 to 255: smaller ones fit the surface closer and take more
+    /// memory.
     pub brick_cells: u32,
     /// Where normals come from.
     pub normals: IsosurfaceNormals,
@@ -60,7 +65,8 @@ pub struct IsosurfaceReport {
     pub isovalues_out_of_range: usize,
 }
 
-/// The surfaces value = isovalue of a grid, for one or several isovalues. `u` of a hit is the number of its isovalue, `v` is 0.
+/// The surfaces value = isovalue of a grid, for one or several isovalues. `u` of a hit is the
+/// number of its isovalue, `v` is 0.
 ///
 /// ```
 /// use rt_core::{grid::Grid, ray::Ray, shapes::{Isosurface, Shape}, glam::{DVec3, UVec3, Vec3}};
@@ -104,7 +110,11 @@ struct Root {
 
 impl Isosurface {
     /// Surfaces of `grid` at `isovalues`.
-    pub fn new(grid: Arc<Grid>, isovalues: &[f32], options: &IsosurfaceOptions) -> Result<Self, ShapeError> {
+    pub fn new(
+        grid: Arc<Grid>,
+        isovalues: &[f32],
+        options: &IsosurfaceOptions,
+    ) -> Result<Self, ShapeError> {
         const SHAPE: &str = "isosurface";
         if grid.dims.min_element() < 2 {
             return Err(ShapeError::NoCells { shape: SHAPE, dims: grid.dims });
@@ -119,11 +129,21 @@ impl Isosurface {
             });
         }
         if let Some(&value) = isovalues.iter().find(|v| !v.is_finite()) {
-            return Err(ShapeError::Value { shape: SHAPE, field: "isovalue", value, rule: "finite" });
+            return Err(ShapeError::Value {
+                shape: SHAPE,
+                field: "isovalue",
+                value,
+                rule: "finite",
+            });
         }
         if !(1..=255).contains(&options.brick_cells) {
             let value = options.brick_cells as f32;
-            return Err(ShapeError::Value { shape: SHAPE, field: "brick_cells", value, rule: "1 to 255" });
+            return Err(ShapeError::Value {
+                shape: SHAPE,
+                field: "brick_cells",
+                value,
+                rule: "1 to 255",
+            });
         }
 
         let cells = grid.dims - UVec3::ONE;
@@ -163,8 +183,8 @@ impl Isosurface {
         })
     }
 
-    /// Takes the scalar for the colour map from another grid, sampled at the hit (outside it, at its nearest point). Without
-    /// it, the scalar is the isovalue.
+    /// Takes the scalar for the colour map from another grid, sampled at the hit (outside it, at
+    /// its nearest point). Without it, the scalar is the isovalue.
     pub fn with_color_by(self, grid: Arc<Grid>) -> Self {
         Isosurface { color_by: Some(grid), ..self }
     }
@@ -211,7 +231,8 @@ impl Isosurface {
                 continue;
             }
             let (p, q) = positions.get_or_insert_with(|| ray.fractions(crossing, 1));
-            // Differences first: f32 values minus an f32 are exact in f64 unless 2²⁹ apart, so the sign at grid points is right.
+            // Differences first: f32 values minus an f32 are exact in f64 unless 2²⁹ apart, so the
+            // sign at grid points is right.
             let iso = f64::from(iso);
             let b = ray_cubic::along(&corners.map(|v| f64::from(v) - iso), p, q);
             // A ray that starts exactly on the surface touches it there, whichever way it goes.
@@ -222,7 +243,10 @@ impl Isosurface {
                 best = Some((u, n));
             }
         }
-        best.map(|(u, isovalue)| Root { t: crossing.t0 + u * (crossing.t1 - crossing.t0), isovalue })
+        best.map(|(u, isovalue)| Root {
+            t: crossing.t0 + u * (crossing.t1 - crossing.t0),
+            isovalue,
+        })
     }
 }
 
@@ -254,13 +278,16 @@ fn scan(grid: &Grid, isovalues: &[f32], lo: UVec3, hi: UVec3) -> BlockScan {
         }
     }
     if s.active > 0 {
-        s.block = Some(CellBlock { lo: first.to_array(), size: (last - first).to_array().map(|n| n as u8) });
+        s.block = Some(CellBlock {
+            lo: first.to_array(),
+            size: (last - first).to_array().map(|n| n as u8),
+        });
     }
     s
 }
 
-/// Central differences (one-sided at the border) at the corners of the cell around the continuous index `p`, interpolated;
-/// in value per world unit. NaN where a neighbour is.
+/// Central differences (one-sided at the border) at the corners of the cell around the continuous
+/// index `p`, interpolated; in value per world unit. NaN where a neighbour is.
 pub(crate) fn smooth_gradient(grid: &Grid, p: Vec3) -> Vec3 {
     let (cell, f) = grid.cell_of(p);
     let mut sum = Vec3::ZERO;
@@ -309,7 +336,11 @@ impl Shape for Isosurface {
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
         // The root again in f64, in the few ulps around the reported parameter.
-        let near = Ray { t_min: hit.t.next_down().max(ray.t_min), t_max: hit.t.next_up().next_up(), ..*ray };
+        let near = Ray {
+            t_min: hit.t.next_down().max(ray.t_min),
+            t_max: hit.t.next_up().next_up(),
+            ..*ray
+        };
         let root = self.first(prim, &near);
         let t = root.as_ref().map_or(f64::from(hit.t), |r| r.t);
         let isovalue = root.map_or(hit.u as usize, |r| r.isovalue).min(self.isovalues.len() - 1);
@@ -320,7 +351,8 @@ impl Shape for Isosurface {
         let terms = (0..3)
             .map(|a| (index_ray.o[a].abs() + (t * index_ray.d[a]).abs()) * self.grid.spacing[a])
             .fold(0.0, f64::max);
-        let (point, point_error) = rounded_point(index * self.grid.spacing, 8.0 * f64::EPSILON * terms);
+        let (point, point_error) =
+            rounded_point(index * self.grid.spacing, 8.0 * f64::EPSILON * terms);
         let at = index.as_vec3();
         let gradient = match self.normals {
             IsosurfaceNormals::Surface => self.grid.gradient(at),
@@ -330,10 +362,16 @@ impl Shape for Isosurface {
         let normal = (-gradient.as_dvec3()).normalize_or(-ray.dir.as_dvec3().normalize_or_zero());
         let scalar = match &self.color_by {
             None => self.isovalues[isovalue],
-            Some(g) => {
-                g.value(((self.grid.origin - g.origin + index * self.grid.spacing) / g.spacing).as_vec3())
-            }
+            Some(g) => g.value(
+                ((self.grid.origin - g.origin + index * self.grid.spacing) / g.spacing).as_vec3(),
+            ),
         };
-        ShapeSurface { point, point_error, normal: normal.as_vec3(), scalar: Some(scalar), color: None }
+        ShapeSurface {
+            point,
+            point_error,
+            normal: normal.as_vec3(),
+            scalar: Some(scalar),
+            color: None,
+        }
     }
 }

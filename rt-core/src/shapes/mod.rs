@@ -1,4 +1,5 @@
-//! Geometry that is not a triangle mesh: anything that can bound its primitives and intersect a ray with one of them.
+//! Geometry that is not a triangle mesh: anything that can bound its primitives and intersect a ray
+//! with one of them.
 
 mod cylinder;
 mod error;
@@ -33,7 +34,8 @@ pub struct ShapeHit {
 /// A point on a shape, for shading and for starting secondary rays; in the shape's object space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeSurface {
-    /// The point, projected back onto the surface so that its error does not grow with the ray's length.
+    /// The point, projected back onto the surface so that its error does not grow with the ray's
+    /// length.
     pub point: Vec3,
     /// Bound on the distance between `point` and the true surface.
     pub point_error: f32,
@@ -47,8 +49,8 @@ pub struct ShapeSurface {
 
 /// Geometry made of primitives numbered `0..num_primitives()`: the door for user-defined geometry.
 ///
-/// Object space is f32 relative to [`Shape::origin`]. Implementations must be deterministic: the same ray and primitive
-/// give the same bits every time.
+/// Object space is f32 relative to [`Shape::origin`]. Implementations must be deterministic: the
+/// same ray and primitive give the same bits every time.
 pub trait Shape: Send + Sync {
     /// How many primitives.
     fn num_primitives(&self) -> usize;
@@ -58,7 +60,8 @@ pub trait Shape: Send + Sync {
         DVec3::ZERO
     }
 
-    /// A box that contains primitive `prim`. An empty or non-finite box leaves the primitive out (it is counted).
+    /// A box that contains primitive `prim`. An empty or non-finite box leaves the primitive out
+    /// (it is counted).
     fn bounds(&self, prim: u32) -> Aabb;
 
     /// The first intersection of `ray` with primitive `prim` within `[t_min, t_max)`.
@@ -72,21 +75,23 @@ pub trait Shape: Send + Sync {
     /// The surface at a hit this shape reported for `ray`.
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface;
 
-    /// Whether [`Shape::surface`] may return a colour with alpha below 1. Asked once, when a scene is made: shapes that say no are not looked
-    /// through, and a hit on one whose colour does have alpha is drawn opaque and counted in
-    /// [`crate::ray_stats::RayStats::opacity_ignored`].
+    /// Whether [`Shape::surface`] may return a colour with alpha below 1. Asked once, when a scene
+    /// is made: shapes that say no are not looked through, and a hit on one whose colour does have
+    /// alpha is drawn opaque and counted in [`crate::ray_stats::RayStats::opacity_ignored`].
     fn has_transparency(&self) -> bool {
         false
     }
 
-    /// A shape of these primitives alone (ascending numbers of this one's, in that order) that holds no others' data, with the same bits in all its answers.
-    /// `None` when the data cannot be cut: who holds some primitives then holds the whole.
+    /// A shape of these primitives alone (ascending numbers of this one's, in that order) that
+    /// holds no others' data, with the same bits in all its answers. `None` when the data cannot be
+    /// cut: who holds some primitives then holds the whole.
     fn part(&self, _primitives: &[u32]) -> Option<Arc<dyn Shape>> {
         None
     }
 
-    /// For a shape that only gives another one's hits a new look: that other shape. Its primitives, bounds and hits must be the same; then a world made
-    /// from one that has it ([`crate::bvh::World::build_sharing`]) takes over its tree.
+    /// For a shape that only gives another one's hits a new look: that other shape. Its primitives,
+    /// bounds and hits must be the same; then a world made from one that has it
+    /// ([`crate::bvh::World::build_sharing`]) takes over its tree.
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {
         None
     }
@@ -128,7 +133,12 @@ impl Radii {
         }
     }
 
-    fn check(&self, shape: &'static str, per: &'static str, expected: usize) -> Result<(), ShapeError> {
+    fn check(
+        &self,
+        shape: &'static str,
+        per: &'static str,
+        expected: usize,
+    ) -> Result<(), ShapeError> {
         match self {
             Radii::Common(_) => Ok(()),
             Radii::Each(r) => error::check_length(shape, "radii", per, expected, r.len()),
@@ -136,8 +146,9 @@ impl Radii {
     }
 }
 
-/// Splits f64 positions into an origin and f32 offsets from it, so that small detail far from zero survives. The origin is
-/// the middle of the finite positions, or zero when they straddle it (then nothing is lost by f32 offsets from zero).
+/// Splits f64 positions into an origin and f32 offsets from it, so that small detail far from zero
+/// survives. The origin is the middle of the finite positions, or zero when they straddle it (then
+/// nothing is lost by f32 offsets from zero).
 pub fn relative_positions(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for p in points.iter().filter(|p| p.is_finite()) {
@@ -150,25 +161,30 @@ pub fn relative_positions(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
     (origin, points.iter().map(|p| (*p - origin).as_vec3()).collect())
 }
 
-/// The box with corners `lo` and `hi` in f64, rounded outwards to f32; empty when a corner is not finite.
+/// The box with corners `lo` and `hi` in f64, rounded outwards to f32; empty when a corner is not
+/// finite.
 pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
     let (min, max) = (lo.as_vec3(), hi.as_vec3());
     if !(min.is_finite() && max.is_finite()) {
         return Aabb::EMPTY;
     }
-    // One step beyond the rounded value: a box that merely touches its surface invites rays through the gap of one ulp
-    // that a traversal's own rounding leaves (notes of the watertight triangle tests).
+    // One step beyond the rounded value: a box that merely touches its surface invites rays through
+    // the gap of one ulp that a traversal's own rounding leaves (notes of the watertight triangle
+    // tests).
     Aabb::new(
         Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down()),
         Vec3::new(max.x.next_up(), max.y.next_up(), max.z.next_up()),
     )
 }
 
-/// `p` rounded to f32 and a bound on its distance from the true surface, when `p` itself is off by at most `error`.
+/// `p` rounded to f32 and a bound on its distance from the true surface, when `p` itself is off by
+/// at most `error`.
 pub(crate) fn rounded_point(p: DVec3, error: f64) -> (Vec3, f32) {
     let point = p.as_vec3();
-    // Each component moved by at most half an ulp (2⁻²⁴ relative); √3 of them together, and f32::MIN_POSITIVE for subnormals.
-    let rounding = 3f64.sqrt() * (-24f64).exp2() * p.abs().max_element() + f64::from(f32::MIN_POSITIVE);
+    // Each component moved by at most half an ulp (2⁻²⁴ relative); √3 of them together, and
+    // f32::MIN_POSITIVE for subnormals.
+    let rounding =
+        3f64.sqrt() * (-24f64).exp2() * p.abs().max_element() + f64::from(f32::MIN_POSITIVE);
     (point, ((rounding + error) as f32).next_up())
 }
 

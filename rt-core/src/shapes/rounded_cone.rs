@@ -1,12 +1,15 @@
 //! A rounded cone: the convex hull of two spheres, one segment of a tube.
 //!
-//! Geometry in the half plane (z along the axis, ρ away from it), with L the distance of the centres and sin α = (r_a − r_b)/L: the
-//! common tangent has the normal (sin α, cos α); it touches the spheres at z = r_a sin α and z = L + r_b sin α. The signed distance is that
-//! to sphere a before the tangent's foot, to the tangent line between, to sphere b behind (own derivation; the same body as in Han, Wald, Usher,
-//! Wu, Wang, Pascucci, Hansen and Johnson, "Ray Tracing Generalized Tube Primitives", EuroVis 2019, section 3, and Quilez' `sdRoundCone`).
+//! Geometry in the half plane (z along the axis, ρ away from it), with L the distance of the
+//! centres and sin α = (r_a − r_b)/L: the common tangent has the normal (sin α, cos α); it touches
+//! the spheres at z = r_a sin α and z = L + r_b sin α. The signed distance is that to sphere a
+//! before the tangent's foot, to the tangent line between, to sphere b behind (own derivation; the
+//! same body as in Han, Wald, Usher, Wu, Wang, Pascucci, Hansen and Johnson, "Ray Tracing
+//! Generalized Tube Primitives", EuroVis 2019, section 3, and Quilez' `sdRoundCone`).
 //!
-//! A ray is intersected with three convex solids that cover the hull, the two spheres and the truncated cone between the two tangent
-//! circles, and the hull's interval is the union of theirs. As the cone's flat ends lie inside the spheres, there is no seam for a ray to slip through.
+//! A ray is intersected with three convex solids that cover the hull, the two spheres and the
+//! truncated cone between the two tangent circles, and the hull's interval is the union of theirs.
+//! As the cone's flat ends lie inside the spheres, there is no seam for a ray to slip through.
 
 use super::frustum::Frustum;
 use super::sphere::ray_sphere;
@@ -58,13 +61,16 @@ impl RoundedCone {
         let dr = self.ra - self.rb;
         let vv = self.v.length_squared();
         if vv <= dr * dr {
-            let (c, r, part) =
-                if dr >= 0.0 { (oa, self.ra, Part::Start) } else { (oa + self.v, self.rb, Part::End) };
+            let (c, r, part) = if dr >= 0.0 {
+                (oa, self.ra, Part::Start)
+            } else {
+                (oa + self.v, self.rb, Part::End)
+            };
             return ray_sphere(c, d, dd, r).map(|(t0, t1)| [(t0, part), (t1, part)]);
         }
 
-        // Most rays that meet the box of a thin diagonal segment pass it: compare the distance of the two lines, unless they are
-        // so parallel that their common normal is only rounding.
+        // Most rays that meet the box of a thin diagonal segment pass it: compare the distance of
+        // the two lines, unless they are so parallel that their common normal is only rounding.
         let n = d.cross(self.v);
         let nn = n.length_squared();
         let r_max = self.ra.max(self.rb);
@@ -118,7 +124,11 @@ impl RoundedCone {
         let dr = self.ra - self.rb;
         let length = self.v.length();
         if length <= dr.abs() {
-            return if dr >= 0.0 { sphere(q, self.ra, 0.0) } else { sphere(q - self.v, self.rb, 1.0) };
+            return if dr >= 0.0 {
+                sphere(q, self.ra, 0.0)
+            } else {
+                sphere(q - self.v, self.rb, 1.0)
+            };
         }
         let e = self.v / length;
         let sin = dr / length;

@@ -1,14 +1,15 @@
 //! Spheres: particles, glyphs, atoms.
 //!
-//! The quadratic is solved in f64 from f32 input with the discriminant as r²·d² − |d × oc|², the form that does not subtract two
-//! large squares (Haines, Günther and Akenine-Möller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems ch. 7,
-//! eq. 5, which goes back to Hearn and Baker), and the second root from the product of the roots. Products of f32 coordinates are exact
-//! in f64, so a sphere a million radii away is hit to 10⁻¹⁰ of its radius.
+//! The quadratic is solved in f64 from f32 input with the discriminant as r²·d² − |d × oc|², the
+//! form that does not subtract two large squares (Haines, Günther and Akenine-Möller, "Precision
+//! Improvements for Ray/Sphere Intersection", Ray Tracing Gems ch. 7, eq. 5, which goes back to
+//! Hearn and Baker), and the second root from the product of the roots. Products of f32 coordinates
+//! are exact in f64, so a sphere a million radii away is hit to 10⁻¹⁰ of its radius.
 
 use super::error::{check_count, check_length};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
-    rounded_point,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range,
+    outward_box, picked, rounded_point,
 };
 use crate::math::Aabb;
 use crate::ray::Ray;
@@ -26,14 +27,16 @@ pub struct Spheres {
 }
 
 impl Spheres {
-    /// Spheres around `centers`, which are relative to the origin (zero unless [`Spheres::with_origin`] moves it).
+    /// Spheres around `centers`, which are relative to the origin (zero unless
+    /// [`Spheres::with_origin`] moves it).
     pub fn new(centers: Vec<Vec3>, radii: Radii) -> Result<Self, ShapeError> {
         check_count("spheres", centers.len())?;
         radii.check("spheres", "sphere", centers.len())?;
         Ok(Spheres { origin: DVec3::ZERO, centers, radii, scalars: None, colors: None })
     }
 
-    /// Spheres around f64 world positions, stored relative to their middle: see [`super::relative_positions`].
+    /// Spheres around f64 world positions, stored relative to their middle: see
+    /// [`super::relative_positions`].
     pub fn from_f64_centers(centers: &[DVec3], radii: Radii) -> Result<Self, ShapeError> {
         let (origin, centers) = super::relative_positions(centers);
         Ok(Spheres::new(centers, radii)?.with_origin(origin))
@@ -122,7 +125,8 @@ impl Shape for Spheres {
         let i = prim as usize;
         let (o, d, t) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), f64::from(hit.t));
         let (center, radius) = (self.centers[i].as_dvec3(), f64::from(self.radii.get(i)));
-        // The root in f64 again: the rounding of `hit.t` would tilt the normal of a small sphere far away.
+        // The root in f64 again: the rounding of `hit.t` would tilt the normal of a small sphere
+        // far away.
         let t = match self.roots(prim, ray) {
             Some((near, far)) => {
                 if (near - t).abs() <= (far - t).abs() {
@@ -134,7 +138,8 @@ impl Shape for Spheres {
             None => t,
         };
         let normal = (o + d * t - center).normalize_or(-d.normalize());
-        let (point, point_error) = rounded_point(center + radius * normal, 4.0 * f64::EPSILON * radius);
+        let (point, point_error) =
+            rounded_point(center + radius * normal, 4.0 * f64::EPSILON * radius);
         ShapeSurface {
             point,
             point_error,
@@ -145,7 +150,8 @@ impl Shape for Spheres {
     }
 }
 
-/// Where the line `t·d` meets the sphere of radius `r` around `oc`, the nearer parameter first. `dd` is d·d.
+/// Where the line `t·d` meets the sphere of radius `r` around `oc`, the nearer parameter first.
+/// `dd` is d·d.
 #[inline]
 pub(super) fn ray_sphere(oc: DVec3, d: DVec3, dd: f64, r: f64) -> Option<(f64, f64)> {
     // |d × oc|²/d² is the squared distance of centre and line: no square of the distance travelled is subtracted.

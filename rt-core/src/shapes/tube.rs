@@ -1,16 +1,19 @@
-//! Tubes: polylines with a radius at every point, drawn as round, joined, untessellated solids (streamlines, field lines, fibres).
+//! Tubes: polylines with a radius at every point, drawn as round, joined, untessellated solids
+//! (streamlines, field lines, fibres).
 //!
-//! Each segment is one primitive, a [rounded cone](super::rounded_cone). Neighbours share the sphere at their joint, so the union has no
-//! gaps. What of a segment's surface lies inside its neighbours is not reported, so a polyline is one solid: a ray through a bend has one entry and one
-//! exit, also for transparent tubes and rays that start inside. Different polylines, and a polyline that crosses itself, interpenetrate.
+//! Each segment is one primitive, a [rounded cone](super::rounded_cone). Neighbours share the
+//! sphere at their joint, so the union has no gaps. What of a segment's surface lies inside its
+//! neighbours is not reported, so a polyline is one solid: a ray through a bend has one entry and
+//! one exit, also for transparent tubes and rays that start inside. Different polylines, and a
+//! polyline that crosses itself, interpenetrate.
 //!
 //! Memory: 20 bytes a point with radii and scalars, 4 bytes a segment.
 
 use super::error::{check_count, check_length};
 use super::rounded_cone::{Part, RoundedCone};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range, outward_box, picked,
-    rounded_point,
+    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range,
+    outward_box, picked, rounded_point,
 };
 use crate::bvh::ShapePart;
 use crate::math::Aabb;
@@ -18,8 +21,8 @@ use crate::ray::Ray;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Polylines as tubes. `u` of a hit runs from 0 at a segment's first point to 1 at its second, linearly along the cone and constant on
-/// the round ends; `v` is 0.
+/// Polylines as tubes. `u` of a hit runs from 0 at a segment's first point to 1 at its second,
+/// linearly along the cone and constant on the round ends; `v` is 0.
 ///
 /// ```
 /// use rt_core::{glam::Vec3, ray::Ray, shapes::{Radii, Shape, Tubes}};
@@ -42,13 +45,14 @@ pub struct Tubes {
     single_points: usize,
 }
 
-/// How many neighbours on each side are looked at for a hit's being inside them: enough for segments down to 1/32 of
-/// the radius; beyond that, a transparent bend may show an inner surface.
+/// How many neighbours on each side are looked at for a hit's being inside them: enough for
+/// segments down to 1/32 of the radius; beyond that, a transparent bend may show an inner surface.
 const NEIGHBOURS: usize = 32;
 
 impl Tubes {
-    /// Tubes around polylines: line i uses the points `offsets[i]..offsets[i + 1]` (as VTK's cell arrays do), so
-    /// `offsets` starts at 0 and ends at `points.len()`. Radii are common or one per point, and vary linearly.
+    /// Tubes around polylines: line i uses the points `offsets[i]..offsets[i + 1]` (as VTK's cell
+    /// arrays do), so `offsets` starts at 0 and ends at `points.len()`. Radii are common or one per
+    /// point, and vary linearly.
     pub fn new(points: Vec<Vec3>, offsets: &[u32], radii: Radii) -> Result<Self, ShapeError> {
         check_count("tubes", points.len())?;
         radii.check("tubes", "point", points.len())?;
@@ -69,11 +73,24 @@ impl Tubes {
         let mut segments = Vec::with_capacity(lines().map(|l| l.len().saturating_sub(1)).sum());
         segments.extend(lines().flat_map(|l| l.start..l.end.saturating_sub(1).max(l.start)));
         let single_points = lines().filter(|l| l.len() == 1).count();
-        Ok(Tubes { origin: DVec3::ZERO, points, radii, scalars: None, colors: None, segments, single_points })
+        Ok(Tubes {
+            origin: DVec3::ZERO,
+            points,
+            radii,
+            scalars: None,
+            colors: None,
+            segments,
+            single_points,
+        })
     }
 
-    /// Tubes around f64 world positions, stored relative to their middle: see [`super::relative_positions`].
-    pub fn from_f64_points(points: &[DVec3], offsets: &[u32], radii: Radii) -> Result<Self, ShapeError> {
+    /// Tubes around f64 world positions, stored relative to their middle: see
+    /// [`super::relative_positions`].
+    pub fn from_f64_points(
+        points: &[DVec3],
+        offsets: &[u32],
+        radii: Radii,
+    ) -> Result<Self, ShapeError> {
         let (origin, points) = super::relative_positions(points);
         Ok(Tubes::new(points, offsets, radii)?.with_origin(origin))
     }
@@ -139,7 +156,8 @@ impl Tubes {
         finite && ra >= 0.0 && rb >= 0.0 && ra.max(rb) > 0.0 && ra.max(rb) < f32::INFINITY
     }
 
-    /// The renderable segment that ends where `prim` begins (`step` −1) or begins where it ends (+1).
+    /// The renderable segment that ends where `prim` begins (`step` −1) or begins where it ends
+    /// (+1).
     #[inline]
     fn neighbour(&self, prim: usize, step: isize) -> Option<usize> {
         let other = prim.checked_add_signed(step)?;
@@ -151,7 +169,8 @@ impl Tubes {
     fn is_hidden(&self, prim: usize, p: DVec3, rounding: f64) -> bool {
         let own = self.cone(prim);
         let reach = 2.0 * own.ra.max(own.rb);
-        // Inside by a margin, so that where two segments' surfaces cross, rounding cannot make each hide the other.
+        // Inside by a margin, so that where two segments' surfaces cross, rounding cannot make each
+        // hide the other.
         let margin = 1e-9 * own.ra.max(own.rb) + rounding;
         for step in [-1, 1] {
             let (mut at, mut walked) = (prim, 0.0);
@@ -181,7 +200,8 @@ impl Tubes {
             if !in_range(reported, ray) {
                 continue;
             }
-            // The sphere at a joint belongs to the segment that ends there; otherwise it would be reported twice.
+            // The sphere at a joint belongs to the segment that ends there; otherwise it would be
+            // reported twice.
             if part == Part::Start && self.neighbour(prim, -1).is_some() {
                 continue;
             }
@@ -229,7 +249,8 @@ impl Shape for Tubes {
         any_alpha(&self.colors)
     }
 
-    /// Holds, beside the segments asked for, those of the same line that may hide something of them.
+    /// Holds, beside the segments asked for, those of the same line that may hide something of
+    /// them.
     fn part(&self, primitives: &[u32]) -> Option<Arc<dyn Shape>> {
         let (mut points, mut segments, mut local) = (Vec::new(), Vec::new(), Vec::new());
         let asked = primitives.iter().map(|&p| p as usize).filter(|&p| p < self.segments.len());
@@ -273,7 +294,8 @@ impl Shape for Tubes {
         let p = o + d * t;
         let n = cone.nearest(p);
         let extent = cone.v.length() + cone.ra.max(cone.rb);
-        let (point, point_error) = rounded_point(p - n.distance * n.normal, 8.0 * f64::EPSILON * extent);
+        let (point, point_error) =
+            rounded_point(p - n.distance * n.normal, 8.0 * f64::EPSILON * extent);
         let i = self.segments[prim as usize] as usize;
         let w = n.along as f32;
         let mix = |a: f32, b: f32| a + (b - a) * w;

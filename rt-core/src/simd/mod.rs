@@ -13,7 +13,8 @@ use fearless_simd::Level;
 pub(crate) use prefetch::{prefetch, prefetch_item};
 pub(crate) use stack::{Stack, StackMemory};
 
-/// An instruction set the kernels can be limited to, for tests and for measurements against peers at the same level.
+/// An instruction set the kernels can be limited to, for tests and for measurements against peers
+/// at the same level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
     /// 128-bit, the x86-64 baseline.

@@ -10,7 +10,8 @@ pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let p = units.as_ptr().wrapping_add(first).cast::<i8>();
         for line in 0..LINES {
-            // SAFETY: a prefetch reads nothing the program can see and cannot fault, wherever it points.
+            // SAFETY: a prefetch reads nothing the program can see and cannot fault, wherever it
+            // points.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(p.wrapping_add(64 * line)) }
         }
     }

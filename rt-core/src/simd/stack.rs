@@ -1,4 +1,5 @@
-//! A fixed-size stack that starts uninitialised: clearing five kilobytes for every ray would cost more than a short traversal.
+//! A fixed-size stack that starts uninitialised: clearing five kilobytes for every ray would cost
+//! more than a short traversal.
 
 use std::mem::MaybeUninit;
 
@@ -14,8 +15,9 @@ impl<T, const N: usize> StackMemory<T, N> {
 
 /// At most `N` entries. Pushing onto a full stack panics: callers bound the depth when they build.
 ///
-/// The length stands apart from the memory so that it stays in a register: inside one struct it lived in memory, and every step of a traversal
-/// waited for the store before it (measured: 10 % of a single ray's time).
+/// The length stands apart from the memory so that it stays in a register: inside one struct it
+/// lived in memory, and every step of a traversal waited for the store before it (measured: 10 % of
+/// a single ray's time).
 pub(crate) struct Stack<'m, T: Copy, const N: usize> {
     len: usize,
     data: &'m mut [MaybeUninit<T>; N],
@@ -39,7 +41,8 @@ impl<'m, T: Copy, const N: usize> Stack<'m, T, N> {
             return None;
         }
         self.len -= 1;
-        // SAFETY: entries below the former `len` have been written by `push`, and `len < N` holds after the decrement.
+        // SAFETY: entries below the former `len` have been written by `push`, and `len < N` holds
+        // after the decrement.
         Some(unsafe { self.data.get_unchecked(self.len).assume_init() })
     }
 
@@ -53,14 +56,16 @@ impl<'m, T: Copy, const N: usize> Stack<'m, T, N> {
         self.len
     }
 
-    /// Orders the entries from `base` up so that the smallest is on top. Insertion sort: there are at most eight, mostly two or three.
+    /// Orders the entries from `base` up so that the smallest is on top. Insertion sort: there are
+    /// at most eight, mostly two or three.
     #[inline(always)]
     pub(crate) fn sort_descending_from(&mut self, base: usize)
     where
         T: PartialOrd,
     {
         // SAFETY: every entry below `len` is initialised.
-        let top = unsafe { std::slice::from_raw_parts_mut(self.data.as_mut_ptr().cast::<T>(), self.len) };
+        let top =
+            unsafe { std::slice::from_raw_parts_mut(self.data.as_mut_ptr().cast::<T>(), self.len) };
         for i in base + 1..top.len() {
             let v = top[i];
             let mut j = i;

@@ -1,5 +1,6 @@
-//! Sixteen three-dimensional vectors at a time. Operations are those of glam's `Vec3`, in the same order and without fused steps, so a lane has the
-//! bits that the same arithmetic on one `Vec3` has, at every instruction set.
+//! Sixteen three-dimensional vectors at a time. Operations are those of glam's `Vec3`, in the same
+//! order and without fused steps, so a lane has the bits that the same arithmetic on one `Vec3`
+//! has, at every instruction set.
 
 use crate::ray::LANES;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, f32x16, mask32x16};
@@ -114,20 +115,30 @@ impl<S: Simd> Vec3x16<S> {
     #[inline(always)]
     pub(crate) fn transformed(self, simd: S, m: &Mat3) -> Self {
         let column = |c: Vec3| Self::splat(simd, c);
-        column(m.x_axis).scale(self.x).add(column(m.y_axis).scale(self.y)).add(column(m.z_axis).scale(self.z))
+        column(m.x_axis)
+            .scale(self.x)
+            .add(column(m.y_axis).scale(self.y))
+            .add(column(m.z_axis).scale(self.z))
     }
 
     /// `self` where `mask` is set, `o` elsewhere.
     #[inline(always)]
     pub(crate) fn or_else(self, mask: mask32x16<S>, o: Self) -> Self {
-        Vec3x16 { x: mask.select(self.x, o.x), y: mask.select(self.y, o.y), z: mask.select(self.z, o.z) }
+        Vec3x16 {
+            x: mask.select(self.x, o.x),
+            y: mask.select(self.y, o.y),
+            z: mask.select(self.z, o.z),
+        }
     }
 
     /// As `Vec3::try_normalize`: unit vectors, and where that worked.
     #[inline(always)]
     pub(crate) fn try_normalize(self, simd: S) -> (Self, mask32x16<S>) {
         let r = f32x16::splat(simd, 1.0) / self.dot(self).sqrt();
-        (self.scale(r), r.simd_gt(f32x16::splat(simd, 0.0)) & r.simd_lt(f32x16::splat(simd, f32::INFINITY)))
+        (
+            self.scale(r),
+            r.simd_gt(f32x16::splat(simd, 0.0)) & r.simd_lt(f32x16::splat(simd, f32::INFINITY)),
+        )
     }
 }
 
@@ -148,8 +159,11 @@ mod tests {
             rows
         };
         let (a, b) = (some(), some());
-        let m =
-            Mat3::from_cols(Vec3::new(1.5, -0.3, 0.1), Vec3::new(0.2, 0.7, -2.0), Vec3::new(0.4, 3.1, 0.9));
+        let m = Mat3::from_cols(
+            Vec3::new(1.5, -0.3, 0.1),
+            Vec3::new(0.2, 0.7, -2.0),
+            Vec3::new(0.4, 3.1, 0.9),
+        );
         dispatch!(Level::new(), simd => {
             let (va, vb) = (Vec3x16::load(simd, &a), Vec3x16::load(simd, &b));
             let mut out = [Rows3::ZERO; 3];

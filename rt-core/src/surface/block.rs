@@ -1,8 +1,10 @@
 //! What local lighting needs of sixteen hits at once.
 //!
-//! Memory is the larger part of it: a hit names a triangle, the triangle three vertices, each of them a position and its attributes. The values of sixteen hits are read
-//! into rows first, so that sixteen waits overlap, and then the arithmetic of [`ResolvedInstance::shading_point`] runs on all lanes, with the same bits. Lanes that need f64 (tiny or
-//! huge triangles, normals that cannot be normalised) are left to `shading_point` itself.
+//! Memory is the larger part of it: a hit names a triangle, the triangle three vertices, each of
+//! them a position and its attributes. The values of sixteen hits are read into rows first, so that
+//! sixteen waits overlap, and then the arithmetic of [`ResolvedInstance::shading_point`] runs on
+//! all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that cannot
+//! be normalised) are left to `shading_point` itself.
 
 use super::{ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
 use crate::material::{ColorSource, Sides};
@@ -74,7 +76,8 @@ impl ResolvedInstance<'_> {
         }
     }
 
-    /// Starts loading what [`ResolvedInstance::shading_point_block`] will read of the triangle `prim`'s vertices.
+    /// Starts loading what [`ResolvedInstance::shading_point_block`] will read of the triangle
+    /// `prim`'s vertices.
     #[inline]
     pub(crate) fn prefetch_vertices(&self, prim: u32) {
         if let Source::Mesh(mesh) = self.source {
@@ -92,7 +95,8 @@ impl ResolvedInstance<'_> {
         }
     }
 
-    /// [`ResolvedInstance::shading_point`] for the hits whose bits are set in `lanes`, all of them on this instance; other lanes of `out` hold anything.
+    /// [`ResolvedInstance::shading_point`] for the hits whose bits are set in `lanes`, all of them
+    /// on this instance; other lanes of `out` hold anything.
     pub(crate) fn shading_point_block<S: Simd, const POINT: bool>(
         &self,
         simd: S,
@@ -115,7 +119,8 @@ impl ResolvedInstance<'_> {
         }
     }
 
-    /// [`ResolvedInstance::plane`] for the hits whose bits are set in `lanes`, all of them on this instance.
+    /// [`ResolvedInstance::plane`] for the hits whose bits are set in `lanes`, all of them on this
+    /// instance.
     pub(crate) fn plane_block<S: Simd>(
         &self,
         simd: S,
@@ -246,7 +251,8 @@ impl ResolvedInstance<'_> {
                 let mut s = match normals.per {
                     PerElement::Vertex => {
                         let p = gather3(simd, &normals.values, &corners[0]).scale(weights[0]);
-                        let p = p.add(gather3(simd, &normals.values, &corners[1]).scale(weights[1]));
+                        let p =
+                            p.add(gather3(simd, &normals.values, &corners[1]).scale(weights[1]));
                         p.add(gather3(simd, &normals.values, &corners[2]).scale(weights[2]))
                     }
                     PerElement::Face => gather3(simd, &normals.values, &prims),
@@ -266,9 +272,10 @@ impl ResolvedInstance<'_> {
         let back = shading.neg();
         let (normal, drawn) = match self.material.sides {
             Sides::Both => (shading.or_else(outside, back), mask32x16::splat(simd, true)),
-            Sides::BothByNormal => {
-                (shading.or_else(shading.dot(dir).simd_le(zero), back), mask32x16::splat(simd, true))
-            }
+            Sides::BothByNormal => (
+                shading.or_else(shading.dot(dir).simd_le(zero), back),
+                mask32x16::splat(simd, true),
+            ),
             Sides::LitOutside => (shading, mask32x16::splat(simd, true)),
             Sides::FrontOnly => (shading, outside),
             Sides::BackOnly => (back, !outside),
@@ -319,7 +326,8 @@ impl ResolvedInstance<'_> {
             },
             ColorSource::Texture(_) => {
                 for lane in 0..LANES {
-                    let corner = [corners[0][lane], corners[1][lane], corners[2][lane]].map(|k| k as usize);
+                    let corner =
+                        [corners[0][lane], corners[1][lane], corners[2][lane]].map(|k| k as usize);
                     let w = [weights[0][lane], weights[1][lane], weights[2][lane]];
                     let color = self.mesh_color(mesh, corner, prims[lane], w);
                     for c in 0..4 {

@@ -1,8 +1,9 @@
 //! From a hit to a point that can be shaded and that rays can start from.
 //!
-//! The point comes from the primitive (barycentric coordinates in f64), not from the ray, so its error does not grow with the ray's
-//! length. It carries a bound of 4 ulp of the largest vertex coordinate; a secondary ray starts that far off the surface along the
-//! face normal. Measured over 16 million rays on spheres of radius 1e-4 to 1e4 up to 1800 radii from the origin: 1 ulp leaves
+//! The point comes from the primitive (barycentric coordinates in f64), not from the ray, so its
+//! error does not grow with the ray's length. It carries a bound of 4 ulp of the largest vertex
+//! coordinate; a secondary ray starts that far off the surface along the face normal. Measured over
+//! 16 million rays on spheres of radius 1e-4 to 1e4 up to 1800 radii from the origin: 1 ulp leaves
 //! 0.1-0.4 % of false self-shadows, 2 ulp 1e-6, 4 ulp none. There is no global epsilon.
 
 mod block;
@@ -79,25 +80,31 @@ pub(crate) struct ShadingPoint {
     pub(crate) opacity: f32,
 }
 
-/// Squared lengths of face normals that f32 can work with: beyond, products of lengths may vanish or overflow.
+/// Squared lengths of face normals that f32 can work with: beyond, products of lengths may vanish
+/// or overflow.
 const ORDINARY_NORMAL_SQUARED: std::ops::Range<f32> = 1e-30..1e30;
 
 impl SurfacePoint {
     /// Start of a ray that leaves in direction `dir`, on the right side of the surface.
     #[inline]
     pub(crate) fn ray_origin(&self, dir: Vec3) -> Vec3 {
-        let side = if dir.dot(self.face_normal) >= 0.0 { self.point_error } else { -self.point_error };
+        let side =
+            if dir.dot(self.face_normal) >= 0.0 { self.point_error } else { -self.point_error };
         self.point + self.face_normal * side
     }
 
-    /// Smallest parameter for continuing `ray`, which met this point at `t`, behind it. Surfaces nearer to each other than their
-    /// error bounds are one surface (that of the lowest id), so an edge shared by two triangles is met once.
+    /// Smallest parameter for continuing `ray`, which met this point at `t`, behind it. Surfaces
+    /// nearer to each other than their error bounds are one surface (that of the lowest id), so an
+    /// edge shared by two triangles is met once.
     #[inline]
     pub(crate) fn t_behind(&self, ray: &Ray, t: f32) -> f32 {
         let length = length(ray.dir);
-        // Error of the point, of the ray's own arithmetic, and of a t this large, across the surface ...
-        let across = 4.0 * self.point_error + 4.0 * f32::EPSILON * (max_abs(ray.origin) + t.abs() * length);
-        // ... is longer along a grazing ray; 2^-10 keeps an exactly edge-on ray from skipping everything behind.
+        // Error of the point, of the ray's own arithmetic, and of a t this large, across the
+        // surface ...
+        let across =
+            4.0 * self.point_error + 4.0 * f32::EPSILON * (max_abs(ray.origin) + t.abs() * length);
+        // ... is longer along a grazing ray; 2^-10 keeps an exactly edge-on ray from skipping
+        // everything behind.
         let cos = (self.face_normal.dot(ray.dir).abs() / length).max(1.0 / 1024.0);
         (t + across / (length * cos)).max(t.next_up())
     }
@@ -134,8 +141,9 @@ impl<'a> ResolvedInstance<'a> {
             normal_from_object: (!identity).then(|| {
                 let n = linear.inverse().transpose();
                 // Scaled to order one, so that f32 holds it for any unit of length.
-                let size =
-                    [n.x_axis, n.y_axis, n.z_axis].iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
+                let size = [n.x_axis, n.y_axis, n.z_axis]
+                    .iter()
+                    .fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
                 (n * size.recip()).as_mat3()
             }),
             winding: linear.determinant().signum(),
@@ -153,20 +161,31 @@ impl<'a> ResolvedInstance<'a> {
         }
     }
 
-    /// What local lighting needs of the point that `ray` met, where no other ray will start: on meshes in f32 wherever the triangle's
-    /// size allows it, and without `POINT` the point is left out. [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
+    /// What local lighting needs of the point that `ray` met, where no other ray will start: on
+    /// meshes in f32 wherever the triangle's size allows it, and without `POINT` the point is left
+    /// out. [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
     #[inline]
     pub(crate) fn shading_point<const POINT: bool>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         match self.source {
             Source::Mesh(mesh) => self.mesh_shading_point::<POINT>(mesh, ray, hit),
             Source::Shape(shape) => {
                 let s = self.shape_surface(shape, ray, hit);
-                ShadingPoint { point: s.point, normal: s.normal, color: s.color, opacity: s.opacity }
+                ShadingPoint {
+                    point: s.point,
+                    normal: s.normal,
+                    color: s.color,
+                    opacity: s.opacity,
+                }
             }
         }
     }
 
-    fn mesh_shading_point<const POINT: bool>(&self, mesh: &TriMesh, ray: &Ray, hit: &Hit) -> ShadingPoint {
+    fn mesh_shading_point<const POINT: bool>(
+        &self,
+        mesh: &TriMesh,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> ShadingPoint {
         let corner = mesh.indices[hit.prim as usize].map(|k| k as usize);
         let [a, b, c] = corner.map(|k| mesh.positions[k]);
         let (u, v) = (hit.u, hit.v);
@@ -185,7 +204,8 @@ impl<'a> ResolvedInstance<'a> {
         } else {
             n * (1.0 / squared.sqrt())
         };
-        let shading = smooth.map_or(outward, |s| self.shading_normal(s, corner, hit.prim, weights, outward));
+        let shading =
+            smooth.map_or(outward, |s| self.shading_normal(s, corner, hit.prim, weights, outward));
         let point = if POINT { self.moved_point(a, e1 * u + e2 * v) } else { Vec3::ZERO };
         let (_, normal, drawn) = self.turned(outward, shading, ray.dir);
         let [r, g, b, alpha] = self.mesh_color(mesh, corner, hit.prim, weights);
@@ -206,7 +226,8 @@ impl<'a> ResolvedInstance<'a> {
         mesh.normals.as_ref().filter(|_| !self.material.flat)
     }
 
-    /// The render-space point `inside` away from the corner `a` of a triangle, in f32: the small numbers are added first.
+    /// The render-space point `inside` away from the corner `a` of a triangle, in f32: the small
+    /// numbers are added first.
     #[inline(always)]
     fn moved_point(&self, a: Vec3, inside: Vec3) -> Vec3 {
         let shift = self.render_from_object.translation.as_vec3();
@@ -255,7 +276,13 @@ impl<'a> ResolvedInstance<'a> {
     }
 
     #[inline(always)]
-    fn mesh_color(&self, mesh: &TriMesh, corner: [usize; 3], prim: u32, [w, u, v]: [f32; 3]) -> [f32; 4] {
+    fn mesh_color(
+        &self,
+        mesh: &TriMesh,
+        corner: [usize; 3],
+        prim: u32,
+        [w, u, v]: [f32; 3],
+    ) -> [f32; 4] {
         match &self.material.color_source {
             ColorSource::Attribute => self.colors.map(|c| interpolate4(c, corner, prim, [w, u, v])),
             ColorSource::Constant => None,
@@ -280,7 +307,8 @@ impl<'a> ResolvedInstance<'a> {
         .unwrap_or_else(|| self.constant())
     }
 
-    /// Point and unit face normal in f64: no underflow for tiny triangles, no cancellation for distant ones.
+    /// Point and unit face normal in f64: no underflow for tiny triangles, no cancellation for
+    /// distant ones.
     #[inline(always)]
     fn point_and_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, Vec3) {
         let [a, b, c] = corners.map(|p| p.as_dvec3());
@@ -300,7 +328,8 @@ impl<'a> ResolvedInstance<'a> {
         let local_ray = self.object_ray(ray);
         let s = shape.surface(hit.prim, &ShapeHit { t: hit.t, u: hit.u, v: hit.v }, &local_ray);
         let point = self.render_from_object.transform_point3(s.point.as_dvec3());
-        let normal = self.normal_from_object.map_or(s.normal, |m| (m * s.normal).normalize_or_zero());
+        let normal =
+            self.normal_from_object.map_or(s.normal, |m| (m * s.normal).normalize_or_zero());
         let from_attribute = match &self.material.color_source {
             ColorSource::Attribute => match self.colors {
                 Some(c) => c.values.get(hit.prim as usize).copied(),
@@ -314,11 +343,20 @@ impl<'a> ResolvedInstance<'a> {
             ColorSource::Constant | ColorSource::Texture(_) => None,
         };
         let [r, g, b, alpha] = from_attribute.unwrap_or_else(|| self.constant());
-        self.finish(ray, point, max_abs(s.point), s.point_error, normal, normal, Vec3::new(r, g, b), alpha)
+        self.finish(
+            ray,
+            point,
+            max_abs(s.point),
+            s.point_error,
+            normal,
+            normal,
+            Vec3::new(r, g, b),
+            alpha,
+        )
     }
 
-    /// A world-space plane through the surface at the hit, as point and normal in f64, for exact depth: on triangles the plane of
-    /// the triangle, elsewhere the tangent plane.
+    /// A world-space plane through the surface at the hit, as point and normal in f64, for exact
+    /// depth: on triangles the plane of the triangle, elsewhere the tangent plane.
     pub(crate) fn plane(&self, ray: &Ray, hit: &Hit, origin: DVec3) -> (DVec3, DVec3) {
         match self.source {
             Source::Mesh(mesh) => {
@@ -333,9 +371,13 @@ impl<'a> ResolvedInstance<'a> {
             }
             Source::Shape(shape) => {
                 let local_ray = self.object_ray(ray);
-                let s = shape.surface(hit.prim, &ShapeHit { t: hit.t, u: hit.u, v: hit.v }, &local_ray);
+                let s =
+                    shape.surface(hit.prim, &ShapeHit { t: hit.t, u: hit.u, v: hit.v }, &local_ray);
                 let n = self.normal_from_object.map_or(s.normal, |m| m * s.normal);
-                (origin + self.render_from_object.transform_point3(s.point.as_dvec3()), n.as_dvec3())
+                (
+                    origin + self.render_from_object.transform_point3(s.point.as_dvec3()),
+                    n.as_dvec3(),
+                )
             }
         }
     }
@@ -358,7 +400,8 @@ impl<'a> ResolvedInstance<'a> {
         [r, g, b, 1.0]
     }
 
-    /// Whether the ray met the outside, the shading normal turned as the material's sides say, and whether this side is drawn.
+    /// Whether the ray met the outside, the shading normal turned as the material's sides say, and
+    /// whether this side is drawn.
     #[inline(always)]
     fn turned(&self, outward: Vec3, shading: Vec3, dir: Vec3) -> (bool, Vec3, bool) {
         let outside = outward.dot(dir) <= 0.0;
@@ -393,7 +436,8 @@ impl<'a> ResolvedInstance<'a> {
         let ulps = 4.0 * f32::EPSILON;
         let mut point_error = (ulps * coordinates + own_error) * self.stretch;
         if self.moved {
-            // The ray was moved to object space in f32: its error there is some ulp of where it was.
+            // The ray was moved to object space in f32: its error there is some ulp of where it
+            // was.
             point_error += ulps * max_abs(point);
         }
         let (outside, normal, drawn) = self.turned(outward, shading, ray.dir);
@@ -404,7 +448,12 @@ impl<'a> ResolvedInstance<'a> {
 }
 
 #[inline]
-fn interpolate4(a: &Attribute<[f32; 4]>, corner: [usize; 3], prim: u32, [w, u, v]: [f32; 3]) -> [f32; 4] {
+fn interpolate4(
+    a: &Attribute<[f32; 4]>,
+    corner: [usize; 3],
+    prim: u32,
+    [w, u, v]: [f32; 3],
+) -> [f32; 4] {
     match a.per {
         PerElement::Vertex => {
             let [x, y, z] = corner.map(|k| a.values[k]);
@@ -414,7 +463,8 @@ fn interpolate4(a: &Attribute<[f32; 4]>, corner: [usize; 3], prim: u32, [w, u, v
     }
 }
 
-/// A point of a triangle and its normal, of any length, in world space; `moved` when its instance does more than shift it.
+/// A point of a triangle and its normal, of any length, in world space; `moved` when its instance
+/// does more than shift it.
 #[inline(always)]
 fn plane_of(
     corners: [Vec3; 3],

@@ -8,9 +8,15 @@ use crate::shapes::ShapeHit;
 use glam::Vec3;
 
 impl ResolvedInstance<'_> {
-    /// What differs from the material at the point that `ray` met, where it has detail; `normal` is the shading normal, which may be bent.
+    /// What differs from the material at the point that `ray` met, where it has detail; `normal` is
+    /// the shading normal, which may be bent.
     #[inline]
-    pub(crate) fn parameters(&self, ray: &Ray, hit: &Hit, normal: &mut Vec3) -> Option<SurfaceParameters> {
+    pub(crate) fn parameters(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        normal: &mut Vec3,
+    ) -> Option<SurfaceParameters> {
         if self.material.maps.is_some() { self.evaluate_maps(ray, hit, normal) } else { None }
     }
 

@@ -1,12 +1,15 @@
 //! Integration of one cell to a tolerance.
 //!
-//! The scalar along the ray is a cubic. A stretch of it becomes one homogeneous layer with the exact mean of the transfer function over its
-//! chord. That is wrong in four ways, and a stretch is cut further until each is small enough:
+//! The scalar along the ray is a cubic. A stretch of it becomes one homogeneous layer with the
+//! exact mean of the transfer function over its chord. That is wrong in four ways, and a stretch is
+//! cut further until each is small enough:
 //!
 //! 1. the curve is not its chord: the layer differs from the layers of the two parts;
-//! 2. the curve leaves the range of its ends and meets, there, a bend of the transfer function that no sample has seen;
+//! 2. the curve leaves the range of its ends and meets, there, a bend of the transfer function that
+//!    no sample has seen;
 //! 3. the curve reaches a step of the transfer function elsewhere than its chord does;
-//! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both parts have some thickness.
+//! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both
+//!    parts have some thickness.
 
 use super::Volume;
 use super::layer::{Layer, MarchState};
@@ -14,16 +17,18 @@ use super::shading::ShadingCurve;
 use crate::grid_walk::Crossing;
 use crate::ray_cubic;
 
-/// Where a stretch is cut. Not in the middle: an antisymmetric cubic passes through the middle of its chord, and would seem straight.
+/// Where a stretch is cut. Not in the middle: an antisymmetric cubic passes through the middle of
+/// its chord, and would seem straight.
 const SPLIT: f64 = 0.375;
-/// A layer is off by the cube of its length (curvature, order of colours): two parts have a quarter of the error of one, a third of the
-/// difference between them.
+/// A layer is off by the cube of its length (curvature, order of colours): two parts have a quarter
+/// of the error of one, a third of the difference between them.
 const REFINEMENT_GAIN: f64 = 3.0;
 /// Cuts of a cell's stretch at most: to less than 2⁻⁸ of a cell.
 const MAX_SPLITS: usize = 12;
 /// Cuts for the sake of something that no sample shows.
 const MAX_BLIND_SPLITS: u32 = 6;
-/// A part with less of the optical thickness than this, relative to the other, shows nothing about the order of colours.
+/// A part with less of the optical thickness than this, relative to the other, shows nothing about
+/// the order of colours.
 const MIN_ORDER_THICKNESS: f64 = 0.1;
 
 /// A stretch of a cell that waits to be agreed on.
@@ -52,10 +57,12 @@ impl Volume {
         let ends = [self.transfer.integral(b[0]), self.transfer.integral(b[3])];
         let layer = self.layer(lit, per_t, c.t0, c.t1, b, &ends);
         m.samples += 1;
-        // What is wrong in one place of a cell, not all along it, may use half of the cell's share of the tolerance.
+        // What is wrong in one place of a cell, not all along it, may use half of the cell's share
+        // of the tolerance.
         let local_share = 0.5 * m.error_per_length * (c.t1 - c.t0) * per_t;
         // Depth first with the near part on top: the stack holds one far part per level.
-        let mut stack = [CubicSegment { ta: c.t0, tb: c.t1, b: *b, ends, layer, splits: 0 }; MAX_SPLITS + 1];
+        let mut stack =
+            [CubicSegment { ta: c.t0, tb: c.t1, b: *b, ends, layer, splits: 0 }; MAX_SPLITS + 1];
         let mut height = 1;
         while height > 0 && !m.is_opaque() {
             height -= 1;
@@ -79,7 +86,8 @@ impl Volume {
                 m.add(mid, tb, &second);
             } else {
                 let splits = splits + 1;
-                stack[height] = CubicSegment { ta: mid, tb, b: far, ends: [im, i1], layer: second, splits };
+                stack[height] =
+                    CubicSegment { ta: mid, tb, b: far, ends: [im, i1], layer: second, splits };
                 stack[height + 1] =
                     CubicSegment { ta, tb: mid, b: near, ends: [i0, im], layer: first, splits };
                 height += 2;
@@ -87,7 +95,8 @@ impl Volume {
         }
     }
 
-    /// The stretch as one layer, its scalar taken as linear; `ends` are the transfer function's integrals at its ends.
+    /// The stretch as one layer, its scalar taken as linear; `ends` are the transfer function's
+    /// integrals at its ends.
     #[inline]
     fn layer(
         &self,
@@ -101,7 +110,8 @@ impl Volume {
         let (s0, s1) = (b[0], b[3]);
         let (sigma, color) = if (s1 - s0).abs() > self.transfer.resolution() {
             let area = ends[1][0] - ends[0][0];
-            let mean = |c: usize| if area != 0.0 { (ends[1][c + 1] - ends[0][c + 1]) / area } else { 0.0 };
+            let mean =
+                |c: usize| if area != 0.0 { (ends[1][c + 1] - ends[0][c + 1]) / area } else { 0.0 };
             (area / (s1 - s0), [mean(0), mean(1), mean(2)])
         } else {
             self.transfer.sample(0.5 * (s0 + s1))
@@ -110,7 +120,8 @@ impl Volume {
         Layer { tau: sigma.max(0.0) * (tb - ta) * per_t, color }
     }
 
-    /// Error 2: whether the scalar may leave the range between its ends and get, there, to where the transfer function bends.
+    /// Error 2: whether the scalar may leave the range between its ends and get, there, to where
+    /// the transfer function bends.
     #[inline]
     fn may_hide_something(&self, b: &[f64; 4]) -> bool {
         let (s0, s1) = (b[0].min(b[3]), b[0].max(b[3]));
@@ -133,8 +144,9 @@ impl Volume {
         steps * length * if shift < 1.0 { shift } else { 1.0 }
     }
 
-    /// Error 4, where the parts' difference does not show it: colours that differ by δ within a layer of opacity a, mixed instead of ordered,
-    /// are off by at most a²·δ/4 (half of the layer in front of the other half).
+    /// Error 4, where the parts' difference does not show it: colours that differ by δ within a
+    /// layer of opacity a, mixed instead of ordered, are off by at most a²·δ/4 (half of the layer
+    /// in front of the other half).
     #[inline]
     fn order_error(&self, first: &Layer, near: &[f64; 4], second: &Layer, far: &[f64; 4]) -> f64 {
         let (small, big, b) =

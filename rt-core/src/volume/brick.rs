@@ -1,7 +1,10 @@
-//! Volumes in bricks: what several holders of one volume need so that together they see what one would.
+//! Volumes in bricks: what several holders of one volume need so that together they see what one
+//! would.
 //!
-//! A ray meets the blocks of a grid in an order that depends on the ray alone, and what a block adds depends only on what was collected in front of it. So a ray may be
-//! carried from brick to brick together with what it has collected ([`PartialIntegral`]): the result has the bits of one march through the whole.
+//! A ray meets the blocks of a grid in an order that depends on the ray alone, and what a block
+//! adds depends only on what was collected in front of it. So a ray may be carried from brick to
+//! brick together with what it has collected ([`PartialIntegral`]): the result has the bits of one
+//! march through the whole.
 
 use super::layer::MarchState;
 use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
@@ -9,8 +12,8 @@ use crate::grid::Grid;
 use glam::UVec3;
 use std::sync::Arc;
 
-/// Layers of points around a brick: a gradient takes the points on both sides of a cell's corners, and the end of a ray's way through a cell may be rounded
-/// into the next one.
+/// Layers of points around a brick: a gradient takes the points on both sides of a cell's corners,
+/// and the end of a ray's way through a cell may be rounded into the next one.
 const GHOSTS: u32 = 2;
 
 /// A box of blocks of [`MACROCELL`]³ cells: from `first` to before `end`.
@@ -58,7 +61,9 @@ impl PartialIntegral {
     pub fn to_words(&self) -> [u32; PartialIntegral::WORDS] {
         let [r, g, b] = self.color;
         let mut words = [0; PartialIntegral::WORDS];
-        for (pair, number) in words.chunks_exact_mut(2).zip([r, g, b, self.transmittance, self.depth]) {
+        for (pair, number) in
+            words.chunks_exact_mut(2).zip([r, g, b, self.transmittance, self.depth])
+        {
             let bits = number.to_bits();
             pair.copy_from_slice(&[bits as u32, (bits >> 32) as u32]);
         }
@@ -68,7 +73,8 @@ impl PartialIntegral {
 
     /// What [`PartialIntegral::to_words`] has made.
     pub fn from_words(words: &[u32; PartialIntegral::WORDS]) -> PartialIntegral {
-        let number = |i: usize| f64::from_bits(u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32);
+        let number =
+            |i: usize| f64::from_bits(u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32);
         PartialIntegral {
             color: [0, 1, 2].map(number),
             transmittance: number(3),
@@ -102,7 +108,12 @@ impl PartialIntegral {
 
 impl From<MarchState> for PartialIntegral {
     fn from(m: MarchState) -> PartialIntegral {
-        PartialIntegral { color: m.color, transmittance: m.transmittance, depth: m.depth, samples: m.samples }
+        PartialIntegral {
+            color: m.color,
+            transmittance: m.transmittance,
+            depth: m.depth,
+            samples: m.samples,
+        }
     }
 }
 
@@ -122,8 +133,9 @@ impl Volume {
         (z * self.blocks.y as usize + y) * self.blocks.x as usize + x
     }
 
-    /// What a holder of `brick` needs: the values of its cells with two layers of points around them, for gradients. The rest of the whole is
-    /// clear here. See [`RaySegments`](super::RaySegments) for an example.
+    /// What a holder of `brick` needs: the values of its cells with two layers of points around
+    /// them, for gradients. The rest of the whole is clear here. See
+    /// [`RaySegments`](super::RaySegments) for an example.
     pub fn part(&self, brick: Brick) -> Volume {
         let cells = self.cells();
         let (mut ranges, mut report) =
@@ -156,7 +168,8 @@ impl Volume {
             for y in brick.first.y..brick.end.y {
                 for x in brick.first.x..brick.end.x {
                     let block = UVec3::new(x, y, z);
-                    let (first, end) = (block * MACROCELL, ((block + UVec3::ONE) * MACROCELL).min(cells));
+                    let (first, end) =
+                        (block * MACROCELL, ((block + UVec3::ONE) * MACROCELL).min(cells));
                     let (range, bad) = scan(&grid, first - low, end - low, self.is_nearest());
                     ranges[self.block_index(block)] = range;
                     report.cells += (end - first).as_u64vec3().element_product();

@@ -1,11 +1,14 @@
-//! Direct volume rendering: emission and absorption along a ray through a uniform grid (Max 1995, "Optical Models for Direct Volume
-//! Rendering", eq. 7), front to back.
+//! Direct volume rendering: emission and absorption along a ray through a uniform grid (Max 1995,
+//! "Optical Models for Direct Volume Rendering", eq. 7), front to back.
 //!
-//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut until it is straight enough, and over straight stretches the
-//! transfer function is integrated exactly ([`TransferFunction`]), so thin shells are not stepped over. "Straight enough" means: one stretch
-//! and its two parts differ by less than the stretch's share of the tolerance, and steps of the transfer function are met where they are.
+//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut until it is straight
+//! enough, and over straight stretches the transfer function is integrated exactly
+//! ([`TransferFunction`]), so thin shells are not stepped over. "Straight enough" means: one
+//! stretch and its two parts differ by less than the stretch's share of the tolerance, and steps of
+//! the transfer function are met where they are.
 //!
-//! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no extinction, then by cells.
+//! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no
+//! extinction, then by cells.
 
 mod adaptive;
 mod brick;
@@ -18,8 +21,8 @@ mod shading;
 
 pub use brick::{Brick, PartialIntegral};
 pub use options::{
-    Blend, GradientOpacity, Interpolation, VolumeError, VolumeHighlight, VolumeLight, VolumeOptions,
-    VolumeShading,
+    Blend, GradientOpacity, Interpolation, VolumeError, VolumeHighlight, VolumeLight,
+    VolumeOptions, VolumeShading,
 };
 pub use ray_segments::{RaySegments, composite_projections, integrate_overlapping};
 pub use reference::integrate_reference;
@@ -42,13 +45,15 @@ pub const MACROCELL: u32 = 8;
 /// What accuracy to spend time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum VolumeQuality {
-    /// Adaptive: estimated error of the colour and opacity of a ray, in levels of 1/255 (linear) for colours up to 1. Half of it is spent on
-    /// integration, half on ending the ray when hardly any light passes.
+    /// Adaptive: estimated error of the colour and opacity of a ray, in levels of 1/255 (linear)
+    /// for colours up to 1. Half of it is spent on integration, half on ending the ray when hardly
+    /// any light passes.
     Tolerance {
         /// Levels, at least 10⁻⁶.
         levels: f32,
     },
-    /// Classical: one sample in the middle of each step, opacity corrected for the step. Can step over thin shells; for comparison.
+    /// Classical: one sample in the middle of each step, opacity corrected for the step. Can step
+    /// over thin shells; for comparison.
     Step {
         /// Step in units of the smallest grid spacing.
         voxels: f32,
@@ -69,13 +74,15 @@ pub struct VolumeSample {
     pub rgba: [f32; 4],
     /// Ray parameter at which the opacity reaches 50 %; infinite when it does not.
     pub depth: f32,
-    /// Stretches of the ray whose transfer function was integrated (or samples taken, with fixed steps).
+    /// Stretches of the ray whose transfer function was integrated (or samples taken, with fixed
+    /// steps).
     pub samples: u32,
 }
 
 impl VolumeSample {
     /// Nothing in the way.
-    pub const CLEAR: VolumeSample = VolumeSample { rgba: [0.0; 4], depth: f32::INFINITY, samples: 0 };
+    pub const CLEAR: VolumeSample =
+        VolumeSample { rgba: [0.0; 4], depth: f32::INFINITY, samples: 0 };
 }
 
 /// Sizes of a volume, and what is left out of it.
@@ -144,7 +151,8 @@ impl Volume {
             .into_par_iter()
             .map(|n| {
                 let (x, y) = (blocks.x as usize, blocks.y as usize);
-                let lo = UVec3::new((n % x) as u32, (n / x % y) as u32, (n / x / y) as u32) * MACROCELL;
+                let lo =
+                    UVec3::new((n % x) as u32, (n / x % y) as u32, (n / x / y) as u32) * MACROCELL;
                 scan(&grid, lo, (lo + MACROCELL).min(cells), nearest)
             })
             .collect();
@@ -210,8 +218,9 @@ impl Volume {
         self.report
     }
 
-    /// Colour and opacity between `t0` and `t1` of a ray in object space (and within the ray's own range). To place surfaces inside, integrate
-    /// up to the surface, then on behind it; the pieces compose to the whole within the tolerance.
+    /// Colour and opacity between `t0` and `t1` of a ray in object space (and within the ray's own
+    /// range). To place surfaces inside, integrate up to the surface, then on behind it; the pieces
+    /// compose to the whole within the tolerance.
     pub fn integrate(&self, ray: &Ray, t0: f32, t1: f32, quality: &VolumeQuality) -> VolumeSample {
         let (t0, t1) = (f64::from(t0.max(ray.t_min)), f64::from(t1.min(ray.t_max)));
         if !(ray.is_valid() && t0 < t1) {
@@ -220,7 +229,8 @@ impl Volume {
         if !self.is_medium() {
             return self.project(ray, t0, t1, quality);
         }
-        PartialIntegral::from(self.march(ray, t0, t1, quality, &PartialIntegral::default())).sample()
+        PartialIntegral::from(self.march(ray, t0, t1, quality, &PartialIntegral::default()))
+            .sample()
     }
 
     /// Whether cells are boxes around the points of the grid, and not between them.
@@ -237,13 +247,15 @@ impl Volume {
         if self.is_nearest() { self.dims } else { self.dims - UVec3::ONE }
     }
 
-    /// The ray in indices of cells, their number, and the part of `t0..t1` that is inside the bounds.
+    /// The ray in indices of cells, their number, and the part of `t0..t1` that is inside the
+    /// bounds.
     fn index_ray(&self, ray: &Ray, t0: f64, t1: f64) -> (IndexRay, UVec3, f64, f64) {
         let (o, d, spacing) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), self.grid.spacing);
         if !self.is_nearest() {
             return (IndexRay::new(o, d, spacing), self.cells(), t0, t1);
         }
-        // Cells are the boxes around points: half a spacing further out than the bounds, where they are cut.
+        // Cells are the boxes around points: half a spacing further out than the bounds, where they
+        // are cut.
         let max_corner = self.origin + spacing * (self.dims - UVec3::ONE).as_dvec3();
         let (near, far) = within(o, d, max_corner - self.origin);
         (IndexRay::new(o + 0.5 * spacing, d, spacing), self.cells(), t0.max(near), t1.min(far))
@@ -307,7 +319,14 @@ impl Volume {
     }
 
     #[inline]
-    fn march_cell(&self, ray: &IndexRay, per_t: f64, anchor: f64, c: &Crossing, m: &mut MarchState) {
+    fn march_cell(
+        &self,
+        ray: &IndexRay,
+        per_t: f64,
+        anchor: f64,
+        c: &Crossing,
+        m: &mut MarchState,
+    ) {
         if c.t1 <= c.t0 {
             return;
         }
@@ -317,7 +336,9 @@ impl Volume {
             let value = self.grid.at(stored.x, stored.y, stored.z);
             if value.is_finite() {
                 let (mut sigma, mut color) = self.transfer.sample(value.into());
-                if let Some(light) = self.light_along(ray, stored, [c.t0, c.t1], &[0.0; 3], &[0.0; 3]) {
+                if let Some(light) =
+                    self.light_along(ray, stored, [c.t0, c.t1], &[0.0; 3], &[0.0; 3])
+                {
                     (sigma, color) = light.on(c.t0, sigma, color);
                 }
                 m.samples += 1;
@@ -338,7 +359,8 @@ impl Volume {
         match m.quality {
             VolumeQuality::Tolerance { .. } => self.march_adaptive(light.as_ref(), per_t, c, &b, m),
             VolumeQuality::Step { voxels } => {
-                // Steps lie at multiples of the step from where the ray enters the grid, cut at cell faces.
+                // Steps lie at multiples of the step from where the ray enters the grid, cut at
+                // cell faces.
                 let step = f64::from(voxels).max(1e-3) * self.grid.spacing.min_element() / per_t;
                 let mut t = c.t0;
                 let mut k = ((t - anchor) / step).floor();
@@ -347,8 +369,9 @@ impl Volume {
                     let end = (anchor + k * step).min(c.t1);
                     if end > t {
                         let mid = 0.5 * (t + end);
-                        let (mut sigma, mut color) =
-                            self.transfer.sample(ray_cubic::evaluate(&b, (mid - c.t0) / (c.t1 - c.t0)));
+                        let (mut sigma, mut color) = self
+                            .transfer
+                            .sample(ray_cubic::evaluate(&b, (mid - c.t0) / (c.t1 - c.t0)));
                         if let Some(light) = &light {
                             (sigma, color) = light.on(mid, sigma, color);
                         }
@@ -385,13 +408,15 @@ fn within(o: DVec3, d: DVec3, size: DVec3) -> (f64, f64) {
     (near, far)
 }
 
-/// Range of the finite values of a block's cells, and how many cells have a value that is not finite. `nearest`: a cell is around a point.
+/// Range of the finite values of a block's cells, and how many cells have a value that is not
+/// finite. `nearest`: a cell is around a point.
 fn scan(grid: &Grid, lo: UVec3, hi: UVec3, nearest: bool) -> ([f32; 2], u64) {
     let (mut range, mut bad) = ([f32::INFINITY, f32::NEG_INFINITY], 0);
     for k in lo.z..hi.z {
         for j in lo.y..hi.y {
             for i in lo.x..hi.x {
-                let v = if nearest { [grid.at(i, j, k); 8] } else { grid.corners(UVec3::new(i, j, k)) };
+                let v =
+                    if nearest { [grid.at(i, j, k); 8] } else { grid.corners(UVec3::new(i, j, k)) };
                 if v.iter().all(|x| x.is_finite()) {
                     for x in v {
                         range = [range[0].min(x), range[1].max(x)];

@@ -7,7 +7,9 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     /// A grid without cells.
-    #[error("volume: the grid has {dims} points; it needs at least 2 along each axis to have cells")]
+    #[error(
+        "volume: the grid has {dims} points; it needs at least 2 along each axis to have cells"
+    )]
     NoCells {
         /// Points per axis.
         dims: UVec3,
@@ -27,22 +29,25 @@ pub enum VolumeError {
 /// How a highlight falls off around the mirrored light.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum VolumeHighlight {
-    /// By the angle between the normal and the direction halfway between light and viewer (Blinn 1977).
+    /// By the angle between the normal and the direction halfway between light and viewer (Blinn
+    /// 1977).
     #[default]
     Halfway,
     /// By the angle between the viewer and the mirrored light (Phong 1975).
     Mirrored,
 }
 
-/// Lambert shading by the gradient, two-sided, with a light at the viewer or in a fixed direction. It multiplies the colour by
-/// `ambient + diffuse·|n·l|` where the gradient is steep, and by 1 where there is none; a highlight is added.
+/// Lambert shading by the gradient, two-sided, with a light at the viewer or in a fixed direction.
+/// It multiplies the colour by `ambient + diffuse·|n·l|` where the gradient is steep, and by 1
+/// where there is none; a highlight is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VolumeShading {
     /// Part of the colour that needs no light, 0..=1.
     pub ambient: f32,
     /// Part that is lit, 0..=1.
     pub diffuse: f32,
-    /// Direction towards the light, any length, in the volume's axes; `None` for a light at the viewer.
+    /// Direction towards the light, any length, in the volume's axes; `None` for a light at the
+    /// viewer.
     pub light: Option<Vec3>,
     /// White highlight of that light; 0 for none.
     pub specular: f32,
@@ -50,8 +55,8 @@ pub struct VolumeShading {
     pub shininess: f32,
     /// Its form.
     pub highlight: VolumeHighlight,
-    /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has all of it everywhere, and only `ambient` where
-    /// there is no gradient (VTK).
+    /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has
+    /// all of it everywhere, and only `ambient` where there is no gradient (VTK).
     pub half_gradient: f32,
 }
 
@@ -79,10 +84,12 @@ pub struct VolumeLight {
     pub color: [f32; 3],
 }
 
-/// Extinction that depends on the gradient too (Levoy 1988, "Display of Surfaces from Volume Data"): that of the transfer function times this.
+/// Extinction that depends on the gradient too (Levoy 1988, "Display of Surfaces from Volume
+/// Data"): that of the transfer function times this.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GradientOpacity {
-    /// Factors for gradients from zero to `steepest`, evenly spaced, linear between; the last holds for steeper ones too.
+    /// Factors for gradients from zero to `steepest`, evenly spaced, linear between; the last holds
+    /// for steeper ones too.
     pub factors: Arc<[f32]>,
     /// Gradient of the last factor, in value per world unit.
     pub steepest: f32,
@@ -101,8 +108,8 @@ impl GradientOpacity {
     }
 }
 
-/// What a ray makes of the scalars it meets. All but [`Blend::Composite`] take the transfer function's extinction for an opacity (of at most 1), or a weight: they
-/// know no thickness.
+/// What a ray makes of the scalars it meets. All but [`Blend::Composite`] take the transfer
+/// function's extinction for an opacity (of at most 1), or a weight: they know no thickness.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Blend {
     /// Emission and absorption.
@@ -116,7 +123,8 @@ pub enum Blend {
     Average,
     /// The integral along the ray of colour times weight per world unit, at most 1; opaque.
     Additive,
-    /// The surfaces on which the scalar has one of these values, each with the value's colour and opacity.
+    /// The surfaces on which the scalar has one of these values, each with the value's colour and
+    /// opacity.
     Isosurfaces(Arc<[f32]>),
 }
 
@@ -133,18 +141,20 @@ pub enum Interpolation {
 /// How to make a [`super::Volume`].
 #[derive(Debug, Clone, Default)]
 pub struct VolumeOptions {
-    /// Shading by the gradient; `None` for pure emission and absorption. Not for the projections (maximum, minimum, average, additive).
+    /// Shading by the gradient; `None` for pure emission and absorption. Not for the projections
+    /// (maximum, minimum, average, additive).
     pub shading: Option<VolumeShading>,
     /// The scalar between points.
     pub interpolation: Interpolation,
     /// What a ray makes of it.
     pub blend: Blend,
-    /// Lights that take the place of the shading's own, and cast no highlight; none for that one, white.
+    /// Lights that take the place of the shading's own, and cast no highlight; none for that one,
+    /// white.
     pub lights: Vec<VolumeLight>,
     /// With [`Blend::Composite`] only.
     pub gradient_opacity: Option<GradientOpacity>,
-    /// Beyond the bounds the scalar goes on as it is there, so that gradients across them are half of what they are inside, as with OpenGL's clamped
-    /// textures. Else they are one-sided.
+    /// Beyond the bounds the scalar goes on as it is there, so that gradients across them are half
+    /// of what they are inside, as with OpenGL's clamped textures. Else they are one-sided.
     pub clamped_gradients: bool,
 }
 
@@ -158,9 +168,13 @@ impl VolumeOptions {
             if let Some(&(field, value)) = fields.iter().find(|f| !(0.0..=1.0).contains(&f.1)) {
                 return fault(field, value, "0 to 1");
             }
-            let fields =
-                [("half_gradient", s.half_gradient), ("specular", s.specular), ("shininess", s.shininess)];
-            if let Some(&(field, value)) = fields.iter().find(|f| !(f.1 >= 0.0 && f.1.is_finite())) {
+            let fields = [
+                ("half_gradient", s.half_gradient),
+                ("specular", s.specular),
+                ("shininess", s.shininess),
+            ];
+            if let Some(&(field, value)) = fields.iter().find(|f| !(f.1 >= 0.0 && f.1.is_finite()))
+            {
                 return fault(field, value, "finite and not negative");
             }
             if let Some(l) = s.light.filter(|l| l.try_normalize().is_none()) {

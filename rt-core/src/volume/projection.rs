@@ -1,4 +1,5 @@
-//! Volumes that are no medium: the largest or smallest scalar along a ray, means and sums, surfaces of given values.
+//! Volumes that are no medium: the largest or smallest scalar along a ray, means and sums, surfaces
+//! of given values.
 
 use super::layer::{Layer, MarchState};
 use super::{Blend, MACROCELL, Volume, VolumeQuality, VolumeSample};
@@ -22,7 +23,13 @@ impl Volume {
     }
 
     /// What a ray through a volume that is no medium shows between `t0` and `t1`.
-    pub(super) fn project(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality) -> VolumeSample {
+    pub(super) fn project(
+        &self,
+        ray: &Ray,
+        t0: f64,
+        t1: f64,
+        quality: &VolumeQuality,
+    ) -> VolumeSample {
         match &self.options.blend {
             Blend::Composite => VolumeSample::CLEAR,
             Blend::Maximum => self.extreme(ray, t0, t1, 1.0),
@@ -33,8 +40,8 @@ impl Volume {
         }
     }
 
-    /// Visits what the ray crosses, in order. `wanted` says by the range of its values whether a block or a cell counts. Cells with a value that is
-    /// not a number are left out.
+    /// Visits what the ray crosses, in order. `wanted` says by the range of its values whether a
+    /// block or a cell counts. Cells with a value that is not a number are left out.
     fn visit_cells(
         &self,
         ray: &Ray,
@@ -51,8 +58,8 @@ impl Volume {
         let size = i64::from(MACROCELL);
         let mut going = true;
         index_ray.walk([0; 3], cells, cells, size, t0, t1, |block| {
-            let [low, high] =
-                self.ranges[self.block_index(UVec3::from_array(block.cell.map(|c| (c / size) as u32)))];
+            let [low, high] = self.ranges
+                [self.block_index(UVec3::from_array(block.cell.map(|c| (c / size) as u32)))];
             if low > high || block.t1 <= block.t0 || !wanted(low.into(), high.into()) {
                 return true;
             }
@@ -109,7 +116,14 @@ impl Volume {
     }
 
     /// Colour times weight, integrated; divided by the length of the way where a mean is asked for.
-    fn sum(&self, ray: &Ray, t0: f64, t1: f64, quality: &VolumeQuality, mean: bool) -> VolumeSample {
+    fn sum(
+        &self,
+        ray: &Ray,
+        t0: f64,
+        t1: f64,
+        quality: &VolumeQuality,
+        mean: bool,
+    ) -> VolumeSample {
         let per_t = f64::from(ray.dir.length());
         let (mut length, mut samples, mut total) = (0.0, 0, [0.0; 3]);
         // A sum may be off by as much in all, a mean by as much everywhere.
@@ -141,8 +155,15 @@ impl Volume {
         VolumeSample { rgba: [r, g, b, 1.0], depth: t0 as f32, samples }
     }
 
-    /// ∫ colour times weight over a stretch of this length: exact along its chord, and cut until that is the curve's.
-    fn weighted(&self, b: &[f64; 4], length: f64, error_per_length: f64, depth: u32) -> ([f64; 3], u32) {
+    /// ∫ colour times weight over a stretch of this length: exact along its chord, and cut until
+    /// that is the curve's.
+    fn weighted(
+        &self,
+        b: &[f64; 4],
+        length: f64,
+        error_per_length: f64,
+        depth: u32,
+    ) -> ([f64; 3], u32) {
         const MAX_DEPTH: u32 = 10;
         let one = self.along_chord(b[0], b[3], length);
         // Not in the middle: an antisymmetric cubic passes through the middle of its chord.
@@ -172,7 +193,8 @@ impl Volume {
     /// The surfaces on which the scalar has one of `values`, one behind the other.
     fn surfaces(&self, ray: &Ray, t0: f64, t1: f64, values: &[f32]) -> VolumeSample {
         let mut m = MarchState::new(VolumeQuality::default(), 1.0);
-        let any = |low: f64, high: f64| values.iter().any(|v| (low..=high).contains(&f64::from(*v)));
+        let any =
+            |low: f64, high: f64| values.iter().any(|v| (low..=high).contains(&f64::from(*v)));
         let mut found: Vec<(f64, f64)> = Vec::new();
         self.visit_cells(ray, t0, t1, any, |index_ray, s| {
             found.clear();
@@ -250,7 +272,8 @@ mod tests {
 
     #[test]
     fn all_crossings_of_a_wave_are_found_in_order() {
-        // Through 0 at 0.1, 0.5 and 0.9, as Bernstein coefficients of 20 (u - 0.1) (u - 0.5) (u - 0.9).
+        // Through 0 at 0.1, 0.5 and 0.9, as Bernstein coefficients of 20 (u - 0.1) (u - 0.5) (u -
+        // 0.9).
         let power = [-0.9, 11.8, -30.0, 20.0];
         let b = [
             power[0],

@@ -1,9 +1,12 @@
-//! Volumes that share space. Media mix: where several overlap, their extinctions add up and each contributes its colour in proportion to
-//! its extinction. Compositing one whole volume over the other would be wrong there.
+//! Volumes that share space. Media mix: where several overlap, their extinctions add up and each
+//! contributes its colour in proportion to its extinction. Compositing one whole volume over the
+//! other would be wrong there.
 //!
-//! Mixing is local: a ray is cut where it comes into another block of any of its volumes ([`RaySegments`]), and what such a span adds depends on nothing but the
-//! blocks around it and what was collected in front. (Halving the whole common stretch until halves agreed, as this did first, marched everything again on
-//! every level, and needed every value along a ray in one place.)
+//! Mixing is local: a ray is cut where it comes into another block of any of its volumes
+//! ([`RaySegments`]), and what such a span adds depends on nothing but the blocks around it and
+//! what was collected in front. (Halving the whole common stretch until halves agreed, as this did
+//! first, marched everything again on every level, and needed every value along a ray in one
+//! place.)
 
 use super::layer::{Layer, MarchState};
 use super::{MACROCELL, PartialIntegral, Volume, VolumeQuality, VolumeSample};
@@ -14,12 +17,15 @@ use std::ops::Range;
 
 /// Halvings of a span at most.
 const MAX_HALVINGS: u32 = 14;
-/// Halvings of a span before it is believed that mixing its volumes as a whole agrees with mixing them in its halves: it can do so by accident.
+/// Halvings of a span before it is believed that mixing its volumes as a whole agrees with mixing
+/// them in its halves: it can do so by accident.
 const BLIND_HALVINGS: u32 = 2;
 
-/// Colour and opacity of several volumes between `t0` and `t1`. Each comes with the ray in its own object space; the parameter must mean the same point for all
-/// (it does when the ray is transformed without normalising). Spans where blocks of several volumes have extinction are halved until mixing a slab's volumes as a
-/// whole agrees with mixing them in its halves. For a single volume, the same as [`Volume::integrate`].
+/// Colour and opacity of several volumes between `t0` and `t1`. Each comes with the ray in its own
+/// object space; the parameter must mean the same point for all (it does when the ray is
+/// transformed without normalising). Spans where blocks of several volumes have extinction are
+/// halved until mixing a slab's volumes as a whole agrees with mixing them in its halves. For a
+/// single volume, the same as [`Volume::integrate`].
 pub fn integrate_overlapping(
     volumes: &[(&Volume, Ray)],
     t0: f32,
@@ -31,15 +37,18 @@ pub fn integrate_overlapping(
     }
     if volumes.iter().all(|(v, _)| v.is_medium()) {
         let segments = RaySegments::new(volumes.to_vec(), t0, t1);
-        return segments.integrate_spans(0..usize::MAX, quality, PartialIntegral::default()).sample();
+        return segments
+            .integrate_spans(0..usize::MAX, quality, PartialIntegral::default())
+            .sample();
     }
     let media: Vec<_> = volumes.iter().filter(|(v, _)| v.is_medium()).copied().collect();
     let mixed = integrate_overlapping(&media, t0, t1, quality);
     composite_projections(volumes, t0, t1, quality, mixed)
 }
 
-/// What several volumes show whose media are `mixed` already. Projections have no place along the ray: they are put in the order of the middles of their boxes, and the
-/// media in that of the first of them.
+/// What several volumes show whose media are `mixed` already. Projections have no place along the
+/// ray: they are put in the order of the middles of their boxes, and the media in that of the first
+/// of them.
 pub fn composite_projections(
     volumes: &[(&Volume, Ray)],
     t0: f32,
@@ -85,8 +94,9 @@ struct VolumeSegments<'a> {
     blocks: Vec<BlockSegment>,
 }
 
-/// The way of a ray through several media, cut into spans along which every medium stays within one block. Spans depend on the ray and on the volumes' sizes
-/// and places alone, not on what of their values is here: holders of parts ([`Volume::part`]) agree on them.
+/// The way of a ray through several media, cut into spans along which every medium stays within one
+/// block. Spans depend on the ray and on the volumes' sizes and places alone, not on what of their
+/// values is here: holders of parts ([`Volume::part`]) agree on them.
 ///
 /// ```
 /// use rt_core::glam::{DVec3, UVec3, Vec3};
@@ -112,13 +122,14 @@ struct VolumeSegments<'a> {
 /// ```
 pub struct RaySegments<'a> {
     per_volume: Vec<VolumeSegments<'a>>,
-    /// From where the ray comes into the first volume to where it leaves the last, in its parameter.
+    /// From where the ray comes into the first volume to where it leaves the last, in its
+    /// parameter.
     path: f64,
 }
 
 impl<'a> RaySegments<'a> {
-    /// The way between `t0` and `t1` through `volumes`, each with the ray in its object space, as for [`integrate_overlapping`]. Volumes that are no medium are passed
-    /// over.
+    /// The way between `t0` and `t1` through `volumes`, each with the ray in its object space, as
+    /// for [`integrate_overlapping`]. Volumes that are no medium are passed over.
     pub fn new(volumes: Vec<(&'a Volume, Ray)>, t0: f32, t1: f32) -> RaySegments<'a> {
         let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut per_volume = Vec::with_capacity(volumes.len());
@@ -143,7 +154,8 @@ impl<'a> RaySegments<'a> {
         RaySegments { per_volume, path: last - first }
     }
 
-    /// Calls `visit` with the number of each span that is longer than nothing, its limits and the block of each volume that is there, until it returns false.
+    /// Calls `visit` with the number of each span that is longer than nothing, its limits and the
+    /// block of each volume that is there, until it returns false.
     fn walk(&self, mut visit: impl FnMut(usize, f64, f64, &[(usize, UVec3)]) -> bool) {
         let mut next = vec![0; self.per_volume.len()];
         let mut here = Vec::with_capacity(self.per_volume.len());
@@ -178,7 +190,8 @@ impl<'a> RaySegments<'a> {
         }
     }
 
-    /// Calls `visit` with the number of each span, in order, and the volumes that are there with their blocks, one or more.
+    /// Calls `visit` with the number of each span, in order, and the volumes that are there with
+    /// their blocks, one or more.
     pub fn spans(&self, mut visit: impl FnMut(usize, &[(usize, UVec3)])) {
         self.walk(|number, _, _, here| {
             visit(number, here);
@@ -198,7 +211,8 @@ impl<'a> RaySegments<'a> {
         all
     }
 
-    /// Goes on where `collected` was left through the spans numbered `spans`. Spans must be gone through in order, by whom ever.
+    /// Goes on where `collected` was left through the spans numbered `spans`. Spans must be gone
+    /// through in order, by whom ever.
     pub fn integrate_spans(
         &self,
         spans: Range<usize>,
@@ -217,7 +231,9 @@ impl<'a> RaySegments<'a> {
                 return number < spans.end;
             }
             there.clear();
-            there.extend(here.iter().filter(|(v, block)| self.per_volume[*v].volume.is_occupied(*block)));
+            there.extend(
+                here.iter().filter(|(v, block)| self.per_volume[*v].volume.is_occupied(*block)),
+            );
             match there[..] {
                 [] => {}
                 [(v, block)] => {
@@ -259,7 +275,8 @@ impl MediaMixer<'_> {
             return;
         }
         let share = m.error_per_length * (tb - ta);
-        // Colours that differ by at most 1 within a layer of opacity a, mixed instead of ordered, are off by at most a²/4.
+        // Colours that differ by at most 1 within a layer of opacity a, mixed instead of ordered,
+        // are off by at most a²/4.
         let opacity = one.opacity();
         if m.transmittance * 0.25 * opacity * opacity <= share {
             m.add(ta, tb, &one);
@@ -282,9 +299,9 @@ impl MediaMixer<'_> {
     fn mix(&self, ta: f64, tb: f64, samples: &mut u32) -> Layer {
         // Each slab may use its share of the tolerance.
         let quality = match *self.quality {
-            VolumeQuality::Tolerance { levels } => {
-                VolumeQuality::Tolerance { levels: levels * ((tb - ta) / self.segments.path) as f32 }
-            }
+            VolumeQuality::Tolerance { levels } => VolumeQuality::Tolerance {
+                levels: levels * ((tb - ta) / self.segments.path) as f32,
+            },
             step => step,
         };
         let mut layer = Layer::NOTHING;

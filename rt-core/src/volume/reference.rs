@@ -1,13 +1,20 @@
-//! The slow reference: many small steps in f64, the transfer function read off its definition, nothing skipped. Tests and
-//! accuracy curves compare the integrator with it.
+//! The slow reference: many small steps in f64, the transfer function read off its definition,
+//! nothing skipped. Tests and accuracy curves compare the integrator with it.
 
 use super::Volume;
 use crate::ray::Ray;
 use glam::{DVec3, UVec3};
 
-/// Premultiplied linear colour and opacity between `t0` and `t1`, by the midpoint rule with steps of `step_voxels` of the smallest
-/// grid spacing. The error falls with the square of the step. Shading is not included.
-pub fn integrate_reference(volume: &Volume, ray: &Ray, t0: f32, t1: f32, step_voxels: f64) -> [f64; 4] {
+/// Premultiplied linear colour and opacity between `t0` and `t1`, by the midpoint rule with steps
+/// of `step_voxels` of the smallest grid spacing. The error falls with the square of the step.
+/// Shading is not included.
+pub fn integrate_reference(
+    volume: &Volume,
+    ray: &Ray,
+    t0: f32,
+    t1: f32,
+    step_voxels: f64,
+) -> [f64; 4] {
     let grid = volume.grid();
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let extent = grid.spacing * (grid.dims - UVec3::ONE).as_dvec3();
@@ -46,7 +53,8 @@ pub fn integrate_reference(volume: &Volume, ray: &Ray, t0: f32, t1: f32, step_vo
     rgba
 }
 
-/// Trilinear value at a continuous index, as the weighted sum over the corners; NaN in cells with a value that is not finite.
+/// Trilinear value at a continuous index, as the weighted sum over the corners; NaN in cells with a
+/// value that is not finite.
 fn value(volume: &Volume, p: DVec3) -> f64 {
     let grid = volume.grid();
     let last = (grid.dims - UVec3::ONE).as_dvec3();
@@ -59,7 +67,8 @@ fn value(volume: &Volume, p: DVec3) -> f64 {
     }
     (0..8)
         .map(|i| {
-            let weight: f64 = (0..3).map(|a| if i >> a & 1 == 1 { f[a] } else { 1.0 - f[a] }).product();
+            let weight: f64 =
+                (0..3).map(|a| if i >> a & 1 == 1 { f[a] } else { 1.0 - f[a] }).product();
             weight * f64::from(v[i])
         })
         .sum()

@@ -13,8 +13,9 @@ struct ShadingSample {
     steepness: f64,
 }
 
-/// Light along a ray's way through a cell: the parabola through its values at both ends and in the middle. Gradients cost as much as everything else of
-/// a sample, and between grid points they bend no more than that.
+/// Light along a ray's way through a cell: the parabola through its values at both ends and in the
+/// middle. Gradients cost as much as everything else of a sample, and between grid points they bend
+/// no more than that.
 pub(super) struct ShadingCurve<'a> {
     t0: f64,
     per_t: f64,
@@ -31,8 +32,12 @@ impl ShadingCurve<'_> {
         let w = [(1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)];
         let mix = |a: f64, b: f64, c: f64| (a * w[0] + b * w[1] + c * w[2]).max(0.0);
         let highlight = mix(a.highlight, b.highlight, c.highlight);
-        let lit = std::array::from_fn(|k| color[k] * mix(a.factor[k], b.factor[k], c.factor[k]) + highlight);
-        let sigma = self.opacity.map_or(sigma, |o| sigma * o.at(mix(a.steepness, b.steepness, c.steepness)));
+        let lit = std::array::from_fn(|k| {
+            color[k] * mix(a.factor[k], b.factor[k], c.factor[k]) + highlight
+        });
+        let sigma = self
+            .opacity
+            .map_or(sigma, |o| sigma * o.at(mix(a.steepness, b.steepness, c.steepness)));
         (sigma, lit)
     }
 }
@@ -43,8 +48,8 @@ impl Volume {
         self.options.shading.is_some() || self.options.gradient_opacity.is_some()
     }
 
-    /// Light along the way of `ray` through a cell (of the grid that is stored here) from `t0` at the place `p` in it to `t1` at `q`; `None` without
-    /// shading and gradient opacity.
+    /// Light along the way of `ray` through a cell (of the grid that is stored here) from `t0` at
+    /// the place `p` in it to `t1` at `q`; `None` without shading and gradient opacity.
     pub(super) fn light_along(
         &self,
         ray: &IndexRay,
@@ -59,10 +64,14 @@ impl Volume {
         let dir = DVec3::from_array(ray.d) * self.grid.spacing;
         let ends = if self.is_nearest() {
             // The gradient at the point around which the box lies.
-            [self.lit(corner_gradient(&self.grid, stored, self.options.clamped_gradients).as_dvec3(), dir); 3]
+            [self.lit(
+                corner_gradient(&self.grid, stored, self.options.clamped_gradients).as_dvec3(),
+                dir,
+            ); 3]
         } else {
             let corners = corner_gradients(&self.grid, stored, self.options.clamped_gradients);
-            let (p, q) = (Vec3::from_array(p.map(|x| x as f32)), Vec3::from_array(q.map(|x| x as f32)));
+            let (p, q) =
+                (Vec3::from_array(p.map(|x| x as f32)), Vec3::from_array(q.map(|x| x as f32)));
             [p, 0.5 * (p + q), q].map(|at| self.lit(between(&corners, at).as_dvec3(), dir))
         };
         let opacity = self.options.gradient_opacity.as_ref();
@@ -70,7 +79,13 @@ impl Volume {
     }
 
     /// A colour under the lights at one place of a stored cell.
-    pub(super) fn shaded_at(&self, ray: &IndexRay, stored: UVec3, at: [f64; 3], color: [f64; 3]) -> [f64; 3] {
+    pub(super) fn shaded_at(
+        &self,
+        ray: &IndexRay,
+        stored: UVec3,
+        at: [f64; 3],
+        color: [f64; 3],
+    ) -> [f64; 3] {
         match self.light_along(ray, stored, [0.0, 1.0], &at, &at) {
             Some(light) => light.on(0.5, 0.0, color).1,
             None => color,
@@ -166,7 +181,9 @@ fn corner_gradients(grid: &Grid, cell: UVec3, clamped: bool) -> [Vec3; 8] {
     // Inside nothing needs to be checked one by one.
     let (row, slab) = (grid.dims.x as usize, grid.dims.x as usize * grid.dims.y as usize);
     let first = grid.index(cell.x - 1, cell.y - 1, cell.z - 1);
-    let Some(v) = grid.values.get(first..first + 3 * slab + 3 * row + 4) else { return [Vec3::ZERO; 8] };
+    let Some(v) = grid.values.get(first..first + 3 * slab + 3 * row + 4) else {
+        return [Vec3::ZERO; 8];
+    };
     let width = 2.0 * grid.spacing.as_vec3();
     std::array::from_fn(|i| {
         let at = slab * (1 + (i >> 2 & 1)) + row * (1 + (i >> 1 & 1)) + 1 + (i & 1);
@@ -191,7 +208,12 @@ mod tests {
                 assert_eq!(*g, corner_gradient(&grid, at, false), "{cell} {i}");
             }
         }
-        let [one_sided, clamped] = [false, true].map(|c| corner_gradient(&grid, UVec3::new(0, 2, 2), c));
-        assert_eq!((one_sided.x, one_sided.y), (2.0 * clamped.x, clamped.y), "half across the bounds");
+        let [one_sided, clamped] =
+            [false, true].map(|c| corner_gradient(&grid, UVec3::new(0, 2, 2), c));
+        assert_eq!(
+            (one_sided.x, one_sided.y),
+            (2.0 * clamped.x, clamped.y),
+            "half across the bounds"
+        );
     }
 }

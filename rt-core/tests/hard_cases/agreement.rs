@@ -1,4 +1,5 @@
-//! Packets, instruction sets and presets give the single ray's bits, and those are the oracle's answer.
+//! Packets, instruction sets and presets give the single ray's bits, and those are the oracle's
+//! answer.
 
 use crate::common::*;
 use crate::oracle::{self, check};
@@ -22,8 +23,10 @@ fn meshes() -> Vec<(&'static str, TriMesh)> {
 fn views() -> Vec<(&'static str, Vec<Ray>)> {
     let eye = Vec3::new(0.3, -2.0, 2.9);
     let tiles = camera(eye, Vec3::ZERO, 1.2, 3);
-    let to_light =
-        tiles.iter().map(|r| Ray { origin: r.at(0.9), dir: -r.dir, t_min: 0.01, t_max: 0.85 }).collect();
+    let to_light = tiles
+        .iter()
+        .map(|r| Ray { origin: r.at(0.9), dir: -r.dir, t_min: 0.01, t_max: 0.85 })
+        .collect();
     let mut all = vec![
         ("inside", camera(Vec3::new(0.1, 0.2, -0.3), Vec3::new(0.4, 1.0, 0.9), 1.0, 2)),
         ("far", camera(Vec3::new(3e5, -4e5, 8e5), Vec3::ZERO, 1.2, 2)),
@@ -99,7 +102,8 @@ fn packets_and_levels_equal_single_rays_bit_for_bit() {
                         let options = BuildOptions { quality, robustness, simd: Some(simd) };
                         let w = world(&mesh, &options);
                         let what = format!("{mesh_name}, {name}, {options:?}");
-                        let hits: Vec<_> = hits_all_ways(&w, rays, &what).into_iter().map(bits).collect();
+                        let hits: Vec<_> =
+                            hits_all_ways(&w, rays, &what).into_iter().map(bits).collect();
                         match &first {
                             None => first = Some(hits),
                             Some(f) => assert!(*f == hits, "{what}: differs from the first level"),
@@ -140,7 +144,8 @@ fn single_rays_agree_with_the_f64_oracle() {
             for (name, rays) in views() {
                 let what = format!("{mesh_name}, {name}, {options:?}");
                 for r in rays.iter().step_by(29).filter(|r| r.is_valid()) {
-                    worst = worst.max(check(&mesh, w.origin(), r, w.closest(r), &what).unwrap_or(0.0));
+                    worst =
+                        worst.max(check(&mesh, w.origin(), r, w.closest(r), &what).unwrap_or(0.0));
                 }
             }
         }
@@ -161,7 +166,8 @@ pub(crate) fn placements(n: usize, seed: u64, spread: f64) -> Vec<DAffine3> {
                 3 => scale = DVec3::new(0.5, -0.1, -0.002),
                 _ => {}
             }
-            let matrix3 = if i % 7 == 0 { DMat3::IDENTITY } else { turn } * DMat3::from_diagonal(scale);
+            let matrix3 =
+                if i % 7 == 0 { DMat3::IDENTITY } else { turn } * DMat3::from_diagonal(scale);
             DAffine3 { matrix3, translation: r.direction() * r.unit() * spread }
         })
         .collect()
@@ -188,7 +194,8 @@ fn many_instances_packets_equal_single_rays_and_the_oracle() {
     }
 }
 
-/// Within 10⁻⁵ of a size, which covers the rounding of transformed rays, the hit is where f64 says, and nothing is surely nearer.
+/// Within 10⁻⁵ of a size, which covers the rounding of transformed rays, the hit is where f64 says,
+/// and nothing is surely nearer.
 fn check_instances(
     w: &World,
     geometries: &[TriMesh],
@@ -204,11 +211,14 @@ fn check_instances(
     for (k, inst) in instances.iter().enumerate() {
         let m = &geometries[inst.geometry];
         for i in 0..m.num_triangles() {
-            let corners = m.triangle(i).map(|p| inst.world_from_object.transform_point3(p.as_dvec3()));
+            let corners =
+                m.triangle(i).map(|p| inst.world_from_object.transform_point3(p.as_dvec3()));
             let Some(x) = oracle::meet(corners, o, d) else { continue };
-            // Surely inside when the ray moves by 10⁻⁵; ill-conditioned meetings are not for this tolerance.
+            // Surely inside when the ray moves by 10⁻⁵; ill-conditioned meetings are not for this
+            // tolerance.
             let inside = x.depth > 1e-5 * x.depth_per_length && x.t_error < tolerance;
-            let in_range = x.t >= ray.t_min as f64 + tolerance && x.t < ray.t_max as f64 - tolerance;
+            let in_range =
+                x.t >= ray.t_min as f64 + tolerance && x.t < ray.t_max as f64 - tolerance;
             if inside && in_range && x.t < nearest {
                 (nearest, which) = (x.t, k);
             }
@@ -225,7 +235,8 @@ fn check_instances(
                 "{what}: {ray:?}: {h:?} lies behind instance {which} at {nearest}"
             );
             let inst = &instances[h.instance as usize];
-            let [a, b, c] = geometries[inst.geometry].triangle(h.prim as usize).map(|p| p.as_dvec3());
+            let [a, b, c] =
+                geometries[inst.geometry].triangle(h.prim as usize).map(|p| p.as_dvec3());
             let p = a + (b - a) * h.u as f64 + (c - a) * h.v as f64;
             let p = inst.world_from_object.transform_point3(p);
             // The distance of the hit point from the ray.

@@ -50,7 +50,8 @@ pub(crate) fn all_options() -> Vec<BuildOptions> {
     all
 }
 
-/// Every preset and robustness mode, each at one instruction set in turn: enough where the tree matters.
+/// Every preset and robustness mode, each at one instruction set in turn: enough where the tree
+/// matters.
 pub(crate) fn some_options() -> Vec<BuildOptions> {
     let levels = SimdLevel::available();
     let modes = Robustness::ALL.iter().flat_map(|&r| BuildQuality::ALL.map(|q| (q, r)));
@@ -68,11 +69,13 @@ pub(crate) fn world(mesh: &TriMesh, options: &BuildOptions) -> World {
     World::from_mesh(mesh.clone(), options).expect("a usable mesh")
 }
 
-/// The single rays' hits, after checking that packets give the same bits in order and sorted, and that occlusion agrees.
+/// The single rays' hits, after checking that packets give the same bits in order and sorted, and
+/// that occlusion agrees.
 pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Option<Hit>> {
     let single: Vec<Option<Hit>> = rays.iter().map(|r| world.closest(r)).collect();
     let blocks = RayBlock::from_rays(rays);
-    let (mut packets, mut sorted) = (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
+    let (mut packets, mut sorted) =
+        (vec![HitBlock::MISS; blocks.len()], vec![HitBlock::MISS; blocks.len()]);
     let (mut any, mut any_sorted) = (vec![0u16; blocks.len()], vec![0u16; blocks.len()]);
     world.closest_coherent(&blocks, &mut packets).expect("one each");
     world.closest_incoherent(&blocks, &mut sorted).expect("one each");
@@ -96,14 +99,16 @@ pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Opti
         }
         if bad.contains(&true) && example.is_empty() {
             example = format!(
-                "ray {i} {ray:?}: single {:?}, packet {p:?}, sorted {s:?}, occluded (single, packet, sorted) {blocked:?}",
+                "ray {i} {ray:?}: single {:?}, packet {p:?}, sorted {s:?}, occluded (single, \
+                 packet, sorted) {blocked:?}",
                 single[i]
             );
         }
     }
     assert!(
         wrong == [0; 5],
-        "{what}: of {} rays differ from the single closest hit: packet {}, sorted {}, occluded {}, packet {}, sorted {}; {example}",
+        "{what}: of {} rays differ from the single closest hit: packet {}, sorted {}, occluded {}, \
+         packet {}, sorted {}; {example}",
         rays.len(),
         wrong[0],
         wrong[1],
@@ -119,7 +124,8 @@ pub(crate) fn bits(h: Option<Hit>) -> Option<[u32; 5]> {
     h.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.prim, h.instance])
 }
 
-/// An icosahedron subdivided `level` times, turned so that no edge lies in an axis plane: unit f64 positions and triangles.
+/// An icosahedron subdivided `level` times, turned so that no edge lies in an axis plane: unit f64
+/// positions and triangles.
 pub(crate) fn icosphere(level: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let p = (1.0 + 5f64.sqrt()) / 2.0;
     let mut v: Vec<DVec3> = Vec::new();
@@ -188,7 +194,8 @@ pub(crate) fn torus(n: u32, m: u32) -> TriMesh {
     TriMesh::new(v, t.collect())
 }
 
-/// The cube from -1 to 1 with `n` by `n` quads a side, each cut in two: every edge but the diagonals lies along an axis, where boxes touch it.
+/// The cube from -1 to 1 with `n` by `n` quads a side, each cut in two: every edge but the
+/// diagonals lies along an axis, where boxes touch it.
 pub(crate) fn cube(n: u32) -> TriMesh {
     let mut mesh = TriMesh::default();
     let mut index: HashMap<[u32; 3], u32> = HashMap::new();
@@ -196,14 +203,16 @@ pub(crate) fn cube(n: u32) -> TriMesh {
         for side in [0, n] {
             for q in 0..n * n {
                 let (i, j) = (q / n, q % n);
-                let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
-                    let mut k = [0; 3];
-                    (k[axis], k[(axis + 1) % 3], k[(axis + 2) % 3]) = (side, i, j);
-                    *index.entry(k).or_insert_with(|| {
-                        mesh.positions.push(Vec3::from_array(k.map(|x| 2.0 * x as f32 / n as f32 - 1.0)));
-                        mesh.positions.len() as u32 - 1
-                    })
-                });
+                let [a, b, c, d] =
+                    [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| {
+                        let mut k = [0; 3];
+                        (k[axis], k[(axis + 1) % 3], k[(axis + 2) % 3]) = (side, i, j);
+                        *index.entry(k).or_insert_with(|| {
+                            mesh.positions
+                                .push(Vec3::from_array(k.map(|x| 2.0 * x as f32 / n as f32 - 1.0)));
+                            mesh.positions.len() as u32 - 1
+                        })
+                    });
                 let quad = if side == n { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
                 mesh.indices.extend(quad);
             }
@@ -238,7 +247,8 @@ pub(crate) fn inward_rays(n: usize, seed: u64) -> Vec<Ray> {
         .collect()
 }
 
-/// Tiles of sixteen by sixteen pixels of a pinhole camera that looks from `eye` at a square of half size `half` around `at`.
+/// Tiles of sixteen by sixteen pixels of a pinhole camera that looks from `eye` at a square of half
+/// size `half` around `at`.
 pub(crate) fn camera(eye: Vec3, at: Vec3, half: f32, tiles: u32) -> Vec<Ray> {
     let forward = (at - eye).normalize();
     let right = forward.any_orthonormal_vector();

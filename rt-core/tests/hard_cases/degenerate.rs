@@ -23,9 +23,12 @@ fn worlds_without_anything_are_missed() {
             Geometry::Mesh(Arc::new(sphere(1, 1.0, DVec3::ZERO))),
         ];
         let place = |geometry| Instance { geometry, world_from_object: DAffine3::IDENTITY };
-        let w = World::build(geometries, vec![place(0), place(1), place(0)], &options).expect("fine");
+        let w =
+            World::build(geometries, vec![place(0), place(1), place(0)], &options).expect("fine");
         let hits = hits_all_ways(&w, &rays, "empty ones among others");
-        assert!(hits.iter().flatten().count() > 200 && hits.iter().flatten().all(|h| h.instance == 1));
+        assert!(
+            hits.iter().flatten().count() > 200 && hits.iter().flatten().all(|h| h.instance == 1)
+        );
         let (ray, moved) = nothing.ray_from_world(DVec3::new(1e9, 0.0, 0.0), DVec3::X);
         assert_eq!((nothing.closest(&ray), moved), (None, 0.0));
     }
@@ -55,7 +58,8 @@ fn triangles_without_area_are_counted_and_harm_nothing() {
     for i in 0..500u32 {
         let n = mesh.positions.len() as u32;
         let p = (r.direction() * r.unit()).as_vec3();
-        // Points, and segments of every length: the third corner is one of the others or exactly between them.
+        // Points, and segments of every length: the third corner is one of the others or exactly
+        // between them.
         let q = if i % 3 == 0 { p } else { Vec3::new(p.x + 2.0, p.y, p.z) };
         let third = if i % 3 == 2 { Vec3::new(p.x + 1.0, p.y, p.z) } else { p };
         mesh.positions.extend([p, q, third]);
@@ -129,11 +133,13 @@ fn singular_and_broken_transforms_are_refused_by_number() {
         }
     }
     let stray = vec![Instance { geometry: 1, world_from_object: DAffine3::IDENTITY }];
-    let e = World::build(vec![mesh], stray, &BuildOptions::default()).err().expect("no such geometry");
+    let e =
+        World::build(vec![mesh], stray, &BuildOptions::default()).err().expect("no such geometry");
     assert_eq!(e, BuildError::NoSuchGeometry { instance: 0, geometry: 1, count: 1 });
 }
 
-/// Triangles at 2^(k/steps), each as large as its distance from zero: cuts by cost peel off one primitive at a time.
+/// Triangles at 2^(k/steps), each as large as its distance from zero: cuts by cost peel off one
+/// primitive at a time.
 fn powers_of_two(exponents: std::ops::Range<i32>, steps: f32) -> TriMesh {
     let mut mesh = TriMesh::default();
     for k in exponents {
@@ -148,14 +154,17 @@ fn powers_of_two(exponents: std::ops::Range<i32>, steps: f32) -> TriMesh {
 #[test]
 fn adversarial_spacing_does_not_overflow_the_stack() {
     let mesh = powers_of_two(-480..480, 16.0);
-    // From the left, through all of them: the nearest is the smallest that reaches the ray's height.
+    // From the left, through all of them: the nearest is the smallest that reaches the ray's
+    // height.
     let heights: Vec<f32> = (-200..400).map(|k| 0.3 * (k as f32 / 16.0).exp2()).collect();
-    let rays: Vec<Ray> = heights.iter().map(|&h| Ray::new(Vec3::new(-1.0, h, h), Vec3::X)).collect();
+    let rays: Vec<Ray> =
+        heights.iter().map(|&h| Ray::new(Vec3::new(-1.0, h, h), Vec3::X)).collect();
     for options in some_options() {
         let w = world(&mesh, &options);
         if options.robustness == Robustness::Fast {
-            // Without exact decisions a triangle smaller than the rounding of its distance collapses to a point or a sliver beside the ray and may be hit
-            // falsely; whether its box is looked at then depends on the tree. Fast promises no more than an answer.
+            // Without exact decisions a triangle smaller than the rounding of its distance
+            // collapses to a point or a sliver beside the ray and may be hit falsely; whether its
+            // box is looked at then depends on the tree. Fast promises no more than an answer.
             assert!(
                 rays.iter().all(|r| w.closest(r).is_some()),
                 "{options:?}: every ray meets a large triangle"
@@ -168,7 +177,8 @@ fn adversarial_spacing_does_not_overflow_the_stack() {
     }
 }
 
-/// More range than products of two lengths have in f32: what is too small may be missed, but nothing false is hit.
+/// More range than products of two lengths have in f32: what is too small may be missed, but
+/// nothing false is hit.
 #[test]
 fn sizes_over_the_whole_range_of_f32_give_no_false_hits() {
     let mesh = powers_of_two(-120..120, 1.0);
@@ -183,7 +193,10 @@ fn sizes_over_the_whole_range_of_f32_give_no_false_hits() {
         for (r, h) in rays.iter().zip(hits_all_ways(&w, &rays, "the whole range")) {
             let Some(h) = h else { continue };
             let [a, b, c] = mesh.triangle(h.prim as usize);
-            assert!(h.u >= 0.0 && h.v >= 0.0 && h.u + h.v <= 1.0 + 1e-5, "{options:?}: {r:?}: {h:?}");
+            assert!(
+                h.u >= 0.0 && h.v >= 0.0 && h.u + h.v <= 1.0 + 1e-5,
+                "{options:?}: {r:?}: {h:?}"
+            );
             assert!(
                 (r.at(h.t).x / a.x - 1.0).abs() < 1e-3 || a.x < 1e-6,
                 "{options:?}: {r:?}: {h:?} at {a} {b} {c}"
@@ -207,7 +220,10 @@ fn slices_of_different_length_are_refused_with_both_lengths() {
         assert_eq!(w.occluded_incoherent(&blocks, &mut masks), expected);
         assert!(hits.iter().all(|h| *h == HitBlock::MISS) && masks.iter().all(|m| *m == 0));
         let words = refusal.to_string();
-        assert!(words.contains("4 blocks of rays") && words.contains(&format!("of {n}")), "{words}");
+        assert!(
+            words.contains("4 blocks of rays") && words.contains(&format!("of {n}")),
+            "{words}"
+        );
     }
     let mut hits = vec![HitBlock::MISS; 4];
     w.closest_coherent(&blocks, &mut hits).unwrap();

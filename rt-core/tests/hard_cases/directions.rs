@@ -7,7 +7,8 @@ use rt_core::ray::Ray;
 
 /// Directions with every combination of awkward components.
 fn awkward() -> Vec<Vec3> {
-    let values = [0.0, -0.0, 1e-30, -1e-30, f32::from_bits(1), -f32::from_bits(77), 1e-10, 1.0, -0.7];
+    let values =
+        [0.0, -0.0, 1e-30, -1e-30, f32::from_bits(1), -f32::from_bits(77), 1e-10, 1.0, -0.7];
     let mut all = Vec::new();
     for x in values {
         for y in values {
@@ -67,7 +68,8 @@ fn scaling_a_direction_scales_t_and_nothing_else() {
     }
 }
 
-/// From inside a closed cube cut into axis-aligned squares, every ray in one of its lattice planes must hit, whatever the sign of its zeros.
+/// From inside a closed cube cut into axis-aligned squares, every ray in one of its lattice planes
+/// must hit, whatever the sign of its zeros.
 #[test]
 fn rays_in_box_planes_do_not_leak() {
     let mesh = cube(4);

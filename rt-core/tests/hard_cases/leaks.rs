@@ -7,7 +7,8 @@ use rt_core::mesh::TriMesh;
 use rt_core::robustness::{LeakTest, QueryKind, RayOrigins, RayTarget};
 use rt_core::simd::SimdLevel;
 
-/// Closed meshes and where rays start in them: curved and flat, at zero and far from it, finely and coarsely cut.
+/// Closed meshes and where rays start in them: curved and flat, at zero and far from it, finely and
+/// coarsely cut.
 fn cases() -> Vec<(&'static str, TriMesh, RayOrigins)> {
     let far = DVec3::new(1000.0, 700.0, -1300.0);
     let ball = |center, radius| RayOrigins::Ball { center, radius };
@@ -27,12 +28,14 @@ fn cases() -> Vec<(&'static str, TriMesh, RayOrigins)> {
     ]
 }
 
-/// Rays per mode and SIMD level set, all cases together. `RT_CORE_LEAK_RAYS=100000000` runs the acceptance test.
+/// Rays per mode and SIMD level set, all cases together. `RT_CORE_LEAK_RAYS=100000000` runs the
+/// acceptance test.
 fn rays_wanted() -> usize {
     std::env::var("RT_CORE_LEAK_RAYS").ok().and_then(|s| s.parse().ok()).unwrap_or(1_000_000)
 }
 
-/// Rays traced and lost in one mode; every combination of case, aim and query, with presets and instruction sets in turn.
+/// Rays traced and lost in one mode; every combination of case, aim and query, with presets and
+/// instruction sets in turn.
 fn shoot(robustness: Robustness, wanted: usize) -> (u64, u64, Vec<String>) {
     let (cases, levels) = (cases(), SimdLevel::available());
     let each = wanted / (cases.len() * RayTarget::ALL.len() * QueryKind::ALL.len());
@@ -42,7 +45,11 @@ fn shoot(robustness: Robustness, wanted: usize) -> (u64, u64, Vec<String>) {
         let worlds: Vec<(BuildOptions, World)> = BuildQuality::ALL
             .iter()
             .flat_map(|&quality| {
-                levels.iter().map(move |&simd| BuildOptions { quality, robustness, simd: Some(simd) })
+                levels.iter().map(move |&simd| BuildOptions {
+                    quality,
+                    robustness,
+                    simd: Some(simd),
+                })
             })
             .map(|o| (o, World::from_mesh(mesh.clone(), &o).expect("a closed mesh")))
             .collect();
@@ -75,6 +82,7 @@ fn watertight_edges() {
 fn fast_mode_leaks_are_counted_and_rare() {
     let (rays, lost, lines) = shoot(Robustness::Fast, rays_wanted() / 4);
     println!("fast: {lost} of {rays} rays leaked\n{}", lines.join("\n"));
-    // Zeros count as inside and boxes are as wide as in the other mode: none of 2.5·10⁷ was lost, but nothing rules it out.
+    // Zeros count as inside and boxes are as wide as in the other mode: none of 2.5·10⁷ was lost,
+    // but nothing rules it out.
     assert!(lost <= rays / 100_000, "{lost} of {rays} rays leaked:\n{}", lines.join("\n"));
 }

@@ -12,7 +12,8 @@ fn check_limits(w: &World, rays: &[Ray], what: &str) {
     let with = |f: &dyn Fn(&Ray, f32) -> Ray| -> Vec<Ray> {
         rays.iter().zip(&free).map(|(r, h)| h.map_or(*r, |h| f(r, h.t))).collect()
     };
-    // Ending exactly at the hit: not hit. One step later: the same hit. Starting exactly there: the same. One step later: something behind.
+    // Ending exactly at the hit: not hit. One step later: the same hit. Starting exactly there: the
+    // same. One step later: something behind.
     let up_to = hits_all_ways(w, &with(&|r, t| Ray { t_max: t, ..*r }), what);
     let beyond = hits_all_ways(w, &with(&|r, t| Ray { t_max: t.next_up(), ..*r }), what);
     let from = hits_all_ways(w, &with(&|r, t| Ray { t_min: t, ..*r }), what);
@@ -22,9 +23,20 @@ fn check_limits(w: &World, rays: &[Ray], what: &str) {
         let Some(f) = h else { continue };
         hits += 1;
         assert_eq!(up_to[i], None, "{what}: {:?} with t_max {} still hits", rays[i], f.t);
-        assert_eq!(bits(beyond[i]), bits(*h), "{what}: {:?} with t_max just beyond {}", rays[i], f.t);
+        assert_eq!(
+            bits(beyond[i]),
+            bits(*h),
+            "{what}: {:?} with t_max just beyond {}",
+            rays[i],
+            f.t
+        );
         assert_eq!(bits(from[i]), bits(*h), "{what}: {:?} with t_min {}", rays[i], f.t);
-        assert!(behind[i].is_none_or(|b| b.t > f.t), "{what}: {:?} with t_min just beyond {}", rays[i], f.t);
+        assert!(
+            behind[i].is_none_or(|b| b.t > f.t),
+            "{what}: {:?} with t_min just beyond {}",
+            rays[i],
+            f.t
+        );
     }
     assert!(hits > 50, "{what}: only {hits} hits");
 }
@@ -50,8 +62,9 @@ fn limits_are_exact_far_away_and_on_instances() {
         .collect();
     for options in some_options() {
         check_limits(&world(&one, &options), &far, &format!("far, {options:?}"));
-        let w = World::build(vec![Geometry::Mesh(Arc::new(one.clone()))], instances.clone(), &options)
-            .expect("invertible");
+        let w =
+            World::build(vec![Geometry::Mesh(Arc::new(one.clone()))], instances.clone(), &options)
+                .expect("invertible");
         check_limits(&w, &inward_rays(700, 9), &format!("instances, {options:?}"));
         check_limits(&w, &far, &format!("far instances, {options:?}"));
     }
@@ -62,7 +75,8 @@ fn limits_are_exact_for_tiny_and_huge_directions() {
     for options in some_options() {
         let w = world(&sphere(1, 1.0, DVec3::ZERO), &options);
         for length in [1e-42f32, 1e-38, 1e-20, 1e-5, 1e5, 1e20, 1e36] {
-            // Distances near 10⁻³⁰ to 3, so that t is in range for most lengths and underflows or overflows for the others.
+            // Distances near 10⁻³⁰ to 3, so that t is in range for most lengths and underflows or
+            // overflows for the others.
             let rays: Vec<Ray> = inward_rays(96, 3)
                 .iter()
                 .map(|r| Ray { dir: r.dir.normalize() * length, t_min: 1e-30, ..*r })

@@ -34,7 +34,8 @@ pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Mee
     let sum = u + v + w;
     let depth = (u / sum).min(v / sum).min(w / sum);
     let t = n.dot(a) / det;
-    // ---- Errors: positions relative to the ray are off by roundings of their size; across a slanted or slender triangle that is more of t.
+    // ---- Errors: positions relative to the ray are off by roundings of their size; across a
+    // slanted or slender triangle that is more of t.
     let cos = (det / (n.length() * dir.length())).abs();
     let length = e1.length().max(e2.length()).max((e2 - e1).length());
     let reach = corners.iter().map(|p| (*p - origin).abs().max_element()).fold(0.0, f64::max);
@@ -45,8 +46,9 @@ pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Mee
     Some(Meeting { t, depth, t_error, depth_error, depth_per_length })
 }
 
-/// Checks `found` against trying every triangle of `mesh` (`world_origin` is that of render space). The range is the ray's. Returns the error of
-/// t in units of what is allowed, or `None` for a miss.
+/// Checks `found` against trying every triangle of `mesh` (`world_origin` is that of render space).
+/// The range is the ray's. Returns the error of t in units of what is allowed, or `None` for a
+/// miss.
 pub(crate) fn check(
     mesh: &TriMesh,
     world_origin: DVec3,
@@ -61,23 +63,39 @@ pub(crate) fn check(
     let mut sure: Option<(f64, f64, usize)> = None;
     for i in (0..mesh.num_triangles()).filter(|&i| mesh.is_renderable(i)) {
         let Some(m) = meet(at(i), o, d) else { continue };
-        let certain = m.depth > m.depth_error && m.t - m.t_error >= t_min && m.t + m.t_error < t_max;
+        let certain =
+            m.depth > m.depth_error && m.t - m.t_error >= t_min && m.t + m.t_error < t_max;
         if certain && sure.is_none_or(|(t, e, _)| m.t + m.t_error < t + e) {
             sure = Some((m.t, m.t_error, i));
         }
     }
     let Some(h) = found else {
-        assert!(sure.is_none(), "{what}: {ray:?} misses, but surely hits (t, error, triangle) {sure:?}");
+        assert!(
+            sure.is_none(),
+            "{what}: {ray:?} misses, but surely hits (t, error, triangle) {sure:?}"
+        );
         return None;
     };
     assert!(h.t >= ray.t_min && h.t < ray.t_max, "{what}: {ray:?}: {h:?} is outside the range");
     let m = meet(at(h.prim as usize), o, d);
-    let m = m.unwrap_or_else(|| panic!("{what}: {ray:?}: {h:?} is parallel to the ray, or no triangle"));
-    assert!(m.depth >= -m.depth_error, "{what}: {ray:?}: {h:?} is {} outside its triangle", -m.depth);
+    let m = m
+        .unwrap_or_else(|| panic!("{what}: {ray:?}: {h:?} is parallel to the ray, or no triangle"));
+    assert!(
+        m.depth >= -m.depth_error,
+        "{what}: {ray:?}: {h:?} is {} outside its triangle",
+        -m.depth
+    );
     let error = (h.t as f64 - m.t).abs() / m.t_error;
-    assert!(error <= 1.0, "{what}: {ray:?}: {h:?} should have t {}: {error} times the allowed error", m.t);
+    assert!(
+        error <= 1.0,
+        "{what}: {ray:?}: {h:?} should have t {}: {error} times the allowed error",
+        m.t
+    );
     if let Some((t, e, i)) = sure {
-        assert!(h.t as f64 - m.t_error <= t + e, "{what}: {ray:?}: {h:?} lies behind triangle {i} at {t}");
+        assert!(
+            h.t as f64 - m.t_error <= t + e,
+            "{what}: {ray:?}: {h:?} lies behind triangle {i} at {t}"
+        );
     }
     Some(error * ROUNDINGS)
 }

@@ -1,4 +1,5 @@
-//! Random soups, transforms and rays: nothing panics, every query agrees, and the oracle agrees. `PROPTEST_CASES=10000` searches longer.
+//! Random soups, transforms and rays: nothing panics, every query agrees, and the oracle agrees.
+//! `PROPTEST_CASES=10000` searches longer.
 
 use crate::common::*;
 use crate::oracle::check;
@@ -32,7 +33,10 @@ fn mesh(
     of: impl Strategy<Value = f32> + Clone,
     indices: std::ops::Range<u32>,
 ) -> impl Strategy<Value = TriMesh> {
-    (prop::collection::vec(vec3(of), 1..40), prop::collection::vec(prop::array::uniform3(indices), 0..60))
+    (
+        prop::collection::vec(vec3(of), 1..40),
+        prop::collection::vec(prop::array::uniform3(indices), 0..60),
+    )
         .prop_map(|(positions, indices)| TriMesh::new(positions, indices))
 }
 

@@ -21,10 +21,12 @@ fn meshes_from_1e_minus_30_to_1e30_are_hit_like_those_of_size_one() {
     for options in some_options() {
         let one = world(&unit, &options);
         for exponent in [-30, -20, -12, -9, -6, -3, 3, 6, 9, 12, 20, 30] {
-            // A power of two near the power of ten: then the numbers are the same but for their exponents.
+            // A power of two near the power of ten: then the numbers are the same but for their
+            // exponents.
             let k = ((10f32).powi(exponent).log2().round()).exp2();
             let w = world(&scaled(&unit, k), &options);
-            let scaled_rays: Vec<Ray> = rays.iter().map(|r| Ray { origin: r.origin * k, ..*r }).collect();
+            let scaled_rays: Vec<Ray> =
+                rays.iter().map(|r| Ray { origin: r.origin * k, ..*r }).collect();
             let what = format!("size {k:e}, {options:?}");
             for (i, h) in hits_all_ways(&w, &scaled_rays, &what).into_iter().enumerate() {
                 let expected = one.closest(&rays[i]);
@@ -54,7 +56,8 @@ fn meshes_of_any_size_are_watertight() {
             for aim in RayTarget::ALL {
                 for query in QueryKind::ALL {
                     let start = RayOrigins::Ball { center, radius: 0.6 * radius };
-                    let c = LeakTest { world: &w, mesh: &mesh, start, aim, seed: 3 }.count(query, 4096);
+                    let c =
+                        LeakTest { world: &w, mesh: &mesh, start, aim, seed: 3 }.count(query, 4096);
                     assert_eq!(
                         (c.leaks, c.occlusion_leaks),
                         (0, 0),
@@ -66,8 +69,8 @@ fn meshes_of_any_size_are_watertight() {
     }
 }
 
-/// A camera this many sizes away sees the same triangles as one three sizes away in the same direction with the same perspective would, as the f64
-/// oracle says.
+/// A camera this many sizes away sees the same triangles as one three sizes away in the same
+/// direction with the same perspective would, as the f64 oracle says.
 #[test]
 fn cameras_1e6_and_1e9_away_lose_nothing() {
     let mesh = sphere(2, 1.0, DVec3::ZERO);
@@ -80,17 +83,22 @@ fn cameras_1e6_and_1e9_away_lose_nothing() {
                 let (x, y) = ((i % 20) as f64 / 10.0 - 0.95, (i / 20) as f64 / 10.0 - 0.95);
                 let target = DVec3::new(x, y, 0.0);
                 let (ray, moved) = w.ray_from_world(eye, (target - eye) / distance);
-                // The oracle gets the moved ray; where that starts is compared with the line in f64.
+                // The oracle gets the moved ray; where that starts is compared with the line in
+                // f64.
                 let o = ray.origin.as_dvec3() + w.origin();
                 let off = (o - eye).cross(target - eye).length() / (target - eye).length();
-                assert!(off < 1e-6, "distance {distance}: the moved ray starts {off} beside the line");
+                assert!(
+                    off < 1e-6,
+                    "distance {distance}: the moved ray starts {off} beside the line"
+                );
                 assert!(moved > 0.9 * distance, "the ray starts near the mesh");
                 let found = w.closest(&ray);
                 hits += found.is_some() as usize;
                 check(&mesh, w.origin(), &ray, found, "far camera");
                 rays.push(ray);
             }
-            // The square from -0.95 to 0.95 around the unit sphere's centre, seen at an angle of 50 degrees.
+            // The square from -0.95 to 0.95 around the unit sphere's centre, seen at an angle of 50
+            // degrees.
             assert!(hits > 250, "distance {distance}: {hits} of 400 hit");
             hits_all_ways(&w, &rays, "far camera");
         }
@@ -106,7 +114,8 @@ fn f32_origins_1e6_and_1e9_away_hit_what_f64_says() {
             let mut r = Random(17);
             let mut rays = Vec::new();
             for _ in 0..300 {
-                // Directions whose f32 rounding still meets the mesh: along axes, or aimed and kept if they do.
+                // Directions whose f32 rounding still meets the mesh: along axes, or aimed and kept
+                // if they do.
                 let o = (r.direction().as_vec3()) * distance;
                 let aim = (r.direction() * 0.5).as_vec3();
                 rays.push(Ray::new(o, aim - o));
@@ -115,7 +124,8 @@ fn f32_origins_1e6_and_1e9_away_hit_what_f64_says() {
             let hits = hits_all_ways(&w, &rays, "far origins");
             assert!(hits[1..].iter().step_by(2).all(Option::is_some), "rays along the axis hit");
             for (ray, h) in rays.iter().zip(hits) {
-                // Barycentrics tell where: the point is on the ray to the mesh's precision although t is not.
+                // Barycentrics tell where: the point is on the ray to the mesh's precision although
+                // t is not.
                 let (o, d) = (ray.origin.as_dvec3() + w.origin(), ray.dir.as_dvec3());
                 let miss = (-o).cross(d).length() / d.length();
                 match h {
@@ -125,7 +135,10 @@ fn f32_origins_1e6_and_1e9_away_hit_what_f64_says() {
                         let p = a + (b - a) * h.u as f64 + (c - a) * h.v as f64;
                         let off = (p - o).cross(d).length() / d.length();
                         assert!(off < 3e-6, "{ray:?}: {h:?} is {off} beside the ray");
-                        assert!((p - o).dot(d) / d.length() < distance as f64 * 1.8, "the near side");
+                        assert!(
+                            (p - o).dot(d) / d.length() < distance as f64 * 1.8,
+                            "the near side"
+                        );
                         let nearer = p.dot(d);
                         assert!(nearer <= 1e-3 * d.length(), "{ray:?}: {h:?} is on the far side");
                     }
@@ -159,7 +172,8 @@ fn instances_far_from_one_another_keep_their_shape() {
         Instance { geometry: 0, world_from_object: DAffine3::from_translation(small) },
     ];
     for options in some_options() {
-        let w = World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options).expect("fine");
+        let w = World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options)
+            .expect("fine");
         // The f32 grid at 3e7 has steps of 2: an eye on it, 8 away, looking along z.
         let eye = w.render_from_world(small + DVec3::new(0.0, 0.0, 8.0));
         let h = w.closest(&Ray::new(eye, -Vec3::Z)).expect("straight at the small one");
@@ -176,17 +190,19 @@ fn spread_out_instances_packets_equal_single_rays() {
     let mesh = Arc::new(sphere(2, 1.0, DVec3::ZERO));
     for spread in [1e3, 1e6] {
         let places = placements(40, 21, spread);
-        let instances: Vec<Instance> =
-            places.iter().map(|&world_from_object| Instance { geometry: 0, world_from_object }).collect();
+        let instances: Vec<Instance> = places
+            .iter()
+            .map(|&world_from_object| Instance { geometry: 0, world_from_object })
+            .collect();
         for options in some_options() {
-            let w =
-                World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options).expect("fine");
+            let w = World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options)
+                .expect("fine");
             let mut rays = Vec::new();
             let mut r = Random(4);
             for i in 0..1500 {
                 let at = w.render_from_world(places[i % places.len()].translation);
-                let from =
-                    w.render_from_world(places[r.below(places.len())].translation) + Vec3::new(0.5, 1.5, 2.0);
+                let from = w.render_from_world(places[r.below(places.len())].translation)
+                    + Vec3::new(0.5, 1.5, 2.0);
                 let aim = at + (r.direction() * 0.3).as_vec3();
                 rays.push(Ray::new(from, aim - from));
             }

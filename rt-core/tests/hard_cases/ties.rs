@@ -1,4 +1,5 @@
-//! Surfaces in the same place: the lowest instance, then the lowest primitive wins, whoever asks and in whatever order the tree is walked.
+//! Surfaces in the same place: the lowest instance, then the lowest primitive wins, whoever asks
+//! and in whatever order the tree is walked.
 
 use crate::common::*;
 use rt_core::bvh::{Geometry, Instance, World};
@@ -32,7 +33,12 @@ fn coplanar_layers_have_one_winner() {
             let w = world(&mesh, &options);
             let hits = hits_all_ways(&w, &views(), &format!("{options:?}"));
             let wrong = hits.iter().flatten().filter(|h| h.prim >= first).count();
-            assert_eq!(wrong, 0, "{options:?}: hits that are not of the first layer, of {}", hits.len());
+            assert_eq!(
+                wrong,
+                0,
+                "{options:?}: hits that are not of the first layer, of {}",
+                hits.len()
+            );
         }
     }
 }
@@ -45,12 +51,17 @@ fn coplanar_instances_have_one_winner() {
     );
     for place in [DAffine3::IDENTITY, turn] {
         for options in some_options() {
-            let geometries = vec![Geometry::Mesh(Arc::new(cube(4))), Geometry::Mesh(Arc::new(cube(4)))];
-            let instances = [1, 0, 0, 1].map(|geometry| Instance { geometry, world_from_object: place });
+            let geometries =
+                vec![Geometry::Mesh(Arc::new(cube(4))), Geometry::Mesh(Arc::new(cube(4)))];
+            let instances =
+                [1, 0, 0, 1].map(|geometry| Instance { geometry, world_from_object: place });
             let w = World::build(geometries, instances.to_vec(), &options).expect("invertible");
             let hits = hits_all_ways(&w, &views(), &format!("{options:?} {place:?}"));
             assert!(hits.iter().flatten().count() > 3000);
-            assert!(hits.iter().flatten().all(|h| h.instance == 0), "{options:?}: the lowest instance wins");
+            assert!(
+                hits.iter().flatten().all(|h| h.instance == 0),
+                "{options:?}: the lowest instance wins"
+            );
         }
     }
 }
@@ -67,6 +78,9 @@ fn a_hundred_thousand_copies_of_one_triangle_build_and_answer() {
         let w = world(&mesh, &options);
         let hit = w.closest(&through).expect("in the middle of it");
         assert_eq!((hit.prim, hit.t), (0, 1.0), "{options:?}");
-        assert!(!w.occluded(&Ray::new(Vec3::new(0.6, 0.6, 1.0), -Vec3::Z)), "{options:?}: beside it");
+        assert!(
+            !w.occluded(&Ray::new(Vec3::new(0.6, 0.6, 1.0), -Vec3::Z)),
+            "{options:?}: beside it"
+        );
     }
 }

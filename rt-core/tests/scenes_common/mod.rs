@@ -48,9 +48,18 @@ pub fn sphere(center: Vec3, radius: f32, n: usize) -> TriMesh {
     TriMesh { normals: Some(Attribute::per_vertex(normals)), ..TriMesh::new(positions, indices) }
 }
 
-/// Looks straight down from height `h` with a parallel projection of world height `height`; x to the right, y up.
+/// Looks straight down from height `h` with a parallel projection of world height `height`; x to
+/// the right, y up.
 pub fn top_camera(h: f64, height: f64) -> Camera {
-    Camera::orthographic(DVec3::new(0.0, 0.0, h), DVec3::ZERO, DVec3::Y, height, 1.0, [0.0, 2.0 * h]).unwrap()
+    Camera::orthographic(
+        DVec3::new(0.0, 0.0, h),
+        DVec3::ZERO,
+        DVec3::Y,
+        height,
+        1.0,
+        [0.0, 2.0 * h],
+    )
+    .unwrap()
 }
 
 /// Perspective from `eye` to the origin.

@@ -1,4 +1,5 @@
-//! What the shape tests share: a small deterministic generator and the closest hit by trying every primitive.
+//! What the shape tests share: a small deterministic generator and the closest hit by trying every
+//! primitive.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use glam::Vec3;
@@ -47,7 +48,8 @@ impl Random {
     }
 }
 
-/// The closest hit over all primitives whose bounds are not empty and are met by the ray; ties to the lower primitive.
+/// The closest hit over all primitives whose bounds are not empty and are met by the ray; ties to
+/// the lower primitive.
 pub(crate) fn closest(shape: &dyn Shape, ray: &Ray) -> Option<(u32, ShapeHit)> {
     let mut best: Option<(u32, ShapeHit)> = None;
     for prim in 0..shape.num_primitives() as u32 {

@@ -39,7 +39,8 @@ pub(super) struct FlowArgs {
     /// Array with the mass fraction of a gas; may be repeated
     #[arg(long, value_name = "NAME=GAS", value_parser = units::species)]
     species: Vec<(String, String)>,
-    /// Transfer function of an array to n - 1, straight between its points; may be repeated, one per array. Illustration, not physics
+    /// Transfer function of an array to n - 1, straight between its points; may be repeated, one
+    /// per array. Illustration, not physics
     #[arg(long, value_name = "NAME=VALUE:N,...", value_parser = units::curve, allow_hyphen_values = true)]
     curve: Vec<(String, Vec<[f64; 2]>)>,
     /// Factor of an array's transfer function; 0 leaves it out
@@ -80,7 +81,8 @@ impl FlowArgs {
         let a = self;
         s.solids.files.extend(a.solid.iter().cloned());
         let f = &mut s.flow;
-        // Another alternative on the command line replaces that of the file; transfer functions are added to those it has.
+        // Another alternative on the command line replaces that of the file; transfer functions are
+        // added to those it has.
         let by_curves = !a.curve.is_empty() && f.multifield.is_none();
         let by_state = a.density.is_some() || a.temperature.is_some();
         if by_curves || by_state || a.n_minus_1.is_some() || a.electrons.is_some() {
@@ -141,7 +143,8 @@ impl FlowArgs {
             let Some(curve) = multifield.fields.get_mut(name) else {
                 let names: Vec<&str> = multifield.fields.keys().map(String::as_str).collect();
                 return Err(UsageError(format!(
-                    "--curve-weight {name}: this array has no transfer function; there are those of: {}",
+                    "--curve-weight {name}: this array has no transfer function; there are those \
+                     of: {}",
                     names.join(", ")
                 )));
             };

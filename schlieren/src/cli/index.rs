@@ -1,4 +1,5 @@
-//! `schlieren index`: the index of refraction for conditions on the command line, or for a table of them.
+//! `schlieren index`: the index of refraction for conditions on the command line, or for a table of
+//! them.
 
 use super::units;
 use crate::index::Gas;
@@ -12,7 +13,8 @@ use std::path::PathBuf;
 /// Options of `schlieren index`.
 #[derive(Debug, Args)]
 pub(super) struct IndexArgs {
-    /// A table with the columns lambda_um, T_C, p_Pa, RH_frac, CO2_ppm; printed with n_minus_1 added
+    /// A table with the columns lambda_um, T_C, p_Pa, RH_frac, CO2_ppm; printed with n_minus_1
+    /// added
     #[arg(long, value_name = "CSV", conflicts_with_all = ["wavelength_nm", "temperature_c", "pressure_pa", "humidity", "co2_ppm", "density", "species", "model"])]
     csv: Option<PathBuf>,
     /// Vacuum wavelength

@@ -10,16 +10,20 @@ pub(super) struct MediaArgs {
     /// Array with the absorption in 1/m
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     absorption: Option<String>,
-    /// Array with the emission in 1/m: per metre of path, relative to undisturbed light without a cut-off
+    /// Array with the emission in 1/m: per metre of path, relative to undisturbed light without a
+    /// cut-off
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     emission: Option<String>,
-    /// Array with the rotation of the plane of polarisation in rad/m, counter-clockwise in the picture
+    /// Array with the rotation of the plane of polarisation in rad/m, counter-clockwise in the
+    /// picture
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     rotation: Option<String>,
-    /// With --rotation: angle of an analyser behind the flow to the polariser before it [default: no analyser]
+    /// With --rotation: angle of an analyser behind the flow to the polariser before it [default:
+    /// no analyser]
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
     analyser: Option<f64>,
-    /// With --emission, schlieren: diameter of the stop in the cut-off plane that the medium's own light fills [default: 25mm]
+    /// With --emission, schlieren: diameter of the stop in the cut-off plane that the medium's own
+    /// light fills [default: 25mm]
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     stop: Option<f64>,
 }

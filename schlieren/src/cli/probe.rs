@@ -34,8 +34,13 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let section = TestSection::open(&scene, |what| common.note(0, what))?;
     let framing = framing(&scene, &section);
     let t = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
-    let planned =
-        section.paths(&scene, 0, PathQuantities { opd: true }, matches!(t, Technique::Bos(_)), true)?;
+    let planned = section.paths(
+        &scene,
+        0,
+        PathQuantities { opd: true },
+        matches!(t, Technique::Bos(_)),
+        true,
+    )?;
     let [x, y] = args.pixel;
     let position_m = framing.plane_from_pixel(x, y);
     let start = Start { position_m: position_m.map(|c| c as f32), tilt_rad: [0.0; 2] };
@@ -95,7 +100,13 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         let given = &scene.media;
         for (name, words, unit, value, present) in [
             ("optical_depth", "optical depth    ", "", c.optical_depth, given.absorption.is_some()),
-            ("emission", "emission         ", " of undisturbed light", emission, given.emission.is_some()),
+            (
+                "emission",
+                "emission         ",
+                " of undisturbed light",
+                emission,
+                given.emission.is_some(),
+            ),
             ("rotation_rad", "rotation         ", " rad", c.rotation_rad, given.rotation.is_some()),
         ] {
             if present {

@@ -19,7 +19,8 @@ pub(super) struct RenderArgs {
     /// The picture as PNG
     #[arg(long, short, value_name = "PNG")]
     out: Option<PathBuf>,
-    /// The picture as OpenEXR: colour, deflection, displacement, phase, transmission, samples, error, what the medium does, and every parameter
+    /// The picture as OpenEXR: colour, deflection, displacement, phase, transmission, samples,
+    /// error, what the medium does, and every parameter
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
     /// The deflection map as NumPy array (height, width, 2) in rad
@@ -67,10 +68,15 @@ impl<'a> Outputs<'a> {
         exr: Option<&'a Path>,
         npy: Option<&'a Path>,
     ) -> Result<Self, UsageError> {
-        for (path, ending, flag) in [(png, "png", "-o"), (exr, "exr", "--exr"), (npy, "npy", "--npy")] {
+        for (path, ending, flag) in
+            [(png, "png", "-o"), (exr, "exr", "--exr"), (npy, "npy", "--npy")]
+        {
             let Some(path) = path else { continue };
             if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
-                return Err(UsageError(format!("{flag} `{}` does not end in .{ending}", path.display())));
+                return Err(UsageError(format!(
+                    "{flag} `{}` does not end in .{ending}",
+                    path.display()
+                )));
             }
         }
         Ok(Outputs { png, exr, npy })
@@ -81,8 +87,11 @@ impl<'a> Outputs<'a> {
     }
 
     fn names(&self) -> String {
-        let names: Vec<String> =
-            [self.png, self.exr, self.npy].iter().flatten().map(|p| p.display().to_string()).collect();
+        let names: Vec<String> = [self.png, self.exr, self.npy]
+            .iter()
+            .flatten()
+            .map(|p| p.display().to_string())
+            .collect();
         names.join(", ")
     }
 }
@@ -154,8 +163,9 @@ pub(super) fn draw(
         "exr": outputs.exr,
         "npy": outputs.npy,
     });
-    let deflection =
-        r.largest_deflection_rad.map_or(String::new(), |d| format!(", deflections up to {d:.3e} rad"));
+    let deflection = r
+        .largest_deflection_rad
+        .map_or(String::new(), |d| format!(", deflections up to {d:.3e} rad"));
     let text = format!(
         "{}: {}{deflection}; {} rays; read {read_secs:.2} s, render {render_secs:.2} s",
         outputs.names(),

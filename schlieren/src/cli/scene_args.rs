@@ -1,4 +1,5 @@
-//! Options that describe the scene, and how they change the one from a file. An option that changes nothing is refused by name.
+//! Options that describe the scene, and how they change the one from a file. An option that changes
+//! nothing is refused by name.
 
 use super::flow_args::FlowArgs;
 use super::media_args::MediaArgs;
@@ -63,7 +64,8 @@ struct OpticsArgs {
     /// circle, complemented-circle, color: radius in the cut-off plane; picture: half its width
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     cutoff_radius: Option<f64>,
-    /// shadowgraph: distance of the film; bos: distance of the background; else the plane in focus. From the middle of the field
+    /// shadowgraph: distance of the film; bos: distance of the background; else the plane in focus.
+    /// From the middle of the field
     #[arg(long, value_name = "LENGTH", value_parser = units::length, allow_hyphen_values = true)]
     film_distance: Option<f64>,
     /// interferogram: distance of the fringes without flow [default: infinite]
@@ -107,7 +109,8 @@ struct FilmArgs {
     /// Cells of a lattice of rays instead of photons; the default of shadowgraphs
     #[arg(long, conflicts_with_all = ["samples", "filter", "jitter", "seed", "tilted_beams"])]
     noise_free: bool,
-    /// Against noise, for 1 photon per pixel, narrower for more: none, gaussian:SIGMA, mean:RADIUS (pixels), cone:NEAREST
+    /// Against noise, for 1 photon per pixel, narrower for more: none, gaussian:SIGMA, mean:RADIUS
+    /// (pixels), cone:NEAREST
     #[arg(long, value_name = "FILTER", value_parser = filter)]
     filter: Option<FilterSpec>,
     /// sobol or random
@@ -131,10 +134,12 @@ struct FilmArgs {
     /// Force a step, in voxels
     #[arg(long, value_name = "VOXELS")]
     step: Option<f64>,
-    /// Leave out gas so even that no ray's deflection changes by more than this in all: 1e-9rad. For verlet on the CPU
+    /// Leave out gas so even that no ray's deflection changes by more than this in all: 1e-9rad.
+    /// For verlet on the CPU
     #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
     skip: Option<f64>,
-    /// Where to trace: gpu needs a Vulkan device; auto takes one if it can, and says why if it cannot
+    /// Where to trace: gpu needs a Vulkan device; auto takes one if it can, and says why if it
+    /// cannot
     #[arg(long, value_enum, value_name = "DEVICE")]
     device: Option<Device>,
 }
@@ -156,7 +161,8 @@ fn jitter(text: &str) -> Result<Jitter, String> {
 fn filter(text: &str) -> Result<FilterSpec, String> {
     let wrong = || format!("`{text}` is not a filter; write none, gaussian:0.8, mean:1 or cone:8");
     let (kind, number) = text.split_once(':').unwrap_or((text, ""));
-    let number = || number.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(wrong);
+    let number =
+        || number.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(wrong);
     match kind {
         "none" => Ok(FilterSpec::None {}),
         "gaussian" => Ok(FilterSpec::Gaussian { sigma_px: number()? }),
@@ -167,7 +173,9 @@ fn filter(text: &str) -> Result<FilterSpec, String> {
 }
 
 fn no_effect(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
-    UsageError(format!("{flag} changes nothing with {what} `{name}`; leave it out, or take {belongs}"))
+    UsageError(format!(
+        "{flag} changes nothing with {what} `{name}`; leave it out, or take {belongs}"
+    ))
 }
 
 impl SceneArgs {
@@ -220,11 +228,17 @@ impl OpticsArgs {
 
     fn apply_lenses(&self, s: &mut Scene) -> anyhow::Result<()> {
         let uses = s.technique.uses_source();
-        for (flag, value) in [("--focal-length", self.focal_length), ("--collimator", self.collimator)] {
+        for (flag, value) in
+            [("--focal-length", self.focal_length), ("--collimator", self.collimator)]
+        {
             if value.is_some() && !uses {
-                return Err(
-                    no_effect(flag, "technique", s.technique.name(), "schlieren or shadowgraph").into()
-                );
+                return Err(no_effect(
+                    flag,
+                    "technique",
+                    s.technique.name(),
+                    "schlieren or shadowgraph",
+                )
+                .into());
             }
         }
         s.lenses.schlieren_m = self.focal_length.unwrap_or(s.lenses.schlieren_m);
@@ -252,9 +266,12 @@ impl OpticsArgs {
         match self.cutoff.as_deref() {
             None => {}
             Some("knife") => *cutoff = CutoffSpec::default(),
-            Some("circle") => *cutoff = CutoffSpec::Circle { radius_m: customary, center_m: [0.0; 2] },
+            Some("circle") => {
+                *cutoff = CutoffSpec::Circle { radius_m: customary, center_m: [0.0; 2] }
+            }
             Some("complemented-circle") => {
-                *cutoff = CutoffSpec::ComplementedCircle { radius_m: customary, center_m: [0.0; 2] };
+                *cutoff =
+                    CutoffSpec::ComplementedCircle { radius_m: customary, center_m: [0.0; 2] };
             }
             Some("color") => *cutoff = CutoffSpec::Color { radius_m: customary, red_deg: 0.0 },
             Some(file) if file.to_ascii_lowercase().ends_with(".png") => {
@@ -262,7 +279,8 @@ impl OpticsArgs {
             }
             Some(other) => {
                 return Err(UsageError(format!(
-                    "there is no cut-off `{other}`; there are: knife, circle, complemented-circle, color, or a picture that ends in .png"
+                    "there is no cut-off `{other}`; there are: knife, circle, complemented-circle, \
+                     color, or a picture that ends in .png"
                 ))
                 .into());
             }
@@ -272,7 +290,11 @@ impl OpticsArgs {
             match cutoff {
                 CutoffSpec::Knife { angle_deg, .. } => *angle_deg = angle,
                 CutoffSpec::Color { red_deg, .. } => *red_deg = angle,
-                _ => return Err(no_effect("--cutoff-angle", "cut-off", kind, "knife or color").into()),
+                _ => {
+                    return Err(
+                        no_effect("--cutoff-angle", "cut-off", kind, "knife or color").into()
+                    );
+                }
             }
         }
         if let Some(part) = self.cutoff_open {
@@ -293,7 +315,11 @@ impl OpticsArgs {
                 | CutoffSpec::ComplementedCircle { radius_m, .. }
                 | CutoffSpec::Color { radius_m, .. } => *radius_m = radius,
                 CutoffSpec::Image { width_m, .. } => *width_m = 2.0 * radius,
-                _ => return Err(no_effect("--cutoff-radius", "cut-off", kind, "another cut-off").into()),
+                _ => {
+                    return Err(
+                        no_effect("--cutoff-radius", "cut-off", kind, "another cut-off").into()
+                    );
+                }
             }
         }
         Ok(())

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 pub(super) struct ServeArgs {
     /// The flow; of a time series (several files, or one .pvd) the page shows any step
     files: Vec<PathBuf>,
-    /// Where to listen; port 0 takes a free one. Other addresses than 127.0.0.1 let other machines in that know the page's whole address
+    /// Where to listen; port 0 takes a free one. Other addresses than 127.0.0.1 let other machines
+    /// in that know the page's whole address
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
     listen: SocketAddr,
     #[command(flatten)]
@@ -25,7 +26,9 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     let mut scene = args.scene.scene(args.files.first().map(PathBuf::as_path))?;
     if !scene.media.is_empty() {
         return Err(UsageError(
-            "the page does not show absorption, emission or rotation; leave out [media] and its options, or take `schlieren render`".into(),
+            "the page does not show absorption, emission or rotation; leave out [media] and its \
+             options, or take `schlieren render`"
+                .into(),
         )
         .into());
     }
@@ -33,8 +36,9 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     scene.flow.file = whole(&scene.flow.file);
     scene.solids.files.iter_mut().for_each(|f| *f = whole(f));
-    if let crate::scene::TechniqueSpec::Schlieren { cutoff: crate::scene::CutoffSpec::Image { file, .. } } =
-        &mut scene.technique
+    if let crate::scene::TechniqueSpec::Schlieren {
+        cutoff: crate::scene::CutoffSpec::Image { file, .. },
+    } = &mut scene.technique
     {
         *file = whole(file);
     }
@@ -43,8 +47,10 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
             Ok(steps) => steps,
             // Times in parts are no steps that can be chosen; the first is read whole.
             Err(e @ crate::input::InputError::InFile { .. }) => {
-                common
-                    .warn(format_args!("only the first time is shown: {}", datasets::cli::report(&e.into())));
+                common.warn(format_args!(
+                    "only the first time is shown: {}",
+                    datasets::cli::report(&e.into())
+                ));
                 Vec::new()
             }
             Err(e) => return Err(e.into()),
@@ -54,7 +60,8 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     steps.iter_mut().for_each(|s| s.path = whole(&s.path));
     if !args.listen.ip().is_loopback() {
         common.warn(format_args!(
-            "listening on {}: everyone who can reach this machine and sees the address can use the page, and it is not encrypted",
+            "listening on {}: everyone who can reach this machine and sees the address can use the \
+             page, and it is not encrypted",
             args.listen
         ));
     }

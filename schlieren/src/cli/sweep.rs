@@ -39,7 +39,8 @@ struct Setting {
 
 /// `film.focus_m=0.1,0.2`. Values are TOML; what is none is a text.
 fn setting(text: &str) -> Result<Setting, String> {
-    let wrong = || format!("`{text}` is not KEY=V1,V2,...; write for example film.focus_m=0.1,0.2,0.4");
+    let wrong =
+        || format!("`{text}` is not KEY=V1,V2,...; write for example film.focus_m=0.1,0.2,0.4");
     let (key, values) = text.split_once('=').ok_or_else(wrong)?;
     let value = |v: &str| {
         let parsed = format!("v = {v}").parse::<toml::Table>().ok().and_then(|mut t| t.remove("v"));
@@ -59,9 +60,9 @@ fn with(scene: &Scene, key: &[String], value: &toml::Value) -> anyhow::Result<Sc
     let mut tree = toml::Value::Table(scene.to_toml()?.parse()?);
     let mut at = &mut tree;
     for part in key {
-        let table = at
-            .as_table_mut()
-            .ok_or_else(|| UsageError(format!("--set {}: `{part}` is inside a value", key.join("."))))?;
+        let table = at.as_table_mut().ok_or_else(|| {
+            UsageError(format!("--set {}: `{part}` is inside a value", key.join(".")))
+        })?;
         at = table.entry(part.clone()).or_insert_with(|| toml::Value::Table(toml::Table::new()));
     }
     *at = value.clone();
@@ -83,7 +84,9 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
     match &args.set {
         Some(set) => {
             let [file] = &args.files[..] else {
-                return Err(UsageError("--set sweeps over one file; leave out the others".into()).into());
+                return Err(
+                    UsageError("--set sweeps over one file; leave out the others".into()).into()
+                );
             };
             let scene = args.scene.scene(Some(file))?;
             for value in &set.values {
@@ -100,7 +103,8 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
     let mut reference: Option<f64> = None;
     for (i, (label, mut scene)) in runs.into_iter().enumerate() {
         cancel.check()?;
-        // All times are relative to the first one's surroundings, or pictures could not be compared.
+        // All times are relative to the first one's surroundings, or pictures could not be
+        // compared.
         if args.set.is_none() && scene.flow.reference_n_minus_1.is_none() {
             scene.flow.reference_n_minus_1 = reference;
         }
@@ -139,7 +143,11 @@ mod tests {
         assert_eq!(
             turned.technique,
             crate::scene::TechniqueSpec::Schlieren {
-                cutoff: crate::scene::CutoffSpec::Knife { angle_deg: 45.0, open: 0.5, open_m: None }
+                cutoff: crate::scene::CutoffSpec::Knife {
+                    angle_deg: 45.0,
+                    open: 0.5,
+                    open_m: None
+                }
             }
         );
         let s = setting("view.direction=x,y").unwrap();

@@ -23,8 +23,8 @@ fn with_unit(text: &str, units: &[(&str, f64)], example: &str) -> Result<f64, St
     let text_trimmed = text.trim();
     // The longest unit that fits: "mm" ends with "m", too.
     let unit = units.iter().filter(|u| text_trimmed.ends_with(u.0)).max_by_key(|u| u.0.len());
-    let (number, scale) =
-        unit.map_or((text_trimmed, 1.0), |u| (&text_trimmed[..text_trimmed.len() - u.0.len()], u.1));
+    let (number, scale) = unit
+        .map_or((text_trimmed, 1.0), |u| (&text_trimmed[..text_trimmed.len() - u.0.len()], u.1));
     let value: f64 = number.trim().parse().map_err(|_| wrong())?;
     if value.is_finite() { Ok(value * scale) } else { Err(wrong()) }
 }
@@ -41,7 +41,8 @@ pub(super) fn angle_rad(text: &str) -> Result<f64, String> {
 
 /// `1024x768`.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
-    let wrong = || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
+    let wrong =
+        || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
     let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let pixels = |t: &str| t.parse().ok().filter(|n| (1..=16384).contains(n));
     Ok([pixels(w).ok_or_else(wrong)?, pixels(h).ok_or_else(wrong)?])
@@ -50,7 +51,10 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
 /// `point`, `slit:1mm,5mm`, `circle:0.5mm`.
 pub(super) fn source(text: &str) -> Result<SourceSpec, String> {
     let wrong = || {
-        format!("`{text}` is not a source; write point, slit:WIDTH,LENGTH (slit:1mm,5mm) or circle:DIAMETER")
+        format!(
+            "`{text}` is not a source; write point, slit:WIDTH,LENGTH (slit:1mm,5mm) or \
+             circle:DIAMETER"
+        )
     };
     if text == "point" {
         return Ok(SourceSpec::Point {});
@@ -69,8 +73,9 @@ pub(super) fn source(text: &str) -> Result<SourceSpec, String> {
 /// `NAME=GAS`.
 pub(super) fn species(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').filter(|(name, gas)| !name.is_empty() && !gas.is_empty());
-    let (name, gas) = parts
-        .ok_or_else(|| format!("`{text}` is not NAME=GAS; write for example Y_CH4=CH4 or Y_fuel=0.42"))?;
+    let (name, gas) = parts.ok_or_else(|| {
+        format!("`{text}` is not NAME=GAS; write for example Y_CH4=CH4 or Y_fuel=0.42")
+    })?;
     Ok((name.to_string(), gas.to_string()))
 }
 
@@ -78,7 +83,8 @@ pub(super) fn species(text: &str) -> Result<(String, String), String> {
 pub(super) fn curve(text: &str) -> Result<(String, Vec<[f64; 2]>), String> {
     let wrong = || {
         format!(
-            "`{text}` is not NAME=VALUE:N,VALUE:N,... with n - 1 at values of the array; write for example T=300:0,2000:-2e-4"
+            "`{text}` is not NAME=VALUE:N,VALUE:N,... with n - 1 at values of the array; write for \
+             example T=300:0,2000:-2e-4"
         )
     };
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite());
@@ -129,9 +135,14 @@ mod tests {
 
     #[test]
     fn units_are_read_and_bare_numbers_are_si() {
-        for (text, value) in
-            [("500mm", 0.5), ("0.5", 0.5), ("0.5m", 0.5), ("633nm", 633e-9), ("2cm", 0.02), ("3µm", 3e-6)]
-        {
+        for (text, value) in [
+            ("500mm", 0.5),
+            ("0.5", 0.5),
+            ("0.5m", 0.5),
+            ("633nm", 633e-9),
+            ("2cm", 0.02),
+            ("3µm", 3e-6),
+        ] {
             assert!((length(text).unwrap() / value - 1.0).abs() < 1e-12, "{text}");
         }
         assert_eq!(angle_rad("1e-7rad"), Ok(1e-7));
@@ -144,7 +155,10 @@ mod tests {
 
     #[test]
     fn curves_are_read() {
-        assert_eq!(curve("T=300:0, 2000:-2e-4"), Ok(("T".into(), vec![[300.0, 0.0], [2000.0, -2e-4]])));
+        assert_eq!(
+            curve("T=300:0, 2000:-2e-4"),
+            Ok(("T".into(), vec![[300.0, 0.0], [2000.0, -2e-4]]))
+        );
         for wrong in ["T", "=1:2", "T=1", "T=1:x", "T=1:2,"] {
             assert!(curve(wrong).unwrap_err().contains("T=300:0,2000:-2e-4"), "{wrong}");
         }

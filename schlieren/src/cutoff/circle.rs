@@ -1,5 +1,6 @@
-//! Circular cut-offs: an iris passes what is deflected little (bright field, deflections darken), its complement, an opaque spot, passes what is deflected
-//! much (dark field, deflections of any direction brighten). The thesis' "circular" and "complemented circular" (section 5.3.4).
+//! Circular cut-offs: an iris passes what is deflected little (bright field, deflections darken),
+//! its complement, an opaque spot, passes what is deflected much (dark field, deflections of any
+//! direction brighten). The thesis' "circular" and "complemented circular" (section 5.3.4).
 
 use crate::optics::{Across, SourceImage};
 

@@ -1,7 +1,8 @@
 //! The colour filter: hue says the direction of a deflection, saturation its size.
 //!
-//! Equation 5.16 takes the hue from the cosine between deflected and undeflected direction. In f32 that cosine is exactly 1 for every deflection below
-//! 2.44e-4 rad, so all of a typical flow gets one hue; here the hue is `atan2(y, x)` of the place in the cut-off plane, as on a real filter.
+//! Equation 5.16 takes the hue from the cosine between deflected and undeflected direction. In f32
+//! that cosine is exactly 1 for every deflection below 2.44e-4 rad, so all of a typical flow gets
+//! one hue; here the hue is `atan2(y, x)` of the place in the cut-off plane, as on a real filter.
 
 use super::Rgb;
 use crate::optics::Across;
@@ -11,12 +12,14 @@ use crate::optics::Across;
 pub struct ColorWheel {
     /// Where colours are fully saturated, in metres.
     pub radius_m: f64,
-    /// Direction of red, counter-clockwise from the picture's right. Green and blue follow at 120 degrees each.
+    /// Direction of red, counter-clockwise from the picture's right. Green and blue follow at 120
+    /// degrees each.
     pub red_deg: f64,
 }
 
 impl ColorWheel {
-    /// Transmission: hue by angle, saturation by distance, the strongest channel always 1 (a filter cannot add light).
+    /// Transmission: hue by angle, saturation by distance, the strongest channel always 1 (a filter
+    /// cannot add light).
     #[inline]
     pub(super) fn transmission(&self, [x, y]: Across) -> Rgb {
         let saturation = (f64::from(x).hypot(f64::from(y)) / self.radius_m).min(1.0) as f32;

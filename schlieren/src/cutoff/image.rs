@@ -1,12 +1,14 @@
-//! Any picture as a filter: each photon is multiplied by the colour of the place where it crosses the cut-off plane.
+//! Any picture as a filter: each photon is multiplied by the colour of the place where it crosses
+//! the cut-off plane.
 
 use super::Rgb;
 use crate::optics::Across;
 use datasets::image_io::{ImageError, read_png};
 use std::path::Path;
 
-/// A raster of linear transmissions that covers a rectangle of the cut-off plane, centred on the axis; the picture's top is up. Bilinear between
-/// pixel centres. Beyond the rectangle the filter is what its edge pixels are.
+/// A raster of linear transmissions that covers a rectangle of the cut-off plane, centred on the
+/// axis; the picture's top is up. Bilinear between pixel centres. Beyond the rectangle the filter
+/// is what its edge pixels are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterImage {
     width: u32,
@@ -22,7 +24,8 @@ pub enum FilterError {
     #[error("the filter's picture cannot be used")]
     File(#[from] ImageError),
     /// Numbers that make no filter.
-    #[error("a filter of {width}x{height} pixels and {} x {} m with {found} values: {reason}", size_m[0], size_m[1])]
+    #[error("a filter of {width}x{height} pixels and {} x {} m with {found} values: \
+             {reason}", size_m[0], size_m[1])]
     Shape {
         /// Pixels per row.
         width: u32,
@@ -38,8 +41,14 @@ pub enum FilterError {
 }
 
 impl FilterImage {
-    /// A filter from `width * height` transmissions, top row first. Each must be in 0..=1: a filter cannot add light.
-    pub fn new(width: u32, height: u32, size_m: [f64; 2], pixels: Vec<Rgb>) -> Result<Self, FilterError> {
+    /// A filter from `width * height` transmissions, top row first. Each must be in 0..=1: a filter
+    /// cannot add light.
+    pub fn new(
+        width: u32,
+        height: u32,
+        size_m: [f64; 2],
+        pixels: Vec<Rgb>,
+    ) -> Result<Self, FilterError> {
         let found = pixels.len();
         let wrong = |reason| FilterError::Shape { width, height, size_m, found, reason };
         if width == 0 || height == 0 || found as u64 != u64::from(width) * u64::from(height) {
@@ -54,7 +63,8 @@ impl FilterImage {
         Ok(FilterImage { width, height, size_m, pixels })
     }
 
-    /// A PNG as a filter of `width_m` across; the height follows from the pixels. Transparent pixels are dark (glass on nothing).
+    /// A PNG as a filter of `width_m` across; the height follows from the pixels. Transparent
+    /// pixels are dark (glass on nothing).
     pub fn from_png(path: &Path, width_m: f64) -> Result<Self, FilterError> {
         let picture = read_png(path)?;
         let (width, height) = (picture.width, picture.height);
@@ -85,7 +95,10 @@ impl FilterImage {
     /// Place in pixels (0,0 the upper left corner) of a point of the plane.
     pub fn pixel_from_plane(&self, at_m: Across) -> [f64; 2] {
         let [w, h] = [f64::from(self.width), f64::from(self.height)];
-        [(f64::from(at_m[0]) / self.size_m[0] + 0.5) * w, (0.5 - f64::from(at_m[1]) / self.size_m[1]) * h]
+        [
+            (f64::from(at_m[0]) / self.size_m[0] + 0.5) * w,
+            (0.5 - f64::from(at_m[1]) / self.size_m[1]) * h,
+        ]
     }
 
     /// True when a pixel is not grey.

@@ -1,16 +1,19 @@
 //! The knife's edge: the classic cut-off of Toepler.
 //!
-//! With a slit parallel to the edge the intensity is *linear and then clipped*: of the image's height h the height a is open, a deflection ε along the
-//! knife's direction shifts the image by f2 ε, and `I/I₀ = clamp((a + f2 ε)/h, 0, 1)`; relative to the background a/h the contrast is `f2 ε/a`
-//! (Settles 2001, equation 3.7). The range before clipping is `-a/f2 … (h-a)/f2`. Slits at other angles and round sources have their own closed forms.
+//! With a slit parallel to the edge the intensity is *linear and then clipped*: of the image's
+//! height h the height a is open, a deflection ε along the knife's direction shifts the image by f2
+//! ε, and `I/I₀ = clamp((a + f2 ε)/h, 0, 1)`; relative to the background a/h the contrast is `f2
+//! ε/a` (Settles 2001, equation 3.7). The range before clipping is `-a/f2 … (h-a)/f2`. Slits at
+//! other angles and round sources have their own closed forms.
 
 use crate::optics::{Across, SourceImage};
 
 /// A straight edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knife {
-    /// Direction in the picture, counter-clockwise from its right, in which a deflection brightens: it points from the blade to the opening.
-    /// 0 is a vertical knife that shows horizontal gradients, 90 a horizontal one.
+    /// Direction in the picture, counter-clockwise from its right, in which a deflection brightens:
+    /// it points from the blade to the opening. 0 is a vertical knife that shows horizontal
+    /// gradients, 90 a horizontal one.
     pub angle_deg: f64,
     /// Where the edge stands.
     pub position: KnifePosition,
@@ -19,9 +22,11 @@ pub struct Knife {
 /// Where the edge stands along the knife's direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum KnifePosition {
-    /// a/h: the part of the undisturbed source image's height that stays open. 0.5 is the customary half cut-off.
+    /// a/h: the part of the undisturbed source image's height that stays open. 0.5 is the customary
+    /// half cut-off.
     OpenFraction(f64),
-    /// a itself, in metres. (As a fraction, the schlieren lens' focal length cancels: image and shift grow alike. With a given height it counts.)
+    /// a itself, in metres. (As a fraction, the schlieren lens' focal length cancels: image and
+    /// shift grow alike. With a given height it counts.)
     OpenM(f64),
     /// Metres from the axis; light beyond it passes.
     EdgeM(f64),
@@ -37,7 +42,9 @@ impl Knife {
     /// The edge in metres from the axis.
     pub fn edge_m(&self, image: &SourceImage) -> f64 {
         match self.position {
-            KnifePosition::OpenFraction(open) => image.half_extent_m(self.direction()) * (1.0 - 2.0 * open),
+            KnifePosition::OpenFraction(open) => {
+                image.half_extent_m(self.direction()) * (1.0 - 2.0 * open)
+            }
             KnifePosition::OpenM(height) => image.half_extent_m(self.direction()) - height,
             KnifePosition::EdgeM(edge) => edge,
         }
@@ -58,7 +65,11 @@ impl Knife {
                 let [a, b] = image.half_sides_along(direction);
                 let (p, q) = (a.max(b), a.min(b));
                 // Corners below the rounding of f32 are none.
-                if q <= 1e-7 * p { Open::Linear { half_m: p as f32 } } else { Open::Trapezoid { p, q } }
+                if q <= 1e-7 * p {
+                    Open::Linear { half_m: p as f32 }
+                } else {
+                    Open::Trapezoid { p, q }
+                }
             }
         };
         Edge { direction: direction.map(|c| c as f32), edge_m: self.edge_m(image) as f32, open }
@@ -87,7 +98,8 @@ enum Open {
 }
 
 impl Edge {
-    /// For one point: 1 beyond the edge. On the edge, 1/2: a point source cut by an edge on the axis has a defined background.
+    /// For one point: 1 beyond the edge. On the edge, 1/2: a point source cut by an edge on the
+    /// axis has a defined background.
     #[inline]
     pub(super) fn transmission(&self, at_m: Across) -> f32 {
         let d = self.beyond(at_m);
@@ -100,7 +112,9 @@ impl Edge {
         match self.open {
             Open::Step => self.transmission(shift_m),
             Open::Linear { half_m } => (0.5 + 0.5 * self.beyond(shift_m) / half_m).clamp(0.0, 1.0),
-            Open::Trapezoid { p, q } => open_rectangle(p, q, f64::from(self.beyond(shift_m))) as f32,
+            Open::Trapezoid { p, q } => {
+                open_rectangle(p, q, f64::from(self.beyond(shift_m))) as f32
+            }
             Open::Disc { radius_m } => open_disc(radius_m, f64::from(self.beyond(shift_m))) as f32,
         }
     }
@@ -111,8 +125,9 @@ impl Edge {
     }
 }
 
-/// Part of a rectangle on the positive side of a line at distance -t from its centre. Its sides, projected on the line's normal, have half-lengths p
-/// and q ≤ p; the area's density along the normal is the convolution of two boxes, a trapezoid, and this is its integral.
+/// Part of a rectangle on the positive side of a line at distance -t from its centre. Its sides,
+/// projected on the line's normal, have half-lengths p and q ≤ p; the area's density along the
+/// normal is the convolution of two boxes, a trapezoid, and this is its integral.
 fn open_rectangle(p: f64, q: f64, t: f64) -> f64 {
     let t = t.clamp(-p - q, p + q);
     let (outer, inner) = (p + q, p - q);

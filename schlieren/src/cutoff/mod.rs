@@ -1,4 +1,5 @@
-//! What stands in the cut-off plane: the part of the light that passes, by where it crosses the plane.
+//! What stands in the cut-off plane: the part of the light that passes, by where it crosses the
+//! plane.
 //!
 //! | kind | passes | thesis |
 //! |---|---|---|
@@ -7,7 +8,8 @@
 //! | [`ColorWheel`] | all of it, coloured by direction and size | equation 5.16 |
 //! | [`FilterImage`] | what a picture in the plane lets through: a file, or one [painted] by hand | 5.6 |
 //!
-//! Coordinates are metres in the plane, along the picture's right and up. Transmission is linear and at most 1 in each channel.
+//! Coordinates are metres in the plane, along the picture's right and up. Transmission is linear
+//! and at most 1 in each channel.
 
 mod circle;
 mod color;
@@ -103,8 +105,9 @@ impl CutoffPlane {
         }
     }
 
-    /// The mean over the source's image, shifted by `shift_m` as a deflection does, where a closed form is known; `None` where the image has to be
-    /// sampled. A closed form takes one photon where sampling takes many.
+    /// The mean over the source's image, shifted by `shift_m` as a deflection does, where a closed
+    /// form is known; `None` where the image has to be sampled. A closed form takes one photon
+    /// where sampling takes many.
     #[inline]
     pub fn averaged(&self, shift_m: Across) -> Option<Rgb> {
         match &self.kind {
@@ -149,8 +152,16 @@ pub(crate) mod testing {
             knife(90.0, KnifePosition::OpenFraction(0.2)),
             knife(37.0, KnifePosition::EdgeM(0.1e-3)),
             knife(-120.0, KnifePosition::OpenFraction(0.8)),
-            Cutoff::Aperture(Aperture { radius_m: 0.5e-3, center_m: [0.0; 2], passes: Passes::Inside }),
-            Cutoff::Aperture(Aperture { radius_m: 0.6e-3, center_m: [1e-4, 2e-4], passes: Passes::Outside }),
+            Cutoff::Aperture(Aperture {
+                radius_m: 0.5e-3,
+                center_m: [0.0; 2],
+                passes: Passes::Inside,
+            }),
+            Cutoff::Aperture(Aperture {
+                radius_m: 0.6e-3,
+                center_m: [1e-4, 2e-4],
+                passes: Passes::Outside,
+            }),
         ];
         let mut compared = 0;
         for image in &images {
@@ -159,7 +170,8 @@ pub(crate) mod testing {
                 for shift in [[0.0, 0.0], [2e-4, -1e-4], [-6e-4, 3e-4], [1e-3, 1e-3], [9e-3, 0.0]] {
                     let Some(closed) = cutoff.averaged(shift) else { continue };
                     let reference = sampled(&cutoff, shift, 1 << 14);
-                    // 2^14 points of a (0,2)-sequence cut by one smooth edge: the error seen is below 1e-3.
+                    // 2^14 points of a (0,2)-sequence cut by one smooth edge: the error seen is
+                    // below 1e-3.
                     let (error, t) = ((f64::from(closed[0]) - reference).abs(), closed[0]);
                     assert!(error < 2e-3, "{cutoff:?} {shift:?}: {t} {reference}");
                     compared += 1;

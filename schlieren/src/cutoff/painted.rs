@@ -1,6 +1,7 @@
 //! Filters painted by hand (section 5.6): strokes of a round brush on a ground colour.
 //!
-//! Strokes are kept in metres of the cut-off plane, so a painted filter is a few lines of a scene file and can be drawn at any resolution.
+//! Strokes are kept in metres of the cut-off plane, so a painted filter is a few lines of a scene
+//! file and can be drawn at any resolution.
 
 use super::{FilterError, FilterImage, Rgb};
 use serde::{Deserialize, Serialize};
@@ -43,7 +44,8 @@ fn default_pixels() -> u32 {
 const MAX_PIXELS: u32 = 8192;
 
 impl Painting {
-    /// The filter as a raster. A pixel takes a stroke's colour by how much of the brush's rim covers it, over one pixel.
+    /// The filter as a raster. A pixel takes a stroke's colour by how much of the brush's rim
+    /// covers it, over one pixel.
     pub fn to_filter(&self) -> Result<FilterImage, FilterError> {
         let longest = self.size_m[0].max(self.size_m[1]);
         let pixels = f64::from(self.pixels.min(MAX_PIXELS));
@@ -69,10 +71,10 @@ fn paint(filter: &mut FilterImage, stroke: &Stroke) {
 
     // Only where the brush and its soft rim can be: paintings have thousands of small strokes.
     let reach = stroke.radius_m + pixel_m;
-    let rows =
-        [a[1].max(b[1]) + reach, a[1].min(b[1]) - reach].map(|y| (0.5 - y / size[1]) * f64::from(height));
-    let columns =
-        [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach].map(|x| (0.5 + x / size[0]) * f64::from(width));
+    let rows = [a[1].max(b[1]) + reach, a[1].min(b[1]) - reach]
+        .map(|y| (0.5 - y / size[1]) * f64::from(height));
+    let columns = [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach]
+        .map(|x| (0.5 + x / size[0]) * f64::from(width));
     // Casts saturate: what lies beside the filter ends at its border.
     let [top, left] = [rows[0], columns[0]].map(|v| v.floor() as u32);
     let [bottom, right] = [rows[1], columns[1]].map(|v| v.ceil() as u32);
@@ -105,14 +107,28 @@ mod tests {
 
     #[test]
     fn later_strokes_cover_earlier_ones_where_they_are() {
-        let red = Stroke { from_m: [-1e-3, 0.0], to_m: [1e-3, 0.0], radius_m: 2e-4, rgb: [1.0, 0.0, 0.0] };
-        let dab = Stroke { from_m: [5e-4, 5e-4], to_m: [5e-4, 5e-4], radius_m: 4e-4, rgb: [0.0, 0.0, 1.0] };
+        let red = Stroke {
+            from_m: [-1e-3, 0.0],
+            to_m: [1e-3, 0.0],
+            radius_m: 2e-4,
+            rgb: [1.0, 0.0, 0.0],
+        };
+        let dab = Stroke {
+            from_m: [5e-4, 5e-4],
+            to_m: [5e-4, 5e-4],
+            radius_m: 4e-4,
+            rgb: [0.0, 0.0, 1.0],
+        };
         let filter = Cutoff::Image(painting(vec![red, dab]).to_filter().unwrap());
         assert!(filter.is_colored());
         let filter = CutoffPlane::new(&filter, SourceImage::Point);
         assert_eq!(filter.transmission([-9e-4, 0.0]), [1.0, 0.0, 0.0]);
         assert_eq!(filter.transmission([5e-4, 6e-4]), [0.0, 0.0, 1.0]);
-        assert_eq!(filter.transmission([5e-4, 1.5e-4]), [0.0, 0.0, 1.0], "the dab lies over the line");
+        assert_eq!(
+            filter.transmission([5e-4, 1.5e-4]),
+            [0.0, 0.0, 1.0],
+            "the dab lies over the line"
+        );
         assert_eq!(filter.transmission([0.0, -6e-4]), [0.0; 3], "ground");
     }
 
@@ -120,7 +136,8 @@ mod tests {
     fn a_painting_keeps_its_sides_and_refuses_glowing_paint() {
         let filter = painting(vec![]).to_filter().unwrap();
         assert_eq!(filter.size_px(), [256, 128]);
-        let glow = Stroke { from_m: [0.0; 2], to_m: [0.0; 2], radius_m: 1e-3, rgb: [2.0, 0.0, 0.0] };
+        let glow =
+            Stroke { from_m: [0.0; 2], to_m: [0.0; 2], radius_m: 1e-3, rgb: [2.0, 0.0, 0.0] };
         assert!(painting(vec![glow]).to_filter().is_err());
     }
 }

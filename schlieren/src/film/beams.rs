@@ -1,11 +1,14 @@
-//! Exposure without noise: the beam is cut into square cells by a lattice of rays, and each cell's energy goes to where its corners land.
+//! Exposure without noise: the beam is cut into square cells by a lattice of rays, and each cell's
+//! energy goes to where its corners land.
 //!
-//! Where the corners of a cell enclose half the area they started with, the film is twice as bright: the picture is `I = Σ 1/|det J|` over all sheets
-//! of light, J being the derivative of the landing place, with J taken as differences over a cell and the result averaged over pixels. Energy is
-//! conserved exactly, folded cells (caustics) add up, and nothing has to be inverted. A shadowgraph takes one ray per pixel instead of hundreds.
+//! Where the corners of a cell enclose half the area they started with, the film is twice as
+//! bright: the picture is `I = Σ 1/|det J|` over all sheets of light, J being the derivative of the
+//! landing place, with J taken as differences over a cell and the result averaged over pixels.
+//! Energy is conserved exactly, folded cells (caustics) add up, and nothing has to be inverted. A
+//! shadowgraph takes one ray per pixel instead of hundreds.
 //!
-//! Cells are split into two triangles, which are distributed to pixels by exact areas. A triangle with a corner that does not arrive is dropped: the
-//! shadow of a body is up to one cell too large.
+//! Cells are split into two triangles, which are distributed to pixels by exact areas. A triangle
+//! with a corner that does not arrive is dropped: the shadow of a body is up to one cell too large.
 
 use super::photons::Exposure;
 use super::{Film, Tally, quantize};
@@ -29,8 +32,9 @@ struct Corner {
 
 const LOST: Corner = Corner { at_px: [f64::NAN; 2], energy: [0.0; 3] };
 
-/// Exposes `film` with `per_side` × `per_side` cells per pixel. `progress` gets numbers of rays. Returns `None` when `cancel` was set. The developed
-/// film is `film.developed(1.0)`. [`Tally`] counts triangles.
+/// Exposes `film` with `per_side` × `per_side` cells per pixel. `progress` gets numbers of rays.
+/// Returns `None` when `cancel` was set. The developed film is `film.developed(1.0)`. [`Tally`]
+/// counts triangles.
 pub fn expose_beams<const C: usize>(
     exposure: &Exposure<'_>,
     film: &Film<C>,
@@ -45,7 +49,8 @@ pub fn expose_beams<const C: usize>(
     let place = |i: usize| i as f64 / k - f64::from(margin);
     let source_points = source_points(exposure);
 
-    // Two rows of corners at a time are enough, but rows are traced in parallel: bands of cells, each with its own corners.
+    // Two rows of corners at a time are enough, but rows are traced in parallel: bands of cells,
+    // each with its own corners.
     const BAND: usize = 16;
     let bands: Vec<usize> = (0..rows - 1).step_by(BAND).collect();
     let tallies: Vec<Tally> = bands
@@ -58,12 +63,16 @@ pub fn expose_beams<const C: usize>(
             let last = (first + BAND).min(rows - 1);
             let mut above = corners(exposure, film, &source_points, columns, place(first), &place);
             for row in first..last {
-                let below = corners(exposure, film, &source_points, columns, place(row + 1), &place);
+                let below =
+                    corners(exposure, film, &source_points, columns, place(row + 1), &place);
                 for c in 0..columns - 1 {
                     let [a, b, d, e] = [above[c], above[c + 1], below[c], below[c + 1]];
                     // The diagonal alternates, so that no direction of the picture is preferred.
-                    let halves =
-                        if (row + c) % 2 == 0 { [[a, b, d], [b, e, d]] } else { [[a, b, e], [a, e, d]] };
+                    let halves = if (row + c) % 2 == 0 {
+                        [[a, b, d], [b, e, d]]
+                    } else {
+                        [[a, b, e], [a, e, d]]
+                    };
                     for t in halves {
                         tally.sent += 1;
                         if t.iter().all(|p| p.at_px[0].is_finite()) {
@@ -92,7 +101,8 @@ fn source_points(exposure: &Exposure<'_>) -> Vec<Across> {
         return Vec::new();
     }
     let image = exposure.technique.optics().source_image();
-    let point = |i| image.point_m(Sampler::new(exposure.sampling, exposure.seed, 0, 0, i).square(0));
+    let point =
+        |i| image.point_m(Sampler::new(exposure.sampling, exposure.seed, 0, 0, i).square(0));
     (0..SOURCE_POINTS).map(point).collect()
 }
 
@@ -136,11 +146,13 @@ fn corners<const C: usize>(
     starts.iter().zip(&exits).enumerate().map(corner).collect()
 }
 
-/// Distributes a triangle that started with `area_px` and the mean of its corners' energy per pixel. True when any of it falls on the film.
+/// Distributes a triangle that started with `area_px` and the mean of its corners' energy per
+/// pixel. True when any of it falls on the film.
 fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool {
     let framing = film.framing();
-    let energy: [f64; C] =
-        std::array::from_fn(|c| t.iter().map(|p| f64::from(p.energy[c])).sum::<f64>() / 3.0 * area_px);
+    let energy: [f64; C] = std::array::from_fn(|c| {
+        t.iter().map(|p| f64::from(p.energy[c])).sum::<f64>() / 3.0 * area_px
+    });
     let points = t.map(|p| p.at_px);
     let bounds = |axis: usize, size: u32| {
         let low = points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min).floor();
@@ -205,7 +217,8 @@ impl Polygon {
     }
 }
 
-/// The part of a polygon on one side of a line across `axis`: above `limit` for `side` = 1, below for -1 (Sutherland and Hodgman 1974).
+/// The part of a polygon on one side of a line across `axis`: above `limit` for `side` = 1, below
+/// for -1 (Sutherland and Hodgman 1974).
 fn clip(polygon: Polygon, axis: usize, limit: f64, side: f64) -> Polygon {
     let mut out = Polygon { corners: [[0.0; 2]; 8], len: 0 };
     let points = polygon.points();
@@ -225,10 +238,12 @@ fn clip(polygon: Polygon, axis: usize, limit: f64, side: f64) -> Polygon {
     out
 }
 
-/// Area of a polygon, whichever way round. Coordinates are taken relative to the first corner, so that far from zero nothing is lost.
+/// Area of a polygon, whichever way round. Coordinates are taken relative to the first corner, so
+/// that far from zero nothing is lost.
 fn polygon_area(points: &[[f64; 2]]) -> f64 {
     let Some((o, rest)) = points.split_first() else { return 0.0 };
-    let twice = |w: &[[f64; 2]]| (w[0][0] - o[0]) * (w[1][1] - o[1]) - (w[1][0] - o[0]) * (w[0][1] - o[1]);
+    let twice =
+        |w: &[[f64; 2]]| (w[0][0] - o[0]) * (w[1][1] - o[1]) - (w[1][0] - o[0]) * (w[0][1] - o[1]);
     0.5 * rest.windows(2).map(twice).sum::<f64>().abs()
 }
 

@@ -1,7 +1,10 @@
-//! The film: energy per pixel, summed as integers, so that the picture has the same bits for any number of threads.
+//! The film: energy per pixel, summed as integers, so that the picture has the same bits for any
+//! number of threads.
 //!
-//! Light arrives in one of two ways. [`photons`] start at jittered places and land somewhere: a picture with noise, correct for any source and any cut-off.
-//! [`beams`] are the cells of a lattice of rays, each carrying its energy to the area that its corners enclose: no noise at all, one ray per pixel.
+//! Light arrives in one of two ways. [`photons`] start at jittered places and land somewhere: a
+//! picture with noise, correct for any source and any cut-off. [`beams`] are the cells of a lattice
+//! of rays, each carrying its energy to the area that its corners enclose: no noise at all, one ray
+//! per pixel.
 //!
 //! Energy 1 per pixel is what the undisturbed beam without a cut-off leaves there.
 
@@ -13,11 +16,12 @@ pub(crate) use tile::{PhotonTile, TILE};
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// Fixed point: an energy of 1 as an integer. A pixel holds 2³² photons of energy 1 before it overflows; quantisation, 2⁻³³ a photon, is far below the
-/// rounding of the f32 energy itself.
+/// Fixed point: an energy of 1 as an integer. A pixel holds 2³² photons of energy 1 before it
+/// overflows; quantisation, 2⁻³³ a photon, is far below the rounding of the f32 energy itself.
 const ONE: f64 = 4_294_967_296.0;
 
-/// Energy as an integer. Energies are never negative, and NaN (a march gone wrong) leaves no light; it is counted where it is seen.
+/// Energy as an integer. Energies are never negative, and NaN (a march gone wrong) leaves no light;
+/// it is counted where it is seen.
 #[inline]
 pub(crate) fn quantize(energy: f32) -> u64 {
     (f64::from(energy) * ONE) as u64
@@ -37,7 +41,8 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// A picture centred on something of the given sides that shows all of it and as little else as its shape allows.
+    /// A picture centred on something of the given sides that shows all of it and as little else as
+    /// its shape allows.
     pub fn fitted(width: u32, height: u32, sides_m: [f64; 2]) -> Framing {
         let pixel_m = (sides_m[0] / f64::from(width)).max(sides_m[1] / f64::from(height));
         Framing { width, height, pixel_m, center_m: [0.0; 2] }
@@ -48,7 +53,8 @@ impl Framing {
         self.width as usize * self.height as usize
     }
 
-    /// The point of the plane at `x`, `y` in pixels from the upper left corner; (0.5, 0.5) is the first pixel's centre.
+    /// The point of the plane at `x`, `y` in pixels from the upper left corner; (0.5, 0.5) is the
+    /// first pixel's centre.
     pub fn plane_from_pixel(&self, x: f64, y: f64) -> [f64; 2] {
         [
             self.center_m[0] + (x - 0.5 * f64::from(self.width)) * self.pixel_m,
@@ -84,7 +90,8 @@ pub struct Tally {
     pub blocked_in_field: u64,
     /// Bent so far that they left sideways or backwards.
     pub turned: u64,
-    /// Came back from the march with a position or energy that is not a number. 0 unless something is broken.
+    /// Came back from the march with a position or energy that is not a number. 0 unless something
+    /// is broken.
     pub not_a_number: u64,
 }
 
@@ -142,7 +149,8 @@ impl<const C: usize> Film<C> {
         }
     }
 
-    /// The energy of each pixel over `per_pixel`, the number of photons that the undisturbed beam leaves in one.
+    /// The energy of each pixel over `per_pixel`, the number of photons that the undisturbed beam
+    /// leaves in one.
     pub fn developed(&self, per_pixel: f64) -> Vec<[f32; C]> {
         let scale = 1.0 / (ONE * per_pixel);
         self.energy

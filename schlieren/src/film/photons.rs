@@ -1,7 +1,9 @@
-//! Exposure by photons: every pixel's share of the beam is sent as jittered rays that land where the flow takes them.
+//! Exposure by photons: every pixel's share of the beam is sent as jittered rays that land where
+//! the flow takes them.
 //!
-//! Starts form a low-discrepancy sequence in each pixel, a function of pixel, pass and seed alone; passes can be added at any time. Pixels beside the
-//! picture send photons too, as far as light strays (`margin_px`), so the picture's edge is as bright as it should be.
+//! Starts form a low-discrepancy sequence in each pixel, a function of pixel, pass and seed alone;
+//! passes can be added at any time. Pixels beside the picture send photons too, as far as light
+//! strays (`margin_px`), so the picture's edge is as bright as it should be.
 
 use super::{Film, PhotonTile, TILE, Tally};
 use crate::optics::Across;
@@ -32,7 +34,8 @@ pub struct Exposure<'a> {
     pub seed: u64,
     /// Pixels around the picture that send light as well.
     pub margin_px: u32,
-    /// Whether every photon travels in the beam of its own source point (an extended source blurs what is out of focus), or all in the axial one.
+    /// Whether every photon travels in the beam of its own source point (an extended source blurs
+    /// what is out of focus), or all in the axial one.
     pub tilted_beams: bool,
 }
 
@@ -54,8 +57,9 @@ pub struct ExposedFilm<const C: usize> {
     pub landed: Vec<LandedPhoton<C>>,
 }
 
-/// Sends passes `passes`, one photon per pixel and pass; pass i goes to film `i % films.len()` (two films tell the noise: their difference). Every tile
-/// reports its photons to `progress`. Returns `None` when `cancel` was set; the films are then half exposed and worthless.
+/// Sends passes `passes`, one photon per pixel and pass; pass i goes to film `i % films.len()` (two
+/// films tell the noise: their difference). Every tile reports its photons to `progress`. Returns
+/// `None` when `cancel` was set; the films are then half exposed and worthless.
 pub fn expose<const C: usize>(
     exposure: &Exposure<'_>,
     films: &[Film<C>],
@@ -103,7 +107,8 @@ fn expose_tile<const C: usize>(
 ) {
     let framing = *films[0].framing();
     let (technique, optics) = (exposure.technique, exposure.technique.optics());
-    let mut tiles: Vec<PhotonTile<'_, C>> = films.iter().map(|f| PhotonTile::new(f, corner)).collect();
+    let mut tiles: Vec<PhotonTile<'_, C>> =
+        films.iter().map(|f| PhotonTile::new(f, corner)).collect();
     let capacity = (TILE * TILE) as usize;
     let (mut starts, mut places) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
     let mut image_points: Vec<Across> = Vec::with_capacity(capacity);
@@ -118,12 +123,16 @@ fn expose_tile<const C: usize>(
         image_points.clear();
         for y in corner[1]..end[1] {
             for x in corner[0]..end[0] {
-                // The margin's pixels have negative numbers; as u32 they are other numbers, no worse.
-                let sampler = Sampler::new(exposure.sampling, exposure.seed, x as u32, y as u32, pass);
+                // The margin's pixels have negative numbers; as u32 they are other numbers, no
+                // worse.
+                let sampler =
+                    Sampler::new(exposure.sampling, exposure.seed, x as u32, y as u32, pass);
                 let jitter = sampler.square(JITTER);
                 let place = [x as f32 + jitter[0], y as f32 + jitter[1]];
-                let at = framing
-                    .plane_from_pixel(x as f64 + f64::from(jitter[0]), y as f64 + f64::from(jitter[1]));
+                let at = framing.plane_from_pixel(
+                    x as f64 + f64::from(jitter[0]),
+                    y as f64 + f64::from(jitter[1]),
+                );
                 let mut start = Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] };
                 let mut point = [0.0; 2];
                 if needs_source {
@@ -160,7 +169,8 @@ fn expose_tile<const C: usize>(
                 continue;
             }
             let shift_m = optics.film_shift_m(start, exit);
-            let energy = technique.landed(&Photon { start, exit, image_point_m: image_points[i], shift_m });
+            let energy =
+                technique.landed(&Photon { start, exit, image_point_m: image_points[i], shift_m });
             let moved = if technique.looks_from_film() { [0.0; 2] } else { shift_m };
             // A NaN or infinity in either becomes NaN here; comparisons with it are false.
             let check = (moved[0] + moved[1] + energy[0] + energy[1] + energy[2]) * 0.0;

@@ -26,7 +26,13 @@ impl<'a, const C: usize> PhotonTile<'a, C> {
     pub(crate) fn new(film: &'a Film<C>, [x, y]: [i64; 2]) -> Self {
         let counts = film.count.is_some();
         let count = if counts { vec![0; SIDE * SIDE] } else { Vec::new() };
-        PhotonTile { film, counts, corner: [x - HALO, y - HALO], energy: vec![[0; C]; SIDE * SIDE], count }
+        PhotonTile {
+            film,
+            counts,
+            corner: [x - HALO, y - HALO],
+            energy: vec![[0; C]; SIDE * SIDE],
+            count,
+        }
     }
 
     /// A photon at a place in pixels. True when the film was hit.
@@ -63,7 +69,11 @@ impl<'a, const C: usize> PhotonTile<'a, C> {
                 let photons = if self.counts { self.count[at] } else { 0 };
                 // Outside the film nothing was deposited.
                 if self.energy[at] != [0; C] || photons > 0 {
-                    self.film.add(j as usize * framing.width as usize + i as usize, self.energy[at], photons);
+                    self.film.add(
+                        j as usize * framing.width as usize + i as usize,
+                        self.energy[at],
+                        photons,
+                    );
                 }
             }
         }

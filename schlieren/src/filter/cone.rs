@@ -1,8 +1,10 @@
-//! The cone filter: the energy at a pixel from the k photons nearest to its centre, with weights that fall linearly to the k-th (section 5.5; Jensen's
-//! photon map, "Realistic Image Synthesis Using Photon Mapping", 2001, section 7.2, with his k = 1).
+//! The cone filter: the energy at a pixel from the k photons nearest to its centre, with weights
+//! that fall linearly to the k-th (section 5.5; Jensen's photon map, "Realistic Image Synthesis
+//! Using Photon Mapping", 2001, section 7.2, with his k = 1).
 //!
-//! With r the distance of the k-th photon, `E = Σ e_i (1 - d_i/r) / (π r²/3)`. The k-th itself has weight 0, which makes the estimate free of bias for
-//! photons that are spread evenly: of the k - 1 inside, each has the mean weight 1/3, and (k-1)/(π r²) is unbiased for their density.
+//! With r the distance of the k-th photon, `E = Σ e_i (1 - d_i/r) / (π r²/3)`. The k-th itself has
+//! weight 0, which makes the estimate free of bias for photons that are spread evenly: of the k - 1
+//! inside, each has the mean weight 1/3, and (k-1)/(π r²) is unbiased for their density.
 
 use crate::film::Framing;
 use crate::film::photons::LandedPhoton;
@@ -11,7 +13,8 @@ use rayon::prelude::*;
 /// Largest number of photons that are kept for this filter: about 2 GB of them.
 pub const MAX_PHOTONS: u64 = 1 << 27;
 
-/// Energy at each pixel's centre, in photons per pixel over `per_pixel`. With fewer than two photons in all, the picture is black.
+/// Energy at each pixel's centre, in photons per pixel over `per_pixel`. With fewer than two
+/// photons in all, the picture is black.
 pub fn cone<const C: usize>(
     photons: &[LandedPhoton<C>],
     framing: &Framing,
@@ -46,7 +49,8 @@ pub fn cone<const C: usize>(
     out
 }
 
-/// Photons sorted into squares of one pixel, over the pixels and some of their surroundings. Photons farther out are in the squares of the border.
+/// Photons sorted into squares of one pixel, over the pixels and some of their surroundings.
+/// Photons farther out are in the squares of the border.
 struct Buckets {
     low: [i64; 2],
     size: [i64; 2],
@@ -80,11 +84,13 @@ impl Buckets {
     }
 
     fn square(&self, at: [f32; 2]) -> usize {
-        let [i, j] = [0, 1].map(|a| (at[a].floor() as i64 - self.low[a]).clamp(0, self.size[a] - 1));
+        let [i, j] =
+            [0, 1].map(|a| (at[a].floor() as i64 - self.low[a]).clamp(0, self.size[a] - 1));
         (j * self.size[0] + i) as usize
     }
 
-    /// The k photons nearest to `at` as squared distances and numbers, nearest first; ties by number. Returns the k-th squared distance.
+    /// The k photons nearest to `at` as squared distances and numbers, nearest first; ties by
+    /// number. Returns the k-th squared distance.
     fn nearest<const C: usize>(
         &self,
         photons: &[LandedPhoton<C>],
@@ -171,7 +177,8 @@ mod tests {
         for k in [5, 30, 200] {
             let film = cone(&all, &FRAMING, k, 20.0);
             let mean = film.iter().map(|p| f64::from(p[0])).sum::<f64>() / film.len() as f64;
-            // 24*16*20 photons: 1.2 % standard error of their number, and the filter reaches beyond.
+            // 24*16*20 photons: 1.2 % standard error of their number, and the filter reaches
+            // beyond.
             assert!((mean - 1.0).abs() < 0.03, "{k}: {mean}");
         }
     }

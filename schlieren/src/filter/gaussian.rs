@@ -1,7 +1,8 @@
 //! The Gaussian filter.
 
-/// Weights of a Gaussian at distances 0, 1, 2… pixels, as far as they matter (1e-6 of the middle). A pixel's weight is the Gaussian's integral over it,
-/// taken with Simpson's rule, so that narrow ones keep their width.
+/// Weights of a Gaussian at distances 0, 1, 2… pixels, as far as they matter (1e-6 of the middle).
+/// A pixel's weight is the Gaussian's integral over it, taken with Simpson's rule, so that narrow
+/// ones keep their width.
 pub fn weights(sigma_px: f64) -> Vec<f64> {
     if sigma_px.is_nan() || sigma_px <= 0.0 {
         return vec![1.0];
@@ -35,10 +36,16 @@ mod tests {
         for sigma in [0.5, 1.0, 2.5] {
             let w = weights(sigma);
             let total: f64 = w[0] + 2.0 * w[1..].iter().sum::<f64>();
-            let second: f64 = w.iter().enumerate().skip(1).map(|(d, w)| 2.0 * w * (d * d) as f64).sum();
-            // A pixel's own width adds 1/12, less what whole pixels alias: 2.5 % at σ = 0.5, nothing from 1 on.
+            let second: f64 =
+                w.iter().enumerate().skip(1).map(|(d, w)| 2.0 * w * (d * d) as f64).sum();
+            // A pixel's own width adds 1/12, less what whole pixels alias: 2.5 % at σ = 0.5,
+            // nothing from 1 on.
             let expected = sigma * sigma + 1.0 / 12.0;
-            assert!((second / total - expected).abs() < 0.03 * expected, "{sigma}: {}", second / total);
+            assert!(
+                (second / total - expected).abs() < 0.03 * expected,
+                "{sigma}: {}",
+                second / total
+            );
         }
         assert_eq!(weights(0.0), [1.0]);
     }

@@ -1,7 +1,7 @@
 //! The mean filter: every pixel becomes the mean of the square around it.
 
-/// Weights at distances 0, 1, 2… pixels of a window that reaches `radius_px` to either side of a pixel's edge; the outermost pixel counts by the
-/// part of it that is covered.
+/// Weights at distances 0, 1, 2… pixels of a window that reaches `radius_px` to either side of a
+/// pixel's edge; the outermost pixel counts by the part of it that is covered.
 pub fn weights(radius_px: f64) -> Vec<f64> {
     let radius = radius_px.max(0.0);
     let whole = radius.floor() as usize;
@@ -27,7 +27,8 @@ mod tests {
         assert_eq!(mean(&pixels, 5, 0.0), pixels);
         let m = mean(&pixels, 5, 1.0)[12][0];
         let expected =
-            [6, 7, 8, 11, 12, 13, 16, 17, 18].iter().map(|i: &i32| (i * i) as f32).sum::<f32>() / 9.0;
+            [6, 7, 8, 11, 12, 13, 16, 17, 18].iter().map(|i: &i32| (i * i) as f32).sum::<f32>()
+                / 9.0;
         assert!((m - expected).abs() < 1e-4, "{m} {expected}");
     }
 }

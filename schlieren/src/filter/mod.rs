@@ -1,9 +1,11 @@
 //! Filters that take the noise of photons out of a picture (section 5.5): one a file.
 //!
-//! [`gaussian`] and [`mean`] average over neighbouring pixels, [`cone`] over the k photons nearest to a pixel. Each blurs as well, so each has to
-//! become narrower as photons are added, or the picture would never become sharp. A filter of radius r over N photons per pixel has an error of r² from
-//! blur and 1/(r √N) from noise; both fall together when r ∝ N^(-1/6) (the same rule that Knaus and Zwicker, "Progressive photon mapping", ACM TOG 2011, reach with
-//! their α = 2/3). Sizes are therefore given for one photon per pixel, and [`Filter::shrunk`] gives them for N.
+//! [`gaussian`] and [`mean`] average over neighbouring pixels, [`cone`] over the k photons nearest
+//! to a pixel. Each blurs as well, so each has to become narrower as photons are added, or the
+//! picture would never become sharp. A filter of radius r over N photons per pixel has an error of
+//! r² from blur and 1/(r √N) from noise; both fall together when r ∝ N^(-1/6) (the same rule that
+//! Knaus and Zwicker, "Progressive photon mapping", ACM TOG 2011, reach with their α = 2/3). Sizes
+//! are therefore given for one photon per pixel, and [`Filter::shrunk`] gives them for N.
 
 pub mod cone;
 pub mod gaussian;
@@ -32,8 +34,8 @@ pub enum Filter {
 }
 
 impl Filter {
-    /// The filter for `samples` photons per pixel: radii shrink as N^(-1/6); k grows as N^(2/3), so that the radius of the k nearest, which goes as √(k/N),
-    /// shrinks the same.
+    /// The filter for `samples` photons per pixel: radii shrink as N^(-1/6); k grows as N^(2/3), so
+    /// that the radius of the k nearest, which goes as √(k/N), shrinks the same.
     #[must_use]
     pub fn shrunk(self, samples: u32) -> Filter {
         let n = f64::from(samples.max(1));
@@ -42,9 +44,9 @@ impl Filter {
             Filter::None => Filter::None,
             Filter::Gaussian { sigma_px } => Filter::Gaussian { sigma_px: sigma_px * narrower },
             Filter::Mean { radius_px } => Filter::Mean { radius_px: radius_px * narrower },
-            Filter::Cone { nearest } => {
-                Filter::Cone { nearest: (f64::from(nearest) * n.powf(2.0 / 3.0)).round().max(2.0) as u32 }
-            }
+            Filter::Cone { nearest } => Filter::Cone {
+                nearest: (f64::from(nearest) * n.powf(2.0 / 3.0)).round().max(2.0) as u32,
+            },
         }
     }
 
@@ -59,9 +61,14 @@ impl Filter {
     }
 }
 
-/// Convolves rows and then columns with the symmetric kernel `weights[|distance|]`. At the picture's edge the weights that lie outside are left out and the
-/// rest is scaled up, so that an even picture stays even.
-pub(crate) fn separable<const C: usize>(pixels: &[[f32; C]], width: usize, weights: &[f64]) -> Vec<[f32; C]> {
+/// Convolves rows and then columns with the symmetric kernel `weights[|distance|]`. At the
+/// picture's edge the weights that lie outside are left out and the rest is scaled up, so that an
+/// even picture stays even.
+pub(crate) fn separable<const C: usize>(
+    pixels: &[[f32; C]],
+    width: usize,
+    weights: &[f64],
+) -> Vec<[f32; C]> {
     use rayon::prelude::*;
     let height = pixels.len() / width.max(1);
     let reach = weights.len() as isize - 1;
@@ -78,13 +85,17 @@ pub(crate) fn separable<const C: usize>(pixels: &[[f32; C]], width: usize, weigh
         sum.map(|s| (s / total) as f32)
     };
     let mut rows = vec![[0.0; C]; pixels.len()];
-    rows.par_chunks_mut(width.max(1)).zip(pixels.par_chunks(width.max(1))).for_each(|(out, row)| {
-        out.iter_mut().enumerate().for_each(|(x, o)| *o = line(x as isize, width, &|i| row[i]));
-    });
+    rows.par_chunks_mut(width.max(1)).zip(pixels.par_chunks(width.max(1))).for_each(
+        |(out, row)| {
+            out.iter_mut().enumerate().for_each(|(x, o)| *o = line(x as isize, width, &|i| row[i]));
+        },
+    );
     let mut out = vec![[0.0; C]; pixels.len()];
     out.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
         let column = |x: usize| move |i: usize| i * width + x;
-        row.iter_mut().enumerate().for_each(|(x, o)| *o = line(y as isize, height, &|i| rows[column(x)(i)]));
+        row.iter_mut()
+            .enumerate()
+            .for_each(|(x, o)| *o = line(y as isize, height, &|i| rows[column(x)(i)]));
     });
     out
 }
@@ -95,7 +106,9 @@ mod tests {
 
     #[test]
     fn filters_shrink_as_samples_grow() {
-        let Filter::Gaussian { sigma_px } = (Filter::Gaussian { sigma_px: 2.0 }).shrunk(64) else { panic!() };
+        let Filter::Gaussian { sigma_px } = (Filter::Gaussian { sigma_px: 2.0 }).shrunk(64) else {
+            panic!()
+        };
         assert!((sigma_px - 1.0).abs() < 1e-12);
         assert_eq!(Filter::Cone { nearest: 10 }.shrunk(8), Filter::Cone { nearest: 40 });
         assert_eq!(Filter::Mean { radius_px: 3.0 }.shrunk(1), Filter::Mean { radius_px: 3.0 });

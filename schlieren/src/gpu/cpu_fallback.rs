@@ -28,7 +28,12 @@ pub(super) trait BatchTracer {
     fn submit(&self, starts: &[Start], parallel: bool) -> Result<Self::Pending, Failure>;
 
     /// Waits for a batch and reads it out.
-    fn finish(&self, pending: Self::Pending, exits: &mut [Exit], parallel: bool) -> Result<(), Failure>;
+    fn finish(
+        &self,
+        pending: Self::Pending,
+        exits: &mut [Exit],
+        parallel: bool,
+    ) -> Result<(), Failure>;
 
     /// Puts another device in the place of the one that failed, unless some thread did. It must
     /// succeed a bounded number of times, and may be called with rayon's workers waiting for it: it
@@ -54,7 +59,9 @@ pub(super) struct CpuFallback<'a> {
 impl<'a> CpuFallback<'a> {
     /// `make` is called once, if ever, with rayon's workers waiting for it: it must not wait for
     /// rayon, where a worker that waits takes other jobs, whose batches fail as well.
-    fn new(make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a) -> CpuFallback<'a> {
+    fn new(
+        make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a,
+    ) -> CpuFallback<'a> {
         CpuFallback {
             make: Box::new(make),
             made: OnceLock::new(),
@@ -72,7 +79,9 @@ impl<'a> CpuFallback<'a> {
         interpolant: Interpolant,
         options: Options,
     ) -> CpuFallback<'a> {
-        CpuFallback::new(move || Box::new(Deviational::on_this_thread(field, view, interpolant, options)))
+        CpuFallback::new(move || {
+            Box::new(Deviational::on_this_thread(field, view, interpolant, options))
+        })
     }
 
     /// Rays that it traced.
@@ -102,7 +111,8 @@ impl<'a> CpuFallback<'a> {
                 )
             }
             (true, true) => format!(
-                "{}; it was opened again and traced once more what it had lost, until {}; what it left then was computed on the CPU",
+                "{}; it was opened again and traced once more what it had lost, until {}; what it \
+                 left then was computed on the CPU",
                 super::failure_message(cause),
                 reopen_error.unwrap_or(cause)
             ),
@@ -197,7 +207,8 @@ mod tests {
     use std::sync::atomic::AtomicU32;
     use std::time::Duration;
 
-    /// Bends each ray by its own place. Traced twice as far where the device did it, so that it shows who did.
+    /// Bends each ray by its own place. Traced twice as far where the device did it, so that it
+    /// shows who did.
     struct Bends(View, f32);
 
     impl LightPaths for Bends {
@@ -288,12 +299,17 @@ mod tests {
             for parallel in [false, true] {
                 let device = Fails::new(in_submit, at, 0);
                 let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
-                let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
+                let mut exits =
+                    vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
                 cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, parallel);
                 let by_device = (10 * at as usize).min(95);
                 for (i, (s, e)) in starts.iter().zip(&exits).enumerate() {
                     let by = if i < by_device { 2.0 } else { 1.0 };
-                    assert_eq!(e.deflection_rad, s.position_m.map(|p| p * by), "ray {i}, failing at {at}");
+                    assert_eq!(
+                        e.deflection_rad,
+                        s.position_m.map(|p| p * by),
+                        "ray {i}, failing at {at}"
+                    );
                 }
                 assert_eq!(cpu_fallback_paths.rays(), 95 - by_device as u64);
                 match cpu_fallback_paths.device_warning() {
@@ -317,10 +333,15 @@ mod tests {
             for at in [1, 2, 5, 9] {
                 let device = Fails::new(in_submit, at, 100);
                 let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
-                let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
+                let mut exits =
+                    vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
                 cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, false);
                 for (i, (s, e)) in starts.iter().zip(&exits).enumerate() {
-                    assert_eq!(e.deflection_rad, s.position_m.map(|p| p * 2.0), "ray {i}, failing at {at}");
+                    assert_eq!(
+                        e.deflection_rad,
+                        s.position_m.map(|p| p * 2.0),
+                        "ray {i}, failing at {at}"
+                    );
                 }
                 assert!(
                     cpu_fallback_paths.rays() == 0 && cpu_fallback_paths.repeated() >= 5,
@@ -347,7 +368,8 @@ mod tests {
             let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
             cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, false);
             let on_cpu =
-                starts.iter().zip(&exits).filter(|(s, e)| e.deflection_rad == s.position_m).count() as u64;
+                starts.iter().zip(&exits).filter(|(s, e)| e.deflection_rad == s.position_m).count()
+                    as u64;
             assert!(exits.iter().all(|e| !e.deflection_rad[0].is_nan()));
             assert_eq!(cpu_fallback_paths.rays(), on_cpu);
             assert_eq!(device.present.load(Ordering::Relaxed), 3);
@@ -359,9 +381,10 @@ mod tests {
         }
     }
 
-    /// A film's tiles are rayon jobs. The spline of the march that stands in is made by the first job whose
-    /// batch fails; a worker that waits inside rayon for parts of it takes another tile, whose batch fails
-    /// as well, and which must not wait for the spline that its own worker is making.
+    /// A film's tiles are rayon jobs. The spline of the march that stands in is made by the first
+    /// job whose batch fails; a worker that waits inside rayon for parts of it takes another tile,
+    /// whose batch fails as well, and which must not wait for the spline that its own worker is
+    /// making.
     #[test]
     fn a_device_that_fails_inside_rayon_jobs_hangs_no_picture() {
         let starts: Vec<Start> = (0..49 * 64)
@@ -371,8 +394,9 @@ mod tests {
             })
             .collect();
         let blob = |p: DVec3| 1e-4 * (-p.length_squared() / 0.02).exp();
-        let field: &Field =
-            Box::leak(Box::new(Field::from_fn([96; 3], [0.01; 3], DVec3::splat(-0.5), 1.0, blob).unwrap()));
+        let field: &Field = Box::leak(Box::new(
+            Field::from_fn([96; 3], [0.01; 3], DVec3::splat(-0.5), 1.0, blob).unwrap(),
+        ));
         let view = View::new(DVec3::Z, DVec3::Y, DVec3::ZERO).unwrap();
         let march = Deviational::new(field, view, Interpolant::BSpline, Options::default());
         let mut expected = vec![Exit::UNDISTURBED; starts.len()];
@@ -383,13 +407,23 @@ mod tests {
             within(Duration::from_secs(120), &format!("{threads} threads"), move || {
                 with_late_jobs(threads, || {
                     let device = Fails::new(true, 0, 0);
-                    let cpu_fallback_paths =
-                        CpuFallback::of_march(field, view, Interpolant::BSpline, Options::default());
+                    let cpu_fallback_paths = CpuFallback::of_march(
+                        field,
+                        view,
+                        Interpolant::BSpline,
+                        Options::default(),
+                    );
                     let shared = shared.clone();
                     move |tile| {
                         let of_tile = 64 * tile..64 * (tile + 1);
                         let mut exits = vec![Exit::UNDISTURBED; 64];
-                        cpu_fallback_paths.trace(&device, 16, &shared.0[of_tile.clone()], &mut exits, false);
+                        cpu_fallback_paths.trace(
+                            &device,
+                            16,
+                            &shared.0[of_tile.clone()],
+                            &mut exits,
+                            false,
+                        );
                         // By words: optical paths that were not asked for are NaN.
                         assert_eq!(format!("{exits:?}"), format!("{:?}", &shared.1[of_tile]));
                     }

@@ -37,7 +37,8 @@ struct Replacement {
 }
 
 impl Gpu {
-    /// Opens the fastest kind of adapter there is: a discrete GPU before an integrated one before a virtual one before a driver that runs on the CPU.
+    /// Opens the fastest kind of adapter there is: a discrete GPU before an integrated one before a
+    /// virtual one before a driver that runs on the CPU.
     ///
     /// # Errors
     /// If there is none, or it cannot be opened.
@@ -66,8 +67,8 @@ impl Gpu {
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()
         }));
-        let (device, queue) =
-            opened.map_err(|e| GpuError::Open { adapter: info.name.clone(), reason: e.to_string() })?;
+        let (device, queue) = opened
+            .map_err(|e| GpuError::Open { adapter: info.name.clone(), reason: e.to_string() })?;
         // Without a handler of ours wgpu panics.
         let failure = Arc::new(OnceLock::new());
         let seen = Arc::clone(&failure);
@@ -83,7 +84,10 @@ impl Gpu {
             queue,
             info,
             // Whole vectors of four numbers, and offsets that fit 32 bits.
-            binding_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(1 << 33)
+            binding_bytes: limits
+                .max_storage_buffer_binding_size
+                .min(limits.max_buffer_size)
+                .min(1 << 33)
                 & !15,
             storage_buffers: limits.max_storage_buffers_per_shader_stage,
             failure,
@@ -175,7 +179,8 @@ impl Gpu {
         }
     }
 
-    /// Whether it is a driver that runs on the CPU: right, and slower than this program's own kernels there.
+    /// Whether it is a driver that runs on the CPU: right, and slower than this program's own
+    /// kernels there.
     pub fn is_software(&self) -> bool {
         self.info.device_type == DeviceType::Cpu
     }
@@ -212,7 +217,8 @@ impl Gpu {
         let done = work();
         let errors = [internal, validation, memory].map(|scope| pollster::block_on(scope.pop()));
         if errors.iter().any(Option::is_some) {
-            // A device that is lost says so when it is asked; what was caught may be no more than a consequence.
+            // A device that is lost says so when it is asked; what was caught may be no more than a
+            // consequence.
             let _ = self.device.poll(wgpu::PollType::Poll);
         }
         match errors.into_iter().flatten().next() {
@@ -252,6 +258,9 @@ impl Gpu {
 
 impl std::fmt::Debug for Gpu {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Gpu").field("name", &self.name()).field("binding_bytes", &self.binding_bytes).finish()
+        f.debug_struct("Gpu")
+            .field("name", &self.name())
+            .field("binding_bytes", &self.binding_bytes)
+            .finish()
     }
 }

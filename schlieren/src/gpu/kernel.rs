@@ -1,9 +1,11 @@
-//! The shader for what a scene calls for, put together from the pieces beside this file. What is not wanted is not in it.
+//! The shader for what a scene calls for, put together from the pieces beside this file. What is
+//! not wanted is not in it.
 
 use crate::interpolate::Interpolant;
 use std::fmt::Write as _;
 
-/// First binding of the field's slabs. Before it: parameters, rays, what is left of rays, kinds of nodes.
+/// First binding of the field's slabs. Before it: parameters, rays, what is left of rays, kinds of
+/// nodes.
 pub(super) const FIRST_SLAB: u32 = 4;
 
 /// What a kernel is compiled for.
@@ -40,13 +42,17 @@ impl Kernel {
             "fn meet(at: vec3f) -> u32 {\n    return 0u;\n}\n"
         };
         if spline {
-            text += "fn weighted(w: vec4f, v: vec4f) -> f32 {\n    return fma(w.w, v.w, fma(w.z, v.z, fma(w.y, v.y, w.x * v.x)));\n}\n";
+            text += "fn weighted(w: vec4f, v: vec4f) -> f32 {\n    return fma(w.w, v.w, fma(w.z, \
+                     v.z, fma(w.y, v.y, w.x * v.x)));\n}\n";
         }
-        let piece = if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
+        let piece =
+            if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
         for slab in 0..self.slabs {
             let binding = FIRST_SLAB + slab;
-            let declared =
-                writeln!(text, "@group(0) @binding({binding}) var<storage, read> values_{slab}: array<f32>;");
+            let declared = writeln!(
+                text,
+                "@group(0) @binding({binding}) var<storage, read> values_{slab}: array<f32>;"
+            );
             declared.expect("writing to a String cannot fail");
             text += &piece.replace("SLAB", &slab.to_string());
         }
@@ -63,12 +69,17 @@ impl Kernel {
             return text;
         }
         text += "    let slab = p.cell.z / params.slab;\n";
-        text += &format!("    let o = {};\n    switch slab {{\n", offset("p.cell.z - slab * params.slab"));
+        text += &format!(
+            "    let o = {};\n    switch slab {{\n",
+            offset("p.cell.z - slab * params.slab")
+        );
         for slab in 0..self.slabs - 1 {
             text += &format!("        case {slab}u: {{ return sample_{slab}(o, p.place); }}\n");
         }
-        text +=
-            &format!("        default: {{ return sample_{}(o, p.place); }}\n    }}\n}}\n", self.slabs - 1);
+        text += &format!(
+            "        default: {{ return sample_{}(o, p.place); }}\n    }}\n}}\n",
+            self.slabs - 1
+        );
         text
     }
 }
@@ -92,7 +103,8 @@ mod tests {
         naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)))
     }
 
-    /// Needs no device. Without capabilities: nothing that only some devices have, f64 least of all (naga accepts its exp(), drivers return garbage).
+    /// Needs no device. Without capabilities: nothing that only some devices have, f64 least of all
+    /// (naga accepts its exp(), drivers return garbage).
     #[test]
     fn every_shader_is_valid_wgsl_for_every_device() {
         use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -124,7 +136,8 @@ mod tests {
     fn what_is_not_wanted_is_not_bound() {
         for kernel in all() {
             let module = parsed(&kernel.wgsl());
-            let bound = module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
+            let bound =
+                module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
             assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.slabs, "{kernel:?}");
         }
     }

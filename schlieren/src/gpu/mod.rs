@@ -1,8 +1,11 @@
-//! Light paths on a GPU: the deviational Verlet march of [`crate::march::Deviational`] as a Vulkan compute shader.
+//! Light paths on a GPU: the deviational Verlet march of [`crate::march::Deviational`] as a Vulkan
+//! compute shader.
 //!
-//! The same numbers as on the CPU, within a few roundings: rays are prepared and read out in `f64` by the same code, take the same steps, and the kernel
-//! does the same operations in `f32` in the same order. The field lies in storage buffers and is interpolated with explicit weights, because texture
-//! units round theirs to 8 bits. A field larger than one binding of the device is cut into slabs, one a binding.
+//! The same numbers as on the CPU, within a few roundings: rays are prepared and read out in `f64`
+//! by the same code, take the same steps, and the kernel does the same operations in `f32` in the
+//! same order. The field lies in storage buffers and is interpolated with explicit weights, because
+//! texture units round theirs to 8 bits. A field larger than one binding of the device is cut into
+//! slabs, one a binding.
 //!
 //! | file | holds |
 //! |---|---|
@@ -13,8 +16,8 @@
 //! | fall_back.rs | what happens to batches that the device does not finish: the device is opened
 //! again, and then the CPU stands in |
 //!
-//! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full marches, and gradients that are interpolated
-//! themselves.
+//! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full
+//! marches, and gradients that are interpolated themselves.
 
 mod cpu_fallback;
 mod device;
@@ -30,7 +33,8 @@ pub use paths::{GpuCounters, GpuOptions, GpuPaths};
 pub enum GpuError {
     /// There is none.
     #[error(
-        "no GPU: {0}; install its Vulkan driver (on Debian mesa-vulkan-drivers, which also has one that runs on the CPU), or compute on the CPU (--device cpu)"
+        "no GPU: {0}; install its Vulkan driver (on Debian mesa-vulkan-drivers, which also has one \
+         that runs on the CPU), or compute on the CPU (--device cpu)"
     )]
     NoAdapter(String),
     /// It cannot be opened.
@@ -51,7 +55,8 @@ pub enum GpuError {
     },
     /// The field does not fit.
     #[error(
-        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {room}; compute on the CPU (--device cpu), or resample the flow coarser"
+        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {room}; compute on the \
+         CPU (--device cpu), or resample the flow coarser"
     )]
     TooLarge {
         /// Part of the field.
@@ -75,7 +80,8 @@ pub enum GpuError {
     },
     /// It failed again and again.
     #[error(
-        "`{adapter}` failed ({reason}) after it was opened again {times} times, and is left alone; look into its driver's log, or compute on the CPU (--device cpu)"
+        "`{adapter}` failed ({reason}) after it was opened again {times} times, and is left alone; \
+         look into its driver's log, or compute on the CPU (--device cpu)"
     )]
     GivenUp {
         /// The device.

@@ -18,7 +18,8 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 use wgpu::{BufferDescriptor, BufferUsages};
 
-/// Rays of one dispatch: enough to fill any device, few enough that two batches take little memory and no driver thinks that the device hangs.
+/// Rays of one dispatch: enough to fill any device, few enough that two batches take little memory
+/// and no driver thinks that the device hangs.
 const BATCH: usize = 1 << 18;
 /// As in march.wgsl.
 const WORKGROUP: usize = 64;
@@ -36,7 +37,11 @@ pub struct GpuOptions {
 
 impl Default for GpuOptions {
     fn default() -> Self {
-        GpuOptions { step_voxels: 1.0, wanted: PathQuantities::default(), blank: BlankCells::Opaque }
+        GpuOptions {
+            step_voxels: 1.0,
+            wanted: PathQuantities::default(),
+            blank: BlankCells::Opaque,
+        }
     }
 }
 
@@ -55,14 +60,16 @@ pub struct GpuCounters {
     pub rays_on_cpu: u64,
 }
 
-/// Light paths through a field of weak index, traced on a GPU. [`LightPaths::trace_parallel`] on many starts is the fast way; every call costs a round
-/// trip to the device.
+/// Light paths through a field of weak index, traced on a GPU. [`LightPaths::trace_parallel`] on
+/// many starts is the fast way; every call costs a round trip to the device.
 ///
 /// When the device fails on the way, it is opened again, a few times at most, and what it lost is
 /// traced once more ([`GpuCounters::rays_repeated`]). What is left then is traced on the CPU
-/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::device_warning`] names the cause and what was done.
+/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::device_warning`] names the cause and what was
+/// done.
 ///
-/// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are those where it was stopped.
+/// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are
+/// those where it was stopped.
 pub struct GpuPaths<'a> {
     field: &'a Field,
     frame: Frame,
@@ -136,8 +143,10 @@ impl DeviceState {
                     mapped_at_creation: false,
                 })
             };
-            let params = buffer(size_of::<Params>(), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
-            let rays = buffer(capacity * size_of::<Ray>(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
+            let params =
+                buffer(size_of::<Params>(), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+            let rays =
+                buffer(capacity * size_of::<Ray>(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
             let output_bytes = capacity * size_of::<RawKernelOutput>();
             let outputs = buffer(output_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
             let readback = buffer(output_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
@@ -396,7 +405,8 @@ impl BatchTracer for GpuPaths<'_> {
         let gpu = &on_device.gpu;
         let failed = |e: &dyn std::fmt::Display| {
             gpu.mark_failed(e.to_string());
-            on_device.failure(gpu.failed(gpu.failure().map_or_else(|| e.to_string(), str::to_string)))
+            on_device
+                .failure(gpu.failed(gpu.failure().map_or_else(|| e.to_string(), str::to_string)))
         };
         let wait = wgpu::PollType::Wait { submission_index: Some(pending.index), timeout: None };
         gpu.device.poll(wait).map_err(|e| failed(&e))?;
@@ -415,7 +425,8 @@ impl BatchTracer for GpuPaths<'_> {
         }
         let bytes = (exits.len() * size_of::<RawKernelOutput>()) as u64;
         {
-            let range = pending.scratch.readback.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
+            let range =
+                pending.scratch.readback.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
             let outputs: &[RawKernelOutput] = bytemuck::cast_slice(&range);
             let read = |((exit, p), raw): ((&mut Exit, &KernelRay), &RawKernelOutput)| {
                 let opd = self.options.wanted.opd.then_some(raw.opd);
@@ -454,10 +465,17 @@ impl BatchTracer for GpuPaths<'_> {
         let gpu = Arc::clone(gpu);
         current.attempts += 1;
         let working = gpu.working()?;
-        let spline = (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
+        let spline =
+            (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
         let number = failed.device + 1;
-        let made =
-            DeviceState::new(working, number, self.field, spline.as_ref(), self.interpolant, self.options)?;
+        let made = DeviceState::new(
+            working,
+            number,
+            self.field,
+            spline.as_ref(),
+            self.interpolant,
+            self.options,
+        )?;
         current.on_device = Arc::new(made);
         Ok(())
     }

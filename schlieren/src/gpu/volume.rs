@@ -1,4 +1,5 @@
-//! The field on the device: its nodes, or its spline's coefficients, in slabs of layers no larger than a binding.
+//! The field on the device: its nodes, or its spline's coefficients, in slabs of layers no larger
+//! than a binding.
 
 use super::kernel::Kernel;
 use super::{Gpu, GpuError};
@@ -6,7 +7,8 @@ use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
 use wgpu::{BufferDescriptor, BufferUsages};
 
-/// Bytes handed to the driver at once; more would all be copied into staging memory before the first of them leaves it.
+/// Bytes handed to the driver at once; more would all be copied into staging memory before the
+/// first of them leaves it.
 const UPLOAD_BYTES: usize = 64 << 20;
 
 /// A field on the device.
@@ -25,10 +27,18 @@ pub(super) struct Volume {
 
 impl Volume {
     /// The field, or the spline through it.
-    pub(super) fn new(gpu: &Gpu, field: &Field, spline: Option<&BSpline>) -> Result<Volume, GpuError> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        field: &Field,
+        spline: Option<&BSpline>,
+    ) -> Result<Volume, GpuError> {
         let [nx, ny, nz] = field.dims();
         let (values, stride) = spline.map_or((field.eps(), [nx, nx * ny]), BSpline::coefficients);
-        let halo = Kernel::halo(if spline.is_some() { Interpolant::BSpline } else { Interpolant::Trilinear });
+        let halo = Kernel::halo(if spline.is_some() {
+            Interpolant::BSpline
+        } else {
+            Interpolant::Trilinear
+        });
         let too_large = |what, need, room| GpuError::TooLarge {
             what,
             dims: field.dims(),
@@ -36,15 +46,18 @@ impl Volume {
             room,
             adapter: gpu.name(),
         };
-        let Some((count, layers)) = cut(nz - 1, halo, 4 * stride[1] as u64, gpu.binding_bytes(), gpu.slabs())
+        let Some((count, layers)) =
+            cut(nz - 1, halo, 4 * stride[1] as u64, gpu.binding_bytes(), gpu.slabs())
         else {
             let need = bytes_of(size_of_val(values) as u64);
             let room = format!("{} bindings of {}", gpu.slabs(), bytes_of(gpu.binding_bytes()));
             return Err(too_large("a field", need, room));
         };
         let words = field.nodes().map(packed);
-        if let Some(w) = words.as_ref().filter(|w| size_of_val(&w[..]) as u64 > gpu.binding_bytes()) {
-            let (need, room) = (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
+        if let Some(w) = words.as_ref().filter(|w| size_of_val(&w[..]) as u64 > gpu.binding_bytes())
+        {
+            let (need, room) =
+                (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
             return Err(too_large("the mask", need, room));
         }
 
@@ -61,9 +74,15 @@ impl Volume {
     }
 }
 
-/// Number of slabs, and layers of cells in each (the last may have fewer), so that no slab is larger than a binding. `None` when that takes more than
-/// `most` slabs.
-fn cut(cells: usize, halo: usize, layer_bytes: u64, binding_bytes: u64, most: u32) -> Option<(usize, usize)> {
+/// Number of slabs, and layers of cells in each (the last may have fewer), so that no slab is
+/// larger than a binding. `None` when that takes more than `most` slabs.
+fn cut(
+    cells: usize,
+    halo: usize,
+    layer_bytes: u64,
+    binding_bytes: u64,
+    most: u32,
+) -> Option<(usize, usize)> {
     let layers = usize::try_from(binding_bytes / layer_bytes).ok()?.checked_sub(halo)?.min(cells);
     if layers == 0 {
         return None;
@@ -74,8 +93,9 @@ fn cut(cells: usize, halo: usize, layer_bytes: u64, binding_bytes: u64, most: u3
 
 /// Two bits a node, sixteen a word.
 fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
-    let word =
-        |w: &[crate::field::Node]| w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i));
+    let word = |w: &[crate::field::Node]| {
+        w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i))
+    };
     nodes.chunks(16).map(word).collect()
 }
 

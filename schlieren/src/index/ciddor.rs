@@ -1,8 +1,9 @@
-//! Refractive index of moist air after P. E. Ciddor, "Refractive index of air: new equations for the visible and near
-//! infrared", Applied Optics 35, 1566 (1996), with all terms. Numbers of equations and appendices are those of the paper.
+//! Refractive index of moist air after P. E. Ciddor, "Refractive index of air: new equations for
+//! the visible and near infrared", Applied Optics 35, 1566 (1996), with all terms. Numbers of
+//! equations and appendices are those of the paper.
 //!
-//! Outside −40…100 °C its compressibility is an extrapolation: at 2000 K it gives 1.4 % more than an ideal gas would have.
-//! Flames need [`super::mixture`].
+//! Outside −40…100 °C its compressibility is an extrapolation: at 2000 K it gives 1.4 % more than
+//! an ideal gas would have. Flames need [`super::mixture`].
 
 use super::{IndexError, OutOfRange};
 
@@ -25,7 +26,8 @@ pub const WAVELENGTH_RANGE_UM: [f64; 2] = [0.3, 1.69];
 pub const PRESSURE_RANGE_PA: [f64; 2] = [10_000.0, 140_000.0];
 /// See [`TEMPERATURE_RANGE_C`].
 pub const CO2_RANGE_PPM: [f64; 2] = [0.0, 2000.0];
-/// Shorter waves come near the poles of the dispersion formula (132 and 65 nm), where oxygen absorbs.
+/// Shorter waves come near the poles of the dispersion formula (132 and 65 nm), where oxygen
+/// absorbs.
 const SHORTEST_UM: f64 = 0.185;
 
 /// State of a parcel of air.
@@ -44,7 +46,12 @@ pub struct MoistAir {
 impl Default for MoistAir {
     /// 20 °C, 101325 Pa, dry, 450 ppm.
     fn default() -> Self {
-        MoistAir { temperature_c: 20.0, pressure_pa: 101_325.0, relative_humidity: 0.0, co2_ppm: 450.0 }
+        MoistAir {
+            temperature_c: 20.0,
+            pressure_pa: 101_325.0,
+            relative_humidity: 0.0,
+            co2_ppm: 450.0,
+        }
     }
 }
 
@@ -69,7 +76,8 @@ pub struct Ciddor {
 }
 
 impl Ciddor {
-    /// For light of this wavelength in vacuum. Refused below 185 nm, where air absorbs and the formula has its poles.
+    /// For light of this wavelength in vacuum. Refused below 185 nm, where air absorbs and the
+    /// formula has its poles.
     pub fn new(wavelength_um: f64) -> Result<Self, IndexError> {
         if !(wavelength_um >= SHORTEST_UM && wavelength_um.is_finite()) {
             return Err(IndexError::Impossible {
@@ -81,7 +89,8 @@ impl Ciddor {
             });
         }
         let s = wavelength_um.powi(-2);
-        // Eq. 1: standard dry air. Eq. 3: water vapour, with the factor 1.022 that fits the infrared.
+        // Eq. 1: standard dry air. Eq. 3: water vapour, with the factor 1.022 that fits the
+        // infrared.
         let n_as = 1e-8 * (5_792_105.0 / (238.0185 - s) + 167_917.0 / (57.362 - s));
         let n_ws = 1.022e-8 * (295.235 + 2.6422 * s - 0.032380 * s * s + 0.004028 * s * s * s);
         let (t, p) = STANDARD_VAPOUR;
@@ -89,7 +98,8 @@ impl Ciddor {
         Ok(Ciddor { wavelength_um, n_as, n_ws, rho_ws })
     }
 
-    /// n − 1. Errors where no such air exists; see [`Self::out_of_range`] for where the formula is not to be trusted.
+    /// n − 1. Errors where no such air exists; see [`Self::out_of_range`] for where the formula is
+    /// not to be trusted.
     pub fn n_minus_1(&self, air: &MoistAir) -> Result<f64, IndexError> {
         let vapour_fraction = vapour_mole_fraction(air)?;
         // Eq. 2, and the molar mass of dry air with that much CO2.
@@ -98,7 +108,8 @@ impl Ciddor {
 
         // Density of standard air.
         let (t_s, p_s) = STANDARD_AIR;
-        let rho_axs = p_s * molar_mass_air / (compressibility(t_s, p_s, 0.0) * R * (t_s + ZERO_CELSIUS_K));
+        let rho_axs =
+            p_s * molar_mass_air / (compressibility(t_s, p_s, 0.0) * R * (t_s + ZERO_CELSIUS_K));
 
         // Eq. 4: densities of the two components, with the compressibility of the mixture.
         let (t, p) = (air.temperature_c, air.pressure_pa);
@@ -110,7 +121,8 @@ impl Ciddor {
         Ok(rho_a / rho_axs * n_axs + rho_w / self.rho_ws * self.n_ws)
     }
 
-    /// Which of the conditions lie outside the range in which the equation was compared with measurements.
+    /// Which of the conditions lie outside the range in which the equation was compared with
+    /// measurements.
     pub fn out_of_range(&self, air: &MoistAir) -> Vec<OutOfRange> {
         let checks = [
             (
@@ -156,11 +168,12 @@ impl Ciddor {
             .collect()
     }
 
-    /// Gladstone-Dale constants in m³/kg at this wavelength: of dry air with 450 ppm CO2, and of water vapour.
+    /// Gladstone-Dale constants in m³/kg at this wavelength: of dry air with 450 ppm CO2, and of
+    /// water vapour.
     pub fn gladstone_dale_m3_per_kg(&self) -> [f64; 2] {
         let (t, p) = STANDARD_AIR;
-        let rho_as =
-            p * molar_mass_of_dry_air(450.0) / (compressibility(t, p, 0.0) * R * (t + ZERO_CELSIUS_K));
+        let rho_as = p * molar_mass_of_dry_air(450.0)
+            / (compressibility(t, p, 0.0) * R * (t + ZERO_CELSIUS_K));
         [self.n_as / rho_as, self.n_ws / self.rho_ws]
     }
 }
@@ -170,12 +183,13 @@ pub(crate) fn molar_mass_of_dry_air(co2_ppm: f64) -> f64 {
     1e-3 * (28.9635 + 12.011e-6 * (co2_ppm - 400.0))
 }
 
-/// Saturation pressure of water vapour in Pa, over water from 0 °C on and over ice below (the paper's appendix A).
+/// Saturation pressure of water vapour in Pa, over water from 0 °C on and over ice below (the
+/// paper's appendix A).
 pub fn saturation_pressure_pa(temperature_c: f64) -> f64 {
     let kelvin = temperature_c + ZERO_CELSIUS_K;
     if temperature_c >= 0.0 {
-        let exponent =
-            1.237_884_7e-5 * kelvin * kelvin - 1.912_131_6e-2 * kelvin + 33.937_110_47 - 6_343.164_5 / kelvin;
+        let exponent = 1.237_884_7e-5 * kelvin * kelvin - 1.912_131_6e-2 * kelvin + 33.937_110_47
+            - 6_343.164_5 / kelvin;
         exponent.exp()
     } else {
         10f64.powf(-2663.5 / kelvin + 12.537)
@@ -198,7 +212,13 @@ fn vapour_mole_fraction(air: &MoistAir) -> Result<f64, IndexError> {
         );
     }
     if !(p >= 0.0 && p.is_finite()) {
-        return impossible("pressure", p, "Pa", "is not a pressure", "give the absolute pressure in Pa");
+        return impossible(
+            "pressure",
+            p,
+            "Pa",
+            "is not a pressure",
+            "give the absolute pressure in Pa",
+        );
     }
     if !(0.0..=1.0).contains(&relative_humidity) {
         return impossible(
@@ -261,7 +281,8 @@ mod tests {
             (10.0, 100.0, 27774.7),
             (30.0, 100.0, 25937.2),
         ] {
-            let air = MoistAir { temperature_c: t, pressure_pa: kpa * 1000.0, ..Default::default() };
+            let air =
+                MoistAir { temperature_c: t, pressure_pa: kpa * 1000.0, ..Default::default() };
             let got = Ciddor::new(0.633).unwrap().n_minus_1(&air).unwrap() * 1e8;
             assert!((got - expected).abs() <= 0.06, "{t} C, {kpa} kPa: {got}, expected {expected}");
         }
@@ -286,14 +307,21 @@ mod tests {
         let warnings = c.out_of_range(&flame);
         assert_eq!(warnings.len(), 1);
         let text = warnings[0].to_string();
-        assert!(text.contains("temperature 1726.85 C") && text.contains("Gladstone-Dale"), "{text}");
-        // The reason: against an ideal gas with the same K the extrapolated compressibility is off by more than 1 %.
+        assert!(
+            text.contains("temperature 1726.85 C") && text.contains("Gladstone-Dale"),
+            "{text}"
+        );
+        // The reason: against an ideal gas with the same K the extrapolated compressibility is off
+        // by more than 1 %.
         let k = c.gladstone_dale_m3_per_kg()[0];
         let ideal = k * 101_325.0 * molar_mass_of_dry_air(450.0) / (R * 2000.0);
         let ratio = c.n_minus_1(&flame).unwrap() / ideal;
         assert!((1.01..1.02).contains(&ratio), "{ratio}");
         assert!(c.out_of_range(&MoistAir::default()).is_empty());
-        assert_eq!(Ciddor::new(1.7).unwrap().out_of_range(&MoistAir::default())[0].quantity, "wavelength");
+        assert_eq!(
+            Ciddor::new(1.7).unwrap().out_of_range(&MoistAir::default())[0].quantity,
+            "wavelength"
+        );
     }
 
     #[test]
@@ -305,7 +333,12 @@ mod tests {
             (MoistAir { pressure_pa: -1.0, ..Default::default() }, "pressure"),
             (MoistAir { relative_humidity: 50.0, ..Default::default() }, "50 % is 0.5"),
             (
-                MoistAir { relative_humidity: 1.0, temperature_c: 95.0, pressure_pa: 5e4, co2_ppm: 450.0 },
+                MoistAir {
+                    relative_humidity: 1.0,
+                    temperature_c: 95.0,
+                    pressure_pa: 5e4,
+                    co2_ppm: 450.0,
+                },
                 "boils",
             ),
             (MoistAir { co2_ppm: -3.0, ..Default::default() }, "CO2"),

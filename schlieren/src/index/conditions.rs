@@ -132,7 +132,8 @@ pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {
                     quantity: "model ciddor with",
                     value: c.species.len() as f64,
                     unit: "species",
-                    reason: "or a density is a contradiction: Ciddor's equation is for air by temperature and pressure",
+                    reason: "or a density is a contradiction: Ciddor's equation is for air by \
+                             temperature and pressure",
                     cure: "leave out the model, or say gladstone-dale",
                 });
             }
@@ -140,18 +141,21 @@ pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {
             (ciddor.n_minus_1(&air)?, None, None)
         }
         _ => {
-            // Checks the ranges of temperature and pressure; humidity has no place in a mixture given by mass.
+            // Checks the ranges of temperature and pressure; humidity has no place in a mixture
+            // given by mass.
             let dry = MoistAir { relative_humidity: 0.0, ..air };
             ciddor.n_minus_1(&dry)?;
             if c.humidity != 0.0 {
                 warnings.push(format!(
-                    "humidity {} is not used by Gladstone-Dale; give water vapour as a species, H2O with its mass fraction",
+                    "humidity {} is not used by Gladstone-Dale; give water vapour as a species, \
+                     H2O with its mass fraction",
                     c.humidity
                 ));
             }
             if c.model == Model::Auto && plain_air {
                 warnings.push(format!(
-                    "{} C is outside -40..100 C, where Ciddor's equation holds: Gladstone-Dale with air of the density of an ideal gas is used",
+                    "{} C is outside -40..100 C, where Ciddor's equation holds: Gladstone-Dale \
+                     with air of the density of an ideal gas is used",
                     c.temperature_c
                 ));
             }
@@ -204,8 +208,12 @@ mod tests {
         assert_eq!((cold.model, cold.warnings.len()), (Model::Ciddor, 0));
         let flame = answer(&Conditions { temperature_c: 1500.0, ..Default::default() }).unwrap();
         assert_eq!((flame.model, flame.warnings.len()), (Model::GladstoneDale, 1));
-        let forced = Conditions { temperature_c: 1500.0, model: Model::Ciddor, ..Default::default() };
-        assert!(answer(&forced).unwrap().warnings[0].contains("temperature 1500 C is outside -40..100 C"));
+        let forced =
+            Conditions { temperature_c: 1500.0, model: Model::Ciddor, ..Default::default() };
+        assert!(
+            answer(&forced).unwrap().warnings[0]
+                .contains("temperature 1500 C is outside -40..100 C")
+        );
         // Both agree for dry air at room temperature but for the compressibility, 4e-4.
         let gd = answer(&Conditions { model: Model::GladstoneDale, ..Default::default() }).unwrap();
         let ratio = gd.n_minus_1 / cold.n_minus_1;
@@ -216,15 +224,23 @@ mod tests {
     fn helium_and_refusals() {
         let helium = vec![("He".parse().unwrap(), 1.0)];
         let he = answer(&Conditions { species: helium.clone(), ..Default::default() }).unwrap();
-        assert!((he.n_minus_1 - 3.25e-5).abs() < 1e-7 && he.density_kg_m3.unwrap() > 0.166, "{he:?}");
-        let text = answer(&Conditions { species: helium, model: Model::Ciddor, ..Default::default() });
+        assert!(
+            (he.n_minus_1 - 3.25e-5).abs() < 1e-7 && he.density_kg_m3.unwrap() > 0.166,
+            "{he:?}"
+        );
+        let text =
+            answer(&Conditions { species: helium, model: Model::Ciddor, ..Default::default() });
         assert!(text.unwrap_err().to_string().contains("contradiction"));
         let humid = Conditions { humidity: 0.5, model: Model::GladstoneDale, ..Default::default() };
         assert!(answer(&humid).unwrap().warnings[0].contains("humidity 0.5 is not used"));
         assert!(answer(&Conditions { density_kg_m3: Some(-1.0), ..Default::default() }).is_err());
         assert!(
-            answer(&Conditions { temperature_c: -300.0, model: Model::GladstoneDale, ..Default::default() })
-                .is_err()
+            answer(&Conditions {
+                temperature_c: -300.0,
+                model: Model::GladstoneDale,
+                ..Default::default()
+            })
+            .is_err()
         );
     }
 

@@ -45,7 +45,8 @@ pub fn answer_table(table: CsvTable) -> Result<Answers, ReadError> {
             "rename the column",
         ));
     }
-    let [wavelength, temperature, pressure, humidity, co2] = COLUMNS.map(|name| table.numbers(name));
+    let [wavelength, temperature, pressure, humidity, co2] =
+        COLUMNS.map(|name| table.numbers(name));
     let (wavelength, temperature, pressure) = (wavelength?, temperature?, pressure?);
     let (humidity, co2) = (humidity?, co2?);
 
@@ -102,7 +103,8 @@ impl Answers {
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
-    /// Writes the table with the result in a last column, with 12 significant digits. Comments of the file are left out.
+    /// Writes the table with the result in a last column, with 12 significant digits. Comments of
+    /// the file are left out.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let separator = self.table.separator();
         writeln!(out, "{}{separator}{RESULT}", self.table.header_text().trim_end())?;
@@ -141,14 +143,16 @@ mod tests {
         let text = answer_table(table("lambda_um,T_C,p_Pa,RH_frac\n")).unwrap_err().to_string();
         assert!(text.contains("no column `CO2_ppm`"), "{text}");
         let text =
-            answer_table(table("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm,n_minus_1\n1,1,1,0,1,1\n")).unwrap_err();
+            answer_table(table("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm,n_minus_1\n1,1,1,0,1,1\n"))
+                .unwrap_err();
         assert!(text.to_string().contains("rename the column"));
     }
 
     #[test]
     fn rows_out_of_range_are_counted_and_the_first_is_named() {
         let rows = "0.5,20,101325,0,450\n0.5,500,101325,0,450\n0.5,600,101325,0,450\n1.7,20,101325,0,450\n";
-        let a = answer_table(table(&format!("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm\n{rows}"))).unwrap();
+        let a =
+            answer_table(table(&format!("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm\n{rows}"))).unwrap();
         assert_eq!((a.n_minus_1().len(), a.warnings().len()), (4, 2));
         assert!(
             a.warnings()[0].starts_with("line 3: ") && a.warnings()[0].ends_with("(2 rows)"),

@@ -1,12 +1,13 @@
 //! Gladstone and Dale's law, n − 1 = K ρ, with K from published dispersion formulas.
 //!
-//! K depends on the wavelength and hardly on the temperature: what the thesis (section 5.2) calls a dependence on
-//! temperature is that of the density. A formula gives n − 1 at a reference state; K divides it by the density there, which
-//! is that of a gas with second virial coefficient B: ρ = p M / (R T Z), Z = 1 + B p / (R T). Without B, K of SF6 would be
-//! 1.3 % too large.
+//! K depends on the wavelength and hardly on the temperature: what the thesis (section 5.2) calls a
+//! dependence on temperature is that of the density. A formula gives n − 1 at a reference state; K
+//! divides it by the density there, which is that of a gas with second virial coefficient B: ρ = p
+//! M / (R T Z), Z = 1 + B p / (R T). Without B, K of SF6 would be 1.3 % too large.
 //!
-//! Coefficients are from the papers named at each gas, as collected in refractiveindex.info (CC0). Virial coefficients: J. H.
-//! Dymond and E. B. Smith, "The Virial Coefficients of Pure Gases and Mixtures" (1980), to about 3 cm³/mol, which is 0.01 % of K.
+//! Coefficients are from the papers named at each gas, as collected in refractiveindex.info (CC0).
+//! Virial coefficients: J. H. Dymond and E. B. Smith, "The Virial Coefficients of Pure Gases and
+//! Mixtures" (1980), to about 3 cm³/mol, which is 0.01 % of K.
 
 use super::ciddor::Ciddor;
 use super::{IndexError, OutOfRange};
@@ -21,8 +22,8 @@ pub(crate) const R: f64 = 8.314_462_618;
 pub enum Gas {
     /// One of [`KNOWN`], by its index.
     Known(usize),
-    /// A gas given by numbers: Gladstone-Dale constant at the wavelength in use, and molar mass if density has to
-    /// follow from temperature and pressure.
+    /// A gas given by numbers: Gladstone-Dale constant at the wavelength in use, and molar mass if
+    /// density has to follow from temperature and pressure.
     Given {
         /// Gladstone-Dale constant, m³/kg.
         k_m3_per_kg: f64,
@@ -49,7 +50,8 @@ pub struct KnownGas {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Dispersion {
-    /// n − 1 = c + Σ b/(a − 1/λ²) at temperature (K), pressure (Pa), with virial coefficient (cm³/mol).
+    /// n − 1 = c + Σ b/(a − 1/λ²) at temperature (K), pressure (Pa), with virial coefficient
+    /// (cm³/mol).
     Sellmeier {
         constant: f64,
         terms: &'static [(f64, f64)],
@@ -182,7 +184,8 @@ pub const KNOWN: &[KnownGas] = &[
         aliases: &["heptane", "n-heptane"],
         molar_mass_g: 100.2019,
         range_um: [0.326, 0.644],
-        source: "liquid at 20 C by K. Kerl and H. Varchmin, J. Mol. Struct. 349, 257 (1995), density 683.8 kg/m^3, by Lorentz-Lorenz",
+        source: "liquid at 20 C by K. Kerl and H. Varchmin, J. Mol. Struct. 349, 257 (1995), \
+                 density 683.8 kg/m^3, by Lorentz-Lorenz",
         dispersion: Dispersion::Liquid { n: [1.38248838, -4.05375e-3, 4.58433e-3], density: 683.8 },
     },
     KnownGas {
@@ -191,7 +194,8 @@ pub const KNOWN: &[KnownGas] = &[
         molar_mass_g: 39.948,
         range_um: [0.4, 1.0],
         source: "A. Boerzsoenyi et al., Appl. Opt. 47, 4856 (2008)",
-        // Its formula is n² − 1 = Σ B λ²/(λ² − C) = Σ (B/C)/(1/C − 1/λ²), and n − 1 = (n² − 1)/2 to 1e-4 of itself.
+        // Its formula is n² − 1 = Σ B λ²/(λ² − C) = Σ (B/C)/(1/C − 1/λ²), and n − 1 = (n² − 1)/2 to
+        // 1e-4 of itself.
         dispersion: Dispersion::Sellmeier {
             constant: 0.0,
             terms: &[
@@ -242,7 +246,8 @@ pub const KNOWN: &[KnownGas] = &[
         aliases: &["sulfur hexafluoride", "sulphur hexafluoride"],
         molar_mass_g: 146.0554,
         range_um: [0.6, 1.3],
-        source: "M. Sneep and W. Ubachs, J. Quant. Spectrosc. Radiat. Transfer 92, 293 (2005), from D. Vukovic et al., J. Phys. D 29, 634 (1996)",
+        source: "M. Sneep and W. Ubachs, J. Quant. Spectrosc. Radiat. Transfer 92, 293 (2005), \
+                 from D. Vukovic et al., J. Phys. D 29, 634 (1996)",
         dispersion: Dispersion::Cauchy {
             a: 7.1517e-4,
             b: 4.996e-6,
@@ -264,14 +269,16 @@ pub const KNOWN: &[KnownGas] = &[
 ];
 
 impl KnownGas {
-    /// Gladstone-Dale constant in m³/kg (1000 times smaller than in cm³/g). NaN below 185 nm and where a formula has a pole.
+    /// Gladstone-Dale constant in m³/kg (1000 times smaller than in cm³/g). NaN below 185 nm and
+    /// where a formula has a pole.
     pub fn k_m3_per_kg(&self, wavelength_um: f64) -> f64 {
         if wavelength_um.is_nan() || wavelength_um < 0.185 {
             return f64::NAN;
         }
         let s = wavelength_um.powi(-2);
-        let per_density =
-            |n_minus_1: f64, state: State| n_minus_1 / state.density_kg_m3(self.molar_mass_g * 1e-3);
+        let per_density = |n_minus_1: f64, state: State| {
+            n_minus_1 / state.density_kg_m3(self.molar_mass_g * 1e-3)
+        };
         match self.dispersion {
             Dispersion::Sellmeier { constant, terms, state } => {
                 per_density(constant + terms.iter().map(|(b, a)| b / (a - s)).sum::<f64>(), state)
@@ -344,7 +351,8 @@ impl Gas {
             value: wavelength_um * 1000.0,
             range: [low * 1000.0, high * 1000.0],
             unit: "nm",
-            cure: "the dispersion there is an extrapolation; a constant of your own can be given as NAME=K in cm^3/g",
+            cure: "the dispersion there is an extrapolation; a constant of your own can be given \
+                   as NAME=K in cm^3/g",
         })
     }
 }
@@ -353,7 +361,9 @@ impl fmt::Display for Gas {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Gas::Known(i) => f.write_str(KNOWN[*i].name),
-            Gas::Given { k_m3_per_kg, molar_mass_kg: None } => write!(f, "{}", k_m3_per_kg * 1000.0),
+            Gas::Given { k_m3_per_kg, molar_mass_kg: None } => {
+                write!(f, "{}", k_m3_per_kg * 1000.0)
+            }
             Gas::Given { k_m3_per_kg, molar_mass_kg: Some(m) } => {
                 write!(f, "{}@{}", k_m3_per_kg * 1000.0, m * 1000.0)
             }
@@ -364,8 +374,8 @@ impl fmt::Display for Gas {
 impl FromStr for Gas {
     type Err = IndexError;
 
-    /// A name (`N2`, `nitrogen`; capitals do not matter), or a Gladstone-Dale constant in cm³/g (`0.42`), or that with a
-    /// molar mass in g/mol (`0.42@77.9`).
+    /// A name (`N2`, `nitrogen`; capitals do not matter), or a Gladstone-Dale constant in cm³/g
+    /// (`0.42`), or that with a molar mass in g/mol (`0.42@77.9`).
     fn from_str(text: &str) -> Result<Gas, IndexError> {
         let word = text.trim();
         let lower = word.to_ascii_lowercase();

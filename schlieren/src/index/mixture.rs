@@ -1,13 +1,14 @@
 //! Mixtures of gases by mass fraction: n − 1 = ρ Σ Yᵢ Kᵢ.
 //!
-//! The thesis (eq. 5.5) weights K by volume fractions, which gives helium in air 12 % too little contrast at a mole fraction
-//! of 0.1. Mass fractions are right: ρ Yᵢ is the density of species i, and each contributes Kᵢ times its own density.
+//! The thesis (eq. 5.5) weights K by volume fractions, which gives helium in air 12 % too little
+//! contrast at a mole fraction of 0.1. Mass fractions are right: ρ Yᵢ is the density of species i,
+//! and each contributes Kᵢ times its own density.
 
 use super::gladstone_dale::{Gas, R};
 use super::{IndexError, OutOfRange};
 
-/// Mass fractions whose sum is off by no more than this are scaled to 1 without a word: single precision and the
-/// transport equations of solvers leave that much.
+/// Mass fractions whose sum is off by no more than this are scaled to 1 without a word: single
+/// precision and the transport equations of solvers leave that much.
 pub const SUM_TOLERANCE: f64 = 1e-3;
 
 /// Gases at one wavelength, ready to be evaluated at many points.
@@ -35,9 +36,13 @@ pub struct Blend {
 }
 
 impl Mixture {
-    /// Species with the names of their fields; `balance` is what the rest consists of (usually [`Gas::AIR`]). No species at
-    /// all is a pure gas, the balance.
-    pub fn new(species: &[(String, Gas)], balance: &Gas, wavelength_um: f64) -> Result<Self, IndexError> {
+    /// Species with the names of their fields; `balance` is what the rest consists of (usually
+    /// [`Gas::AIR`]). No species at all is a pure gas, the balance.
+    pub fn new(
+        species: &[(String, Gas)],
+        balance: &Gas,
+        wavelength_um: f64,
+    ) -> Result<Self, IndexError> {
         let constants = |gas: &Gas| -> Result<(f64, f64), IndexError> {
             Ok((gas.k_m3_per_kg(wavelength_um)?, 1.0 / gas.molar_mass_kg().unwrap_or(f64::NAN)))
         };
@@ -69,7 +74,8 @@ impl Mixture {
         self.gases.is_empty()
     }
 
-    /// The first species without molar mass, an error where density has to follow from temperature and pressure.
+    /// The first species without molar mass, an error where density has to follow from temperature
+    /// and pressure.
     pub fn check_molar_masses(&self) -> Result<(), IndexError> {
         match self.inverse_molar_mass.iter().position(|m| m.is_nan()) {
             Some(i) => Err(IndexError::NoMolarMass { name: self.names[i].clone() }),
@@ -77,8 +83,9 @@ impl Mixture {
         }
     }
 
-    /// The constants where the species have these mass fractions. The balance takes what is missing to 1. Fractions that sum
-    /// to more are scaled down; negative ones (overshoots of a solver) count as 0. See [`Blend::sum`] to tell.
+    /// The constants where the species have these mass fractions. The balance takes what is missing
+    /// to 1. Fractions that sum to more are scaled down; negative ones (overshoots of a solver)
+    /// count as 0. See [`Blend::sum`] to tell.
     pub fn blend(&self, mass_fractions: &[f64]) -> Blend {
         debug_assert_eq!(mass_fractions.len(), self.len());
         let (mut k, mut inverse, mut sum) = (0.0, 0.0, 0.0);
@@ -94,12 +101,13 @@ impl Mixture {
         // A rest within the tolerance is an error of the fractions, not a trace of air.
         let scale = if sum > 1.0 - SUM_TOLERANCE { 1.0 / sum } else { 1.0 };
         let rest = if sum > 1.0 - SUM_TOLERANCE { 0.0 } else { 1.0 - sum };
-        let inverse = inverse * scale + if rest > 0.0 { rest * self.balance_inverse_molar_mass } else { 0.0 };
+        let inverse =
+            inverse * scale + if rest > 0.0 { rest * self.balance_inverse_molar_mass } else { 0.0 };
         Blend { k_m3_per_kg: k * scale + rest * self.balance_k, molar_mass_kg: 1.0 / inverse, sum }
     }
 
-    /// [`Self::blend`] of fractions that have to make sense by themselves (from a command line): each from 0 to 1, and in
-    /// sum no more than 1.
+    /// [`Self::blend`] of fractions that have to make sense by themselves (from a command line):
+    /// each from 0 to 1, and in sum no more than 1.
     pub fn blend_strictly(&self, mass_fractions: &[f64]) -> Result<Blend, IndexError> {
         let sum: f64 = mass_fractions.iter().sum();
         let bad = mass_fractions.iter().any(|y| !(0.0..=1.0).contains(y));
@@ -125,7 +133,8 @@ impl Blend {
     }
 }
 
-/// Mass fractions of gases given by mole (volume) fractions, which must sum to 1 to [`SUM_TOLERANCE`].
+/// Mass fractions of gases given by mole (volume) fractions, which must sum to 1 to
+/// [`SUM_TOLERANCE`].
 pub fn mass_from_mole_fractions(gases: &[(f64, Gas)]) -> Result<Vec<f64>, IndexError> {
     let sum: f64 = gases.iter().map(|g| g.0).sum();
     if !(1.0 - SUM_TOLERANCE..=1.0 + SUM_TOLERANCE).contains(&sum) {
@@ -163,7 +172,8 @@ mod tests {
                 b.n_minus_1(b.density_kg_m3(293.15, 101_325.0))
             };
             let (got, expected) = (at(y[0]), x * at(1.0) + (1.0 - x) * at(0.0));
-            // Fractions within SUM_TOLERANCE of 1 are pure gas by definition; these are farther from it.
+            // Fractions within SUM_TOLERANCE of 1 are pure gas by definition; these are farther
+            // from it.
             assert!((got / expected - 1.0).abs() < 1e-12, "X = {x}: {got} {expected}");
         }
     }
@@ -177,15 +187,18 @@ mod tests {
         let (k_he, k_air) = (m.blend(&[1.0]).k_m3_per_kg, m.blend(&[0.0]).k_m3_per_kg);
         let air = m.blend(&[0.0]);
         let background = air.n_minus_1(air.density_kg_m3(293.15, 101_325.0));
-        let (right, thesis) = (background - b.n_minus_1(rho), background - (0.1 * k_he + 0.9 * k_air) * rho);
+        let (right, thesis) =
+            (background - b.n_minus_1(rho), background - (0.1 * k_he + 0.9 * k_air) * rho);
         let error = thesis / right - 1.0;
         assert!((0.11..0.14).contains(&error), "{error}");
     }
 
     #[test]
     fn fractions_that_do_not_sum_to_one() {
-        let species =
-            [("N2".to_string(), "N2".parse().unwrap()), ("CO2".to_string(), "CO2".parse().unwrap())];
+        let species = [
+            ("N2".to_string(), "N2".parse().unwrap()),
+            ("CO2".to_string(), "CO2".parse().unwrap()),
+        ];
         let m = Mixture::new(&species, &Gas::AIR, 0.589).unwrap();
         let whole = m.blend(&[0.6, 0.4]);
         for scaled in [m.blend(&[1.2, 0.8]), m.blend(&[0.5997, 0.3998])] {
@@ -199,12 +212,15 @@ mod tests {
         let air = Gas::AIR.k_m3_per_kg(0.589).unwrap();
         let n2 = Gas::Known(2).k_m3_per_kg(0.589).unwrap();
         assert!((half.k_m3_per_kg - 0.5 * (air + n2)).abs() < 1e-18);
-        assert!(m.blend_strictly(&[0.8, 0.4]).unwrap_err().to_string().contains("N2, CO2 sum to 1.2"));
+        assert!(
+            m.blend_strictly(&[0.8, 0.4]).unwrap_err().to_string().contains("N2, CO2 sum to 1.2")
+        );
     }
 
     #[test]
     fn a_gas_without_molar_mass_serves_with_density_only() {
-        let m = Mixture::new(&[("AsH3".into(), "0.42".parse().unwrap())], &Gas::AIR, 0.633).unwrap();
+        let m =
+            Mixture::new(&[("AsH3".into(), "0.42".parse().unwrap())], &Gas::AIR, 0.633).unwrap();
         assert!(m.check_molar_masses().unwrap_err().to_string().contains("`AsH3=0.42@77.9`"));
         assert!((m.blend(&[1.0]).n_minus_1(2.0) - 0.84e-3).abs() < 1e-15);
         assert!(m.blend(&[0.5]).molar_mass_kg.is_nan());

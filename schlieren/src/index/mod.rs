@@ -9,9 +9,9 @@
 //! | [`multifield`] | any fields through transfer functions (thesis, section 5.7) | pictures, not physics |
 //! | [`conditions`], [`csv`] | what the program `schlieren index` answers | |
 //!
-//! Units: wavelengths in micrometres of vacuum where a formula is evaluated (`wavelength_um`; what users type is nm),
-//! temperatures in °C in Ciddor's equation and in K elsewhere, pressures in Pa, densities in kg/m³, humidity and fractions
-//! from 0 to 1, CO2 in µmol/mol (ppm).
+//! Units: wavelengths in micrometres of vacuum where a formula is evaluated (`wavelength_um`; what
+//! users type is nm), temperatures in °C in Ciddor's equation and in K elsewhere, pressures in Pa,
+//! densities in kg/m³, humidity and fractions from 0 to 1, CO2 in µmol/mol (ppm).
 
 pub mod ciddor;
 pub mod conditions;
@@ -45,7 +45,8 @@ pub enum IndexError {
     },
     /// No gas of this name.
     #[error(
-        "no gas `{name}`; known gases: {known}; or give its Gladstone-Dale constant in cm^3/g as a number, such as NAME=0.42"
+        "no gas `{name}`; known gases: {known}; or give its Gladstone-Dale constant in cm^3/g as a \
+         number, such as NAME=0.42"
     )]
     UnknownGas {
         /// What was asked for.
@@ -65,7 +66,9 @@ pub enum IndexError {
     },
     /// The density of a gas of unknown molar mass is needed.
     #[error(
-        "gas `{name}` has no molar mass, so its density does not follow from temperature and pressure; give a density field, or the molar mass as NAME=K@M with M in g/mol, such as `{name}=0.42@77.9`"
+        "gas `{name}` has no molar mass, so its density does not follow from temperature and \
+         pressure; give a density field, or the molar mass as NAME=K@M with M in g/mol, such as \
+         `{name}=0.42@77.9`"
     )]
     NoMolarMass {
         /// The gas.
@@ -73,7 +76,8 @@ pub enum IndexError {
     },
 }
 
-/// A value outside the range in which a formula was measured. The result is still computed: warn, and let the user decide.
+/// A value outside the range in which a formula was measured. The result is still computed: warn,
+/// and let the user decide.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct OutOfRange {
     /// The formula, by its author.

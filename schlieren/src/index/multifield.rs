@@ -1,12 +1,15 @@
-//! Several fields combined into one index through one-dimensional transfer functions (thesis, section 5.7).
+//! Several fields combined into one index through one-dimensional transfer functions (thesis,
+//! section 5.7).
 //!
-//! This shows fields that have no refractive index of their own (temperature, a mixture fraction, vorticity) as if they had:
-//! each value is mapped to an n − 1 by a curve the user draws, and the curves' results are combined. It is illustration and
-//! not physics, and pictures made so should say it.
+//! This shows fields that have no refractive index of their own (temperature, a mixture fraction,
+//! vorticity) as if they had: each value is mapped to an n − 1 by a curve the user draws, and the
+//! curves' results are combined. It is illustration and not physics, and pictures made so should
+//! say it.
 
 use super::IndexError;
 
-/// A piecewise linear curve from a field's value to a contribution to n − 1. Constant beyond its ends.
+/// A piecewise linear curve from a field's value to a contribution to n − 1. Constant beyond its
+/// ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     /// (value, n − 1), values strictly increasing.
@@ -59,7 +62,10 @@ impl TransferFunction {
 
     /// The steepest slope, for bounds on gradients.
     pub fn max_slope(&self) -> f64 {
-        self.knots.windows(2).map(|w| ((w[1].1 - w[0].1) / (w[1].0 - w[0].0)).abs()).fold(0.0, f64::max)
+        self.knots
+            .windows(2)
+            .map(|w| ((w[1].1 - w[0].1) / (w[1].0 - w[0].0)).abs())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -100,9 +106,8 @@ impl Multifield {
         let contributions = used.map(|((curve, weight), v)| weight * curve.at(*v));
         match self.rule {
             Rule::Sum => contributions.sum(),
-            Rule::Largest => {
-                contributions.fold(0.0, |a: f64, b| if b.is_nan() || b.abs() > a.abs() { b } else { a })
-            }
+            Rule::Largest => contributions
+                .fold(0.0, |a: f64, b| if b.is_nan() || b.abs() > a.abs() { b } else { a }),
         }
     }
 }
@@ -126,8 +131,12 @@ mod tests {
 
     #[test]
     fn curves_that_are_none_are_refused() {
-        for bad in [vec![], vec![(0.0, 0.0), (0.0, 1.0)], vec![(1.0, 0.0), (0.0, 1.0)], vec![(f64::NAN, 0.0)]]
-        {
+        for bad in [
+            vec![],
+            vec![(0.0, 0.0), (0.0, 1.0)],
+            vec![(1.0, 0.0), (0.0, 1.0)],
+            vec![(f64::NAN, 0.0)],
+        ] {
             assert!(TransferFunction::new(bad).is_err());
         }
     }

@@ -1,6 +1,7 @@
 //! Free electrons: n² = 1 − n_e/n_c, without collisions and without a magnetic field.
 //!
-//! The critical density n_c = ε0 m_e ω²/e² is where the plasma frequency is that of the light. Beyond it nothing propagates.
+//! The critical density n_c = ε0 m_e ω²/e² is where the plasma frequency is that of the light.
+//! Beyond it nothing propagates.
 
 use super::IndexError;
 
@@ -12,7 +13,8 @@ pub fn critical_density_m3(wavelength_um: f64) -> f64 {
     CRITICAL_M3_UM2 / (wavelength_um * wavelength_um)
 }
 
-/// n − 1 of electrons of this density (1/m³), never positive. The difference is not formed: −x/(1 + √(1 − x)).
+/// n − 1 of electrons of this density (1/m³), never positive. The difference is not formed: −x/(1 +
+/// √(1 − x)).
 ///
 /// ```
 /// use schlieren::index::plasma;

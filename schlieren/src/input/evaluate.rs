@@ -7,7 +7,8 @@ use crate::index::conditions::Model;
 use crate::index::{Gas, IndexError, Mixture, mixture, plasma};
 use rayon::prelude::*;
 
-/// Densities of gases that people photograph, kg/m³, with room to spare: rarefied wind tunnels to supercritical injection.
+/// Densities of gases that people photograph, kg/m³, with room to spare: rarefied wind tunnels to
+/// supercritical injection.
 const PLAUSIBLE_DENSITY: [f64; 2] = [1e-4, 100.0];
 const PLAUSIBLE_PRESSURE: [f64; 2] = [10.0, 1e9];
 const PLAUSIBLE_TEMPERATURE: [f64; 2] = [20.0, 20_000.0];
@@ -35,7 +36,11 @@ fn spread(len: usize, value: impl Fn(usize) -> f64 + Sync) -> Option<Spread> {
     let step = (len / 10_001).max(1);
     let mut some: Vec<f64> = (0..len).step_by(step).map(&value).filter(|v| v.is_finite()).collect();
     some.sort_by(f64::total_cmp);
-    (low <= high).then(|| Spread { low, high, median: some.get(some.len() / 2).copied().unwrap_or(low) })
+    (low <= high).then(|| Spread {
+        low,
+        high,
+        median: some.get(some.len() / 2).copied().unwrap_or(low),
+    })
 }
 
 /// n − 1 at every place; NaN where it cannot be.
@@ -54,7 +59,9 @@ pub(super) fn evaluate(
     let wavelength_um = options.wavelength_nm * 1e-3;
     let out = match &options.medium {
         Medium::Density { .. } => by_density(columns, len, wavelength_um, options, report)?,
-        Medium::TemperaturePressure { .. } => by_state(columns, len, wavelength_um, options, report)?,
+        Medium::TemperaturePressure { .. } => {
+            by_state(columns, len, wavelength_um, options, report)?
+        }
         Medium::NMinus1(_) => {
             report.formula = "given";
             (0..len).into_par_iter().map(|i| columns[0].at(i)).collect()
@@ -67,8 +74,10 @@ pub(super) fn evaluate(
         }
         Medium::Multifield { .. } => {
             report.formula = "multifield";
-            let fields =
-                options.medium.multifield().unwrap_or_else(|| unreachable!("the medium is multifield"));
+            let fields = options
+                .medium
+                .multifield()
+                .unwrap_or_else(|| unreachable!("the medium is multifield"));
             let of = |i| fields.n_minus_1(&columns.iter().map(|c| c.at(i)).collect::<Vec<_>>());
             (0..len).into_par_iter().map(of).collect::<Vec<f64>>()
         }
@@ -91,7 +100,8 @@ fn count_lost(columns: &[Column], out: &[f64], options: &Options, report: &mut R
         let why = match options.medium {
             Medium::Electrons(_) => "the electron density is negative or above the critical one",
             _ => {
-                "there is no such gas (temperature not above 0 K, negative pressure or density, or humidity beyond boiling)"
+                "there is no such gas (temperature not above 0 K, negative pressure or density, or \
+                 humidity beyond boiling)"
             }
         };
         report.warnings.push(format!(
@@ -124,11 +134,13 @@ fn by_density(
         if s.low < low || s.high > high {
             let value = if s.high > high { s.high } else { s.low };
             report.warnings.push(format!(
-                "density {value} kg/m^3 is not one of a gas in a wind tunnel ({low}..{high}); give the unit of the file as a scale, such as 1000 for g/cm^3"
+                "density {value} kg/m^3 is not one of a gas in a wind tunnel ({low}..{high}); give \
+                 the unit of the file as a scale, such as 1000 for g/cm^3"
             ));
         } else if (s.median - 1.0).abs() < NORMALISED && s.low < s.high {
             report.warnings.push(
-                "the density is 1 in most places, so it is probably normalised by the free stream; give the free stream's density in kg/m^3 as its scale, such as 1.2".into(),
+                "the density is 1 in most places, so it is probably normalised by the free stream; \
+                 give the free stream's density in kg/m^3 as its scale, such as 1.2".into(),
             );
         }
     }
@@ -173,8 +185,11 @@ fn by_state(
         report.formula = "ciddor";
         if let (Some(t), Some(p)) = (&t, &p) {
             for (kelvin, pressure_pa) in [(t.low, p.low), (t.high, p.high)] {
-                let air =
-                    MoistAir { temperature_c: kelvin - ZERO_CELSIUS_K, pressure_pa, ..Default::default() };
+                let air = MoistAir {
+                    temperature_c: kelvin - ZERO_CELSIUS_K,
+                    pressure_pa,
+                    ..Default::default()
+                };
                 for text in ciddor.out_of_range(&air).iter().map(ToString::to_string) {
                     if !report.warnings.contains(&text) {
                         report.warnings.push(text);
@@ -200,13 +215,15 @@ fn by_state(
         && let Some(s) = &t
     {
         report.warnings.push(format!(
-            "temperatures from {:.1} to {:.1} K leave -40..100 C, where Ciddor's equation holds: Gladstone-Dale with the density of an ideal gas is used; for flames name the species",
+            "temperatures from {:.1} to {:.1} K leave -40..100 C, where Ciddor's equation holds: \
+             Gladstone-Dale with the density of an ideal gas is used; for flames name the species",
             s.low, s.high
         ));
     }
     if wet {
         report.warnings.push(
-            "humidity is not used by Gladstone-Dale; give water vapour as a species, NAME=H2O with its mass fraction".into(),
+            "humidity is not used by Gladstone-Dale; give water vapour as a species, NAME=H2O with \
+             its mass fraction".into(),
         );
     }
     let (mixture, blends) = mix(species, wavelength_um, options, report)?;
@@ -225,13 +242,15 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
         let [low, high] = PLAUSIBLE_TEMPERATURE;
         if (CELSIUS_SUSPECT[0]..CELSIUS_SUSPECT[1]).contains(&s.median) {
             report.warnings.push(format!(
-                "the temperature is {:.1} K in the middle: if it is in degrees Celsius, say so (offset 273.15)",
+                "the temperature is {:.1} K in the middle: if it is in degrees Celsius, say so \
+                 (offset 273.15)",
                 s.median
             ));
         } else if s.low < low || s.high > high {
             let value = if s.high > high { s.high } else { s.low };
             report.warnings.push(format!(
-                "temperature {value} K is not plausible ({low}..{high}); give its unit as scale and offset"
+                "temperature {value} K is not plausible ({low}..{high}); give its unit as scale \
+                 and offset"
             ));
         }
     }
@@ -239,7 +258,11 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
         let [low, high] = PLAUSIBLE_PRESSURE;
         if s.low < low || s.high > high {
             let value = if s.high > high { s.high } else { s.low };
-            report.warnings.push(format!("pressure {value} Pa is not plausible ({low}..{high}); give its unit as a scale (100000 for bar), and 101325 as offset when it is relative to the atmosphere"));
+            report.warnings.push(format!(
+                "pressure {value} Pa is not plausible ({low}..{high}); \
+                                          give its unit as a scale (100000 for bar), and 101325 as \
+                                          offset when it is relative to the atmosphere"
+            ));
         }
     }
 }
@@ -288,14 +311,16 @@ fn mix<'a>(
     if let Some(s) = spread(len.unwrap_or(1), |i| blends.at(&mixture, i).sum) {
         if s.high > 1.0 + 10.0 * mixture::SUM_TOLERANCE {
             report.warnings.push(format!(
-                "mass fractions sum to as much as {:.4} and are scaled down to 1; are they mass fractions, and not mole fractions or per cent?",
+                "mass fractions sum to as much as {:.4} and are scaled down to 1; are they mass \
+                 fractions, and not mole fractions or per cent?",
                 s.high
             ));
         }
         if s.low < 1.0 - 10.0 * mixture::SUM_TOLERANCE {
-            report
-                .warnings
-                .push(format!("mass fractions sum to as little as {:.4}; air fills them up to 1", s.low));
+            report.warnings.push(format!(
+                "mass fractions sum to as little as {:.4}; air fills them up to 1",
+                s.low
+            ));
         }
     }
     Ok((mixture, blends))

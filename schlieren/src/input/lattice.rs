@@ -3,8 +3,8 @@
 use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
 use datasets::resample::{
-    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, resample as resample_mesh, revolve,
-    revolved_bounds,
+    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, resample as resample_mesh,
+    revolve, revolved_bounds,
 };
 use glam::{DMat3, DVec3};
 
@@ -28,7 +28,8 @@ pub(super) struct LatticeValues {
     pub(super) report: Option<Report>,
 }
 
-/// Nodes along the axis over which a two-dimensional flow is repeated: enough for any interpolant's border.
+/// Nodes along the axis over which a two-dimensional flow is repeated: enough for any interpolant's
+/// border.
 const SPAN_NODES: usize = 8;
 
 impl Places {
@@ -42,11 +43,9 @@ impl Places {
         let per_point = associations.iter().any(|p| *p);
         let mixed = per_point && associations.iter().any(|p| !p);
         let own = uniform(data);
-        let ghosts = data
-            .leaves()
-            .iter()
-            .filter_map(|d| d.attributes())
-            .any(|a| a.cell_array("vtkGhostType").is_some() || a.point_array("vtkGhostType").is_some());
+        let ghosts = data.leaves().iter().filter_map(|d| d.attributes()).any(|a| {
+            a.cell_array("vtkGhostType").is_some() || a.point_array("vtkGhostType").is_some()
+        });
         if let Some((lattice, backwards)) = own
             && !mixed
             && !ghosts
@@ -70,7 +69,11 @@ impl Places {
     pub(super) fn values(&self, data: &Dataset, color: &ColorBy) -> Vec<f64> {
         let of = |a: &Attributes, i: usize| {
             // Blocks may lack the array, or have it for the other of points and cells.
-            let array = if color.per_point { a.point_array(&color.name) } else { a.cell_array(&color.name) };
+            let array = if color.per_point {
+                a.point_array(&color.name)
+            } else {
+                a.cell_array(&color.name)
+            };
             array.map_or(f64::NAN, |array| match color.component {
                 Some(c) if c < array.components => array.get(i, c),
                 Some(_) => f64::NAN,
@@ -85,7 +88,9 @@ impl Places {
             },
             Places::Uniform { lattice, backwards } => {
                 let leaves = data.leaves();
-                let Some(a) = leaves.first().and_then(|l| l.attributes()) else { return Vec::new() };
+                let Some(a) = leaves.first().and_then(|l| l.attributes()) else {
+                    return Vec::new();
+                };
                 let d = lattice.dims;
                 let source = |i: usize| {
                     let mut at = [i % d[0], i / d[0] % d[1], i / d[0] / d[1]];
@@ -116,13 +121,19 @@ impl Places {
             }
             Places::Mesh { mesh, per_point, own } => {
                 let lattice = target(mesh, own.as_ref(), options)?;
-                let samples = if *per_point { Samples::Points(&values) } else { Samples::Cells(&values) };
+                let samples =
+                    if *per_point { Samples::Points(&values) } else { Samples::Cells(&values) };
                 let how = resample::Options { samples_per_axis: options.samples_per_axis };
                 let r = match options.depth {
                     Some(Depth::Revolve) => revolve(mesh, samples, &lattice, &how)?,
                     _ => resample_mesh(mesh, samples, &lattice, &how)?,
                 };
-                Ok(LatticeValues { lattice, values: r.values, marks: r.marks, report: Some(r.report) })
+                Ok(LatticeValues {
+                    lattice,
+                    values: r.values,
+                    marks: r.marks,
+                    report: Some(r.report),
+                })
             }
         }
     }
@@ -155,7 +166,9 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
     }
     // A sheet's thickness says nothing of its cells; the plane's own steps are taken instead.
     let typical = match options.depth {
-        Some(_) => (high - low).truncate().element_product().sqrt() / (mesh.num_cells() as f64).sqrt(),
+        Some(_) => {
+            (high - low).truncate().element_product().sqrt() / (mesh.num_cells() as f64).sqrt()
+        }
         None => mesh.typical_cell(),
     };
     let mut lattice = Lattice::fit(low, high, typical, options.resolution)?;
@@ -173,10 +186,12 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
     Ok(lattice)
 }
 
-/// Thickness that a plane gets before it is revolved: far below any lattice's spacing, far above rounding.
+/// Thickness that a plane gets before it is revolved: far below any lattice's spacing, far above
+/// rounding.
 fn sheet(data: &Dataset) -> f64 {
     let range = |p: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = p.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let (low, high) =
+            p.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
         high - low
     };
     let longest = data.leaves().into_iter().map(|leaf| match leaf {
@@ -202,7 +217,8 @@ fn cell_centres(points: Lattice) -> Lattice {
     }
 }
 
-/// The lattice of uniform data in three dimensions whose axes are those of space, and which of them run backwards.
+/// The lattice of uniform data in three dimensions whose axes are those of space, and which of them
+/// run backwards.
 fn uniform(data: &Dataset) -> Option<(Lattice, [bool; 3])> {
     let (dims, first, step) = match data {
         Dataset::ImageData(d) => {
@@ -232,8 +248,8 @@ fn uniform(data: &Dataset) -> Option<(Lattice, [bool; 3])> {
     Some((Lattice { dims, origin: first.min(last), spacing: step.abs() }, backwards))
 }
 
-/// The step of coordinates that are where equal steps put them, to four roundings of the largest in f32 (the precision
-/// most files have).
+/// The step of coordinates that are where equal steps put them, to four roundings of the largest in
+/// f32 (the precision most files have).
 fn even_step(x: &[f64]) -> Option<f64> {
     let (&first, &last) = (x.first()?, x.last()?);
     if x.len() < 2 {

@@ -9,8 +9,9 @@ use datasets::model::Dataset;
 use datasets::resample::Mark;
 use std::path::Path;
 
-/// Reads properties of the medium from a file; `options` are those of the field, whose formula, smoothing and reference do not matter here. Each array gets a lattice of
-/// its own, so none of them changes the field. See [`media_from_dataset`].
+/// Reads properties of the medium from a file; `options` are those of the field, whose formula,
+/// smoothing and reference do not matter here. Each array gets a lattice of its own, so none of
+/// them changes the field. See [`media_from_dataset`].
 pub fn load_media(
     path: &Path,
     options: &Options,
@@ -20,8 +21,10 @@ pub fn load_media(
     Ok(with_data(path, |data| media_from_dataset(data, options, quantities, field))?.0)
 }
 
-/// Properties of the medium from the arrays of a data set. Numbers hold for all of `field`. Values outside the mesh and in hidden cells are continued from their neighbours;
-/// so are those that are not finite, and negative ones become zero where they mean nothing: both are counted ([`Media::warnings`]).
+/// Properties of the medium from the arrays of a data set. Numbers hold for all of `field`. Values
+/// outside the mesh and in hidden cells are continued from their neighbours; so are those that are
+/// not finite, and negative ones become zero where they mean nothing: both are counted
+/// ([`Media::warnings`]).
 pub fn media_from_dataset(
     data: &Dataset,
     options: &Options,
@@ -31,7 +34,9 @@ pub fn media_from_dataset(
     let mut media = Media::default();
     for (property, quantity) in quantities {
         let volume = match quantity.source {
-            Source::Constant(value) => Volume::uniform(value * quantity.scale + quantity.offset, field)?,
+            Source::Constant(value) => {
+                Volume::uniform(value * quantity.scale + quantity.offset, field)?
+            }
             Source::Array(_) => volume(data, options, *property, quantity)?,
         };
         media = media.with(*property, volume);
@@ -63,7 +68,8 @@ fn volume(
         });
     }
     let on = places.to_lattice(values, &options)?;
-    let unknown: Vec<bool> = on.marks.iter().map(|m| matches!(m, Mark::Outside | Mark::Hidden)).collect();
+    let unknown: Vec<bool> =
+        on.marks.iter().map(|m| matches!(m, Mark::Outside | Mark::Hidden)).collect();
     let (unit, lattice) = (options.length_unit_m, on.lattice);
     let spacing_m = (lattice.spacing * unit).to_array();
     Ok(Volume::new(lattice.dims, spacing_m, lattice.origin * unit, on.values, Some(&unknown))?)
@@ -104,8 +110,12 @@ mod tests {
         assert_eq!(media.warnings().len(), 2);
         assert_eq!(media.get(Property::Rotation).unwrap().sample(DVec3::ZERO), -2.0);
 
-        let missing =
-            media_from_dataset(&data, &options, &[(Property::Emission, Quantity::array("glow"))], &field);
+        let missing = media_from_dataset(
+            &data,
+            &options,
+            &[(Property::Emission, Quantity::array("glow"))],
+            &field,
+        );
         let message = missing.unwrap_err().to_string();
         assert!(message.contains("glow"), "{message}");
     }

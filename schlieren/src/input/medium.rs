@@ -8,7 +8,8 @@ use datasets::model::{ColorBy, Dataset};
 use std::convert::Infallible;
 use std::str::FromStr;
 
-/// An array of the file, or one number everywhere; times a scale plus an offset it is in the unit that is needed.
+/// An array of the file, or one number everywhere; times a scale plus an offset it is in the unit
+/// that is needed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     /// Where it comes from.
@@ -173,26 +174,33 @@ impl Medium {
     /// Species with the names of their fields.
     pub(super) fn species(&self) -> Vec<(String, Gas)> {
         match self {
-            Medium::Density { species, .. } | Medium::TemperaturePressure { species, .. } => species
-                .iter()
-                .map(|(q, gas)| {
-                    let name = match &q.source {
-                        Source::Array(name) => name.clone(),
-                        Source::Constant(_) => gas.to_string(),
-                    };
-                    (name, gas.clone())
-                })
-                .collect(),
+            Medium::Density { species, .. } | Medium::TemperaturePressure { species, .. } => {
+                species
+                    .iter()
+                    .map(|(q, gas)| {
+                        let name = match &q.source {
+                            Source::Array(name) => name.clone(),
+                            Source::Constant(_) => gas.to_string(),
+                        };
+                        (name, gas.clone())
+                    })
+                    .collect()
+            }
             _ => Vec::new(),
         }
     }
 
     /// The values of all quantities at the places.
-    pub(super) fn columns(&self, data: &Dataset, places: &Places) -> Result<Vec<Column>, InputError> {
+    pub(super) fn columns(
+        &self,
+        data: &Dataset,
+        places: &Places,
+    ) -> Result<Vec<Column>, InputError> {
         let quantities = self.quantities();
         if quantities.iter().all(|q| matches!(q.source, Source::Constant(_))) {
             return Err(InputError::Option {
-                what: "no array of the file is used, so the index would be the same everywhere".into(),
+                what: "no array of the file is used, so the index would be the same everywhere"
+                    .into(),
                 cure: "name the array of density, or those of temperature and pressure",
             });
         }

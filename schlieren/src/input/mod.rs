@@ -1,11 +1,13 @@
-//! From the files of a flow solver to [`Field`]: which arrays mean what, what they make of the index, and the lattice.
+//! From the files of a flow solver to [`Field`]: which arrays mean what, what they make of the
+//! index, and the lattice.
 //!
 //! ```text
 //! file ── arrays by name and unit ── n − 1 at the points of the file (f64) ── uniform lattice ── eps = n/n0 − 1 (f32)
 //!         [medium]                   [crate::index]                           [datasets::resample]
 //! ```
-//! The index is computed before resampling, at the points the solver computed, and a common background is subtracted
-//! in f64 before anything is rounded: a plume with differences of 1e-9 in n keeps its digits.
+//! The index is computed before resampling, at the points the solver computed, and a common
+//! background is subtracted in f64 before anything is rounded: a plume with differences of 1e-9 in
+//! n keeps its digits.
 
 mod evaluate;
 mod lattice;
@@ -114,7 +116,8 @@ pub struct Options {
     pub depth: Option<Depth>,
     /// See [`resample::Options`].
     pub samples_per_axis: usize,
-    /// Shock smoothing: standard deviation in nodes; 0 for none, 1 to 1.4 where shocks are one cell wide.
+    /// Shock smoothing: standard deviation in nodes; 0 for none, 1 to 1.4 where shocks are one cell
+    /// wide.
     pub smoothing_nodes: f64,
     /// What nodes outside every cell are.
     pub outside: Role,
@@ -125,8 +128,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Defaults for a medium: 532 nm, metres, the file's own lattice, no smoothing, hidden cells solid, the reference that of
-    /// the border.
+    /// Defaults for a medium: 532 nm, metres, the file's own lattice, no smoothing, hidden cells
+    /// solid, the reference that of the border.
     pub fn new(medium: Medium) -> Self {
         Options {
             medium,
@@ -173,19 +176,22 @@ pub struct LoadedField {
     pub report: Report,
 }
 
-/// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`] for the others.
+/// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`]
+/// for the others.
 pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
     let (mut loaded, warnings) = with_data(path, |data| from_dataset(data, options))?;
     loaded.report.warnings.splice(0..0, warnings);
     Ok(loaded)
 }
 
-/// Reads a file and makes something of its data; also what the reader warns of. Errors name the file.
+/// Reads a file and makes something of its data; also what the reader warns of. Errors name the
+/// file.
 fn with_data<T>(
     path: &Path,
     make: impl FnOnce(&Dataset) -> Result<T, InputError>,
 ) -> Result<(T, Vec<String>), InputError> {
-    let in_file = |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
+    let in_file =
+        |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
     // A table of points on a lattice: cell centres of a solver, or ParaView's export.
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
@@ -275,16 +281,20 @@ fn nodes_of(marks: &[Mark], options: &Options, report: &mut Report) -> Option<Ve
         Mark::Hidden => options.hidden.node(),
         Mark::NotFinite => Node::Blank,
     };
-    let share = |m: Mark| 100.0 * marks.iter().filter(|x| **x == m).count() as f64 / marks.len() as f64;
+    let share =
+        |m: Mark| 100.0 * marks.iter().filter(|x| **x == m).count() as f64 / marks.len() as f64;
     let outside = share(Mark::Outside);
     if outside > 0.0 && options.outside == Role::Blank {
         report.warnings.push(format!(
-            "{outside:.1} % of the lattice lie outside the mesh and are blank; say that they are solid (a body) or gas (undisturbed flow)"
+            "{outside:.1} % of the lattice lie outside the mesh and are blank; say that they are \
+             solid (a body) or gas (undisturbed flow)"
         ));
     }
     let bad = share(Mark::NotFinite);
     if bad > 0.0 {
-        report.warnings.push(format!("{bad:.2} % of the lattice have no finite index and are blank"));
+        report
+            .warnings
+            .push(format!("{bad:.2} % of the lattice have no finite index and are blank"));
     }
     Some(marks.iter().map(of).collect())
 }

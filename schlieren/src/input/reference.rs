@@ -12,8 +12,9 @@ pub enum Reference {
     Border,
     /// Median over all gas.
     Median,
-    /// This n − 1, for instance that of the free stream from [`crate::index::conditions`]. Also how the fields of a time series
-    /// get the same reference: take [`super::Report::reference_n_minus_1`] of the first.
+    /// This n − 1, for instance that of the free stream from [`crate::index::conditions`]. Also how
+    /// the fields of a time series get the same reference: take
+    /// [`super::Report::reference_n_minus_1`] of the first.
     Given {
         /// n0 − 1.
         n_minus_1: f64,
@@ -61,7 +62,8 @@ impl Reference {
                 let border = gas(&at_border);
                 if border.is_empty() {
                     report.warnings.push(
-                        "no gas at the border of the lattice: the reference is the median of all of it"
+                        "no gas at the border of the lattice: the reference is the median of all \
+                         of it"
                             .into(),
                     );
                     return Ok(or_zero(median(&gas(&all))));
@@ -77,9 +79,14 @@ fn or_zero(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }
 }
 
-/// Values where nodes outside the mesh are to be gas: continued from the nearest gas, layer by layer. Others are left to
-/// [`crate::field::Field::new`].
-pub(super) fn continued(mut eps: Vec<f32>, dims: [usize; 3], marks: &[Mark], options: &Options) -> Vec<f32> {
+/// Values where nodes outside the mesh are to be gas: continued from the nearest gas, layer by
+/// layer. Others are left to [`crate::field::Field::new`].
+pub(super) fn continued(
+    mut eps: Vec<f32>,
+    dims: [usize; 3],
+    marks: &[Mark],
+    options: &Options,
+) -> Vec<f32> {
     let open = |m: Mark| match m {
         Mark::Outside => options.outside == Role::Gas,
         Mark::Hidden => options.hidden == Role::Gas,
@@ -112,8 +119,11 @@ pub(super) fn continued(mut eps: Vec<f32>, dims: [usize; 3], marks: &[Mark], opt
         for (&i, v) in layer.iter().zip(new) {
             (eps[i], known[i]) = (v, true);
         }
-        let mut next: Vec<usize> =
-            layer.iter().flat_map(|&i| neighbours(i)).filter(|&j| !known[j] && open(marks[j])).collect();
+        let mut next: Vec<usize> = layer
+            .iter()
+            .flat_map(|&i| neighbours(i))
+            .filter(|&j| !known[j] && open(marks[j]))
+            .collect();
         next.sort_unstable();
         next.dedup();
         layer = next;

@@ -25,12 +25,19 @@ pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
             return Err(InputError::InFile {
                 path: only.clone(),
                 source: Box::new(InputError::Option {
-                    what: format!("time {} has several files, the parts of one data set", twice[0].time),
+                    what: format!(
+                        "time {} has several files, the parts of one data set",
+                        twice[0].time
+                    ),
                     cure: "write each time as one file (.pvtu, .vtm), or open the parts one by one",
                 }),
             });
         }
-        return Ok(opened.time_steps.into_iter().map(|s| Step { time: s.time, path: s.path }).collect());
+        return Ok(opened
+            .time_steps
+            .into_iter()
+            .map(|s| Step { time: s.time, path: s.path })
+            .collect());
     }
     Ok(paths.iter().enumerate().map(|(i, p)| Step { time: i as f64, path: p.clone() }).collect())
 }

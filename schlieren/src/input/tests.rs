@@ -33,7 +33,9 @@ fn uniform_data_keeps_its_lattice_in_metres() {
     assert_eq!((field.dims(), field.origin_m()), ([4, 3, 2], DVec3::new(1e-3, 2e-3, 3e-3)));
     assert!(close(field.spacing_m()[2], 3e-4, 1e-12));
     assert!(
-        report.resampling.is_none() && report.formula == "gladstone-dale" && report.warnings.is_empty(),
+        report.resampling.is_none()
+            && report.formula == "gladstone-dale"
+            && report.warnings.is_empty(),
         "{report:?}"
     );
     assert_eq!(report.density_range_kg_m3, Some([1.2, 1.43]));
@@ -43,7 +45,8 @@ fn uniform_data_keeps_its_lattice_in_metres() {
 
 #[test]
 fn differences_of_a_billionth_keep_their_digits() {
-    // Without subtracting the background in f64, an f32 of n − 1 has steps of 3e-11, 3 % of these differences.
+    // Without subtracting the background in f64, an f32 of n − 1 has steps of 3e-11, 3 % of these
+    // differences.
     let data = image([4, 4, 4], vec![("n1", true, ramp(64, 2.7e-4, 1e-11))]);
     let options = Options::new(Medium::NMinus1(Quantity::array("n1")));
     let field = from_dataset(&data, &options).unwrap().field;
@@ -67,14 +70,21 @@ fn axes_that_run_backwards_and_cell_arrays() {
         },
     };
     let field =
-        from_dataset(&Dataset::RectilinearGrid(grid), &Options::new(Medium::density("rho"))).unwrap().field;
+        from_dataset(&Dataset::RectilinearGrid(grid), &Options::new(Medium::density("rho")))
+            .unwrap()
+            .field;
     assert_eq!((field.dims(), field.origin_m()), ([3, 2, 2], DVec3::ZERO));
-    assert!(field.eps()[0] > field.eps()[1] && field.eps()[1] > field.eps()[2], "{:?}", field.eps());
+    assert!(
+        field.eps()[0] > field.eps()[1] && field.eps()[1] > field.eps()[2],
+        "{:?}",
+        field.eps()
+    );
 }
 
 #[test]
 fn temperature_and_pressure_choose_the_formula() {
-    let cold = image([3, 3, 3], vec![("T", true, ramp(27, 290.0, 0.1)), ("p", true, vec![101_325.0; 27])]);
+    let cold =
+        image([3, 3, 3], vec![("T", true, ramp(27, 290.0, 0.1)), ("p", true, vec![101_325.0; 27])]);
     let medium = || Medium::temperature_pressure(Quantity::array("T"), Quantity::array("p"));
     let LoadedField { field, report } = from_dataset(&cold, &Options::new(medium())).unwrap();
     assert_eq!((report.formula, report.warnings.len()), ("ciddor", 0));
@@ -91,11 +101,22 @@ fn temperature_and_pressure_choose_the_formula() {
     let constant_p = Medium::temperature_pressure(Quantity::array("T"), "101325".parse().unwrap());
     let report = from_dataset(&flame, &Options::new(constant_p.clone())).unwrap().report;
     assert_eq!(report.formula, "gladstone-dale");
-    assert!(report.warnings.iter().any(|w| w.contains("name the species")), "{:?}", report.warnings);
+    assert!(
+        report.warnings.iter().any(|w| w.contains("name the species")),
+        "{:?}",
+        report.warnings
+    );
     let forced = Options { model: Model::Ciddor, ..Options::new(constant_p) };
     let report = from_dataset(&flame, &forced).unwrap().report;
-    assert!(report.warnings.iter().any(|w| w.contains("is outside -40..100 C")), "{:?}", report.warnings);
-    let text = from_dataset(&cold, &Options { model: Model::Ciddor, ..Options::new(Medium::density("T")) });
+    assert!(
+        report.warnings.iter().any(|w| w.contains("is outside -40..100 C")),
+        "{:?}",
+        report.warnings
+    );
+    let text = from_dataset(
+        &cold,
+        &Options { model: Model::Ciddor, ..Options::new(Medium::density("T")) },
+    );
     assert!(text.unwrap_err().to_string().contains("not a density"));
 }
 
@@ -104,24 +125,31 @@ fn species_by_mass_fraction() {
     // Helium into air at constant temperature and pressure.
     let y = ramp(27, 0.0, 1.0 / 26.0);
     let data = image([3, 3, 3], vec![("Y", true, y), ("T", true, vec![300.0; 27])]);
-    let mut medium = Medium::temperature_pressure(Quantity::array("T"), Quantity::constant(101_325.0));
+    let mut medium =
+        Medium::temperature_pressure(Quantity::array("T"), Quantity::constant(101_325.0));
     if let Medium::TemperaturePressure { species, .. } = &mut medium {
         species.push((Quantity::array("Y"), "He".parse().unwrap()));
     }
     let report = from_dataset(&data, &Options::new(medium)).unwrap().report;
     assert!(
-        close(report.n_minus_1_range[0], 3.19e-5, 0.01) && close(report.n_minus_1_range[1], 2.67e-4, 0.01),
+        close(report.n_minus_1_range[0], 3.19e-5, 0.01)
+            && close(report.n_minus_1_range[1], 2.67e-4, 0.01),
         "{report:?}"
     );
     assert!(report.warnings.iter().any(|w| w.contains("air fills them up")));
     // Mole per cent instead of mass fractions.
-    let percent = image([3, 3, 3], vec![("Y", true, vec![40.0; 27]), ("rho", true, ramp(27, 0.5, 0.01))]);
+    let percent =
+        image([3, 3, 3], vec![("Y", true, vec![40.0; 27]), ("rho", true, ramp(27, 0.5, 0.01))]);
     let medium = Medium::Density {
         density: Quantity::array("rho"),
         species: vec![(Quantity::array("Y"), "He".parse().unwrap())],
     };
     let report = from_dataset(&percent, &Options::new(medium)).unwrap().report;
-    assert!(report.warnings.iter().any(|w| w.contains("sum to as much as 40.0000")), "{:?}", report.warnings);
+    assert!(
+        report.warnings.iter().any(|w| w.contains("sum to as much as 40.0000")),
+        "{:?}",
+        report.warnings
+    );
 }
 
 #[test]
@@ -137,7 +165,11 @@ fn numbers_that_cannot_be_true_are_named_with_their_cure() {
     warned(vec![("r", true, ramp(27, 1100.0, 5.0))], Medium::density("r"), "density 1230 kg/m^3");
     let mut normalised = vec![1.0; 27];
     normalised[13] = 3.8;
-    warned(vec![("r", true, normalised.clone())], Medium::density("r"), "normalised by the free stream");
+    warned(
+        vec![("r", true, normalised.clone())],
+        Medium::density("r"),
+        "normalised by the free stream",
+    );
     let tp = |t: Quantity, p: Quantity| Medium::temperature_pressure(t, p);
     warned(
         vec![("T", true, ramp(27, 19.0, 0.2))],
@@ -152,10 +184,16 @@ fn numbers_that_cannot_be_true_are_named_with_their_cure() {
     // The cures work.
     let data = image([3, 3, 3], vec![("r", true, normalised)]);
     let scaled = Medium::Density { density: Quantity::array("r").scaled(1.2), species: vec![] };
-    assert_eq!(from_dataset(&data, &Options::new(scaled)).unwrap().report.warnings, Vec::<String>::new());
+    assert_eq!(
+        from_dataset(&data, &Options::new(scaled)).unwrap().report.warnings,
+        Vec::<String>::new()
+    );
     let data = image([3, 3, 3], vec![("T", true, ramp(27, 19.0, 0.2))]);
     let celsius = tp(Quantity::array("T").shifted(273.15), Quantity::constant(1e5));
-    assert_eq!(from_dataset(&data, &Options::new(celsius)).unwrap().report.warnings, Vec::<String>::new());
+    assert_eq!(
+        from_dataset(&data, &Options::new(celsius)).unwrap().report.warnings,
+        Vec::<String>::new()
+    );
 }
 
 #[test]
@@ -163,9 +201,11 @@ fn nan_places_are_blank_and_negative_densities_too() {
     let mut rho = ramp(27, 1.1, 0.01);
     rho[3] = f64::NAN;
     rho[4] = -0.5;
-    let LoadedField { field, report } =
-        from_dataset(&image([3, 3, 3], vec![("rho", true, rho)]), &Options::new(Medium::density("rho")))
-            .unwrap();
+    let LoadedField { field, report } = from_dataset(
+        &image([3, 3, 3], vec![("rho", true, rho)]),
+        &Options::new(Medium::density("rho")),
+    )
+    .unwrap();
     assert_eq!(field.count(Node::Blank), 2);
     assert!(
         report.warnings.iter().any(|w| w.starts_with("1 of 27 values of `rho` give no index")),
@@ -191,8 +231,10 @@ fn annulus() -> Dataset {
             }
         }
     }
-    let attributes =
-        Attributes { point: vec![DataArray::new("rho", 1, Values::F64(rho))], ..Default::default() };
+    let attributes = Attributes {
+        point: vec![DataArray::new("rho", 1, Values::F64(rho))],
+        ..Default::default()
+    };
     Dataset::StructuredGrid(StructuredGrid {
         extent: [0, 11, 0, 23, 0, 4],
         points: Points::F64(points),
@@ -215,7 +257,8 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
     assert!(r.back.rms / r.back.range < 5e-3 && r.back.compared > 700, "{r:?}");
     assert!(report.warnings.iter().any(|w| w.contains("outside the mesh and are blank")));
     for (role, node) in [(Role::Solid, Node::Solid), (Role::Gas, Node::Gas)] {
-        let other = from_dataset(&annulus(), &Options { outside: role, ..options.clone() }).unwrap();
+        let other =
+            from_dataset(&annulus(), &Options { outside: role, ..options.clone() }).unwrap();
         assert!(other.field.count(node) >= r.outside);
         assert_eq!(other.field.count(Node::Blank), 0);
         assert!(other.field.eps().iter().all(|e| e.is_finite()));
@@ -228,27 +271,36 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
             + DVec3::from(field.spacing_m())
                 * DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
         let expected = K_AIR * (2.0 - p.truncate().length());
-        assert!((f64::from(*e) - expected).abs() < 0.02 * K_AIR, "{e} instead of {expected} at {p}");
+        assert!(
+            (f64::from(*e) - expected).abs() < 0.02 * K_AIR,
+            "{e} instead of {expected} at {p}"
+        );
     }
 }
 
 #[test]
 fn bounds_units_spans_and_smoothing() {
     let bounds = Some([DVec3::new(-0.5, 1.0, 0.2), DVec3::new(0.5, 9.0, 0.8)]);
-    let options =
-        Options { bounds, resolution: Resolution::Longest(33), ..Options::new(Medium::density("rho")) };
+    let options = Options {
+        bounds,
+        resolution: Resolution::Longest(33),
+        ..Options::new(Medium::density("rho"))
+    };
     let field = from_dataset(&annulus(), &options).unwrap().field;
     assert!((field.origin_m() - DVec3::new(-0.5, 1.0, 0.2)).length() < 1e-12);
     assert!((field.size_m() - DVec3::new(1.0, 1.0, 0.6)).length() < 0.02, "{}", field.size_m());
     let nowhere = Some([DVec3::splat(50.0), DVec3::splat(60.0)]);
     assert!(from_dataset(&annulus(), &Options { bounds: nowhere, ..options }).is_err());
 
-    let flat =
-        image([9, 9, 1], vec![("rho", true, (0..81).map(|i| if i % 9 < 4 { 1.2 } else { 3.6 }).collect())]);
+    let flat = image(
+        [9, 9, 1],
+        vec![("rho", true, (0..81).map(|i| if i % 9 < 4 { 1.2 } else { 3.6 }).collect())],
+    );
     let options = Options::new(Medium::density("rho"));
     let text = from_dataset(&flat, &options).unwrap_err().to_string();
     assert!(text.contains("it is a plane"), "{text}");
-    let options = Options { depth: Some(Depth::Span(0.5)), resolution: Resolution::Longest(17), ..options };
+    let options =
+        Options { depth: Some(Depth::Span(0.5)), resolution: Resolution::Longest(17), ..options };
     let sharp = from_dataset(&flat, &options).unwrap();
     assert_eq!(sharp.field.dims()[2], 8);
     assert!((sharp.field.size_m().z - 0.5).abs() < 1e-9);
@@ -274,7 +326,9 @@ fn references_and_series() {
     rho[0] = 9.0;
     let data = image([5, 5, 5], vec![("rho", true, rho)]);
     let with = |reference| {
-        from_dataset(&data, &Options { reference, ..Options::new(Medium::density("rho")) }).unwrap().field
+        from_dataset(&data, &Options { reference, ..Options::new(Medium::density("rho")) })
+            .unwrap()
+            .field
     };
     assert!(close(with(Reference::Border).n0() - 1.0, 2.0 * K_AIR, 1e-3));
     assert!(close(with(Reference::Median).n0() - 1.0, 2.0 * K_AIR, 1e-3));
@@ -297,12 +351,18 @@ fn references_and_series() {
 
 #[test]
 fn plasma_and_multifield() {
-    let data = image([3, 3, 3], vec![("ne", true, ramp(27, 0.0, 1e23)), ("mix", true, ramp(27, 0.0, 0.04))]);
-    let report = from_dataset(&data, &Options::new(Medium::Electrons(Quantity::array("ne")))).unwrap().report;
+    let data = image(
+        [3, 3, 3],
+        vec![("ne", true, ramp(27, 0.0, 1e23)), ("mix", true, ramp(27, 0.0, 0.04))],
+    );
+    let report = from_dataset(&data, &Options::new(Medium::Electrons(Quantity::array("ne"))))
+        .unwrap()
+        .report;
     assert_eq!((report.formula, report.n_minus_1_range[1]), ("plasma", 0.0));
     assert!(close(report.n_minus_1_range[0], -0.5 * 2.6e24 * 0.532 * 0.532 / 1.11485e27, 1e-3));
     let curve = TransferFunction::linear(1e-4, 0.0, 1.0).unwrap();
-    let medium = Medium::Multifield { parts: vec![(Quantity::array("mix"), curve, 2.0)], rule: Rule::Sum };
+    let medium =
+        Medium::Multifield { parts: vec![(Quantity::array("mix"), curve, 2.0)], rule: Rule::Sum };
     let report = from_dataset(&data, &Options::new(medium)).unwrap().report;
     assert!(close(report.n_minus_1_range[1], 2e-4, 1e-12));
 }
@@ -310,15 +370,17 @@ fn plasma_and_multifield() {
 #[test]
 fn errors_name_the_array_the_file_and_the_cure() {
     let data = image([3, 3, 3], vec![("rho", true, vec![1.0; 27])]);
-    let text = from_dataset(&data, &Options::new(Medium::density("density"))).unwrap_err().to_string();
+    let text =
+        from_dataset(&data, &Options::new(Medium::density("density"))).unwrap_err().to_string();
     assert!(text.contains("no array `density`") && text.contains("`rho`"), "{text}");
     let constant = Medium::Density { density: Quantity::constant(1.2), species: vec![] };
     let text = from_dataset(&data, &Options::new(constant)).unwrap_err().to_string();
     assert!(text.contains("name the array"), "{text}");
     let bad_unit = Options { length_unit_m: 0.0, ..Options::new(Medium::density("rho")) };
     assert!(from_dataset(&data, &bad_unit).unwrap_err().to_string().contains("metres per unit"));
-    let text =
-        load(Path::new("no/such/flow.vti"), &Options::new(Medium::density("rho"))).unwrap_err().to_string();
+    let text = load(Path::new("no/such/flow.vti"), &Options::new(Medium::density("rho")))
+        .unwrap_err()
+        .to_string();
     assert!(text.contains("no/such/flow.vti"), "{text}");
     let zero = Medium::Density { density: Quantity::array("rho").scaled(0.0), species: vec![] };
     assert!(from_dataset(&data, &Options::new(zero)).is_err());
@@ -335,8 +397,10 @@ fn blocks_without_the_array_are_blank() {
         Block { name: "a".into(), data: with },
         Block { name: "b".into(), data: Dataset::ImageData(other) },
     ];
-    let options = Options { resolution: Resolution::Dims([9, 5, 5]), ..Options::new(Medium::density("rho")) };
-    let LoadedField { field, report } = from_dataset(&Dataset::MultiBlock(blocks), &options).unwrap();
+    let options =
+        Options { resolution: Resolution::Dims([9, 5, 5]), ..Options::new(Medium::density("rho")) };
+    let LoadedField { field, report } =
+        from_dataset(&Dataset::MultiBlock(blocks), &options).unwrap();
     assert_eq!(field.count(Node::Blank), 4 * 25);
     assert!(report.warnings.iter().any(|w| w.contains("no finite index")), "{:?}", report.warnings);
 }

@@ -1,16 +1,16 @@
 //! Prefiltered cubic B-spline: C2, 64 taps.
 
 use super::{
-    Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, prefilter_line, transpose,
-    trilinear::padded_row,
+    Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, prefilter_line,
+    transpose, trilinear::padded_row,
 };
 use crate::field::Field;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 use rayon::prelude::*;
 
-/// The natural cubic spline through the nodes. Sigworth's rule of thumb holds: where the field is resolved at all, its error is hundreds of times smaller than
-/// that of trilinear gradients.
+/// The natural cubic spline through the nodes. Sigworth's rule of thumb holds: where the field is
+/// resolved at all, its error is hundreds of times smaller than that of trilinear gradients.
 #[derive(Debug)]
 pub struct BSpline {
     /// Coefficients of nodes -1 ..= n along each axis.
@@ -40,7 +40,8 @@ impl BSpline {
 
         // Along x and y, a layer at a time in f64.
         let mut layers = vec![0.0f32; layer * nz];
-        let filtered = layers.par_chunks_exact_mut(layer).zip(field.eps().par_chunks_exact(nx * ny));
+        let filtered =
+            layers.par_chunks_exact_mut(layer).zip(field.eps().par_chunks_exact(nx * ny));
         filtered.with_min_len(least).for_each(|(out, values)| {
             let mut plane = vec![0.0f64; (nx + 2) * (ny + 2)];
             for (to, from) in plane.chunks_exact_mut(nx + 2).skip(1).zip(values.chunks_exact(nx)) {
@@ -57,8 +58,9 @@ impl BSpline {
             }
         });
 
-        // Along z, a sheet of rows with the same y at a time, again in f64: two roundings to f32 in all. (Eliminating layer by layer in place saves
-        // this copy, and puts a rounding into every step of the recursion: a uniform gas then had slopes of a last digit.)
+        // Along z, a sheet of rows with the same y at a time, again in f64: two roundings to f32 in
+        // all. (Eliminating layer by layer in place saves this copy, and puts a rounding into every
+        // step of the recursion: a uniform gas then had slopes of a last digit.)
         let sheets: Vec<Vec<f32>> = (0..ny + 2)
             .into_par_iter()
             .with_min_len(least)
@@ -75,11 +77,13 @@ impl BSpline {
             .collect();
         drop(layers);
         let mut coefficients = vec![0.0f32; layer * (nz + 2)];
-        coefficients.par_chunks_exact_mut(layer).enumerate().with_min_len(least).for_each(|(k, out)| {
-            for (to, sheet) in out.chunks_exact_mut(row).zip(&sheets) {
-                to.copy_from_slice(&sheet[k * row..(k + 1) * row]);
-            }
-        });
+        coefficients.par_chunks_exact_mut(layer).enumerate().with_min_len(least).for_each(
+            |(k, out)| {
+                for (to, sheet) in out.chunks_exact_mut(row).zip(&sheets) {
+                    to.copy_from_slice(&sheet[k * row..(k + 1) * row]);
+                }
+            },
+        );
         BSpline { coefficients, dims: [nx, ny, nz], stride: [row, layer] }
     }
 
@@ -99,13 +103,15 @@ impl BSpline {
         }
     }
 
-    /// The coefficients, of nodes -1 ..= n along each axis, and the distances of neighbours along y and z.
+    /// The coefficients, of nodes -1 ..= n along each axis, and the distances of neighbours along y
+    /// and z.
     pub(crate) fn coefficients(&self) -> (&[f32], [usize; 2]) {
         (&self.coefficients, self.stride)
     }
 }
 
-/// [`prefilter_line`] along the second axis of a plane, all columns at once: the same elimination, row by row.
+/// [`prefilter_line`] along the second axis of a plane, all columns at once: the same elimination,
+/// row by row.
 fn prefilter_rows(plane: &mut [f64], row: usize) {
     let n = plane.len() / row - 2;
     let pass = |plane: &mut [f64], out: usize, other: usize, f: &dyn Fn(f64, f64) -> f64| {
@@ -141,7 +147,8 @@ fn prefilter_rows(plane: &mut [f64], row: usize) {
     pass(plane, n + 1, n - 1, &|a, b| a - b);
 }
 
-/// Weights of the four coefficients around a cell at place `t` in it, and of their three differences for the derivative.
+/// Weights of the four coefficients around a cell at place `t` in it, and of their three
+/// differences for the derivative.
 pub(crate) fn weights(t: f64) -> ([f64; 4], [f64; 3]) {
     let s = 1.0 - t;
     let (t2, s2) = (t * t, s * s);
@@ -175,11 +182,15 @@ impl Interpolate for BSpline {
         let layers = rows.map(|r| {
             let value = wy[0] * r[0].0 + wy[1] * r[1].0 + wy[2] * r[2].0 + wy[3] * r[3].0;
             let gx = wy[0] * r[0].1 + wy[1] * r[1].1 + wy[2] * r[2].1 + wy[3] * r[3].1;
-            let gy = dy[0] * (r[1].0 - r[0].0) + dy[1] * (r[2].0 - r[1].0) + dy[2] * (r[3].0 - r[2].0);
+            let gy =
+                dy[0] * (r[1].0 - r[0].0) + dy[1] * (r[2].0 - r[1].0) + dy[2] * (r[3].0 - r[2].0);
             [value, gx, gy]
         });
         let along = |q: usize| {
-            wz[0] * layers[0][q] + wz[1] * layers[1][q] + wz[2] * layers[2][q] + wz[3] * layers[3][q]
+            wz[0] * layers[0][q]
+                + wz[1] * layers[1][q]
+                + wz[2] * layers[2][q]
+                + wz[3] * layers[3][q]
         };
         let gz = dz[0] * (layers[1][0] - layers[0][0])
             + dz[1] * (layers[2][0] - layers[1][0])
@@ -196,7 +207,8 @@ impl Interpolate for BSpline {
     }
 }
 
-/// The coefficients as four slices of one length, shifted by rows: one bounds check for the four rows of a layer.
+/// The coefficients as four slices of one length, shifted by rows: one bounds check for the four
+/// rows of a layer.
 #[derive(Clone, Copy)]
 pub(crate) struct BSplineRows<'a> {
     rows: [&'a [f32]; 4],
@@ -237,7 +249,8 @@ impl Interpolate16 for BSplineRows<'_> {
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
         let (cells, place) = cells16(simd, at, self.last, self.last_cell);
-        let offsets = cells[0] + cells[1] * (self.stride[0] as i32) + cells[2] * (self.stride[1] as i32);
+        let offsets =
+            cells[0] + cells[1] * (self.stride[0] as i32) + cells[2] * (self.stride[1] as i32);
         let offsets: [i32; LANES] = offsets.into();
         let (wx, dx) = weights16(simd, place[0]);
         let (wy, dy) = weights16(simd, place[1]);
@@ -252,7 +265,8 @@ impl Interpolate16 for BSplineRows<'_> {
         let mut value = [0.0f32; 4 * LANES];
         let mut along_y = [0.0f32; 4 * LANES];
         let mut along_z = [0.0f32; 4 * LANES];
-        // Cut to one length here, where the compiler can see it: then one check is enough for a layer's four rows.
+        // Cut to one length here, where the compiler can see it: then one check is enough for a
+        // layer's four rows.
         let len = self.rows[0].len();
         let rows = [self.rows[0], &self.rows[1][..len], &self.rows[2][..len], &self.rows[3][..len]];
         for l in 0..LANES {
@@ -263,8 +277,11 @@ impl Interpolate16 for BSplineRows<'_> {
             let c3 = layer(simd, &rows, o + 3 * self.stride[1]);
             let (w0, w1) = (f32x8::splat(simd, wz[0][l]), f32x8::splat(simd, wz[1][l]));
             let (w2, w3) = (f32x8::splat(simd, wz[2][l]), f32x8::splat(simd, wz[3][l]));
-            let [d0, d1, d2] =
-                [f32x8::splat(simd, dz[0][l]), f32x8::splat(simd, dz[1][l]), f32x8::splat(simd, dz[2][l])];
+            let [d0, d1, d2] = [
+                f32x8::splat(simd, dz[0][l]),
+                f32x8::splat(simd, dz[1][l]),
+                f32x8::splat(simd, dz[2][l]),
+            ];
             let mut a = [c0[0]; 2];
             let mut az = [c0[0]; 2];
             for h in 0..2 {
@@ -275,8 +292,11 @@ impl Interpolate16 for BSplineRows<'_> {
             let ((z0, z1), (z2, z3)) = (az[0].split(), az[1].split());
             let (w0, w1) = (f32x4::splat(simd, wy[0][l]), f32x4::splat(simd, wy[1][l]));
             let (w2, w3) = (f32x4::splat(simd, wy[2][l]), f32x4::splat(simd, wy[3][l]));
-            let [d0, d1, d2] =
-                [f32x4::splat(simd, dy[0][l]), f32x4::splat(simd, dy[1][l]), f32x4::splat(simd, dy[2][l])];
+            let [d0, d1, d2] = [
+                f32x4::splat(simd, dy[0][l]),
+                f32x4::splat(simd, dy[1][l]),
+                f32x4::splat(simd, dy[2][l]),
+            ];
             let v = w3.mul_add(a3, w2.mul_add(a2, w1.mul_add(a1, w0 * a0)));
             let gy = d2.mul_add(a3 - a2, d1.mul_add(a2 - a1, d0 * (a1 - a0)));
             let gz = w3.mul_add(z3, w2.mul_add(z2, w1.mul_add(z1, w0 * z0)));

@@ -6,8 +6,8 @@
 //! | [`Trilinear`] | C0 | 4 | 1e-2, 4e-4 |
 //! | [`TrilinearGradient`] | C0, gradient C0 | 16 | 2e-3, 4e-4 |
 //!
-//! All work in lattice coordinates: 0 at the first node along each axis, 1 at the next. Points outside the lattice get the value and
-//! the gradient of the nearest point on its surface.
+//! All work in lattice coordinates: 0 at the first node along each axis, 1 at the next. Points
+//! outside the lattice get the value and the gradient of the nearest point on its surface.
 
 mod bspline;
 mod prefilter;
@@ -69,7 +69,8 @@ pub trait Interpolate: Sync {
     fn memory_bytes(&self) -> usize;
 }
 
-/// The kernels: sixteen points in `f32`. Implementors borrow an interpolant's arrays, so that bounds are checked once a point.
+/// The kernels: sixteen points in `f32`. Implementors borrow an interpolant's arrays, so that
+/// bounds are checked once a point.
 pub(crate) trait Interpolate16: Copy + Sync {
     /// Accurate enough for sums over hundreds of samples to be compensated.
     const EXACT: bool;
@@ -85,7 +86,8 @@ pub(crate) fn cell(at: f64, nodes: usize) -> (usize, f64) {
     (i, at - i as f64)
 }
 
-/// [`cell`] along x, y and z for sixteen rays. `last` and `last_cell` are n - 1 and n - 2 along each.
+/// [`cell`] along x, y and z for sixteen rays. `last` and `last_cell` are n - 1 and n - 2 along
+/// each.
 #[inline(always)]
 pub(crate) fn cells16<S: Simd>(
     simd: S,

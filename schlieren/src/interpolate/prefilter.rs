@@ -1,14 +1,16 @@
 //! From values at the nodes to the coefficients of the cubic B-spline through them.
 
-/// Coefficients `c` with `(c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i]`, in place, for the natural spline: second derivatives vanish at both ends, so that
-/// straight lines stay straight. `line[0]` and `line[n+1]` are the coefficients outside; the values come in `line[1..=n]`.
+/// Coefficients `c` with `(c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i]`, in place, for the natural spline:
+/// second derivatives vanish at both ends, so that straight lines stay straight. `line[0]` and
+/// `line[n+1]` are the coefficients outside; the values come in `line[1..=n]`.
 ///
-/// (Mirrored ends, the usual choice for images, would force the gradient to zero at the field's faces.)
+/// (Mirrored ends, the usual choice for images, would force the gradient to zero at the field's
+/// faces.)
 pub(crate) fn prefilter_line(line: &mut [f64]) {
     let n = line.len() - 2;
     debug_assert!(n >= 2, "a line of a field has two nodes or more");
-    // A natural spline's end coefficients are the end values: c'' = 0 there makes (c[-1] + c[1]) / 2 = c[0].
-    // What remains is tridiagonal for c[1..n-1], solved by elimination.
+    // A natural spline's end coefficients are the end values: c'' = 0 there makes (c[-1] + c[1]) /
+    // 2 = c[0]. What remains is tridiagonal for c[1..n-1], solved by elimination.
     let v = &mut line[1..=n];
     if n > 2 {
         // c[i-1] + 4 c[i] + c[i+1] = 6 v[i]

@@ -6,8 +6,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, u64x8};
 use std::borrow::Cow;
 
-/// Trilinear interpolation. Its gradient jumps from cell to cell, so shadowgraphs through it are wrong by most of their contrast;
-/// deflections are right within a few percent.
+/// Trilinear interpolation. Its gradient jumps from cell to cell, so shadowgraphs through it are
+/// wrong by most of their contrast; deflections are right within a few percent.
 #[derive(Debug)]
 pub struct Trilinear<'a> {
     values: Cow<'a, [f32]>,
@@ -17,7 +17,8 @@ pub struct Trilinear<'a> {
 }
 
 impl<'a> Trilinear<'a> {
-    /// Over a field, which is copied only when its rows would compete for the same lines of the cache.
+    /// Over a field, which is copied only when its rows would compete for the same lines of the
+    /// cache.
     pub fn new(field: &'a Field) -> Trilinear<'a> {
         Trilinear::of(Cow::Borrowed(field.eps()), field.dims())
     }
@@ -77,7 +78,11 @@ impl Interpolate for Trilinear<'_> {
         let (dx_low, dx_high) = (da + y * (db - da), dc + y * (dd - dc));
         Sample {
             eps: low + z * (high - low),
-            gradient: [dx_low + z * (dx_high - dx_low), (b - a) + z * ((d - c) - (b - a)), high - low],
+            gradient: [
+                dx_low + z * (dx_high - dx_low),
+                (b - a) + z * ((d - c) - (b - a)),
+                high - low,
+            ],
         }
     }
 
@@ -93,7 +98,8 @@ impl Interpolate for Trilinear<'_> {
     }
 }
 
-/// The lattice as four slices of one length, shifted by a row and a layer: one bounds check is good for all eight taps.
+/// The lattice as four slices of one length, shifted by a row and a layer: one bounds check is good
+/// for all eight taps.
 #[derive(Clone, Copy)]
 pub(crate) struct TrilinearRows<'a> {
     corners: [&'a [f32]; 4],
@@ -118,19 +124,25 @@ impl Interpolate16 for TrilinearRows<'_> {
         // Differences first, so that the gradient is not a difference of interpolated values.
         let [x, y, z] = place;
         let [da, db, dc, dd] = [a1 - a0, b1 - b0, c1 - c0, d1 - d0];
-        let [a, b, c, d] = [x.mul_add(da, a0), x.mul_add(db, b0), x.mul_add(dc, c0), x.mul_add(dd, d0)];
+        let [a, b, c, d] =
+            [x.mul_add(da, a0), x.mul_add(db, b0), x.mul_add(dc, c0), x.mul_add(dd, d0)];
         let [dy_low, dy_high] = [b - a, d - c];
         let [low, high] = [y.mul_add(dy_low, a), y.mul_add(dy_high, c)];
         let [dx_low, dx_high] = [y.mul_add(db - da, da), y.mul_add(dd - dc, dc)];
         let dz = high - low;
         Samples {
             eps: z.mul_add(dz, low),
-            gradient: [z.mul_add(dx_high - dx_low, dx_low), z.mul_add(dy_high - dy_low, dy_low), dz],
+            gradient: [
+                z.mul_add(dx_high - dx_low, dx_low),
+                z.mul_add(dy_high - dy_low, dy_low),
+                dz,
+            ],
         }
     }
 }
 
-/// The two neighbours along x at each of a cell's four edges, for sixteen cells. Each pair is one load of eight bytes.
+/// The two neighbours along x at each of a cell's four edges, for sixteen cells. Each pair is one
+/// load of eight bytes.
 #[inline(always)]
 fn taps<S: Simd>(simd: S, corners: &[&[f32]; 4], offsets: &[i32; LANES]) -> [[f32x16<S>; 2]; 4] {
     // Cut to one length here, where the compiler can see it: then one check is enough for all four.

@@ -1,7 +1,9 @@
-//! Trilinear interpolation of eps and of its central differences at the nodes: what the dissertation keeps in a texture of four floats a voxel.
+//! Trilinear interpolation of eps and of its central differences at the nodes: what the
+//! dissertation keeps in a texture of four floats a voxel.
 
 use super::{
-    Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, transpose, trilinear::padded_row,
+    Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, transpose,
+    trilinear::padded_row,
 };
 use crate::field::Field;
 use fearless_simd::prelude::*;
@@ -73,8 +75,9 @@ impl Interpolate for TrilinearGradient {
         let component = |q: usize| {
             let v = |d: [usize; 3]| {
                 f64::from(
-                    self.nodes
-                        [4 * (i + d[0] + (j + d[1]) * self.stride[0] + (k + d[2]) * self.stride[1]) + q],
+                    self.nodes[4
+                        * (i + d[0] + (j + d[1]) * self.stride[0] + (k + d[2]) * self.stride[1])
+                        + q],
                 )
             };
             let along_x = |dj, dk| (1.0 - x) * v([0, dj, dk]) + x * v([1, dj, dk]);
@@ -111,10 +114,15 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
         let place: [Row; 3] = place.map(Into::into);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
-        // Cut to one length here, where the compiler can see it: then one check is enough for all four.
+        // Cut to one length here, where the compiler can see it: then one check is enough for all
+        // four.
         let len = self.corners[0].len();
-        let corners =
-            [self.corners[0], &self.corners[1][..len], &self.corners[2][..len], &self.corners[3][..len]];
+        let corners = [
+            self.corners[0],
+            &self.corners[1][..len],
+            &self.corners[2][..len],
+            &self.corners[3][..len],
+        ];
         let mut out = [0.0f32; 4 * LANES];
         for l in 0..LANES {
             let o = 4 * offsets[l] as u32 as usize;
@@ -124,7 +132,8 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
             let mut edges = [x; 4];
             for e in 0..4 {
                 let taps = &corners[e][o..o + 8];
-                let (a, b) = (f32x4::from_slice(simd, &taps[..4]), f32x4::from_slice(simd, &taps[4..]));
+                let (a, b) =
+                    (f32x4::from_slice(simd, &taps[..4]), f32x4::from_slice(simd, &taps[4..]));
                 edges[e] = x.mul_add(b - a, a);
             }
             let [a, b, c, d] = edges;

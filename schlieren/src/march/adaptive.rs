@@ -4,7 +4,8 @@ use super::integrator::{Medium, Rate, Ray};
 
 /// DOPRI5 with steps chosen so that the estimated error of each stays below a tolerance.
 ///
-/// The estimate is blind to kinks of an interpolant that a step jumps over: give `longest_step_m` about a voxel for interpolated fields.
+/// The estimate is blind to kinks of an interpolant that a step jumps over: give `longest_step_m`
+/// about a voxel for interpolated fields.
 #[derive(Debug, Clone, Copy)]
 pub struct DormandPrince {
     /// Largest error a step may have: in metres for positions and path, and for w without unit.
@@ -33,11 +34,19 @@ const A: [[f64; 6]; 6] = [
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
 /// Fifth order minus fourth.
-const E: [f64; 7] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
+const E: [f64; 7] = [
+    71.0 / 57600.0,
+    0.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339_200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
 
 impl DormandPrince {
-    /// The ray after `tau_m`. `None` when the steps become too short to move the ray: the medium is singular there.
+    /// The ray after `tau_m`. `None` when the steps become too short to move the ray: the medium is
+    /// singular there.
     pub fn run(&self, medium: &impl Medium, ray: &Ray, tau_m: f64) -> Option<AdaptiveRay> {
         let mut r = *ray;
         let end = ray.tau_m + tau_m;
@@ -52,7 +61,8 @@ impl DormandPrince {
             for s in 0..6 {
                 let terms: [(f64, &Rate); 6] = [0, 1, 2, 3, 4, 5].map(|i| (A[s][i], &k[i]));
                 next = r.after(step, &Rate::sum(&terms[..=s]));
-                // `after` moved tau by the whole step; the stages in between are at fractions of it, whose sum the row of A is.
+                // `after` moved tau by the whole step; the stages in between are at fractions of
+                // it, whose sum the row of A is.
                 let fraction: f64 = A[s][..=s].iter().sum();
                 next.tau_m = r.tau_m + fraction * step;
                 k[s + 1] = next.rate(medium);

@@ -1,13 +1,18 @@
-//! Cell by cell: steps that end on the faces of the lattice's cells, Gauss's rule between them. The reference for interpolated fields.
+//! Cell by cell: steps that end on the faces of the lattice's cells, Gauss's rule between them. The
+//! reference for interpolated fields.
 //!
-//! Between two faces an interpolant is one polynomial; across a face something of it jumps (trilinear: the gradient; trilinear gradients: their slope; the
-//! cubic spline: its third derivative). An integrator that steps over a face has no order there, and an adaptive one does not
-//! notice: its estimate compares two formulas that saw the same few points (`adaptive_estimates_are_fooled_by_kinks`). Here no formula ever sees both sides.
+//! Between two faces an interpolant is one polynomial; across a face something of it jumps
+//! (trilinear: the gradient; trilinear gradients: their slope; the cubic spline: its third
+//! derivative). An integrator that steps over a face has no order there, and an adaptive one does
+//! not notice: its estimate compares two formulas that saw the same few points
+//! (`adaptive_estimates_are_fooled_by_kinks`). Here no formula ever sees both sides.
 //!
-//! Along a straight line a trilinear function is a cubic polynomial and its gradient a quadratic one, so Gauss's rule with two points integrates both without error; the
-//! cubic spline in three variables is of degree 9, which takes five points. Bent rays take the collocation method on three
-//! Gauss points (Kuntzmann and Butcher; Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, table II.7.4): order 6, symmetric, symplectic, and on a
-//! ray that is not bent it is the three-point rule.
+//! Along a straight line a trilinear function is a cubic polynomial and its gradient a quadratic
+//! one, so Gauss's rule with two points integrates both without error; the cubic spline in three
+//! variables is of degree 9, which takes five points. Bent rays take the collocation method on
+//! three Gauss points (Kuntzmann and Butcher; Hairer, Nørsett, Wanner, *Solving Ordinary
+//! Differential Equations I*, table II.7.4): order 6, symmetric, symplectic, and on a ray that is
+//! not bent it is the three-point rule.
 
 use super::integrator::{Integrator, Medium, Rate, Ray};
 use crate::field::Field;
@@ -15,8 +20,10 @@ use glam::DVec3;
 
 /// Splits steps at the faces of a field's cells.
 ///
-/// As an [`Integrator`] it takes steps of any (positive) length; each is split where it crosses faces. A ray in a face belongs to the upper cell, as for the
-/// interpolants. A ray that is drawn into a face from both sides (a ridge of a trilinear eps) zigzags along it in thousands of steps a cell.
+/// As an [`Integrator`] it takes steps of any (positive) length; each is split where it crosses
+/// faces. A ray in a face belongs to the upper cell, as for the interpolants. A ray that is drawn
+/// into a face from both sides (a ridge of a trilinear eps) zigzags along it in thousands of steps
+/// a cell.
 ///
 /// ```
 /// use glam::DVec3;
@@ -57,7 +64,8 @@ pub enum Points {
 impl Points {
     /// Places in 0..1 and weights, whose sum is 1.
     fn rule(self) -> &'static [(f64, f64)] {
-        const TWO: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+        const TWO: [(f64, f64); 2] =
+            [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
         const THREE: [(f64, f64); 3] = [(C[0], B[0]), (C[1], B[1]), (C[2], B[2])];
         const FIVE: [(f64, f64); 5] = [
             (0.046_910_077_030_668_0, 0.118_463_442_528_094_54),
@@ -77,7 +85,8 @@ impl Points {
 /// Integrals along a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineIntegrals {
-    /// Integral of the gradient of eps: across the line it is the deflection to first order, in rad.
+    /// Integral of the gradient of eps: across the line it is the deflection to first order, in
+    /// rad.
     pub slope: DVec3,
     /// Integral of eps: the optical path difference to first order, divided by n0.
     pub path_m: f64,
@@ -95,7 +104,8 @@ const A: [[f64; 3]; 3] = [
     [5.0 / 36.0 + ROOT_15 / 30.0, 2.0 / 9.0 + ROOT_15 / 15.0, 5.0 / 36.0],
 ];
 
-/// A ray this close to a face, in cells, is on it. Rounding of coordinates in the thousands is a thousandth of it.
+/// A ray this close to a face, in cells, is on it. Rounding of coordinates in the thousands is a
+/// thousandth of it.
 const ON_FACE: f64 = 1e-10;
 /// How far a step may end beyond a face, in cells.
 const BEYOND: f64 = 1e-11;
@@ -115,7 +125,8 @@ impl CellExact {
         (at_m - self.origin_m) / self.spacing_m
     }
 
-    /// Integrals along a line from `start_m` in `direction` (of length one) over `length_m`, with Gauss's rule between every two faces.
+    /// Integrals along a line from `start_m` in `direction` (of length one) over `length_m`, with
+    /// Gauss's rule between every two faces.
     pub fn line_of_sight(
         &self,
         medium: &impl Medium,
@@ -146,7 +157,8 @@ impl CellExact {
             }
             out.pieces += 1;
             for (place, weight) in points.rule() {
-                let (eps, gradient) = medium.sample(start_m + direction * (pair[0] + place * piece_m));
+                let (eps, gradient) =
+                    medium.sample(start_m + direction * (pair[0] + place * piece_m));
                 out.path_m += eps * (weight * piece_m);
                 out.slope += gradient * (weight * piece_m);
             }
@@ -154,12 +166,16 @@ impl CellExact {
         out
     }
 
-    /// The cell that a ray is in, or enters when it is on a face, as its lowest and highest coordinates. Infinite outside the lattice, where values are continued.
+    /// The cell that a ray is in, or enters when it is on a face, as its lowest and highest
+    /// coordinates. Infinite outside the lattice, where values are continued.
     fn cell(&self, at: DVec3, rate: DVec3) -> [DVec3; 2] {
         let (mut low, mut high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
         for c in 0..3 {
-            let below =
-                if rate[c] < 0.0 { (at[c] - ON_FACE).ceil() - 1.0 } else { (at[c] + ON_FACE).floor() };
+            let below = if rate[c] < 0.0 {
+                (at[c] - ON_FACE).ceil() - 1.0
+            } else {
+                (at[c] + ON_FACE).floor()
+            };
             if below >= 0.0 {
                 low[c] = below.min(self.last[c]);
             }
@@ -171,8 +187,9 @@ impl CellExact {
     }
 }
 
-/// A medium as one cell has it: beyond its faces the values on them. Without this the stages of a step that is still too long would see the next cell, and where the
-/// two pull apart the equations would have no solution at all.
+/// A medium as one cell has it: beyond its faces the values on them. Without this the stages of a
+/// step that is still too long would see the next cell, and where the two pull apart the equations
+/// would have no solution at all.
 struct ClampedMedium<'a, M> {
     medium: &'a M,
     low_m: DVec3,
@@ -193,18 +210,21 @@ fn outside([low, high]: [DVec3; 2], at: DVec3) -> (f64, usize) {
     (by[axis], axis)
 }
 
-/// One step of the collocation method, its three equations solved by iteration: the gas is so thin, or the cell so small, that each round gains digits.
+/// One step of the collocation method, its three equations solved by iteration: the gas is so thin,
+/// or the cell so small, that each round gains digits.
 fn collocation(medium: &impl Medium, ray: &Ray, step_m: f64) -> Ray {
     const ROUNDS: u32 = 16;
     let stage = |i: usize, k: &[Rate; 3]| {
-        let mut at = ray.after(step_m, &Rate::sum(&[(A[i][0], &k[0]), (A[i][1], &k[1]), (A[i][2], &k[2])]));
+        let mut at =
+            ray.after(step_m, &Rate::sum(&[(A[i][0], &k[0]), (A[i][1], &k[1]), (A[i][2], &k[2])]));
         at.tau_m = ray.tau_m + C[i] * step_m;
         at.rate(medium)
     };
     let mut k = [Rate { xi: ray.u, u: DVec3::ZERO, excess: 0.0 }; 3];
     for _ in 0..ROUNDS {
         let next = [0, 1, 2].map(|i| stage(i, &k));
-        let change = |i: usize| (next[i].xi - k[i].xi).length() + (next[i].u - k[i].u).length() * step_m;
+        let change =
+            |i: usize| (next[i].xi - k[i].xi).length() + (next[i].u - k[i].u).length() * step_m;
         let size = |i: usize| next[i].xi.length() + next[i].u.length() * step_m;
         let done = (0..3).all(|i| change(i) <= 1e-16 * size(i));
         k = next;
@@ -225,7 +245,8 @@ impl Integrator for CellExact {
         let end_m = ray.tau_m + dtau_m;
         let least_m = 1e-9 * self.spacing_m.min_element();
         let mut r = *ray;
-        // The number of pieces is bounded by the least step; this bound is for media that are no numbers.
+        // The number of pieces is bounded by the least step; this bound is for media that are no
+        // numbers.
         for _ in 0..1_000_000 {
             let left_m = end_m - r.tau_m;
             if left_m.is_nan() || left_m <= 0.0 {
@@ -238,12 +259,14 @@ impl Integrator for CellExact {
                 low_m: self.origin_m + (cell[0] + BEYOND) * self.spacing_m,
                 high_m: self.origin_m + (cell[1] - BEYOND) * self.spacing_m,
             };
-            // Where a straight ray leaves the cell. A bent one may fall a little short of it, and the next step makes up for that.
+            // Where a straight ray leaves the cell. A bent one may fall a little short of it, and
+            // the next step makes up for that.
             let to_face = |c: usize| {
                 let face = if rate[c] > 0.0 { cell[1][c] } else { cell[0][c] };
                 if rate[c] == 0.0 { f64::INFINITY } else { (face - at[c]) / rate[c] }
             };
-            let mut step_m = to_face(0).min(to_face(1)).min(to_face(2)).clamp(least_m, left_m.max(least_m));
+            let mut step_m =
+                to_face(0).min(to_face(1)).min(to_face(2)).clamp(least_m, left_m.max(least_m));
             let mut next = collocation(&inside, &r, step_m);
             // Or go beyond it: shorter, by the rate at which it leaves.
             for _ in 0..60 {

@@ -1,9 +1,12 @@
-//! Marching deviations in `f32`, sixteen rays at a time: Verlet for gases, Euler to compare with the dissertation.
+//! Marching deviations in `f32`, sixteen rays at a time: Verlet for gases, Euler to compare with
+//! the dissertation.
 
 use super::field_cache::FieldCache;
 use super::frame::{BlankCells, Frame};
 use super::kernel_ray::{KernelOutput, KernelRay};
-use super::packet::{FeatureSet, KernelFeatures, Nodes, Packet, PacketConstants, Skip, Steps, Work, march};
+use super::packet::{
+    FeatureSet, KernelFeatures, Nodes, Packet, PacketConstants, Skip, Steps, Work, march,
+};
 use crate::at_level;
 use crate::field::Field;
 use crate::interpolate::{
@@ -22,7 +25,8 @@ pub enum Scheme {
     /// Position Verlet: second order, symplectic, one sample a step. The default.
     #[default]
     Verlet,
-    /// Explicit Euler, first order: equations 5.7 and 5.8 of the dissertation, without its loss of digits.
+    /// Explicit Euler, first order: equations 5.7 and 5.8 of the dissertation, without its loss of
+    /// digits.
     Euler,
 }
 
@@ -31,17 +35,20 @@ pub enum Scheme {
 pub struct Options {
     /// How deviations are stepped.
     pub scheme: Scheme,
-    /// Longest step, in lattice steps. 1 is right for nearly all fields: below it, the interpolant decides the error.
+    /// Longest step, in lattice steps. 1 is right for nearly all fields: below it, the interpolant
+    /// decides the error.
     pub step_voxels: f64,
     /// What to compute beside deflection and displacement.
     pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
-    /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up to less than this. Zero: leave out nothing, and no
-    /// ray's exit depends on any other ray. With it, rays that are in flight together leave out the same, so that they agree with the same rays traced
-    /// in another order within twice this bound.
+    /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up
+    /// to less than this. Zero: leave out nothing, and no ray's exit depends on any other ray. With
+    /// it, rays that are in flight together leave out the same, so that they agree with the same
+    /// rays traced in another order within twice this bound.
     pub skip_rad: f64,
-    /// The largest error of the optical path difference that leaving out one stretch of eight steps may cost, when that is wanted.
+    /// The largest error of the optical path difference that leaving out one stretch of eight steps
+    /// may cost, when that is wanted.
     pub skip_opd_m: f64,
 }
 
@@ -69,7 +76,8 @@ pub struct Counters {
     pub ray_steps: u64,
     /// Ray-steps that were left out.
     pub ray_steps_skipped: u64,
-    /// The largest bound on what skipping left out of any ray's deflection, in 1e-15 rad, rounded up.
+    /// The largest bound on what skipping left out of any ray's deflection, in 1e-15 rad, rounded
+    /// up.
     pub skipped_femtorad: u64,
 }
 
@@ -96,7 +104,12 @@ pub struct Deviational<'a> {
 
 impl<'a> Deviational<'a> {
     /// Prepares the interpolant, and bricks if some may be skipped.
-    pub fn new(field: &'a Field, view: View, interpolant: Interpolant, options: Options) -> Deviational<'a> {
+    pub fn new(
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: Options,
+    ) -> Deviational<'a> {
         Self::with_level(field, view, interpolant, options, Level::new())
     }
 
@@ -156,7 +169,8 @@ impl<'a> Deviational<'a> {
                 (FieldInterpolant::TrilinearGradient(TrilinearGradient::new(field)), None)
             }
         };
-        let bricks = (options.skip_rad > 0.0).then(|| Bricks::new(field, &of_bricks.unwrap_or_else(spline)));
+        let bricks =
+            (options.skip_rad > 0.0).then(|| Bricks::new(field, &of_bricks.unwrap_or_else(spline)));
         Deviational {
             field,
             frame: Frame::new(field, view),
@@ -210,7 +224,13 @@ impl<'a> Deviational<'a> {
 
     /// Picks the kernel with only the effects that this march needs.
     #[inline(always)]
-    fn run<S: Simd, I: Interpolate16>(&self, simd: S, field: I, starts: &[Start], exits: &mut [Exit]) {
+    fn run<S: Simd, I: Interpolate16>(
+        &self,
+        simd: S,
+        field: I,
+        starts: &[Start],
+        exits: &mut [Exit],
+    ) {
         let plain = self.field.nodes().is_none() && self.bricks.is_none();
         match (self.options.scheme, plain) {
             (Scheme::Verlet, true) if self.options.wanted.opd => {
@@ -219,11 +239,14 @@ impl<'a> Deviational<'a> {
             (Scheme::Verlet, true) => {
                 self.all(simd, field, starts, exits, FeatureSet::<false, false, false, false>)
             }
-            // Three kernels an interpolant and instruction set, not twelve: each is a second of compiling. The path costs a tenth of a step.
+            // Three kernels an interpolant and instruction set, not twelve: each is a second of
+            // compiling. The path costs a tenth of a step.
             (Scheme::Verlet, false) => {
                 self.all(simd, field, starts, exits, FeatureSet::<true, true, true, false>)
             }
-            (Scheme::Euler, _) => self.all(simd, field, starts, exits, FeatureSet::<true, true, false, true>),
+            (Scheme::Euler, _) => {
+                self.all(simd, field, starts, exits, FeatureSet::<true, true, false, true>)
+            }
         }
     }
 
@@ -262,7 +285,9 @@ impl<'a> Deviational<'a> {
         let mut work = Work::default();
         let mut in_field = 0;
         let mut skipped_rad = 0.0f32;
-        for (starts, exits) in starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES)) {
+        for (starts, exits) in
+            starts.chunks(IN_FLIGHT * LANES).zip(exits.chunks_mut(IN_FLIGHT * LANES))
+        {
             let mut packets = [const { Packet::EMPTY }; IN_FLIGHT];
             let mut rays = [KernelRay::default(); IN_FLIGHT * LANES];
             for (ray, start) in rays.iter_mut().zip(starts) {
@@ -306,7 +331,8 @@ impl<'a> Deviational<'a> {
         self.rays_in_field.fetch_add(in_field, Ordering::Relaxed);
         self.sampled.fetch_add(work.sampled, Ordering::Relaxed);
         self.skipped.fetch_add(work.skipped, Ordering::Relaxed);
-        self.skipped_femtorad.fetch_max((f64::from(skipped_rad) * 1e15).ceil() as u64, Ordering::Relaxed);
+        self.skipped_femtorad
+            .fetch_max((f64::from(skipped_rad) * 1e15).ceil() as u64, Ordering::Relaxed);
     }
 }
 
@@ -345,7 +371,8 @@ impl LightPaths for Deviational<'_> {
         let bricks = self.bricks.as_ref()?;
         let c = self.counters();
         Some(SkipReport {
-            steps_part: c.ray_steps_skipped as f64 / (c.ray_steps + c.ray_steps_skipped).max(1) as f64,
+            steps_part: c.ray_steps_skipped as f64
+                / (c.ray_steps + c.ray_steps_skipped).max(1) as f64,
             bound_rad: c.skipped_femtorad as f64 * 1e-15,
             bricks_bytes: bricks.memory_bytes(),
             bricks_secs: bricks.build_time().as_secs_f64(),

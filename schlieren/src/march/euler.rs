@@ -2,7 +2,8 @@
 
 use super::integrator::{Integrator, Medium, Ray};
 
-/// Position and rate both from the values at the step's start. First order; it gains energy, and blows up in a light guide.
+/// Position and rate both from the values at the step's start. First order; it gains energy, and
+/// blows up in a light guide.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Euler;
 

@@ -87,12 +87,13 @@ mod tests {
     use glam::DVec3;
     use std::time::Duration;
 
-    /// Several pictures of one field can be rayon jobs of one pool. A worker that waits inside rayon for a
-    /// part of what it makes may take another of them, which asks for the same.
+    /// Several pictures of one field can be rayon jobs of one pool. A worker that waits inside
+    /// rayon for a part of what it makes may take another of them, which asks for the same.
     #[test]
     fn jobs_of_one_pool_that_ask_for_the_same_do_not_wait_for_themselves() {
         let eps = |p: DVec3| 1e-4 * (-p.length_squared() / 0.02).exp();
-        let field = Arc::new(Field::from_fn([96; 3], [0.01; 3], DVec3::splat(-0.5), 1.0, eps).unwrap());
+        let field =
+            Arc::new(Field::from_fn([96; 3], [0.01; 3], DVec3::splat(-0.5), 1.0, eps).unwrap());
         let view = View::new(DVec3::new(0.3, 0.1, 1.0), DVec3::Y, DVec3::ZERO).unwrap();
         let view = [view, View::along(Axis::X, DVec3::ZERO)];
         for what in 0..4 {
@@ -123,7 +124,8 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_made_once_and_projections_are_few() {
-        let field = Field::from_fn([8; 3], [0.1; 3], DVec3::ZERO, 1.0, |p| 1e-4 * p.x * p.y).unwrap();
+        let field =
+            Field::from_fn([8; 3], [0.1; 3], DVec3::ZERO, 1.0, |p| 1e-4 * p.x * p.y).unwrap();
         let cache = FieldCache::default();
         let of = |axis| Projection {
             view: View::along(axis, field.centre_m()),
@@ -139,6 +141,9 @@ mod tests {
         assert!(Arc::ptr_eq(&x, &cache.line_of_sight(&field, of(Axis::X))));
         cache.line_of_sight(&field, of(Axis::Z));
         assert_eq!(cache.projections.lock().unwrap().len(), PROJECTIONS);
-        assert!(!Arc::ptr_eq(&x, &cache.line_of_sight(&field, of(Axis::X))), "the oldest goes first");
+        assert!(
+            !Arc::ptr_eq(&x, &cache.line_of_sight(&field, of(Axis::X))),
+            "the oldest goes first"
+        );
     }
 }

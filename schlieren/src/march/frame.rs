@@ -11,7 +11,8 @@ pub enum BlankCells {
     /// It stops: the picture is dark there.
     #[default]
     Opaque,
-    /// It goes on through values continued from the gas around them. Exits still say [`Status::Masked`].
+    /// It goes on through values continued from the gas around them. Exits still say
+    /// [`Status::Masked`].
     Continued,
 }
 
@@ -35,7 +36,8 @@ pub(crate) struct Frame {
     pub(crate) last: DVec3,
     /// The view's centre in lattice coordinates.
     centre: DVec3,
-    /// Length unit of the kernels: a power of two near the largest spacing, so that fields of any size use the same numbers.
+    /// Length unit of the kernels: a power of two near the largest spacing, so that fields of any
+    /// size use the same numbers.
     pub(crate) unit_m: f64,
 }
 
@@ -65,7 +67,8 @@ impl Frame {
         }
     }
 
-    /// The ray of a start. `known` is a beam computed before, with its tilt: neighbours mostly share it.
+    /// The ray of a start. `known` is a beam computed before, with its tilt: neighbours mostly
+    /// share it.
     pub(crate) fn undisturbed(
         &self,
         start: &Start,
@@ -91,7 +94,8 @@ impl Frame {
     }
 }
 
-/// The part of the line `at + s direction` in the box from 0 to `last`, faces included: `[s, s]` when there is none. Directions may have zeros.
+/// The part of the line `at + s direction` in the box from 0 to `last`, faces included: `[s, s]`
+/// when there is none. Directions may have zeros.
 pub(crate) fn clip(at: DVec3, direction: DVec3, last: DVec3) -> [f64; 2] {
     let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
     for c in 0..3 {

@@ -17,7 +17,8 @@ pub struct FullOptions {
     pub wanted: PathQuantities,
     /// What becomes of light in cells without data.
     pub blank: BlankCells,
-    /// A ray that is still inside after this many times the steps that the undisturbed ray needs is given up as [`Status::Turned`].
+    /// A ray that is still inside after this many times the steps that the undisturbed ray needs is
+    /// given up as [`Status::Turned`].
     pub patience: u32,
 }
 
@@ -34,8 +35,9 @@ impl Default for FullOptions {
 
 /// Light paths in `f64`, one ray at a time.
 ///
-/// Rays are marched until they pass the plane through the undisturbed ray's exit, or leave the field elsewhere; from there they go straight on to that plane.
-/// Those that never reach it (they left backwards, or stay inside) are [`Status::Turned`].
+/// Rays are marched until they pass the plane through the undisturbed ray's exit, or leave the
+/// field elsewhere; from there they go straight on to that plane. Those that never reach it (they
+/// left backwards, or stay inside) are [`Status::Turned`].
 pub struct Full<'a, I: Interpolate, G: Integrator> {
     field: &'a Field,
     interpolate: &'a I,
@@ -60,7 +62,10 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let ray = self.frame.undisturbed(start, known);
         let [near_m, far_m] = ray.range_m;
         if near_m >= far_m {
-            return Exit { opd_m: if self.options.wanted.opd { 0.0 } else { f32::NAN }, ..Exit::UNDISTURBED };
+            return Exit {
+                opd_m: if self.options.wanted.opd { 0.0 } else { f32::NAN },
+                ..Exit::UNDISTURBED
+            };
         }
         let medium = InterpolatedMedium::new(self.field, self.interpolate);
         let [right, up, direction] = ray.beam;
@@ -72,7 +77,8 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let steps = (length_m * speed / self.options.step_voxels).ceil().max(1.0);
         let dtau_m = length_m / steps;
 
-        // Outside: beyond the exit plane, or a voxel beyond a face, so that rays along a face stay in.
+        // Outside: beyond the exit plane, or a voxel beyond a face, so that rays along a face stay
+        // in.
         let mut met = 0;
         let margin = 1.0;
         let smallest_m = self.frame.spacing_m.min_element();
@@ -88,7 +94,8 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
                 // Step by step, looking at the nearest node.
                 let d = self.field.dims();
                 let stops = |kind: u8| {
-                    kind == Node::Solid as u8 || (kind != 0 && self.options.blank == BlankCells::Opaque)
+                    kind == Node::Solid as u8
+                        || (kind != 0 && self.options.blank == BlankCells::Opaque)
                 };
                 let look = |r: &Ray| {
                     let p = lattice(r).clamp(DVec3::ZERO, self.frame.last).round().as_usizevec3();

@@ -1,6 +1,7 @@
 //! The reference in `f64`: one ray at a time, any integrator, any medium.
 //!
-//! As in the kernels, a ray is a deviation: position = start + direction tau + xi, rate = direction + u, both deviations zero at the start.
+//! As in the kernels, a ray is a deviation: position = start + direction tau + xi, rate = direction
+//! + u, both deviations zero at the start.
 
 use crate::field::Field;
 use crate::interpolate::Interpolate;
@@ -12,7 +13,8 @@ pub trait Medium: Sync {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3);
 }
 
-/// An interpolated field as a medium. Outside the field it continues the values of the nearest point on its surface.
+/// An interpolated field as a medium. Outside the field it continues the values of the nearest
+/// point on its surface.
 pub struct InterpolatedMedium<'a, I: Interpolate + ?Sized> {
     interpolate: &'a I,
     origin_m: DVec3,
@@ -153,8 +155,9 @@ pub trait Integrator: Sync {
         (0..steps).fold(*ray, |r, _| self.step(medium, &r, dtau_m))
     }
 
-    /// Steps of `dtau_m` until `outside` of the ray is no longer negative, and the ray where it becomes zero: the last step is shortened until it ends
-    /// there. `None` when that does not happen in `limit` steps.
+    /// Steps of `dtau_m` until `outside` of the ray is no longer negative, and the ray where it
+    /// becomes zero: the last step is shortened until it ends there. `None` when that does not
+    /// happen in `limit` steps.
     fn run_until(
         &self,
         medium: &impl Medium,

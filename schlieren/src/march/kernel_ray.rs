@@ -1,4 +1,5 @@
-//! A ray's way into a kernel and out of it, in `f64`: the same for the kernels of the CPU and of the GPU.
+//! A ray's way into a kernel and out of it, in `f64`: the same for the kernels of the CPU and of
+//! the GPU.
 
 use super::frame::{BlankCells, Frame};
 use crate::path::{Exit, Start};
@@ -16,15 +17,16 @@ pub(crate) struct KernelRay {
     rest: DVec3,
     /// From entry to exit in lattice coordinates.
     chord: DVec3,
-    /// What rounding the step to f32 did to it: every step of a ray is wrong by the same factor, and that is put right at the end.
+    /// What rounding the step to f32 did to it: every step of a ray is wrong by the same factor,
+    /// and that is put right at the end.
     scale: f64,
 }
 
 /// What a kernel gets of a ray. Lengths are in units of [`Frame::unit_m`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct KernelInput {
-    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions are counted from there because that halves
-    /// the largest product, and with it the rounding.
+    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions
+    /// are counted from there because that halves the largest product, and with it the rounding.
     pub(crate) middle: [f32; 3],
     /// What rounding `middle` to f32 left out: the deviation's start, taken off again at the end.
     pub(crate) xi: [f32; 3],
@@ -51,7 +53,11 @@ pub(crate) struct KernelOutput {
 
 impl KernelRay {
     /// The undisturbed ray of a start. `known` is as for [`Frame::undisturbed`].
-    pub(crate) fn new(frame: &Frame, start: &Start, known: &mut Option<([f32; 2], [DVec3; 3])>) -> KernelRay {
+    pub(crate) fn new(
+        frame: &Frame,
+        start: &Start,
+        known: &mut Option<([f32; 2], [DVec3; 3])>,
+    ) -> KernelRay {
         let ray = frame.undisturbed(start, known);
         let length_m = ray.range_m[1] - ray.range_m[0];
         KernelRay {
@@ -65,7 +71,8 @@ impl KernelRay {
         }
     }
 
-    /// Distances along the ray, from where it crosses the centre plane, to where it enters and leaves the field.
+    /// Distances along the ray, from where it crosses the centre plane, to where it enters and
+    /// leaves the field.
     pub(crate) fn range_m(&self) -> [f64; 2] {
         [self.exit_depth_m - self.length_m, self.exit_depth_m]
     }
@@ -75,7 +82,8 @@ impl KernelRay {
         self.length_m > 0.0
     }
 
-    /// Steps that a ray needs; none when it misses the field. Of every ray by itself: its exit must not depend on its neighbours.
+    /// Steps that a ray needs; none when it misses the field. Of every ray by itself: its exit must
+    /// not depend on its neighbours.
     pub(crate) fn steps(&self, step_voxels: f64) -> u32 {
         if self.meets_field() { steps_of(self.chord.length() / step_voxels).max(1) } else { 0 }
     }
@@ -98,12 +106,19 @@ impl KernelRay {
     }
 
     /// What the kernel left, as an exit.
-    pub(crate) fn exit(&self, frame: &Frame, n0: f64, blank: BlankCells, output: &KernelOutput) -> Exit {
+    pub(crate) fn exit(
+        &self,
+        frame: &Frame,
+        n0: f64,
+        blank: BlankCells,
+        output: &KernelOutput,
+    ) -> Exit {
         let [right, up, _] = self.beam;
         let h = frame.spacing_m / frame.unit_m;
         let u = DVec3::from([0, 1, 2].map(|c| f64::from(output.v[c]) * h[c])) * self.scale;
         let xi = if self.meets_field() {
-            let xi = [0, 1, 2].map(|c| (f64::from(output.xi[c]) - f64::from(self.rest[c] as f32)) * h[c]);
+            let xi = [0, 1, 2]
+                .map(|c| (f64::from(output.xi[c]) - f64::from(self.rest[c] as f32)) * h[c]);
             DVec3::from(xi) * (self.scale * self.scale * frame.unit_m)
         } else {
             DVec3::ZERO

@@ -1,8 +1,10 @@
-//! Straight rays: the field is projected along the light once, and every photon reads deflection and path off a two-dimensional spline.
+//! Straight rays: the field is projected along the light once, and every photon reads deflection
+//! and path off a two-dimensional spline.
 //!
-//! Linear in eps, and right as long as a ray stays within a small part of the field's finest structure: its relative error is of the order of
-//! eps times (size of the field / size of the structure). The light is taken as deflected in the plane through the view's centre, and the
-//! tilt of an extended source's beams shifts nothing.
+//! Linear in eps, and right as long as a ray stays within a small part of the field's finest
+//! structure: its relative error is of the order of eps times (size of the field / size of the
+//! structure). The light is taken as deflected in the plane through the view's centre, and the tilt
+//! of an extended source's beams shifts nothing.
 
 use super::frame::{BlankCells, Frame, clip};
 use crate::at_level;
@@ -37,19 +39,22 @@ struct Map {
     /// Nodes along right and up.
     dims: [usize; 2],
     row: usize,
-    /// Map coordinate of the view's centre, and map steps per metre (negative where the lattice runs the other way).
+    /// Map coordinate of the view's centre, and map steps per metre (negative where the lattice
+    /// runs the other way).
     centre: [f64; 2],
     per_m: [f64; 2],
-    /// Coefficients of the deflection along right and up, where it is not the slope of the first. Obliquely the way through the field's
-    /// box changes from ray to ray, and that slope would be the deflection of a prism of the box's shape.
+    /// Coefficients of the deflection along right and up, where it is not the slope of the first.
+    /// Obliquely the way through the field's box changes from ray to ray, and that slope would be
+    /// the deflection of a prism of the box's shape.
     slopes: Option<[Vec<f32>; 2]>,
     /// The worst [`Node`] on the way, by nearest map node.
     kinds: Option<Vec<u8>>,
 }
 
 impl LineOfSight {
-    /// Projects a field along a view, in parallel. Along an axis of the field the projection is the exact integral of the cubic B-spline through the
-    /// nodes (and takes milliseconds); other directions are integrated with the given interpolant, a step a voxel.
+    /// Projects a field along a view, in parallel. Along an axis of the field the projection is the
+    /// exact integral of the cubic B-spline through the nodes (and takes milliseconds); other
+    /// directions are integrated with the given interpolant, a step a voxel.
     pub fn new(
         field: &Field,
         view: View,
@@ -73,16 +78,23 @@ impl LineOfSight {
         let axes = [view.right, view.up, view.forward].map(lattice_axis);
         let (map, exit_depth_m) = if let [Some(right), Some(up), Some(forward)] = axes {
             let centre = (view.centre_m - field.origin_m()) / frame.spacing_m;
-            let far =
-                if forward.1 > 0.0 { frame.last[forward.0] - centre[forward.0] } else { centre[forward.0] };
-            (project_along_axis(field, centre, right, up, forward.0), Some(far * frame.spacing_m[forward.0]))
+            let far = if forward.1 > 0.0 {
+                frame.last[forward.0] - centre[forward.0]
+            } else {
+                centre[forward.0]
+            };
+            (
+                project_along_axis(field, centre, right, up, forward.0),
+                Some(far * frame.spacing_m[forward.0]),
+            )
         } else {
             let map = match interpolant {
                 Interpolant::BSpline => {
                     let s = BSpline::new(field);
                     project_obliquely(field, &frame, s.rows(), level)
                 }
-                // Line of sight is linear in eps, so there is nothing that gradients at the nodes could add.
+                // Line of sight is linear in eps, so there is nothing that gradients at the nodes
+                // could add.
                 Interpolant::Trilinear | Interpolant::TrilinearGradient => {
                     let s = Trilinear::new(field);
                     debug_assert_eq!(s.dims(), field.dims());
@@ -113,14 +125,20 @@ impl LineOfSight {
         let straight = Start { tilt_rad: [0.0; 2], ..*start };
         let ray = self.frame.undisturbed(
             &straight,
-            &mut Some(([0.0; 2], [self.frame.view.right, self.frame.view.up, self.frame.view.forward])),
+            &mut Some((
+                [0.0; 2],
+                [self.frame.view.right, self.frame.view.up, self.frame.view.forward],
+            )),
         );
         (ray.range_m[1] > ray.range_m[0]).then_some(ray.range_m[1])
     }
 
     fn exit(&self, start: &Start, map: [f32; 2], path_m: f32, slope: [f32; 2]) -> Exit {
         let Some(depth_m) = self.exit_depth_m(start, map) else {
-            return Exit { opd_m: if self.wanted.opd { 0.0 } else { f32::NAN }, ..Exit::UNDISTURBED };
+            return Exit {
+                opd_m: if self.wanted.opd { 0.0 } else { f32::NAN },
+                ..Exit::UNDISTURBED
+            };
         };
         let met = self.map.kinds.as_ref().map_or(0, |k| {
             let near = |c: usize| (map[c] + 0.5).clamp(0.0, (self.map.dims[c] - 1) as f32) as usize;
@@ -150,7 +168,8 @@ impl LineOfSight {
                     let mut at = [[0.0f32; LANES]; 2];
                     for (l, s) in starts.iter().enumerate() {
                         for c in 0..2 {
-                            at[c][l] = (m.centre[c] + f64::from(s.position_m[c]) * m.per_m[c]) as f32;
+                            at[c][l] =
+                                (m.centre[c] + f64::from(s.position_m[c]) * m.per_m[c]) as f32;
                         }
                     }
                     let [path, mut along_s, mut along_t] = spline2(simd, rows, m.dims, m.row, &at);
@@ -180,7 +199,13 @@ fn four_rows(coefficients: &[f32], row: usize) -> [&[f32]; 4] {
 
 /// Value and derivatives of a two-dimensional spline at sixteen points.
 #[inline(always)]
-fn spline2<S: Simd>(simd: S, rows: [&[f32]; 4], dims: [usize; 2], row: usize, at: &[Row; 2]) -> [Row; 3] {
+fn spline2<S: Simd>(
+    simd: S,
+    rows: [&[f32]; 4],
+    dims: [usize; 2],
+    row: usize,
+    at: &[Row; 2],
+) -> [Row; 3] {
     let mut cells = [i32x16::splat(simd, 0); 2];
     let mut place = [f32x16::splat(simd, 0.0); 2];
     for c in 0..2 {
@@ -231,7 +256,8 @@ fn lattice_axis(d: DVec3) -> Option<(usize, f64)> {
     (0..3).all(|o| o == c || a[o] == 0.0).then_some((c, a[c]))
 }
 
-/// Weights of a line's values in the integral of the natural spline through them, in steps: 1 inside, less near the ends.
+/// Weights of a line's values in the integral of the natural spline through them, in steps: 1
+/// inside, less near the ends.
 fn integral_weights(n: usize) -> Vec<f64> {
     // Integrals of the coefficients' basis functions between the first and the last node.
     let basis = |i: usize| {
@@ -288,7 +314,10 @@ fn project_along_axis(
         kinds.par_chunks_exact_mut(nf).enumerate().for_each(|(s, out)| {
             for (f, worst) in out.iter_mut().enumerate() {
                 let o = f * stride[fast] + s * stride[slow];
-                *worst = (0..dims3[forward]).map(|k| nodes[o + k * stride[forward]] as u8).max().unwrap_or(0);
+                *worst = (0..dims3[forward])
+                    .map(|k| nodes[o + k * stride[forward]] as u8)
+                    .max()
+                    .unwrap_or(0);
             }
         });
     }
@@ -319,11 +348,13 @@ fn transposed<T: Copy>(a: &[T], row: usize) -> Vec<T> {
 
 fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, level: Level) -> Map {
     let view = &frame.view;
-    // The smallest rectangle in the picture that holds the field, with nodes as close as the field's.
+    // The smallest rectangle in the picture that holds the field, with nodes as close as the
+    // field's.
     let step_m = frame.spacing_m.min_element();
     let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for corner in 0..8 {
-        let c = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
+        let c =
+            DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
         let from_centre = field.origin_m() + c * field.size_m() - view.centre_m;
         for (a, axis) in [view.right, view.up].into_iter().enumerate() {
             lo[a] = lo[a].min(from_centre.dot(axis));
@@ -360,7 +391,8 @@ fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, le
     }
 }
 
-/// Integrals of eps (in metres) and of its gradient along right and up, along the rays through a row of map nodes.
+/// Integrals of eps (in metres) and of its gradient along right and up, along the rays through a
+/// row of map nodes.
 #[inline(never)]
 fn integrate_row<S: Simd, I: Interpolate16>(
     simd: S,
@@ -387,7 +419,8 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                 let mut longest_m = 0.0f64;
                 for l in 0..sums.len() {
                     let x = first_m[0] + (block * LANES + l) as f64 * step_m;
-                    let at = origin + (frame.view.right * x + frame.view.up * first_m[1]) / frame.spacing_m;
+                    let at = origin
+                        + (frame.view.right * x + frame.view.up * first_m[1]) / frame.spacing_m;
                     let [near, far] = clip(at, direction, frame.last);
                     length_m[l] = far - near;
                     longest_m = longest_m.max(far - near);
@@ -406,7 +439,8 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                 let mut total = [[0.0f64; LANES]; 4];
                 let mut k = 0;
                 while k < steps {
-                    // A few steps in f32, blocks of them in f64: the sum's rounding does not grow with the path.
+                    // A few steps in f32, blocks of them in f64: the sum's rounding does not grow
+                    // with the path.
                     let mut some = [f32x16::splat(simd, 0.0); 4];
                     let end = (k + 16).min(steps);
                     while k < end {
@@ -426,9 +460,10 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                         if let (Some(nodes), false) = (field.nodes(), kinds.is_empty()) {
                             let p: [Row; 3] = [at[0].into(), at[1].into(), at[2].into()];
                             for l in 0..sums.len() {
-                                let near =
-                                    [0, 1, 2].map(|c| ((p[c][l] + 0.5).max(0.0) as usize).min(dims[c] - 1));
-                                let kind = nodes[near[0] + (near[1] + near[2] * dims[1]) * dims[0]] as u8;
+                                let near = [0, 1, 2]
+                                    .map(|c| ((p[c][l] + 0.5).max(0.0) as usize).min(dims[c] - 1));
+                                let kind =
+                                    nodes[near[0] + (near[1] + near[2] * dims[1]) * dims[0]] as u8;
                                 if length_m[l] > 0.0 {
                                     let worst = &mut kinds[block * LANES + l];
                                     *worst = (*worst).max(kind);
@@ -472,7 +507,8 @@ fn prefilter_map(values: &[f64], [nu, nv]: [usize; 2]) -> (Vec<f32>, usize) {
             line
         })
         .collect();
-    let coefficients: Vec<f32> = (0..row * (nv + 2)).map(|o| columns[o % row][o / row] as f32).collect();
+    let coefficients: Vec<f32> =
+        (0..row * (nv + 2)).map(|o| columns[o % row][o / row] as f32).collect();
     (coefficients, row)
 }
 
@@ -495,7 +531,12 @@ impl LightPaths for LineOfSight {
     }
 
     /// From the spline's second derivatives.
-    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+    fn trace_with_jacobians(
+        &self,
+        starts: &[Start],
+        exits: &mut [Exit],
+        jacobians: &mut [Jacobian],
+    ) {
         assert_eq!(starts.len(), jacobians.len(), "one Jacobian per start");
         self.trace(starts, exits);
         let m = &self.map;
@@ -508,16 +549,25 @@ impl LightPaths for LineOfSight {
             let [(i, x), (k, y)] = [0, 1].map(|c| cell(at[c], m.dims[c]));
             let hessian = match &m.slopes {
                 None => second_derivatives(&m.coefficients, m.row, [i, k], [x, y], m.per_m),
-                Some(slopes) => [0, 1].map(|r| derivatives(&slopes[r], m.row, [i, k], [x, y], m.per_m)),
+                Some(slopes) => {
+                    [0, 1].map(|r| derivatives(&slopes[r], m.row, [i, k], [x, y], m.per_m))
+                }
             };
             j.deflection_per_m = hessian.map(|r| r.map(|v| v as f32));
-            j.displacement_per_m = hessian.map(|r| r.map(|v| (v * f64::from(e.exit_depth_m)) as f32));
+            j.displacement_per_m =
+                hessian.map(|r| r.map(|v| (v * f64::from(e.exit_depth_m)) as f32));
         }
     }
 }
 
 /// First derivatives of a map's spline, per metre.
-fn derivatives(c: &[f32], row: usize, [i, k]: [usize; 2], [x, y]: [f64; 2], per_m: [f64; 2]) -> [f64; 2] {
+fn derivatives(
+    c: &[f32],
+    row: usize,
+    [i, k]: [usize; 2],
+    [x, y]: [f64; 2],
+    per_m: [f64; 2],
+) -> [f64; 2] {
     let ((wx, dx), (wy, dy)) = (bspline_weights(x), bspline_weights(y));
     let c = |a: usize, b: usize| f64::from(c[i + a + (k + b) * row]);
     let (mut along_x, mut along_y) = (0.0, 0.0);
@@ -557,4 +607,5 @@ fn second_derivatives(
 }
 
 /// Nodes are compared by how bad they are for light.
-const _: () = assert!((Node::Gas as u8) < Node::Blank as u8 && (Node::Blank as u8) < Node::Solid as u8);
+const _: () =
+    assert!((Node::Gas as u8) < Node::Blank as u8 && (Node::Blank as u8) < Node::Solid as u8);

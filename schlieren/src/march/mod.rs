@@ -7,8 +7,9 @@
 //! | [`Deviational`] (Euler) | the dissertation's equations 5.7 and 5.8, for comparison | the same |
 //! | [`Full`] | strong index: lenses, liquids, turning rays | one to six samples a step, `f64` |
 //!
-//! Two are there to judge the others by: [`DormandPrince`], adaptive, for smooth media, and [`CellExact`], which ends its steps on the cells' faces, for
-//! interpolated fields, whose kinks no adaptive step sees.
+//! Two are there to judge the others by: [`DormandPrince`], adaptive, for smooth media, and
+//! [`CellExact`], which ends its steps on the cells' faces, for interpolated fields, whose kinks no
+//! adaptive step sees.
 
 mod adaptive;
 mod cell_exact;

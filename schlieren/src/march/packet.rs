@@ -1,16 +1,21 @@
 //! The kernels: sixteen rays a packet in `f32`, several packets in flight.
 //!
-//! State per ray, all zero at the start: the deviation of the position in lattice steps, `xi`, and of its rate, `v`, along the lattice's axes, and the
-//! optical path difference. The undisturbed ray is computed afresh for each step from the step's number. So rounding is relative to the
-//! deviation and not to the position, and a gas of eps = 1e-8 is traced as accurately as one of 1e-3.
+//! State per ray, all zero at the start: the deviation of the position in lattice steps, `xi`, and
+//! of its rate, `v`, along the lattice's axes, and the optical path difference. The undisturbed ray
+//! is computed afresh for each step from the step's number. So rounding is relative to the
+//! deviation and not to the position, and a gas of eps = 1e-8 is traced as accurately as one of
+//! 1e-3.
 //!
-//! In the lattice's own axes a step needs no rotations: with lattice spacing h (in units of the longest) and gradient g per lattice step,
-//! `dv_i/dtau = (1 + eps) g_i / h_i^2` and `dxi_i/dtau = v_i`.
+//! In the lattice's own axes a step needs no rotations: with lattice spacing h (in units of the
+//! longest) and gradient g per lattice step, `dv_i/dtau = (1 + eps) g_i / h_i^2` and `dxi_i/dtau =
+//! v_i`.
 //!
-//! A ray's exit does not depend on the rays beside it: each takes its own number of steps, and one that has arrived or was stopped *rests*: its step
-//! of tau is zero from then on, so that what the packet still does changes nothing of it. (In an earlier form all took the steps of the longest, and stopped rays
-//! went on until the last of them was stopped: whether a ray that met a blank cell first and a body later was masked or blocked was up to its neighbours.)
-//! The one exception is leaving out bricks, which rays in flight decide together.
+//! A ray's exit does not depend on the rays beside it: each takes its own number of steps, and one
+//! that has arrived or was stopped *rests*: its step of tau is zero from then on, so that what the
+//! packet still does changes nothing of it. (In an earlier form all took the steps of the longest,
+//! and stopped rays went on until the last of them was stopped: whether a ray that met a blank cell
+//! first and a body later was masked or blocked was up to its neighbours.) The one exception is
+//! leaving out bricks, which rays in flight decide together.
 
 use crate::field::Node;
 use crate::interpolate::{Interpolate16, LANES, Row, Samples};
@@ -22,21 +27,23 @@ use fearless_simd::{Simd, f32x16, i32x16};
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Packet {
-    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions are counted from there because that halves
-    /// the largest product, and with it the rounding.
+    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions
+    /// are counted from there because that halves the largest product, and with it the rounding.
     pub(super) middle: [Row; 3],
     /// A step along the undisturbed ray, in lattice coordinates.
     pub(super) stride: [Row; 3],
     /// The direction times the spacing: projects lattice components of `xi` and `v` on the ray.
     pub(super) along: [Row; 3],
-    /// A step of tau. Before the march: of path. The ray enters with a rate of 1 + eps there, and deviations are from a ray that keeps it.
-    /// Zero for rays that miss the field, and for those at rest.
+    /// A step of tau. Before the march: of path. The ray enters with a rate of 1 + eps there, and
+    /// deviations are from a ray that keeps it. Zero for rays that miss the field, and for those at
+    /// rest.
     pub(super) dt: Row,
     /// Steps from entry to exit. Zero for rays that miss the field.
     pub(super) steps: Row,
     /// eps where the ray enters.
     pub(super) eps_at_entry: Row,
-    /// Starts as what rounding `middle` to f32 left out, which [`super::Deviational`] takes off again at the end.
+    /// Starts as what rounding `middle` to f32 left out, which [`super::Deviational`] takes off
+    /// again at the end.
     pub(super) xi: [Row; 3],
     pub(super) v: [Row; 3],
     /// What rounding left out of `v` so far (Kahan 1965), for interpolants that are worth it.
@@ -114,7 +121,12 @@ pub(super) trait KernelFeatures: Copy {
 
 /// The only implementation of [`KernelFeatures`].
 #[derive(Clone, Copy)]
-pub(super) struct FeatureSet<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool>;
+pub(super) struct FeatureSet<
+    const OPD: bool,
+    const NODES: bool,
+    const SKIP: bool,
+    const EULER: bool,
+>;
 
 impl<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool> KernelFeatures
     for FeatureSet<OPD, NODES, SKIP, EULER>
@@ -162,8 +174,8 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     let mut work = Work::default();
     let mut k = 0;
     let mut entering = true;
-    // Two iterations more than steps, to look at the entry and to end in the exit plane; in the same loop, so that there is one copy of the
-    // sampling code.
+    // Two iterations more than steps, to look at the entry and to end in the exit plane; in the
+    // same loop, so that there is one copy of the sampling code.
     while k <= steps.longest {
         // Leaving out whole bricks, when all rays in flight may.
         if E::SKIP
@@ -181,7 +193,8 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
             let of_ray = f32x16::from_slice(simd, &p.steps);
             // Step numbers are counted from the middle of the way: exact in f32.
             let middle = of_ray * 0.5;
-            let number = f32x16::splat(simd, if E::EULER { k as f32 } else { k as f32 + 0.5 }) - middle;
+            let number =
+                f32x16::splat(simd, if E::EULER { k as f32 } else { k as f32 + 0.5 }) - middle;
             let mut s = Step { number, move_by: dt, dt };
             let mut arriving = None;
             if entering {
@@ -235,7 +248,8 @@ pub(super) struct Steps {
     pub(super) longest: u32,
 }
 
-/// A ray has arrived or was stopped. What compensation still holds is below the last digit, and must not get into it with the steps of others.
+/// A ray has arrived or was stopped. What compensation still holds is below the last digit, and
+/// must not get into it with the steps of others.
 #[inline(always)]
 fn rest(p: &mut Packet, l: usize) {
     p.dt[l] = 0.0;
@@ -275,8 +289,9 @@ struct Step<S: Simd> {
     dt: f32x16<S>,
 }
 
-/// One step. Verlet's positions arrive at the middle of the last step and drift to the middle of this one (in the first step there is
-/// nothing to drift yet); Euler's arrive at the start of the step and drift to its end after the sample.
+/// One step. Verlet's positions arrive at the middle of the last step and drift to the middle of
+/// this one (in the first step there is nothing to drift yet); Euler's arrive at the start of the
+/// step and drift to its end after the sample.
 #[inline(always)]
 fn step<S: Simd, I: Interpolate16, E: KernelFeatures>(
     simd: S,
@@ -291,8 +306,10 @@ fn step<S: Simd, I: Interpolate16, E: KernelFeatures>(
         let v = f32x16::from_slice(simd, &p.v[c]);
         let moved = s.move_by.mul_add(v, xi);
         moved.store_slice(&mut p.xi[c]);
-        let straight =
-            s.number.mul_add(f32x16::from_slice(simd, &p.stride[c]), f32x16::from_slice(simd, &p.middle[c]));
+        let straight = s.number.mul_add(
+            f32x16::from_slice(simd, &p.stride[c]),
+            f32x16::from_slice(simd, &p.middle[c]),
+        );
         at[c] = straight + if E::EULER { xi } else { moved };
     }
     if E::NODES {
@@ -305,8 +322,8 @@ fn step<S: Simd, I: Interpolate16, E: KernelFeatures>(
     here.eps
 }
 
-/// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One step back brings it there; half of its drift is left to
-/// the caller.
+/// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One
+/// step back brings it there; half of its drift is left to the caller.
 #[inline(always)]
 fn last_step<S: Simd, E: KernelFeatures>(simd: S, p: &Packet, middle: f32x16<S>) -> Step<S> {
     let whole = f32x16::from_slice(simd, &p.dt);
@@ -324,7 +341,11 @@ fn last_step<S: Simd, E: KernelFeatures>(simd: S, p: &Packet, middle: f32x16<S>)
     let dt = -zeta / rate;
     // Rays that miss the field have steps of length zero.
     let steps = (whole.simd_gt(0.0)).select(dt / whole, dt * 0.0);
-    Step { number: steps.mul_add(f32x16::splat(simd, 0.5), middle), move_by: missing + dt * 0.5, dt }
+    Step {
+        number: steps.mul_add(f32x16::splat(simd, 0.5), middle),
+        move_by: missing + dt * 0.5,
+        dt,
+    }
 }
 
 /// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
@@ -355,7 +376,8 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
         }
     }
     if E::OPD {
-        // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z): all terms small, none a difference.
+        // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z): all terms small, none a
+        // difference.
         let mut square = middle[0] * 0.0;
         let mut u_z = square;
         for c in 0..3 {
@@ -363,9 +385,11 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
             u_z = middle[c].mul_add(f32x16::from_slice(simd, &p.along[c]), u_z);
         }
         let transverse = square - u_z * u_z;
-        let twice = eps + u_z + f32x16::from_slice(simd, &p.eps_at_entry) + f32x16::splat(simd, 2.0);
+        let twice =
+            eps + u_z + f32x16::from_slice(simd, &p.eps_at_entry) + f32x16::splat(simd, 2.0);
         let more = eps.mul_add(eps, eps) + transverse / twice;
-        // A phase of thousands of radians wants more digits than a plain sum of hundreds of terms keeps.
+        // A phase of thousands of radians wants more digits than a plain sum of hundreds of terms
+        // keeps.
         let sum = f32x16::from_slice(simd, &p.opd);
         let term = dt.mul_sub(more, f32x16::from_slice(simd, &p.opd_rest));
         let new = sum + term;
@@ -376,7 +400,12 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
 
 /// The nearest nodes' kinds, for the rays that are on their way; those that may not go on rest.
 #[inline(always)]
-fn look_up_nodes<S: Simd>(simd: S, constants: &PacketConstants<'_>, p: &mut Packet, at: &[f32x16<S>; 3]) {
+fn look_up_nodes<S: Simd>(
+    simd: S,
+    constants: &PacketConstants<'_>,
+    p: &mut Packet,
+    at: &[f32x16<S>; 3],
+) {
     let Some(nodes) = constants.nodes else { return };
     let mut near = [i32x16::splat(simd, 0); 3];
     for c in 0..3 {
@@ -395,7 +424,8 @@ fn look_up_nodes<S: Simd>(simd: S, constants: &PacketConstants<'_>, p: &mut Pack
     rest_where_stopped(constants, p);
 }
 
-/// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that leaves out.
+/// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that
+/// leaves out.
 #[inline(always)]
 fn skip_steps<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     simd: S,
@@ -410,8 +440,10 @@ fn skip_steps<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
         let mut at: [Row; 3] = [[0.0; LANES]; 3];
         for c in 0..3 {
             let number = number - f32x16::from_slice(simd, &p.steps) * 0.5;
-            let straight = number
-                .mul_add(f32x16::from_slice(simd, &p.stride[c]), f32x16::from_slice(simd, &p.middle[c]));
+            let straight = number.mul_add(
+                f32x16::from_slice(simd, &p.stride[c]),
+                f32x16::from_slice(simd, &p.middle[c]),
+            );
             at[c] = (straight + f32x16::from_slice(simd, &p.xi[c])).into();
         }
         for l in 0..LANES {

@@ -2,7 +2,8 @@
 
 use super::integrator::{Integrator, Medium, Ray};
 
-/// Omelyan, Mryglod and Folk 2002, equation 20 with the constants of equation 22: 26 times more accurate than Forest-Ruth for one more sample.
+/// Omelyan, Mryglod and Folk 2002, equation 20 with the constants of equation 22: 26 times more
+/// accurate than Forest-Ruth for one more sample.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pefrl;
 

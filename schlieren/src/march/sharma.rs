@@ -2,7 +2,8 @@
 
 use super::integrator::{Integrator, Medium, Rate, Ray};
 
-/// Fourth order with three samples a step, because the force does not depend on the rate (Applied Optics 21, 984, equations 8 to 11).
+/// Fourth order with three samples a step, because the force does not depend on the rate (Applied
+/// Optics 21, 984, equations 8 to 11).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sharma;
 

@@ -2,7 +2,8 @@
 
 use super::integrator::{Integrator, Medium, Ray};
 
-/// Second order with one sample a step; symplectic and reversible, and exact where n^2 is linear. The reference for the kernels in `packet.rs`.
+/// Second order with one sample a step; symplectic and reversible, and exact where n^2 is linear.
+/// The reference for the kernels in `packet.rs`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Verlet;
 

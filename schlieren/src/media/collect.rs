@@ -8,8 +8,9 @@ use crate::march::KernelRay;
 use crate::path::Start;
 
 impl MediaIntegrator<'_> {
-    /// Walks from where each start's ray enters the field to where it leaves it, meets a solid or opaque node, or has come as far as `ends_m` says: distances along the
-    /// undisturbed ray from the plane through the view's centre, such as those of bodies.
+    /// Walks from where each start's ray enters the field to where it leaves it, meets a solid or
+    /// opaque node, or has come as far as `ends_m` says: distances along the undisturbed ray from
+    /// the plane through the view's centre, such as those of bodies.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -50,17 +51,25 @@ impl MediaIntegrator<'_> {
         }
     }
 
-    /// [`MediaIntegrator::collect`] on all threads of the current rayon pool. The result does not depend on their number.
+    /// [`MediaIntegrator::collect`] on all threads of the current rayon pool. The result does not
+    /// depend on their number.
     ///
     /// # Panics
     /// If the slices differ in length.
-    pub fn collect_parallel(&self, starts: &[Start], ends_m: Option<&[f64]>, out: &mut [MediaIntegrals]) {
+    pub fn collect_parallel(
+        &self,
+        starts: &[Start],
+        ends_m: Option<&[f64]>,
+        out: &mut [MediaIntegrals],
+    ) {
         use rayon::prelude::*;
         assert_eq!(starts.len(), out.len(), "one answer per start");
         // A multiple of the packets' size; a few milliseconds of work.
         const CHUNK: usize = 1024;
-        starts.par_chunks(CHUNK).zip(out.par_chunks_mut(CHUNK)).enumerate().for_each(|(i, (s, o))| {
-            self.collect(s, ends_m.map(|e| &e[i * CHUNK..i * CHUNK + s.len()]), o);
-        });
+        starts.par_chunks(CHUNK).zip(out.par_chunks_mut(CHUNK)).enumerate().for_each(
+            |(i, (s, o))| {
+                self.collect(s, ends_m.map(|e| &e[i * CHUNK..i * CHUNK + s.len()]), o);
+            },
+        );
     }
 }

@@ -7,8 +7,9 @@ use crate::march::{FullOptions, Integrator, InterpolatedMedium, Pefrl, Ray};
 use crate::path::Start;
 use glam::DVec3;
 
-/// Walks along one ray. Each step is a cubic through its ends (Hermite): its middle is where properties are sampled, and its length is
-/// Simpson's sum of |w|. Both are of fourth order, as the march is.
+/// Walks along one ray. Each step is a cubic through its ends (Hermite): its middle is where
+/// properties are sampled, and its length is Simpson's sum of |w|. Both are of fourth order, as the
+/// march is.
 pub(super) fn collect(
     integrator: &MediaIntegrator<'_>,
     spline: &BSpline,

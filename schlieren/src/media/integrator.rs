@@ -47,8 +47,8 @@ pub struct MediaIntegrator<'a> {
 }
 
 impl<'a> MediaIntegrator<'a> {
-    /// Through `field` with `media`, as far as they are `wanted`. `step_voxels` is the march's step; it is shortened where a property's lattice is finer than
-    /// the field's.
+    /// Through `field` with `media`, as far as they are `wanted`. `step_voxels` is the march's
+    /// step; it is shortened where a property's lattice is finer than the field's.
     pub fn new(
         field: &'a Field,
         view: View,
@@ -68,7 +68,15 @@ impl<'a> MediaIntegrator<'a> {
             Bend::Full => BendField::Full(BSpline::new(field)),
         };
         let step_voxels = if bend == Bend::Full { step_voxels } else { step_voxels.min(1.0) };
-        MediaIntegrator { field, frame, wanted, blank, step_voxels, bend_field, level: Level::new() }
+        MediaIntegrator {
+            field,
+            frame,
+            wanted,
+            blank,
+            step_voxels,
+            bend_field,
+            level: Level::new(),
+        }
     }
 
     /// The view in whose frame starts are given.
@@ -91,13 +99,15 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// A piece of path of `length_m` with even values of the properties, in the order of [`Property::ALL`].
+    /// A piece of path of `length_m` with even values of the properties, in the order of
+    /// [`Property::ALL`].
     #[inline(always)]
     pub(super) fn add(&mut self, values: [f32; 3], length_m: f64) {
         let [absorption, emission, rotation] = values.map(f64::from);
         let depth = absorption * length_m;
         if emission != 0.0 {
-            // Of the light that the piece emits, (1 - exp(-a))/a leaves it, and exp(-τ) of that reaches the eye.
+            // Of the light that the piece emits, (1 - exp(-a))/a leaves it, and exp(-τ) of that
+            // reaches the eye.
             let leaves = if depth == 0.0 { 1.0 } else { -(-depth).exp_m1() / depth };
             self.emission += emission * length_m * leaves * (-self.optical_depth).exp();
         }

@@ -1,4 +1,5 @@
-//! What a medium does to light beside bending it: it absorbs, glows, and turns the plane of polarisation.
+//! What a medium does to light beside bending it: it absorbs, glows, and turns the plane of
+//! polarisation.
 //!
 //! Along the path of a ray, s its length in metres ([`MediaIntegrals`]):
 //!
@@ -8,20 +9,27 @@
 //! | [`Property::Emission`] | j(x), 1/m, see below | L = ∫ j exp(-τ') ds, τ' the optical depth between x and the eye | Chandrasekhar, *Radiative Transfer* (1950), chapter I, without scattering |
 //! | [`Property::Rotation`] | ρ(x), rad/m | φ = ∫ ρ ds; an analyser at the angle θ to the polariser passes cos²(θ - φ) | Faraday, Malus |
 //!
-//! Nothing of it bends light, so it is collected in a walk of its own beside the march ([`MediaIntegrator`]), and a scene without such properties runs none of this code.
-//! The walk bends as the march does ([`Bend`]): straight for line of sight, in `f32` by the trilinear gradient of eps for gases (a displacement within some per cent, and
-//! the displacement itself is below a voxel there), in `f64` by the spline for strong index.
+//! Nothing of it bends light, so it is collected in a walk of its own beside the march
+//! ([`MediaIntegrator`]), and a scene without such properties runs none of this code. The walk
+//! bends as the march does ([`Bend`]): straight for line of sight, in `f32` by the trilinear
+//! gradient of eps for gases (a displacement within some per cent, and the displacement itself is
+//! below a voxel there), in `f64` by the spline for strong index.
 //!
-//! Properties are sampled trilinearly: they are not differentiated, and trilinear never rings below zero. A smooth property of width σ on a lattice of spacing h
-//! is then off by about h²/(8σ²) of its largest value. A walk's steps are those of the march, but no longer than a voxel of any property's lattice; each takes the
-//! middle's value. A property without variation is integrated to rounding.
+//! Properties are sampled trilinearly: they are not differentiated, and trilinear never rings below
+//! zero. A smooth property of width σ on a lattice of spacing h is then off by about h²/(8σ²) of
+//! its largest value. A walk's steps are those of the march, but no longer than a voxel of any
+//! property's lattice; each takes the middle's value. A property without variation is integrated to
+//! rounding.
 //!
-//! **Emission** is relative: 1 is the radiance that makes the film as bright as undisturbed light without a cut-off does. A flame of emission 0.2/m that is half a
-//! metre thick is a tenth as bright as the lamp. From W/(m³ sr) it is j / (B a/A): B the lamp's radiance, a and A the areas of its image and of the stop in
-//! the cut-off plane, because a flame fills the stop and the lamp's image does not.
+//! **Emission** is relative: 1 is the radiance that makes the film as bright as undisturbed light
+//! without a cut-off does. A flame of emission 0.2/m that is half a metre thick is a tenth as
+//! bright as the lamp. From W/(m³ sr) it is j / (B a/A): B the lamp's radiance, a and A the areas
+//! of its image and of the stop in the cut-off plane, because a flame fills the stop and the lamp's
+//! image does not.
 //!
-//! **Rotation** is positive counter-clockwise in the picture, for the light of this view. Faraday's rotation depends on the field's component along the light:
-//! another view needs another array (`B:x` takes a component of a vector).
+//! **Rotation** is positive counter-clockwise in the picture, for the light of this view. Faraday's
+//! rotation depends on the field's component along the light: another view needs another array
+//! (`B:x` takes a component of a vector).
 //!
 //! ```
 //! use glam::DVec3;
@@ -100,7 +108,8 @@ pub struct Media {
 }
 
 impl Media {
-    /// The same with a property. Values below zero that mean nothing are taken as zero and counted in its [`Volume::repairs`].
+    /// The same with a property. Values below zero that mean nothing are taken as zero and counted
+    /// in its [`Volume::repairs`].
     #[must_use]
     pub fn with(mut self, property: Property, volume: Volume) -> Media {
         let volume = if property.is_signed() { volume } else { volume.without_negatives() };
@@ -127,7 +136,8 @@ impl Media {
             let nodes: usize = volume.dims().iter().product();
             if not_finite > 0 {
                 out.push(format!(
-                    "media.{name}: {not_finite} of {nodes} values are not finite; they are continued from their neighbours"
+                    "media.{name}: {not_finite} of {nodes} values are not finite; they are \
+                     continued from their neighbours"
                 ));
             }
             if negative > 0 {
@@ -157,7 +167,8 @@ pub struct MediaIntegrals {
 }
 
 impl MediaIntegrals {
-    /// The part of polarised light that is left, behind an analyser at an angle to the polariser when there is one.
+    /// The part of polarised light that is left, behind an analyser at an angle to the polariser
+    /// when there is one.
     pub fn transmission(&self, analyser_rad: Option<f64>) -> f64 {
         let left = (-f64::from(self.optical_depth)).exp();
         left * analyser_rad.map_or(1.0, |a| (a - f64::from(self.rotation_rad)).cos().powi(2))

@@ -1,8 +1,10 @@
 //! Sixteen rays at a time, straight or bent as in gases.
 //!
-//! Here the path's parameter is the depth z along the undisturbed ray, not tau: steps then end in the exit plane by themselves. With s the slope (transverse), primes for
-//! derivatives by z: `s' = (1 + s²) (∇ₜ eps - s ∂eps/∂z) / (1 + eps)`, the ray equation without approximation, and a step of path is
-//! `√(1 + s²) dz`. In the lattice's axes nothing has to be rotated: see [`crate::march`]'s packets, which this follows.
+//! Here the path's parameter is the depth z along the undisturbed ray, not tau: steps then end in
+//! the exit plane by themselves. With s the slope (transverse), primes for derivatives by z: `s' =
+//! (1 + s²) (∇ₜ eps - s ∂eps/∂z) / (1 + eps)`, the ray equation without approximation, and a step
+//! of path is `√(1 + s²) dz`. In the lattice's axes nothing has to be rotated: see
+//! [`crate::march`]'s packets, which this follows.
 
 use super::integrator::{MediaIntegrator, Sums};
 use crate::field::Node;
@@ -13,7 +15,8 @@ use fearless_simd::{Simd, f32x16, i32x16};
 
 /// Rays with their state. Lengths are in units of [`Frame::unit_m`] unless the name says metres.
 pub(super) struct Packet {
-    /// Steps from entry to exit. Each ray has its own: what it collects must not depend on the rays beside it.
+    /// Steps from entry to exit. Each ray has its own: what it collects must not depend on the rays
+    /// beside it.
     steps: Row,
     longest: u32,
     middle: [Row; 3],
@@ -50,7 +53,14 @@ impl Packet {
     }
 
     /// A ray that meets the field.
-    pub(super) fn set(&mut self, l: usize, ray: &mut KernelRay, frame: &Frame, steps: u32, end_m: f64) {
+    pub(super) fn set(
+        &mut self,
+        l: usize,
+        ray: &mut KernelRay,
+        frame: &Frame,
+        steps: u32,
+        end_m: f64,
+    ) {
         let [near_m, far_m] = ray.range_m();
         let entry = ray.entry(frame, steps);
         self.steps[l] = steps as f32;
@@ -140,7 +150,8 @@ pub(super) fn integrate16<S: Simd>(simd: S, sampled: &SampledProperties<'_>, p: 
     );
 }
 
-/// One leapfrog step through the depth's middle: moves `at` there and the ray to the step's end. Returns path per depth.
+/// One leapfrog step through the depth's middle: moves `at` there and the ray to the step's end.
+/// Returns path per depth.
 #[inline(always)]
 fn bend<S: Simd>(
     simd: S,
@@ -210,7 +221,8 @@ fn gather<S: Simd>(
         if let Some(PropertyOnLattice { rows, scale, offset }) = property {
             let mut there = *at;
             for c in 0..3 {
-                there[c] = at[c].mul_add(f32x16::splat(simd, scale[c]), f32x16::splat(simd, offset[c]));
+                there[c] =
+                    at[c].mul_add(f32x16::splat(simd, scale[c]), f32x16::splat(simd, offset[c]));
             }
             *row = rows.sample16(simd, &there).eps.into();
         }

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Paths whose [`Exit::transmission`] has what absorption and an analyser leave. Whatever else is in the exits is left as the march computed it, bit by bit.
+/// Paths whose [`Exit::transmission`] has what absorption and an analyser leave. Whatever else is
+/// in the exits is left as the march computed it, bit by bit.
 pub struct AttenuatedPaths<'a> {
     paths: Box<dyn LightPaths + 'a>,
     integrator: MediaIntegrator<'a>,
@@ -16,8 +17,8 @@ pub struct AttenuatedPaths<'a> {
 }
 
 impl<'a> AttenuatedPaths<'a> {
-    /// `paths` and `integrator` must be of the same field and view. The angle of the analyser is to the polariser, counter-clockwise in the picture; `rays` counts the rays that were
-    /// walked.
+    /// `paths` and `integrator` must be of the same field and view. The angle of the analyser is to
+    /// the polariser, counter-clockwise in the picture; `rays` counts the rays that were walked.
     pub fn new(
         paths: Box<dyn LightPaths + 'a>,
         integrator: MediaIntegrator<'a>,
@@ -36,7 +37,8 @@ impl<'a> AttenuatedPaths<'a> {
         let mut collected = vec![MediaIntegrals::default(); starts.len()];
         self.integrator.collect(starts, None, &mut collected);
         for (exit, c) in exits.iter_mut().zip(&collected) {
-            // 0 stays for what is blocked: light that is absorbed, however much, still tells where it went.
+            // 0 stays for what is blocked: light that is absorbed, however much, still tells where
+            // it went.
             if exit.transmission > 0.0 {
                 let left = f64::from(exit.transmission) * c.transmission(self.analyser_rad);
                 exit.transmission = (left as f32).max(f32::MIN_POSITIVE);
@@ -72,7 +74,12 @@ impl LightPaths for AttenuatedPaths<'_> {
         self.paths.skip_report()
     }
 
-    fn trace_with_jacobians(&self, starts: &[Start], exits: &mut [Exit], jacobians: &mut [Jacobian]) {
+    fn trace_with_jacobians(
+        &self,
+        starts: &[Start],
+        exits: &mut [Exit],
+        jacobians: &mut [Jacobian],
+    ) {
         self.paths.trace_with_jacobians(starts, exits, jacobians);
         self.dim(starts, exits);
     }

@@ -5,7 +5,8 @@ use crate::interpolate::{Interpolate, Trilinear};
 use glam::DVec3;
 use std::borrow::Cow;
 
-/// A property over a uniform lattice, trilinear between the nodes and constant beyond the outermost. Its lattice need not be that of the [`Field`].
+/// A property over a uniform lattice, trilinear between the nodes and constant beyond the
+/// outermost. Its lattice need not be that of the [`Field`].
 #[derive(Debug)]
 pub struct Volume {
     pub(super) values: Trilinear<'static>,
@@ -26,8 +27,9 @@ pub struct Repairs {
 }
 
 impl Volume {
-    /// A property from its values at the nodes, x fastest. Where `unknown` says so (outside the flow, inside a body) values are continued from the nodes around,
-    /// so that nothing fades towards a wall; values that are not finite are treated alike, and counted.
+    /// A property from its values at the nodes, x fastest. Where `unknown` says so (outside the
+    /// flow, inside a body) values are continued from the nodes around, so that nothing fades
+    /// towards a wall; values that are not finite are treated alike, and counted.
     ///
     /// # Errors
     /// If sizes do not match, or no value is finite.
@@ -57,13 +59,33 @@ impl Volume {
             }
             fill(dims, &mut values, &nodes);
         }
-        Ok(Volume::of(dims, DVec3::from(spacing_m), origin_m, values, Repairs { not_finite, negative: 0 }))
+        Ok(Volume::of(
+            dims,
+            DVec3::from(spacing_m),
+            origin_m,
+            values,
+            Repairs { not_finite, negative: 0 },
+        ))
     }
 
-    fn of(dims: [usize; 3], spacing_m: DVec3, origin_m: DVec3, values: Vec<f32>, repairs: Repairs) -> Volume {
-        let range =
-            values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
-        Volume { values: Trilinear::of(Cow::Owned(values), dims), dims, spacing_m, origin_m, range, repairs }
+    fn of(
+        dims: [usize; 3],
+        spacing_m: DVec3,
+        origin_m: DVec3,
+        values: Vec<f32>,
+        repairs: Repairs,
+    ) -> Volume {
+        let range = values
+            .iter()
+            .fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
+        Volume {
+            values: Trilinear::of(Cow::Owned(values), dims),
+            dims,
+            spacing_m,
+            origin_m,
+            range,
+            repairs,
+        }
     }
 
     /// The same value everywhere in a field.
@@ -71,7 +93,13 @@ impl Volume {
     /// # Errors
     /// If the value is not finite.
     pub fn uniform(value: f64, field: &Field) -> Result<Volume, FieldError> {
-        Volume::new([2; 3], field.size_m().to_array(), field.origin_m(), vec![value as f32; 8], None)
+        Volume::new(
+            [2; 3],
+            field.size_m().to_array(),
+            field.origin_m(),
+            vec![value as f32; 8],
+            None,
+        )
     }
 
     /// A property from a function of position in metres.
@@ -86,10 +114,17 @@ impl Volume {
     ) -> Result<Volume, FieldError> {
         let count = check_lattice(dims, spacing_m, origin_m)?;
         let at = |i: usize| {
-            let [x, y, z] = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]].map(|c| c as f64);
+            let [x, y, z] =
+                [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]].map(|c| c as f64);
             origin_m + DVec3::new(x, y, z) * DVec3::from(spacing_m)
         };
-        Volume::new(dims, spacing_m, origin_m, (0..count).map(|i| value(at(i)) as f32).collect(), None)
+        Volume::new(
+            dims,
+            spacing_m,
+            origin_m,
+            (0..count).map(|i| value(at(i)) as f32).collect(),
+            None,
+        )
     }
 
     /// With zero in place of everything below it.
@@ -145,7 +180,8 @@ mod tests {
         values[13] = f32::NAN;
         values[0] = f32::INFINITY;
         values[26] = -1.0;
-        let media = Media::default().with(Property::Absorption, volume(values.clone(), None).unwrap());
+        let media =
+            Media::default().with(Property::Absorption, volume(values.clone(), None).unwrap());
         let v = media.get(Property::Absorption).unwrap();
         assert_eq!(v.repairs(), Repairs { not_finite: 2, negative: 1 });
         assert_eq!((v.range(), v.sample(DVec3::splat(1.5))), ([0.0, 2.0], 2.0));

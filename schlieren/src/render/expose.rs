@@ -1,6 +1,9 @@
-//! Sends light of every line of the spectrum through the test section onto a film, and takes the noise out.
+//! Sends light of every line of the spectrum through the test section onto a film, and takes the
+//! noise out.
 
-use super::{Control, Layers, PlannedPaths, RenderError, RenderOutput, Report, TestSection, technique};
+use super::{
+    Control, Layers, PlannedPaths, RenderError, RenderOutput, Report, TestSection, technique,
+};
 use crate::film::beams::expose_beams;
 use crate::film::photons::{Exposure, LandedPhoton, expose};
 use crate::film::{Film, Framing};
@@ -12,7 +15,8 @@ use crate::spectrum::film_colors;
 use rt_core::sampler::Sampling;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// How far the beams of an extended source part from the axial one, in pixels: within the flow, or on the way to the plane in focus.
+/// How far the beams of an extended source part from the axial one, in pixels: within the flow, or
+/// on the way to the plane in focus.
 fn beam_spread_px(scene: &Scene, section: &TestSection, optics: &Optics, framing: &Framing) -> f64 {
     if !scene.technique.uses_source() {
         return 0.0;
@@ -26,7 +30,8 @@ fn beam_spread_px(scene: &Scene, section: &TestSection, optics: &Optics, framing
     reach_m / optics.schlieren_focal_length_m * lever_m / framing.pixel_m
 }
 
-/// Exposes the film to every line of the spectrum and adds up their colours. Returns the paths of the first.
+/// Exposes the film to every line of the spectrum and adds up their colours. Returns the paths of
+/// the first.
 pub(super) fn expose_lines<'a>(
     scene: &Scene,
     section: &'a TestSection,
@@ -46,7 +51,8 @@ pub(super) fn expose_lines<'a>(
         };
     if spread_px > 0.5 && !tilted_beams {
         r.report.warnings.push(format!(
-            "the source's extent would blur the picture by {spread_px:.1} pixels, which is left out; take photons with light.beams = \"auto\""
+            "the source's extent would blur the picture by {spread_px:.1} pixels, which is left \
+             out; take photons with light.beams = \"auto\""
         ));
     }
     r.report.effects.tilted_beams = tilted_beams;
@@ -89,8 +95,11 @@ pub(super) fn expose_lines<'a>(
             tilted_beams,
         };
         let part = |done: f64| (control.progress)((line as f64 + done) / lines.len() as f64);
-        let wished =
-            Layers { counts: layers.counts && line == 0, noise: layers.noise && line == 0, ..layers };
+        let wished = Layers {
+            counts: layers.counts && line == 0,
+            noise: layers.noise && line == 0,
+            ..layers
+        };
         let (scale, before) = (scene.exposure() as f32, r.report.counters.rays);
         if t.is_colored() {
             let film = expose_line::<3>(scene, &setup, framing, wished, control.cancel, &part, r)?;
@@ -163,7 +172,8 @@ fn expose_line<const C: usize>(
                 .ok_or(RenderError::Cancelled)?;
             r.report.tally.add(&exposed.tally);
             r.report.counters.rays += exposed.tally.sent - exposed.tally.blocked_by_solids;
-            r.report.counters.solid_queries += if setup.solids.is_some() { exposed.tally.sent } else { 0 };
+            r.report.counters.solid_queries +=
+                if setup.solids.is_some() { exposed.tally.sent } else { 0 };
             if two {
                 r.noise = Some(noise(&films, samples, filter, scene.exposure()));
             }
@@ -173,7 +183,13 @@ fn expose_line<const C: usize>(
             if layers.counts {
                 r.counts = films[0].counts();
             }
-            filtered(&films[0].developed(f64::from(samples)), &exposed.landed, &framing, filter, samples)
+            filtered(
+                &films[0].developed(f64::from(samples)),
+                &exposed.landed,
+                &framing,
+                filter,
+                samples,
+            )
         }
     };
     Ok(film)
@@ -192,12 +208,20 @@ fn filtered<const C: usize>(
         Filter::None => film.to_vec(),
         Filter::Gaussian { sigma_px } => crate::filter::gaussian::gaussian(film, width, sigma_px),
         Filter::Mean { radius_px } => crate::filter::mean::mean(film, width, radius_px),
-        Filter::Cone { nearest } => crate::filter::cone::cone(landed, framing, nearest, f64::from(samples)),
+        Filter::Cone { nearest } => {
+            crate::filter::cone::cone(landed, framing, nearest, f64::from(samples))
+        }
     }
 }
 
-/// Half the difference between two halves of the photons, filtered like the picture (a cone's noise is told by its film's).
-fn noise<const C: usize>(films: &[Film<C>], samples: u32, filter: Filter, exposure: f64) -> Vec<f32> {
+/// Half the difference between two halves of the photons, filtered like the picture (a cone's noise
+/// is told by its film's).
+fn noise<const C: usize>(
+    films: &[Film<C>],
+    samples: u32,
+    filter: Filter,
+    exposure: f64,
+) -> Vec<f32> {
     let halves = [samples.div_ceil(2), samples / 2];
     let developed: Vec<Vec<[f32; C]>> =
         films.iter().zip(halves).map(|(f, n)| f.developed(f64::from(n))).collect();
@@ -208,29 +232,41 @@ fn noise<const C: usize>(films: &[Film<C>], samples: u32, filter: Filter, exposu
         .collect();
     let width = films[0].framing().width as usize;
     let difference = match filter {
-        Filter::Gaussian { sigma_px } => crate::filter::gaussian::gaussian(&difference, width, sigma_px),
+        Filter::Gaussian { sigma_px } => {
+            crate::filter::gaussian::gaussian(&difference, width, sigma_px)
+        }
         Filter::Mean { radius_px } => crate::filter::mean::mean(&difference, width, radius_px),
         Filter::None | Filter::Cone { .. } => difference,
     };
     difference.iter().map(|d| d.iter().fold(0.0f32, |m, v| m.max(v.abs()))).collect()
 }
 
-/// Pixels around the picture from which light can stray into it: the farthest stray of a coarse lattice of rays over the picture and half its size more,
-/// and a quarter of that for what the lattice missed.
-fn margin_px(paths: &dyn LightPaths, optics: &Optics, framing: &Framing, report: &mut Report) -> u32 {
+/// Pixels around the picture from which light can stray into it: the farthest stray of a coarse
+/// lattice of rays over the picture and half its size more, and a quarter of that for what the
+/// lattice missed.
+fn margin_px(
+    paths: &dyn LightPaths,
+    optics: &Optics,
+    framing: &Framing,
+    report: &mut Report,
+) -> u32 {
     const PROBES: u32 = 64;
-    let probe =
-        |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(PROBES) * 1.5 * f64::from(n) - 0.25 * f64::from(n);
+    let probe = |i: u32, n: u32| {
+        (f64::from(i) + 0.5) / f64::from(PROBES) * 1.5 * f64::from(n) - 0.25 * f64::from(n)
+    };
     let starts: Vec<Start> = (0..PROBES * PROBES)
         .map(|k| {
-            let at =
-                framing.plane_from_pixel(probe(k % PROBES, framing.width), probe(k / PROBES, framing.height));
+            let at = framing.plane_from_pixel(
+                probe(k % PROBES, framing.width),
+                probe(k / PROBES, framing.height),
+            );
             Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] }
         })
         .collect();
     let mut exits = vec![Exit::UNDISTURBED; starts.len()];
     paths.trace_parallel(&starts, &mut exits);
-    let lands = |e: &&(&Start, &Exit)| e.1.transmission > 0.0 && e.1.status != crate::path::Status::Turned;
+    let lands =
+        |e: &&(&Start, &Exit)| e.1.transmission > 0.0 && e.1.status != crate::path::Status::Turned;
     let stray = |(s, e): (&Start, &Exit)| {
         let [x, y] = optics.film_shift_m(s, e);
         f64::from(x.abs().max(y.abs())) / framing.pixel_m
@@ -241,7 +277,8 @@ fn margin_px(paths: &dyn LightPaths, optics: &Optics, framing: &Framing, report:
     let limit = f64::from(framing.width.max(framing.height));
     if wanted > limit {
         report.warnings.push(format!(
-            "light strays by {farthest:.0} pixels, more than the picture's size; what comes from farther away is left out. Bring the film nearer, or look at more"
+            "light strays by {farthest:.0} pixels, more than the picture's size; what comes from \
+             farther away is left out. Bring the film nearer, or look at more"
         ));
     }
     let margin = wanted.min(limit) as u32;

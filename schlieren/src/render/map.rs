@@ -1,4 +1,5 @@
-//! The deflection map: one ray through the centre of every pixel. What measurements and other programs compare with.
+//! The deflection map: one ray through the centre of every pixel. What measurements and other
+//! programs compare with.
 
 use crate::film::Framing;
 use crate::optics::Optics;

@@ -1,8 +1,11 @@
-//! The medium in pictures: paths that lose light, the light that the medium adds, and layers of both.
+//! The medium in pictures: paths that lose light, the light that the medium adds, and layers of
+//! both.
 //!
-//! Light from the source is dimmed photon by photon ([`crate::media::AttenuatedPaths`]). Light that the medium emits is no photon's: each pixel's camera ray, parallel to the axis, is
-//! walked back through the flow, and what was collected on it is added to the exposed film, after all filters, for it has no noise. On its way to the film it
-//! meets the same bench: it fills the stop in the cut-off plane evenly, so a cut-off passes its mean over the stop wherever the light came from
+//! Light from the source is dimmed photon by photon ([`crate::media::AttenuatedPaths`]). Light that
+//! the medium emits is no photon's: each pixel's camera ray, parallel to the axis, is walked back
+//! through the flow, and what was collected on it is added to the exposed film, after all filters,
+//! for it has no noise. On its way to the film it meets the same bench: it fills the stop in the
+//! cut-off plane evenly, so a cut-off passes its mean over the stop wherever the light came from
 //! ([`Technique::passes_evenly`]), and half of it gets through an analyser.
 
 use super::planned::PlannedPaths;
@@ -17,12 +20,14 @@ use crate::technique::bos::ReversedPaths;
 use crate::view::View;
 use std::sync::Arc;
 
-/// What was collected through the pixels' centres, row by row from the top; empty for properties that are not in the scene.
+/// What was collected through the pixels' centres, row by row from the top; empty for properties
+/// that are not in the scene.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MediaMap {
     /// Optical depth.
     pub optical_depth: Vec<f32>,
-    /// Emission as the film sees it, before cut-off and exposure: 1 is undisturbed light without a cut-off.
+    /// Emission as the film sees it, before cut-off and exposure: 1 is undisturbed light without a
+    /// cut-off.
     pub emission: Vec<f32>,
     /// Rotation of the plane of polarisation in rad.
     pub rotation_rad: Vec<f32>,
@@ -55,7 +60,9 @@ impl TestSection {
         mut planned: PlannedPaths<'a>,
     ) -> Result<PlannedPaths<'a>, RenderError> {
         let wanted = scene.media.dims_light();
-        let Some(media) = self.media_of(scene)?.filter(|_| !wanted.is_empty()) else { return Ok(planned) };
+        let Some(media) = self.media_of(scene)?.filter(|_| !wanted.is_empty()) else {
+            return Ok(planned);
+        };
         let integrator = self.media_integrator(media, line, view, &planned, &wanted);
         let (analyser, rays) = (scene.media.analyser_rad(), Arc::clone(&planned.media_rays));
         planned.paths = Box::new(AttenuatedPaths::new(planned.paths, integrator, analyser, rays));
@@ -82,8 +89,9 @@ impl TestSection {
         )
     }
 
-    /// What the picture's light collects from these starts: by the light's own way, or the camera's with techniques that look from the film. Emission is left out: see
-    /// [`TestSection::emitted`]. `None` when the scene has no media.
+    /// What the picture's light collects from these starts: by the light's own way, or the camera's
+    /// with techniques that look from the film. Emission is left out: see [`TestSection::emitted`].
+    /// `None` when the scene has no media.
     pub fn collected(
         &self,
         scene: &Scene,
@@ -105,7 +113,8 @@ impl TestSection {
         Ok(Some(out))
     }
 
-    /// What the medium emits towards the film along camera rays that end at these starts, bodies in front of it hiding it. `None` when the scene has no emission.
+    /// What the medium emits towards the film along camera rays that end at these starts, bodies in
+    /// front of it hiding it. `None` when the scene has no emission.
     pub fn emitted(
         &self,
         scene: &Scene,
@@ -118,10 +127,9 @@ impl TestSection {
         let wanted = [Property::Absorption, Property::Emission];
         let integrator = self.media_integrator(media, 0, view, planned, &wanted);
         let starts = ReversedPaths::starts(starts);
-        let ends: Option<Vec<f64>> = self
-            .solids
-            .as_ref()
-            .map(|solids| starts.iter().map(|s| solids.depth_m(&view, s).unwrap_or(f64::INFINITY)).collect());
+        let ends: Option<Vec<f64>> = self.solids.as_ref().map(|solids| {
+            starts.iter().map(|s| solids.depth_m(&view, s).unwrap_or(f64::INFINITY)).collect()
+        });
         let mut out = vec![MediaIntegrals::default(); starts.len()];
         integrator.collect_parallel(&starts, ends.as_deref(), &mut out);
         Ok(Some(out.into_iter().map(|c| c.emission).collect()))
@@ -139,7 +147,9 @@ pub(super) fn add_emission(
     if scene.media.emission.is_none() {
         return Ok(());
     }
-    let Some(emitted) = section.emitted(scene, planned, &r.framing.pixel_centers())? else { return Ok(()) };
+    let Some(emitted) = section.emitted(scene, planned, &r.framing.pixel_centers())? else {
+        return Ok(());
+    };
     r.report.counters.media_rays += emitted.len() as u64;
 
     // The medium glows in the light's own spectrum.
@@ -176,7 +186,9 @@ pub(super) fn add_map(
     if spec.absorption.is_none() && spec.rotation.is_none() {
         return Ok(());
     }
-    let Some(all) = section.collected(scene, planned, &r.framing.pixel_centers())? else { return Ok(()) };
+    let Some(all) = section.collected(scene, planned, &r.framing.pixel_centers())? else {
+        return Ok(());
+    };
     counters.media_rays += all.len() as u64;
     let lit = |i: usize| r.map.as_ref().is_none_or(|m| m.transmission[i] > 0.0);
     let layer = |wanted: bool, of: fn(&MediaIntegrals) -> f32| -> Vec<f32> {
@@ -194,7 +206,8 @@ pub(super) fn add_map(
 pub(super) fn warn(scene: &Scene, layers: Layers, warnings: &mut Vec<String>) {
     if scene.media.rotation.is_some() && scene.media.analyser_deg.is_none() && !layers.map {
         warnings.push(
-            "media.rotation does not show in the picture without an analyser (media.analyser_deg); its angles are in the EXR's layer rotation.Y".into(),
+            "media.rotation does not show in the picture without an analyser (media.analyser_deg); \
+             its angles are in the EXR's layer rotation.Y".into(),
         );
     }
 }

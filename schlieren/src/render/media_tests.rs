@@ -23,7 +23,8 @@ fn scene(rest: &str) -> Scene {
 fn section(s: &Scene, values: &[(Property, f64)], solids: Option<Solids>) -> TestSection {
     let fields = s.lines().iter().map(|_| blob()).collect();
     let section = TestSection::of_fields(s, fields, solids).unwrap();
-    let uniform = |m: Media, (p, v): &(Property, f64)| m.with(*p, Volume::uniform(*v, &blob()).unwrap());
+    let uniform =
+        |m: Media, (p, v): &(Property, f64)| m.with(*p, Volume::uniform(*v, &blob()).unwrap());
     section.with_media(values.iter().fold(Media::default(), uniform))
 }
 
@@ -46,7 +47,8 @@ const TECHNIQUES: [&str; 6] = [
     "[technique]\nkind = \"shadowgraph\"\n",
     "[technique]\nkind = \"bos\"\n",
     "[technique]\nkind = \"schlieren\"\n[light]\nwavelengths_nm = [633, 532]\nbeams = \"tilted\"\n",
-    "[technique]\nkind = \"schlieren\"\n[march]\nmethod = \"pefrl\"\n[sampling]\nmethod = \"photons\"\nsamples = 1\n",
+    "[technique]\nkind = \"schlieren\"\n[march]\nmethod = \"pefrl\"\n[sampling]\nmethod \
+     = \"photons\"\nsamples = 1\n",
 ];
 
 fn bits(r: &RenderOutput) -> Vec<u32> {
@@ -90,7 +92,10 @@ fn even_smoke_dims_every_technique_by_beer_and_lambert() {
                 assert!((s - p * left).abs() < 2e-6, "{technique} {i} {c}: {s} of {p}");
             }
         }
-        assert!(smoky.report.counters.media_rays > smoky.report.counters.rays, "photons and the map");
+        assert!(
+            smoky.report.counters.media_rays > smoky.report.counters.rays,
+            "photons and the map"
+        );
         assert!(smoky.report.effects.absorption && !smoky.report.effects.emission);
         let (map, media) = (smoky.map.unwrap(), smoky.media.unwrap());
         assert!((map.transmission[ROW + 12] - left).abs() < 1e-6);
@@ -101,10 +106,12 @@ fn even_smoke_dims_every_technique_by_beer_and_lambert() {
 
 #[test]
 fn an_interferogram_loses_contrast_before_light() {
-    let fringes = "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 0.02\n[sampling]\nmethod = \"photons\"\nsamples = 64\n";
+    let fringes = "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = \
+                   0.02\n[sampling]\nmethod = \"photons\"\nsamples = 64\n";
     let of = |r: RenderOutput| {
         let row: Vec<f32> = r.pixels[ROW + 2..ROW + 22].iter().map(|p| p[0]).collect();
-        let [low, high] = row.iter().fold([f32::MAX, 0.0], |[l, h]: [f32; 2], v| [l.min(*v), h.max(*v)]);
+        let [low, high] =
+            row.iter().fold([f32::MAX, 0.0], |[l, h]: [f32; 2], v| [l.min(*v), h.max(*v)]);
         [low, high]
     };
     let [low, high] = of(drawn(fringes, "", &[], Layers::NONE));
@@ -120,7 +127,8 @@ fn an_interferogram_loses_contrast_before_light() {
 fn glow_adds_what_the_cut_offs_mean_over_the_stop_lets_through() {
     let depth = 2.0 * HALF;
     let glow = GLOW.1 / SMOKE.1 * (1.0 - (-SMOKE.1 * depth).exp());
-    let circle = "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"KIND\", radius_m = 1e-3 }\n";
+    let circle =
+        "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"KIND\", radius_m = 1e-3 }\n";
     let small = 1e-3f64 / 12.5e-3;
     for (technique, gain) in [
         (TECHNIQUES[0].to_string(), 0.5),
@@ -133,7 +141,8 @@ fn glow_adds_what_the_cut_offs_mean_over_the_stop_lets_through() {
     ] {
         // Only smoke, and smoke that glows.
         let dark = drawn(&technique, "absorption = \"a\"", &[SMOKE], Layers::NONE);
-        let lit = drawn(&technique, "absorption = \"a\"\nemission = \"j\"", &[SMOKE, GLOW], Layers::ALL);
+        let lit =
+            drawn(&technique, "absorption = \"a\"\nemission = \"j\"", &[SMOKE, GLOW], Layers::ALL);
         let i = ROW + 12;
         let added = f64::from(lit.pixels[i][0] - dark.pixels[i][0]);
         // A circle of 41 squares' radius among a million: its area within 1 %.
@@ -172,13 +181,15 @@ fn an_analyser_shows_the_rotation_by_malus() {
         let i = ROW + 12;
         let expected = f64::from(plain.pixels[i][0]) * (deg.to_radians() - phi).cos().powi(2);
         assert!((f64::from(r.pixels[i][0]) - expected).abs() < 2e-6, "{deg}: {expected}");
-        // Beside the field nothing turns; a crossed analyser is dark there, but the map still knows where light went.
+        // Beside the field nothing turns; a crossed analyser is dark there, but the map still knows
+        // where light went.
         let beside = f64::from(plain.pixels[ROW][0]) * deg.to_radians().cos().powi(2);
         assert!((f64::from(r.pixels[ROW][0]) - beside).abs() < 2e-6, "{deg}: {beside}");
         assert_eq!(r.map.as_ref().unwrap().dark, 0);
         assert!((f64::from(r.media.unwrap().rotation_rad[i]) - phi).abs() < 1e-6);
         // What glows is not polarised: half of it passes.
-        let both = drawn(&technique, &format!("{media}\nemission = \"j\""), &[TURN, GLOW], Layers::NONE);
+        let both =
+            drawn(&technique, &format!("{media}\nemission = \"j\""), &[TURN, GLOW], Layers::NONE);
         let added = f64::from(both.pixels[i][0] - r.pixels[i][0]);
         assert!((added - 0.25 * GLOW.1 * 2.0 * HALF).abs() < 2e-5, "{added}");
     }
@@ -195,9 +206,14 @@ fn bodies_hide_the_glow_behind_them_and_not_that_before() {
         let world = World::from_mesh(mesh(), &BuildOptions::default()).unwrap();
         let solids = Some(Solids::from_world(world));
         let section = section(&s, &[GLOW], solids);
-        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
+        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+            .unwrap();
         let emission = r.media.unwrap().emission;
-        assert!((f64::from(emission[ROW + 12]) - GLOW.1 * 24e-3).abs() < 1e-6, "{}", emission[ROW + 12]);
+        assert!(
+            (f64::from(emission[ROW + 12]) - GLOW.1 * 24e-3).abs() < 1e-6,
+            "{}",
+            emission[ROW + 12]
+        );
         assert!((f64::from(emission[ROW + 5]) - GLOW.1 * 2.0 * HALF).abs() < 1e-6);
         // The body's silhouette glows.
         assert!((f64::from(r.pixels[ROW + 12][0]) / s.exposure() - GLOW.1 * 24e-3).abs() < 2e-5);

@@ -75,7 +75,9 @@ pub enum RenderError {
         found: usize,
     },
     /// The GPU march is not part of this program.
-    #[error("this program is built without the feature gpu; take --device cpu (march.device in a scene)")]
+    #[error(
+        "this program is built without the feature gpu; take --device cpu (march.device in a scene)"
+    )]
     NoGpu,
     /// The GPU was asked for and cannot do it.
     #[cfg(feature = "gpu")]
@@ -83,7 +85,8 @@ pub enum RenderError {
     Gpu(#[from] crate::gpu::GpuError),
     /// The scene names a property of the medium, and the test section has none.
     #[error(
-        "the scene has media.{0} and the test section does not; read it from a file, or give it with `TestSection::with_media`"
+        "the scene has media.{0} and the test section does not; read it from a file, or give it \
+         with `TestSection::with_media`"
     )]
     NoMedia(&'static str),
     /// A name that nothing has.
@@ -98,7 +101,8 @@ pub enum RenderError {
     },
     /// The photons for a cone filter do not fit.
     #[error(
-        "the cone filter keeps every photon, and {photons} are more than the {limit} it may keep; take fewer samples or another filter"
+        "the cone filter keeps every photon, and {photons} are more than the {limit} it may keep; \
+         take fewer samples or another filter"
     )]
     TooManyPhotons {
         /// Wanted.
@@ -153,7 +157,8 @@ impl Layers {
 pub struct RenderOutput {
     /// Where its pixels lie in the test section.
     pub framing: Framing,
-    /// Linear brightness, 1 is white: energy times exposure. Grey pictures have three equal channels.
+    /// Linear brightness, 1 is white: energy times exposure. Grey pictures have three equal
+    /// channels.
     pub pixels: Vec<Rgb>,
     /// Whether channels can differ.
     pub colored: bool,
@@ -163,8 +168,9 @@ pub struct RenderOutput {
     pub media: Option<MediaMap>,
     /// With [`Layers::counts`], when photons were sent.
     pub counts: Option<Vec<u32>>,
-    /// With [`Layers::noise`]: estimated error of each pixel's brightness by too few photons: half the difference between two halves of them, of the first
-    /// wavelength, strongest channel. `None` for pictures without noise.
+    /// With [`Layers::noise`]: estimated error of each pixel's brightness by too few photons: half
+    /// the difference between two halves of them, of the first wavelength, strongest channel.
+    /// `None` for pictures without noise.
     pub noise: Option<Vec<f32>>,
     /// What was done.
     pub report: Report,
@@ -187,9 +193,11 @@ pub struct Report {
     pub resolution_error_rad: Option<f64>,
     /// Largest deflection through a pixel's centre, when there is a map.
     pub largest_deflection_rad: Option<f64>,
-    /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are bodies and a map.
+    /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are
+    /// bodies and a map.
     pub silhouette_error_px: Option<f64>,
-    /// What leaving out even gas came to (`march.skip_rad`), in the light of the first wavelength or, without light, the map.
+    /// What leaving out even gas came to (`march.skip_rad`), in the light of the first wavelength
+    /// or, without light, the map.
     #[serde(rename = "left_out")]
     pub skip_report: Option<SkipReport>,
     /// Darkest and brightest channel of the picture.
@@ -252,7 +260,8 @@ pub fn render(
             r.pixels = grey(volume::volume(&section.fields[0], &section.view, &framing, strength)?);
         }
         TechniqueSpec::Slice { strength, depth_m } => {
-            r.pixels = grey(slice::slice(&section.fields[0], &section.view, &framing, depth_m, strength)?);
+            r.pixels =
+                grey(slice::slice(&section.fields[0], &section.view, &framing, depth_m, strength)?);
         }
         _ => first = expose::expose_lines(scene, section, layers, control, &mut r)?,
     }
@@ -266,17 +275,22 @@ pub fn render(
     }
     if scene.march.skip_rad > 0.0 && !measured && !layers.map {
         let name = scene.technique.name();
-        r.report
-            .warnings
-            .push(format!("march.skip_rad changes nothing with technique {name}, which follows no light"));
+        r.report.warnings.push(format!(
+            "march.skip_rad changes nothing with technique {name}, which follows no light"
+        ));
     }
     if layers.map {
-        // The picture's own paths serve when they tell what is wanted; the optical path is not computed for photons that do not need it.
+        // The picture's own paths serve when they tell what is wanted; the optical path is not
+        // computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
             Some(planned) => planned,
-            None => {
-                section.paths(scene, 0, PathQuantities { opd: layers.phase }, against_light, !measured)?
-            }
+            None => section.paths(
+                scene,
+                0,
+                PathQuantities { opd: layers.phase },
+                against_light,
+                !measured,
+            )?,
         };
         add_map(scene, section, &planned, &mut r);
         media::add_map(scene, section, &planned, &mut r)?;
@@ -334,14 +348,15 @@ pub fn technique(
             ))
         }
         TechniqueSpec::Bos { dot_diameter_m, dot_spacing_m, seed } => {
-            let diameter_m =
-                dot_diameter_m.unwrap_or(3.0 * framing.pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
+            let diameter_m = dot_diameter_m
+                .unwrap_or(3.0 * framing.pixel_m)
+                .min(dot_spacing_m.unwrap_or(f64::INFINITY));
             let spacing_m = dot_spacing_m.unwrap_or(2.0 * diameter_m);
             Technique::Bos(bos::Bos::new(optics, bos::Dots { diameter_m, spacing_m, seed: *seed }))
         }
-        TechniqueSpec::Shadowgraph {} | TechniqueSpec::Volume { .. } | TechniqueSpec::Slice { .. } => {
-            Technique::Shadowgraph(optics)
-        }
+        TechniqueSpec::Shadowgraph {}
+        | TechniqueSpec::Volume { .. }
+        | TechniqueSpec::Slice { .. } => Technique::Shadowgraph(optics),
     })
 }
 
@@ -358,14 +373,17 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
     report.add_traced(&*planned.paths);
     report.counters.map_rays += m.transmission.len() as u64;
     report.counters.phase_rays += m.waves.len() as u64;
-    report.counters.solid_queries += if section.solids.is_some() { m.transmission.len() as u64 } else { 0 };
+    report.counters.solid_queries +=
+        if section.solids.is_some() { m.transmission.len() as u64 } else { 0 };
     report.largest_deflection_rad = Some(m.largest_deflection_rad);
     if section.solids.is_some() {
         let error_px = m.largest_displacement_m / r.framing.pixel_m;
         report.silhouette_error_px = Some(error_px);
         if error_px > 0.5 {
             report.warnings.push(format!(
-                "rays are displaced by up to {error_px:.1} pixels and bodies see them straight: silhouettes can be off by that much; mark the bodies' cells solid in the flow's file"
+                "rays are displaced by up to {error_px:.1} pixels and bodies see them straight: \
+                 silhouettes can be off by that much; mark the bodies' cells solid in the flow's \
+                 file"
             ));
         }
     }
@@ -373,7 +391,9 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
         let pairs = interferogram::unresolved_pairs(&m.waves, r.framing.width as usize);
         if pairs > 0 {
             report.warnings.push(format!(
-                "the phase changes by more than half a wave between {pairs} pairs of neighbouring pixels: fringes there are finer than pixels and turn grey; take more pixels or look at less"
+                "the phase changes by more than half a wave between {pairs} pairs of neighbouring \
+                 pixels: fringes there are finer than pixels and turn grey; take more pixels or \
+                 look at less"
             ));
         }
     }
@@ -388,19 +408,28 @@ fn warn_about_picture(scene: &Scene, report: &mut Report) {
     if high - low < visible && !matches!(scene.technique, TechniqueSpec::Bos { .. }) {
         let cure = match scene.technique {
             TechniqueSpec::Schlieren { .. } => {
-                "a smaller source (light.source), a longer collimator (lenses.collimator_m) or a smaller opening of the cut-off make it more sensitive"
+                "a smaller source (light.source), a longer collimator (lenses.collimator_m) or a \
+                 smaller opening of the cut-off make it more sensitive"
             }
-            TechniqueSpec::Shadowgraph {} => "a film farther away (film.focus_m) makes it more sensitive",
+            TechniqueSpec::Shadowgraph {} => {
+                "a film farther away (film.focus_m) makes it more sensitive"
+            }
             TechniqueSpec::Interferogram { .. } => {
-                "the optical path differs by less than a fringe; finite fringes (technique.fringe_spacing_m) show less"
+                "the optical path differs by less than a fringe; finite fringes \
+                 (technique.fringe_spacing_m) show less"
             }
             _ => "a larger technique.strength shows more",
         };
-        report.warnings.push(format!("the picture is even ({low:.4} to {high:.4} of white): {cure}"));
+        report
+            .warnings
+            .push(format!("the picture is even ({low:.4} to {high:.4} of white): {cure}"));
     }
     if report.tally.blocked_in_field > 0 && report.largest_deflection_rad == Some(0.0) {
         report.warnings.push(
-            "no light passes the flow: every ray that enters it meets cells that are blank or solid; say what lies outside the mesh (flow.outside) and in hidden cells (flow.hidden), or look from another side".into(),
+            "no light passes the flow: every ray that enters it meets cells that are blank or \
+             solid; say what lies outside the mesh (flow.outside) and in hidden cells \
+             (flow.hidden), or look from another side"
+                .into(),
         );
     }
     if report.tally.not_a_number > 0 {

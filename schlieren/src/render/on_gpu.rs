@@ -8,7 +8,8 @@ use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
 
-/// Why a scene's march cannot be computed on a GPU here whatever the flow is, for who asked for one. Opens it.
+/// Why a scene's march cannot be computed on a GPU here whatever the flow is, for who asked for
+/// one. Opens it.
 ///
 /// # Errors
 /// With the reason and the cure.
@@ -25,7 +26,8 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
 }
 
 #[cfg(feature = "gpu")]
-const CURE: &str = "Leave out --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
+const CURE: &str =
+    "Leave out --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
 
 /// What a scene asks for by name that has no kernel.
 #[cfg(feature = "gpu")]
@@ -39,8 +41,8 @@ fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
     Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
 }
 
-/// Why the CPU stands in for a GPU that cannot do it. Who asked for one gets an error for what can be known before anything is drawn; a device that is lost or
-/// out of memory spoils no picture.
+/// Why the CPU stands in for a GPU that cannot do it. Who asked for one gets an error for what can
+/// be known before anything is drawn; a device that is lost or out of memory spoils no picture.
 #[cfg(feature = "gpu")]
 fn fallback_reason(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
     match error {
@@ -52,7 +54,8 @@ fn fallback_reason(asked: Device, error: crate::gpu::GpuError) -> Result<String,
     }
 }
 
-/// Paths on the GPU if the scene wants that and it can be, else in words why not; no words when the CPU was asked for, or is quicker by plan.
+/// Paths on the GPU if the scene wants that and it can be, else in words why not; no words when the
+/// CPU was asked for, or is quicker by plan.
 #[cfg(feature = "gpu")]
 pub(super) fn on_gpu<'a>(
     march: &MarchSpec,
@@ -87,7 +90,8 @@ pub(super) fn on_gpu<'a>(
         }
         if plan.mode != Mode::Paraxial {
             return Err(GpuError::Unsupported {
-                what: "the full march (pefrl), which an index as strong as this flow's needs".into(),
+                what: "the full march (pefrl), which an index as strong as this flow's needs"
+                    .into(),
                 cure: "Compute on the CPU (--device cpu), or force --march verlet.",
             });
         }
@@ -98,15 +102,21 @@ pub(super) fn on_gpu<'a>(
                 gpu.name()
             )));
         }
-        let options =
-            GpuOptions { step_voxels: plan.step_voxels, wanted: request.wanted, blank: request.blank };
+        let options = GpuOptions {
+            step_voxels: plan.step_voxels,
+            wanted: request.wanted,
+            blank: request.blank,
+        };
         // A device that fails while the field is copied to it is opened again, which gives up after
         // a few times.
         let mut told = None;
         let paths = loop {
             match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
-                    told.get_or_insert(format!("{}; it was opened again", crate::gpu::failure_message(&e)));
+                    told.get_or_insert(format!(
+                        "{}; it was opened again",
+                        crate::gpu::failure_message(&e)
+                    ));
                     gpu = Gpu::shared()?;
                 }
                 made => break made?,
@@ -145,9 +155,9 @@ pub(super) fn on_gpu<'a>(
 ) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
     match march.device {
         Device::Cpu => Ok(Err(None)),
-        Device::Auto => {
-            Ok(Err(Some("computed on the CPU: this program is built without the feature gpu".into())))
-        }
+        Device::Auto => Ok(Err(Some(
+            "computed on the CPU: this program is built without the feature gpu".into(),
+        ))),
         Device::Gpu => Err(RenderError::NoGpu),
     }
 }
@@ -159,9 +169,13 @@ mod tests {
 
     #[test]
     fn a_device_that_fails_spoils_no_picture_and_one_that_cannot_is_refused() {
-        let lost = GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
-        let give_up_error =
-            GpuError::GivenUp { adapter: "Lamp 9".into(), times: 3, reason: "the device is lost".into() };
+        let lost =
+            GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
+        let give_up_error = GpuError::GivenUp {
+            adapter: "Lamp 9".into(),
+            times: 3,
+            reason: "the device is lost".into(),
+        };
         for asked in [Device::Gpu, Device::Auto] {
             for e in [&lost, &give_up_error] {
                 let told = fallback_reason(asked, e.clone()).unwrap();
@@ -172,6 +186,8 @@ mod tests {
         }
         let none = GpuError::NoAdapter("Vulkan finds no device".into());
         assert!(matches!(fallback_reason(Device::Gpu, none.clone()), Err(RenderError::Gpu(_))));
-        assert!(fallback_reason(Device::Auto, none).unwrap().contains("computed on the CPU: no GPU"));
+        assert!(
+            fallback_reason(Device::Auto, none).unwrap().contains("computed on the CPU: no GPU")
+        );
     }
 }

@@ -1,5 +1,6 @@
-//! Which march takes the light through, and how exact it is: [`crate::plan`] picks what the scene leaves open by bounds from the tolerance, and measures
-//! what was achieved. Marches that no plan picks, because they are for comparison, are made here.
+//! Which march takes the light through, and how exact it is: [`crate::plan`] picks what the scene
+//! leaves open by bounds from the tolerance, and measures what was achieved. Marches that no plan
+//! picks, because they are for comparison, are made here.
 
 use super::on_gpu::on_gpu;
 use super::planned::{PlannedPaths, described};
@@ -7,8 +8,8 @@ use super::{RenderError, TestSection};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use crate::march::{
-    BlankCells, Deviational, FieldCache, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme,
-    Sharma,
+    BlankCells, Deviational, FieldCache, Full, FullOptions, Integrator, Options, Pefrl,
+    RungeKutta4, Scheme, Sharma,
 };
 use crate::media::Bend;
 use crate::path::{Exit, LightPaths, PathQuantities, Start};
@@ -25,12 +26,13 @@ pub const INTERPOLANTS: [&str; 3] = ["b-spline", "trilinear", "trilinear-gradien
 /// Rays that are traced twice to measure a plan's error.
 const MEASURED_RAYS: usize = 256;
 
-/// The error of the phase that leaving out eight steps may cost, in waves: a hundred of such stretches are a thousandth of a wave.
+/// The error of the phase that leaving out eight steps may cost, in waves: a hundred of such
+/// stretches are a thousandth of a wave.
 const SKIPPED_WAVES: f64 = 1e-5;
 
 impl TestSection {
-    /// Light paths through field `line` as the scene's march says. `against_light`: traced from the camera. `measure` traces some rays with everything
-    /// refined, to know the error.
+    /// Light paths through field `line` as the scene's march says. `against_light`: traced from the
+    /// camera. `measure` traces some rays with everything refined, to know the error.
     pub fn paths(
         &self,
         scene: &Scene,
@@ -76,11 +78,14 @@ impl TestSection {
             "verlet" => Mode::Paraxial,
             _ => Mode::Full,
         });
-        let planned = on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), cache)?;
+        let planned =
+            on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), cache)?;
         let why_not = match planned {
             Ok(mut planned) => {
                 if !scene.media.dims_light().is_empty() {
-                    planned.warnings.push("absorption and rotation are collected on the CPU".into());
+                    planned
+                        .warnings
+                        .push("absorption and rotation are collected on the CPU".into());
                 }
                 return Ok(self.attenuated(scene, line, view, planned)?.seen(against_light));
             }
@@ -89,43 +94,51 @@ impl TestSection {
 
         let mut skip_warning = None;
         // For comparison: by name only, never picked.
-        let (paths, description, achieved, walked) = if let Some(name @ ("euler" | "sharma" | "rk4")) = method
-        {
-            let interpolant = interpolant.unwrap_or_default();
-            let step_voxels = march.step_voxels.unwrap_or(1.0);
-            let paths = comparison_march(name, field, view, interpolant, step_voxels, wanted);
-            let bend = if name == "euler" { Bend::Paraxial } else { Bend::Full };
-            (paths, described(name, interpolant, step_voxels), None, (bend, step_voxels))
-        } else {
-            let plan = Plan::from_derivative_bounds(field, with(mode), cache.derivative_bounds(field));
-            let walked = (Bend::from(plan.mode), plan.step_voxels);
-            // PEFRL is made with the spline only.
-            if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline) {
-                let step = plan.step_voxels;
-                let options = FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
-                let paths = full(field, view, plan.interpolant, Pefrl, options);
-                skip_warning = (march.skip_rad > 0.0).then(|| skipping_has_no_effect("pefrl"));
-                (paths, described("pefrl", plan.interpolant, step), None, walked)
+        let (paths, description, achieved, walked) =
+            if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
+                let interpolant = interpolant.unwrap_or_default();
+                let step_voxels = march.step_voxels.unwrap_or(1.0);
+                let paths = comparison_march(name, field, view, interpolant, step_voxels, wanted);
+                let bend = if name == "euler" { Bend::Paraxial } else { Bend::Full };
+                (paths, described(name, interpolant, step_voxels), None, (bend, step_voxels))
             } else {
-                let name = match plan.mode {
-                    Mode::LineOfSight => "line-of-sight",
-                    Mode::Paraxial => "verlet",
-                    Mode::Full => "pefrl",
-                };
-                let achieved = measure.then(|| plan.measure_with(field, view, MEASURED_RAYS, cache));
-                let mut description = described(name, plan.interpolant, plan.step_voxels);
-                if march.skip_rad > 0.0 {
-                    match plan.mode {
-                        Mode::Paraxial => {
-                            description += &format!(", leaving out at most {:e} rad", march.skip_rad)
+                let plan =
+                    Plan::from_derivative_bounds(field, with(mode), cache.derivative_bounds(field));
+                let walked = (Bend::from(plan.mode), plan.step_voxels);
+                // PEFRL is made with the spline only.
+                if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline)
+                {
+                    let step = plan.step_voxels;
+                    let options =
+                        FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
+                    let paths = full(field, view, plan.interpolant, Pefrl, options);
+                    skip_warning = (march.skip_rad > 0.0).then(|| skipping_has_no_effect("pefrl"));
+                    (paths, described("pefrl", plan.interpolant, step), None, walked)
+                } else {
+                    let name = match plan.mode {
+                        Mode::LineOfSight => "line-of-sight",
+                        Mode::Paraxial => "verlet",
+                        Mode::Full => "pefrl",
+                    };
+                    let achieved =
+                        measure.then(|| plan.measure_with(field, view, MEASURED_RAYS, cache));
+                    let mut description = described(name, plan.interpolant, plan.step_voxels);
+                    if march.skip_rad > 0.0 {
+                        match plan.mode {
+                            Mode::Paraxial => {
+                                description +=
+                                    &format!(", leaving out at most {:e} rad", march.skip_rad)
+                            }
+                            Mode::LineOfSight | Mode::Full => {
+                                skip_warning = Some(skipping_has_no_effect(name))
+                            }
                         }
-                        Mode::LineOfSight | Mode::Full => skip_warning = Some(skipping_has_no_effect(name)),
                     }
+                    (plan.paths_with(field, view, cache), description, achieved, walked)
                 }
-                (plan.paths_with(field, view, cache), description, achieved, walked)
-            }
-        };
-        let mut planned = PlannedPaths::new(paths, description, achieved, march.tolerance_rad, walked);
+            };
+        let mut planned =
+            PlannedPaths::new(paths, description, achieved, march.tolerance_rad, walked);
         planned.warnings.extend(why_not);
         planned.warnings.extend(skip_warning);
         Ok(self.attenuated(scene, line, view, planned)?.seen(against_light))
@@ -136,7 +149,8 @@ impl TestSection {
 fn skipping_has_no_effect(march: &str) -> String {
     let why = match march {
         "line-of-sight" => {
-            "the tolerance lets the plan take straight rays, which need no steps through the flow; force --march verlet to compare"
+            "the tolerance lets the plan take straight rays, which need no steps through the flow; \
+             force --march verlet to compare"
         }
         _ => "the index is so strong that the plan takes the full march, which samples every step",
     };
@@ -157,7 +171,8 @@ fn comparison_march<'a>(
         "sharma" => full(field, view, interpolant, Sharma, options),
         "rk4" => full(field, view, interpolant, RungeKutta4, options),
         _ => {
-            let options = Options { scheme: Scheme::Euler, step_voxels, wanted, ..Options::default() };
+            let options =
+                Options { scheme: Scheme::Euler, step_voxels, wanted, ..Options::default() };
             Box::new(Deviational::new(field, view, interpolant, options))
         }
     }
@@ -171,12 +186,20 @@ fn full<'a, G: Integrator + Copy + 'a>(
     options: FullOptions,
 ) -> Box<dyn LightPaths + 'a> {
     match interpolant {
-        Interpolant::BSpline => {
-            Box::new(OwnedFull { field, interpolate: BSpline::new(field), integrator, view, options })
-        }
-        Interpolant::Trilinear => {
-            Box::new(OwnedFull { field, interpolate: Trilinear::new(field), integrator, view, options })
-        }
+        Interpolant::BSpline => Box::new(OwnedFull {
+            field,
+            interpolate: BSpline::new(field),
+            integrator,
+            view,
+            options,
+        }),
+        Interpolant::Trilinear => Box::new(OwnedFull {
+            field,
+            interpolate: Trilinear::new(field),
+            integrator,
+            view,
+            options,
+        }),
         Interpolant::TrilinearGradient => Box::new(OwnedFull {
             field,
             interpolate: TrilinearGradient::new(field),
@@ -211,6 +234,7 @@ impl<I: Interpolate, G: Integrator + Copy> LightPaths for OwnedFull<'_, I, G> {
     }
 
     fn difference_step_m(&self) -> f64 {
-        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options).difference_step_m()
+        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options)
+            .difference_step_m()
     }
 }

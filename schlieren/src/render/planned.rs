@@ -13,7 +13,8 @@ pub struct PlannedPaths<'a> {
     pub paths: Box<dyn LightPaths + 'a>,
     /// The march, the interpolant and the step, in words.
     pub description: String,
-    /// Measured error of a deflection by march, interpolant and step; `None` when it was not to be measured, or the march is one for comparison.
+    /// Measured error of a deflection by march, interpolant and step; `None` when it was not to be
+    /// measured, or the march is one for comparison.
     pub error_rad: Option<f64>,
     /// Estimate of what the flow's own lattice leaves open.
     pub resolution_error_rad: Option<f64>,
@@ -37,14 +38,20 @@ impl<'a> PlannedPaths<'a> {
         let mut warnings = Vec::new();
         if let Some(a) = achieved.filter(|a| a.max_rad > tolerance_rad) {
             warnings.push(format!(
-                "deflections are off by up to {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad; the flow has structures that its lattice does not resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
+                "deflections are off by up to {:.1e} rad, above the tolerance of \
+                 {tolerance_rad:.1e} rad; the flow has structures that its lattice does not \
+                 resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
                 a.max_rad
             ));
         }
-        if let Some(a) = achieved.filter(|a| a.resolution_rad.is_finite() && a.resolution_rad > tolerance_rad)
+        if let Some(a) =
+            achieved.filter(|a| a.resolution_rad.is_finite() && a.resolution_rad > tolerance_rad)
         {
             warnings.push(format!(
-                "the flow's own lattice leaves deflections open by about {:.1e} rad, above the tolerance of {tolerance_rad:.1e} rad, whatever march is taken: take a finer lattice, smooth shocks (flow.smoothing_nodes), or ask for less (march.tolerance_rad)",
+                "the flow's own lattice leaves deflections open by about {:.1e} rad, above the \
+                 tolerance of {tolerance_rad:.1e} rad, whatever march is taken: take a finer \
+                 lattice, smooth shocks (flow.smoothing_nodes), or ask for less \
+                 (march.tolerance_rad)",
                 a.resolution_rad
             ));
         }
@@ -68,8 +75,11 @@ impl<'a> PlannedPaths<'a> {
     /// The same, seen from the film when `against_light`.
     pub(super) fn seen(self, against_light: bool) -> PlannedPaths<'a> {
         let paths = self.paths;
-        let paths =
-            if against_light { Box::new(ReversedPaths::new(paths)) as Box<dyn LightPaths> } else { paths };
+        let paths = if against_light {
+            Box::new(ReversedPaths::new(paths)) as Box<dyn LightPaths>
+        } else {
+            paths
+        };
         PlannedPaths { paths, ..self }
     }
 }

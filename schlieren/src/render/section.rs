@@ -1,4 +1,5 @@
-//! The test section: fields for each wavelength, the view, the bodies, and the paths of light through them.
+//! The test section: fields for each wavelength, the view, the bodies, and the paths of light
+//! through them.
 
 use super::RenderError;
 use crate::field::Field;
@@ -73,8 +74,9 @@ impl TestSection {
         Ok(TestSection { fields, view, solids, media: None, input, warnings, caches })
     }
 
-    /// Keeps what marches prepare of the fields (splines, projections) for further pictures: takes as much memory as the fields again, and the time of the second
-    /// picture is that of its light alone. Fields must not be replaced after this.
+    /// Keeps what marches prepare of the fields (splines, projections) for further pictures: takes
+    /// as much memory as the fields again, and the time of the second picture is that of its light
+    /// alone. Fields must not be replaced after this.
     #[must_use]
     pub fn with_caches(mut self) -> TestSection {
         self.caches = self.fields.iter().map(|_| FieldCache::default()).collect();

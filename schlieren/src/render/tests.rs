@@ -54,15 +54,18 @@ fn pictures_are_the_same_for_any_number_of_threads() {
 #[test]
 fn a_flow_that_no_light_passes_is_named() {
     let walled = |from: usize| {
-        let kind = |i: usize| if i / 1089 == 16 && i % 33 >= from { Node::Blank } else { Node::Gas };
+        let kind =
+            |i: usize| if i / 1089 == 16 && i % 33 >= from { Node::Blank } else { Node::Gas };
         let nodes: Vec<Node> = (0..33 * 33 * 33).map(kind).collect();
         let b = blob();
-        Field::new(b.dims(), b.spacing_m(), b.origin_m(), b.eps().to_vec(), b.n0(), Some(nodes)).unwrap()
+        Field::new(b.dims(), b.spacing_m(), b.origin_m(), b.eps().to_vec(), b.n0(), Some(nodes))
+            .unwrap()
     };
     let s = scene(&format!("{SMALL}[view]\ndirection = \"z\"\n"));
     let warned = |from| {
         let section = TestSection::of_fields(&s, vec![walled(from)], None).unwrap();
-        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
+        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+            .unwrap();
         assert!(r.report.tally.blocked_in_field > 0);
         r.report.warnings.iter().any(|w| w.contains("no light passes the flow"))
     };
@@ -93,8 +96,12 @@ fn the_map_is_the_closed_form_with_row_0_at_the_top() {
         }
         worst_phase = worst_phase.max((f64::from(m.waves[i]) - n0 * path / 633e-9).abs());
     }
-    // σ is four voxels: the B-spline's error is 7e-5 rms (notes' table at h/σ 0.2…0.4), several times that at most; deflections reach 3e-5.
-    assert!(m.largest_deflection_rad > 2e-5 && worst < 3e-3 * m.largest_deflection_rad, "{worst:e}");
+    // σ is four voxels: the B-spline's error is 7e-5 rms (notes' table at h/σ 0.2…0.4), several
+    // times that at most; deflections reach 3e-5.
+    assert!(
+        m.largest_deflection_rad > 2e-5 && worst < 3e-3 * m.largest_deflection_rad,
+        "{worst:e}"
+    );
     assert!(worst_phase < 2e-3, "{worst_phase:e} waves of {}", AMPLITUDE * SIGMA * 2.5 / 633e-9);
     // Warm air bends light away from its middle: up in the upper row.
     assert!(m.deflection_rad[10 * 48 + 24][1] > 0.0 && m.deflection_rad[30 * 48 + 24][1] < 0.0);
@@ -108,7 +115,14 @@ fn what_a_scene_does_not_call_for_is_not_counted() {
     let k = plain.counters;
     assert!(k.rays >= 2 * 48 * 40);
     assert_eq!(
-        (k.map_rays, k.phase_rays, k.dispersion_rays, k.solid_queries, k.tilted_rays, k.differential_rays),
+        (
+            k.map_rays,
+            k.phase_rays,
+            k.dispersion_rays,
+            k.solid_queries,
+            k.tilted_rays,
+            k.differential_rays
+        ),
         (0, 0, 0, 0, 0, 0)
     );
     assert_eq!(plain.effects, Effects::default());
@@ -116,7 +130,9 @@ fn what_a_scene_does_not_call_for_is_not_counted() {
     let phase = c(&format!("[technique]\nkind = \"interferogram\"\n{photons}"), Layers::NONE);
     assert!(phase.effects.phase && phase.counters.phase_rays == phase.counters.rays);
     let colors = c(&format!("[light]\nwavelengths_nm = [633, 532]\n{photons}"), Layers::NONE);
-    assert!(colors.effects.dispersion && colors.counters.dispersion_rays * 2 == colors.counters.rays);
+    assert!(
+        colors.effects.dispersion && colors.counters.dispersion_rays * 2 == colors.counters.rays
+    );
     let tilted = c(&format!("[light]\nbeams = \"tilted\"\n{photons}"), Layers::NONE);
     assert!(tilted.effects.tilted_beams && tilted.counters.tilted_rays == tilted.counters.rays);
     let beams = c("[technique]\nkind = \"shadowgraph\"\n", Layers::NONE);
@@ -129,17 +145,23 @@ fn what_a_scene_does_not_call_for_is_not_counted() {
 fn a_plate_casts_its_shadow_and_only_there() {
     // A square of 20 mm in the middle of the section, across the light.
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0) * 10e-3;
-    let positions = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    let positions =
+        vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
     let mesh = TriMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]);
-    let plate = || Solids::from_world(World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap());
-    for sampling in ["method = \"photons\"\nsamples = 4\nfilter = { kind = \"none\" }", "method = \"beams\""]
+    let plate =
+        || Solids::from_world(World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap());
+    for sampling in
+        ["method = \"photons\"\nsamples = 4\nfilter = { kind = \"none\" }", "method = \"beams\""]
     {
-        // The scene names a file so that its effects know of bodies; what is used is the plate above.
+        // The scene names a file so that its effects know of bodies; what is used is the plate
+        // above.
         let s = scene(&format!(
-            "{SMALL}[technique]\nkind = \"shadowgraph\"\n[solids]\nfiles = [\"plate.stl\"]\n[sampling]\n{sampling}"
+            "{SMALL}[technique]\nkind = \"shadowgraph\"\n[solids]\nfiles = \
+             [\"plate.stl\"]\n[sampling]\n{sampling}"
         ));
         let section = TestSection::of_fields(&s, vec![blob()], Some(plate())).unwrap();
-        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap();
+        let r = render(&s, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+            .unwrap();
         // Rays bend outwards by up to 0.5 m · 3e-5 = 15 µm, far below a pixel of 2.4 mm.
         let at = |x_mm: f64, y_mm: f64| {
             let [x, y] = [x_mm, -y_mm].map(|c| c * 1e-3 / r.framing.pixel_m);
@@ -159,7 +181,11 @@ fn a_plate_casts_its_shadow_and_only_there() {
 #[test]
 fn even_pictures_are_warned_about_and_cancelling_cancels() {
     let r = drawn("[film]\nsize = [16, 16]\n[lenses]\ncollimator_m = 1e-3", Layers::NONE);
-    assert!(r.report.warnings.iter().any(|w| w.contains("more sensitive")), "{:?}", r.report.warnings);
+    assert!(
+        r.report.warnings.iter().any(|w| w.contains("more sensitive")),
+        "{:?}",
+        r.report.warnings
+    );
     let s = scene(SMALL);
     let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
     let cancel = AtomicBool::new(true);
@@ -173,7 +199,12 @@ fn the_tolerance_picks_the_march() {
     let rough = march("tolerance_rad = 1e-6");
     assert!(rough.march.starts_with("line-of-sight"), "{}", rough.march);
     let fine = march("tolerance_rad = 2e-10");
-    assert!(!fine.march.starts_with("line-of-sight"), "{} {:?}", fine.march, fine.deflection_error_rad);
+    assert!(
+        !fine.march.starts_with("line-of-sight"),
+        "{} {:?}",
+        fine.march,
+        fine.deflection_error_rad
+    );
     for name in MARCHES {
         assert!(march(&format!("method = \"{name}\"")).march.starts_with(name));
     }
@@ -185,9 +216,13 @@ fn the_tolerance_picks_the_march() {
 
 #[test]
 fn dots_are_displaced_as_the_map_says() {
-    let r = drawn(&format!("{SMALL}[technique]\nkind = \"bos\"\n"), Layers { map: true, ..Layers::NONE });
+    let r = drawn(
+        &format!("{SMALL}[technique]\nkind = \"bos\"\n"),
+        Layers { map: true, ..Layers::NONE },
+    );
     let m = r.map.unwrap();
-    // Camera rays bend away from the warm middle; the background stands 0.5 m behind: at (x, 0) by about 0.5 m times the deflection.
+    // Camera rays bend away from the warm middle; the background stands 0.5 m behind: at (x, 0) by
+    // about 0.5 m times the deflection.
     let i = 20 * 48 + 30;
     let ratio = f64::from(m.displacement_m[i][0]) / f64::from(m.deflection_rad[i][0]);
     assert!((ratio - 0.5).abs() < 0.01 && m.deflection_rad[i][0] > 0.0, "{ratio}");
@@ -220,13 +255,18 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
         let s = scene(&format!("{SMALL}[technique]\nkind = \"{technique}\""));
         let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
         let against_light = technique == "bos";
-        let planned = section.paths(&s, 0, PathQuantities::default(), against_light, false).unwrap();
+        let planned =
+            section.paths(&s, 0, PathQuantities::default(), against_light, false).unwrap();
         let planned = PlannedPaths { paths: Box::new(Failed(planned.paths)), ..planned };
         let mut r = drawn(&format!("{SMALL}[technique]\nkind = \"{technique}\""), Layers::NONE);
         for _ in 0..2 {
             add_map(&s, &section, &planned, &mut r);
         }
-        let told = r.report.warnings.iter().filter(|w| w.contains("Lamp 9") && w.contains("out of memory"));
+        let told = r
+            .report
+            .warnings
+            .iter()
+            .filter(|w| w.contains("Lamp 9") && w.contains("out of memory"));
         assert_eq!(told.count(), 1, "{technique}: {:?}", r.report.warnings);
         assert!(r.map.is_some());
     }

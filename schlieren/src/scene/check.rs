@@ -1,6 +1,8 @@
 //! Values that no scene can have, and values that change no pixel.
 
-use super::{BeamsSpec, CutoffSpec, FilterSpec, SamplingSpec, Scene, SceneError, SourceSpec, TechniqueSpec};
+use super::{
+    BeamsSpec, CutoffSpec, FilterSpec, SamplingSpec, Scene, SceneError, SourceSpec, TechniqueSpec,
+};
 use std::fmt::Display;
 
 /// Largest side of a picture.
@@ -34,7 +36,8 @@ fn within(key: &'static str, value: f64, low: f64, high: f64) -> Result<(), Scen
 }
 
 impl Scene {
-    /// Refuses values that no scene can have, and values that change no pixel. Scenes from files are checked already.
+    /// Refuses values that no scene can have, and values that change no pixel. Scenes from files
+    /// are checked already.
     pub fn check(&self) -> Result<(), SceneError> {
         self.check_light()?;
         self.check_technique()?;
@@ -57,7 +60,10 @@ impl Scene {
             Some(m) => Err(wrong(
                 "march.skip_rad",
                 skip,
-                format!("it changes nothing with march.method = \"{m}\": only verlet can leave out even gas"),
+                format!(
+                    "it changes nothing with march.method = \"{m}\": only verlet can leave out \
+                     even gas"
+                ),
             )),
             None => Ok(()),
         }
@@ -77,13 +83,20 @@ impl Scene {
     fn check_light(&self) -> Result<(), SceneError> {
         let light = &self.light;
         if light.wavelengths_nm.is_empty() {
-            return Err(wrong("light.wavelengths_nm", "[]", "give at least one wavelength, such as 633"));
+            return Err(wrong(
+                "light.wavelengths_nm",
+                "[]",
+                "give at least one wavelength, such as 633",
+            ));
         }
         for &nm in &light.wavelengths_nm {
             within("light.wavelengths_nm", nm, 100.0, 20_000.0)?;
         }
         if !light.weights.is_empty() && light.weights.len() != light.wavelengths_nm.len() {
-            let cure = format!("give one weight for each of the {} wavelengths", light.wavelengths_nm.len());
+            let cure = format!(
+                "give one weight for each of the {} wavelengths",
+                light.wavelengths_nm.len()
+            );
             return Err(wrong("light.weights", format!("{:?}", light.weights), cure));
         }
         light.weights.iter().try_for_each(|w| positive("light.weights", *w))?;
@@ -93,7 +106,9 @@ impl Scene {
                 positive("light.source.length_m", length_m)?;
                 finite("light.source.angle_deg", &[angle_deg.unwrap_or(0.0)])?;
             }
-            Some(SourceSpec::Circle { diameter_m }) => positive("light.source.diameter_m", diameter_m)?,
+            Some(SourceSpec::Circle { diameter_m }) => {
+                positive("light.source.diameter_m", diameter_m)?
+            }
             Some(SourceSpec::Point {}) | None => {}
         }
         positive("lenses.collimator_m", self.lenses.collimator_m)?;
@@ -146,9 +161,11 @@ impl Scene {
                 dot_diameter_m.map_or(Ok(()), |d| positive("technique.dot_diameter_m", d))?;
                 dot_spacing_m.map_or(Ok(()), |d| positive("technique.dot_spacing_m", d))?;
                 match (dot_diameter_m, dot_spacing_m) {
-                    (Some(d), Some(s)) if d > s => {
-                        Err(wrong("technique.dot_diameter_m", d, "give at most technique.dot_spacing_m"))
-                    }
+                    (Some(d), Some(s)) if d > s => Err(wrong(
+                        "technique.dot_diameter_m",
+                        d,
+                        "give at most technique.dot_spacing_m",
+                    )),
                     _ => Ok(()),
                 }
             }
@@ -164,7 +181,11 @@ impl Scene {
         let film = &self.film;
         if !film.size.iter().all(|s| (1..=MAX_SIDE).contains(s)) {
             let value = format!("{}x{}", film.size[0], film.size[1]);
-            return Err(wrong("film.size", value, format!("give 1 to {MAX_SIDE} pixels along each side")));
+            return Err(wrong(
+                "film.size",
+                value,
+                format!("give 1 to {MAX_SIDE} pixels along each side"),
+            ));
         }
         film.field_of_view_m.map_or(Ok(()), |v| positive("film.field_of_view_m", v))?;
         film.exposure.map_or(Ok(()), |v| positive("film.exposure", v))?;
@@ -173,7 +194,11 @@ impl Scene {
         match self.sampling() {
             SamplingSpec::Photons { samples, filter, .. } => {
                 if !(1..=MAX_SAMPLES).contains(&samples) {
-                    return Err(wrong("sampling.samples", samples, format!("give 1 to {MAX_SAMPLES}")));
+                    return Err(wrong(
+                        "sampling.samples",
+                        samples,
+                        format!("give 1 to {MAX_SAMPLES}"),
+                    ));
                 }
                 match filter {
                     FilterSpec::None {} => Ok(()),
@@ -194,7 +219,8 @@ impl Scene {
         }
     }
 
-    /// Focal lengths that cancel or meet nothing. The customary ones are never refused: they stand in every effective scene.
+    /// Focal lengths that cancel or meet nothing. The customary ones are never refused: they stand
+    /// in every effective scene.
     fn check_lenses(&self) -> Result<(), SceneError> {
         let technique = self.technique.name();
         let customary = super::LensSpec::default();
@@ -203,10 +229,13 @@ impl Scene {
             TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { open_m: None, .. } }
         );
         if self.lenses.schlieren_m != customary.schlieren_m {
-            let in_vain = |hint| Err(SceneError::NoEffect { key: "lenses.schlieren_m", technique, hint });
+            let in_vain =
+                |hint| Err(SceneError::NoEffect { key: "lenses.schlieren_m", technique, hint });
             if fraction {
                 return in_vain(
-                    ", because with a knife that leaves a fraction of the source open the image and its shift grow alike; give the open height technique.cutoff.open_m, or take lenses.collimator_m",
+                    ", because with a knife that leaves a fraction of the source open the image \
+                     and its shift grow alike; give the open height technique.cutoff.open_m, or \
+                     take lenses.collimator_m",
                 );
             }
             if !matches!(self.technique, TechniqueSpec::Schlieren { .. }) {
@@ -214,7 +243,9 @@ impl Scene {
             }
         }
         let point = self.optics().source == crate::optics::SourceShape::Point;
-        if self.lenses.collimator_m != customary.collimator_m && (point || !self.technique.uses_source()) {
+        if self.lenses.collimator_m != customary.collimator_m
+            && (point || !self.technique.uses_source())
+        {
             let hint = "; it sets how large the source looks, and there is a point or none";
             return Err(SceneError::NoEffect { key: "lenses.collimator_m", technique, hint });
         }
@@ -231,7 +262,9 @@ impl Scene {
         if self.light.beams != BeamsSpec::Auto && !self.technique.uses_source() {
             return in_vain("light.beams", "; it belongs to schlieren and shadowgraph");
         }
-        if self.light.beams == BeamsSpec::Tilted && matches!(self.sampling(), SamplingSpec::Beams { .. }) {
+        if self.light.beams == BeamsSpec::Tilted
+            && matches!(self.sampling(), SamplingSpec::Beams { .. })
+        {
             return in_vain("light.beams = \"tilted\"", " with sampling by beams; take photons");
         }
         self.check_lenses()?;
@@ -250,8 +283,8 @@ impl Scene {
             }
         }
         if matches!(self.technique, TechniqueSpec::Shadowgraph {}) && self.focus_m() == 0.0 {
-            let cure =
-                "focused into the middle of the flow there is no shadowgraph; give the film's distance";
+            let cure = "focused into the middle of the flow there is no shadowgraph; give the \
+                        film's distance";
             return Err(wrong("film.focus_m", 0.0, cure));
         }
         if matches!(self.technique, TechniqueSpec::Bos { .. }) && self.focus_m() <= 0.0 {
@@ -273,7 +306,10 @@ mod tests {
 
     fn refused(rest: &str) -> String {
         let error = Scene::from_toml(&format!("{FLOW}{rest}")).expect_err(rest);
-        format!("{error} {}", std::error::Error::source(&error).map_or(String::new(), ToString::to_string))
+        format!(
+            "{error} {}",
+            std::error::Error::source(&error).map_or(String::new(), ToString::to_string)
+        )
     }
 
     #[test]
@@ -281,18 +317,26 @@ mod tests {
         for (text, key) in [
             ("[fiml]\nsize = [1, 1]", "fiml"),
             ("[film]\nsiez = [1, 1]", "siez"),
-            ("[light]\nsource = { kind = \"slit\", width_m = 1e-3, length_m = 1e-3, depth = 1 }", "depth"),
+            (
+                "[light]\nsource = { kind = \"slit\", width_m = 1e-3, length_m = 1e-3, depth = 1 }",
+                "depth",
+            ),
             ("[light]\nsource = { kind = \"point\", width_m = 1e-3 }", "width_m"),
             ("[technique]\nkind = \"schlieren\"\nvisibility = 1.0", "visibility"),
             ("[technique]\nkind = \"shadowgraph\"\ncutoff = { kind = \"knife\" }", "cutoff"),
-            ("[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"knife\", opne = 0.5 }", "opne"),
+            (
+                "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"knife\", opne = 0.5 }",
+                "opne",
+            ),
             ("[sampling]\nmethod = \"beams\"\nsamples = 3", "samples"),
             (
-                "[sampling]\nmethod = \"photons\"\nfilter = { kind = \"cone\", nearest = 3, sigma_px = 1.0 }",
+                "[sampling]\nmethod = \"photons\"\nfilter = { kind = \"cone\", nearest = 3, \
+                 sigma_px = 1.0 }",
                 "sigma_px",
             ),
             (
-                "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"painted\", size_m = [1, 1], ground_rgb = [1, 1, 1], glow = 1 }",
+                "[technique]\nkind = \"schlieren\"\ncutoff = { kind = \"painted\", size_m = [1, \
+                 1], ground_rgb = [1, 1, 1], glow = 1 }",
                 "glow",
             ),
         ] {
@@ -324,12 +368,18 @@ mod tests {
         for (text, key) in [
             ("[technique]\nkind = \"bos\"\n[light]\nsource = { kind = \"point\" }", "light.source"),
             ("[technique]\nkind = \"slice\"\n[film]\nfocus_m = 1.0", "film.focus_m"),
-            ("[technique]\nkind = \"volume\"\n[sampling]\nmethod = \"photons\"\nsamples = 4", "sampling"),
+            (
+                "[technique]\nkind = \"volume\"\n[sampling]\nmethod = \"photons\"\nsamples = 4",
+                "sampling",
+            ),
             ("[technique]\nkind = \"volume\"\n[solids]\nfiles = [\"a.stl\"]", "solids"),
             ("[technique]\nkind = \"interferogram\"\nfringe_angle_deg = 3.0", "fringe_angle_deg"),
             ("[technique]\nkind = \"shadowgraph\"\n[film]\nfocus_m = 0.0", "film.focus_m"),
             ("[lenses]\nschlieren_m = 3.0", "lenses.schlieren_m"),
-            ("[technique]\nkind = \"shadowgraph\"\n[lenses]\ncollimator_m = 3.0", "lenses.collimator_m"),
+            (
+                "[technique]\nkind = \"shadowgraph\"\n[lenses]\ncollimator_m = 3.0",
+                "lenses.collimator_m",
+            ),
         ] {
             let message = refused(text);
             assert!(message.contains(key), "{text}: {message}");
@@ -343,8 +393,8 @@ mod tests {
             let scene = Scene::from_toml(&text).unwrap();
             let effective = scene.effective();
             let written = effective.to_toml().unwrap();
-            let again =
-                Scene::from_toml(&written).unwrap_or_else(|e| panic!("{technique}: {e:?}\n{written}"));
+            let again = Scene::from_toml(&written)
+                .unwrap_or_else(|e| panic!("{technique}: {e:?}\n{written}"));
             assert_eq!(again, effective);
             assert_eq!(again.optics(), scene.optics());
             assert!(written.contains("exposure"), "{written}");
@@ -354,7 +404,8 @@ mod tests {
     #[test]
     fn the_slit_follows_the_knife() {
         let text = format!(
-            "{FLOW}[technique]\nkind = \"schlieren\"\ncutoff = {{ kind = \"knife\", angle_deg = 90.0 }}"
+            "{FLOW}[technique]\nkind = \"schlieren\"\ncutoff = {{ kind = \"knife\", angle_deg = \
+             90.0 }}"
         );
         let optics = Scene::from_toml(&text).unwrap().optics();
         assert!(matches!(optics.source, crate::optics::SourceShape::Slit { angle_deg: 90.0, .. }));

@@ -45,7 +45,8 @@ impl FromStr for Direction {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{text}` is not a view; write x, y, z, or AZIMUTH,ELEVATION in degrees such as 30,15 (elevation -90 to 90)"
+                "`{text}` is not a view; write x, y, z, or AZIMUTH,ELEVATION in degrees such as \
+                 30,15 (elevation -90 to 90)"
             )
         };
         match text.trim().to_ascii_lowercase().as_str() {
@@ -55,7 +56,8 @@ impl FromStr for Direction {
             _ => {}
         }
         let (a, e) = text.split_once(',').ok_or_else(wrong)?;
-        let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
+        let number =
+            |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong);
         let direction = Direction::Angles { azimuth_deg: number(a)?, elevation_deg: number(e)? };
         direction.view(DVec3::ZERO).map_err(|_| wrong())?;
         Ok(direction)
@@ -68,7 +70,9 @@ impl fmt::Display for Direction {
             Direction::Axis(Axis::X) => f.write_str("x"),
             Direction::Axis(Axis::Y) => f.write_str("y"),
             Direction::Axis(Axis::Z) => f.write_str("z"),
-            Direction::Angles { azimuth_deg, elevation_deg } => write!(f, "{azimuth_deg},{elevation_deg}"),
+            Direction::Angles { azimuth_deg, elevation_deg } => {
+                write!(f, "{azimuth_deg},{elevation_deg}")
+            }
         }
     }
 }
@@ -96,7 +100,10 @@ mod tests {
             assert_eq!(text.parse::<Direction>().unwrap().to_string(), text);
         }
         for wrong in ["w", "30", "30,95", "nan,0", ""] {
-            assert!(wrong.parse::<Direction>().unwrap_err().contains("AZIMUTH,ELEVATION"), "{wrong}");
+            assert!(
+                wrong.parse::<Direction>().unwrap_err().contains("AZIMUTH,ELEVATION"),
+                "{wrong}"
+            );
         }
     }
 }

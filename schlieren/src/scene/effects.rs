@@ -25,7 +25,8 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// Read from the scene. Tilted beams with [`BeamsSpec::Auto`] are decided when the field's depth is known; here they count as absent.
+    /// Read from the scene. Tilted beams with [`BeamsSpec::Auto`] are decided when the field's
+    /// depth is known; here they count as absent.
     pub fn required_by(scene: &Scene) -> Effects {
         let follows_light = scene.technique.follows_light();
         Effects {

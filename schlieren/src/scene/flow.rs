@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// The file and what its arrays are: a density, or temperature and pressure, or an index, or electrons. Where an array is named, a number can stand that holds for all
-/// of the field.
+/// The file and what its arrays are: a density, or temperature and pressure, or an index, or
+/// electrons. Where an array is named, a number can stand that holds for all of the field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlowSpec {
@@ -65,7 +65,8 @@ pub struct FlowSpec {
     /// Two-dimensional data are half of an axisymmetric flow, revolved about its axis.
     #[serde(default)]
     pub revolve: bool,
-    /// Nodes along the longest axis when the data have to be resampled; chosen from the cells when absent.
+    /// Nodes along the longest axis when the data have to be resampled; chosen from the cells when
+    /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resample_nodes: Option<usize>,
     /// Standard deviation in nodes of the smoothing of shocks; 0 for none.
@@ -191,7 +192,9 @@ impl FlowSpec {
         let named: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
         let [only] = named[..] else {
             return Err(wrong(match named.len() {
-                0 => "nothing says what the index depends on; name the array of the density, or those of temperature and pressure".into(),
+                0 => "nothing says what the index depends on; name the array of the density, or \
+                      those of temperature and pressure"
+                    .into(),
                 _ => format!("{} are alternatives; keep one", named.join(" and ")),
             }));
         };
@@ -210,7 +213,9 @@ impl FlowSpec {
             ("model", self.model != Model::Auto, by_state),
         ] {
             if present && !belongs {
-                return Err(wrong(format!("`{key}` changes nothing with `{only}`; leave one of them out")));
+                return Err(wrong(format!(
+                    "`{key}` changes nothing with `{only}`; leave one of them out"
+                )));
             }
         }
 
@@ -225,7 +230,8 @@ impl FlowSpec {
             "temperature" => {
                 let Some(pressure) = text(&self.pressure) else {
                     return Err(wrong(
-                        "a temperature needs a pressure; name its array, or give Pa for all of the field, such as pressure = \"101325\"".into(),
+                        "a temperature needs a pressure; name its array, or give Pa for all of the \
+                         field, such as pressure = \"101325\"".into(),
                     ));
                 };
                 Medium::TemperaturePressure {
@@ -239,7 +245,9 @@ impl FlowSpec {
                 }
             }
             "multifield" => self.multifield_medium()?,
-            "n_minus_1" => Medium::NMinus1(text(&self.n_minus_1).unwrap_or(Quantity::constant(f64::NAN))),
+            "n_minus_1" => {
+                Medium::NMinus1(text(&self.n_minus_1).unwrap_or(Quantity::constant(f64::NAN)))
+            }
             _ => Medium::Electrons(text(&self.electrons).unwrap_or(Quantity::constant(f64::NAN))),
         })
     }
@@ -248,8 +256,9 @@ impl FlowSpec {
         let spec = self.multifield.clone().unwrap_or_default();
         let mut parts = Vec::new();
         for (array, curve) in &spec.fields {
-            let wrong =
-                |reason: String| SceneError::Flow { reason: format!("multifield `{array}`: {reason}") };
+            let wrong = |reason: String| SceneError::Flow {
+                reason: format!("multifield `{array}`: {reason}"),
+            };
             if !curve.weight.is_finite() {
                 return Err(wrong(format!("weight {} is not a finite number", curve.weight)));
             }
@@ -261,7 +270,8 @@ impl FlowSpec {
             }
         }
         if parts.is_empty() {
-            let reason = "multifield: no array has a weight other than 0; give at least one curve".into();
+            let reason =
+                "multifield: no array has a weight other than 0; give at least one curve".into();
             return Err(SceneError::Flow { reason });
         }
         Ok(Medium::Multifield { parts, rule: spec.rule })
@@ -279,7 +289,9 @@ impl FlowSpec {
             smoothing_nodes: self.smoothing_nodes,
             outside: self.outside,
             hidden: self.hidden,
-            reference: self.reference_n_minus_1.map_or(border, |n_minus_1| Reference::Given { n_minus_1 }),
+            reference: self
+                .reference_n_minus_1
+                .map_or(border, |n_minus_1| Reference::Given { n_minus_1 }),
             ..Options::new(self.medium()?)
         })
     }
@@ -306,7 +318,10 @@ mod tests {
             ("density = \"rho\"\nspecies = { Y = \"unobtainium\" }", "unobtainium"),
             ("multifield = { fields = {} }", "no array has a weight"),
             ("multifield = { fields = { T = { knots = [[2, 0], [1, 0]] } } }", "multifield `T`"),
-            ("density = \"rho\"\nmultifield = { fields = { T = { knots = [[0, 0]] } } }", "alternatives"),
+            (
+                "density = \"rho\"\nmultifield = { fields = { T = { knots = [[0, 0]] } } }",
+                "alternatives",
+            ),
         ] {
             let message = flow(text).unwrap_err();
             assert!(message.contains(word), "{text}: {message}");
@@ -316,7 +331,8 @@ mod tests {
     #[test]
     fn curves_reach_the_medium_and_weightless_ones_do_not() {
         let m = flow(
-            "multifield = { rule = \"largest\", fields = { T = { knots = [[300, 0], [2000, -2e-4]] }, Z = { knots = [[0, 0]], weight = 0.0 } } }",
+            "multifield = { rule = \"largest\", fields = { T = { knots = [[300, 0], [2000, -2e-4]] \
+             }, Z = { knots = [[0, 0]], weight = 0.0 } } }",
         );
         let Ok(Medium::Multifield { parts, rule }) = m else { panic!("{m:?}") };
         assert_eq!((parts.len(), rule), (1, Rule::Largest));
@@ -326,9 +342,12 @@ mod tests {
     #[test]
     fn units_reach_the_medium() {
         let m = flow(
-            "temperature = \"T\"\ntemperature_zero_k = 273.15\npressure = \"1013.25\"\npressure_unit_pa = 100.0",
+            "temperature = \"T\"\ntemperature_zero_k = 273.15\npressure \
+             = \"1013.25\"\npressure_unit_pa = 100.0",
         );
-        let Ok(Medium::TemperaturePressure { temperature, pressure, .. }) = m else { panic!("{m:?}") };
+        let Ok(Medium::TemperaturePressure { temperature, pressure, .. }) = m else {
+            panic!("{m:?}")
+        };
         assert_eq!((temperature.offset, pressure.scale), (273.15, 100.0));
         assert_eq!(pressure.source, crate::input::Source::Constant(1013.25));
     }

@@ -8,23 +8,27 @@ use serde::{Deserialize, Serialize};
 /// Diameter of the stop in the cut-off plane when none is given: a camera lens.
 const STOP_M: f64 = 0.025;
 
-/// Arrays of the flow's file, each with its property ([`crate::media`]); a number holds for all of the field. The same for all wavelengths.
+/// Arrays of the flow's file, each with its property ([`crate::media`]); a number holds for all of
+/// the field. The same for all wavelengths.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MediaSpec {
     /// Absorption in 1/m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub absorption: Option<String>,
-    /// Emission in 1/m: radiance per metre, relative to that which exposes the film as undisturbed light without a cut-off does.
+    /// Emission in 1/m: radiance per metre, relative to that which exposes the film as undisturbed
+    /// light without a cut-off does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emission: Option<String>,
     /// Rotation of the plane of polarisation in rad/m, counter-clockwise in the picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<String>,
-    /// Angle of an analyser behind the flow to the polariser before it, counter-clockwise in the picture. No analyser when absent.
+    /// Angle of an analyser behind the flow to the polariser before it, counter-clockwise in the
+    /// picture. No analyser when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub analyser_deg: Option<f64>,
-    /// Diameter of the stop in the cut-off plane, 25 mm when absent. Light that the medium emits fills it evenly, and the cut-off passes its mean over it.
+    /// Diameter of the stop in the cut-off plane, 25 mm when absent. Light that the medium emits
+    /// fills it evenly, and the cut-off passes its mean over it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop_m: Option<f64>,
 }
@@ -55,7 +59,8 @@ impl MediaSpec {
         Property::ALL.into_iter().filter_map(given).collect()
     }
 
-    /// Properties that change the light that comes through: none for emission, and rotation only with an analyser.
+    /// Properties that change the light that comes through: none for emission, and rotation only
+    /// with an analyser.
     pub fn dims_light(&self) -> Vec<Property> {
         let counts = |p: &Property| match p {
             Property::Absorption => self.absorption.is_some(),
@@ -97,8 +102,11 @@ impl Scene {
             if let Source::Constant(v) = quantity.source
                 && !(v.is_finite() && (v >= 0.0 || property.is_signed()))
             {
-                let cure =
-                    if property.is_signed() { "give a finite number" } else { "give a number of at least 0" };
+                let cure = if property.is_signed() {
+                    "give a finite number"
+                } else {
+                    "give a number of at least 0"
+                };
                 return Err(SceneError::Value { key, value: v.to_string(), cure: cure.into() });
             }
         }
@@ -143,7 +151,10 @@ mod tests {
             ("analyser_deg = 45.0", ["media.analyser_deg", "media.rotation"]),
             ("absorption = \"a\"\nstop_m = 0.01", ["media.stop_m", "media.emission"]),
             ("emission = \"j\"\nstop_m = 0.0", ["media.stop_m", "above 0"]),
-            ("rotation = \"r\"\n[technique]\nkind = \"interferogram\"", ["media.rotation", "reference beam"]),
+            (
+                "rotation = \"r\"\n[technique]\nkind = \"interferogram\"",
+                ["media.rotation", "reference beam"],
+            ),
             ("absorption = \"a\"\n[technique]\nkind = \"slice\"", ["media", "no light"]),
         ] {
             let message = scene(&format!("[media]\n{text}")).unwrap_err().to_string();

@@ -1,7 +1,9 @@
 //! A picture's recipe as a TOML file: flow, view, light, bench, technique, film, march.
 //!
-//! Unknown keys are refused, keys that belong to another technique are unknown, and [`Scene::to_toml`] writes every value in effect, so a picture can be made
-//! again from what is written with it. Lengths are metres, angles degrees where people set them and radians where light is bent.
+//! Unknown keys are refused, keys that belong to another technique are unknown, and
+//! [`Scene::to_toml`] writes every value in effect, so a picture can be made again from what is
+//! written with it. Lengths are metres, angles degrees where people set them and radians where
+//! light is bent.
 //!
 //! ```
 //! use schlieren::scene::Scene;
@@ -89,7 +91,8 @@ pub struct ViewSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightSpec {
-    /// Vacuum wavelengths. The index is that of the first for one; several are traced each by itself and added up in their colours.
+    /// Vacuum wavelengths. The index is that of the first for one; several are traced each by
+    /// itself and added up in their colours.
     #[serde(default = "helium_neon")]
     pub wavelengths_nm: Vec<f64>,
     /// Parts of the light per wavelength; even when absent.
@@ -109,7 +112,12 @@ fn helium_neon() -> Vec<f64> {
 
 impl Default for LightSpec {
     fn default() -> Self {
-        LightSpec { wavelengths_nm: helium_neon(), weights: Vec::new(), source: None, beams: BeamsSpec::Auto }
+        LightSpec {
+            wavelengths_nm: helium_neon(),
+            weights: Vec::new(),
+            source: None,
+            beams: BeamsSpec::Auto,
+        }
     }
 }
 
@@ -136,11 +144,13 @@ pub enum SourceSpec {
     },
 }
 
-/// How the extent of the source is treated on the way through the flow. (In the cut-off plane it always counts.)
+/// How the extent of the source is treated on the way through the flow. (In the cut-off plane it
+/// always counts.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BeamsSpec {
-    /// Tilted when the source's tilts move anything by more than half a pixel, within the flow or in the plane of focus.
+    /// Tilted when the source's tilts move anything by more than half a pixel, within the flow or
+    /// in the plane of focus.
     #[default]
     Auto,
     /// All light travels along the axis.
@@ -184,11 +194,13 @@ pub struct FilmSpec {
     /// Where the picture's middle is, from the middle of the field along right and up.
     #[serde(default)]
     pub center_m: [f64; 2],
-    /// The plane in focus, from the middle of the field along the light: the film's distance of a shadowgraph, the background's distance of
-    /// a BOS set-up (towards the light). Each technique has a customary one.
+    /// The plane in focus, from the middle of the field along the light: the film's distance of a
+    /// shadowgraph, the background's distance of a BOS set-up (towards the light). Each technique
+    /// has a customary one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_m: Option<f64>,
-    /// Factor from energy to the picture's brightness (1 is white); each technique has a customary one.
+    /// Factor from energy to the picture's brightness (1 is white); each technique has a customary
+    /// one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<f64>,
 }
@@ -324,8 +336,9 @@ pub struct MarchSpec {
     /// Step in voxels; picked by the tolerance when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_voxels: Option<f64>,
-    /// Gas is left out as long as that changes no ray's deflection by more than this in all; 0 leaves out nothing. Where the phase is computed, its error is kept
-    /// below 1e-5 waves for each eight steps that are left out.
+    /// Gas is left out as long as that changes no ray's deflection by more than this in all; 0
+    /// leaves out nothing. Where the phase is computed, its error is kept below 1e-5 waves for each
+    /// eight steps that are left out.
     #[serde(default)]
     pub skip_rad: f64,
     /// Where it is computed.
@@ -433,13 +446,15 @@ impl Scene {
 
     /// A scene from a file, checked. Files it names are taken relative to it.
     pub fn open(path: &Path) -> Result<Scene, SceneError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SceneError::Read { path: path.into(), source })?;
         let mut scene = Scene::parse(&text, &path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut files = vec![&mut scene.flow.file];
         files.extend(scene.solids.files.iter_mut());
-        if let TechniqueSpec::Schlieren { cutoff: CutoffSpec::Image { file, .. } } = &mut scene.technique {
+        if let TechniqueSpec::Schlieren { cutoff: CutoffSpec::Image { file, .. } } =
+            &mut scene.technique
+        {
             files.push(file);
         }
         for file in files {
@@ -450,8 +465,8 @@ impl Scene {
     }
 
     fn parse(text: &str, name: &str) -> Result<Scene, SceneError> {
-        let scene: Scene =
-            toml::from_str(text).map_err(|source| SceneError::Toml { name: name.into(), source })?;
+        let scene: Scene = toml::from_str(text)
+            .map_err(|source| SceneError::Toml { name: name.into(), source })?;
         scene.check()?;
         Ok(scene)
     }
@@ -489,12 +504,16 @@ impl Scene {
         s
     }
 
-    /// How the film is exposed: as given, or by the technique. A shadowgraph is nothing but the density of light, which photons tell slowly (16 of them by
-    /// 25 %), so it is made of beams; others are made of photons.
+    /// How the film is exposed: as given, or by the technique. A shadowgraph is nothing but the
+    /// density of light, which photons tell slowly (16 of them by 25 %), so it is made of beams;
+    /// others are made of photons.
     pub fn sampling(&self) -> SamplingSpec {
         let beams = matches!(self.technique, TechniqueSpec::Shadowgraph {});
-        let customary =
-            if beams { SamplingSpec::Beams { cells_per_side: cells() } } else { SamplingSpec::default() };
+        let customary = if beams {
+            SamplingSpec::Beams { cells_per_side: cells() }
+        } else {
+            SamplingSpec::default()
+        };
         self.sampling.unwrap_or(customary)
     }
 
@@ -506,7 +525,8 @@ impl Scene {
         })
     }
 
-    /// From energy to brightness: as given, or the technique's. A shadowgraph's undisturbed light is set to the middle, so that there is room above it.
+    /// From energy to brightness: as given, or the technique's. A shadowgraph's undisturbed light
+    /// is set to the middle, so that there is room above it.
     pub fn exposure(&self) -> f64 {
         self.film.exposure.unwrap_or(if matches!(self.technique, TechniqueSpec::Shadowgraph {}) {
             0.5
@@ -548,7 +568,8 @@ impl Scene {
         let light = &self.light;
         let weight = |i: usize| light.weights.get(i).copied().unwrap_or(1.0);
         let total: f64 = (0..light.wavelengths_nm.len()).map(weight).sum();
-        let line = |(i, &wavelength_nm): (usize, &f64)| Line { wavelength_nm, weight: weight(i) / total };
+        let line =
+            |(i, &wavelength_nm): (usize, &f64)| Line { wavelength_nm, weight: weight(i) / total };
         light.wavelengths_nm.iter().enumerate().map(line).collect()
     }
 }

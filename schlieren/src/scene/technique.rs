@@ -79,7 +79,8 @@ impl Default for TechniqueSpec {
 
 impl TechniqueSpec {
     /// All names.
-    pub const NAMES: [&str; 6] = ["shadowgraph", "schlieren", "interferogram", "bos", "volume", "slice"];
+    pub const NAMES: [&str; 6] =
+        ["shadowgraph", "schlieren", "interferogram", "bos", "volume", "slice"];
 
     /// The technique of that name with its customary values.
     pub fn by_name(name: &str) -> Option<TechniqueSpec> {
@@ -183,7 +184,8 @@ impl CutoffSpec {
     pub fn cutoff(&self) -> Result<Cutoff, SceneError> {
         Ok(match self {
             CutoffSpec::Knife { angle_deg, open, open_m } => {
-                let position = open_m.map_or(KnifePosition::OpenFraction(*open), KnifePosition::OpenM);
+                let position =
+                    open_m.map_or(KnifePosition::OpenFraction(*open), KnifePosition::OpenM);
                 Cutoff::Knife(Knife { angle_deg: *angle_deg, position })
             }
             CutoffSpec::Circle { radius_m, center_m } => Cutoff::Aperture(Aperture {
@@ -199,7 +201,9 @@ impl CutoffSpec {
             CutoffSpec::Color { radius_m, red_deg } => {
                 Cutoff::Color(ColorWheel { radius_m: *radius_m, red_deg: *red_deg })
             }
-            CutoffSpec::Image { file, width_m } => Cutoff::Image(FilterImage::from_png(file, *width_m)?),
+            CutoffSpec::Image { file, width_m } => {
+                Cutoff::Image(FilterImage::from_png(file, *width_m)?)
+            }
             CutoffSpec::Painted(painting) => Cutoff::Image(painting.to_filter()?),
         })
     }

@@ -1,4 +1,5 @@
-//! The filter as the page shows it: what it lets through, where the light is on it, and how light is followed from a pixel to the filter.
+//! The filter as the page shows it: what it lets through, where the light is on it, and how light
+//! is followed from a pixel to the filter.
 
 use crate::cutoff::painted::{Painting, Stroke};
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
@@ -27,8 +28,8 @@ pub(super) struct FilterPlane {
     pub(super) outside: f32,
 }
 
-/// Half the side of the plane that is worth showing: the light and the cut-off, rounded up to a number with one digit so that it does not flicker. The size
-/// of a painting stays.
+/// Half the side of the plane that is worth showing: the light and the cut-off, rounded up to a
+/// number with one digit so that it does not flicker. The size of a painting stays.
 pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
     let optics = scene.optics();
     let image = optics.source_image();
@@ -82,7 +83,8 @@ impl FilterPlane {
                 rgb.extend(t.map(|v| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8));
             }
         }
-        let (light, outside) = map.map_or((vec![0.0; PIXELS * PIXELS], 0.0), |m| histogram(scene, m, half_m));
+        let (light, outside) =
+            map.map_or((vec![0.0; PIXELS * PIXELS], 0.0), |m| histogram(scene, m, half_m));
         Ok(FilterPlane { half_m, rgb, light, outside })
     }
 }
@@ -116,15 +118,25 @@ fn histogram(scene: &Scene, map: &Map, half_m: f64) -> (Vec<f32>, f32) {
     (sums.into_iter().map(|s| (s / all) as f32).collect(), (outside / all) as f32)
 }
 
-/// Where the light of a place of the picture crosses the filter: deflection and point, for the middle of the source. `at` is 0..=1 from the picture's upper left
-/// corner. `None` where no light comes from.
+/// Where the light of a place of the picture crosses the filter: deflection and point, for the
+/// middle of the source. `at` is 0..=1 from the picture's upper left corner. `None` where no light
+/// comes from.
 ///
-/// The map is by where rays start, the picture by where they land; out of focus that is not the same. A few steps of a fixed-point iteration find the start.
-pub(super) fn traced(map: &Map, framing: &Framing, f2_m: f64, at: [f64; 2]) -> Option<(Across, Across)> {
+/// The map is by where rays start, the picture by where they land; out of focus that is not the
+/// same. A few steps of a fixed-point iteration find the start.
+pub(super) fn traced(
+    map: &Map,
+    framing: &Framing,
+    f2_m: f64,
+    at: [f64; 2],
+) -> Option<(Across, Across)> {
     let [w, h] = [framing.width, framing.height];
     let landed = [at[0] * f64::from(w), at[1] * f64::from(h)];
     let pixel = |p: [f64; 2]| {
-        let [x, y] = [p[0].clamp(0.0, f64::from(w - 1)) as usize, p[1].clamp(0.0, f64::from(h - 1)) as usize];
+        let [x, y] = [
+            p[0].clamp(0.0, f64::from(w - 1)) as usize,
+            p[1].clamp(0.0, f64::from(h - 1)) as usize,
+        ];
         y * w as usize + x
     };
     let mut start = landed;
@@ -143,16 +155,21 @@ pub(super) fn traced(map: &Map, framing: &Framing, f2_m: f64, at: [f64; 2]) -> O
     Some((d, d.map(|c| (f2_m * f64::from(c)) as f32)))
 }
 
-/// A cut-off as a painting, to be painted on. Knives and circles become dabs of the same shape; a wheel of colours or a picture cannot, so they give way to `ground`
-/// and the second value is false.
+/// A cut-off as a painting, to be painted on. Knives and circles become dabs of the same shape; a
+/// wheel of colours or a picture cannot, so they give way to `ground` and the second value is
+/// false.
 pub(super) fn as_painting(
     scene: &Scene,
     cutoff: &CutoffSpec,
     half_m: f64,
     ground: Rgb,
 ) -> Result<(Painting, bool), SceneError> {
-    let painting =
-        |ground_rgb, strokes| Painting { size_m: [2.0 * half_m; 2], pixels: 512, ground_rgb, strokes };
+    let painting = |ground_rgb, strokes| Painting {
+        size_m: [2.0 * half_m; 2],
+        pixels: 512,
+        ground_rgb,
+        strokes,
+    };
     let dab = |at: [f64; 2], radius_m, rgb| Stroke { from_m: at, to_m: at, radius_m, rgb };
     let (black, white) = ([0.0; 3], [1.0; 3]);
     Ok(match cutoff {
@@ -173,12 +190,15 @@ pub(super) fn as_painting(
                 let middle = 0.5 * (closed_m + open_m);
                 *if open(middle) { &mut open_m } else { &mut closed_m } = middle;
             }
-            // A dab so large that its rim is straight: over the filter it sags by less than a thousandth of its half side.
+            // A dab so large that its rim is straight: over the filter it sags by less than a
+            // thousandth of its half side.
             let radius_m = 1000.0 * half_m;
             let at = [cos, sin].map(|c| c * (open_m + radius_m));
             (painting(black, vec![dab(at, radius_m, white)]), true)
         }
-        CutoffSpec::Color { .. } | CutoffSpec::Image { .. } => (painting(ground, Vec::new()), false),
+        CutoffSpec::Color { .. } | CutoffSpec::Image { .. } => {
+            (painting(ground, Vec::new()), false)
+        }
     })
 }
 
@@ -204,8 +224,9 @@ mod tests {
         let s = scene("[light]\nsource = { kind = \"point\" }");
         let plane = FilterPlane::new(&s, Some(&prism([2e-4, -1e-4]))).unwrap();
         // f2 = 1.5 m: 0.3 mm to the right, 0.15 mm down.
-        let brightest =
-            (0..PIXELS * PIXELS).max_by(|a, b| plane.light[*a].total_cmp(&plane.light[*b])).unwrap();
+        let brightest = (0..PIXELS * PIXELS)
+            .max_by(|a, b| plane.light[*a].total_cmp(&plane.light[*b]))
+            .unwrap();
         let at = |i: usize| 2.0 * plane.half_m * ((i as f64 + 0.5) / PIXELS as f64 - 0.5);
         let pixel_m = 2.0 * plane.half_m / PIXELS as f64;
         assert!((at(brightest % PIXELS) - 3e-4).abs() < pixel_m);
@@ -243,7 +264,8 @@ mod tests {
         let framing = Framing { width: 4, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
         let mut map = prism([1e-4, 0.0]);
         assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
-        // All light lands a pixel to the right of where it started: what is seen in column 2 has started in column 1.
+        // All light lands a pixel to the right of where it started: what is seen in column 2 has
+        // started in column 1.
         map.displacement_m = vec![[1e-3, 0.0]; 16];
         map.deflection_rad[2 * 4 + 1] = [0.0, 3e-4];
         assert_eq!(traced(&map, &framing, 2.0, [0.6, 0.6]).unwrap().1, [0.0, 6e-4]);

@@ -1,4 +1,5 @@
-//! The flow in memory: read once, made into fields again whenever wavelengths or transfer functions change.
+//! The flow in memory: read once, made into fields again whenever wavelengths or transfer functions
+//! change.
 
 use crate::field::{Field, Node};
 use crate::input::{InputError, from_dataset};
@@ -31,7 +32,8 @@ impl Flow {
     /// Reads a file. Of a collection this is the first time.
     pub(super) fn open(path: &Path) -> Result<Flow, InputError> {
         let file = path.to_path_buf();
-        let in_file = |e: InputError| InputError::InFile { path: file.clone(), source: Box::new(e) };
+        let in_file =
+            |e: InputError| InputError::InFile { path: file.clone(), source: Box::new(e) };
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
             let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
             return Ok(Flow { file, data, warnings: Vec::new() });
@@ -51,7 +53,8 @@ impl Flow {
                 let range = if array.components == 1 {
                     array.range().map(|r| [r.0, r.1])
                 } else {
-                    let sizes = (0..array.tuples()).map(|i| array.magnitude(i)).filter(|m| m.is_finite());
+                    let sizes =
+                        (0..array.tuples()).map(|i| array.magnitude(i)).filter(|m| m.is_finite());
                     let nothing = [f64::INFINITY, f64::NEG_INFINITY];
                     Some(sizes.fold(nothing, |[l, h], m| [l.min(m), h.max(m)]))
                 };
@@ -64,7 +67,8 @@ impl Flow {
         found.into_iter().map(|(name, range)| ArrayInfo { name, range }).collect()
     }
 
-    /// n0 - 1 around this flow, in the light of the scene's first wavelength: what all times of a series are relative to.
+    /// n0 - 1 around this flow, in the light of the scene's first wavelength: what all times of a
+    /// series are relative to.
     pub(super) fn reference_n_minus_1(&self, scene: &Scene) -> Result<f64, RenderError> {
         let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
         let loaded = from_dataset(&self.data, &options)
@@ -72,8 +76,13 @@ impl Flow {
         Ok(loaded.report.reference_n_minus_1)
     }
 
-    /// The test section for a scene. `solids` are taken over from the one before: a page cannot change them.
-    pub(super) fn section(&self, scene: &Scene, solids: Option<Solids>) -> Result<TestSection, RenderError> {
+    /// The test section for a scene. `solids` are taken over from the one before: a page cannot
+    /// change them.
+    pub(super) fn section(
+        &self,
+        scene: &Scene,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
         let mut fields = Vec::new();
         let mut report = None;
         for line in scene.lines() {
@@ -94,7 +103,8 @@ impl Flow {
 /// Nodes of a field that is drawn while something moves.
 const COARSE_NODES: usize = 1 << 18;
 
-/// Every so many nodes of a field, few enough to be drawn while something moves; `None` when the field is as small as that already.
+/// Every so many nodes of a field, few enough to be drawn while something moves; `None` when the
+/// field is as small as that already.
 pub(super) fn coarse(field: &Field) -> Option<Field> {
     let d = field.dims();
     let kept = |every: usize| d.map(|n| (n - 1) / every + 1);
@@ -106,13 +116,16 @@ pub(super) fn coarse(field: &Field) -> Option<Field> {
     }
     let count = dims.iter().product();
     let from = |i: usize| {
-        let [x, y, z] = [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])].map(|c| c * every);
+        let [x, y, z] =
+            [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])].map(|c| c * every);
         x + d[0] * (y + d[1] * z)
     };
     let eps = (0..count).map(|i| field.eps()[from(i)]).collect();
     let nodes = field.nodes().map(|n: &[Node]| (0..count).map(|i| n[from(i)]).collect());
-    // Stretched so that the last node is where the whole field's last node is: the picture must not jump when it gets sharp.
-    let spacing_m = [0, 1, 2].map(|c| field.spacing_m()[c] * (d[c] - 1) as f64 / (dims[c] - 1) as f64);
+    // Stretched so that the last node is where the whole field's last node is: the picture must not
+    // jump when it gets sharp.
+    let spacing_m =
+        [0, 1, 2].map(|c| field.spacing_m()[c] * (d[c] - 1) as f64 / (dims[c] - 1) as f64);
     Field::new(dims, spacing_m, field.origin_m(), eps, field.n0(), nodes).ok()
 }
 
@@ -123,7 +136,9 @@ mod tests {
 
     #[test]
     fn the_coarse_field_fills_the_same_box() {
-        let f = Field::from_fn([130, 129, 70], [1e-3; 3], DVec3::splat(0.5), 1.0003, |p| 1e-5 * p.x).unwrap();
+        let f =
+            Field::from_fn([130, 129, 70], [1e-3; 3], DVec3::splat(0.5), 1.0003, |p| 1e-5 * p.x)
+                .unwrap();
         let c = coarse(&f).unwrap();
         assert!(c.dims().iter().product::<usize>() <= COARSE_NODES);
         assert!((c.size_m() - f.size_m()).length() < 1e-12 && c.origin_m() == f.origin_m());

@@ -45,7 +45,8 @@ pub struct FrameInfo {
     pub largest_deflection_rad: Option<f64>,
     /// The march, in words.
     pub march: String,
-    /// Whether it was drawn with a coarse tolerance, and maybe through every so many nodes of the field.
+    /// Whether it was drawn with a coarse tolerance, and maybe through every so many nodes of the
+    /// field.
     pub draft: bool,
     /// Darkest and brightest channel.
     pub levels: [f32; 2],
@@ -71,7 +72,8 @@ pub(super) struct DeflectionMap {
 pub struct Frame {
     /// In numbers.
     pub info: FrameInfo,
-    /// Head and pixels, as sent: length of the JSON as u32, the JSON, the picture's sRGB bytes, the filter's, the light on the filter as f32; little-endian.
+    /// Head and pixels, as sent: length of the JSON as u32, the JSON, the picture's sRGB bytes, the
+    /// filter's, the light on the filter as f32; little-endian.
     pub bytes: Vec<u8>,
     pub(super) traced: Option<Arc<DeflectionMap>>,
 }
@@ -86,7 +88,8 @@ impl Frame {
     ) -> Frame {
         let mut pixels = Vec::new();
         if let Some(r) = rendered {
-            (info.width, info.height, info.pixel_m) = (r.framing.width, r.framing.height, r.framing.pixel_m);
+            (info.width, info.height, info.pixel_m) =
+                (r.framing.width, r.framing.height, r.framing.pixel_m);
             pixels.resize(3 * r.pixels.len(), 0);
             // NaN becomes 0 in the cast; there is a warning for it in the report.
             let byte = |v: f32| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8;
@@ -96,7 +99,8 @@ impl Frame {
                 .for_each(|(to, from)| to.copy_from_slice(&from.map(byte)));
         }
         if let Some(f) = filter {
-            (info.filter_half_m, info.filter_pixels, info.light_outside) = (f.half_m, PIXELS, f.outside);
+            (info.filter_half_m, info.filter_pixels, info.light_outside) =
+                (f.half_m, PIXELS, f.outside);
         }
         let head = serde_json::to_vec(&info).unwrap_or_default();
         let mut bytes = (head.len() as u32).to_le_bytes().to_vec();

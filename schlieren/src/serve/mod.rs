@@ -3,8 +3,9 @@
 //! ```text
 //!   browser ── HTTP on loopback, token in every address ── [routes] ── [session] ── [worker]: one thread that draws
 //! ```
-//! One thread answers requests and never computes; another draws with all cores, and stops when the scene changes. All pages that are open show the same scene.
-//! Files cannot be opened or written from the page: it changes how the flow is looked at, and downloads what it sees.
+//! One thread answers requests and never computes; another draws with all cores, and stops when the
+//! scene changes. All pages that are open show the same scene. Files cannot be opened or written
+//! from the page: it changes how the flow is looked at, and downloads what it sees.
 
 mod filter_plane;
 mod flow;
@@ -16,7 +17,8 @@ mod worker;
 pub use flow::ArrayInfo;
 pub use frame::{Frame, FrameInfo};
 pub use session::{
-    Canvas, MAX_POINTS, MAX_SAMPLES, MAX_SIDE, MAX_STROKES, Paint, PaintOutcome, RefusedChange, Session,
+    Canvas, MAX_POINTS, MAX_SAMPLES, MAX_SIDE, MAX_STROKES, Paint, PaintOutcome, RefusedChange,
+    Session,
 };
 
 use crate::input::Step;
@@ -61,7 +63,9 @@ const TICK: Duration = Duration::from_millis(50);
 /// How long connections may take to finish at the end.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Serves the scene until `cancel` is set. With several `steps` the page has a choice of time, and the first is shown first; with fewer the scene's own file is. `ready` gets the address of the page once it can be opened, and notes on the way.
+/// Serves the scene until `cancel` is set. With several `steps` the page has a choice of time, and
+/// the first is shown first; with fewer the scene's own file is. `ready` gets the address of the
+/// page once it can be opened, and notes on the way.
 pub fn serve(
     mut scene: Scene,
     steps: Vec<Step>,
@@ -71,8 +75,10 @@ pub fn serve(
 ) -> Result<(), ServeError> {
     let start = |e: &dyn std::fmt::Display| ServeError::Start(e.to_string());
     let token = token().map_err(|e| start(&e))?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| start(&e))?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|e| start(&e))?;
     let listen = |source| ServeError::Listen { address, source };
     // Before the flow is read: a port that is taken should be known at once.
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
@@ -99,7 +105,8 @@ pub fn serve(
     runtime.block_on(async {
         let ending = Arc::new(tokio::sync::Notify::new());
         let told = ending.clone();
-        let server = axum::serve(listener, app).with_graceful_shutdown(async move { told.notified().await });
+        let server =
+            axum::serve(listener, app).with_graceful_shutdown(async move { told.notified().await });
         let server = tokio::spawn(async move { server.await });
         while !cancel.load(Ordering::Relaxed) && !server.is_finished() {
             tokio::time::sleep(TICK).await;

@@ -1,4 +1,5 @@
-//! The page's addresses. All lie below the token: `/TOKEN/`, `/TOKEN/frame`…; whoever does not know it learns nothing, not even which addresses there are.
+//! The page's addresses. All lie below the token: `/TOKEN/`, `/TOKEN/frame`…; whoever does not know
+//! it learns nothing, not even which addresses there are.
 //!
 //! | address | |
 //! |---|---|
@@ -67,7 +68,8 @@ pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
         .with_state(app)
 }
 
-/// Lets through what knows the token, and says to browsers what the page may do: nothing but talk to this server.
+/// Lets through what knows the token, and says to browsers what the page may do: nothing but talk
+/// to this server.
 async fn guarded(State(app): State<App>, request: Request, next: Next) -> Response {
     let given = request.uri().path().split('/').nth(1).unwrap_or_default();
     let mut response = if same(given, &app.token) {
@@ -80,7 +82,8 @@ async fn guarded(State(app): State<App>, request: Request, next: Next) -> Respon
     for (name, value) in [
         (
             "content-security-policy",
-            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
+             connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
         ),
         ("referrer-policy", "no-referrer"),
         ("x-content-type-options", "nosniff"),
@@ -108,8 +111,9 @@ fn error(status: StatusCode, text: &str) -> Response {
 
 /// JSON of a body, whatever content type it claims.
 fn json<T: DeserializeOwned>(body: &Bytes) -> Result<T, Box<Response>> {
-    serde_json::from_slice(body)
-        .map_err(|e| Box::new(error(StatusCode::BAD_REQUEST, &format!("the request makes no sense: {e}"))))
+    serde_json::from_slice(body).map_err(|e| {
+        Box::new(error(StatusCode::BAD_REQUEST, &format!("the request makes no sense: {e}")))
+    })
 }
 
 async fn index() -> Response {
@@ -143,9 +147,8 @@ async fn frame(State(app): State<App>, Query(FrameQuery { after }): Query<FrameQ
     }
     match app.session.frame() {
         // A clone of some 100 kB to megabytes; sharing it would need another body type.
-        Some(frame) => {
-            ([(header::CONTENT_TYPE, "application/octet-stream")], frame.bytes.clone()).into_response()
-        }
+        Some(frame) => ([(header::CONTENT_TYPE, "application/octet-stream")], frame.bytes.clone())
+            .into_response(),
         None => StatusCode::NO_CONTENT.into_response(),
     }
 }
@@ -185,7 +188,8 @@ async fn trace(State(app): State<App>, body: Bytes) -> Response {
     };
     match app.session.trace(place.at) {
         Ok(Some((deflection, point))) => {
-            axum::Json(serde_json::json!({ "deflection_rad": deflection, "filter_m": point })).into_response()
+            axum::Json(serde_json::json!({ "deflection_rad": deflection, "filter_m": point }))
+                .into_response()
         }
         Ok(None) => axum::Json(serde_json::json!({ "dark": true })).into_response(),
         Err(refused) => refused.into_response(),

@@ -1,6 +1,8 @@
-//! What the page's requests and the drawing thread share: the scene, the newest frame, and what is wanted next.
+//! What the page's requests and the drawing thread share: the scene, the newest frame, and what is
+//! wanted next.
 //!
-//! Requests only change values under a lock that nobody holds for long; everything that takes time is done by [`super::worker`].
+//! Requests only change values under a lock that nobody holds for long; everything that takes time
+//! is done by [`super::worker`].
 
 use super::filter_plane::{as_painting, half_side_m, traced};
 use super::flow::ArrayInfo;
@@ -10,7 +12,8 @@ use crate::cutoff::painted::Stroke;
 use crate::input::Step;
 use crate::optics::Across;
 use crate::scene::{
-    BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene, TechniqueSpec,
+    BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene,
+    TechniqueSpec,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -26,7 +29,8 @@ pub const MAX_SAMPLES: u32 = 4096;
 pub const MAX_STROKES: usize = 5000;
 /// Most points of one request to paint.
 pub const MAX_POINTS: usize = 4096;
-/// Sections of the scene that a page may change; of the flow only its transfer functions (and its time, by `step`).
+/// Sections of the scene that a page may change; of the flow only its transfer functions (and its
+/// time, by `step`).
 const PAGE_SECTIONS: [&str; 8] =
     ["view", "light", "lenses", "technique", "film", "sampling", "march", "flow"];
 
@@ -90,7 +94,8 @@ pub struct Session {
     pub(super) steps: Vec<Step>,
     /// Arrays for transfer functions, of the first step.
     arrays: Vec<ArrayInfo>,
-    /// As it was when the program started: a page may change neither files nor what the arrays mean, only curves.
+    /// As it was when the program started: a page may change neither files nor what the arrays
+    /// mean, only curves.
     flow: FlowSpec,
     image: Option<CutoffSpec>,
 }
@@ -101,7 +106,8 @@ pub struct Session {
 pub struct Paint {
     /// Where the points are.
     pub on: Canvas,
-    /// Along the stroke: on the filter metres from the axis, on the picture 0..=1 from its upper left corner.
+    /// Along the stroke: on the filter metres from the axis, on the picture 0..=1 from its upper
+    /// left corner.
     pub points: Vec<[f64; 2]>,
     /// Of the brush, on the filter.
     pub radius_m: f64,
@@ -141,7 +147,9 @@ impl Session {
     ) -> Result<Session, RefusedChange> {
         check_limits(&scene)?;
         let image = match &scene.technique {
-            TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { .. } } => Some(cutoff.clone()),
+            TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { .. } } => {
+                Some(cutoff.clone())
+            }
             _ => None,
         };
         let shared = Shared {
@@ -193,7 +201,8 @@ impl Session {
         let shared = self.lock();
         let mut scene = shared.scene.effective();
         if self.is_later(&scene) {
-            // Without the series around it, the file would be relative to its own surroundings and make another picture.
+            // Without the series around it, the file would be relative to its own surroundings and
+            // make another picture.
             match &shared.reference {
                 Some((flow, n_minus_1)) if *flow == shared.scene.flow => {
                     scene.flow.reference_n_minus_1 = Some(*n_minus_1);
@@ -214,8 +223,9 @@ impl Session {
         self.lock().frame.clone()
     }
 
-    /// Changes the scene by a JSON merge patch (RFC 7396); objects with a `kind` or `method` are replaced whole, `null` is the technique's custom. A technique of
-    /// another kind brings its own bench back. Returns the new generation.
+    /// Changes the scene by a JSON merge patch (RFC 7396); objects with a `kind` or `method` are
+    /// replaced whole, `null` is the technique's custom. A technique of another kind brings its own
+    /// bench back. Returns the new generation.
     pub fn edit(&self, patch: &Value) -> Result<u64, RefusedChange> {
         let mut shared = self.lock();
         let before = shared.scene.clone();
@@ -240,7 +250,8 @@ impl Session {
         if previous.is_some()
             && patch.pointer("/technique").and_then(Value::as_object).is_some_and(|t| t.len() == 1)
         {
-            patch["technique"] = serde_json::to_value(&base.technique).map_err(|e| refused(e.to_string()))?;
+            patch["technique"] =
+                serde_json::to_value(&base.technique).map_err(|e| refused(e.to_string()))?;
         }
         self.check_patch(&patch)?;
 
@@ -251,7 +262,8 @@ impl Session {
                 curves => self.with_curves(curves)?,
             };
         }
-        // The time: one of those there are. Transfer functions start from the first file, so the one shown is named again.
+        // The time: one of those there are. Transfer functions start from the first file, so the
+        // one shown is named again.
         base.flow.file = match step {
             Some(step) => self.step(&step)?.path.clone(),
             None => before.flow.file.clone(),
@@ -261,7 +273,8 @@ impl Session {
         }
         let mut value = serde_json::to_value(&base).map_err(|e| refused(e.to_string()))?;
         merge(&mut value, patch);
-        let scene: Scene = serde_json::from_value(value).map_err(|e| refused(format!("not a scene: {e}")))?;
+        let scene: Scene =
+            serde_json::from_value(value).map_err(|e| refused(format!("not a scene: {e}")))?;
         self.check_scene(&scene)?;
         if let Some(k) = previous {
             shared.settings.insert(k.technique.name(), k);
@@ -276,7 +289,10 @@ impl Session {
     fn step(&self, number: &Value) -> Result<&Step, RefusedChange> {
         let step = number.as_u64().and_then(|n| self.steps.get(usize::try_from(n).ok()?));
         step.ok_or_else(|| match self.steps.len() {
-            0 => refused("`step`: the flow has one time; start the program with a time series (.pvd, or several files)"),
+            0 => refused(
+                "`step`: the flow has one time; start the program with a time series \
+                          (.pvd, or several files)",
+            ),
             n => refused(format!("`step` is {number}; give 0 to {}", n - 1)),
         })
     }
@@ -289,7 +305,9 @@ impl Session {
 
     fn check_patch(&self, patch: &Value) -> Result<(), RefusedChange> {
         let Some(sections) = patch.as_object() else {
-            return Err(refused("a change is an object such as {\"view\": {\"direction\": \"30,15\"}}"));
+            return Err(refused(
+                "a change is an object such as {\"view\": {\"direction\": \"30,15\"}}",
+            ));
         };
         if let Some(other) = sections.keys().find(|k| !PAGE_SECTIONS.contains(&k.as_str())) {
             return Err(refused(format!(
@@ -299,7 +317,8 @@ impl Session {
         }
         match sections.get("flow").and_then(Value::as_object) {
             Some(flow) if flow.keys().any(|k| k != "multifield") => Err(refused(
-                "of the flow only `multifield` can be changed from the page; start the program with other options",
+                "of the flow only `multifield` can be changed from the page; start the program \
+                 with other options",
             )),
             None if sections.contains_key("flow") => Err(refused("`flow` is no object")),
             _ => Ok(()),
@@ -308,15 +327,20 @@ impl Session {
 
     fn with_curves(&self, curves: Value) -> Result<FlowSpec, RefusedChange> {
         if self.arrays.len() < 2 {
-            return Err(refused("the flow has fewer than two arrays; transfer functions are for several"));
+            return Err(refused(
+                "the flow has fewer than two arrays; transfer functions are for several",
+            ));
         }
-        let multifield =
-            serde_json::from_value(curves).map_err(|e| refused(format!("not transfer functions: {e}")))?;
+        let multifield = serde_json::from_value(curves)
+            .map_err(|e| refused(format!("not transfer functions: {e}")))?;
         let flow = FlowSpec { multifield: Some(multifield), ..self.flow.without_medium() };
         for name in flow.multifield.iter().flat_map(|m| m.fields.keys()) {
             if !self.arrays.iter().any(|a| a.name == *name) {
                 let names: Vec<&str> = self.arrays.iter().map(|a| a.name.as_str()).collect();
-                return Err(refused(format!("there is no array `{name}`; there are: {}", names.join(", "))));
+                return Err(refused(format!(
+                    "there is no array `{name}`; there are: {}",
+                    names.join(", ")
+                )));
             }
         }
         Ok(flow)
@@ -325,7 +349,8 @@ impl Session {
     fn check_scene(&self, scene: &Scene) -> Result<(), RefusedChange> {
         check_limits(scene)?;
         // Pages must not make the program read any file.
-        if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } = &scene.technique
+        if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } =
+            &scene.technique
         {
             let known = self
                 .image
@@ -333,7 +358,8 @@ impl Session {
                 .is_some_and(|i| matches!(i, CutoffSpec::Image { file: f, .. } if f == file));
             if !known {
                 return Err(refused(format!(
-                    "the page cannot open `{}` as a filter; start the program with --cutoff PNG for a {}",
+                    "the page cannot open `{}` as a filter; start the program with --cutoff PNG \
+                     for a {}",
                     file.display(),
                     cutoff.name()
                 )));
@@ -369,11 +395,14 @@ impl Session {
             Canvas::Filter => (paint.points.clone(), 0),
             Canvas::Picture => {
                 let Some(view) = &traced_view else {
-                    return Err(refused("the picture is not drawn yet; paint when it stands still"));
+                    return Err(refused(
+                        "the picture is not drawn yet; paint when it stands still",
+                    ));
                 };
                 let f2 = shared.scene.optics().schlieren_focal_length_m;
-                let on_filter =
-                    |p: &[f64; 2]| traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from));
+                let on_filter = |p: &[f64; 2]| {
+                    traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from))
+                };
                 let places: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
                 let dark = paint.points.len() - places.len();
                 (places, dark)
@@ -382,8 +411,8 @@ impl Session {
 
         // Onto a painting.
         let half_m = half_side_m(&shared.scene, traced_view.as_ref().map(|t| &t.map));
-        let (mut painting, same) =
-            as_painting(&shared.scene, &cutoff, half_m, [0.0; 3]).map_err(|e| refused(chain(&e)))?;
+        let (mut painting, same) = as_painting(&shared.scene, &cutoff, half_m, [0.0; 3])
+            .map_err(|e| refused(chain(&e)))?;
         let strokes = strokes(&places, paint);
         let added = strokes.len();
         painting.strokes.extend(strokes);
@@ -393,7 +422,8 @@ impl Session {
             )));
         }
         let mut scene = shared.scene.clone();
-        // The source stays as it was: a knife's customary slit would otherwise become a painting's customary disc.
+        // The source stays as it was: a knife's customary slit would otherwise become a painting's
+        // customary disc.
         scene.light.source = scene.effective().light.source;
         scene.technique = TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(painting) };
         self.check_scene(&scene)?;
@@ -402,12 +432,16 @@ impl Session {
             self.changed(&mut shared);
         }
         let note = (!same && added > 0).then(|| {
-            format!("a {} filter cannot be painted over; the painting starts on black", cutoff.name())
+            format!(
+                "a {} filter cannot be painted over; the painting starts on black",
+                cutoff.name()
+            )
         });
         Ok(PaintOutcome { generation: shared.generation, added, dark, note })
     }
 
-    /// Where the light of a place of the picture goes: deflection, and point on the filter; `None` without light.
+    /// Where the light of a place of the picture goes: deflection, and point on the filter; `None`
+    /// without light.
     pub fn trace(&self, at: [f64; 2]) -> Result<Option<(Across, Across)>, RefusedChange> {
         if !at.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(refused("places of the picture are 0 to 1 from its upper left corner"));
@@ -468,14 +502,16 @@ impl Session {
     }
 }
 
-/// Strokes through places on the filter. Neighbouring places farther apart than the brush is wide are not joined on the picture's behalf: across a shock they have nothing between
-/// them. Places that a dab already covers add nothing.
+/// Strokes through places on the filter. Neighbouring places farther apart than the brush is wide
+/// are not joined on the picture's behalf: across a shock they have nothing between them. Places
+/// that a dab already covers add nothing.
 fn strokes(places: &[[f64; 2]], paint: &Paint) -> Vec<Stroke> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let mut strokes: Vec<Stroke> = Vec::new();
     let mut last: Option<[f64; 2]> = None;
     for &to_m in places {
-        let joined = |l: &[f64; 2]| paint.on == Canvas::Filter || distance(*l, to_m) <= 2.0 * paint.radius_m;
+        let joined =
+            |l: &[f64; 2]| paint.on == Canvas::Filter || distance(*l, to_m) <= 2.0 * paint.radius_m;
         if last.is_some_and(|l| distance(l, to_m) < 0.05 * paint.radius_m) {
             continue;
         }
@@ -531,18 +567,21 @@ fn check_limits(scene: &Scene) -> Result<(), RefusedChange> {
     let [w, h] = scene.film.size;
     if w > MAX_SIDE || h > MAX_SIDE {
         return Err(refused(format!(
-            "film.size is {w}x{h}; the page draws at most {MAX_SIDE} pixels along a side: save the scene and draw it with `schlieren render --scene`"
+            "film.size is {w}x{h}; the page draws at most {MAX_SIDE} pixels along a side: save the \
+             scene and draw it with `schlieren render --scene`"
         )));
     }
     match scene.sampling() {
         SamplingSpec::Photons { samples, .. } if samples > MAX_SAMPLES => Err(refused(format!(
-            "sampling.samples is {samples}; the page takes at most {MAX_SAMPLES}: save the scene and draw it with `schlieren render --scene`"
+            "sampling.samples is {samples}; the page takes at most {MAX_SAMPLES}: save the scene \
+             and draw it with `schlieren render --scene`"
         ))),
         _ => Ok(()),
     }
 }
 
-/// RFC 7396, but for objects that choose one of several kinds: merged, keys of the old kind would remain.
+/// RFC 7396, but for objects that choose one of several kinds: merged, keys of the old kind would
+/// remain.
 fn merge(target: &mut Value, patch: Value) {
     let Value::Object(patch) = patch else {
         *target = patch;

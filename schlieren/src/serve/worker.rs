@@ -5,9 +5,10 @@
 //!  requests ───┐                         ┐
 //!  thread      └─ 1 coarse, never stopped └─ (stopped) 1 coarse ─ 2 … ─ samples × 4 … ─ finished ─ error measured
 //! ```
-//! The first picture after a change is never stopped by the next change: whoever drags without pause sees every picture that this machine can draw. All others are
-//! stopped at once. Each is drawn from scratch, so the finished one is bit for bit what `schlieren render` makes of the same scene; since photons grow by fours, that costs a third more than
-//! adding them up would.
+//! The first picture after a change is never stopped by the next change: whoever drags without
+//! pause sees every picture that this machine can draw. All others are stopped at once. Each is
+//! drawn from scratch, so the finished one is bit for bit what `schlieren render` makes of the same
+//! scene; since photons grow by fours, that costs a third more than adding them up would.
 
 use super::filter_plane::FilterPlane;
 use super::flow::{Flow, coarse};
@@ -29,7 +30,8 @@ const MOVING_SECS: f64 = 0.06;
 const MOVING_SIDES: [u32; 2] = [320, 64];
 /// Photons per pixel of it.
 const MOVING_SAMPLES: u32 = 4;
-/// Tolerance of the first two pictures: straight rays through all but the strongest flows, which shows as much as an eye sees.
+/// Tolerance of the first two pictures: straight rays through all but the strongest flows, which
+/// shows as much as an eye sees.
 const DRAFT_TOLERANCE_RAD: f64 = 1e-2;
 /// How long nothing has to change before the error is measured: that cannot be stopped.
 const STILL: Duration = Duration::from_millis(500);
@@ -52,7 +54,14 @@ impl Geometry {
             flow: scene.flow.clone(),
             view: scene.view.clone(),
             wavelengths_nm: scene.light.wavelengths_nm.clone(),
-            film: [w, h, f.field_of_view_m.unwrap_or(n), f.center_m[0], f.center_m[1], scene.focus_m()],
+            film: [
+                w,
+                h,
+                f.field_of_view_m.unwrap_or(n),
+                f.center_m[0],
+                f.center_m[1],
+                scene.focus_m(),
+            ],
             march: scene.march.clone(),
         }
     }
@@ -69,7 +78,8 @@ pub(super) struct Worker {
     session: Arc<Session>,
     /// The file that was read last.
     flow: Flow,
-    /// n0 - 1 of a series' first step, for the flow (as of that step) and wavelength it was made with.
+    /// n0 - 1 of a series' first step, for the flow (as of that step) and wavelength it was made
+    /// with.
     reference: Option<(FlowSpec, f64, f64)>,
     /// The section for a flow and wavelengths, and a thinned one.
     section: Option<Section>,
@@ -121,7 +131,8 @@ impl Worker {
             let session = self.session.clone();
             let mut shared = session.lock();
             while !shared.stop && shared.saves.is_empty() && shared.generation == finished {
-                shared = session.wake.wait(shared).unwrap_or_else(std::sync::PoisonError::into_inner);
+                shared =
+                    session.wake.wait(shared).unwrap_or_else(std::sync::PoisonError::into_inner);
             }
             if shared.stop {
                 return;
@@ -199,7 +210,12 @@ impl Worker {
                 ..FrameInfo::default()
             };
             let complete = i == last && self.errors_known(&geometry).is_some();
-            self.publish(scene, FrameInfo { finished: complete, ..info.clone() }, &rendered, &traced)?;
+            self.publish(
+                scene,
+                FrameInfo { finished: complete, ..info.clone() },
+                &rendered,
+                &traced,
+            )?;
             drawn = Some((info, rendered, traced));
             if i < last && self.session.cancel.load(Ordering::Relaxed) {
                 return Ok(false);
@@ -226,7 +242,8 @@ impl Worker {
 
     /// The test section for a scene.
     fn prepare(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        let fits = |s: &Section| s.flow == scene.flow && s.wavelengths_nm == scene.light.wavelengths_nm;
+        let fits =
+            |s: &Section| s.flow == scene.flow && s.wavelengths_nm == scene.light.wavelengths_nm;
         if !self.section.as_ref().is_some_and(fits) {
             if let Some(old) = self.section.take() {
                 self.solids = old.full.solids;
@@ -257,7 +274,8 @@ impl Worker {
         Ok(())
     }
 
-    /// What a scene's times are relative to: the surroundings of the first, or pictures could not be compared.
+    /// What a scene's times are relative to: the surroundings of the first, or pictures could not
+    /// be compared.
     fn reference_n_minus_1(&mut self, scene: &Scene) -> Result<Option<f64>, RenderError> {
         if !self.session.is_later(scene) {
             return Ok(scene.flow.reference_n_minus_1);
@@ -296,14 +314,20 @@ impl Worker {
     fn render(&mut self, level: &Level) -> Result<RenderOutput, RenderError> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         let session = self.session.clone();
-        let control =
-            Control { cancel: if level.stoppable { &session.cancel } else { &NEVER }, progress: &|_| {} };
+        let control = Control {
+            cancel: if level.stoppable { &session.cancel } else { &NEVER },
+            progress: &|_| {},
+        };
         let layers = Layers { noise: true, ..Layers::NONE };
         self.with_section(level.thin, |s| render::render(&level.scene, s, layers, &control))?
     }
 
     /// Deflections of the scene itself where they are known, else of this level.
-    fn traced(&mut self, level: &Level, geometry: &Geometry) -> Result<Arc<DeflectionMap>, RenderError> {
+    fn traced(
+        &mut self,
+        level: &Level,
+        geometry: &Geometry,
+    ) -> Result<Arc<DeflectionMap>, RenderError> {
         if let Some((g, t)) = &self.traced
             && g == geometry
         {
@@ -313,12 +337,19 @@ impl Worker {
         let traced = self.with_section(level.thin, |section| {
             let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, false)?;
             let framing = framing(scene, section);
-            let blocked =
-                |s: &crate::path::Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
+            let blocked = |s: &crate::path::Start| {
+                section.solids.as_ref().is_some_and(|b| b.block(&section.view, s))
+            };
             let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
             let n0 = section.fields[0].n0();
-            let map: Map =
-                render::map::map(&*planned.paths, &scene.optics(), &framing, wavelength_m, n0, blocked);
+            let map: Map = render::map::map(
+                &*planned.paths,
+                &scene.optics(),
+                &framing,
+                wavelength_m,
+                n0,
+                blocked,
+            );
             Ok::<_, RenderError>(Arc::new(DeflectionMap { map, framing }))
         })??;
         if !level.draft {
@@ -355,7 +386,8 @@ impl Worker {
         let r = &rendered.report;
         let errors = self.errors_known(&Geometry::of(scene));
         let noise = rendered.noise.as_ref().filter(|n| !n.is_empty());
-        let squares = |n: &Vec<f32>| n.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / n.len() as f64;
+        let squares =
+            |n: &Vec<f32>| n.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / n.len() as f64;
         let info = FrameInfo {
             serial: self.serial,
             rays: r.counters.rays,
@@ -399,7 +431,8 @@ impl Worker {
             SaveKind::Png => Layers::NONE,
             SaveKind::Exr => Layers::ALL,
         };
-        // Changes of the scene do not stop a file that was asked for; its request's end and the program's do.
+        // Changes of the scene do not stop a file that was asked for; its request's end and the
+        // program's do.
         let control = Control { cancel: &save.cancel, progress: &|_| {} };
         let rendered = self
             .with_section(false, |s| render::render(&save.scene, s, layers, &control))
@@ -409,20 +442,24 @@ impl Worker {
         let path = folder.path().join("picture");
         match save.kind {
             SaveKind::Png => output::write_png(&path, &rendered).map(|_| ()),
-            SaveKind::Exr => output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64()),
+            SaveKind::Exr => {
+                output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64())
+            }
         }
         .map_err(|e| text(&e))?;
         std::fs::read(&path).map_err(|e| text(&e))
     }
 }
 
-/// The background's dots in metres, where the scene leaves them to the pixels: coarse pictures have other pixels, and the same dots.
+/// The background's dots in metres, where the scene leaves them to the pixels: coarse pictures have
+/// other pixels, and the same dots.
 fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
     let TechniqueSpec::Bos { dot_diameter_m: None, dot_spacing_m, seed } = scene.technique else {
         return None;
     };
     // As [`render::technique`] chooses them.
-    let diameter_m = (3.0 * framing(scene, section).pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
+    let diameter_m =
+        (3.0 * framing(scene, section).pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
     Some(TechniqueSpec::Bos {
         dot_diameter_m: Some(diameter_m),
         dot_spacing_m: Some(dot_spacing_m.unwrap_or(2.0 * diameter_m)),
@@ -452,7 +489,9 @@ fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
     let wanted = wanted_samples(scene);
     let whole = |samples: Option<u32>| {
         let mut s = scene.clone();
-        if let (Some(n), SamplingSpec::Photons { jitter, seed, filter, .. }) = (samples, scene.sampling()) {
+        if let (Some(n), SamplingSpec::Photons { jitter, seed, filter, .. }) =
+            (samples, scene.sampling())
+        {
             s.sampling = Some(SamplingSpec::Photons { samples: n, jitter, seed, filter });
         }
         Level { scene: s, draft: false, thin: false, stoppable: true, samples }

@@ -1,11 +1,14 @@
-//! Background-oriented schlieren: a camera sees a pattern through the flow, and the pattern is displaced.
+//! Background-oriented schlieren: a camera sees a pattern through the flow, and the pattern is
+//! displaced.
 //!
-//! Rays are sent from the camera (far away: a parallel beam) through the flow to the background, which stands at `Optics::focus_m` behind the flow
-//! as the camera sees it; the camera is focused on it. A ray that leaves with the deflection ε at the depth z hits it displaced by
-//! `ξ + ε (focus - z)`: the displacement that correlating the picture with the undisturbed one yields. The paths must be traced against the light
-//! ([`ReversedPaths`]).
+//! Rays are sent from the camera (far away: a parallel beam) through the flow to the background,
+//! which stands at `Optics::focus_m` behind the flow as the camera sees it; the camera is focused
+//! on it. A ray that leaves with the deflection ε at the depth z hits it displaced by `ξ + ε (focus
+//! - z)`: the displacement that correlating the picture with the undisturbed one yields. The paths
+//! must be traced against the light ([`ReversedPaths`]).
 //!
-//! The pattern is random dots: one dot per cell of a square lattice, jittered by a hash of the cell, the same at any resolution.
+//! The pattern is random dots: one dot per cell of a square lattice, jittered by a hash of the
+//! cell, the same at any resolution.
 
 use super::Photon;
 use crate::optics::{Across, Optics};
@@ -31,14 +34,16 @@ pub struct Dots {
 }
 
 impl Bos {
-    /// The background stands at `optics.focus_m` behind the middle of the flow, seen from the camera.
+    /// The background stands at `optics.focus_m` behind the middle of the flow, seen from the
+    /// camera.
     pub fn new(optics: Optics, dots: Dots) -> Bos {
         Bos { optics, dots }
     }
 
     #[inline]
     pub(super) fn energy(&self, photon: &Photon<'_>) -> f32 {
-        let at = [0, 1].map(|i| f64::from(photon.start.position_m[i]) + f64::from(photon.shift_m[i]));
+        let at =
+            [0, 1].map(|i| f64::from(photon.start.position_m[i]) + f64::from(photon.shift_m[i]));
         self.dots.brightness(at)
     }
 }
@@ -53,7 +58,8 @@ impl Dots {
             for di in -1..=1 {
                 let (i, j) = (cell[0] + f64::from(di), cell[1] + f64::from(dj));
                 let [u, v] = self.place(i as i64, j as i64);
-                let (dx, dy) = (at_m[0] - (i + u) * self.spacing_m, at_m[1] - (j + v) * self.spacing_m);
+                let (dx, dy) =
+                    (at_m[0] - (i + u) * self.spacing_m, at_m[1] - (j + v) * self.spacing_m);
                 if dx * dx + dy * dy < radius2 {
                     return 0.0;
                 }
@@ -81,11 +87,13 @@ fn mix(x: u64) -> u64 {
 
 /// Paths traced against the light, in the frame of the picture.
 ///
-/// `paths` look along the reversed view ([`ReversedPaths::view`]), whose right is the picture's left; this exchanges the signs on the way in and out. Light paths
-/// can be reversed, so rays from the camera are the light that reaches it.
+/// `paths` look along the reversed view ([`ReversedPaths::view`]), whose right is the picture's
+/// left; this exchanges the signs on the way in and out. Light paths can be reversed, so rays from
+/// the camera are the light that reaches it.
 pub struct ReversedPaths<'a> {
     paths: Box<dyn LightPaths + 'a>,
-    /// The frame of starts and exits: left-handed, because it is the picture's with the light's direction turned round.
+    /// The frame of starts and exits: left-handed, because it is the picture's with the light's
+    /// direction turned round.
     view: View,
 }
 
@@ -103,7 +111,10 @@ impl<'a> ReversedPaths<'a> {
 
     /// Starts of the picture in the frame of [`ReversedPaths::view`].
     pub fn starts(starts: &[Start]) -> Vec<Start> {
-        let mirror = |s: &Start| Start { position_m: mirrored(s.position_m), tilt_rad: mirrored(s.tilt_rad) };
+        let mirror = |s: &Start| Start {
+            position_m: mirrored(s.position_m),
+            tilt_rad: mirrored(s.tilt_rad),
+        };
         starts.iter().map(mirror).collect()
     }
 }
@@ -160,13 +171,13 @@ mod tests {
     #[test]
     fn a_prism_displaces_the_pattern_by_angle_times_distance() {
         let still = picture(&ClosedForm::prism([0.0; 2]), 2.0);
-        // 1 mm right and 0.5 mm up at 2 m: what pixel (x, y) sees, pixel (x+2, y-1) saw without flow.
+        // 1 mm right and 0.5 mm up at 2 m: what pixel (x, y) sees, pixel (x+2, y-1) saw without
+        // flow.
         let moved = picture(&ClosedForm::prism([5e-4, 2.5e-4]), 2.0);
         let same = |dx: usize, dy: usize| {
-            (4..44)
-                .flat_map(|y| (4..60).map(move |x| (x, y)))
-                .fold(0.0f32, |sum, (x, y)| sum + (moved[y * 64 + x] - still[(y - dy) * 64 + x + dx]).abs())
-                / (40.0 * 56.0)
+            (4..44).flat_map(|y| (4..60).map(move |x| (x, y))).fold(0.0f32, |sum, (x, y)| {
+                sum + (moved[y * 64 + x] - still[(y - dy) * 64 + x + dx]).abs()
+            }) / (40.0 * 56.0)
         };
         assert!(same(2, 1) < 0.03 && same(0, 0) > 0.2, "{} {}", same(2, 1), same(0, 0));
     }
@@ -175,8 +186,9 @@ mod tests {
     fn dots_cover_the_area_they_should() {
         // Dots whose places overlap cover a little less than their sum, π/16 of the area.
         let n = 400;
-        let dark = (0..n * n)
-            .filter(|k| DOTS.brightness([f64::from(k % n), f64::from(k / n)].map(|v| v * 2.1e-4)) == 0.0);
+        let dark = (0..n * n).filter(|k| {
+            DOTS.brightness([f64::from(k % n), f64::from(k / n)].map(|v| v * 2.1e-4)) == 0.0
+        });
         let part = dark.count() as f64 / f64::from(n * n);
         assert!((0.17..0.197).contains(&part), "{part}");
     }

@@ -1,9 +1,11 @@
 //! Interferograms: the test beam and a reference beam of the same light on one film.
 //!
-//! With the optical path difference δ the phase is φ = 2π δ/λ, and of two beams of equal strength the film gets `I = (1 + V cos φ)/2`: bright where nothing
-//! is disturbed, never negative, V ≤ 1 the visibility. (Equation 5.17 of the thesis has `sin φ`: negative half the time and grey where nothing is.)
-//! *Infinite fringe*: the reference beam is parallel, lines are contours of δ. *Finite fringe*: it is inclined, and without flow there are straight
-//! fringes at the distance χ that the flow bends (equation 5.1): φ grows by 2π/χ along their direction.
+//! With the optical path difference δ the phase is φ = 2π δ/λ, and of two beams of equal strength
+//! the film gets `I = (1 + V cos φ)/2`: bright where nothing is disturbed, never negative, V ≤ 1
+//! the visibility. (Equation 5.17 of the thesis has `sin φ`: negative half the time and grey where
+//! nothing is.) *Infinite fringe*: the reference beam is parallel, lines are contours of δ. *Finite
+//! fringe*: it is inclined, and without flow there are straight fringes at the distance χ that the
+//! flow bends (equation 5.1): φ grows by 2π/χ along their direction.
 
 use super::Photon;
 use crate::optics::Optics;
@@ -29,8 +31,8 @@ pub struct Fringes {
 }
 
 impl Interferogram {
-    /// Light of vacuum wavelength `wavelength_m`, fringes of visibility `visibility` (0..=1); `fringes` is `None` for the infinite fringe. `n0` is the index
-    /// outside the flow.
+    /// Light of vacuum wavelength `wavelength_m`, fringes of visibility `visibility` (0..=1);
+    /// `fringes` is `None` for the infinite fringe. `n0` is the index outside the flow.
     pub fn new(
         optics: Optics,
         wavelength_m: f64,
@@ -55,8 +57,11 @@ impl Interferogram {
     #[inline]
     pub fn waves(&self, photon: &Photon<'_>) -> f64 {
         let path_m = self.optics.film_path_difference_m(photon.exit, self.n0);
-        let at = [0, 1].map(|i| f64::from(photon.start.position_m[i]) + f64::from(photon.shift_m[i]));
-        f64::from(path_m) * self.waves_per_m + at[0] * self.carrier_per_m[0] + at[1] * self.carrier_per_m[1]
+        let at =
+            [0, 1].map(|i| f64::from(photon.start.position_m[i]) + f64::from(photon.shift_m[i]));
+        f64::from(path_m) * self.waves_per_m
+            + at[0] * self.carrier_per_m[0]
+            + at[1] * self.carrier_per_m[1]
     }
 
     #[inline]
@@ -79,8 +84,8 @@ impl Interferogram {
     }
 }
 
-/// Pairs of neighbouring pixels whose phases differ by more than half a wave: there the picture cannot show the fringes, and they turn
-/// grey. `waves` row by row.
+/// Pairs of neighbouring pixels whose phases differ by more than half a wave: there the picture
+/// cannot show the fringes, and they turn grey. `waves` row by row.
 pub fn unresolved_pairs(waves: &[f32], width: usize) -> usize {
     let steep = |a: f32, b: f32| usize::from((a - b).abs() > 0.5);
     let in_rows = waves.chunks_exact(width).flat_map(|r| r.windows(2)).map(|w| steep(w[0], w[1]));
@@ -120,7 +125,9 @@ mod tests {
 
     #[test]
     fn nothing_is_bright_and_visibility_limits_the_range() {
-        assert!(picture(&ClosedForm::prism([0.0; 2]), 1.0, None).iter().all(|v| (v - 1.0).abs() < 1e-6));
+        assert!(
+            picture(&ClosedForm::prism([0.0; 2]), 1.0, None).iter().all(|v| (v - 1.0).abs() < 1e-6)
+        );
         let half = ClosedForm::path_ramp(10.0 * WAVELENGTH / 0.2);
         let film = picture(&half, 0.5, None);
         let (low, high) = film.iter().fold((1.0f32, 0.0f32), |(l, h), v| (l.min(*v), h.max(*v)));
@@ -138,8 +145,11 @@ mod tests {
             assert!((a + b - 1.0).abs() < 2e-3, "{a} {b}");
         }
         // And across: constant along rows.
-        let across =
-            picture(&ClosedForm::prism([0.0; 2]), 1.0, Some(Fringes { spacing_m: 0.02, angle_deg: 90.0 }));
+        let across = picture(
+            &ClosedForm::prism([0.0; 2]),
+            1.0,
+            Some(Fringes { spacing_m: 0.02, angle_deg: 90.0 }),
+        );
         assert!(across[..200].windows(2).all(|w| (w[0] - w[1]).abs() < 0.2));
     }
 
@@ -155,18 +165,25 @@ mod tests {
             let expected = 0.5 + 0.5 * (std::f64::consts::TAU * waves).cos();
             worst = worst.max((f64::from(film[k]) - expected).abs());
         }
-        // Steepest: 3.2 waves e^(-1/2)/σ · pixel = 0.16 waves over a pixel, whose mean of a cosine is down by (π 0.16)²/6 = 4 %, half of it in I.
+        // Steepest: 3.2 waves e^(-1/2)/σ · pixel = 0.16 waves over a pixel, whose mean of a cosine
+        // is down by (π 0.16)²/6 = 4 %, half of it in I.
         assert!(worst < 0.04, "{worst}");
     }
 
     #[test]
     fn thousands_of_waves_keep_their_phase() {
         let i = Interferogram::new(Optics::CUSTOMARY, WAVELENGTH, 1.0, None, 1.0);
-        let exit =
-            crate::path::Exit { opd_m: (3000.25 * WAVELENGTH) as f32, ..crate::path::Exit::UNDISTURBED };
+        let exit = crate::path::Exit {
+            opd_m: (3000.25 * WAVELENGTH) as f32,
+            ..crate::path::Exit::UNDISTURBED
+        };
         let start = crate::path::Start::default();
-        let waves =
-            i.waves(&Photon { start: &start, exit: &exit, image_point_m: [0.0; 2], shift_m: [0.0; 2] });
+        let waves = i.waves(&Photon {
+            start: &start,
+            exit: &exit,
+            image_point_m: [0.0; 2],
+            shift_m: [0.0; 2],
+        });
         // The f32 path itself is worth 1e-4 waves there.
         assert!((waves - 3000.25).abs() < 2e-4, "{waves}");
     }

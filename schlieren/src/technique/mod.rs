@@ -26,7 +26,8 @@ pub struct Photon<'a> {
     pub start: &'a Start,
     /// What the flow did to it.
     pub exit: &'a Exit,
-    /// The image of its source point in the cut-off plane; zero unless [`Technique::needs_source_points`] or tilted beams.
+    /// The image of its source point in the cut-off plane; zero unless
+    /// [`Technique::needs_source_points`] or tilted beams.
     pub image_point_m: Across,
     /// Where it lands in the plane of focus, from its start.
     pub shift_m: Across,
@@ -72,8 +73,8 @@ impl Technique {
         matches!(self, Technique::Schlieren(s) if s.is_colored())
     }
 
-    /// True when rays are sent from the camera's pixels towards the light (and energy stays in the pixel they were sent from), not
-    /// from the light to the film.
+    /// True when rays are sent from the camera's pixels towards the light (and energy stays in the
+    /// pixel they were sent from), not from the light to the film.
     #[inline]
     pub fn looks_from_film(&self) -> bool {
         matches!(self, Technique::Bos(_))
@@ -90,8 +91,8 @@ impl Technique {
         }
     }
 
-    /// The energy a photon leaves of what [`Exit::transmission`] says has come through. Absorption dims the object beam, so an interferogram loses contrast before it gets
-    /// dark.
+    /// The energy a photon leaves of what [`Exit::transmission`] says has come through. Absorption
+    /// dims the object beam, so an interferogram loses contrast before it gets dark.
     #[inline]
     pub fn landed(&self, photon: &Photon<'_>) -> Rgb {
         let left = photon.exit.transmission;
@@ -101,8 +102,9 @@ impl Technique {
         }
     }
 
-    /// The part that reaches the film of light that fills a stop in the cut-off plane evenly: what the flow itself emits. An interferometer's two beam splitters
-    /// leave a quarter of the object beam.
+    /// The part that reaches the film of light that fills a stop in the cut-off plane evenly: what
+    /// the flow itself emits. An interferometer's two beam splitters leave a quarter of the object
+    /// beam.
     pub fn passes_evenly(&self, stop_m: f64) -> Rgb {
         match self {
             Technique::Schlieren(s) => s.passes_evenly(stop_m),

@@ -1,4 +1,5 @@
-//! Schlieren: light is let through, held back or coloured by where its deflection brings it in the cut-off plane.
+//! Schlieren: light is let through, held back or coloured by where its deflection brings it in the
+//! cut-off plane.
 
 use super::Photon;
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
@@ -11,20 +12,23 @@ pub struct Schlieren {
     plane: CutoffPlane,
     colored: bool,
     sampled: bool,
-    /// How much of each of the filter's channels this light's wavelength is; `None` for white light whose dispersion does not matter.
+    /// How much of each of the filter's channels this light's wavelength is; `None` for white light
+    /// whose dispersion does not matter.
     band: Option<Rgb>,
 }
 
 impl Schlieren {
-    /// `cutoff` in the bench. With `sample_source` every photon takes its own point of the source although a closed form for all of them is known;
-    /// needed with tilted beams, where each source point lights another way through the flow.
+    /// `cutoff` in the bench. With `sample_source` every photon takes its own point of the source
+    /// although a closed form for all of them is known; needed with tilted beams, where each source
+    /// point lights another way through the flow.
     pub fn new(optics: Optics, cutoff: &Cutoff, sample_source: bool) -> Schlieren {
         let plane = CutoffPlane::new(cutoff, optics.source_image());
         let sampled = sample_source || !plane.has_closed_form();
         Schlieren { optics, plane, colored: cutoff.is_colored(), sampled, band: None }
     }
 
-    /// For light of one wavelength among several: a coloured filter then passes `band · rgb`, and the picture of this wavelength is grey.
+    /// For light of one wavelength among several: a coloured filter then passes `band · rgb`, and
+    /// the picture of this wavelength is grey.
     pub fn with_band(self, band: Rgb) -> Schlieren {
         Schlieren { band: Some(band), ..self }
     }
@@ -96,7 +100,10 @@ mod tests {
                 let expected: f32 = expected;
                 // Closed form: rounding. Sampled: 64 points of a (0,2)-sequence on a straight edge.
                 let tolerance = if sampled { 2.0 / 64.0 } else { 2e-6 };
-                assert!((middle - expected).abs() < tolerance, "{angle_deg} {sampled}: {middle} {expected}");
+                assert!(
+                    (middle - expected).abs() < tolerance,
+                    "{angle_deg} {sampled}: {middle} {expected}"
+                );
             }
         }
     }
@@ -113,7 +120,8 @@ mod tests {
             worst = worst.max((film[i] - expected).abs());
             contrast = contrast.max((expected - 0.5).abs());
         }
-        // The pixel's mean against its centre, h²/24 of the second derivative (h = σ/4), is 0.3 % of the contrast.
+        // The pixel's mean against its centre, h²/24 of the second derivative (h = σ/4), is 0.3 %
+        // of the contrast.
         assert!(contrast > 0.02 && worst < 0.01 * contrast, "{worst} of {contrast}");
     }
 
@@ -121,7 +129,9 @@ mod tests {
     fn the_color_filter_paints_directions() {
         let cutoff = Cutoff::Color(ColorWheel { radius_m: 1e-3, red_deg: 0.0 });
         let optics = Optics { source: crate::optics::SourceShape::Point, ..Optics::CUSTOMARY };
-        for (deflection, strongest) in [([3e-4, 0.0], 0), ([-1.5e-4, 2.6e-4], 1), ([-1.5e-4, -2.6e-4], 2)] {
+        for (deflection, strongest) in
+            [([3e-4, 0.0], 0), ([-1.5e-4, 2.6e-4], 1), ([-1.5e-4, -2.6e-4], 2)]
+        {
             let technique = Technique::Schlieren(Schlieren::new(optics, &cutoff, false));
             assert!(technique.is_colored() && !technique.needs_source_points());
             let film = expose_rgb(&technique, &ClosedForm::prism(deflection), FRAMING, 4);

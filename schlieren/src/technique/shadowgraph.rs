@@ -1,11 +1,14 @@
-//! Shadowgraph: no cut-off; light lands where it was deflected to, and where it crowds the film is bright.
+//! Shadowgraph: no cut-off; light lands where it was deflected to, and where it crowds the film is
+//! bright.
 //!
-//! Behind a thin flow with deflections u(x), a film at the distance D sees `I(x + D u) = 1/|det(1 + D ∇u)|`, summed over all x that land in the same place;
-//! for weak flows `I - 1 = -D ∇·u`, the Laplacian of the optical path. When D reaches the shortest focal length of the flow, the determinant
-//! vanishes: a caustic.
+//! Behind a thin flow with deflections u(x), a film at the distance D sees `I(x + D u) = 1/|det(1 +
+//! D ∇u)|`, summed over all x that land in the same place; for weak flows `I - 1 = -D ∇·u`, the
+//! Laplacian of the optical path. When D reaches the shortest focal length of the flow, the
+//! determinant vanishes: a caustic.
 //!
-//! There is no code here but [`crate::technique::Technique::Shadowgraph`]'s energy of 1: the work is the film's, by [`crate::film::photons`] (as the thesis does it,
-//! with noise) or by [`crate::film::beams`] (without).
+//! There is no code here but [`crate::technique::Technique::Shadowgraph`]'s energy of 1: the work
+//! is the film's, by [`crate::film::photons`] (as the thesis does it, with noise) or by
+//! [`crate::film::beams`] (without).
 
 #[cfg(test)]
 mod tests {
@@ -21,7 +24,8 @@ mod tests {
         Technique::Shadowgraph(Optics { focus_m: distance_m, ..Optics::CUSTOMARY })
     }
 
-    /// `I = 1/|det(1 + D ∇u)|` of a radial deflection u(r) = -(opd/σ²) r, opd = A exp(-r²/2σ²), at the place r + D u(r).
+    /// `I = 1/|det(1 + D ∇u)|` of a radial deflection u(r) = -(opd/σ²) r, opd = A exp(-r²/2σ²), at
+    /// the place r + D u(r).
     fn closed_form(amplitude_m: f64, distance_m: f64, landing_r: f64) -> f64 {
         let opd = |r: f64| amplitude_m * (-0.5 * (r / SIGMA).powi(2)).exp();
         let u = |r: f64| -r / (SIGMA * SIGMA) * opd(r);
@@ -49,7 +53,8 @@ mod tests {
                 worst = worst.max((f64::from(film[i]) - expected).abs());
                 contrast = contrast.max((expected - 1.0).abs());
             }
-            // Second order in pixel/σ = 1/12, on the picture and on the cell: 0.7 % each way, more where the middle contracts.
+            // Second order in pixel/σ = 1/12, on the picture and on the cell: 0.7 % each way, more
+            // where the middle contracts.
             assert!(worst < 0.02 * contrast, "{amplitude_m}: {worst} of {contrast}");
         }
     }
@@ -64,7 +69,8 @@ mod tests {
             (sum / film.len() as f64).sqrt()
         };
         let (few, many) = (rms(4), rms(64));
-        // Independent photons would go down by 4; a low-discrepancy sequence through a smooth map does better.
+        // Independent photons would go down by 4; a low-discrepancy sequence through a smooth map
+        // does better.
         assert!(many < few / 5.0 && many < 0.02, "{few} {many}");
     }
 
@@ -72,7 +78,9 @@ mod tests {
     fn energy_is_conserved_through_a_caustic() {
         // Beyond the focal length the light has crossed over; all of it is still there.
         let blob = ClosedForm::gaussian(1.2e-4, SIGMA / 2.0, 0.0);
-        for film in [beams_grey(&at(1.0), &blob, FRAMING, 1), expose_grey(&at(1.0), &blob, FRAMING, 16)] {
+        for film in
+            [beams_grey(&at(1.0), &blob, FRAMING, 1), expose_grey(&at(1.0), &blob, FRAMING, 16)]
+        {
             let mean = film.iter().map(|v| f64::from(*v)).sum::<f64>() / film.len() as f64;
             let brightest = film.iter().copied().fold(0.0f32, f32::max);
             assert!((mean - 1.0).abs() < 2e-3 && brightest > 3.0, "{mean} {brightest}");

@@ -1,7 +1,9 @@
-//! For comparison: the size of the gradient of eps along straight rays, as smoke. What visualization programs draw as "volume rendered schlieren" (figure 5.12).
-//! There are no optics in it: directions of gradients are lost, opposite gradients do not cancel, and it has no unit.
+//! For comparison: the size of the gradient of eps along straight rays, as smoke. What
+//! visualization programs draw as "volume rendered schlieren" (figure 5.12). There are no optics in
+//! it: directions of gradients are lost, opposite gradients do not cancel, and it has no unit.
 //!
-//! A ray's brightness is `exp(-strength ∫ |∇eps| ds / (g L))`, g being the largest gradient and L the field's depth along the view.
+//! A ray's brightness is `exp(-strength ∫ |∇eps| ds / (g L))`, g being the largest gradient and L
+//! the field's depth along the view.
 
 use crate::field::Field;
 use crate::film::Framing;
@@ -71,14 +73,16 @@ pub fn volume(
     let grid = gradient_grid(field)?;
     let depth = field.size_m().dot(view.forward.abs());
     let black = ColorMap::new(vec![[0.0, 0.0, 0.0, 1.0]], [0.0, 1.0]);
-    let transfer = TransferFunction::new(black, vec![[0.0, 0.0], [1.0, (strength / depth) as f32]])?;
+    let transfer =
+        TransferFunction::new(black, vec![[0.0, 0.0], [1.0, (strength / depth) as f32]])?;
     let volume = Volume::new(grid.into(), transfer, VolumeOptions::default())?;
     let radius = field.size_m().length();
     let pixel = |start: &crate::path::Start| {
         let [x, y] = start.position_m.map(f64::from);
         let origin = view.centre_m + view.right * x + view.up * y - view.forward * radius;
         let ray = Ray::new((origin - volume.origin()).as_vec3(), view.forward.as_vec3());
-        let seen = volume.integrate(&ray, 0.0, f32::INFINITY, &VolumeQuality::Tolerance { levels: 0.1 });
+        let seen =
+            volume.integrate(&ray, 0.0, f32::INFINITY, &VolumeQuality::Tolerance { levels: 0.1 });
         1.0 - seen.rgba[3]
     };
     Ok(framing.pixel_centers().par_iter().map(pixel).collect())
@@ -100,7 +104,8 @@ mod tests {
 
     #[test]
     fn an_even_gradient_darkens_by_the_length_of_the_way() {
-        // eps grows along x: |∇eps| is the same everywhere, so the picture is e^-strength inside and 1 outside.
+        // eps grows along x: |∇eps| is the same everywhere, so the picture is e^-strength inside
+        // and 1 outside.
         let field = Field::from_fn([9, 9, 9], [0.1; 3], DVec3::ZERO, 1.0, |p| 1e-4 * p.x).unwrap();
         let view = View::along(Axis::Z, field.centre_m());
         let framing = Framing::fitted(20, 10, [0.8, 0.8]);

@@ -20,8 +20,9 @@ pub(crate) fn cube(n: usize, eps: impl Fn(DVec3) -> f64 + Sync) -> Field {
 
 /// Three blobs of different size and sign: no symmetry at all.
 pub(crate) fn lopsided(p: DVec3) -> f64 {
-    let blob =
-        |x: f64, y: f64, z: f64, s: f64| (-(p - DVec3::new(x, y, z)).length_squared() / (2.0 * s * s)).exp();
+    let blob = |x: f64, y: f64, z: f64, s: f64| {
+        (-(p - DVec3::new(x, y, z)).length_squared() / (2.0 * s * s)).exp()
+    };
     1e-4 * (blob(0.1, 0.05, -0.08, 0.09) - 0.6 * blob(-0.12, 0.1, 0.05, 0.11)
         + 0.3 * blob(0.02, -0.14, 0.13, 0.08))
 }
@@ -48,7 +49,8 @@ pub(crate) fn largest(exits: &[Exit]) -> f64 {
     exits.iter().flat_map(|e| e.deflection_rad).fold(0.0, |m, u| f64::from(u.abs()).max(m))
 }
 
-/// Root mean square and maximum of the deflections' differences, relative to the largest deflection.
+/// Root mean square and maximum of the deflections' differences, relative to the largest
+/// deflection.
 pub(crate) fn difference(a: &[Exit], b: &[Exit]) -> (f64, f64) {
     let scale = largest(b).max(f64::MIN_POSITIVE);
     let (mut sum, mut max) = (0.0, 0.0f64);

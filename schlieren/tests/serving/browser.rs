@@ -1,4 +1,5 @@
-//! Headless Chromium by its DevTools protocol: JSON over a WebSocket, with no more of either than a test needs.
+//! Headless Chromium by its DevTools protocol: JSON over a WebSocket, with no more of either than a
+//! test needs.
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -7,17 +8,21 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The Chromium to test with: the one that the set-up found, or one of the usual names. `Err` says why there is none.
+/// The Chromium to test with: the one that the set-up found, or one of the usual names. `Err` says
+/// why there is none.
 pub(crate) fn chromium() -> Result<PathBuf, String> {
     if let Some(path) = std::env::var_os("RTSV_CHROMIUM") {
         return Ok(path.into());
     }
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let names = ["chromium", "chromium-browser", "google-chrome"];
-    let found = std::env::split_paths(&folders).flat_map(|f| names.map(|n| f.join(n))).find(|p| p.is_file());
+    let found = std::env::split_paths(&folders)
+        .flat_map(|f| names.map(|n| f.join(n)))
+        .find(|p| p.is_file());
     found.ok_or_else(|| {
         format!(
-            "none of {} is in PATH and RTSV_CHROMIUM is not set; on Debian: apt-get install chromium",
+            "none of {} is in PATH and RTSV_CHROMIUM is not set; on Debian: apt-get install \
+             chromium",
             names.join(", ")
         )
     })
@@ -44,7 +49,11 @@ impl Browser {
                 "--disable-dev-shm-usage",
                 "--no-first-run",
             ])
-            .args(["--remote-debugging-port=0", "--window-size=1280,1100", "--force-device-scale-factor=1"])
+            .args([
+                "--remote-debugging-port=0",
+                "--window-size=1280,1100",
+                "--force-device-scale-factor=1",
+            ])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg("about:blank")
             .stdout(Stdio::null())
@@ -84,7 +93,9 @@ impl Browser {
         loop {
             let message: Value = serde_json::from_str(&self.receive()).expect("JSON");
             match message["method"].as_str() {
-                Some("Runtime.exceptionThrown") => self.complaints.push(message["params"].to_string()),
+                Some("Runtime.exceptionThrown") => {
+                    self.complaints.push(message["params"].to_string())
+                }
                 Some("Log.entryAdded") if message["params"]["entry"]["level"] == "error" => {
                     self.complaints.push(message["params"]["entry"].to_string());
                 }
@@ -137,8 +148,7 @@ impl Browser {
         from_base64(result["data"].as_str().expect("a picture"))
     }
 
-    // ---- WebSocket (RFC 6455) -------------------------------------------------------------------------------
-
+    // ---- WebSocket (RFC 6455) -------------------------------------------------------------------
     fn send(&mut self, text: &str) {
         let mut frame = vec![0x81];
         match text.len() {
@@ -200,8 +210,10 @@ fn http(host: &str, request: &str) -> TcpStream {
 /// Address of the first page's socket.
 fn page_of(host: &str) -> String {
     for _ in 0..100 {
-        let stream =
-            http(host, &format!("GET /json/list HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"));
+        let stream = http(
+            host,
+            &format!("GET /json/list HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"),
+        );
         let mut reader = BufReader::new(stream);
         let mut length = 0;
         for line in reader.by_ref().lines().map_while(Result::ok).take_while(|l| !l.is_empty()) {
@@ -225,7 +237,9 @@ fn upgrade(host: &str, path: &str) -> TcpStream {
     let mut stream = http(
         host,
         &format!(
-            "GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+            "GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: \
+             Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: \
+             AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
         ),
     );
     // Byte by byte: what follows the head are frames.
@@ -249,7 +263,8 @@ fn from_base64(text: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(text.len() * 3 / 4);
     let digits: Vec<u8> = text.bytes().filter(|c| *c != b'=').map(value).collect();
     for group in digits.chunks(4) {
-        let word = group.iter().enumerate().fold(0u32, |w, (i, d)| w | u32::from(*d) << (18 - 6 * i));
+        let word =
+            group.iter().enumerate().fold(0u32, |w, (i, d)| w | u32::from(*d) << (18 - 6 * i));
         bytes.extend(&word.to_be_bytes()[1..group.len()]);
     }
     bytes

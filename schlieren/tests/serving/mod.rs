@@ -1,4 +1,5 @@
-//! A running `schlieren serve`, and HTTP over a plain socket: what a test sends is what the program gets, right or wrong.
+//! A running `schlieren serve`, and HTTP over a plain socket: what a test sends is what the program
+//! gets, right or wrong.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use datasets::model::{DataArray, Dataset, ImageData, Values};
@@ -11,7 +12,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Air with a light blob right of and above the middle, in a box of 0.2 x 0.1 x 0.1 m, and a temperature beside it.
+/// Air with a light blob right of and above the middle, in a box of 0.2 x 0.1 x 0.1 m, and a
+/// temperature beside it.
 pub(crate) fn flow(path: &Path) {
     flow_at(path, 0.03, 1.2);
 }
@@ -24,13 +26,17 @@ fn flow_at(path: &Path, blob_x_m: f64, around_kg_m3: f64) {
     let blob = |i: u32| {
         let (x, y, z) = (at(i % nx, nx), at(i / nx % n, n), at(i / nx / n, n));
         around_kg_m3
-            - 0.3 * (-((x - blob_x_m).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
+            - 0.3
+                * (-((x - blob_x_m).powi(2) + (y - 0.01).powi(2) + z * z)
+                    / (2.0 * 0.015f64.powi(2)))
+                .exp()
     };
     let values: Vec<f32> = (0..nx * n * n).map(|i| blob(i) as f32).collect();
     let temperature = values.iter().map(|r| 1.2 / r * 293.15).collect();
     image.attributes.point.push(DataArray::new("T", 1, Values::F32(temperature)));
     image.attributes.point.push(DataArray::new("rho", 1, Values::F32(values)));
-    write_vtk(path, &Dataset::ImageData(image), VtkOptions::default()).expect("the flow is written");
+    write_vtk(path, &Dataset::ImageData(image), VtkOptions::default())
+        .expect("the flow is written");
 }
 
 /// The program, ended when dropped.
@@ -57,7 +63,8 @@ impl Answer {
     }
 
     pub(crate) fn json(&self) -> Value {
-        serde_json::from_slice(&self.body).unwrap_or_else(|e| panic!("{e}: {} {}", self.head, self.text()))
+        serde_json::from_slice(&self.body)
+            .unwrap_or_else(|e| panic!("{e}: {} {}", self.head, self.text()))
     }
 }
 
@@ -74,7 +81,8 @@ impl Served {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         let mut entries = String::new();
-        for (i, (x_m, around)) in [(0.03, 1.2), (0.0, 1.2), (0.0, 1.2), (-0.03, 1.1)].into_iter().enumerate()
+        for (i, (x_m, around)) in
+            [(0.03, 1.2), (0.0, 1.2), (0.0, 1.2), (-0.03, 1.1)].into_iter().enumerate()
         {
             let name = format!("flow-{i}.vti");
             entries += &format!("<DataSet timestep=\"{}\" file=\"{name}\"/>", 0.5 * i as f64);
@@ -82,7 +90,8 @@ impl Served {
         }
         std::fs::remove_file(path("flow-2.vti")).unwrap();
         let text = format!(
-            "<VTKFile type=\"Collection\" version=\"0.1\"><Collection>{entries}</Collection></VTKFile>"
+            "<VTKFile type=\"Collection\" \
+             version=\"0.1\"><Collection>{entries}</Collection></VTKFile>"
         );
         std::fs::write(path("flow.pvd"), text).unwrap();
         Served::of(&path("flow.pvd"), dir, options)
@@ -130,7 +139,8 @@ impl Served {
     pub(crate) fn ask(&self, method: &str, path: &str, body: &str) -> Answer {
         let (base, length) = (&self.base, body.len());
         let request = format!(
-            "{method} {base}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n{body}"
+            "{method} {base}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: \
+             close\r\nContent-Length: {length}\r\n\r\n{body}"
         );
         self.raw(request.as_bytes()).unwrap_or_else(|| panic!("{method} {path}: no answer"))
     }
@@ -157,7 +167,9 @@ impl Served {
             }
             let shown = Shown::new(&answer.body);
             after = shown.info["serial"].as_u64().unwrap();
-            if shown.info["finished"] == true && shown.info["generation"].as_u64() >= Some(generation) {
+            if shown.info["finished"] == true
+                && shown.info["generation"].as_u64() >= Some(generation)
+            {
                 return shown;
             }
         }
@@ -192,8 +204,10 @@ impl Shown {
         let (n, m) = (3 * size("width") * size("height"), size("filter_pixels").pow(2));
         let rest = &bytes[4 + length..];
         assert_eq!(rest.len(), n + 3 * m + 4 * m, "{info}");
-        let light =
-            rest[n + 3 * m..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+        let light = rest[n + 3 * m..]
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+            .collect();
         Shown { rgb: rest[..n].to_vec(), filter: rest[n..n + 3 * m].to_vec(), light, info }
     }
 }

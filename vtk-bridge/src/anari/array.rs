@@ -1,7 +1,8 @@
 //! Arrays: whose memory they use, and their elements as values.
 //!
-//! Three owners (ANARI 1.0, section "Array objects"): the program's memory, shared until the program releases the array (then it is copied, because the program
-//! may free it); the program's memory handed over with a deleter; memory of the device, which the program fills by mapping it.
+//! Three owners (ANARI 1.0, section "Array objects"): the program's memory, shared until the
+//! program releases the array (then it is copied, because the program may free it); the program's
+//! memory handed over with a deleter; memory of the device, which the program fills by mapping it.
 
 use super::abi::memory::{AppMemory, OwnMemory};
 use super::data_type::DataType;
@@ -100,7 +101,10 @@ impl Array {
         }
     }
 
-    pub(crate) fn set_objects(&mut self, objects: Vec<Option<Arc<Object>>>) -> Vec<Option<Arc<Object>>> {
+    pub(crate) fn set_objects(
+        &mut self,
+        objects: Vec<Option<Arc<Object>>>,
+    ) -> Vec<Option<Arc<Object>>> {
         std::mem::replace(&mut self.objects, objects)
     }
 
@@ -115,8 +119,7 @@ impl Array {
             .collect()
     }
 
-    // ---- Elements as values ---------------------------------------------------------------------------------------
-
+    // ---- Elements as values ---------------------------------------------------------------------
     /// Attribute values: see [`DataType::attribute`].
     pub(crate) fn attributes(&self) -> Vec<[f32; 4]> {
         let Some(size) = self.element.size() else { return Vec::new() };
@@ -139,12 +142,17 @@ impl Array {
     pub(crate) fn vectors(&self) -> Vec<[f32; 3]> {
         if self.element == DataType::FLOAT32_VEC3 {
             let f = |b: &[u8]| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
-            return self.bytes().chunks_exact(12).map(|b| [f(&b[..4]), f(&b[4..8]), f(&b[8..])]).collect();
+            return self
+                .bytes()
+                .chunks_exact(12)
+                .map(|b| [f(&b[..4]), f(&b[4..8]), f(&b[8..])])
+                .collect();
         }
         self.attributes().into_iter().map(|a| [a[0], a[1], a[2]]).collect()
     }
 
-    /// Indices, `N` an element; what does not fit into 32 bits becomes `u32::MAX`, which is past every end.
+    /// Indices, `N` an element; what does not fit into 32 bits becomes `u32::MAX`, which is past
+    /// every end.
     pub(crate) fn indices<const N: usize>(&self) -> Vec<[u32; N]> {
         let Some(size) = self.element.size() else { return Vec::new() };
         let wide = size / N == 8;
@@ -168,7 +176,9 @@ impl Array {
         self.bytes()
             .chunks_exact(64)
             .map(|m| {
-                let f = |i: usize| f32::from_ne_bytes([m[4 * i], m[4 * i + 1], m[4 * i + 2], m[4 * i + 3]]);
+                let f = |i: usize| {
+                    f32::from_ne_bytes([m[4 * i], m[4 * i + 1], m[4 * i + 2], m[4 * i + 3]])
+                };
                 std::array::from_fn(|i| f64::from(f(i)))
             })
             .collect()

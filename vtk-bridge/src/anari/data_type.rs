@@ -1,8 +1,10 @@
-//! ANARI's data types: their numbers (fixed by the specification, version 1.0, section "Data types"), sizes, names, and how elements become numbers.
+//! ANARI's data types: their numbers (fixed by the specification, version 1.0, section "Data
+//! types"), sizes, names, and how elements become numbers.
 
 use rt_core::colormap::srgb_to_linear;
 
-/// A number of the enumeration `ANARIDataType`. A program may pass any; unknown ones have size `None`.
+/// A number of the enumeration `ANARIDataType`. A program may pass any; unknown ones have size
+/// `None`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DataType(pub u32);
 
@@ -36,7 +38,8 @@ data_types! {
     FLOAT32_QUAT_IJKW = 2017; UINT64_REGION1 = 2104; UINT64_REGION4 = 2107; FLOAT64_BOX1 = 2208; FLOAT64_BOX4 = 2211;
 }
 
-/// Families of vector types, each of one to four components: number of the first, bytes of a component, name.
+/// Families of vector types, each of one to four components: number of the first, bytes of a
+/// component, name.
 const FAMILIES: &[(u32, usize, &str)] = &[
     (1000, 1, "INT8"),
     (1004, 1, "UINT8"),
@@ -105,7 +108,11 @@ impl DataType {
     /// The name without the prefix `ANARI_`.
     pub fn name(self) -> String {
         if let Some((_, components, name)) = self.family() {
-            return if components == 1 { name.to_owned() } else { format!("{name}_VEC{components}") };
+            return if components == 1 {
+                name.to_owned()
+            } else {
+                format!("{name}_VEC{components}")
+            };
         }
         NAMED
             .iter()
@@ -154,13 +161,16 @@ impl DataType {
         self.component().map_or(0, |(_, n)| n)
     }
 
-    /// True for types whose elements [`DataType::attribute`] can turn into colours: everything but whole numbers.
+    /// True for types whose elements [`DataType::attribute`] can turn into colours: everything but
+    /// whole numbers.
     pub fn is_color(self) -> bool {
-        self.component().is_some_and(|(c, _)| !matches!(c, Component::Signed(_) | Component::Unsigned(_)))
+        self.component()
+            .is_some_and(|(c, _)| !matches!(c, Component::Signed(_) | Component::Unsigned(_)))
     }
 
-    /// One element as an attribute value: what is missing of four components comes from (0, 0, 0, 1); fixed point numbers are scaled to
-    /// 0..=1 (signed: -1..=1), sRGB is decoded (its last of two or four components, alpha, is linear).
+    /// One element as an attribute value: what is missing of four components comes from (0, 0, 0,
+    /// 1); fixed point numbers are scaled to 0..=1 (signed: -1..=1), sRGB is decoded (its last of
+    /// two or four components, alpha, is linear).
     pub fn attribute(self, bytes: &[u8]) -> [f32; 4] {
         let mut out = [0.0, 0.0, 0.0, 1.0];
         let Some((kind, n)) = self.component() else { return out };
@@ -215,7 +225,8 @@ impl std::fmt::Display for DataType {
 fn unsigned(b: &[u8]) -> u64 {
     let mut wide = [0; 8];
     wide[..b.len()].copy_from_slice(b);
-    // The device runs where the program runs; the numbers are little-endian on every platform that ANARI exists for.
+    // The device runs where the program runs; the numbers are little-endian on every platform that
+    // ANARI exists for.
     u64::from_le_bytes(wide)
 }
 
@@ -267,15 +278,24 @@ mod tests {
     #[test]
     fn fixed_point_and_srgb_reach_the_ends_of_their_ranges() {
         assert_eq!(DataType::UFIXED8_VEC4.attribute(&[255, 0, 51, 255]), [1.0, 0.0, 0.2, 1.0]);
-        assert_eq!(DataType::FIXED16_VEC3.attribute(&[0xff, 0x7f, 0, 0x80, 0, 0])[..3], [1.0, -1.0, 0.0]);
+        assert_eq!(
+            DataType::FIXED16_VEC3.attribute(&[0xff, 0x7f, 0, 0x80, 0, 0])[..3],
+            [1.0, -1.0, 0.0]
+        );
         assert_eq!(DataType::UFIXED32.attribute(&[255; 4])[0], 1.0);
-        assert_eq!(DataType::UFIXED8_RA_SRGB.attribute(&[255, 128]), [1.0, 128.0 / 255.0, 0.0, 1.0]);
+        assert_eq!(
+            DataType::UFIXED8_RA_SRGB.attribute(&[255, 128]),
+            [1.0, 128.0 / 255.0, 0.0, 1.0]
+        );
         assert!((DataType::UFIXED8_RGB_SRGB.attribute(&[188, 0, 255])[0] - 0.5).abs() < 0.01);
     }
 
     #[test]
     fn half_floats_include_subnormals_and_infinity() {
-        assert_eq!([0x3c00, 0xc000, 0x0001, 0x7c00].map(half), [1.0, -2.0, (-24f32).exp2(), f32::INFINITY]);
+        assert_eq!(
+            [0x3c00, 0xc000, 0x0001, 0x7c00].map(half),
+            [1.0, -2.0, (-24f32).exp2(), f32::INFINITY]
+        );
         assert!(half(0x7e00).is_nan());
     }
 }

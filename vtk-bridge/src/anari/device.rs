@@ -1,4 +1,5 @@
-//! The device: makes objects, keeps count of who uses them, and answers questions. Every fault of the program is a message and nothing else happens.
+//! The device: makes objects, keeps count of who uses them, and answers questions. Every fault of
+//! the program is a message and nothing else happens.
 
 mod frames;
 
@@ -42,7 +43,8 @@ pub enum Property {
 
 /// What a device needs of the program besides messages.
 pub trait Hooks: Send + Sync {
-    /// Calls the program's function of type `ANARIFrameCompletionCallback` at `function`, for `frame`.
+    /// Calls the program's function of type `ANARIFrameCompletionCallback` at `function`, for
+    /// `frame`.
     fn frame_completed(&self, function: usize, user: usize, frame: Handle);
 }
 
@@ -78,9 +80,14 @@ impl Device {
         self.status.set_listener(listener);
     }
 
-    // ---- Messages -------------------------------------------------------------------------------------------------
-
-    fn tell(&self, source: Handle, source_type: DataType, severity: Severity, text: impl Into<String>) {
+    // ---- Messages -------------------------------------------------------------------------------
+    fn tell(
+        &self,
+        source: Handle,
+        source_type: DataType,
+        severity: Severity,
+        text: impl Into<String>,
+    ) {
         let code = if severity <= Severity::Warning { Code::InvalidArgument } else { Code::Ok };
         self.status.tell(&Message { source, source_type, severity, code, text: text.into() });
     }
@@ -97,8 +104,7 @@ impl Device {
         self.tell(Handle::NULL, DataType::DEVICE, severity, text);
     }
 
-    // ---- Objects --------------------------------------------------------------------------------------------------
-
+    // ---- Objects --------------------------------------------------------------------------------
     fn find(&self, handle: Handle, what: &str) -> Option<Arc<Object>> {
         let found = lock(&self.objects).get(&handle).map(|e| e.object.clone());
         if found.is_none() {
@@ -106,7 +112,8 @@ impl Device {
                 format!("{what}: the object is null")
             } else {
                 format!(
-                    "{what}: {:#x} is no object of this device; it was released, or belongs to another device",
+                    "{what}: {:#x} is no object of this device; it was released, or belongs to \
+                     another device",
                     handle.0
                 )
             };
@@ -121,13 +128,16 @@ impl Device {
         handle
     }
 
-    /// A new object. An unknown subtype gives an object that takes parameters and draws nothing, with a message.
+    /// A new object. An unknown subtype gives an object that takes parameters and draws nothing,
+    /// with a message.
     pub fn new_object(&self, kind: DataType, subtype: &str) -> Handle {
         let known = schema::find(kind, subtype).is_some();
         if !known {
             let have: Vec<_> = schema::subtypes(kind).collect();
-            let text =
-                format!("there is no {} `{subtype}`; this device has {have:?}", kind.name().to_lowercase());
+            let text = format!(
+                "there is no {} `{subtype}`; this device has {have:?}",
+                kind.name().to_lowercase()
+            );
             self.tell(Handle::NULL, kind, Severity::Error, text);
         }
         let extra = match kind {
@@ -135,7 +145,8 @@ impl Device {
             DataType::WORLD => Extra::World(Box::<WorldCache>::default()),
             _ => Extra::None,
         };
-        // Some renderers are called differently by programs that know other devices: they all get the default one.
+        // Some renderers are called differently by programs that know other devices: they all get
+        // the default one.
         self.keep(Object::new(kind, subtype, known, extra))
     }
 
@@ -143,11 +154,20 @@ impl Device {
     pub fn check_array(&self, kind: DataType, element: DataType, dims: [u64; 3]) -> Option<usize> {
         let text = match (element.size(), byte_size(element, dims)) {
             (None, _) => format!("elements of type {element} have no size"),
-            (_, None) => format!("{dims:?} elements of type {element} are more than fit into memory"),
-            (_, Some(0)) => format!("{dims:?} elements: an array must have at least one in each dimension"),
+            (_, None) => {
+                format!("{dims:?} elements of type {element} are more than fit into memory")
+            }
+            (_, Some(0)) => {
+                format!("{dims:?} elements: an array must have at least one in each dimension")
+            }
             (_, bytes) => return bytes,
         };
-        self.tell(Handle::NULL, kind, Severity::Error, format!("{}: {text}", kind.name().to_lowercase()));
+        self.tell(
+            Handle::NULL,
+            kind,
+            Severity::Error,
+            format!("{}: {text}", kind.name().to_lowercase()),
+        );
         None
     }
 
@@ -181,11 +201,15 @@ impl Device {
 
     /// Looks up the objects that an array of handles names.
     fn resolve(&self, array: &Object) {
-        let handles = array.with_array(|a| if a.element.is_object() { a.handles() } else { Vec::new() });
+        let handles =
+            array.with_array(|a| if a.element.is_object() { a.handles() } else { Vec::new() });
         let Some(handles) = handles.filter(|h| !h.is_empty()) else { return };
         let objects = {
             let table = lock(&self.objects);
-            handles.iter().map(|h| table.get(&Handle(*h)).map(|e| e.object.clone())).collect::<Vec<_>>()
+            handles
+                .iter()
+                .map(|h| table.get(&Handle(*h)).map(|e| e.object.clone()))
+                .collect::<Vec<_>>()
         };
         let unknown = handles.iter().zip(&objects).filter(|(h, o)| **h != 0 && o.is_none()).count();
         if unknown > 0 {
@@ -208,8 +232,8 @@ impl Device {
         }
     }
 
-    /// One reference less. Without references the program no longer knows the object; what other objects refer to lives on, with a copy of memory
-    /// that the program may now free.
+    /// One reference less. Without references the program no longer knows the object; what other
+    /// objects refer to lives on, with a copy of memory that the program may now free.
     pub fn release(&self, handle: Handle) {
         let Some(object) = self.find(handle, "anariRelease") else { return };
         let gone = {
@@ -240,8 +264,7 @@ impl Device {
         }
     }
 
-    // ---- Parameters -----------------------------------------------------------------------------------------------
-
+    // ---- Parameters -----------------------------------------------------------------------------
     /// Sets a parameter; it takes effect with the next commit.
     pub fn set_parameter(&self, handle: Handle, name: &str, given: DataType, raw: Raw) {
         let Some(object) = self.find(handle, "anariSetParameter") else { return };
@@ -257,7 +280,10 @@ impl Device {
                     self.about(
                         &object,
                         Severity::Error,
-                        format!("`{name}` is given as {given}, but it is a {}: it is not set", other.kind),
+                        format!(
+                            "`{name}` is given as {given}, but it is a {}: it is not set",
+                            other.kind
+                        ),
                     );
                     return;
                 }
@@ -303,7 +329,11 @@ impl Device {
             let Some(p) = schema.and_then(|s| s.parameter(name)) else { return false };
             match misfit(p, value) {
                 Some(fault) => {
-                    self.about(&object, Severity::Error, format!("`{name}` {fault}: it is ignored"));
+                    self.about(
+                        &object,
+                        Severity::Error,
+                        format!("`{name}` {fault}: it is ignored"),
+                    );
                     false
                 }
                 None => true,
@@ -327,8 +357,7 @@ impl Device {
         }
     }
 
-    // ---- Arrays ---------------------------------------------------------------------------------------------------
-
+    // ---- Arrays ---------------------------------------------------------------------------------
     /// Address for the program to write to.
     pub fn map_array(&self, handle: Handle) -> *mut c_void {
         let Some(array) = self.find(handle, "anariMapArray") else { return std::ptr::null_mut() };
@@ -356,14 +385,17 @@ impl Device {
     fn written(&self, array: &Object) {
         match array.with_array(|a| std::mem::replace(&mut a.mapped, false)) {
             Some(true) => {}
-            Some(false) => self.about(array, Severity::Warning, "it is unmapped without having been mapped"),
+            Some(false) => {
+                self.about(array, Severity::Warning, "it is unmapped without having been mapped")
+            }
             None => return self.about(array, Severity::Error, "anariUnmapArray: it is no array"),
         }
         self.resolve(array);
         array.touch();
     }
 
-    /// Makes an array, sets it as a parameter, and gives the program its memory and the distance of its elements in bytes.
+    /// Makes an array, sets it as a parameter, and gives the program its memory and the distance of
+    /// its elements in bytes.
     pub fn map_parameter_array(
         &self,
         handle: Handle,
@@ -399,12 +431,12 @@ impl Device {
         }
     }
 
-    // ---- Properties -----------------------------------------------------------------------------------------------
-
+    // ---- Properties -----------------------------------------------------------------------------
     /// A property of the device.
     pub fn device_property(&self, name: &str) -> Option<Property> {
-        let version =
-            |i: usize| env!("CARGO_PKG_VERSION").split('.').nth(i).and_then(|v| v.parse().ok()).unwrap_or(0);
+        let version = |i: usize| {
+            env!("CARGO_PKG_VERSION").split('.').nth(i).and_then(|v| v.parse().ok()).unwrap_or(0)
+        };
         Some(match name {
             "version" => Property::I32(version(0) * 10_000 + version(1) * 100 + version(2)),
             "version.major" => Property::I32(version(0)),
@@ -468,7 +500,10 @@ impl Drop for Device {
         }
         let left = self.num_objects();
         if left > 0 {
-            self.report(Severity::Info, &format!("the device is released with {left} objects that were not"));
+            self.report(
+                Severity::Info,
+                &format!("the device is released with {left} objects that were not"),
+            );
         }
     }
 }
@@ -484,7 +519,8 @@ fn misfit(p: &schema::Parameter, value: &Value) -> Option<String> {
         Value::Object(a) if given.is_array() && !p.elements.is_empty() => {
             let element = a.with_array(|a| a.element)?;
             let fits = p.elements.iter().any(|e| e.accepts(element));
-            let types = || p.elements.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ");
+            let types =
+                || p.elements.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ");
             (!fits).then(|| format!("is an array of {element}; its elements must be {}", types()))
         }
         Value::Text(t) if !p.values.is_empty() && !p.values.contains(&t.as_str()) => {

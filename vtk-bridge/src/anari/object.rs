@@ -1,8 +1,9 @@
 //! Objects: parameters that take effect when they are committed, and who keeps an object alive.
 //!
-//! A program knows an object by its [`Handle`], a number that is never a memory address and never used again: a handle that was released once too
-//! often, or that belongs to another device, is found out and reported. Objects that other objects refer to live on after the program has released
-//! them: parameters hold [`Arc`]s.
+//! A program knows an object by its [`Handle`], a number that is never a memory address and never
+//! used again: a handle that was released once too often, or that belongs to another device, is
+//! found out and reported. Objects that other objects refer to live on after the program has
+//! released them: parameters hold [`Arc`]s.
 
 use super::array::Array;
 use super::data_type::DataType;
@@ -23,7 +24,8 @@ impl Handle {
 
     /// A handle that no device of this process has given out before.
     pub(crate) fn fresh() -> Handle {
-        // Steps of 16 from a number that is no small integer: programs that look at handles as pointers see aligned ones.
+        // Steps of 16 from a number that is no small integer: programs that look at handles as
+        // pointers see aligned ones.
         static NEXT: AtomicU64 = AtomicU64::new(0x1000);
         Handle(NEXT.fetch_add(16, Ordering::Relaxed))
     }
@@ -91,9 +93,11 @@ pub struct Object {
     pub handle: Handle,
     /// What it is.
     pub kind: DataType,
-    /// Which of its kind; empty for kinds without subtypes, and for unknown subtypes what the program asked for.
+    /// Which of its kind; empty for kinds without subtypes, and for unknown subtypes what the
+    /// program asked for.
     pub subtype: String,
-    /// False when the device does not have this subtype: the object takes parameters and draws nothing.
+    /// False when the device does not have this subtype: the object takes parameters and draws
+    /// nothing.
     pub known: bool,
     staged: Mutex<Parameters>,
     committed: Mutex<Arc<Parameters>>,
@@ -117,7 +121,8 @@ impl Object {
 
     /// Sets a parameter; it takes effect with the next commit.
     pub(crate) fn set(&self, name: &str, value: Value) {
-        // The old value is dropped after the lock is free: it may be the last reference to an array whose deleter calls back.
+        // The old value is dropped after the lock is free: it may be the last reference to an array
+        // whose deleter calls back.
         let _old = lock(&self.staged).insert(name.to_owned(), value);
     }
 
@@ -136,7 +141,8 @@ impl Object {
     /// Makes what was set effective, but for what `usable` refuses.
     pub(crate) fn commit(&self, mut usable: impl FnMut(&str, &Value) -> bool) {
         let staged = lock(&self.staged).clone();
-        let fresh: Parameters = staged.into_iter().filter(|(name, value)| usable(name, value)).collect();
+        let fresh: Parameters =
+            staged.into_iter().filter(|(name, value)| usable(name, value)).collect();
         let old = std::mem::replace(&mut *lock(&self.committed), Arc::new(fresh));
         self.touch();
         drop(old);
@@ -170,8 +176,7 @@ impl Object {
         }
     }
 
-    // ---- Committed parameters by type ---------------------------------------------------------------------------
-
+    // ---- Committed parameters by type -----------------------------------------------------------
     /// Numbers of a parameter with any numeric type.
     pub(crate) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
         match self.parameters().get(name)? {
@@ -194,7 +199,9 @@ impl Object {
 
     pub(crate) fn vector<const N: usize>(&self, name: &str, default: [f64; N]) -> [f64; N] {
         let given = self.numbers(name);
-        std::array::from_fn(|i| given.as_ref().and_then(|v| v.get(i)).copied().unwrap_or(default[i]))
+        std::array::from_fn(|i| {
+            given.as_ref().and_then(|v| v.get(i)).copied().unwrap_or(default[i])
+        })
     }
 
     pub(crate) fn text(&self, name: &str) -> Option<String> {
@@ -214,7 +221,10 @@ impl Object {
     /// The objects in an array parameter, in order; nulls are left out.
     pub(crate) fn objects(&self, name: &str) -> Vec<Arc<Object>> {
         self.object(name)
-            .map(|a| a.with_array(|a| a.objects().iter().flatten().cloned().collect()).unwrap_or_default())
+            .map(|a| {
+                a.with_array(|a| a.objects().iter().flatten().cloned().collect())
+                    .unwrap_or_default()
+            })
             .unwrap_or_default()
     }
 

@@ -87,7 +87,8 @@ impl Status {
     }
 }
 
-/// A lock whatever other threads did while they held it: the data behind the device's locks is never left half changed.
+/// A lock whatever other threads did while they held it: the data behind the device's locks is
+/// never left half changed.
 pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

@@ -1,4 +1,5 @@
-//! `vtk-bridge`: installs the bridge for the VTKs of this machine, says what is wrong, and prints the variables to set.
+//! `vtk-bridge`: installs the bridge for the VTKs of this machine, says what is wrong, and prints
+//! the variables to set.
 #![forbid(unsafe_code)]
 
 use anyhow::Context;
@@ -13,7 +14,8 @@ use vtk_bridge::setup::layout::{Layout, library};
 use vtk_bridge::setup::{SetupError, doctor, plugin};
 
 #[derive(Parser)]
-#[command(name = "vtk-bridge", version, about = "Ray tracing inside unmodified VTK and ParaView", after_help = EXAMPLES)]
+#[command(name = "vtk-bridge", version, about = "Ray tracing inside unmodified VTK and \
+                                                 ParaView", after_help = EXAMPLES)]
 struct Cli {
     #[command(flatten)]
     common: CommonArgs,
@@ -64,7 +66,8 @@ impl PrefixArgs {
 struct InstallArgs {
     #[command(flatten)]
     place: PrefixArgs,
-    /// Folder with VTK's headers (vtkObjectFactory.h); may be given several times. RTV_VTK_INCLUDE and the system's are looked at as well.
+    /// Folder with VTK's headers (vtkObjectFactory.h); may be given several times. RTV_VTK_INCLUDE
+    /// and the system's are looked at as well.
     #[arg(long = "include")]
     includes: Vec<PathBuf>,
     /// Build ParaView's plugin with its panel too (needs paraview-dev).
@@ -115,7 +118,11 @@ fn flavours(more: &[PathBuf]) -> (Vec<Flavour>, Vec<String>, String) {
     let looked: Vec<PathBuf> = more.iter().cloned().chain(places(variable)).collect();
     let (found, faults) = find(&looked);
     let looked = looked.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
-    (found, faults, if looked.is_empty() { "/usr/include and /usr/local/include".to_owned() } else { looked })
+    (
+        found,
+        faults,
+        if looked.is_empty() { "/usr/include and /usr/local/include".to_owned() } else { looked },
+    )
 }
 
 fn install(common: &CommonArgs, args: &InstallArgs) -> anyhow::Result<Status> {
@@ -134,16 +141,23 @@ fn install(common: &CommonArgs, args: &InstallArgs) -> anyhow::Result<Status> {
     }
     if args.plugin {
         let Some(pv) = found.iter().find(|f| f.is_paraview()) else {
-            return usage(SetupError::NotFound { asked: "ParaView", cure: Program::ParaView.cure() });
+            return usage(SetupError::NotFound {
+                asked: "ParaView",
+                cure: Program::ParaView.cure(),
+            });
         };
         let file = plugin::install(&layout, pv)?;
         common.note(0, format!("plugin: {}", file.display()));
-        common.note(0, format!("load it with PV_PLUGIN_PATH={}", layout.plugin_folder(&pv.name).display()));
+        common.note(
+            0,
+            format!("load it with PV_PLUGIN_PATH={}", layout.plugin_folder(&pv.name).display()),
+        );
     }
     common.result(&done, || {
         let list = done.built.join(", ");
         format!(
-            "installed in {} for VTK {list}\nset VTK_AUTOLOAD_PATH={} (eval \"$(vtk-bridge env --vtk)\" does), and scripts are ray traced",
+            "installed in {} for VTK {list}\nset VTK_AUTOLOAD_PATH={} (eval \"$(vtk-bridge env \
+             --vtk)\" does), and scripts are ray traced",
             layout.prefix().display(),
             layout.autoload().display()
         )
@@ -154,8 +168,9 @@ fn install(common: &CommonArgs, args: &InstallArgs) -> anyhow::Result<Status> {
 fn examine(common: &CommonArgs, args: &PrefixArgs) -> anyhow::Result<Status> {
     let findings = doctor::examine(&args.layout(), variable);
     common.result(&findings, || {
-        let line =
-            |f: &doctor::Finding| format!("{} {:<18} {}", if f.ok { "ok " } else { "BAD" }, f.what, f.text);
+        let line = |f: &doctor::Finding| {
+            format!("{} {:<18} {}", if f.ok { "ok " } else { "BAD" }, f.what, f.text)
+        };
         findings.iter().map(line).collect::<Vec<_>>().join("\n")
     })?;
     Ok(if findings.iter().all(|f| f.ok) { Status::Success } else { Status::Failure })
@@ -213,7 +228,11 @@ fn env(common: &CommonArgs, args: &EnvArgs) -> anyhow::Result<Status> {
 
 fn options(common: &CommonArgs) -> anyhow::Result<Status> {
     common.result(&NAMES, || {
-        NAMES.iter().map(|(n, what, rule)| format!("{n:<18} {what} ({rule})")).collect::<Vec<_>>().join("\n")
+        NAMES
+            .iter()
+            .map(|(n, what, rule)| format!("{n:<18} {what} ({rule})"))
+            .collect::<Vec<_>>()
+            .join("\n")
     })?;
     Ok(Status::Success)
 }

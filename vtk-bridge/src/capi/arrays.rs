@@ -2,8 +2,8 @@
 
 use super::types::*;
 use crate::input::{
-    Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars, SceneLight,
-    Shading, Shape, Surface, Volume, VolumeBlend,
+    Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars,
+    SceneLight, Shading, Shape, Surface, Volume, VolumeBlend,
 };
 use rt_core::glam::DMat4;
 
@@ -177,7 +177,8 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
             back: (s.has_back != 0).then(|| property(&s.back)),
             glyphs: (s.glyph_matrices.kind != RTV_NONE)
                 .then(|| {
-                    tuples(&s.glyph_colors, "glyph colours", RTV_U8).map(|rgba| Glyphs { matrices, rgba })
+                    tuples(&s.glyph_colors, "glyph colours", RTV_U8)
+                        .map(|rgba| Glyphs { matrices, rgba })
                 })
                 .transpose()?,
         })
@@ -231,7 +232,9 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
                 RTV_BLEND_AVERAGE => VolumeBlend::Average,
                 RTV_BLEND_ADDITIVE => VolumeBlend::Additive,
                 RTV_BLEND_ISOSURFACES => VolumeBlend::Isosurfaces(isovalues.as_flattened()),
-                other => return Err(format!("a volume with blending {other}, which does not exist")),
+                other => {
+                    return Err(format!("a volume with blending {other}, which does not exist"));
+                }
             },
         })
     }
@@ -262,7 +265,9 @@ fn property(p: &RtvProperty) -> Property {
 
 pub(super) fn light(l: &RtvLight) -> SceneLight {
     let kind = match l.kind {
-        RTV_LIGHT_SPOT => LightKind::Spot { cutoff_rad: l.cone_angle_deg.to_radians(), exponent: l.exponent },
+        RTV_LIGHT_SPOT => {
+            LightKind::Spot { cutoff_rad: l.cone_angle_deg.to_radians(), exponent: l.exponent }
+        }
         RTV_LIGHT_POINT => LightKind::Point,
         _ => LightKind::Directional,
     };

@@ -1,8 +1,10 @@
 //! The C ABI behind the C++ shim, the plugin and the Python package: `include/rtv.h`.
 //!
-//! A frame is `rtv_begin`, `rtv_surface` and `rtv_light` for everything there is, `rtv_render`. Arrays belong to the caller and are read
-//! before the call returns. Pictures and texts belong to the bridge. A panic never crosses the border: it becomes a warning, and the
-//! call fails. A bridge is used by one thread at a time; different bridges may be used at once, each with options of its own.
+//! A frame is `rtv_begin`, `rtv_surface` and `rtv_light` for everything there is, `rtv_render`.
+//! Arrays belong to the caller and are read before the call returns. Pictures and texts belong to
+//! the bridge. A panic never crosses the border: it becomes a warning, and the call fails. A bridge
+//! is used by one thread at a time; different bridges may be used at once, each with options of its
+//! own.
 #![allow(unsafe_code, reason = "this is where foreign code calls us")]
 
 mod arrays;
@@ -25,7 +27,8 @@ pub struct RtvBridge {
     _private: [u8; 0],
 }
 
-/// Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on.
+/// Number of this interface, made from its structures and calls (a test says which). A shim built
+/// for another one must not go on.
 pub const RTV_ABI: u32 = 4_135_612_408;
 
 /// [`RTV_ABI`] of the library.
@@ -47,12 +50,14 @@ pub extern "C" fn rtv_new() -> *mut RtvBridge {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtv_free(bridge: *mut RtvBridge) {
     if !bridge.is_null() {
-        // SAFETY: made by `rtv_new` from a box of this type, and given back once (the caller's promise).
+        // SAFETY: made by `rtv_new` from a box of this type, and given back once (the caller's
+        // promise).
         guarded((), || drop(unsafe { Box::from_raw(bridge.cast::<BridgeState>()) }));
     }
 }
 
-/// Sets an option for all bridges of the process (`RTV_AO`, "16"); an empty value takes it back. 1 when it was understood.
+/// Sets an option for all bridges of the process (`RTV_AO`, "16"); an empty value takes it back. 1
+/// when it was understood.
 ///
 /// # Safety
 /// Both are null or end with a zero byte.
@@ -98,8 +103,9 @@ pub unsafe extern "C" fn rtv_bridge_option(bridge: *mut RtvBridge, name: *const 
     unsafe { with(bridge, -1.0, |h| h.option(&text(name))) }
 }
 
-/// Tells which VTK the library is inside of: options whose default follows VTK's version (`RTV_EDGES`) take it from here, unless the
-/// environment or the program says otherwise. For all bridges of the process.
+/// Tells which VTK the library is inside of: options whose default follows VTK's version
+/// (`RTV_EDGES`) take it from here, unless the environment or the program says otherwise. For all
+/// bridges of the process.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {
     guarded((), || state::set_host(vtk_major, vtk_minor));
@@ -115,10 +121,12 @@ pub unsafe extern "C" fn rtv_begin(bridge: *mut RtvBridge) -> i32 {
     unsafe { with(bridge, 0, |h| h.begin()) }
 }
 
-/// Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense.
+/// Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1
+/// when its arrays make no sense.
 ///
 /// # Safety
-/// As `rtv_begin`; every array of `surface` has the length it says and is not written to during the call.
+/// As `rtv_begin`; every array of `surface` has the length it says and is not written to during the
+/// call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rtv_surface(bridge: *mut RtvBridge, surface: *const RtvSurface) -> i32 {
     // SAFETY: as above.
@@ -156,12 +164,16 @@ pub unsafe extern "C" fn rtv_surfaces(
     }
 }
 
-/// Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory until its next call.
+/// Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory
+/// until its next call.
 ///
 /// # Safety
 /// As `rtv_surface`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtv_volume(bridge: *mut RtvBridge, volume: *const RtvVolume) -> *const c_char {
+pub unsafe extern "C" fn rtv_volume(
+    bridge: *mut RtvBridge,
+    volume: *const RtvVolume,
+) -> *const c_char {
     // SAFETY: as above; a null volume is refused.
     let Some(v) = (unsafe { volume.as_ref() }) else { return c"no volume".as_ptr() };
     // SAFETY: as above.
@@ -187,12 +199,17 @@ pub unsafe extern "C" fn rtv_has_volume(bridge: *mut RtvBridge, scalar_key: u64)
     unsafe { with(bridge, 0, |h| i32::from(h.bridge.has_volume(scalar_key))) }
 }
 
-/// 1 when colours of these keys are kept from the frame before: `rtv_surface` need not be given their arrays.
+/// 1 when colours of these keys are kept from the frame before: `rtv_surface` need not be given
+/// their arrays.
 ///
 /// # Safety
 /// As `rtv_begin`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtv_has_colors(bridge: *mut RtvBridge, shape_key: u64, color_key: u64) -> i32 {
+pub unsafe extern "C" fn rtv_has_colors(
+    bridge: *mut RtvBridge,
+    shape_key: u64,
+    color_key: u64,
+) -> i32 {
     // SAFETY: as above.
     unsafe { with(bridge, 0, |h| i32::from(h.bridge.has_colors(shape_key, color_key))) }
 }
@@ -214,7 +231,11 @@ pub unsafe extern "C" fn rtv_light(bridge: *mut RtvBridge, light: *const RtvLigh
 /// # Safety
 /// As `rtv_begin`; texts are null or end with a zero byte.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtv_pass(bridge: *mut RtvBridge, name: *const c_char, reason: *const c_char) {
+pub unsafe extern "C" fn rtv_pass(
+    bridge: *mut RtvBridge,
+    name: *const c_char,
+    reason: *const c_char,
+) {
     // SAFETY: as above.
     unsafe { with(bridge, (), |h| h.bridge.report_untraced(&text(name), &text(reason))) }
 }
@@ -229,7 +250,8 @@ pub unsafe extern "C" fn rtv_warn(bridge: *mut RtvBridge, message: *const c_char
     unsafe { with(bridge, (), |h| h.bridge.warn(text(message))) }
 }
 
-/// Draws what was added: 1 with a picture, 0 when it could not be drawn (the user is told why; OpenGL should draw everything).
+/// Draws what was added: 1 with a picture, 0 when it could not be drawn (the user is told why;
+/// OpenGL should draw everything).
 ///
 /// # Safety
 /// As `rtv_begin`; `view` and `picture` are null or valid.
@@ -310,7 +332,8 @@ pub struct RtvApi {
     /// [`rtv_end`].
     pub end: unsafe extern "C" fn(*mut RtvBridge),
     /// [`rtv_set_bridge_option`].
-    pub set_bridge_option: unsafe extern "C" fn(*mut RtvBridge, *const c_char, *const c_char) -> i32,
+    pub set_bridge_option:
+        unsafe extern "C" fn(*mut RtvBridge, *const c_char, *const c_char) -> i32,
     /// [`rtv_bridge_option`].
     pub bridge_option: unsafe extern "C" fn(*mut RtvBridge, *const c_char) -> f64,
     /// [`rtv_surfaces`].
@@ -357,7 +380,8 @@ unsafe fn text(t: *const c_char) -> String {
     unsafe { CStr::from_ptr(t) }.to_string_lossy().into_owned()
 }
 
-/// The options in force, for programs that use the library from Rust and want what the environment says.
+/// The options in force, for programs that use the library from Rust and want what the environment
+/// says.
 pub fn options_of_process() -> Options {
     state::options()
 }

@@ -42,7 +42,8 @@ pub(super) fn set_host(major: u32, minor: u32) {
     HOST.store(u64::from(major) << 32 | u64::from(minor), Ordering::Relaxed);
 }
 
-/// Options that follow VTK's version. Shaders of versions after 9.2 draw edges on their surfaces alone.
+/// Options that follow VTK's version. Shaders of versions after 9.2 draw edges on their surfaces
+/// alone.
 fn host_options(host: u64) -> Option<(String, String)> {
     ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
 }
@@ -184,7 +185,11 @@ impl BridgeState {
                 return Some(RtvPicture {
                     width: p.width,
                     height: p.height,
-                    opaque: if p.opaque.is_empty() { std::ptr::null() } else { p.opaque.as_ptr().cast() },
+                    opaque: if p.opaque.is_empty() {
+                        std::ptr::null()
+                    } else {
+                        p.opaque.as_ptr().cast()
+                    },
                     blended: pointer(p.blended.as_flattened()),
                     depth: pointer(&p.depth),
                     first_depth: pointer(&p.first_depth),
@@ -219,18 +224,20 @@ impl Drop for BridgeState {
     }
 }
 
-/// A line for the user of the foreign program, each text once in the process. There is nobody else to tell: we are a guest.
+/// A line for the user of the foreign program, each text once in the process. There is nobody else
+/// to tell: we are a guest.
 fn warn_user_once(text: &str) {
     static SHOWN_WARNINGS: Mutex<BTreeMap<String, ()>> = Mutex::new(BTreeMap::new());
-    let first = SHOWN_WARNINGS.lock().map(|mut t| t.insert(text.to_owned(), ()).is_none()).unwrap_or(false);
+    let first =
+        SHOWN_WARNINGS.lock().map(|mut t| t.insert(text.to_owned(), ()).is_none()).unwrap_or(false);
     if first {
         use std::io::Write;
         let _ = writeln!(std::io::stderr().lock(), "vtk-bridge: {text}");
     }
 }
 
-/// Calls `work` with the handle; `otherwise` for null, and after a panic, which is told. After a panic the bridge leaves everything to
-/// OpenGL, because what it keeps may be half done.
+/// Calls `work` with the handle; `otherwise` for null, and after a panic, which is told. After a
+/// panic the bridge leaves everything to OpenGL, because what it keeps may be half done.
 ///
 /// # Safety
 /// `bridge` is null or came from `rtv_new`, and no other thread uses it.
@@ -239,7 +246,8 @@ pub(super) unsafe fn with<T>(
     otherwise: T,
     work: impl FnOnce(&mut BridgeState) -> T,
 ) -> T {
-    // SAFETY: `rtv_new` made it from a `BridgeState`; the caller promises that it is alive and not in use.
+    // SAFETY: `rtv_new` made it from a `BridgeState`; the caller promises that it is alive and not
+    // in use.
     let Some(handle) = (unsafe { bridge.cast::<BridgeState>().as_mut() }) else { return otherwise };
     if handle.poisoned {
         return otherwise;
@@ -281,6 +289,9 @@ mod tests {
             assert_eq!(of(major, minor).as_deref(), Some("RTV_EDGES=0"), "{major}.{minor}");
         }
         let said = ("RTV_EDGES".to_owned(), "0.5".to_owned());
-        assert_eq!(Options::parse(host_options(9 << 32 | 5).into_iter().chain([said])).0.edge_reach, 0.5);
+        assert_eq!(
+            Options::parse(host_options(9 << 32 | 5).into_iter().chain([said])).0.edge_reach,
+            0.5
+        );
     }
 }

@@ -17,7 +17,8 @@ fn array<T, const N: usize>(values: &[[T; N]], kind: u32) -> RtvArray {
 
 const NO_ARRAY: RtvArray = RtvArray { data: ptr::null(), tuples: 0, components: 0, kind: RTV_NONE };
 const NO_CELLS: RtvCells = RtvCells { offsets: NO_ARRAY, connectivity: NO_ARRAY };
-const IDENTITY: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+const IDENTITY: [f64; 16] =
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
 fn property() -> RtvProperty {
     RtvProperty {
@@ -43,7 +44,8 @@ fn property() -> RtvProperty {
 }
 
 fn surface(points: &[[f32; 3]], offsets: &[[i64; 1]], connectivity: &[[i64; 1]]) -> RtvSurface {
-    let polys = RtvCells { offsets: array(offsets, RTV_I64), connectivity: array(connectivity, RTV_I64) };
+    let polys =
+        RtvCells { offsets: array(offsets, RTV_I64), connectivity: array(connectivity, RTV_I64) };
     RtvSurface {
         name: c"test".as_ptr(),
         shape_key: 1,
@@ -253,8 +255,9 @@ fn views_in_two_threads_do_not_mix_their_options() {
             assert_eq!(set(c"RTV_OFF", if off { c"1" } else { c"0" }), 1);
             together.wait();
             // SAFETY: as above.
-            let seen =
-                unsafe { (rtv_begin(bridge), rtv_bridge_option(bridge, c"RTV_POINT_RADIUS".as_ptr())) };
+            let seen = unsafe {
+                (rtv_begin(bridge), rtv_bridge_option(bridge, c"RTV_POINT_RADIUS".as_ptr()))
+            };
             found.push(seen);
             // SAFETY: as above.
             unsafe { rtv_end(bridge) };

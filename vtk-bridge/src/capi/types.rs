@@ -156,7 +156,8 @@ pub struct RtvMaps {
 pub struct RtvSurface {
     /// Name for messages, UTF-8.
     pub name: *const c_char,
-    /// Changes whenever points, cells, normals, texture coordinates, clipping planes or radii do; 0: not known.
+    /// Changes whenever points, cells, normals, texture coordinates, clipping planes or radii do;
+    /// 0: not known.
     pub shape_key: u64,
     /// Changes whenever the colours do; 0: not known.
     pub color_key: u64,
@@ -232,7 +233,8 @@ pub struct RtvVolume {
     pub name: *const c_char,
     /// Changes whenever the scalars do; 0: not known.
     pub scalar_key: u64,
-    /// One number of any kind per point, x fastest; none when rtv_has_volume says that they are kept.
+    /// One number of any kind per point, x fastest; none when rtv_has_volume says that they are
+    /// kept.
     pub scalars: RtvArray,
     /// Points per axis.
     pub dims: [u32; 3],
@@ -262,9 +264,11 @@ pub struct RtvVolume {
     pub specular_power: f32,
     /// 1 for a highlight around the mirrored light instead of the half vector.
     pub specular_mirrored: u32,
-    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and its colour; none for a white one at the viewer.
+    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and
+    /// its colour; none for a white one at the viewer.
     pub lights: RtvArray,
-    /// Opacities by gradient, evenly spaced from 0 to steepest, that those of the scalars are multiplied by; none for 1.
+    /// Opacities by gradient, evenly spaced from 0 to steepest, that those of the scalars are
+    /// multiplied by; none for 1.
     pub gradient_opacities: RtvArray,
     /// Gradient of the last of them, scalar per data unit.
     pub steepest: f64,

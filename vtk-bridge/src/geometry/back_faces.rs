@@ -1,7 +1,8 @@
 //! Backs of triangles that look different from their fronts (`vtkActor::SetBackfaceProperty`).
 //!
-//! OpenGL asks each fragment which side it is of. rt-core's materials belong to instances, so the backs are a second shape: its triangles are met only from
-//! behind, and a hair before the surface itself.
+//! OpenGL asks each fragment which side it is of. rt-core's materials belong to instances, so the
+//! backs are a second shape: its triangles are met only from behind, and a hair before the surface
+//! itself.
 
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::math::Aabb;
@@ -44,7 +45,8 @@ impl Shape for BackFaces {
                 let [a, b, c] = self.mesh.triangle(prim as usize);
                 // Some roundings larger: flat boxes are missed by rays that run along them.
                 let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-                let pad = (lo.abs().max(hi.abs()) * 4.0 * f32::EPSILON).max(Vec3::splat(f32::MIN_POSITIVE));
+                let pad = (lo.abs().max(hi.abs()) * 4.0 * f32::EPSILON)
+                    .max(Vec3::splat(f32::MIN_POSITIVE));
                 Aabb { min: lo - pad, max: hi + pad }
             }
             None => Aabb::EMPTY,

@@ -1,13 +1,16 @@
-//! Clipping planes of a mapper: triangles are cut (Sutherland and Hodgman 1974), because rays know no planes.
+//! Clipping planes of a mapper: triangles are cut (Sutherland and Hodgman 1974), because rays know
+//! no planes.
 //!
-//! OpenGL interpolates the distance to the plane over the triangle and drops fragments where it is negative; a cut along the plane is the
-//! same, up to rounding. New vertices remember the edge they were made on, so that colours can be carried over later without a new mesh.
+//! OpenGL interpolates the distance to the plane over the triangle and drops fragments where it is
+//! negative; a cut along the plane is the same, up to rounding. New vertices remember the edge they
+//! were made on, so that colours can be carried over later without a new mesh.
 
 use rt_core::glam::{DVec3, Vec2, Vec3, Vec4};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::collections::HashMap;
 
-/// Where a vertex of a clipped mesh comes from: `(1 - t) a + t b` of two vertices of the mesh before.
+/// Where a vertex of a clipped mesh comes from: `(1 - t) a + t b` of two vertices of the mesh
+/// before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClipVertex {
     /// First vertex.
@@ -46,7 +49,8 @@ impl ClipMap {
 
 /// The part of `mesh` on the positive side of every plane.
 pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
-    let mut clip_map = ClipMap { triangles: (0..mesh.indices.len() as u32).collect(), ..ClipMap::default() };
+    let mut clip_map =
+        ClipMap { triangles: (0..mesh.indices.len() as u32).collect(), ..ClipMap::default() };
     let mut positions = mesh.positions.clone();
     let mut indices = mesh.indices.clone();
     for plane in planes {
@@ -56,7 +60,11 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
             .map(|o| {
                 let (a, b) = (positions[o.a as usize], positions[o.b as usize]);
                 // In f64: the cut must not depend on how long the edge is.
-                if o.t == 0.0 { a } else { a.as_dvec3().lerp(b.as_dvec3(), f64::from(o.t)).as_vec3() }
+                if o.t == 0.0 {
+                    a
+                } else {
+                    a.as_dvec3().lerp(b.as_dvec3(), f64::from(o.t)).as_vec3()
+                }
             })
             .collect();
         indices = new_indices;
@@ -71,13 +79,19 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
             Attribute::per_face(clip_map.triangles.iter().map(|&i| n.values[i as usize]).collect())
         }
     });
-    let texcoords = mesh.texcoords.as_ref().map(|v| clip_map.vertex_values(v, |a: Vec2, b, t| a.lerp(b, t)));
-    let tangents = mesh.tangents.as_ref().map(|v| clip_map.vertex_values(v, |a: Vec4, b, t| a.lerp(b, t)));
+    let texcoords =
+        mesh.texcoords.as_ref().map(|v| clip_map.vertex_values(v, |a: Vec2, b, t| a.lerp(b, t)));
+    let tangents =
+        mesh.tangents.as_ref().map(|v| clip_map.vertex_values(v, |a: Vec4, b, t| a.lerp(b, t)));
     let origin = mesh.origin;
-    (TriMesh { origin, positions, indices, normals, texcoords, tangents, ..TriMesh::default() }, clip_map)
+    (
+        TriMesh { origin, positions, indices, normals, texcoords, tangents, ..TriMesh::default() },
+        clip_map,
+    )
 }
 
-/// One plane: origins of the vertices that remain or are new, triangles, and the triangle each comes from.
+/// One plane: origins of the vertices that remain or are new, triangles, and the triangle each
+/// comes from.
 fn cut(
     origin: DVec3,
     positions: &[Vec3],
@@ -159,8 +173,10 @@ mod tests {
 
     #[test]
     fn neighbours_share_the_vertices_on_the_cut() {
-        let mesh =
-            TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X + Vec3::Y], vec![[0, 1, 2], [1, 3, 2]]);
+        let mesh = TriMesh::new(
+            vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X + Vec3::Y],
+            vec![[0, 1, 2], [1, 3, 2]],
+        );
         let (out, _) = clip(&mesh, &[[1.0, 0.0, 0.0, -0.5]]);
         assert_eq!(out.positions.len(), 5, "two corners and one new vertex on each of three edges");
     }

@@ -37,7 +37,8 @@ pub struct PolygonMesh {
     pub mesh: Arc<TriMesh>,
     /// Cell number of each triangle.
     pub cells: CellOfTriangle,
-    /// Which sides of each triangle are edges of its polygon (bit i: from corner i to the next); `None` when all are.
+    /// Which sides of each triangle are edges of its polygon (bit i: from corner i to the next);
+    /// `None` when all are.
     pub edges: Option<Arc<Vec<u8>>>,
     /// Set when clipping planes made new vertices and triangles.
     pub clip_map: Option<Arc<ClipMap>>,
@@ -86,7 +87,8 @@ fn cell_numbers(shape: &Shape<'_>) -> [Range<usize>; 4] {
 /// Builds everything that `shape` asks for.
 pub fn build(shape: &Shape<'_>) -> GeometrySet {
     let [_, _, polys, strips] = cell_numbers(shape);
-    let mut built = GeometrySet { mesh: None, spheres: None, tubes: None, back_faces: None, skipped: 0 };
+    let mut built =
+        GeometrySet { mesh: None, spheres: None, tubes: None, back_faces: None, skipped: 0 };
     points_and_lines::add(shape, &mut built);
     if shape.edges_only {
         return built;
@@ -99,16 +101,21 @@ pub fn build(shape: &Shape<'_>) -> GeometrySet {
     let points = positions.len();
     let mut mesh = TriMesh { origin, positions, indices, ..TriMesh::default() };
     mesh.normals = shape.normals.and_then(|normals| match normals {
-        PerItem::Point(n) => (n.len() == points).then(|| Attribute::per_vertex(vertices::vectors(n))),
+        PerItem::Point(n) => {
+            (n.len() == points).then(|| Attribute::per_vertex(vertices::vectors(n)))
+        }
         PerItem::Cell(n) => (n.len() >= strips.end).then(|| {
             let of = |i| n.get(cells.at(i)).map_or(Vec3::ZERO, |v| Vec3::from(*v));
             Attribute::per_face((0..mesh.indices.len()).map(of).collect())
         }),
     });
-    mesh.texcoords =
-        shape.texcoords.filter(|t| t.len() == points).map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
+    mesh.texcoords = shape
+        .texcoords
+        .filter(|t| t.len() == points)
+        .map(|t| t.iter().map(|v| Vec2::from(*v)).collect());
     let tangent = |t: &[f32; 3]| Vec3::from(*t).extend(1.0);
-    mesh.tangents = shape.tangents.filter(|t| t.len() == points).map(|t| t.iter().map(tangent).collect());
+    mesh.tangents =
+        shape.tangents.filter(|t| t.len() == points).map(|t| t.iter().map(tangent).collect());
     let (mesh, clip_map) = if shape.clip_planes.is_empty() {
         (mesh, None)
     } else {
@@ -121,8 +128,9 @@ pub fn build(shape: &Shape<'_>) -> GeometrySet {
         CellOfTriangle::List(_) => Some(Arc::new(triangulate::edges(shape))),
     };
     let mesh = Arc::new(mesh);
-    built.back_faces =
-        shape.has_back_faces.then(|| Arc::new(back_faces::BackFaces::of(Arc::clone(&mesh))) as Arc<_>);
+    built.back_faces = shape
+        .has_back_faces
+        .then(|| Arc::new(back_faces::BackFaces::of(Arc::clone(&mesh))) as Arc<_>);
     built.mesh = Some(PolygonMesh { mesh, cells, edges, clip_map });
     built
 }

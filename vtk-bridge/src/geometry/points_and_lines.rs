@@ -12,7 +12,9 @@ pub(super) fn add(shape: &Shape<'_>, built: &mut GeometrySet) {
     if shape.point_radius > 0.0 && !shape.verts.is_empty() {
         let centers = points_of(shape, &shape.verts);
         built.spheres =
-            Spheres::from_f64_centers(&centers, Radii::Common(shape.point_radius as f32)).ok().map(Arc::new);
+            Spheres::from_f64_centers(&centers, Radii::Common(shape.point_radius as f32))
+                .ok()
+                .map(Arc::new);
     }
     if shape.line_radius > 0.0 {
         let (mut points, mut offsets) = (Vec::new(), vec![0u32]);
@@ -71,8 +73,10 @@ mod tests {
 
     #[test]
     fn edges_shared_by_two_polygons_are_drawn_once() {
-        let quads =
-            Cells { offsets: Ids::I64(&[0, 4, 8]), connectivity: Ids::I64(&[0, 1, 2, 3, 1, 4, 5, 2]) };
+        let quads = Cells {
+            offsets: Ids::I64(&[0, 4, 8]),
+            connectivity: Ids::I64(&[0, 1, 2, 3, 1, 4, 5, 2]),
+        };
         assert_eq!(edges(&quads).len(), 7);
     }
 
@@ -80,8 +84,11 @@ mod tests {
     fn spheres_and_tubes_come_only_when_asked_for() {
         let points = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0]];
         let line = Cells { offsets: Ids::I64(&[0, 2]), connectivity: Ids::I64(&[0, 1]) };
-        let shape =
-            Shape { lines: line, verts: line, ..Shape::polygons(1, Points::F32(&points), Cells::NONE) };
+        let shape = Shape {
+            lines: line,
+            verts: line,
+            ..Shape::polygons(1, Points::F32(&points), Cells::NONE)
+        };
         let built = super::super::build(&shape);
         assert!(built.mesh.is_none() && built.spheres.is_none() && built.tubes.is_none());
         let built = super::super::build(&Shape { line_radius: 0.1, point_radius: 0.2, ..shape });

@@ -1,5 +1,5 @@
-//! Polygons and strips to triangles, in VTK's order: polygons are fanned from their first point, every other triangle of a strip is
-//! turned.
+//! Polygons and strips to triangles, in VTK's order: polygons are fanned from their first point,
+//! every other triangle of a strip is turned.
 
 use super::CellOfTriangle;
 use crate::input::{Cells, Ids, Shape};
@@ -34,7 +34,8 @@ pub(super) fn triangles(
     (all().map(|t| t.0).collect(), CellOfTriangle::List(Arc::new(all().map(|t| t.1).collect())))
 }
 
-/// Which sides of the triangles of [`triangles`] are edges of their polygon: bit i for the side from corner i to the next.
+/// Which sides of the triangles of [`triangles`] are edges of their polygon: bit i for the side
+/// from corner i to the next.
 pub(super) fn edges(shape: &Shape<'_>) -> Vec<u8> {
     let polys = expanded(&shape.polys, 0, |_, run, _, out| {
         for k in run.start + 1..run.end.saturating_sub(1) {
@@ -73,7 +74,10 @@ fn all_triangles(cells: &Cells<'_>) -> bool {
     let n = cells.len();
     n == 0
         || cells.connectivity.len() == 3 * n
-            && (0..n + 1).into_par_iter().with_min_len(CHUNK).all(|i| cells.offsets.at(i) == 3 * i as i64)
+            && (0..n + 1)
+                .into_par_iter()
+                .with_min_len(CHUNK)
+                .all(|i| cells.offsets.at(i) == 3 * i as i64)
 }
 
 /// The connectivity of cells that all are triangles.
@@ -104,13 +108,20 @@ mod tests {
 
     #[test]
     fn polygons_are_fanned_and_strips_alternate() {
-        let polys =
-            Cells { offsets: Ids::I64(&[0, 3, 8]), connectivity: Ids::I64(&[0, 1, 2, 3, 4, 5, 6, 7]) };
-        let strips = Cells { offsets: Ids::I32(&[0, 4]), connectivity: Ids::I32(&[10, 11, 12, 13]) };
+        let polys = Cells {
+            offsets: Ids::I64(&[0, 3, 8]),
+            connectivity: Ids::I64(&[0, 1, 2, 3, 4, 5, 6, 7]),
+        };
+        let strips =
+            Cells { offsets: Ids::I32(&[0, 4]), connectivity: Ids::I32(&[10, 11, 12, 13]) };
         let (t, cells) = triangles(&shape(polys, strips), 5, 7);
         assert_eq!(t, [[0, 1, 2], [3, 4, 5], [3, 5, 6], [3, 6, 7], [10, 11, 12], [12, 11, 13]]);
         assert_eq!((0..6).map(|i| cells.at(i)).collect::<Vec<_>>(), [5, 6, 6, 6, 7, 7]);
-        assert_eq!(edges(&shape(polys, strips)), [7, 3, 2, 6, 7, 7], "diagonals of polygons are no edges");
+        assert_eq!(
+            edges(&shape(polys, strips)),
+            [7, 3, 2, 6, 7, 7],
+            "diagonals of polygons are no edges"
+        );
     }
 
     #[test]
@@ -126,7 +137,8 @@ mod tests {
 
     #[test]
     fn offsets_and_numbers_that_make_no_sense_give_no_triangle_of_other_points() {
-        let polys = Cells { offsets: Ids::I64(&[0, 3, 2, 99]), connectivity: Ids::I64(&[0, -1, 1 << 40]) };
+        let polys =
+            Cells { offsets: Ids::I64(&[0, 3, 2, 99]), connectivity: Ids::I64(&[0, -1, 1 << 40]) };
         let (t, _) = triangles(&shape(polys, Cells::NONE), 0, 3);
         assert_eq!(t, [[0, u32::MAX, u32::MAX]]);
     }

@@ -1,8 +1,11 @@
-//! What VTK finds through `VTK_AUTOLOAD_PATH`: three functions, behind which the C++ shim is loaded that was built for the VTK in the process.
+//! What VTK finds through `VTK_AUTOLOAD_PATH`: three functions, behind which the C++ shim is loaded
+//! that was built for the VTK in the process.
 //!
-//! VTK opens every shared library in that folder and asks for its version before it calls `vtkLoad`. A shim linked to one VTK would drag that VTK's
-//! libraries into a process that runs another one before the question is even asked (seen: ParaView 5.11 crashes when Debian's VTK 9.1 is installed).
-//! So the folder has only this library, which needs no VTK, looks which one is there, and opens the shim that fits.
+//! VTK opens every shared library in that folder and asks for its version before it calls
+//! `vtkLoad`. A shim linked to one VTK would drag that VTK's libraries into a process that runs
+//! another one before the question is even asked (seen: ParaView 5.11 crashes when Debian's VTK 9.1
+//! is installed). So the folder has only this library, which needs no VTK, looks which one is
+//! there, and opens the shim that fits.
 #![allow(unsafe_code, reason = "symbols that VTK calls, and dlopen")]
 
 mod process;
@@ -22,7 +25,8 @@ struct Shim {
     load: unsafe extern "C" fn() -> *mut c_void,
 }
 
-/// The shim for this process, or what to tell the user, as a text that VTK prints for us as the "version" it rejects.
+/// The shim for this process, or what to tell the user, as a text that VTK prints for us as the
+/// "version" it rejects.
 fn shim() -> Result<&'static Shim, &'static CStr> {
     static SHIM_OR_REASON: OnceLock<Result<Shim, CString>> = OnceLock::new();
     let found = SHIM_OR_REASON.get_or_init(|| {
@@ -39,7 +43,8 @@ fn find_and_load() -> Result<Shim, String> {
     let modules = process::loaded_files();
     let flavours: Vec<String> = modules.iter().filter_map(|m| flavour_of(m)).collect();
     let home = home().ok_or(
-        "cannot find out where this library lies; set RTV_HOME to the folder of `vtk-bridge install`",
+        "cannot find out where this library lies; set RTV_HOME to the folder of `vtk-bridge \
+         install`",
     )?;
     let (flavour, path) = choose(&flavours, &home, |p| p.is_file())?;
     process::open_shim(&path).map_err(|e| {
@@ -64,7 +69,8 @@ fn choose(
     candidates.iter().find(|(_, p)| exists(p)).cloned().ok_or_else(|| {
         let (f, p) = &candidates[0];
         format!(
-            "this is VTK {f}, and there is no build for it at {}; run `vtk-bridge install` (it needs the headers of this VTK; for a VTK \
+            "this is VTK {f}, and there is no build for it at {}; run `vtk-bridge install` (it \
+             needs the headers of this VTK; for a VTK \
              from pip there are none: use `python -m rtvtk script.py`)",
             p.display()
         )
@@ -83,7 +89,8 @@ pub fn flavour_of(file: &str) -> Option<String> {
     flavour.strip_prefix('-').map(str::to_owned)
 }
 
-/// The folder of `vtk-bridge install`: `RTV_HOME`, or the parent of the folder this library lies in.
+/// The folder of `vtk-bridge install`: `RTV_HOME`, or the parent of the folder this library lies
+/// in.
 fn home() -> Option<PathBuf> {
     if let Some(set) = std::env::var_os("RTV_HOME").filter(|v| !v.is_empty()) {
         return Some(set.into());
@@ -91,7 +98,8 @@ fn home() -> Option<PathBuf> {
     Some(process::own_file()?.parent()?.parent()?.to_owned())
 }
 
-/// VTK's question which VTK this was built for: the shim's answer, or one that no VTK accepts, with the reason.
+/// VTK's question which VTK this was built for: the shim's answer, or one that no VTK accepts, with
+/// the reason.
 #[allow(non_snake_case, reason = "VTK's name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn vtkGetFactoryVersion() -> *const c_char {
@@ -129,7 +137,10 @@ mod tests {
 
     #[test]
     fn flavours_are_read_from_file_names() {
-        assert_eq!(flavour_of("/usr/lib/x86_64-linux-gnu/libvtkCommonCore-9.1.so.1").as_deref(), Some("9.1"));
+        assert_eq!(
+            flavour_of("/usr/lib/x86_64-linux-gnu/libvtkCommonCore-9.1.so.1").as_deref(),
+            Some("9.1")
+        );
         assert_eq!(flavour_of("/x/libvtkCommonCore-pv5.11.so.1").as_deref(), Some("pv5.11"));
         assert_eq!(flavour_of("libvtkCommonCore.so").as_deref(), Some("unnamed"));
         assert_eq!(flavour_of("/x/libvtkCommonCorePython3.11-9.1.so"), None);
@@ -138,10 +149,12 @@ mod tests {
 
     #[test]
     fn a_missing_build_is_a_message_with_the_cure() {
-        let e = choose(&["9.4".to_owned()], Path::new("home"), |_| false).expect_err("there is none");
+        let e =
+            choose(&["9.4".to_owned()], Path::new("home"), |_| false).expect_err("there is none");
         assert!(e.contains("VTK 9.4") && e.contains("vtk-bridge install"), "{e}");
         let both = ["9.1".to_owned(), "pv5.11".to_owned()];
-        let found = choose(&both, Path::new("h"), |p| p.starts_with("h/lib/pv5.11")).expect("one is there");
+        let found =
+            choose(&both, Path::new("h"), |p| p.starts_with("h/lib/pv5.11")).expect("one is there");
         assert_eq!(found.0, "pv5.11");
         assert!(choose(&[], Path::new("h"), |_| true).is_err());
     }
@@ -149,7 +162,8 @@ mod tests {
     #[test]
     fn without_vtk_nothing_is_loaded_and_the_answer_says_why() {
         // SAFETY: a text that ends with zero and lives as long as the process.
-        let version = unsafe { CStr::from_ptr(vtkGetFactoryVersion()) }.to_string_lossy().into_owned();
+        let version =
+            unsafe { CStr::from_ptr(vtkGetFactoryVersion()) }.to_string_lossy().into_owned();
         assert!(version.contains("no VTK in this process"), "{version}");
         assert!(vtkLoad().is_null());
     }

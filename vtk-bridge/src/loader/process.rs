@@ -9,7 +9,11 @@ use std::path::{Path, PathBuf};
 
 /// Files of all shared libraries in the process.
 pub(super) fn loaded_files() -> Vec<String> {
-    unsafe extern "C" fn collect(info: *mut libc::dl_phdr_info, _: usize, list: *mut c_void) -> c_int {
+    unsafe extern "C" fn collect(
+        info: *mut libc::dl_phdr_info,
+        _: usize,
+        list: *mut c_void,
+    ) -> c_int {
         // SAFETY: dl_iterate_phdr passes a valid entry, and back the pointer it was given below.
         let (info, list) = unsafe { (&*info, &mut *list.cast::<Vec<String>>()) };
         if !info.dlpi_name.is_null() {
@@ -48,14 +52,18 @@ pub(super) fn open_shim(path: &Path) -> Result<Shim, String> {
         // SAFETY: after a failure dlerror returns a C string, or null.
         let error = unsafe { libc::dlerror() };
         // SAFETY: checked for null.
-        let text =
-            (!error.is_null()).then(|| unsafe { CStr::from_ptr(error) }.to_string_lossy().into_owned());
+        let text = (!error.is_null())
+            .then(|| unsafe { CStr::from_ptr(error) }.to_string_lossy().into_owned());
         return Err(text.unwrap_or_else(|| "dlopen failed without a reason".to_owned()));
     }
     let symbol = |name: &CStr| {
         // SAFETY: an open library and a C string.
         let address = unsafe { libc::dlsym(handle, name.as_ptr()) };
-        if address.is_null() { Err(format!("it has no {}", name.to_string_lossy())) } else { Ok(address) }
+        if address.is_null() {
+            Err(format!("it has no {}", name.to_string_lossy()))
+        } else {
+            Ok(address)
+        }
     };
     let (init, version, load) =
         (symbol(c"rtv_shim_init")?, symbol(c"vtkGetFactoryVersion")?, symbol(c"vtkLoad")?);

@@ -66,7 +66,8 @@ pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
     Ok(())
 }
 
-/// Compiles the shim for `flavour` into `out`, and for ParaView what composites over ranks beside it.
+/// Compiles the shim for `flavour` into `out`, and for ParaView what composites over ranks beside
+/// it.
 pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupError> {
     let names = SOURCES.iter().map(|(name, _)| *name).filter(|n| n.ends_with(".cxx"));
     let files: Vec<PathBuf> = names.map(|n| sources.join(n)).collect();
@@ -77,11 +78,13 @@ pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupEr
     }
     let file = sources.join(ICET.0);
     fs::write(&file, ICET.1).map_err(io(&file, "write"))?;
-    let what = format!("compositing over ranks for ParaView {}", flavour.name.trim_start_matches("pv"));
+    let what =
+        format!("compositing over ranks for ParaView {}", flavour.name.trim_start_matches("pv"));
     library(flavour, &icet, &[file], ICET_MODULES, &out.with_file_name(ICET_FILE), what)
 }
 
-/// Compiles `files`, which call `modules`, into the shared library `out`. `headers` is a folder of more headers.
+/// Compiles `files`, which call `modules`, into the shared library `out`. `headers` is a folder of
+/// more headers.
 fn library(
     flavour: &Flavour,
     headers: &Path,
@@ -95,8 +98,10 @@ fn library(
     // Beside, then renamed: a program that is running keeps the old file.
     let beside = out.with_extension("so.new");
     let compiler = compiler();
-    let objects: Vec<PathBuf> =
-        files.iter().map(|f| folder.join(f.file_name().unwrap_or_default()).with_extension("o")).collect();
+    let objects: Vec<PathBuf> = files
+        .iter()
+        .map(|f| folder.join(f.file_name().unwrap_or_default()).with_extension("o"))
+        .collect();
     let compile = |file: &PathBuf, object: &PathBuf| {
         let mut command = Command::new(&compiler);
         command.args(["-std=c++17", "-O2", "-fPIC", "-fvisibility=hidden", "-w", "-c", "-I"]);
@@ -109,12 +114,13 @@ fn library(
     let made: Result<(), SetupError> = made.into_iter().collect();
     let mut command = Command::new(&compiler);
     command.args(["-shared", "-o"]).arg(&beside).args(&objects);
-    // Libraries of VTK need others of it, which the process has already.
-    // Never unloaded: VTK deletes our factory when the process ends, after ParaView has closed its plugins.
+    // Libraries of VTK need others of it, which the process has already. Never unloaded: VTK
+    // deletes our factory when the process ends, after ParaView has closed its plugins.
     command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]);
     command.args(modules.iter().filter_map(|m| flavour.library(m)));
     command.args(["-lGL", "-ldl"]);
-    let mut link = || run(&mut command, &compiler.to_string_lossy(), what.clone(), "apt-get install g++");
+    let mut link =
+        || run(&mut command, &compiler.to_string_lossy(), what.clone(), "apt-get install g++");
     let linked = made.and_then(|()| link());
     for object in &objects {
         let _ = fs::remove_file(object);

@@ -36,14 +36,17 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
         ));
     }
     let compiler = variable("CXX").unwrap_or_else(|| "g++".to_owned());
-    let version = Command::new(&compiler).arg("--version").output().ok().filter(|o| o.status.success());
+    let version =
+        Command::new(&compiler).arg("--version").output().ok().filter(|o| o.status.success());
     out.push(match version {
         Some(o) => finding(
             "compiler",
             true,
             String::from_utf8_lossy(&o.stdout).lines().next().unwrap_or("").to_owned(),
         ),
-        None => finding("compiler", false, format!("`{compiler}` does not run; apt-get install g++")),
+        None => {
+            finding("compiler", false, format!("`{compiler}` does not run; apt-get install g++"))
+        }
     });
     let glew = ["/usr/include/GL/glew.h", "/usr/local/include/GL/glew.h"]
         .iter()
@@ -51,10 +54,16 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
     out.push(if glew {
         finding("GL/glew.h", true, "there")
     } else {
-        finding("GL/glew.h", false, "missing: VTK's headers include it; apt-get install libglew-dev")
+        finding(
+            "GL/glew.h",
+            false,
+            "missing: VTK's headers include it; apt-get install libglew-dev",
+        )
     });
     out.push(match library() {
-        Ok(path) if layout.loader_is(&path) => finding("loader", true, layout.loader().display().to_string()),
+        Ok(path) if layout.loader_is(&path) => {
+            finding("loader", true, layout.loader().display().to_string())
+        }
         Ok(_) if layout.loader().is_file() => {
             finding("loader", false, "older than this program; run `vtk-bridge install`")
         }
@@ -66,14 +75,20 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
     out.push(if path.split(':').any(|p| std::path::Path::new(p) == ours) {
         finding("VTK_AUTOLOAD_PATH", true, "has our folder")
     } else {
-        finding("VTK_AUTOLOAD_PATH", true, "does not have our folder: scripts are not ray traced in this shell; `eval \"$(vtk-bridge env --vtk)\"`")
+        finding(
+            "VTK_AUTOLOAD_PATH",
+            true,
+            "does not have our folder: scripts are not ray traced \
+                                            in this shell; `eval \"$(vtk-bridge env --vtk)\"`",
+        )
     });
     out.push(match variable("DISPLAY").filter(|d| !d.is_empty()) {
         Some(d) => finding("DISPLAY", true, d),
         None => finding(
             "DISPLAY",
             true,
-            "not set: Debian's VTK and ParaView need an X server; `Xvfb :9 -noreset & export DISPLAY=:9`",
+            "not set: Debian's VTK and ParaView need an X server; `Xvfb :9 -noreset & export \
+             DISPLAY=:9`",
         ),
     });
     let (_, faults) = crate::options::Options::parse(
@@ -84,7 +99,11 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
 }
 
 fn of_flavour(layout: &Layout, f: &Flavour) -> Finding {
-    let name = if f.is_paraview() { format!("ParaView {}", &f.name[2..]) } else { format!("VTK {}", f.name) };
+    let name = if f.is_paraview() {
+        format!("ParaView {}", &f.name[2..])
+    } else {
+        format!("VTK {}", f.name)
+    };
     let shim = layout.shim(&f.name);
     let age = |p: &std::path::Path| std::fs::metadata(p).and_then(|m| m.modified()).ok();
     let text = match (age(&shim), age(&f.include.join("vtkVersionMacros.h"))) {
@@ -92,11 +111,18 @@ fn of_flavour(layout: &Layout, f: &Flavour) -> Finding {
             return finding(
                 &name,
                 false,
-                format!("headers in {}, but no build; run `vtk-bridge install`", f.include.display()),
+                format!(
+                    "headers in {}, but no build; run `vtk-bridge install`",
+                    f.include.display()
+                ),
             );
         }
         (Some(built), Some(headers)) if headers > built => {
-            return finding(&name, false, "its headers are newer than our build; run `vtk-bridge install`");
+            return finding(
+                &name,
+                false,
+                "its headers are newer than our build; run `vtk-bridge install`",
+            );
         }
         _ => shim.display().to_string(),
     };

@@ -26,11 +26,13 @@ impl Program {
     pub fn cure(self) -> &'static str {
         match self {
             Program::Vtk => {
-                "install them (Debian: `apt-get install libvtk9-dev`) or name their folder in RTV_VTK_INCLUDE, then run `vtk-bridge install`; \
+                "install them (Debian: `apt-get install libvtk9-dev`) or name their folder in \
+                 RTV_VTK_INCLUDE, then run `vtk-bridge install`; \
                  a VTK from pip has none: use `python -m rtvtk script.py`"
             }
             Program::ParaView => {
-                "install them (Debian: `apt-get install paraview-dev libglew-dev`) or name their folder in RTV_VTK_INCLUDE, then run `vtk-bridge install`"
+                "install them (Debian: `apt-get install paraview-dev libglew-dev`) or name their \
+                 folder in RTV_VTK_INCLUDE, then run `vtk-bridge install`"
             }
         }
     }
@@ -39,8 +41,10 @@ impl Program {
 /// Lines for `eval` in a POSIX shell.
 pub fn exports(layout: &Layout, autoload_before: Option<&str>) -> String {
     let ours = layout.autoload().display().to_string();
-    let others =
-        autoload_before.into_iter().flat_map(|v| v.split(':')).filter(|p| !p.is_empty() && *p != ours);
+    let others = autoload_before
+        .into_iter()
+        .flat_map(|v| v.split(':'))
+        .filter(|p| !p.is_empty() && *p != ours);
     let path = std::iter::once(ours.as_str()).chain(others).collect::<Vec<_>>().join(":");
     format!(
         "export VTK_AUTOLOAD_PATH={}\nexport RTV_HOME={}\n",
@@ -49,11 +53,14 @@ pub fn exports(layout: &Layout, autoload_before: Option<&str>) -> String {
     )
 }
 
-/// Lines for `eval` after which ANARI programs load us when they ask for the library of the environment.
+/// Lines for `eval` after which ANARI programs load us when they ask for the library of the
+/// environment.
 pub fn anari_exports(layout: &Layout, libraries_before: Option<&str>) -> String {
     let ours = layout.anari().parent().unwrap_or(layout.prefix()).display().to_string();
-    let others =
-        libraries_before.into_iter().flat_map(|v| v.split(':')).filter(|p| !p.is_empty() && *p != ours);
+    let others = libraries_before
+        .into_iter()
+        .flat_map(|v| v.split(':'))
+        .filter(|p| !p.is_empty() && *p != ours);
     let path = std::iter::once(ours.as_str()).chain(others).collect::<Vec<_>>().join(":");
     format!("export LD_LIBRARY_PATH={}\nexport ANARI_LIBRARY=rtv\n", quoted(&path))
 }
@@ -73,7 +80,8 @@ mod tests {
         let text = exports(&layout, Some("/other:/a b/it's/autoload"));
         assert_eq!(
             text,
-            "export VTK_AUTOLOAD_PATH='/a b/it'\\''s/autoload:/other'\nexport RTV_HOME='/a b/it'\\''s'\n"
+            "export VTK_AUTOLOAD_PATH='/a b/it'\\''s/autoload:/other'\nexport RTV_HOME='/a \
+             b/it'\\''s'\n"
         );
         assert_eq!(
             anari_exports(&Layout::at("/a b".into()), Some("/lib:/a b/anari")),

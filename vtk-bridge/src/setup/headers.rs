@@ -34,11 +34,14 @@ impl Flavour {
             return Some(plain);
         }
         let names = fs::read_dir(&self.libraries).ok()?.filter_map(|e| Some(e.ok()?.path()));
-        names.filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(&stem))).min()
+        names
+            .filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(&stem)))
+            .min()
     }
 }
 
-/// Folders that are looked at: those of `RTV_VTK_INCLUDE` (separated by colons), those beside the libraries of `LD_LIBRARY_PATH`, the system's.
+/// Folders that are looked at: those of `RTV_VTK_INCLUDE` (separated by colons), those beside the
+/// libraries of `LD_LIBRARY_PATH`, the system's.
 pub fn places(variable: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let list = |name| {
         let value = variable(name).unwrap_or_default();
@@ -47,8 +50,10 @@ pub fn places(variable: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let own = list("RTV_VTK_INCLUDE").into_iter();
     // PREFIX/lib/MACHINE, PREFIX/lib: to PREFIX/include.
     let beside = list("LD_LIBRARY_PATH");
-    let beside = beside.iter().flat_map(|p| p.ancestors().skip(1).take(2).map(|a| a.join("include")));
-    let system = ["/usr/include", "/usr/local/include", "/opt/vtk/include", "/opt/paraview/include"];
+    let beside =
+        beside.iter().flat_map(|p| p.ancestors().skip(1).take(2).map(|a| a.join("include")));
+    let system =
+        ["/usr/include", "/usr/local/include", "/opt/vtk/include", "/opt/paraview/include"];
     let mut inside: Vec<PathBuf> = beside
         .chain(system.map(PathBuf::from))
         .filter_map(|d| fs::read_dir(d).ok())
@@ -64,7 +69,8 @@ pub fn places(variable: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     own.chain(inside).collect()
 }
 
-/// The VTKs whose headers and libraries are there; the second list says what is wrong with the other folders.
+/// The VTKs whose headers and libraries are there; the second list says what is wrong with the
+/// other folders.
 pub fn find(places: &[PathBuf]) -> (Vec<Flavour>, Vec<String>) {
     let (mut found, mut faults) = (Vec::<Flavour>::new(), Vec::new());
     for place in places {
@@ -98,12 +104,16 @@ fn look_at(include: &Path) -> Result<Flavour, String> {
         .map(|v| format!("pv{v}"))
         .or_else(|| Some(wanted.strip_prefix("vtk-")?.to_owned()));
     for folder in [machine.as_str(), "lib64", "lib"].map(|l| prefix.join(l)) {
-        let entries = fs::read_dir(&folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path()));
-        let mut names: Vec<String> = entries.filter_map(|p| flavour_of(&p.to_string_lossy())).collect();
+        let entries =
+            fs::read_dir(&folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path()));
+        let mut names: Vec<String> =
+            entries.filter_map(|p| flavour_of(&p.to_string_lossy())).collect();
         names.sort();
         names.dedup();
         let name = match &wanted {
-            Some(w) => names.into_iter().find(|n| n == w || (n == "unnamed" && !w.starts_with("pv"))),
+            Some(w) => {
+                names.into_iter().find(|n| n == w || (n == "unnamed" && !w.starts_with("pv")))
+            }
             None => names.into_iter().next(),
         };
         if let Some(name) = name {
@@ -131,12 +141,15 @@ mod tests {
         }
         make("lib/libvtkCommonCore-9.1.so.1");
         make("lib/libvtkCommonCore-pv5.11.so");
-        let places =
-            ["vtk-9.1", "paraview-5.11", "vtk-9.4", "nothing"].map(|p| root.path().join("include").join(p));
+        let places = ["vtk-9.1", "paraview-5.11", "vtk-9.4", "nothing"]
+            .map(|p| root.path().join("include").join(p));
         let (found, faults) = find(&places);
         let names: Vec<_> = found.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names, ["9.1", "pv5.11"]);
-        assert_eq!(found[0].library("CommonCore"), Some(root.path().join("lib/libvtkCommonCore-9.1.so.1")));
+        assert_eq!(
+            found[0].library("CommonCore"),
+            Some(root.path().join("lib/libvtkCommonCore-9.1.so.1"))
+        );
         assert!(
             faults[0].contains("no libvtkCommonCore") && faults[1].contains("vtkObjectFactory.h"),
             "{faults:?}"

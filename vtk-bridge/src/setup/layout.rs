@@ -81,8 +81,8 @@ impl Layout {
         names
     }
 
-    /// Installs the loader from `library`, and builds a shim for each of `flavours`. A shim that cannot be built does not keep the others
-    /// from being built.
+    /// Installs the loader from `library`, and builds a shim for each of `flavours`. A shim that
+    /// cannot be built does not keep the others from being built.
     pub fn install(&self, library: &Path, flavours: &[Flavour]) -> Result<Installed, SetupError> {
         let mut done = Installed { prefix: self.prefix.clone(), ..Installed::default() };
         let sources = self.prefix.join("src");
@@ -144,7 +144,8 @@ fn same(a: &Path, b: &Path) -> bool {
     read(a).is_some_and(|a| read(b) == Some(a))
 }
 
-/// The library that VTK loads: `RTV_LIBRARY`, or beside the program, or in `deps` beside it, or in `lib` one folder up.
+/// The library that VTK loads: `RTV_LIBRARY`, or beside the program, or in `deps` beside it, or in
+/// `lib` one folder up.
 pub fn library() -> Result<PathBuf, SetupError> {
     if let Some(set) = std::env::var_os("RTV_LIBRARY").filter(|v| !v.is_empty()) {
         return Ok(set.into());
@@ -152,8 +153,13 @@ pub fn library() -> Result<PathBuf, SetupError> {
     let program = std::env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new("."));
     let name = "libvtk_bridge.so";
-    let places = [folder.join("deps").join(name), folder.join(name), folder.join("../lib").join(name)];
+    let places =
+        [folder.join("deps").join(name), folder.join(name), folder.join("../lib").join(name)];
     // A build of the program alone renews only one of them.
     let age = |p: &PathBuf| fs::metadata(p).and_then(|m| m.modified()).ok();
-    places.into_iter().filter(|p| p.is_file()).max_by_key(age).ok_or(SetupError::NoLibrary { program })
+    places
+        .into_iter()
+        .filter(|p| p.is_file())
+        .max_by_key(age)
+        .ok_or(SetupError::NoLibrary { program })
 }

@@ -1,4 +1,5 @@
-//! Building and laying out the pieces for the VTKs of this machine: what the program `vtk-bridge` does.
+//! Building and laying out the pieces for the VTKs of this machine: what the program `vtk-bridge`
+//! does.
 //!
 //! ```text
 //! PREFIX/autoload/librtv_loader.so        the only library in the folder that VTK_AUTOLOAD_PATH names
@@ -51,7 +52,8 @@ pub enum SetupError {
     },
     /// The library that VTK loads is not beside the program.
     #[error(
-        "libvtk_bridge.so is neither beside {program} nor in its folder `deps`; build it with `cargo build -p vtk-bridge`, or name it in RTV_LIBRARY"
+        "libvtk_bridge.so is neither beside {program} nor in its folder `deps`; build it with \
+         `cargo build -p vtk-bridge`, or name it in RTV_LIBRARY"
     )]
     NoLibrary {
         /// Where the program lies.
@@ -59,7 +61,8 @@ pub enum SetupError {
     },
     /// There is no VTK with headers.
     #[error(
-        "no headers of VTK or ParaView were found in {looked}; install them (Debian: `apt-get install libvtk9-dev`, or `paraview-dev libglew-dev`), or name \
+        "no headers of VTK or ParaView were found in {looked}; install them (Debian: `apt-get \
+         install libvtk9-dev`, or `paraview-dev libglew-dev`), or name \
          the folder with vtkObjectFactory.h in RTV_VTK_INCLUDE"
     )]
     NoHeaders {

@@ -1,4 +1,5 @@
-//! What `scripts/capture.py` wrote of one window: picture, window depth, facts, and the bridge's report where there was one.
+//! What `scripts/capture.py` wrote of one window: picture, window depth, facts, and the bridge's
+//! report where there was one.
 
 use serde_json::Value;
 use std::path::Path;
@@ -24,15 +25,19 @@ impl Capture {
     /// Reads `NAME.png` and what lies beside it.
     pub(crate) fn read(folder: &Path, name: &str) -> Result<Capture, String> {
         let file = |extension: &str| folder.join(format!("{name}.{extension}"));
-        let picture =
-            image::open(file("png")).map_err(|e| format!("{}: {e}", file("png").display()))?.into_rgb8();
+        let picture = image::open(file("png"))
+            .map_err(|e| format!("{}: {e}", file("png").display()))?
+            .into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let rows = picture.as_raw().chunks_exact(3 * width).rev();
         let rgb = rows.flat_map(|row| row.chunks_exact(3).map(|p| [p[0], p[1], p[2]])).collect();
-        let depth = if file("npy").is_file() { read_npy(&file("npy"), width * height)? } else { vec![] };
+        let depth =
+            if file("npy").is_file() { read_npy(&file("npy"), width * height)? } else { vec![] };
         let json = |extension: &str| -> Result<Option<Value>, String> {
             let Ok(text) = std::fs::read_to_string(file(extension)) else { return Ok(None) };
-            serde_json::from_str(&text).map(Some).map_err(|e| format!("{}: {e}", file(extension).display()))
+            serde_json::from_str(&text)
+                .map(Some)
+                .map_err(|e| format!("{}: {e}", file(extension).display()))
         };
         let facts = json("json")?.unwrap_or(Value::Null);
         Ok(Capture { width, height, rgb, depth, facts, report: json("report.json")? })
@@ -61,7 +66,8 @@ impl Capture {
         lists.flatten().filter_map(|w| w.as_str().map(str::to_owned)).collect()
     }
 
-    /// Mean colour, 0 to 255, of the rectangle `[left, bottom, right, top]` given in parts of the picture.
+    /// Mean colour, 0 to 255, of the rectangle `[left, bottom, right, top]` given in parts of the
+    /// picture.
     pub(crate) fn color(&self, part: [f64; 4]) -> [f64; 3] {
         let x = |f: f64| ((f * self.width as f64) as usize).min(self.width);
         let y = |f: f64| ((f * self.height as f64) as usize).min(self.height);
@@ -88,7 +94,8 @@ impl Capture {
     pub(crate) fn pixel(&self, place: &str) -> [usize; 2] {
         [0, 1].map(|i| {
             let v = self.facts[place][i].as_u64();
-            v.unwrap_or_else(|| panic!("the script named no pixel for {place}: {}", self.facts)) as usize
+            v.unwrap_or_else(|| panic!("the script named no pixel for {place}: {}", self.facts))
+                as usize
         })
     }
 }

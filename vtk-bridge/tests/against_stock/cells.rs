@@ -20,10 +20,11 @@ const MODULES: &[&str] = &[
 /// What the program printed for this VTK.
 fn checked(flavour: &Flavour) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cell_arrays-{}", flavour.name));
-    let libraries = MODULES
-        .iter()
-        .map(|m| flavour.library(m).unwrap_or_else(|| panic!("VTK {} has no library {m}", flavour.name)));
+    let program =
+        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cell_arrays-{}", flavour.name));
+    let libraries = MODULES.iter().map(|m| {
+        flavour.library(m).unwrap_or_else(|| panic!("VTK {} has no library {m}", flavour.name))
+    });
     let made = Command::new(std::env::var_os("CXX").unwrap_or_else(|| "g++".into()))
         .args(["-std=c++17", "-O1", "-w", "-I"])
         .arg(root.join("include"))
@@ -52,7 +53,8 @@ fn checked(flavour: &Flavour) -> String {
 #[test]
 fn cells_are_read_by_the_width_of_their_own_arrays_in_every_storage() {
     let debian = peers::vtk91().map(|root| root.join("usr/include/vtk-9.1"));
-    let known: Vec<PathBuf> = debian.into_iter().chain(places(|name| std::env::var(name).ok())).collect();
+    let known: Vec<PathBuf> =
+        debian.into_iter().chain(places(|name| std::env::var(name).ok())).collect();
     let (flavours, _) = find(&known);
     if flavours.is_empty() {
         return peers::skip("no VTK with headers was found (set RTSV_VTK91 or RTV_VTK_INCLUDE)");

@@ -1,7 +1,8 @@
 //! Two pictures of the same script: by how much they differ, and how much is allowed.
 //!
-//! Near edges the two may disagree by a pixel, because VTK's rasterizer rounds corners to 1/256 of a pixel and rays do not; so colours and
-//! depths are compared away from edges, and edges by the silhouette.
+//! Near edges the two may disagree by a pixel, because VTK's rasterizer rounds corners to 1/256 of
+//! a pixel and rays do not; so colours and depths are compared away from edges, and edges by the
+//! silhouette.
 
 use crate::capture::Capture;
 use std::fmt;
@@ -11,13 +12,15 @@ use std::fmt;
 pub(crate) struct Bars {
     /// Part of the pixels where one shows a surface and the other does not.
     pub(crate) silhouette: f64,
-    /// Units in the last place of the window depth, away from edges, in all but [`ROUNDED`] of these pixels.
+    /// Units in the last place of the window depth, away from edges, in all but [`ROUNDED`] of
+    /// these pixels.
     pub(crate) depth_ulp: u32,
     /// Part of the pixels that may be further off than [`ROUNDING_ULP`].
     pub(crate) depth_strays: f64,
     /// Mean difference of colours, of 255, over the pixels that either shows something in.
     pub(crate) color_mean: f64,
-    /// Part of the pixels away from edges whose colour may differ by more than 16 of 255. So a small object in a wrong colour is found.
+    /// Part of the pixels away from edges whose colour may differ by more than 16 of 255. So a
+    /// small object in a wrong colour is found.
     pub(crate) color_strays: f64,
 }
 
@@ -32,8 +35,9 @@ impl Bars {
     };
 }
 
-/// How far OpenGL's own depths may be from the exact ones: llvmpipe interpolates in f32, which was measured to be up to 22 units in the
-/// last place beside the plane through a triangle's corners, and most where a triangle covers many pixels. Ours are exact: see
+/// How far OpenGL's own depths may be from the exact ones: llvmpipe interpolates in f32, which was
+/// measured to be up to 22 units in the last place beside the plane through a triangle's corners,
+/// and most where a triangle covers many pixels. Ours are exact: see
 /// `our_window_depth_is_exact_where_opengl_rounds`.
 const ROUNDING_ULP: u32 = 32;
 /// Part of the pixels away from edges in which OpenGL may be that far off.
@@ -61,7 +65,8 @@ impl fmt::Display for Measured {
         let part = |n: usize| 100.0 * n as f64 / self.pixels as f64;
         write!(
             f,
-            "silhouette {} px ({:.4} %), depth median {} p99 {} worst {} ulp ({} beyond the bar, {} far beyond), colour mean {:.3} worst {} ({} far off), {} of {} px away from edges",
+            "silhouette {} px ({:.4} %), depth median {} p99 {} worst {} ulp ({} beyond the bar, \
+             {} far beyond), colour mean {:.3} worst {} ({} far off), {} of {} px away from edges",
             self.silhouette,
             part(self.silhouette),
             self.depth_median_ulp,
@@ -78,11 +83,12 @@ impl fmt::Display for Measured {
     }
 }
 
-/// Depths of one surface do not jump and do not bend by more than this between neighbours: beyond is an edge. About one part in a
-/// thousand of the depth range per pixel and pixel.
+/// Depths of one surface do not jump and do not bend by more than this between neighbours: beyond
+/// is an edge. About one part in a thousand of the depth range per pixel and pixel.
 const BEND: f32 = 1e-3;
 
-/// True where the 3 by 3 pixels around lie on one surface in both pictures, or show background in both.
+/// True where the 3 by 3 pixels around lie on one surface in both pictures, or show background in
+/// both.
 fn away_from_edges(a: &Capture, b: &Capture) -> Vec<bool> {
     let (w, h) = (a.width, a.height);
     let mut inner = vec![false; w * h];
@@ -91,11 +97,15 @@ fn away_from_edges(a: &Capture, b: &Capture) -> Vec<bool> {
         for x in 1..w.saturating_sub(1) {
             let at = y * w + x;
             let around = (y - 1..=y + 1).flat_map(|v| (x - 1..=x + 1).map(move |u| v * w + u));
-            let same = around.into_iter().all(|i| shows(a, i) == shows(a, at) && shows(b, i) == shows(a, at));
+            let same = around
+                .into_iter()
+                .all(|i| shows(a, i) == shows(a, at) && shows(b, i) == shows(a, at));
             let bends = |c: &Capture| {
                 let d = |i: usize| c.depth[i];
                 // Across, up, and both diagonals.
-                [1, w, w + 1, w - 1].iter().any(|&s| (d(at + s) - 2.0 * d(at) + d(at - s)).abs() > BEND)
+                [1, w, w + 1, w - 1]
+                    .iter()
+                    .any(|&s| (d(at + s) - 2.0 * d(at) + d(at - s)).abs() > BEND)
             };
             inner[at] = same && !bends(a) && !bends(b);
         }
@@ -174,7 +184,10 @@ pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String
         ));
     }
     if part(m.depth_far) > bars.depth_strays {
-        faults.push(format!("depth beyond {ROUNDING_ULP} ulp in more than {} %", 100.0 * bars.depth_strays));
+        faults.push(format!(
+            "depth beyond {ROUNDING_ULP} ulp in more than {} %",
+            100.0 * bars.depth_strays
+        ));
     }
     if m.color_mean > bars.color_mean {
         faults.push(format!("colour mean beyond {}", bars.color_mean));
@@ -183,8 +196,10 @@ pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String
         faults.push(format!("colours far off in more than {} %", 100.0 * bars.color_strays));
     }
     if stock.facts != ours.facts {
-        faults
-            .push(format!("facts (picks, selections, counts) differ:\n  {}\n  {}", stock.facts, ours.facts));
+        faults.push(format!(
+            "facts (picks, selections, counts) differ:\n  {}\n  {}",
+            stock.facts, ours.facts
+        ));
     }
     if !faults.is_empty() {
         faults.push(m.to_string());
@@ -231,13 +246,25 @@ mod tests {
             c.depth.rotate_right(1);
         };
         let found = change(shifted).join("; ");
-        assert!(found.contains("silhouette") && found.contains("depth"), "shifted by a pixel: {found}");
-        let found = change(|c| c.depth.iter_mut().filter(|d| **d < 1.0).for_each(|d| *d += 4e-7)).join("; ");
-        assert!(found.contains("depth beyond 4 ulp") && !found.contains("silhouette beyond"), "{found}");
-        let found = change(|c| c.rgb.iter_mut().filter(|p| p[0] == 200).for_each(|p| p[0] += 2)).join("; ");
+        assert!(
+            found.contains("silhouette") && found.contains("depth"),
+            "shifted by a pixel: {found}"
+        );
+        let found = change(|c| c.depth.iter_mut().filter(|d| **d < 1.0).for_each(|d| *d += 4e-7))
+            .join("; ");
+        assert!(
+            found.contains("depth beyond 4 ulp") && !found.contains("silhouette beyond"),
+            "{found}"
+        );
+        let found =
+            change(|c| c.rgb.iter_mut().filter(|p| p[0] == 200).for_each(|p| p[0] += 2)).join("; ");
         assert!(found.contains("colour mean"), "{found}");
-        let found = change(|c| (0..9).for_each(|i| c.rgb[50 * 120 + 56 + i] = [9, 9, 200])).join("; ");
-        assert!(found.contains("far off") && !found.contains("silhouette beyond"), "nine pixels: {found}");
+        let found =
+            change(|c| (0..9).for_each(|i| c.rgb[50 * 120 + 56 + i] = [9, 9, 200])).join("; ");
+        assert!(
+            found.contains("far off") && !found.contains("silhouette beyond"),
+            "nine pixels: {found}"
+        );
         let found = change(|c| c.facts = json!({"picks": [1, 3]})).join("; ");
         assert!(found.contains("picks"), "{found}");
         let found = change(|c| c.width = 60).join("; ");

@@ -16,7 +16,8 @@ fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option
     let mut made = made.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let result = made.entry(name).or_insert_with(|| {
         let scripts = crate::session::scripts_in("effects");
-        let run = Run::new(Program::Vtk, with, &scripts, output(&format!("effects-{name}")), settings)?;
+        let run =
+            Run::new(Program::Vtk, with, &scripts, output(&format!("effects-{name}")), settings)?;
         for script in ["room", "ball"] {
             run.pictures(script)?;
         }
@@ -36,7 +37,9 @@ fn rays(picture: &Capture, kind: &str) -> u64 {
 
 #[test]
 fn without_options_no_effect_runs_and_the_picture_is_stock() {
-    let (Some([room, _]), Some([stock, _])) = (plain(), pictures(With::Stock, "stock", &[])) else { return };
+    let (Some([room, _]), Some([stock, _])) = (plain(), pictures(With::Stock, "stock", &[])) else {
+        return;
+    };
     let bars = crate::compare::Bars::STRICT;
     assert_eq!(crate::compare::faults(&stock, &room, &bars), Vec::<String>::new());
     for kind in ["shadow", "ambient occlusion", "reflection", "refraction"] {
@@ -52,7 +55,10 @@ fn off_leaves_everything_to_opengl() {
         return;
     };
     for (off, stock) in off.iter().zip(&stock) {
-        assert!(off.rgb == stock.rgb && off.depth == stock.depth, "RTV_OFF=1 is not stock VTK, bit for bit");
+        assert!(
+            off.rgb == stock.rgb && off.depth == stock.depth,
+            "RTV_OFF=1 is not stock VTK, bit for bit"
+        );
         assert_eq!(off.traced_elements(), 0);
     }
 }
@@ -78,7 +84,8 @@ fn shadows_fall_where_the_light_does_not_reach() {
 fn large_lights_soften_the_shadow_s_edge() {
     let hard = pictures(With::Bridge, "shadows", &[("RTV_SHADOWS", "1")]);
     let settings = [("RTV_SHADOWS", "1"), ("RTV_LIGHT_SIZE", "6"), ("RTV_SAMPLES", "16")];
-    let (Some([hard, _]), Some([soft, _])) = (hard, pictures(With::Bridge, "soft", &settings)) else {
+    let (Some([hard, _]), Some([soft, _])) = (hard, pictures(With::Bridge, "soft", &settings))
+    else {
         return;
     };
     // Floor pixels between light and shadow.
@@ -104,7 +111,9 @@ fn large_lights_soften_the_shadow_s_edge() {
 #[test]
 fn ambient_occlusion_darkens_concave_corners_only() {
     let settings = [("RTV_AO", "64"), ("RTV_AO_RADIUS", "1")];
-    let (Some([plain, _]), Some([occluded, _])) = (plain(), pictures(With::Bridge, "ao", &settings)) else {
+    let (Some([plain, _]), Some([occluded, _])) =
+        (plain(), pictures(With::Bridge, "ao", &settings))
+    else {
         return;
     };
     assert!(rays(&occluded, "ambient occlusion") > 0);
@@ -120,9 +129,10 @@ fn ambient_occlusion_darkens_concave_corners_only() {
 
 #[test]
 fn mirrors_show_what_stands_on_them() {
-    let (Some([plain, _]), Some([mirror, _])) =
-        (plain(), pictures(With::Bridge, "mirror", &[("RTV_MIRROR", "0.5"), ("RTV_REFLECTIONS", "1")]))
-    else {
+    let (Some([plain, _]), Some([mirror, _])) = (
+        plain(),
+        pictures(With::Bridge, "mirror", &[("RTV_MIRROR", "0.5"), ("RTV_REFLECTIONS", "1")]),
+    ) else {
         return;
     };
     assert!(rays(&mirror, "reflection") > 0);
@@ -169,7 +179,8 @@ fn glass_turns_the_background_upside_down() {
 fn depth_of_field_blurs_what_is_not_in_focus() {
     let settings = [("RTV_APERTURE", "0.15"), ("RTV_SAMPLES", "64")];
     let sharp = pictures(With::Bridge, "sharp", &[("RTV_SAMPLES", "64")]);
-    let (Some([sharp, _]), Some([blurred, _])) = (sharp, pictures(With::Bridge, "lens", &settings)) else {
+    let (Some([sharp, _]), Some([blurred, _])) = (sharp, pictures(With::Bridge, "lens", &settings))
+    else {
         return;
     };
     // The steepest step along 25 pixels across an edge.
@@ -219,8 +230,10 @@ fn paths_carry_color_from_surface_to_surface() {
 #[test]
 fn options_that_cannot_be_understood_are_named() {
     use crate::session::Launch;
-    let line =
-        format!("exec /usr/bin/python3 '{}' \"$@\"", crate::peers::scripts().join("run_all.py").display());
+    let line = format!(
+        "exec /usr/bin/python3 '{}' \"$@\"",
+        crate::peers::scripts().join("run_all.py").display()
+    );
     let folder = output("effects-misspelt");
     std::fs::create_dir_all(&folder).unwrap();
     let launch = match Launch::new(Program::Vtk, With::Bridge, &line) {
@@ -231,6 +244,11 @@ fn options_that_cannot_be_understood_are_named() {
     let out = launch.args([folder, script]).env("RTV_SHADOW", "1").env("RTV_AO", "many").output();
     let out = out.expect_success("a misspelt option");
     for word in ["RTV_SHADOWS", "RTV_AO=many"] {
-        assert_eq!(out.stderr.matches(word).count(), 1, "{word} must be named once:\n{}", out.stderr);
+        assert_eq!(
+            out.stderr.matches(word).count(),
+            1,
+            "{word} must be named once:\n{}",
+            out.stderr
+        );
     }
 }

@@ -1,11 +1,13 @@
-//! ParaView's window itself, under an X server: the plugin loads by its own list, and the options of the view's panel change what the view shows.
+//! ParaView's window itself, under an X server: the plugin loads by its own list, and the options
+//! of the view's panel change what the view shows.
 
 use crate::capture::{Capture, bright};
 use crate::compare::{Bars, faults};
 use crate::peers::{find, scripts, skip};
 use crate::session::{Launch, Program, With, installed, output};
 
-/// Runs the script in ParaView's window and gives its pictures back, or says why it cannot be run here.
+/// Runs the script in ParaView's window and gives its pictures back, or says why it cannot be run
+/// here.
 fn pictures() -> Result<[Capture; 4], String> {
     let paraview = find("RTSV_PARAVIEW", &["/usr/bin/paraview"])
         .ok_or("paraview, the program with the window, was not found (set RTSV_PARAVIEW)")?;
@@ -34,8 +36,9 @@ fn pictures() -> Result<[Capture; 4], String> {
         .env("RTV_REPORT", &report)
         .env("CAPTURE_BESIDE", &report);
     let outcome = launch.output().expect_success("paraview's window");
-    let read =
-        |name| Capture::read(&folder, name).unwrap_or_else(|e| panic!("{name}: {e}\n{}", outcome.stderr));
+    let read = |name| {
+        Capture::read(&folder, name).unwrap_or_else(|e| panic!("{name}: {e}\n{}", outcome.stderr))
+    };
     Ok(["plain", "shadows", "back", "off"].map(read))
 }
 
@@ -50,7 +53,10 @@ fn options_of_the_panel_change_what_paraviews_window_shows() {
     assert!(plain.traced_elements() > 0, "{:?}", plain.report);
     let ratio = |c: &Capture, place| bright(c.at(place)) / bright(plain.at(place));
     let [shadow, lit] = ["shadow", "lit"].map(|place| ratio(&shadows, place));
-    assert!(shadow < 0.3 && (lit - 1.0).abs() < 0.01, "with shadows: {shadow} where one falls, {lit} beside");
+    assert!(
+        shadow < 0.3 && (lit - 1.0).abs() < 0.01,
+        "with shadows: {shadow} where one falls, {lit} beside"
+    );
     assert!(back.rgb == plain.rgb, "switched off again, the picture is another");
     assert_eq!(off.traced_elements(), 0, "without ray tracing everything is OpenGL's");
     assert_eq!(faults(&off, &plain, &Bars::STRICT), Vec::<String>::new());

@@ -9,8 +9,12 @@ fn both() -> Option<&'static (Run, Run)> {
     static BOTH: OnceLock<Result<(Run, Run), String>> = OnceLock::new();
     let made = BOTH.get_or_init(|| {
         let scripts = scripts_in("paraview");
-        let stock = Run::new(Program::ParaView, With::Stock, &scripts, output("paraview-stock"), &[])?;
-        Ok((stock, Run::new(Program::ParaView, With::Bridge, &scripts, output("paraview-ours"), &[])?))
+        let stock =
+            Run::new(Program::ParaView, With::Stock, &scripts, output("paraview-stock"), &[])?;
+        Ok((
+            stock,
+            Run::new(Program::ParaView, With::Bridge, &scripts, output("paraview-ours"), &[])?,
+        ))
     });
     made.as_ref().map_err(|reason| skip(reason)).ok()
 }
@@ -58,11 +62,13 @@ fn every_paraview_script_has_a_test() {
 fn paraview_blocks_beside_a_refused_one_are_not_drawn_twice() {
     let scripts = [crate::peers::scripts().join("vtk/refused_blocks.py")];
     let run = |with, name| Run::new(Program::ParaView, with, &scripts, output(name), &[]);
-    let (stock, ours) =
-        match (run(With::Stock, "paraview-refused-stock"), run(With::Bridge, "paraview-refused-ours")) {
-            (Ok(stock), Ok(ours)) => (stock, ours),
-            (Err(reason), _) | (_, Err(reason)) => return skip(&reason),
-        };
+    let (stock, ours) = match (
+        run(With::Stock, "paraview-refused-stock"),
+        run(With::Bridge, "paraview-refused-ours"),
+    ) {
+        (Ok(stock), Ok(ours)) => (stock, ours),
+        (Err(reason), _) | (_, Err(reason)) => return skip(&reason),
+    };
     let found = differences(&stock, &ours, "refused_blocks", &[], &[]);
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
 }

@@ -1,4 +1,5 @@
-//! The programs that the bridge is compared with: found through the variables of `cargo xtask test`, or at their usual places.
+//! The programs that the bridge is compared with: found through the variables of `cargo xtask
+//! test`, or at their usual places.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,8 @@ pub(crate) fn skip(reason: &str) {
     let _ = writeln!(std::io::stderr(), "skipped: {reason}");
 }
 
-/// Debian's VTK 9.1, unpacked beside the system because it conflicts with ParaView's Python packages.
+/// Debian's VTK 9.1, unpacked beside the system because it conflicts with ParaView's Python
+/// packages.
 pub(crate) fn vtk91() -> Option<PathBuf> {
     let root = find("RTSV_VTK91", &[])
         .or_else(|| std::env::var_os("RTSV_PEERS").map(|p| PathBuf::from(p).join("vtk91")))?;
@@ -35,13 +37,15 @@ pub(crate) fn mpirun() -> Option<PathBuf> {
     find("RTSV_MPIRUN", &["/usr/bin/mpirun.openmpi"])
 }
 
-/// An X server of our own, or why there is none. It ends when this process ends, however that happens: a shell waits for the end of its
-/// input, which we hold, and then stops the server.
+/// An X server of our own, or why there is none. It ends when this process ends, however that
+/// happens: a shell waits for the end of its input, which we hold, and then stops the server.
 pub(crate) fn display() -> Result<&'static str, String> {
     static DISPLAY: OnceLock<Result<(String, std::process::Child), String>> = OnceLock::new();
     let started = DISPLAY.get_or_init(|| {
-        let program = find("RTSV_XVFB", &["/usr/bin/Xvfb"]).ok_or("Xvfb was not found (set RTSV_XVFB)")?;
-        // -noreset: else the server begins anew when its last client goes, and the next one dies of that.
+        let program = find("RTSV_XVFB", &["/usr/bin/Xvfb"]).ok_or("Xvfb was not found (set \
+                                                                   RTSV_XVFB)")?;
+        // -noreset: else the server begins anew when its last client goes, and the next one dies of
+        // that.
         let script = r#""$0" -displayfd 1 -noreset -nolisten tcp -screen 0 1280x1024x24 2>/dev/null & cat >/dev/null; kill $!"#;
         let mut child = Command::new("sh")
             .args(["-c", script])

@@ -1,4 +1,5 @@
-//! The ParaView plugin, loaded by `PV_PLUGIN_PATH`: the override without `VTK_AUTOLOAD_PATH`, and its options set as a user sets them.
+//! The ParaView plugin, loaded by `PV_PLUGIN_PATH`: the override without `VTK_AUTOLOAD_PATH`, and
+//! its options set as a user sets them.
 
 use crate::capture::{Capture, bright};
 use crate::compare::{Bars, faults};
@@ -26,7 +27,13 @@ fn pictures() -> Option<&'static Run> {
         ];
         let settings: Vec<(&str, &str)> = settings.iter().map(|(n, v)| (*n, v.as_str())).collect();
         // `Stock`: no VTK_AUTOLOAD_PATH, only the plugin.
-        Run::new(Program::ParaView, With::Stock, &crate::session::scripts_in("plugin"), folder, &settings)
+        Run::new(
+            Program::ParaView,
+            With::Stock,
+            &crate::session::scripts_in("plugin"),
+            folder,
+            &settings,
+        )
     });
     run.as_ref().map_err(|reason| skip(reason)).ok()
 }
@@ -43,13 +50,19 @@ fn names_are_those_of_ospray_where_there_is_one() {
     let names: Vec<&str> =
         plain.facts["names"].as_array().expect("names").iter().filter_map(|n| n.as_str()).collect();
     // As paraview.simple calls the properties of a view in a ParaView with OSPRay.
-    for name in
-        ["EnableRayTracing", "BackEnd", "Shadows", "AmbientSamples", "SamplesPerPixel", "ProgressivePasses"]
-    {
+    for name in [
+        "EnableRayTracing",
+        "BackEnd",
+        "Shadows",
+        "AmbientSamples",
+        "SamplesPerPixel",
+        "ProgressivePasses",
+    ] {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
     // The thesis' panel, section 3.2.8.
-    for name in ["Threads", "AmbientRadius", "Reflections", "Material", "Robustness", "LensRadius"] {
+    for name in ["Threads", "AmbientRadius", "Reflections", "Material", "Robustness", "LensRadius"]
+    {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
 }
@@ -78,13 +91,16 @@ fn the_panel_switches_every_effect() {
         "ambient occlusion: where box and floor meet {concave}, on top of the box {convex}"
     );
     let mirror = picture("mirror").expect("the run is there");
-    // Half of what the floor shows before the box is the box, which is red, and elsewhere the background, which is blue.
+    // Half of what the floor shows before the box is the box, which is red, and elsewhere the
+    // background, which is blue.
     let redder = |c: &Capture| {
         let [a, b] = [c.at("mirror_of_box"), c.at("lit")];
         (a[0] - a[2]) - (b[0] - b[2])
     };
     assert!(redder(&mirror) > redder(&plain) + 20.0, "{} {}", redder(&mirror), redder(&plain));
-    for (name, kind) in [("glass", "refraction"), ("metal", "reflection"), ("transparent", "transparency")] {
+    for (name, kind) in
+        [("glass", "refraction"), ("metal", "reflection"), ("transparent", "transparency")]
+    {
         let other = picture(name).expect("the run is there");
         let rays = other.report.clone().unwrap_or_default().to_string();
         assert!(rays.contains(kind), "{name}: no {kind} rays: {rays}");
@@ -102,7 +118,9 @@ fn the_panel_switches_every_effect() {
 
 #[test]
 fn options_go_back_and_views_do_not_share_them() {
-    let (Some(plain), Some(back), Some(other)) = (picture("plain"), picture("back"), picture("other")) else {
+    let (Some(plain), Some(back), Some(other)) =
+        (picture("plain"), picture("back"), picture("other"))
+    else {
         return;
     };
     let mut back = back;
@@ -120,13 +138,16 @@ fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
     }
     // The plugin alone in a folder: nothing it needs is above it.
     let lonely = tempfile::tempdir().unwrap();
-    std::fs::copy(plugin_folder().join("VtkBridge.so"), lonely.path().join("VtkBridge.so")).unwrap();
+    std::fs::copy(plugin_folder().join("VtkBridge.so"), lonely.path().join("VtkBridge.so"))
+        .unwrap();
     let folder = output("plugin-alone");
     std::fs::create_dir_all(&folder).unwrap();
     let line = format!("exec {} \"$@\"", interpreter(Program::ParaView, With::Stock).unwrap());
     let script = [scripts().join("run_all.py"), folder, scripts().join("paraview/views.py")];
     let launch = Launch::new(Program::ParaView, With::Stock, &line).unwrap().args(script);
-    let out =
-        launch.env("PV_PLUGIN_PATH", lonely.path()).output().expect_success("pvbatch with a plugin alone");
+    let out = launch
+        .env("PV_PLUGIN_PATH", lonely.path())
+        .output()
+        .expect_success("pvbatch with a plugin alone");
     assert!(out.stderr.contains("vtk-bridge install --plugin"), "{}", out.stderr);
 }

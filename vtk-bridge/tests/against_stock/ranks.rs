@@ -34,8 +34,8 @@ fn run(
     Ok((folder, launch.output()))
 }
 
-/// Pixels that are not within `levels` of 255 of any pixel of the other picture that touches their place. So edges may lie one pixel
-/// beside, and nothing else may differ.
+/// Pixels that are not within `levels` of 255 of any pixel of the other picture that touches their
+/// place. So edges may lie one pixel beside, and nothing else may differ.
 fn strangers(a: &Capture, b: &Capture, levels: u8) -> usize {
     let (w, h) = (a.width, a.height);
     assert_eq!((w, h), (b.width, b.height));
@@ -79,7 +79,8 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
             let allowed = if name == "annotated" { pixels / 2000 } else { pixels / 5000 };
             if strange > allowed || different * 200 > pixels {
                 found.push(format!(
-                    "{ranks} ranks, {name}: {strange} of {pixels} pixels are not within 1/255 edges aside, {different} are not within 1 at their place"
+                    "{ranks} ranks, {name}: {strange} of {pixels} pixels are not within 1/255 \
+                     edges aside, {different} are not within 1 at their place"
                 ));
             }
         }
@@ -87,7 +88,10 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
             let path = folder.join(format!("report.rank{rank}.json"));
             let text = std::fs::read_to_string(&path)
                 .unwrap_or_else(|e| panic!("{}: {e}\n{}", path.display(), outcome.stderr));
-            assert!(text.contains("\"triangles\""), "rank {rank} of {ranks} traced nothing:\n{text}");
+            assert!(
+                text.contains("\"triangles\""),
+                "rank {rank} of {ranks} traced nothing:\n{text}"
+            );
         }
     }
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
@@ -95,8 +99,8 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
 
 #[test]
 fn one_rank_with_the_bridge_is_as_stock() {
-    let [stock, ours] =
-        [(With::Stock, "ranks-stock"), (With::Bridge, "ranks-ours")].map(|(w, n)| run(1, w, n, &[]));
+    let [stock, ours] = [(With::Stock, "ranks-stock"), (With::Bridge, "ranks-ours")]
+        .map(|(w, n)| run(1, w, n, &[]));
     let (stock, ours) = match (stock, ours) {
         (Ok(stock), Ok(ours)) => (stock.0, ours.0),
         (Err(reason), _) | (_, Err(reason)) => return skip(&reason),
@@ -108,7 +112,8 @@ fn one_rank_with_the_bridge_is_as_stock() {
         let (mean, pixels) = (difference(&a, &b), a.width * a.height);
         assert!(
             strange * 5000 <= pixels && mean <= 0.5,
-            "{name}: {strange} of {pixels} pixels are not as in stock ParaView, mean difference {mean}"
+            "{name}: {strange} of {pixels} pixels are not as in stock ParaView, mean difference \
+             {mean}"
         );
     }
 }

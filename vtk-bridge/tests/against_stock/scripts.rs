@@ -6,7 +6,8 @@ use crate::session::Run;
 /// A picture (script, name) that is held to other bars than the rest, or to none, and why.
 pub(crate) type Exception = (&'static str, &'static str, Option<Bars>, &'static str);
 
-/// What is wrong with our pictures of `script`, a line each. In those of `untraced` there is nothing to trace.
+/// What is wrong with our pictures of `script`, a line each. In those of `untraced` there is
+/// nothing to trace.
 pub(crate) fn differences(
     stock: &Run,
     ours: &Run,
@@ -27,7 +28,9 @@ pub(crate) fn differences(
             found.push(format!("{}: nothing was ray traced: {:?}", path.display(), b.report));
         }
         let exception = exceptions.iter().copied().flatten().find(|(s, p, ..)| (*s, *p) == place);
-        let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else { continue };
+        let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else {
+            continue;
+        };
         found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{}: {f}", path.display())));
     }
     found

@@ -45,7 +45,12 @@ pub(crate) fn installed() -> &'static Path {
         }
         let out = install.output().expect("vtk-bridge starts");
         let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
-        assert!(out.status.success(), "vtk-bridge install:\n{}\n{}", text(&out.stdout), text(&out.stderr));
+        assert!(
+            out.status.success(),
+            "vtk-bridge install:\n{}\n{}",
+            text(&out.stdout),
+            text(&out.stderr)
+        );
         home
     })
 }
@@ -70,16 +75,25 @@ impl Launch {
             );
         }
         command.args(["-k", "5", TIME_LIMIT, "sh", "-c", &(script + line), "sh"]);
-        command.env("DISPLAY", display).env("PYTHONDONTWRITEBYTECODE", "1").env("LC_ALL", "C.UTF-8");
+        command
+            .env("DISPLAY", display)
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .env("LC_ALL", "C.UTF-8");
         // Nothing of the person who runs the tests.
-        for (name, _) in std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_")) {
+        for (name, _) in
+            std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_"))
+        {
             command.env_remove(name);
         }
-        command.env_remove("VTK_AUTOLOAD_PATH").env_remove("PV_PLUGIN_PATH").env_remove("PYTHONPATH");
+        command
+            .env_remove("VTK_AUTOLOAD_PATH")
+            .env_remove("PV_PLUGIN_PATH")
+            .env_remove("PYTHONPATH");
         if program == Program::Wheel {
             // Without a display it draws by EGL or OSMesa, as on a server.
-            let library =
-                std::env::current_exe().map_err(|e| e.to_string())?.with_file_name("libvtk_bridge.so");
+            let library = std::env::current_exe()
+                .map_err(|e| e.to_string())?
+                .with_file_name("libvtk_bridge.so");
             let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
             command.env_remove("DISPLAY").env("PYTHONPATH", package).env("RTVTK_LIBRARY", library);
         }
@@ -94,7 +108,10 @@ impl Launch {
     }
 
     /// What stands for `"$@"`.
-    pub(crate) fn args<S: AsRef<std::ffi::OsStr>>(mut self, args: impl IntoIterator<Item = S>) -> Launch {
+    pub(crate) fn args<S: AsRef<std::ffi::OsStr>>(
+        mut self,
+        args: impl IntoIterator<Item = S>,
+    ) -> Launch {
         self.command.args(args);
         self
     }
@@ -125,7 +142,13 @@ pub(crate) struct Outcome {
 impl Outcome {
     /// Fails with everything it printed unless it ended with 0.
     pub(crate) fn expect_success(self, what: &str) -> Outcome {
-        assert!(self.code == Some(0), "{what}: ended with {:?}\n{}\n{}", self.code, self.stdout, self.stderr);
+        assert!(
+            self.code == Some(0),
+            "{what}: ended with {:?}\n{}\n{}",
+            self.code,
+            self.stdout,
+            self.stderr
+        );
         self
     }
 }
@@ -188,7 +211,8 @@ impl Run {
             run.stderr += &out.stderr;
             for line in out.stdout.lines() {
                 if let Some(name) = line.strip_prefix("raised ") {
-                    run.failed.insert(name.to_owned(), format!("raised an exception:\n{}", out.stderr));
+                    run.failed
+                        .insert(name.to_owned(), format!("raised an exception:\n{}", out.stderr));
                 }
             }
             let started = out.stdout.lines().filter_map(|l| l.strip_prefix("running ")).count();
@@ -203,8 +227,10 @@ impl Run {
                 break;
             }
             // It died in the script that started last. The others must not suffer for that.
-            let name = left[finished].file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            run.failed.insert(name, format!("the process ended with {:?}:\n{}", out.code, out.stderr));
+            let name =
+                left[finished].file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            run.failed
+                .insert(name, format!("the process ended with {:?}:\n{}", out.code, out.stderr));
             left = &left[finished + 1..];
         }
         Ok(run)
@@ -216,12 +242,17 @@ impl Run {
             return Err(format!("{script}: {how}"));
         }
         let folder = self.folder.join(script);
-        let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        let names =
-            entries.filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".png")?.to_owned()));
+        let entries =
+            std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let names = entries
+            .filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".png")?.to_owned()));
         let mut names: Vec<String> = names.collect();
         names.sort();
-        if names.is_empty() { Err(format!("{script} saved no picture:\n{}", self.stderr)) } else { Ok(names) }
+        if names.is_empty() {
+            Err(format!("{script} saved no picture:\n{}", self.stderr))
+        } else {
+            Ok(names)
+        }
     }
 
     /// One picture of a script.
@@ -238,7 +269,8 @@ impl Run {
 /// The scripts of a folder, sorted.
 pub(crate) fn scripts_in(folder: &str) -> Vec<PathBuf> {
     let folder = peers::scripts().join(folder);
-    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let entries =
+        std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut scripts: Vec<PathBuf> = entries
         .filter_map(|e| Some(e.ok()?.path()).filter(|p| p.extension().is_some_and(|x| x == "py")))
         .collect();

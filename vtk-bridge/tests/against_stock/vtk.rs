@@ -36,7 +36,8 @@ const STEEP: Bars = Bars { color_mean: 2.5, color_strays: 0.002, ..Bars::STRICT 
 /// Isosurfaces of volumes.
 const GRAZED: Bars = Bars { color_strays: 0.005, ..SHADED };
 
-const LEFT_BEHIND: &str = "OpenGL's light does not follow a turned volume; ours does (`turning_a_volume_or_camera_and_light_is_the_same`)";
+const LEFT_BEHIND: &str = "OpenGL's light does not follow a turned volume; ours does \
+                           (`turning_a_volume_or_camera_and_light_is_the_same`)";
 
 /// Pictures that are held to other bars than the rest, or to none, and why.
 pub(crate) const EXCEPTIONS: &[Exception] = &[
@@ -44,20 +45,23 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
         "volume_blends",
         "gradient_opacity",
         Some(STEEP),
-        "OpenGL takes differences over a twentieth more than the distance of points, and half of them at the bounds",
+        "OpenGL takes differences over a twentieth more than the distance of points, and half of \
+         them at the bounds",
     ),
     ("volume_blends", "gradient_opacity_shaded", Some(STEEP), "as gradient opacity"),
     (
         "edges",
         "edges",
         Some(Bars { depth_strays: 0.003, ..Bars::STRICT }),
-        "where moved triangles overlap inside a surface, OpenGL shows the one in front, we the one that the ray meets",
+        "where moved triangles overlap inside a surface, OpenGL shows the one in front, we the one \
+         that the ray meets",
     ),
     (
         "odd_inputs",
         "not_a_number",
         None,
-        "OpenGL shows nothing of a surface with one bad point; we show the rest (`one_bad_point_costs_only_its_own_triangles`)",
+        "OpenGL shows nothing of a surface with one bad point; we show the rest \
+         (`one_bad_point_costs_only_its_own_triangles`)",
     ),
     (
         "projections",
@@ -69,7 +73,8 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
         "volumes",
         "shaded",
         Some(SHADED),
-        "at the bounds of the grid OpenGL takes its gradient from clamped texels, which is half of the difference across",
+        "at the bounds of the grid OpenGL takes its gradient from clamped texels, which is half of \
+         the difference across",
     ),
     (
         "volume_blends",
@@ -90,7 +95,8 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
         "volumes",
         "translucent_inside",
         Some(Bars { color_mean: 3.0, color_strays: 0.2, ..Bars::STRICT }),
-        "OpenGL blends volumes over all translucent surfaces, also over those in front of them and inside",
+        "OpenGL blends volumes over all translucent surfaces, also over those in front of them and \
+         inside",
     ),
     (
         "windows",
@@ -102,7 +108,8 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
         "textures",
         "transparent",
         Some(Bars { silhouette: 1.0, depth_ulp: u32::MAX, ..Bars::STRICT }),
-        "OpenGL writes no depth for a surface with a translucent texture; we write it where the texture is opaque",
+        "OpenGL writes no depth for a surface with a translucent texture; we write it where the \
+         texture is opaque",
     ),
 ];
 
@@ -173,7 +180,8 @@ fn every_script_has_a_test() {
 /// So the bars measure us and not the chance of OpenGL's threads.
 #[test]
 fn stock_against_stock_passes_and_planted_faults_do_not() {
-    // Runs of its own of the two scripts it looks at: neither the bridge nor the other scripts are needed.
+    // Runs of its own of the two scripts it looks at: neither the bridge nor the other scripts are
+    // needed.
     let mut scripts = scripts_in("vtk");
     scripts.retain(|p| p.ends_with("contours.py") || p.ends_with("opacity.py"));
     let run = |name| Run::new(Program::Vtk, With::Stock, &scripts, output(name), &[]);
@@ -211,7 +219,8 @@ fn one_bad_point_costs_only_its_own_triangles() {
     assert!(told.iter().any(|w| w.contains("not a number")), "{told:?}");
 }
 
-/// OpenGL's own pictures differ in the last digit between sizes; ours must be the same scene everywhere.
+/// OpenGL's own pictures differ in the last digit between sizes; ours must be the same scene
+/// everywhere.
 #[test]
 fn size_and_place_do_not_change_our_picture() {
     let Some(both) = both() else { return };
@@ -232,7 +241,8 @@ fn turning_a_volume_or_camera_and_light_is_the_same() {
     let Some(both) = both() else { return };
     let pictures = ["turned", "camera_turned"];
     let [volume, camera] = pictures.map(|p| both.ours.capture("volume_lights", p).unwrap());
-    let [stock_volume, stock_camera] = pictures.map(|p| both.stock.capture("volume_lights", p).unwrap());
+    let [stock_volume, stock_camera] =
+        pictures.map(|p| both.stock.capture("volume_lights", p).unwrap());
     let bars = Bars { color_mean: 0.05, ..Bars::STRICT };
     assert_eq!(faults(&volume, &camera, &bars), Vec::<String>::new());
     let stock_differs = faults(&stock_volume, &stock_camera, &Bars { color_mean: 5.0, ..SHADED });
@@ -256,13 +266,20 @@ fn colors_and_matrices_do_not_rebuild() {
         // The last is this script's; renderers of scripts before may be alive.
         capture.renderers().last().and_then(|r| r["rebuilt"].as_u64()).expect("a report")
     };
-    for (script, picture) in [("colors", "recolored"), ("changing", "moved"), ("contours", "turned")] {
-        assert_eq!(rebuilt(script, picture), 0, "{script}/{picture} built an acceleration structure again");
+    for (script, picture) in
+        [("colors", "recolored"), ("changing", "moved"), ("contours", "turned")]
+    {
+        assert_eq!(
+            rebuilt(script, picture),
+            0,
+            "{script}/{picture} built an acceleration structure again"
+        );
     }
     assert!(rebuilt("changing", "deformed") > 0, "points that moved must be built again");
 }
 
-/// The depth of the plane through a triangle's corners, in f64, at every pixel: who is right where we and OpenGL differ.
+/// The depth of the plane through a triangle's corners, in f64, at every pixel: who is right where
+/// we and OpenGL differ.
 #[test]
 fn our_window_depth_is_exact_where_opengl_rounds() {
     let scripts = [crate::peers::scripts().join("exact/triangles.py")];
@@ -273,8 +290,12 @@ fn our_window_depth_is_exact_where_opengl_rounds() {
     };
     let [stock, ours] = [stock, ours].map(|r| r.capture("triangles", "triangles").unwrap());
     let worst = |c: &Capture| {
-        let corners: Vec<f64> =
-            c.facts["corners"].as_array().expect("a list").iter().filter_map(|v| v.as_f64()).collect();
+        let corners: Vec<f64> = c.facts["corners"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .filter_map(|v| v.as_f64())
+            .collect();
         let mut worst = (0, 0);
         for y in 0..c.height {
             for x in 0..c.width {
@@ -292,10 +313,14 @@ fn our_window_depth_is_exact_where_opengl_rounds() {
         worst.0
     };
     let (opengl, rays) = (worst(&stock), worst(&ours));
-    assert!(rays <= 1, "our depth is {rays} units in the last place beside the exact one, OpenGL's {opengl}");
+    assert!(
+        rays <= 1,
+        "our depth is {rays} units in the last place beside the exact one, OpenGL's {opengl}"
+    );
 }
 
-/// Window depth of the triangle with these projected corners (x, y, z from -1 to 1) at `p`, when it covers `p`.
+/// Window depth of the triangle with these projected corners (x, y, z from -1 to 1) at `p`, when it
+/// covers `p`.
 fn depth_at(t: &[f64], p: [f64; 2]) -> Option<f64> {
     let edge = |i: usize| [t[3 * i] - t[0], t[3 * i + 1] - t[1], t[3 * i + 2] - t[2]];
     let ([ux, uy, uz], [vx, vy, vz]) = (edge(1), edge(2));

@@ -6,7 +6,8 @@ use crate::session::{Program, Run, With, output, scripts_in};
 use crate::vtk::EMPTY;
 use std::path::PathBuf;
 
-/// Pictures that are held to other bars than the rest, or to none, and why. Those of Debian's VTK hold here too.
+/// Pictures that are held to other bars than the rest, or to none, and why. Those of Debian's VTK
+/// hold here too.
 const EXCEPTIONS: &[Exception] = &[
     (
         "windows",
@@ -24,7 +25,8 @@ fn names(folder: &str) -> Vec<String> {
 }
 
 fn run(with: With, folder: &str, names: &[String], settings: &[(&str, &str)]) -> Option<Run> {
-    let chosen = |p: &PathBuf| names.iter().any(|n| p.file_stem().is_some_and(|stem| stem == n.as_str()));
+    let chosen =
+        |p: &PathBuf| names.iter().any(|n| p.file_stem().is_some_and(|stem| stem == n.as_str()));
     let scripts: Vec<PathBuf> = scripts_in(folder).into_iter().filter(chosen).collect();
     assert_eq!(scripts.len(), names.len(), "every script is there");
     let folder = output(&format!("wheel-{folder}-{with:?}{}", settings.len()).to_lowercase());
@@ -34,7 +36,8 @@ fn run(with: With, folder: &str, names: &[String], settings: &[(&str, &str)]) ->
 /// Compares all pictures of all scripts of a folder; gives the runs back.
 fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
     let scripts = names(folder);
-    let (stock, ours) = (run(With::Stock, folder, &scripts, &[])?, run(With::Bridge, folder, &scripts, &[])?);
+    let (stock, ours) =
+        (run(With::Stock, folder, &scripts, &[])?, run(With::Bridge, folder, &scripts, &[])?);
     let exceptions = [EXCEPTIONS, crate::vtk::EXCEPTIONS];
     let untraced = [EMPTY, &[("steady", "after_a_fault")]].concat();
     let of = |script: &String| differences(&stock, &ours, script, &exceptions, &untraced);
@@ -48,14 +51,18 @@ fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
     same_as_stock("vtk");
 }
 
-/// Classes that Python derives (PyVista's are such), observers that a program removes, tiles, a fault of ours.
+/// Classes that Python derives (PyVista's are such), observers that a program removes, tiles, a
+/// fault of ours.
 #[test]
 fn python_programs_of_other_kinds_look_the_same_and_steady_frames_look_at_no_array() {
     let Some([_, ours]) = same_as_stock("wheel") else { return };
     let turned = ours.path("steady", "turned");
     let looks = std::fs::read_to_string(turned.with_file_name("looks.txt")).unwrap();
     let looks: Vec<u32> = looks.split_whitespace().map(|n| n.parse().unwrap()).collect();
-    assert!(looks[0] > 0 && looks[1] == 0, "arrays looked at in the first frame and in five more: {looks:?}");
+    assert!(
+        looks[0] > 0 && looks[1] == 0,
+        "arrays looked at in the first frame and in five more: {looks:?}"
+    );
     assert!(ours.stderr.contains("internal error, OpenGL draws from now on"), "{}", ours.stderr);
 }
 

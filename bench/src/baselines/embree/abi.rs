@@ -21,8 +21,9 @@ pub(super) const PROPERTY_VERSION_MAJOR: c_int = 1;
 pub(super) const PROPERTY_VERSION_MINOR: c_int = 2;
 pub(super) const PROPERTY_VERSION_PATCH: c_int = 3;
 
-/// Rows of instance ids behind a hit. A default build writes one (Embree 3) or two (Embree 4: `instID` and
-/// `instPrimID`); builds with more instance levels write more. Room for eight levels of both.
+/// Rows of instance ids behind a hit. A default build writes one (Embree 3) or two (Embree 4:
+/// `instID` and `instPrimID`); builds with more instance levels write more. Room for eight levels
+/// of both.
 const INSTANCE_ROWS: usize = 16;
 
 /// `RTCRay` (N = 1) or `RTCRay4`, `RTCRay8`, `RTCRay16`: twelve rows of N numbers, no gaps.
@@ -55,8 +56,9 @@ pub(super) struct HitN<const N: usize> {
     pub(super) instance: [[u32; N]; INSTANCE_ROWS],
 }
 
-/// `RTCRayHit` and its packets. The C type is aligned to 16, 32 or 64 bytes by N; 64 serves all. The hit follows the
-/// ray without a gap in C too, because a ray's size (48 N bytes) is a multiple of each alignment.
+/// `RTCRayHit` and its packets. The C type is aligned to 16, 32 or 64 bytes by N; 64 serves all.
+/// The hit follows the ray without a gap in C too, because a ray's size (48 N bytes) is a multiple
+/// of each alignment.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct RayHitN<const N: usize> {
@@ -162,7 +164,10 @@ mod tests {
     /// Offsets as a C compiler gives them for the headers' structures.
     #[test]
     fn layouts_are_those_of_the_c_headers() {
-        assert_eq!((size_of::<RayN<1>>(), size_of::<RayN<4>>(), size_of::<RayN<16>>()), (48, 192, 768));
+        assert_eq!(
+            (size_of::<RayN<1>>(), size_of::<RayN<4>>(), size_of::<RayN<16>>()),
+            (48, 192, 768)
+        );
         assert_eq!(offset_of!(RayN<1>, tfar), 32);
         assert_eq!((offset_of!(RayN<8>, dir_x), offset_of!(RayN<8>, tfar)), (128, 256));
         assert_eq!((offset_of!(RayHitN<1>, hit), offset_of!(RayHitN<8>, hit)), (48, 384));

@@ -1,10 +1,13 @@
 //! Finding and loading Embree.
 //!
-//! Looked for, in this order: the file or folder that `RTSV_EMBREE3` or `RTSV_EMBREE4` names; `target/peers`, where
-//! the set-up program puts peers; the active Python environment's and `.venv`'s `embreex` package, which carries
-//! Embree 4; and whatever the system's loader finds.
+//! Looked for, in this order: the file or folder that `RTSV_EMBREE3` or `RTSV_EMBREE4` names;
+//! `target/peers`, where the set-up program puts peers; the active Python environment's and
+//! `.venv`'s `embreex` package, which carries Embree 4; and whatever the system's loader finds.
 
-#![expect(unsafe_code, reason = "a C library cannot be loaded and its symbols cannot be typed without it")]
+#![expect(
+    unsafe_code,
+    reason = "a C library cannot be loaded and its symbols cannot be typed without it"
+)]
 
 use super::abi::{self, Calls, Queries, Widths};
 use crate::baselines::BaselineError;
@@ -42,8 +45,9 @@ impl Version {
     }
 }
 
-/// A loaded library. It stays loaded until the program ends: its worker threads, and those of the TBB it may bring,
-/// outlive the devices, and unloading pulls the code from under them (seen as a crash in about every second run).
+/// A loaded library. It stays loaded until the program ends: its worker threads, and those of the
+/// TBB it may bring, outlive the devices, and unloading pulls the code from under them (seen as a
+/// crash in about every second run).
 #[derive(Clone)]
 pub struct Embree {
     pub(super) calls: Calls,
@@ -60,7 +64,8 @@ impl Embree {
         for candidate in candidates(version) {
             match Embree::open(version, &candidate) {
                 Ok(e) => return Ok(e),
-                // A file that is there and fails is worth a report; a name the loader does not know is not.
+                // A file that is there and fails is worth a report; a name the loader does not know
+                // is not.
                 Err(e) if candidate.is_absolute() => unusable = Some(e),
                 Err(_) => {}
             }
@@ -84,11 +89,12 @@ impl Embree {
             let cause = std::error::Error::source(&e).map_or(String::new(), |c| format!(": {c}"));
             unusable(format!("{e}{cause}"))
         };
-        // SAFETY: loading runs the library's initialisers. The candidates are Embree by name or by the user's choice,
-        // whose initialisers only set up its own globals.
+        // SAFETY: loading runs the library's initialisers. The candidates are Embree by name or by
+        // the user's choice, whose initialisers only set up its own globals.
         let library = unsafe { libloading::Library::new(path) }.map_err(because)?;
-        // SAFETY: `calls` types each symbol as the headers of this major version declare it; that it is this version
-        // is checked below, before anything but device functions, which both versions share, is called.
+        // SAFETY: `calls` types each symbol as the headers of this major version declare it; that
+        // it is this version is checked below, before anything but device functions, which both
+        // versions share, is called.
         let calls = unsafe { calls(&library, version) }.map_err(|e| unusable(e.to_string()))?;
         std::mem::forget(library);
         let mut embree = Embree { calls, version: String::new(), path: shown.clone() };
@@ -102,15 +108,21 @@ impl Embree {
 
     fn version_numbers(&self) -> Result<[i64; 3], String> {
         let c = &self.calls;
-        // SAFETY: device functions have the same signature in both versions; the configuration is a C string; the
-        // device is used only when it is not null and is released once.
+        // SAFETY: device functions have the same signature in both versions; the configuration is a
+        // C string; the device is used only when it is not null and is released once.
         unsafe {
             let device = (c.new_device)(c"threads=1".as_ptr());
             if device.is_null() {
-                return Err(format!("no device: {}", abi::error_name((c.get_device_error)(device))));
+                return Err(format!(
+                    "no device: {}",
+                    abi::error_name((c.get_device_error)(device))
+                ));
             }
-            let properties =
-                [abi::PROPERTY_VERSION_MAJOR, abi::PROPERTY_VERSION_MINOR, abi::PROPERTY_VERSION_PATCH];
+            let properties = [
+                abi::PROPERTY_VERSION_MAJOR,
+                abi::PROPERTY_VERSION_MINOR,
+                abi::PROPERTY_VERSION_PATCH,
+            ];
             let numbers = properties.map(|p| (c.get_device_property)(device, p) as i64);
             (c.release_device)(device);
             Ok(numbers)
@@ -135,7 +147,10 @@ impl Embree {
 
 /// # Safety
 /// `library` is Embree of the major version `version`.
-unsafe fn calls(library: &libloading::Library, version: Version) -> Result<Calls, libloading::Error> {
+unsafe fn calls(
+    library: &libloading::Library,
+    version: Version,
+) -> Result<Calls, libloading::Error> {
     macro_rules! symbol {
         ($name:expr) => {
             // SAFETY: the caller says which library this is; `abi` repeats its declarations.
@@ -185,7 +200,8 @@ fn candidates(version: Version) -> Vec<PathBuf> {
     let stem = format!("libembree{}", version.number());
     let mut found = vec![];
     if let Some(named) = std::env::var_os(version.variable()) {
-        // Named explicitly: nothing else is tried, so that a measurement is never of another library than asked for.
+        // Named explicitly: nothing else is tried, so that a measurement is never of another
+        // library than asked for.
         let named = PathBuf::from(named);
         if named.is_dir() {
             collect(&named, &stem, 6, &mut found);
@@ -198,18 +214,22 @@ fn candidates(version: Version) -> Vec<PathBuf> {
     for dir in peer_dirs() {
         collect(&dir, &stem, 8, &mut found);
     }
-    found.extend([format!("{stem}.so.{}", version.number()), format!("{stem}.so")].map(PathBuf::from));
+    found.extend(
+        [format!("{stem}.so.{}", version.number()), format!("{stem}.so")].map(PathBuf::from),
+    );
     found
 }
 
 /// Folders that may hold peers.
 fn peer_dirs() -> Vec<PathBuf> {
     let mut dirs = vec![PathBuf::from("target/peers")];
-    // The program may be started from anywhere: the build folder it lies in has a `peers` folder too.
+    // The program may be started from anywhere: the build folder it lies in has a `peers` folder
+    // too.
     if let Ok(exe) = std::env::current_exe() {
         dirs.extend(exe.ancestors().skip(1).take(3).map(|a| a.join("peers")));
     }
-    let environments = [std::env::var_os("VIRTUAL_ENV").map(PathBuf::from), Some(PathBuf::from(".venv"))];
+    let environments =
+        [std::env::var_os("VIRTUAL_ENV").map(PathBuf::from), Some(PathBuf::from(".venv"))];
     dirs.extend(environments.into_iter().flatten().map(|e| e.join("lib")));
     dirs.into_iter().filter_map(|d| std::path::absolute(d).ok()).filter(|d| d.is_dir()).collect()
 }
@@ -240,7 +260,10 @@ mod tests {
         std::fs::write(&path, "not a library").unwrap();
         let e = Embree::open(Version::V4, &path).err().unwrap().to_string();
         assert!(e.contains("libembree4.so cannot be used"), "{e}");
-        assert!(e.contains("ELF") || e.contains("too short"), "the loader's reason is missing: {e}");
+        assert!(
+            e.contains("ELF") || e.contains("too short"),
+            "the loader's reason is missing: {e}"
+        );
     }
 
     #[test]

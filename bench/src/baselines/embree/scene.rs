@@ -88,21 +88,27 @@ pub struct EmbreeScene {
     options: Options,
     /// What building cost. Memory as Embree's monitor counts it; the input arrays are not in it.
     pub cost: BuildCost,
-    /// Shared with Embree until the scene is released; padded, since Embree reads 16 bytes at the last vertex.
+    /// Shared with Embree until the scene is released; padded, since Embree reads 16 bytes at the
+    /// last vertex.
     _positions: Vec<f32>,
     _indices: Vec<u32>,
     _memory: Box<Memory>,
 }
 
-// SAFETY: a committed scene is only read by queries, which Embree allows from any thread at the same time, and it may
-// be released from any thread. The pointers are not used for anything else, and the counters are atomic.
+// SAFETY: a committed scene is only read by queries, which Embree allows from any thread at the
+// same time, and it may be released from any thread. The pointers are not used for anything else,
+// and the counters are atomic.
 unsafe impl Send for EmbreeScene {}
 // SAFETY: as above.
 unsafe impl Sync for EmbreeScene {}
 
 impl EmbreeScene {
     /// Builds a mesh.
-    pub fn build(embree: &Embree, mesh: &TriMesh, options: &Options) -> Result<EmbreeScene, BaselineError> {
+    pub fn build(
+        embree: &Embree,
+        mesh: &TriMesh,
+        options: &Options,
+    ) -> Result<EmbreeScene, BaselineError> {
         require_clean(mesh)?;
         let calls = embree.calls;
         let failed = |code: c_int, doing: &'static str| BaselineError::Failed {
@@ -110,17 +116,19 @@ impl EmbreeScene {
             error: abi::error_name(code),
             doing,
         };
-        let config = CString::new(options.device_configuration()).map_err(|_| failed(2, "configuring"))?;
+        let config =
+            CString::new(options.device_configuration()).map_err(|_| failed(2, "configuring"))?;
         let mut positions: Vec<f32> = Vec::with_capacity(mesh.positions.len() * 3 + 4);
         positions.extend(mesh.positions.iter().flat_map(|p| p.to_array()));
         positions.extend([0.0; 4]);
         let indices: Vec<u32> = mesh.indices.iter().flatten().copied().collect();
         let memory = Box::<Memory>::default();
 
-        // SAFETY: functions are called as the headers say. The configuration outlives the call; the monitor's data is
-        // boxed, lives in `self` and is dropped after the device; the arrays have the counts and strides given, all
-        // indices are below the vertex count (`require_clean`), and they live in `self` until the scene is released.
-        // The geometry's reference is given to the scene. Handles are released once, in `Drop` or below on failure.
+        // SAFETY: functions are called as the headers say. The configuration outlives the call; the
+        // monitor's data is boxed, lives in `self` and is dropped after the device; the arrays have
+        // the counts and strides given, all indices are below the vertex count (`require_clean`),
+        // and they live in `self` until the scene is released. The geometry's reference is given to
+        // the scene. Handles are released once, in `Drop` or below on failure.
         let (device, scene, time) = unsafe {
             let device = (calls.new_device)(config.as_ptr());
             if device.is_null() {
@@ -172,9 +180,13 @@ impl EmbreeScene {
         })
     }
 
-    /// A way to send rays: 1, 4, 8 or 16 at a time, marked as coherent or not. Panics on another width.
+    /// A way to send rays: 1, 4, 8 or 16 at a time, marked as coherent or not. Panics on another
+    /// width.
     pub fn view(&self, width: usize, coherent: bool) -> View<'_> {
-        assert!([1, 4, 8, 16].contains(&width), "Embree has packets of 1, 4, 8 and 16 rays, not {width}");
+        assert!(
+            [1, 4, 8, 16].contains(&width),
+            "Embree has packets of 1, 4, 8 and 16 rays, not {width}"
+        );
         View { scene: self, width, coherent }
     }
 
@@ -189,13 +201,14 @@ impl EmbreeScene {
     ) {
         let rays: *mut c_void = (&raw mut *packet).cast();
         let (valid, scene) = (valid.0.as_ptr(), self.scene);
-        // SAFETY: the scene is committed; the packet and the valid mask are aligned to 64 bytes and have the layout
-        // of width N (tested in `abi`; occlusion queries take the ray part, which comes first); the context or the
-        // arguments live through the call and have no callbacks.
+        // SAFETY: the scene is committed; the packet and the valid mask are aligned to 64 bytes and
+        // have the layout of width N (tested in `abi`; occlusion queries take the ray part, which
+        // comes first); the context or the arguments live through the call and have no callbacks.
         unsafe {
             match &self.embree.calls.queries {
                 Queries::V3 { intersect, occluded } => {
-                    let (f, context) = (if OCCLUDED { occluded } else { intersect }, &raw mut flags.context3);
+                    let (f, context) =
+                        (if OCCLUDED { occluded } else { intersect }, &raw mut flags.context3);
                     match N {
                         1 => (f.one)(scene, context, rays),
                         4 => (f.four)(valid, scene, context, rays),
@@ -226,7 +239,8 @@ impl EmbreeScene {
                     h.prim[from] = NO_HIT;
                     continue;
                 }
-                // SAFETY: `closest` and `occluded` choose N from 1, 4, 8, 16, and `load` filled all lanes.
+                // SAFETY: `closest` and `occluded` choose N from 1, 4, 8, 16, and `load` filled all
+                // lanes.
                 unsafe { self.query::<N, false>(&valid, &mut q, &mut flags) };
                 let to = from..from + N;
                 h.t[to.clone()].copy_from_slice(&q.ray.tfar);
@@ -262,7 +276,8 @@ impl EmbreeScene {
 
 impl Drop for EmbreeScene {
     fn drop(&mut self) {
-        // SAFETY: both handles are valid and released here only; the arrays and the monitor's data are dropped after.
+        // SAFETY: both handles are valid and released here only; the arrays and the monitor's data
+        // are dropped after.
         unsafe {
             (self.embree.calls.release_scene)(self.scene);
             (self.embree.calls.release_device)(self.device);
@@ -316,7 +331,8 @@ impl<const N: usize> RayHitN<N> {
             id: zero,
             flags: zero,
         };
-        let hit = HitN { normal: [f; 3], u: f, v: f, prim_id: all, geom_id: all, instance: [all; _] };
+        let hit =
+            HitN { normal: [f; 3], u: f, v: f, prim_id: all, geom_id: all, instance: [all; _] };
         RayHitN { ray, hit }
     }
 
@@ -381,8 +397,8 @@ mod tests {
     use crate::baselines::testing;
     use std::io::Write as _;
 
-    /// Runs a check with each version that is installed. Says which are not, in a way that libtest does not swallow in
-    /// tests that pass; with `RTSV_REQUIRE_PEERS=1` that is a failure.
+    /// Runs a check with each version that is installed. Says which are not, in a way that libtest
+    /// does not swallow in tests that pass; with `RTSV_REQUIRE_PEERS=1` that is a failure.
     fn with_each(check: impl Fn(&Embree)) {
         for version in [Version::V3, Version::V4] {
             match Embree::load(version) {
@@ -417,8 +433,13 @@ mod tests {
         with_each(|embree| {
             for quality in Quality::ALL {
                 for max_isa in [None, Some("avx2"), Some("sse4.2")] {
-                    let options =
-                        Options { quality, max_isa, compact: true, threads: 2, ..Options::default() };
+                    let options = Options {
+                        quality,
+                        max_isa,
+                        compact: true,
+                        threads: 2,
+                        ..Options::default()
+                    };
                     let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
                     testing::agrees_with_brute_force(&scene.view(16, true));
                 }

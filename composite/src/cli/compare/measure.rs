@@ -17,8 +17,9 @@ use std::time::Duration;
 
 /// Frames before the clock counts: buffers are made and connections opened.
 const WARM_UP: u64 = 3;
-/// Largest difference of a channel that counts as equal where floating-point colours are blended: IceT groups the ranks differently
-/// for every strategy, so its own strategies differ by about as much.
+/// Largest difference of a channel that counts as equal where floating-point colours are blended:
+/// IceT groups the ranks differently for every strategy, so its own strategies differ by about as
+/// much.
 const BLEND_TOLERANCE: f32 = 1e-5;
 
 /// What is the same for all frames of a measurement.
@@ -57,7 +58,9 @@ impl Groups {
     /// For ranks that are threads; 0 if they are not, or are to send messages.
     pub(super) fn new(ranks: usize) -> Self {
         let members = shared_memory_group(ranks).into_iter().zip(shared_memory_group(ranks));
-        Self(members.map(|(depth, blend)| Mutex::new(Some(GroupMembers { depth, blend }))).collect())
+        Self(
+            members.map(|(depth, blend)| Mutex::new(Some(GroupMembers { depth, blend }))).collect(),
+        )
     }
 
     pub(super) fn members_of(&self, rank: usize) -> Option<GroupMembers> {
@@ -66,7 +69,11 @@ impl Groups {
 }
 
 impl<'a> Bench<'a> {
-    pub(super) fn new(comm: &'a mut RankComm, path: &Path, setting: Setting) -> anyhow::Result<Self> {
+    pub(super) fn new(
+        comm: &'a mut RankComm,
+        path: &Path,
+        setting: Setting,
+    ) -> anyhow::Result<Self> {
         let Setting { size_px: size, strategy, in_memory, simd, timeout, .. } = setting;
         let mode = match setting.pixels {
             Pixels::Depth => IcetMode::Depth,
@@ -77,7 +84,8 @@ impl<'a> Bench<'a> {
             RankComm::Thread(comm) => Icet::over_comm(path, comm, mode, size, size),
             RankComm::Model(comm) => Icet::over_comm(path, comm, mode, size, size),
         };
-        // IceT collects colours only. Its ranks do not wait for each other at the end either: the barrier is timed for both.
+        // IceT collects colours only. Its ranks do not wait for each other at the end either: the
+        // barrier is timed for both.
         let options = Options {
             strategy,
             in_memory,
@@ -102,17 +110,20 @@ impl<'a> Bench<'a> {
         let SyntheticFrame { width_px, height_px, colors, depths, .. } = &self.drawn;
         Ok(match self.setting.pixels {
             Pixels::Depth => {
-                let image = Image::from_planes(*width_px, *height_px, colors.clone(), depths.clone())?;
+                let image =
+                    Image::from_planes(*width_px, *height_px, colors.clone(), depths.clone())?;
                 Shared::Depth(Arc::new(image))
             }
             Pixels::Blend => {
-                let image = Image::from_planes(*width_px, *height_px, self.glass.clone(), Vec::new())?;
+                let image =
+                    Image::from_planes(*width_px, *height_px, self.glass.clone(), Vec::new())?;
                 Shared::Blend(Arc::new(image))
             }
         })
     }
 
-    /// The frame at hand by IceT's strategy of this number, and what `look` makes of the image where it is.
+    /// The frame at hand by IceT's strategy of this number, and what `look` makes of the image
+    /// where it is.
     fn run_icet<T>(
         &mut self,
         strategy: usize,
@@ -165,9 +176,9 @@ impl<'a> Bench<'a> {
             let ours_at = turns.iter().position(|turn| *turn == 0).unwrap_or(0);
             let mut copies = Vec::new();
             for turn in &turns[..ours_at] {
-                copies.extend(
-                    self.run_icet(turn - 1, timed, &mut rivals_ms, |image| IcetPixels::copied(&image))?,
-                );
+                copies.extend(self.run_icet(turn - 1, timed, &mut rivals_ms, |image| {
+                    IcetPixels::copied(&image)
+                })?);
             }
 
             // Ours.
@@ -176,28 +187,41 @@ impl<'a> Bench<'a> {
             let (image, report) = match (&shared, &mut members) {
                 (Some(Shared::Depth(image)), Some(members)) => {
                     let (comm, bounds) = (self.comm.comm(), self.drawn.bounds);
-                    let done = members.depth.composite(comm, image, bounds, self.depth.options())?;
+                    let done =
+                        members.depth.composite(comm, image, bounds, self.depth.options())?;
                     (done.image.map(CompositeImage::Depth), done.report)
                 }
                 (Some(Shared::Blend(image)), Some(members)) => {
                     self.blend.set_order(Some(order));
                     let (comm, bounds) = (self.comm.comm(), self.drawn.bounds);
-                    let done = members.blend.composite(comm, image, bounds, self.blend.options())?;
+                    let done =
+                        members.blend.composite(comm, image, bounds, self.blend.options())?;
                     (done.image.map(CompositeImage::Blend), done.report)
                 }
                 _ if pixels == Pixels::Depth => {
                     let drawn = &self.drawn;
-                    let frame =
-                        Frame::with_depth(drawn.width_px, drawn.height_px, &drawn.colors, &drawn.depths)?;
-                    let done = self.depth.composite(self.comm.comm(), &frame.with_bounds(drawn.bounds)?)?;
+                    let frame = Frame::with_depth(
+                        drawn.width_px,
+                        drawn.height_px,
+                        &drawn.colors,
+                        &drawn.depths,
+                    )?;
+                    let done = self
+                        .depth
+                        .composite(self.comm.comm(), &frame.with_bounds(drawn.bounds)?)?;
                     (done.image.map(CompositeImage::Depth), done.report)
                 }
                 _ => {
                     // The order changes from frame to frame; buffers stay.
                     self.blend.set_order(Some(order));
-                    let frame = Frame::premultiplied(self.drawn.width_px, self.drawn.height_px, &self.glass)?;
-                    let done =
-                        self.blend.composite(self.comm.comm(), &frame.with_bounds(self.drawn.bounds)?)?;
+                    let frame = Frame::premultiplied(
+                        self.drawn.width_px,
+                        self.drawn.height_px,
+                        &self.glass,
+                    )?;
+                    let done = self
+                        .blend
+                        .composite(self.comm.comm(), &frame.with_bounds(self.drawn.bounds)?)?;
                     (done.image.map(CompositeImage::Blend), done.report)
                 }
             };
@@ -238,10 +262,12 @@ impl<'a> Bench<'a> {
             all.iter().filter_map(number).map(u64::from_le_bytes).sum()
         };
         let medians: Vec<f64> = rivals_ms.iter().map(|times| median(times)).collect();
-        let best = (0..medians.len()).min_by(|&a, &b| medians[a].total_cmp(&medians[b])).unwrap_or(0);
+        let best =
+            (0..medians.len()).min_by(|&a, &b| medians[a].total_cmp(&medians[b])).unwrap_or(0);
         let ours = median(&ours_ms);
-        let column =
-            |of: fn(&crate::Report) -> f64| 1e3 * median(&reports.iter().map(of).collect::<Vec<f64>>());
+        let column = |of: fn(&crate::Report) -> f64| {
+            1e3 * median(&reports.iter().map(of).collect::<Vec<f64>>())
+        };
         Ok(Row {
             scene: scene.name().to_string(),
             ranks,
@@ -262,7 +288,11 @@ impl<'a> Bench<'a> {
             simd: simd.unwrap_or_else(SimdLevel::best).name().to_string(),
             ours_mb: total(0) as f64 / 1e6,
             ours_messages: total(8),
-            rivals_ms: IcetStrategy::ALL.iter().map(|s| s.name().to_string()).zip(medians).collect(),
+            rivals_ms: IcetStrategy::ALL
+                .iter()
+                .map(|s| s.name().to_string())
+                .zip(medians)
+                .collect(),
             columns_ms: [
                 ("compress", column(|r| r.compress_secs)),
                 ("blend", column(|r| r.blend_secs)),
@@ -275,11 +305,12 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The order of a frame's turns, the same on all ranks: rotated from frame to frame, and reversed in every second one, so
-/// that each is first, last and behind each neighbour equally often. As in `runner` of the member bench, which may use
-/// composite and may not be used by it.
+/// The order of a frame's turns, the same on all ranks: rotated from frame to frame, and reversed
+/// in every second one, so that each is first, last and behind each neighbour equally often. As in
+/// `runner` of the member bench, which may use composite and may not be used by it.
 fn rotated_order(count: usize, frame: u64) -> Vec<usize> {
-    let mut turns: Vec<usize> = (0..count).map(|i| (i + frame as usize / 2) % count.max(1)).collect();
+    let mut turns: Vec<usize> =
+        (0..count).map(|i| (i + frame as usize / 2) % count.max(1)).collect();
     if frame % 2 == 1 {
         turns.reverse();
     }
@@ -355,8 +386,8 @@ mod tests {
         let count = 1 + IcetStrategy::ALL.len();
         for place in 0..count {
             for contender in 0..count {
-                let here =
-                    (0..2 * count as u64).filter(|frame| rotated_order(count, *frame)[place] == contender);
+                let here = (0..2 * count as u64)
+                    .filter(|frame| rotated_order(count, *frame)[place] == contender);
                 assert_eq!(here.count(), 2, "contender {contender} at place {place}");
             }
         }

@@ -1,8 +1,10 @@
-//! What differs between MPI implementations below the level of C source: handles, sizes and magic numbers.
+//! What differs between MPI implementations below the level of C source: handles, sizes and magic
+//! numbers.
 //!
-//! The standard fixes names and arguments, not the binary interface. Open MPI's and SMPI's handles are pointers, MPICH's are
-//! `int`s. A `usize` argument carries both: on x86-64 and aarch64 the callee reads the register's lower half where it wants an
-//! `int`. Read from the installed headers (`mpi.h`, `smpi.h`) of the versions named in [`Abi::of_version`].
+//! The standard fixes names and arguments, not the binary interface. Open MPI's and SMPI's handles
+//! are pointers, MPICH's are `int`s. A `usize` argument carries both: on x86-64 and aarch64 the
+//! callee reads the register's lower half where it wants an `int`. Read from the installed headers
+//! (`mpi.h`, `smpi.h`) of the versions named in [`Abi::of_version`].
 use super::MpiError;
 
 /// A binary interface.
@@ -43,8 +45,8 @@ impl Abi {
         }
     }
 
-    /// The ABI of the library that calls itself `version` (`MPI_Get_library_version`). What is not known by name is refused:
-    /// calls with handles of the wrong kind would not fail but go astray.
+    /// The ABI of the library that calls itself `version` (`MPI_Get_library_version`). What is not
+    /// known by name is refused: calls with handles of the wrong kind would not fail but go astray.
     ///
     /// # Errors
     /// [`MpiError::UnknownAbi`] with the library's name.
@@ -65,7 +67,9 @@ impl Abi {
         } else if starts(&["SMPI Version 3."]) {
             Ok(Self::Smpi)
         } else {
-            Err(MpiError::UnknownAbi { version: version.lines().next().unwrap_or_default().to_string() })
+            Err(MpiError::UnknownAbi {
+                version: version.lines().next().unwrap_or_default().to_string(),
+            })
         }
     }
 
@@ -105,10 +109,17 @@ mod tests {
 
     #[test]
     fn libraries_are_told_apart_by_what_they_call_themselves() {
-        let open = "Open MPI v4.1.4, package: Debian OpenMPI, ident: 4.1.4, repo rev: v4.1.4, May 26, 2022";
+        let open = "Open MPI v4.1.4, package: Debian OpenMPI, ident: 4.1.4, repo rev: v4.1.4, May \
+                    26, 2022";
         assert_eq!(Abi::of_version(open).ok(), Some(Abi::OpenMpi));
-        assert_eq!(Abi::of_version("MPICH Version:\t4.0.2\nMPICH Release date:").ok(), Some(Abi::Mpich));
-        assert_eq!(Abi::of_version("SMPI Version 3.32. Copyright The SimGrid Team").ok(), Some(Abi::Smpi));
+        assert_eq!(
+            Abi::of_version("MPICH Version:\t4.0.2\nMPICH Release date:").ok(),
+            Some(Abi::Mpich)
+        );
+        assert_eq!(
+            Abi::of_version("SMPI Version 3.32. Copyright The SimGrid Team").ok(),
+            Some(Abi::Smpi)
+        );
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! What time it is for a rank.
 //!
-//! Under SMPI every look at the simulated clock hands the processor to other simulated ranks, whose work empties the caches: a
-//! program that measures itself would be slowed by that alone. There the clock is read where a call has waited, and from then on the
-//! time that passes here counts, which is about what SMPI itself will add (it adds processor time, but to ask for that takes most of a
-//! microsecond, which would be added too). Calls that do not wait take no simulated time, but may hand over: what happened meanwhile is
-//! taken out. So right behind a wait or barrier the time is exact, and spans within a frame are as good as the machine is quiet.
+//! Under SMPI every look at the simulated clock hands the processor to other simulated ranks, whose
+//! work empties the caches: a program that measures itself would be slowed by that alone. There the
+//! clock is read where a call has waited, and from then on the time that passes here counts, which
+//! is about what SMPI itself will add (it adds processor time, but to ask for that takes most of a
+//! microsecond, which would be added too). Calls that do not wait take no simulated time, but may
+//! hand over: what happened meanwhile is taken out. So right behind a wait or barrier the time is
+//! exact, and spans within a frame are as good as the machine is quiet.
 use super::abi::Abi;
 use super::library::Mpi;
 use std::cell::Cell;

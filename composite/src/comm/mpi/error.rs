@@ -11,7 +11,8 @@ pub enum MpiError {
     NotLaunched,
     /// No library could be loaded.
     #[error(
-        "no MPI library for this launcher ({reason}): {tried}: install it (Debian: openmpi-bin or mpich), \
+        "no MPI library for this launcher ({reason}): {tried}: install it (Debian: openmpi-bin or \
+         mpich), \
          or name the library in COMPOSITE_MPI"
     )]
     NoLibrary {

@@ -1,9 +1,11 @@
-//! Signs of life: whoever waits long for a rank asks whether it is at work, and counts its timeout from the last answer.
+//! Signs of life: whoever waits long for a rank asks whether it is at work, and counts its timeout
+//! from the last answer.
 //!
-//! A rank counts its steps: messages it sent, messages it got, and calls of [`alive`](crate::Communicator::alive). Asked, it tells
-//! its count if it has grown since it last told that rank. A rank that itself waits makes no steps, but hands on what it hears from
-//! those it waits for; each count of each rank counts once, so two ranks that wait for each other do not keep each other alive.
-//! Nothing is sent unless somebody waits for a quarter of its timeout.
+//! A rank counts its steps: messages it sent, messages it got, and calls of
+//! [`alive`](crate::Communicator::alive). Asked, it tells its count if it has grown since it last
+//! told that rank. A rank that itself waits makes no steps, but hands on what it hears from those
+//! it waits for; each count of each rank counts once, so two ranks that wait for each other do not
+//! keep each other alive. Nothing is sent unless somebody waits for a quarter of its timeout.
 use std::time::{Duration, Instant};
 
 /// Asks in a timeout.
@@ -76,9 +78,12 @@ impl Heartbeats {
         out
     }
 
-    /// Of what has come, whether anything is a new sign of one of those waited for; and those signs, for the ranks that wait for this
-    /// one.
-    pub(super) fn take_new(&mut self, waited_for: impl Fn(usize) -> bool) -> (bool, Vec<(usize, Heartbeat)>) {
+    /// Of what has come, whether anything is a new sign of one of those waited for; and those
+    /// signs, for the ranks that wait for this one.
+    pub(super) fn take_new(
+        &mut self,
+        waited_for: impl Fn(usize) -> bool,
+    ) -> (bool, Vec<(usize, Heartbeat)>) {
         let mut new = Vec::new();
         for (from, heartbeat) in std::mem::take(&mut self.unread) {
             if waited_for(from) && heartbeat.steps > self.newest[heartbeat.origin] {

@@ -19,8 +19,9 @@ pub const OPEN_MPI: &[&str] = &["libmpi.so.40", "libmpi.so"];
 /// File names of MPICH's library; Intel MPI and MVAPICH use the second.
 pub const MPICH: &[&str] = &["libmpich.so.12", "libmpi.so.12", "libmpich.so"];
 
-/// A variable of this process. One that is not UTF-8 is set too, and a library whose name is not is named as well as it can be
-/// by the error that says it was not found: as if it were not set, another library would be taken without a word.
+/// A variable of this process. One that is not UTF-8 is set too, and a library whose name is not is
+/// named as well as it can be by the error that says it was not found: as if it were not set,
+/// another library would be taken without a word.
 pub fn variable(name: &str) -> Option<String> {
     std::env::var_os(name).map(text)
 }
@@ -53,7 +54,8 @@ pub fn choose(variable: impl Fn(&str) -> Option<String>) -> Result<Choice, MpiEr
     if variable("OMPI_COMM_WORLD_RANK").is_some() {
         return choice(OPEN_MPI, "OMPI_COMM_WORLD_RANK is set".to_string());
     }
-    // Hydra and its relatives (MPICH, Intel MPI, MVAPICH), and Slurm with PMI 1 or 2, which those use.
+    // Hydra and its relatives (MPICH, Intel MPI, MVAPICH), and Slurm with PMI 1 or 2, which those
+    // use.
     if variable("PMI_RANK").is_some() {
         return choice(MPICH, "PMI_RANK is set".to_string());
     }
@@ -64,10 +66,12 @@ pub fn choose(variable: impl Fn(&str) -> Option<String>) -> Result<Choice, MpiEr
     Err(MpiError::NotLaunched)
 }
 
-/// Processors of this machine. What the standard library says is less where the launcher has bound each rank to its own.
+/// Processors of this machine. What the standard library says is less where the launcher has bound
+/// each rank to its own.
 pub(super) fn processors_here() -> usize {
     let online = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
-    count_ranges(online.trim()).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    count_ranges(online.trim())
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 
 /// How many numbers are in a list like `0-3,8`.
@@ -99,7 +103,8 @@ mod tests {
     fn each_launcher_gets_its_own_library_and_the_user_the_last_word() {
         assert_eq!(with(&[("OMPI_COMM_WORLD_RANK", "0")]).unwrap().libraries[0], "libmpi.so.40");
         assert_eq!(with(&[("PMI_RANK", "1")]).unwrap().libraries[0], "libmpich.so.12");
-        let both = with(&[("OMPI_COMM_WORLD_RANK", "0"), ("COMPOSITE_MPI", "/opt/x/libmpi.so")]).unwrap();
+        let both =
+            with(&[("OMPI_COMM_WORLD_RANK", "0"), ("COMPOSITE_MPI", "/opt/x/libmpi.so")]).unwrap();
         assert_eq!(both.libraries, ["/opt/x/libmpi.so"]);
         assert_eq!(with(&[("COMPOSITE_MPI", "mpich")]).unwrap().libraries[0], "libmpich.so.12");
     }

@@ -22,8 +22,9 @@ macro_rules! functions {
             fn of(library: &Library, name: &str) -> Result<Self, MpiError> {
                 Ok(Self {
                     $($field: {
-                        // SAFETY: the MPI standard fixes this function's arguments; handles fit `usize` in every ABI that
-                        // `Abi::of_version` lets pass, and no function is called before that check but the version's.
+                        // SAFETY: the MPI standard fixes this function's arguments; handles fit
+                        // `usize` in every ABI that `Abi::of_version` lets pass, and no function is
+                        // called before that check but the version's.
                         let symbol = unsafe {
                             library.get::<unsafe extern "C" fn($($argument),*) $(-> $result)?>($symbol.as_bytes())
                         };
@@ -72,7 +73,8 @@ functions! {
 }
 
 /// `MPI_Comm_split_type`.
-pub(super) type SplitType = unsafe extern "C" fn(Handle, c_int, c_int, Handle, *mut Handle) -> c_int;
+pub(super) type SplitType =
+    unsafe extern "C" fn(Handle, c_int, c_int, Handle, *mut Handle) -> c_int;
 /// `MPI_Comm_free`.
 pub(super) type CommFree = unsafe extern "C" fn(*mut Handle) -> c_int;
 
@@ -94,12 +96,14 @@ pub(crate) struct Mpi {
     /// Functions of MPI 3, which old libraries lack.
     pub(super) split_type: Option<SplitType>,
     pub(super) comm_free: Option<CommFree>,
-    // Last, so that nothing outlives it; never unloaded in practice, because MPI libraries leave threads behind.
+    // Last, so that nothing outlives it; never unloaded in practice, because MPI libraries leave
+    // threads behind.
     _library: std::mem::ManuallyDrop<Library>,
 }
 
 impl Mpi {
-    /// The MPI that is already in the process (linked, or SMPI around it), else that of the launcher.
+    /// The MPI that is already in the process (linked, or SMPI around it), else that of the
+    /// launcher.
     pub(super) fn load() -> Result<Self, MpiError> {
         let this = Library::this();
         if has(&this, "MPI_Init") {
@@ -135,12 +139,14 @@ impl Mpi {
             Abi::Mpich => (0x4400_0000, 0x4c00_010d, 0x2c00_0000, 0x5400_0001, 0x1c00_0000),
             // The variable's address for now; `started` reads the handle.
             Abi::Smpi => {
-                let (byte, handler) = (address("smpi_MPI_BYTE")?, address("smpi_MPI_ERRORS_RETURN")?);
+                let (byte, handler) =
+                    (address("smpi_MPI_BYTE")?, address("smpi_MPI_ERRORS_RETURN")?);
                 (address("MPI_COMM_WORLD")?, byte, 0, handler, 0)
             }
         };
         let constants = abi.constants();
-        // SAFETY: the MPI standard fixes these functions' arguments, with handles as in `Functions`.
+        // SAFETY: the MPI standard fixes these functions' arguments, with handles as in
+        // `Functions`.
         let (split_type, comm_free) = unsafe {
             (
                 library.get::<SplitType>(b"MPI_Comm_split_type").ok().map(|symbol| *symbol),
@@ -167,7 +173,8 @@ impl Mpi {
     /// To be called once, after MPI was started: SMPI's world is a variable that is set then.
     pub(super) fn started(&mut self) {
         if self.abi == Abi::Smpi {
-            // SAFETY: the address of SMPI's variable of type MPI_Comm, a pointer, which lives as long as the process.
+            // SAFETY: the address of SMPI's variable of type MPI_Comm, a pointer, which lives as
+            // long as the process.
             self.world = unsafe { (self.world as *const Handle).read() };
         }
     }
@@ -179,7 +186,8 @@ impl Mpi {
         // SAFETY: the buffer is longer than MPI_MAX_ERROR_STRING of every ABI here (512 at most).
         unsafe { (self.functions.error_string)(code, text.as_mut_ptr().cast(), &raw mut length) };
         let length = usize::try_from(length).unwrap_or(0).min(text.len());
-        let text = String::from_utf8_lossy(&text[..length]).trim_end_matches('\0').trim().to_string();
+        let text =
+            String::from_utf8_lossy(&text[..length]).trim_end_matches('\0').trim().to_string();
         if text.is_empty() { format!("error {code}") } else { text }
     }
 
@@ -201,7 +209,8 @@ impl Mpi {
             wide.extend_from_slice(requests);
             wide.as_mut_ptr().cast()
         };
-        // SAFETY: `count` requests or nulls in an array of the ABI's width. Undefined is negative in every ABI.
+        // SAFETY: `count` requests or nulls in an array of the ABI's width. Undefined is negative
+        // in every ABI.
         unsafe { (self.functions.wait_any)(count, array, &raw mut index, self.status_ignore()) };
         usize::try_from(index).ok().filter(|&index| index < requests.len())
     }
@@ -220,7 +229,8 @@ fn has(library: &Library, symbol: &str) -> bool {
 fn version_of(functions: &Functions) -> String {
     let mut text = vec![0_u8; 16384];
     let mut length = 0;
-    // SAFETY: allowed before MPI_Init (MPI 3.1, section 8.1.1); the buffer is longer than MPI_MAX_LIBRARY_VERSION_STRING (8192).
+    // SAFETY: allowed before MPI_Init (MPI 3.1, section 8.1.1); the buffer is longer than
+    // MPI_MAX_LIBRARY_VERSION_STRING (8192).
     unsafe { (functions.library_version)(text.as_mut_ptr().cast(), &raw mut length) };
     let length = text.iter().position(|&byte| byte == 0).unwrap_or(0);
     String::from_utf8_lossy(&text[..length]).into_owned()
@@ -229,7 +239,8 @@ fn version_of(functions: &Functions) -> String {
 fn open_first(choice: &Choice, flags: c_int) -> Result<(Library, String), MpiError> {
     let mut tried = Vec::new();
     for name in &choice.libraries {
-        // SAFETY: loading an MPI library runs its initialisers, which expect no more than a process.
+        // SAFETY: loading an MPI library runs its initialisers, which expect no more than a
+        // process.
         match unsafe { Library::open(Some(name), flags) } {
             Ok(library) => return Ok((library, name.clone())),
             Err(error) => tried.push(error.to_string()),
@@ -238,8 +249,8 @@ fn open_first(choice: &Choice, flags: c_int) -> Result<(Library, String), MpiErr
     Err(MpiError::NoLibrary { reason: choice.reason.clone(), tried: tried.join("; ") })
 }
 
-/// What the first library of `names` that can be loaded says of itself, with its ABI if that is known. For `composite doctor`:
-/// nothing is started.
+/// What the first library of `names` that can be loaded says of itself, with its ABI if that is
+/// known. For `composite doctor`: nothing is started.
 ///
 /// # Errors
 /// [`MpiError::NoLibrary`] or [`MpiError::MissingSymbol`].

@@ -1,11 +1,13 @@
 //! Ranks as processes of an MPI job: Open MPI, MPICH or SimGrid's SMPI, whichever started them.
 //!
-//! The library is looked for when the program runs (`dlopen`), so that one binary serves all and building needs none. Which one
-//! is the launcher's choice ([`launcher`]); what calls itself by an unknown name is refused ([`Abi`]).
+//! The library is looked for when the program runs (`dlopen`), so that one binary serves all and
+//! building needs none. Which one is the launcher's choice ([`launcher`]); what calls itself by an
+//! unknown name is refused ([`Abi`]).
 //!
-//! Faults: waits poll, so they end at their timeout; a rank that gives up tells the others by a notice. MPI itself cannot go on
-//! after that, so a program ends with [`MpiComm::end_job`]. A killed rank is noticed by the launcher, which ends the job (Open
-//! MPI and MPICH both do). Under SMPI time is simulated and waits block: SimGrid itself finds ranks that wait for ever.
+//! Faults: waits poll, so they end at their timeout; a rank that gives up tells the others by a
+//! notice. MPI itself cannot go on after that, so a program ends with [`MpiComm::end_job`]. A
+//! killed rank is noticed by the launcher, which ends the job (Open MPI and MPICH both do). Under
+//! SMPI time is simulated and waits block: SimGrid itself finds ranks that wait for ever.
 #![allow(unsafe_code, reason = "calls into an MPI library found at run time")]
 
 mod abi;
@@ -39,8 +41,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use transfer::Transfers;
 
-/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB. Room is made chunk by chunk, as they come:
-/// how long a message may be follows from what its sender has announced, and need not be true.
+/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB. Room is
+/// made chunk by chunk, as they come: how long a message may be follows from what its sender has
+/// announced, and need not be true.
 const CHUNK_BYTES: usize = 1 << 26;
 /// `MPI_THREAD_FUNNELED` in all three ABIs: there may be other threads, but this one calls.
 const FUNNELED: c_int = 1;
@@ -48,7 +51,8 @@ const FUNNELED: c_int = 1;
 const LATE_MESSAGE_TIMEOUT: Duration = Duration::from_millis(200);
 /// How long a rank that leaves waits for its messages to be taken.
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
-/// Messages on their way from which on a sender looks which of them have left, if it has not needed their buffers before.
+/// Messages on their way from which on a sender looks which of them have left, if it has not needed
+/// their buffers before.
 const REAP_AT: usize = 512;
 /// Polls before the processor is offered to others, where every rank has its own.
 const SPINS: u32 = 2000;
@@ -61,9 +65,11 @@ const STARTUP_TIMEOUT: Duration = Duration::from_secs(300);
 /// How often a waiting rank looks for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
 
-/// All ranks of the MPI job that this process belongs to. There is one per process; it is used by the thread that made it.
+/// All ranks of the MPI job that this process belongs to. There is one per process; it is used by
+/// the thread that made it.
 ///
-/// Dropping it leaves the group and ends MPI (`MPI_Finalize`) if this object started it, unless the group was aborted.
+/// Dropping it leaves the group and ends MPI (`MPI_Finalize`) if this object started it, unless the
+/// group was aborted.
 pub struct MpiComm {
     mpi: Rc<Mpi>,
     rank: usize,
@@ -78,7 +84,8 @@ pub struct MpiComm {
     aborted: Option<(usize, String)>,
     /// Whether there are more ranks here than processors.
     oversubscribed: bool,
-    /// The machine of every rank, numbered in the order of their first ranks; the same on all ranks.
+    /// The machine of every rank, numbered in the order of their first ranks; the same on all
+    /// ranks.
     nodes: Vec<usize>,
     finalize: bool,
     /// See [`delay_after_collectives`](Self::delay_after_collectives).
@@ -100,14 +107,16 @@ impl MpiComm {
         Self::with_chunks(CHUNK_BYTES)
     }
 
-    /// As [`world`](Self::world), with messages cut into chunks of this many bytes (64 MiB at most); for tests.
+    /// As [`world`](Self::world), with messages cut into chunks of this many bytes (64 MiB at
+    /// most); for tests.
     ///
     /// # Errors
     /// As [`world`](Self::world).
     pub fn with_chunks(chunk_bytes: usize) -> Result<Self, MpiError> {
         let chunk_bytes = chunk_bytes.clamp(1, CHUNK_BYTES);
         let mut mpi = Mpi::load()?;
-        // Under SMPI all ranks share this library's statics unless it is privatised, and each rank has its own world.
+        // Under SMPI all ranks share this library's statics unless it is privatised, and each rank
+        // has its own world.
         if mpi.abi != Abi::Smpi && STARTED.swap(true, Ordering::SeqCst) {
             return Err(MpiError::StartedTwice);
         }
@@ -119,10 +128,13 @@ impl MpiComm {
             _ => Err(MpiError::Call { call: call.to_string(), reason: mpi.error_text(code) }),
         };
         // SAFETY: MPI_Initialized may be called at any time.
-        check(&mpi, "MPI_Initialized", unsafe { (mpi.functions.initialized)(&raw mut initialized) })?;
+        check(&mpi, "MPI_Initialized", unsafe {
+            (mpi.functions.initialized)(&raw mut initialized)
+        })?;
         if initialized == 0 {
             let mut provided: c_int = 0;
-            // SAFETY: null arguments are allowed since MPI 2; called once a process (a rank, under SMPI).
+            // SAFETY: null arguments are allowed since MPI 2; called once a process (a rank, under
+            // SMPI).
             let code = unsafe {
                 if mpi.abi == Abi::Smpi {
                     (mpi.functions.init)(std::ptr::null_mut(), std::ptr::null_mut())
@@ -139,7 +151,8 @@ impl MpiComm {
         }
         mpi.started();
 
-        // Communicators of our own, so that no message is mistaken for one of the program around us.
+        // Communicators of our own, so that no message is mistaken for one of the program around
+        // us.
         let duplicate = || {
             let mut comm: Handle = 0;
             // SAFETY: every rank of the job makes the same calls in the same order.
@@ -188,8 +201,8 @@ impl MpiComm {
         Ok(comm)
     }
 
-    /// The machine of every rank, numbered in the order of their first ranks. Ranks of which neither MPI nor the system says that
-    /// they share one count as apart. The same on all ranks.
+    /// The machine of every rank, numbered in the order of their first ranks. Ranks of which
+    /// neither MPI nor the system says that they share one count as apart. The same on all ranks.
     pub fn nodes(&self) -> &[usize] {
         &self.nodes
     }
@@ -214,8 +227,9 @@ impl MpiComm {
         String::from_utf8_lossy(&text).trim_end_matches('\0').to_string()
     }
 
-    /// Ends all processes of the job, this one included, with exit code `code` (`MPI_Abort`). For programs, after an error: say
-    /// what went wrong before. Gives the others a moment to say it as well.
+    /// Ends all processes of the job, this one included, with exit code `code` (`MPI_Abort`). For
+    /// programs, after an error: say what went wrong before. Gives the others a moment to say it as
+    /// well.
     pub fn end_job(mut self, code: i32) {
         let begin = Instant::now();
         while begin.elapsed() < LATE_MESSAGE_TIMEOUT && self.mpi.abi != Abi::Smpi {
@@ -267,7 +281,8 @@ impl MpiComm {
         self.notices.send_heartbeats(&self.mpi, heartbeats);
     }
 
-    /// To be called while waiting, behind [`process_notices`](Self::process_notices): gives and takes signs of life.
+    /// To be called while waiting, behind [`process_notices`](Self::process_notices): gives and
+    /// takes signs of life.
     fn update_timeout(&mut self, patience: &mut HeartbeatTimeout, sources: &[usize], now: Instant) {
         if self.mpi.abi == Abi::Smpi {
             return;
@@ -342,14 +357,23 @@ impl Communicator for MpiComm {
         })
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.check_peer(source)?;
         let Self { transfers, mpi, clock, .. } = self;
         let id = clock.around(|| transfers.post(mpi, source, tag, capacity))?;
         Ok(Receive { id, source, tag, capacity })
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         let rank = self.rank;
         let first = posted.first().ok_or(CommError::NothingPosted { rank })?;
         let silent = CommError::Timeout {
@@ -395,7 +419,8 @@ impl Communicator for MpiComm {
             }
             polls += 1;
             if self.oversubscribed && polls > YIELDS {
-                // Whoever only yields uses up its share of the processor and is served last when its message has come.
+                // Whoever only yields uses up its share of the processor and is served last when
+                // its message has come.
                 std::thread::sleep(POLL_SLEEP);
             } else if self.oversubscribed || polls > SPINS {
                 std::thread::yield_now();
@@ -477,10 +502,15 @@ impl Communicator for MpiComm {
         // SAFETY: a communicator of this object; every rank calls this.
         let code = unsafe { (self.mpi.functions.barrier)(self.transfers.comm()) };
         self.clock.waited();
-        if code == 0 { Ok(()) } else { Err(transfer::failed(&self.mpi, self.rank, "MPI_Barrier", code)) }
+        if code == 0 {
+            Ok(())
+        } else {
+            Err(transfer::failed(&self.mpi, self.rank, "MPI_Barrier", code))
+        }
     }
 
-    /// Simulated ranks block anyway, so there the library's own all-gather takes the place of ours, which has timeouts.
+    /// Simulated ranks block anyway, so there the library's own all-gather takes the place of ours,
+    /// which has timeouts.
     fn all_gather(
         &mut self,
         mine: &[u8],
@@ -513,7 +543,8 @@ impl Communicator for MpiComm {
         own.extend_from_slice(mine);
         own.resize(block, 0);
         let mut all = vec![0_u8; block * self.size];
-        // SAFETY: every rank calls this with blocks of the same size, and `all` has room for one of each.
+        // SAFETY: every rank calls this with blocks of the same size, and `all` has room for one of
+        // each.
         let code = unsafe {
             (self.mpi.functions.allgather)(
                 own.as_ptr().cast(),
@@ -556,7 +587,8 @@ impl Drop for MpiComm {
         }
         if self.mpi.abi == Abi::Smpi {
             if self.finalize {
-                // SAFETY: called once, by the object that started MPI. SimGrid finds ranks that wait here for ever.
+                // SAFETY: called once, by the object that started MPI. SimGrid finds ranks that
+                // wait here for ever.
                 unsafe { (self.mpi.functions.finalize)() };
             }
             return;
@@ -565,7 +597,10 @@ impl Drop for MpiComm {
         // What was sent shall arrive before the news that this rank has left.
         let begin = Instant::now();
         self.transfers.reclaim_buffers(&self.mpi);
-        while self.transfers.outgoing() > 0 && begin.elapsed() < DRAIN_TIMEOUT && self.aborted.is_none() {
+        while self.transfers.outgoing() > 0
+            && begin.elapsed() < DRAIN_TIMEOUT
+            && self.aborted.is_none()
+        {
             std::thread::yield_now();
             self.transfers.reclaim_buffers(&self.mpi);
         }
@@ -577,8 +612,8 @@ impl Drop for MpiComm {
             std::thread::yield_now();
         }
 
-        // MPI_Finalize waits for all ranks, as every MPI program does at its end; after a fault there is no such end, and whoever
-        // still works may yet report one.
+        // MPI_Finalize waits for all ranks, as every MPI program does at its end; after a fault
+        // there is no such end, and whoever still works may yet report one.
         if self.finalize && self.aborted.is_none() {
             while self.others().any(|other| !self.left[other]) {
                 if self.process_notices().is_err() {

@@ -1,5 +1,5 @@
-//! News about the group itself: a rank gives up, has left, asks for a sign of life or gives one. They go beside the messages, on a communicator of their own, and
-//! are looked for while waiting.
+//! News about the group itself: a rank gives up, has left, asks for a sign of life or gives one.
+//! They go beside the messages, on a communicator of their own, and are looked for while waiting.
 use super::heartbeat::Heartbeat;
 use super::library::{Handle, Mpi, Status};
 use std::ffi::c_int;
@@ -48,7 +48,12 @@ impl Notices {
         self.send(mpi, others, vec![LEFT]);
     }
 
-    pub(super) fn send_aborted(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>, reason: &str) {
+    pub(super) fn send_aborted(
+        &mut self,
+        mpi: &Mpi,
+        others: impl Iterator<Item = usize>,
+        reason: &str,
+    ) {
         let mut end = reason.len().min(LONGEST);
         while !reason.is_char_boundary(end) {
             end -= 1;
@@ -74,7 +79,8 @@ impl Notices {
         for rank in others {
             let message = message.clone();
             let mut request: Handle = 0;
-            // SAFETY: `sent` owns the bytes from here on and they are leaked rather than freed while MPI may read them.
+            // SAFETY: `sent` owns the bytes from here on and they are leaked rather than freed
+            // while MPI may read them.
             let code = unsafe {
                 (mpi.functions.isend)(
                     message.as_ptr().cast(),
@@ -98,7 +104,9 @@ impl Notices {
         self.sent.retain_mut(|(request, _)| {
             let mut flag: c_int = 0;
             // SAFETY: a request of MPI_Isend that has not been completed.
-            let code = unsafe { (mpi.functions.test)(&raw mut *request, &raw mut flag, mpi.status_ignore()) };
+            let code = unsafe {
+                (mpi.functions.test)(&raw mut *request, &raw mut flag, mpi.status_ignore())
+            };
             code == 0 && flag == 0
         });
         self.sent.is_empty()
@@ -108,19 +116,28 @@ impl Notices {
     pub(super) fn receive(&mut self, mpi: &Mpi) -> Option<Notice> {
         let mut status: Status = [0; 8];
         let mut flag: c_int = 0;
-        // SAFETY: looks for a message on this object's communicator; a status is at most as large as `Status`.
+        // SAFETY: looks for a message on this object's communicator; a status is at most as large
+        // as `Status`.
         let code = unsafe {
-            (mpi.functions.iprobe)(mpi.constants.any_source, TAG, self.comm, &raw mut flag, &raw mut status)
+            (mpi.functions.iprobe)(
+                mpi.constants.any_source,
+                TAG,
+                self.comm,
+                &raw mut flag,
+                &raw mut status,
+            )
         };
         if code != 0 || flag == 0 {
             return None;
         }
         // SAFETY: MPI_SOURCE is an int at this offset of a status of this ABI.
-        let source =
-            unsafe { status.as_ptr().cast::<u8>().add(mpi.constants.status_source).cast::<c_int>().read() };
+        let source = unsafe {
+            status.as_ptr().cast::<u8>().add(mpi.constants.status_source).cast::<c_int>().read()
+        };
         let mut message = vec![0_u8; LONGEST + 1];
         let mut bytes: c_int = 0;
-        // SAFETY: the probed message is from another `Notices`, so it is not longer than the buffer.
+        // SAFETY: the probed message is from another `Notices`, so it is not longer than the
+        // buffer.
         let code = unsafe {
             (mpi.functions.get_count)(&raw const status, mpi.byte, &raw mut bytes);
             (mpi.functions.recv)(
@@ -136,9 +153,10 @@ impl Notices {
         message.truncate(usize::try_from(bytes).unwrap_or(0));
         let rank = usize::try_from(source).ok().filter(|_| code == 0)?;
         match message.split_first() {
-            Some((&ABORTED, reason)) => {
-                Some(Notice::Aborted { by: rank, reason: String::from_utf8_lossy(reason).into_owned() })
-            }
+            Some((&ABORTED, reason)) => Some(Notice::Aborted {
+                by: rank,
+                reason: String::from_utf8_lossy(reason).into_owned(),
+            }),
             Some((&HEARTBEAT_REQUEST, _)) => Some(Notice::HeartbeatRequest { rank }),
             Some((&HEARTBEAT, rest)) => {
                 let (origin, steps) = rest.split_first_chunk::<4>()?;

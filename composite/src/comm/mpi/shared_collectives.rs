@@ -2,23 +2,26 @@
 
 use super::heartbeat::HeartbeatTimeout;
 use super::{
-    CommError, Communicator, MpiComm, NOTICE_INTERVAL, POLL_SLEEP, SPINS, STARTUP_TIMEOUT, collective,
-    shared_memory,
+    CommError, Communicator, MpiComm, NOTICE_INTERVAL, POLL_SLEEP, SPINS, STARTUP_TIMEOUT,
+    collective, shared_memory,
 };
 use std::time::{Duration, Instant};
 
 impl MpiComm {
-    /// For tests: has this rank wait so long behind each meeting in shared memory, as one does to whom the system gives no processor.
+    /// For tests: has this rank wait so long behind each meeting in shared memory, as one does to
+    /// whom the system gives no processor.
     pub fn delay_after_collectives(&mut self, behind_meetings: Duration) {
         self.delay_after_collectives = behind_meetings;
     }
 
-    /// Makes what the ranks of one machine share, if they are all of one machine and all of them can.
+    /// Makes what the ranks of one machine share, if they are all of one machine and all of them
+    /// can.
     pub(super) fn share_memory(&mut self) -> Result<(), CommError> {
         if self.size < 2 || !self.is_one_node() {
             return Ok(());
         }
-        let made = if self.rank == 0 { shared_memory::SharedMemory::make(self.size).ok() } else { None };
+        let made =
+            if self.rank == 0 { shared_memory::SharedMemory::make(self.size).ok() } else { None };
         let address = made.as_ref().map_or([0; 3], |made| made.1);
         let mine: &[u8] = bytemuck::cast_slice(&address);
         let gathered = collective::all_gather(self, mine, mine.len(), STARTUP_TIMEOUT)?;
@@ -28,10 +31,13 @@ impl MpiComm {
         };
         let shared = match made {
             Some((shared, _)) => Some(shared),
-            None if address != [0; 3] => shared_memory::SharedMemory::map(self.rank, self.size, address).ok(),
+            None if address != [0; 3] => {
+                shared_memory::SharedMemory::map(self.rank, self.size, address).ok()
+            }
             None => None,
         };
-        let gathered = collective::all_gather(self, &[u8::from(shared.is_some())], 1, STARTUP_TIMEOUT)?;
+        let gathered =
+            collective::all_gather(self, &[u8::from(shared.is_some())], 1, STARTUP_TIMEOUT)?;
         self.shared = shared.filter(|_| gathered.iter().all(|one| one == &[1]));
         Ok(())
     }

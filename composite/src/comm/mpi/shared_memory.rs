@@ -1,9 +1,12 @@
-//! Memory that the processes of one machine share: a small table in which ranks meet without messages, and a room for each rank's pixels.
+//! Memory that the processes of one machine share: a small table in which ranks meet without
+//! messages, and a room for each rank's pixels.
 //!
-//! Each piece is a file without a name (`memfd_create`), opened by the others through the process that made it, so nothing is left behind
-//! whatever happens to a process. Ranks wait on a word of the table (`futex`): they sleep until they are woken, which matters where ranks
-//! share processors. There, whoever polls for messages takes the processor from those it waits for, and Linux (6.18) moves a process
-//! that yields behind all others, so that it is served last when its message has come.
+//! Each piece is a file without a name (`memfd_create`), opened by the others through the process
+//! that made it, so nothing is left behind whatever happens to a process. Ranks wait on a word of
+//! the table (`futex`): they sleep until they are woken, which matters where ranks share
+//! processors. There, whoever polls for messages takes the processor from those it waits for, and
+//! Linux (6.18) moves a process that yields behind all others, so that it is served last when its
+//! message has come.
 use crate::comm::{CommError, SharedSegments};
 use rustix::fs::{FallocateFlags, MemfdFlags, fallocate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
@@ -16,7 +19,8 @@ use std::time::Duration;
 
 /// Words of 32 bits for a rank's entry: one line of the cache.
 const ENTRY: usize = 16;
-/// Words of what a rank says at a meeting ([`SharedMemory::slot`]): the meeting's number, what it came for, and 248 bytes.
+/// Words of what a rank says at a meeting ([`SharedMemory::slot`]): the meeting's number, what it
+/// came for, and 248 bytes.
 const STRING: usize = 64;
 /// What stands in place of a length where a rank came to a barrier.
 const BARRIER: u32 = u32::MAX;
@@ -38,8 +42,8 @@ const REFUSED: usize = 5;
 /// Behind which meeting its room was written last.
 const PUBLISHED: usize = 6;
 
-/// Where the table is: process and file of rank 0, and what stands in it, so that the process of that number in another container is not
-/// taken for it.
+/// Where the table is: process and file of rank 0, and what stands in it, so that the process of
+/// that number in another container is not taken for it.
 pub(super) type Address = [u32; 3];
 
 struct Mapping {
@@ -55,34 +59,44 @@ impl Mapping {
         }
         let flags = if fill { MapFlags::SHARED | MapFlags::POPULATE } else { MapFlags::SHARED };
         // SAFETY: a new mapping at an address that the system chooses.
-        let at =
-            unsafe { mmap(std::ptr::null_mut(), bytes, ProtFlags::READ | ProtFlags::WRITE, flags, file, 0) }?;
+        let at = unsafe {
+            mmap(std::ptr::null_mut(), bytes, ProtFlags::READ | ProtFlags::WRITE, flags, file, 0)
+        }?;
         Ok(Self { at: at.cast(), bytes })
     }
 
     /// # Safety
     /// During the life of the slice nobody, here or in another process, writes these bytes.
     unsafe fn read(&self, from: usize, bytes: usize) -> &[u8] {
-        assert!(from.checked_add(bytes).is_some_and(|end| end <= self.bytes), "beyond a rank's room");
+        assert!(
+            from.checked_add(bytes).is_some_and(|end| end <= self.bytes),
+            "beyond a rank's room"
+        );
         // SAFETY: within the mapping, and not written, as the caller promises.
         unsafe { std::slice::from_raw_parts(self.at.add(from), bytes) }
     }
 
     /// # Safety
-    /// During the life of the slice nobody else, here or in another process, reads or writes these bytes.
+    /// During the life of the slice nobody else, here or in another process, reads or writes these
+    /// bytes.
     #[allow(
         clippy::mut_from_ref,
-        reason = "the memory belongs to several processes, so exclusiveness is the caller's to see to"
+        reason = "the memory belongs to several processes, so exclusiveness is the caller's to see \
+                  to"
     )]
     unsafe fn write(&self, from: usize, bytes: usize) -> &mut [u8] {
-        assert!(from.checked_add(bytes).is_some_and(|end| end <= self.bytes), "beyond a rank's room");
+        assert!(
+            from.checked_add(bytes).is_some_and(|end| end <= self.bytes),
+            "beyond a rank's room"
+        );
         // SAFETY: within the mapping, and nobody else's, as the caller promises.
         unsafe { std::slice::from_raw_parts_mut(self.at.add(from), bytes) }
     }
 
     fn word(&self, index: usize) -> &AtomicU32 {
         assert!(4 * index + 4 <= self.bytes, "beyond the table");
-        // SAFETY: within the mapping, which begins at a page; words of the table are only used as atomics, by every process.
+        // SAFETY: within the mapping, which begins at a page; words of the table are only used as
+        // atomics, by every process.
         unsafe { &*self.at.cast::<AtomicU32>().add(index) }
     }
 }
@@ -147,7 +161,11 @@ impl SharedMemory {
     }
 
     /// The table that rank 0 has made.
-    pub(super) fn map(rank: usize, size: usize, [process, file, nonce]: Address) -> std::io::Result<Self> {
+    pub(super) fn map(
+        rank: usize,
+        size: usize,
+        [process, file, nonce]: Address,
+    ) -> std::io::Result<Self> {
         let node = Self::of(rank, size, file_of(process, file)?)?;
         let same = node.table.word(NONCE).load(Ordering::Acquire) == nonce;
         if same { Ok(node) } else { Err(std::io::ErrorKind::NotFound.into()) }
@@ -170,11 +188,12 @@ impl SharedMemory {
         self.table.word(ENTRY * (rank + 1) + word)
     }
 
-    /// Says that this rank has come to the next meeting, to a barrier or (with a string) to an all-gather; wakes all if it is the
-    /// last one.
+    /// Says that this rank has come to the next meeting, to a barrier or (with a string) to an
+    /// all-gather; wakes all if it is the last one.
     ///
-    /// The string can be read behind the meeting. There are two sets of them, and a rank is at most one meeting ahead of another, so
-    /// nobody writes what another still reads: a rank that runs ahead is not mistaken for one that came for the same reason.
+    /// The string can be read behind the meeting. There are two sets of them, and a rank is at most
+    /// one meeting ahead of another, so nobody writes what another still reads: a rank that runs
+    /// ahead is not mistaken for one that came for the same reason.
     pub(super) fn arrive(&self, string: Option<&[u8]>) {
         let number = self.arrivals.get().wrapping_add(1);
         self.arrivals.set(number);
@@ -203,14 +222,18 @@ impl SharedMemory {
     /// Sleeps until all have come or the time has passed, or for no reason.
     pub(super) fn sleep(&self, most: Duration) {
         let before = self.arrivals.get().wrapping_sub(1);
-        let most = futex::Timespec { tv_sec: most.as_secs() as i64, tv_nsec: i64::from(most.subsec_nanos()) };
+        let most = futex::Timespec {
+            tv_sec: most.as_secs() as i64,
+            tv_nsec: i64::from(most.subsec_nanos()),
+        };
         let _ = futex::wait(self.table.word(EPOCH), futex::Flags::empty(), before, Some(&most));
     }
 
     /// Ranks that have not come.
     pub(super) fn missing(&self) -> impl Iterator<Item = usize> {
         let here = self.arrivals.get();
-        (0..self.size).filter(move |&rank| self.entry(rank, ARRIVALS).load(Ordering::Acquire) != here)
+        (0..self.size)
+            .filter(move |&rank| self.entry(rank, ARRIVALS).load(Ordering::Acquire) != here)
     }
 
     /// What all have said at the meeting that has passed; nothing if it was a barrier.
@@ -276,7 +299,8 @@ impl SharedSegments for SharedMemory {
         self.published.set(self.arrivals.get());
         self.entry(self.rank, PUBLISHED).store(self.arrivals.get(), Ordering::Relaxed);
         if self.rank == 0 {
-            // Whoever took bands of the last frame has come to a barrier since, and nobody takes one before the next.
+            // Whoever took bands of the last frame has come to a barrier since, and nobody takes
+            // one before the next.
             self.table.word(NEXT_BAND).store(0, Ordering::Relaxed);
         }
         if let (Ok(()), Some(segment)) = (made, &self.segments[self.rank]) {
@@ -291,10 +315,12 @@ impl SharedSegments for SharedMemory {
             call: format!("opening the memory of rank {rank}"),
             reason,
         };
-        let unpublished =
-            |rank: &usize| self.entry(*rank, PUBLISHED).load(Ordering::Relaxed) != self.published.get();
+        let unpublished = |rank: &usize| {
+            self.entry(*rank, PUBLISHED).load(Ordering::Relaxed) != self.published.get()
+        };
         if let Some(rank) = (0..self.size).find(unpublished) {
-            let reason = "it has laid down nothing for this frame: do all ranks make the same calls?";
+            let reason =
+                "it has laid down nothing for this frame: do all ranks make the same calls?";
             return Err(failed(rank, reason.to_string()));
         }
         let refused = |rank| self.entry(rank, REFUSED).load(Ordering::Relaxed) != 0;
@@ -303,13 +329,14 @@ impl SharedSegments for SharedMemory {
         }
         for rank in 0..self.size {
             let generation = self.entry(rank, GENERATION).load(Ordering::Relaxed);
-            if self.segments[rank].as_ref().is_some_and(|segment| segment.generation == generation) {
+            if self.segments[rank].as_ref().is_some_and(|segment| segment.generation == generation)
+            {
                 continue;
             }
             let [process, file, kib] =
                 [PROCESS, FILE, KIB].map(|word| self.entry(rank, word).load(Ordering::Relaxed));
-            let mapping =
-                file_of(process, file).and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
+            let mapping = file_of(process, file)
+                .and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
             let mapping = match mapping {
                 Ok(mapping) => mapping,
                 // A room is there as long as its process is.
@@ -326,7 +353,8 @@ impl SharedSegments for SharedMemory {
     fn segment(&self, rank: usize, bytes: usize) -> &[u8] {
         let Some(segment) = self.segments[rank].as_ref() else { return &[] };
         let bytes = bytes.min(segment.mapping.bytes);
-        // SAFETY: behind the barrier that follows `publish` nobody writes what was laid until all have met again.
+        // SAFETY: behind the barrier that follows `publish` nobody writes what was laid until all
+        // have met again.
         unsafe { segment.mapping.read(0, bytes) }
     }
 
@@ -336,7 +364,8 @@ impl SharedSegments for SharedMemory {
 
     fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8])) {
         if let Some(segment) = &self.segments[rank] {
-            // SAFETY: who has taken a band is the only one to write it, and it is read behind the next barrier.
+            // SAFETY: who has taken a band is the only one to write it, and it is read behind the
+            // next barrier.
             write(unsafe { segment.mapping.write(from, bytes) });
         }
     }
@@ -355,7 +384,11 @@ mod tests {
     /// Three ranks in one process, which finds its own files as others would.
     fn three() -> [SharedMemory; 3] {
         let (first, address) = SharedMemory::make(3).unwrap();
-        [first, SharedMemory::map(1, 3, address).unwrap(), SharedMemory::map(2, 3, address).unwrap()]
+        [
+            first,
+            SharedMemory::map(1, 3, address).unwrap(),
+            SharedMemory::map(2, 3, address).unwrap(),
+        ]
     }
 
     #[test]
@@ -366,14 +399,18 @@ mod tests {
         }
         assert!(nodes.iter().all(SharedMemory::passed));
         // Rank 2 is quick: before the others have read a word, it says what they expect.
-        let expected = |rank| Err(CommError::OutOfStep { rank, gathering: vec![0, 1], waiting: vec![2] });
+        let expected =
+            |rank| Err(CommError::OutOfStep { rank, gathering: vec![0, 1], waiting: vec![2] });
         assert_eq!(nodes[2].gathered(), expected(2));
         nodes[2].arrive(Some(b"drawn"));
         for rank in [0, 1] {
             assert_eq!(nodes[rank].gathered(), expected(rank));
         }
         let text = nodes[0].gathered().unwrap_err().to_string();
-        assert!(text.contains("ranks 0, 1 came to an all-gather and rank 2 to a barrier"), "{text}");
+        assert!(
+            text.contains("ranks 0, 1 came to an all-gather and rank 2 to a barrier"),
+            "{text}"
+        );
     }
 
     #[test]

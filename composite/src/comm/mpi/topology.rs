@@ -1,8 +1,10 @@
-//! On which machine each rank is: what MPI says of it (`MPI_Comm_split_type`, MPI 3.1, section 6.4.2), and what the system says.
+//! On which machine each rank is: what MPI says of it (`MPI_Comm_split_type`, MPI 3.1, section
+//! 6.4.2), and what the system says.
 //!
-//! Two ranks count as of one machine if MPI finds them in one memory and all else that is known of their machines is the same: the
-//! kernel's boot, the name, and what the variable [`NODE_VARIABLE`] says. Where MPI cannot tell, the kernel's boot must be known.
-//! Variables of launchers are not asked: not every launcher sets them.
+//! Two ranks count as of one machine if MPI finds them in one memory and all else that is known of
+//! their machines is the same: the kernel's boot, the name, and what the variable [`NODE_VARIABLE`]
+//! says. Where MPI cannot tell, the kernel's boot must be known. Variables of launchers are not
+//! asked: not every launcher sets them.
 use super::Communicator as _;
 use super::library::{Handle, Mpi};
 use std::ffi::c_int;
@@ -40,23 +42,27 @@ fn machine_id(
     bytes
 }
 
-/// The lowest rank that shares memory with this one, as MPI says; all ranks must call it. `None` if the library has no such function or
-/// it fails.
+/// The lowest rank that shares memory with this one, as MPI says; all ranks must call it. `None` if
+/// the library has no such function or it fails.
 fn lowest_in_memory(mpi: &Mpi, comm: Handle, rank: usize) -> Option<u32> {
     let (split, free) = (mpi.split_type?, mpi.comm_free?);
     let mut here: Handle = 0;
     // SAFETY: every rank of `comm` calls this, with constants of the library's ABI.
-    let code = unsafe { split(comm, mpi.constants.type_shared, rank as c_int, mpi.info_null, &raw mut here) };
+    let code = unsafe {
+        split(comm, mpi.constants.type_shared, rank as c_int, mpi.info_null, &raw mut here)
+    };
     if code != 0 {
         return None;
     }
     let mut size: c_int = 0;
-    // SAFETY: a communicator that was just made. Its errors return, as those of `comm` do (MPI 3.1, section 8.3).
+    // SAFETY: a communicator that was just made. Its errors return, as those of `comm` do (MPI 3.1,
+    // section 8.3).
     let code = unsafe { (mpi.functions.comm_size)(here, &raw mut size) };
     let count = usize::try_from(size).ok().filter(|_| code == 0)?;
     let own = (rank as u32).to_le_bytes();
     let mut all = vec![0_u8; 4 * count];
-    // SAFETY: every rank of `here` calls this with four bytes, and `all` has room for those of each.
+    // SAFETY: every rank of `here` calls this with four bytes, and `all` has room for those of
+    // each.
     let code = unsafe {
         (mpi.functions.allgather)(
             own.as_ptr().cast(),
@@ -92,10 +98,12 @@ pub(super) fn numbered_nodes(ids: &[Vec<u8>]) -> Vec<usize> {
 impl super::MpiComm {
     /// Finds out which ranks share a machine.
     pub(super) fn find_nodes(&mut self) -> Result<(), super::CommError> {
-        let mine = id_of_this_rank(&self.mpi, self.transfers.comm(), self.rank, &self.processor_name());
+        let mine =
+            id_of_this_rank(&self.mpi, self.transfers.comm(), self.rank, &self.processor_name());
         let all = self.all_gather(&mine, mine.len(), super::STARTUP_TIMEOUT)?;
         self.nodes = numbered_nodes(&all);
-        // More ranks than processors: a rank that spins takes the processor from the one it waits for.
+        // More ranks than processors: a rank that spins takes the processor from the one it waits
+        // for.
         let here = self.nodes.iter().filter(|&&node| node == self.nodes[self.rank]).count();
         self.oversubscribed = here > super::launcher::processors_here();
         Ok(())

@@ -1,7 +1,8 @@
 //! Messages on their way: buffers that MPI reads or writes stay here until it is done with them.
 //!
-//! MPI counts bytes in an `int`, so a message travels as *chunks*: any number of full ones and one that is not full, possibly
-//! empty. A message shorter than a chunk, which is nearly every one, is one MPI message.
+//! MPI counts bytes in an `int`, so a message travels as *chunks*: any number of full ones and one
+//! that is not full, possibly empty. A message shorter than a chunk, which is nearly every one, is
+//! one MPI message.
 use super::library::{Handle, Mpi, Status};
 use crate::comm::{BufferPool, CommError};
 use std::ffi::c_int;
@@ -22,7 +23,8 @@ struct Incoming {
     source: usize,
     tag: u32,
     capacity: usize,
-    /// Its capacity is at least one byte more than the receive's, so that a message that is too long shows.
+    /// Its capacity is at least one byte more than the receive's, so that a message that is too
+    /// long shows.
     buffer: Vec<u8>,
     /// Bytes of complete chunks.
     received: usize,
@@ -83,8 +85,8 @@ impl Transfers {
         loop {
             let chunk = (message.len() - begin).min(self.chunk_bytes);
             let mut request: Handle = 0;
-            // SAFETY: the chunk lies within `message`, whose heap buffer neither moves nor changes until the request is complete:
-            // `outgoing` owns it. chunk_bytes fits a c_int.
+            // SAFETY: the chunk lies within `message`, whose heap buffer neither moves nor changes
+            // until the request is complete: `outgoing` owns it. chunk_bytes fits a c_int.
             let code = unsafe {
                 (mpi.functions.isend)(
                     message.as_ptr().add(begin).cast(),
@@ -110,7 +112,8 @@ impl Transfers {
         result
     }
 
-    /// An empty buffer with room for `capacity` bytes: one given back, one of a message that has left meanwhile, or a new one.
+    /// An empty buffer with room for `capacity` bytes: one given back, one of a message that has
+    /// left meanwhile, or a new one.
     pub(super) fn buffer(&mut self, mpi: &Mpi, capacity: usize) -> Vec<u8> {
         if let Some(buffer) = self.pool.fitting(capacity) {
             return buffer;
@@ -136,10 +139,17 @@ impl Transfers {
         };
         let mut done: c_int = 0;
         let mut indices = vec![0 as c_int; count as usize];
-        // SAFETY: `count` requests of MPI_Isend that have not been completed, in an array of the ABI's width, and room for as many
-        // indices; the value that ignores statuses is that of one status in every ABI.
+        // SAFETY: `count` requests of MPI_Isend that have not been completed, in an array of the
+        // ABI's width, and room for as many indices; the value that ignores statuses is that of one
+        // status in every ABI.
         let code = unsafe {
-            (mpi.functions.test_some)(count, array, &raw mut done, indices.as_mut_ptr(), mpi.status_ignore())
+            (mpi.functions.test_some)(
+                count,
+                array,
+                &raw mut done,
+                indices.as_mut_ptr(),
+                mpi.status_ignore(),
+            )
         };
         // Undefined, which is negative, if there was nothing to look at.
         let done = usize::try_from(done).unwrap_or(0).min(indices.len());
@@ -147,7 +157,8 @@ impl Transfers {
             return;
         }
         for &index in &indices[..done] {
-            if let Some(request) = usize::try_from(index).ok().and_then(|index| wide.get_mut(index)) {
+            if let Some(request) = usize::try_from(index).ok().and_then(|index| wide.get_mut(index))
+            {
                 *request = COMPLETE;
             }
         }
@@ -175,12 +186,19 @@ impl Transfers {
         self.outgoing.iter().filter(|message| message.tag == tag).count()
     }
 
-    /// Waits until one more request of the messages with this tag is complete; false if there is none.
+    /// Waits until one more request of the messages with this tag is complete; false if there is
+    /// none.
     pub(super) fn wait_sent(&mut self, mpi: &Mpi, tag: u32) -> bool {
         let of_tag = |message: &Outgoing| message.tag == tag;
-        let requests: Vec<Handle> =
-            self.outgoing.iter().filter(|m| of_tag(m)).flat_map(|m| m.requests.iter().copied()).collect();
-        let Some(done) = mpi.wait_any_of(&requests).map(|index| requests[index]) else { return false };
+        let requests: Vec<Handle> = self
+            .outgoing
+            .iter()
+            .filter(|m| of_tag(m))
+            .flat_map(|m| m.requests.iter().copied())
+            .collect();
+        let Some(done) = mpi.wait_any_of(&requests).map(|index| requests[index]) else {
+            return false;
+        };
         for message in self.outgoing.iter_mut().filter(|m| of_tag(m)) {
             message.requests.retain(|request| *request != done);
         }
@@ -216,7 +234,8 @@ impl Transfers {
         if self.may_start(last) { self.start_chunk(mpi, last).map(|()| id) } else { Ok(id) }
     }
 
-    /// Whether the next chunk of its source and tag belongs to this receive: those before it must not need another one.
+    /// Whether the next chunk of its source and tag belongs to this receive: those before it must
+    /// not need another one.
     fn may_start(&self, index: usize) -> bool {
         let this = &self.incoming[index];
         let ahead = self.incoming[..index]
@@ -238,8 +257,8 @@ impl Transfers {
             })?;
         }
         this.posted = room;
-        // SAFETY: the `room` bytes behind `received` are within the buffer's capacity; `incoming` owns the buffer, which does not
-        // move or grow until the request is complete.
+        // SAFETY: the `room` bytes behind `received` are within the buffer's capacity; `incoming`
+        // owns the buffer, which does not move or grow until the request is complete.
         let code = unsafe {
             (mpi.functions.irecv)(
                 this.buffer.as_mut_ptr().add(this.received).cast(),
@@ -254,17 +273,23 @@ impl Transfers {
         if code == 0 { Ok(()) } else { Err(failed(mpi, self.rank, "MPI_Irecv", code)) }
     }
 
-    /// The first of `wanted` that is complete, and its message. Looks at complete ones only: with a hundred receives posted, a
-    /// walk over all of them after each message takes longer than the messages.
-    pub(super) fn take(&mut self, wanted: impl Fn(u64) -> Option<usize>) -> Option<(usize, Vec<u8>)> {
-        let found = self.finished.iter().enumerate().find_map(|(at, &id)| Some((at, id, wanted(id)?)));
+    /// The first of `wanted` that is complete, and its message. Looks at complete ones only: with a
+    /// hundred receives posted, a walk over all of them after each message takes longer than the
+    /// messages.
+    pub(super) fn take(
+        &mut self,
+        wanted: impl Fn(u64) -> Option<usize>,
+    ) -> Option<(usize, Vec<u8>)> {
+        let found =
+            self.finished.iter().enumerate().find_map(|(at, &id)| Some((at, id, wanted(id)?)));
         let (at, id, position) = found?;
         self.finished.remove(at);
         let index = self.incoming.iter().position(|other| other.id == id)?;
         Some((position, self.incoming.remove(index).buffer))
     }
 
-    /// Lets MPI work and takes at most one chunk in; `wait` blocks until one has come, else it looks once. Says whether one came.
+    /// Lets MPI work and takes at most one chunk in; `wait` blocks until one has come, else it
+    /// looks once. Says whether one came.
     pub(super) fn progress(&mut self, mpi: &Mpi, wait: bool) -> Result<bool, CommError> {
         self.requests.clear();
         self.owners.clear();
@@ -288,12 +313,19 @@ impl Transfers {
         let mut index: c_int = -1;
         let mut flag: c_int = 1;
         let mut status: Status = [0; 8];
-        // SAFETY: `count` active requests in an array of the ABI's width; a status is at most as large as `Status`.
+        // SAFETY: `count` active requests in an array of the ABI's width; a status is at most as
+        // large as `Status`.
         let code = unsafe {
             if wait {
                 (mpi.functions.wait_any)(count, array, &raw mut index, &raw mut status)
             } else {
-                (mpi.functions.test_any)(count, array, &raw mut index, &raw mut flag, &raw mut status)
+                (mpi.functions.test_any)(
+                    count,
+                    array,
+                    &raw mut index,
+                    &raw mut flag,
+                    &raw mut status,
+                )
             }
         };
         if code == 0 && flag == 0 {
@@ -307,7 +339,8 @@ impl Transfers {
         let (rank, chunk_bytes) = (self.rank, self.chunk_bytes);
         let this = &mut self.incoming[owner];
         this.request = mpi.request_null;
-        let too_long = CommError::TooLong { rank, peer: this.source, tag: this.tag, capacity: this.capacity };
+        let too_long =
+            CommError::TooLong { rank, peer: this.source, tag: this.tag, capacity: this.capacity };
         if code != 0 {
             let words = mpi.error_text(code);
             // The class's number differs between libraries, its name does not.
@@ -352,7 +385,8 @@ pub(super) fn failed(mpi: &Mpi, rank: usize, call: &str, code: c_int) -> CommErr
 
 impl Drop for Transfers {
     fn drop(&mut self) {
-        // MPI may still read or write these; a leak is better than memory that changes under its next owner.
+        // MPI may still read or write these; a leak is better than memory that changes under its
+        // next owner.
         for outgoing in self.outgoing.drain(..) {
             std::mem::forget(outgoing.buffer);
         }

@@ -1,9 +1,12 @@
-//! Messages that share the network interfaces: each has its fair part of both ends, from when it is sent until it is through.
+//! Messages that share the network interfaces: each has its fair part of both ends, from when it is
+//! sent until it is through.
 //!
-//! Fair is the largest smallest part (max-min): the end where parts are smallest decides for all messages there, what these leave elsewhere is
-//! shared by the others, and so on (D. Bertsekas, R. Gallager, "Data Networks", 1992, section 6.5.2). It is what adapters do
-//! that serve their queues in turn, and what SimGrid computes. Interfaces that send one message after the other would be kinder to programs that
-//! cut pictures in slices: their first slices would arrive first instead of all at about the same time.
+//! Fair is the largest smallest part (max-min): the end where parts are smallest decides for all
+//! messages there, what these leave elsewhere is shared by the others, and so on (D. Bertsekas, R.
+//! Gallager, "Data Networks", 1992, section 6.5.2). It is what adapters do that serve their queues
+//! in turn, and what SimGrid computes. Interfaces that send one message after the other would be
+//! kinder to programs that cut pictures in slices: their first slices would arrive first instead of
+//! all at about the same time.
 use std::collections::BTreeMap;
 
 struct Flow {
@@ -20,7 +23,8 @@ struct Flow {
 /// All messages on their way.
 pub(super) struct Flows {
     ranks: usize,
-    /// Of the last change: a beginning or an end. Nothing is added up in between, so that times do not depend on when somebody looks.
+    /// Of the last change: a beginning or an end. Nothing is added up in between, so that times do
+    /// not depend on when somebody looks.
     since_secs: f64,
     active: Vec<Flow>,
     /// When those that are through were.
@@ -42,8 +46,15 @@ impl Flows {
         }
     }
 
-    /// Begins a message that would take `secs` alone; what ended before must have been [`end`](Self::end_next)ed. Returns its number.
-    pub(super) fn begin(&mut self, (from, to): (usize, usize), tag: u32, now_secs: f64, secs: f64) -> u64 {
+    /// Begins a message that would take `secs` alone; what ended before must have been
+    /// [`end`](Self::end_next)ed. Returns its number.
+    pub(super) fn begin(
+        &mut self,
+        (from, to): (usize, usize),
+        tag: u32,
+        now_secs: f64,
+        secs: f64,
+    ) -> u64 {
         self.advance(now_secs);
         let number = self.next;
         self.next += 1;
@@ -52,10 +63,13 @@ impl Flows {
         number
     }
 
-    /// Ends the messages that are through next, if that is not after `until_secs`; whether there are such.
+    /// Ends the messages that are through next, if that is not after `until_secs`; whether there
+    /// are such.
     pub(super) fn end_next(&mut self, until_secs: f64) -> bool {
         let ends = |flow: &Flow| self.since_secs + flow.left_secs / flow.rate;
-        let Some(next_secs) = self.active.iter().map(ends).min_by(f64::total_cmp) else { return false };
+        let Some(next_secs) = self.active.iter().map(ends).min_by(f64::total_cmp) else {
+            return false;
+        };
         if next_secs > until_secs {
             return false;
         }
@@ -70,8 +84,9 @@ impl Flows {
         true
     }
 
-    /// Whose messages have another time of arrival than when this was asked last: all that are on their way, because a
-    /// beginning or an end changes what others have, and those that are through since.
+    /// Whose messages have another time of arrival than when this was asked last: all that are on
+    /// their way, because a beginning or an end changes what others have, and those that are
+    /// through since.
     pub(super) fn take_receivers(&mut self) -> Vec<usize> {
         let mut receivers = std::mem::take(&mut self.reached);
         receivers.extend(self.active.iter().map(|flow| flow.to));
@@ -80,7 +95,8 @@ impl Flows {
         receivers
     }
 
-    /// How many messages of a sender with this tag are on their way, and when, as far as is known, the first of them will be through.
+    /// How many messages of a sender with this tag are on their way, and when, as far as is known,
+    /// the first of them will be through.
     pub(super) fn leaving(&self, from: usize, tag: u32) -> (usize, f64) {
         let own = self.active.iter().filter(|flow| (flow.from, flow.tag) == (from, tag));
         own.fold((0, f64::INFINITY), |(count, first), flow| {
@@ -175,10 +191,13 @@ mod tests {
 
     #[test]
     fn what_one_message_leaves_the_others_take() {
-        // Half of the time alone, then two at half speed until the first is through, then alone again.
+        // Half of the time alone, then two at half speed until the first is through, then alone
+        // again.
         assert_eq!(ends_of(&[(0, 1, 0.0, 4.0), (0, 2, 2.0, 4.0)]), [6.0, 8.0]);
-        // Three come to rank 3; the sender of the first has another message, which gets the two thirds that are left.
-        let ends = ends_of(&[(0, 3, 0.0, 1.0), (1, 3, 0.0, 1.0), (2, 3, 0.0, 1.0), (0, 1, 0.0, 1.0)]);
+        // Three come to rank 3; the sender of the first has another message, which gets the two
+        // thirds that are left.
+        let ends =
+            ends_of(&[(0, 3, 0.0, 1.0), (1, 3, 0.0, 1.0), (2, 3, 0.0, 1.0), (0, 1, 0.0, 1.0)]);
         for (end, expected) in ends.iter().zip([3.0, 3.0, 3.0, 1.5]) {
             assert!((end - expected).abs() < 1e-9, "{ends:?}");
         }

@@ -1,9 +1,11 @@
-//! A simulated network: ranks as threads of one process whose messages take the time that a model of a network says.
+//! A simulated network: ranks as threads of one process whose messages take the time that a model
+//! of a network says.
 //!
-//! Every rank has a clock. What it computes between two calls advances it by the processor time its thread took (or by what
-//! [`SimComm::compute`] is told), and messages by the LogGP model of [`Network`]. So one machine with few cores gives the times of many nodes, with
-//! nothing installed. What the model leaves out: contention inside the network, noise of operating systems, and that a node's caches and memory
-//! belong to it alone (here many ranks share them).
+//! Every rank has a clock. What it computes between two calls advances it by the processor time its
+//! thread took (or by what [`SimComm::compute`] is told), and messages by the LogGP model of
+//! [`Network`]. So one machine with few cores gives the times of many nodes, with nothing
+//! installed. What the model leaves out: contention inside the network, noise of operating systems,
+//! and that a node's caches and memory belong to it alone (here many ranks share them).
 //!
 //! ```
 //! use composite::comm::sim::{Compute, Network, run};
@@ -70,9 +72,11 @@ pub struct SimComm {
     next_id: u64,
 }
 
-/// Runs `work` on `size` simulated ranks and returns their results in rank order. As many ranks compute at once as this machine has cores.
+/// Runs `work` on `size` simulated ranks and returns their results in rank order. As many ranks
+/// compute at once as this machine has cores.
 ///
-/// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as [`CommError::PeerLost`].
+/// A panic of one rank is that rank's [`CommError::Panicked`]; the others see it as
+/// [`CommError::PeerLost`].
 pub fn run<T: Send>(
     size: usize,
     network: Network,
@@ -83,7 +87,8 @@ pub fn run<T: Send>(
     run_on(size, network, compute, cores, work)
 }
 
-/// As [`run`], with at most `cores` ranks computing at once. With one, ranks do not disturb each other's caches while they compute.
+/// As [`run`], with at most `cores` ranks computing at once. With one, ranks do not disturb each
+/// other's caches while they compute.
 pub fn run_on<T: Send>(
     size: usize,
     network: Network,
@@ -164,7 +169,9 @@ impl SimComm {
         schedule.ranks[self.rank].state = State::Ready;
         group.dispatch(&mut schedule);
         // After an abort nobody keeps time any more.
-        while schedule.aborted.is_none() && !matches!(schedule.ranks[self.rank].state, State::Computing) {
+        while schedule.aborted.is_none()
+            && !matches!(schedule.ranks[self.rank].state, State::Computing)
+        {
             schedule = group.wake[self.rank].wait(schedule).unwrap_or_else(PoisonError::into_inner);
         }
         drop(schedule);
@@ -214,7 +221,12 @@ impl Communicator for SimComm {
         result
     }
 
-    fn post_recv(&mut self, source: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+    fn post_recv(
+        &mut self,
+        source: usize,
+        tag: u32,
+        capacity: usize,
+    ) -> Result<Receive, CommError> {
         self.check_rank(source)?;
         let id = self.next_id;
         self.next_id += 1;
@@ -222,7 +234,11 @@ impl Communicator for SimComm {
         Ok(Receive { id, source, tag, capacity })
     }
 
-    fn wait_any(&mut self, posted: &mut Vec<Receive>, timeout: Duration) -> Result<Arrival, CommError> {
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
         let rank = self.rank;
         let first = posted.first().ok_or(CommError::NothingPosted { rank })?;
         let (peer, tag) = (first.source, first.tag);
@@ -242,10 +258,9 @@ impl Communicator for SimComm {
             schedule.wait(rank, wanted.clone(), deadline_secs);
             schedule = self.until_granted(&group, schedule)?;
             // ---- What arrived first, of the lowest rank among equals.
-            let found = wanted
-                .iter()
-                .enumerate()
-                .filter_map(|(i, w)| schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source)));
+            let found = wanted.iter().enumerate().filter_map(|(i, w)| {
+                schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source))
+            });
             let found = found.min_by(|a, b| a.2.total_cmp(&b.2).then(a.3.cmp(&b.3)));
             let now_secs = schedule.ranks[rank].clock_secs;
             let found = found.filter(|f| f.2 <= deadline_secs.max(now_secs));
@@ -281,7 +296,12 @@ impl Communicator for SimComm {
                 Some(lost) => Err(CommError::PeerLost { rank, peer: lost.source }),
                 None => {
                     schedule.ranks[rank].clock_secs = deadline_secs;
-                    Err(CommError::Timeout { rank, peer, tag, waited_ms: timeout.as_millis() as u64 })
+                    Err(CommError::Timeout {
+                        rank,
+                        peer,
+                        tag,
+                        waited_ms: timeout.as_millis() as u64,
+                    })
                 }
             },
         };

@@ -1,8 +1,9 @@
 //! What a message costs: the LogGP model.
 
-/// A network in the parameters of LogGP (Culler et al., "LogP", PPoPP 1993; Alexandrov et al., "LogGP", SPAA 1995), with a network
-/// interface per rank, whose two directions are shared fairly by the messages that are under way. Between interfaces the network is perfect:
-/// nothing is in the way of anything else.
+/// A network in the parameters of LogGP (Culler et al., "LogP", PPoPP 1993; Alexandrov et al.,
+/// "LogGP", SPAA 1995), with a network interface per rank, whose two directions are shared fairly
+/// by the messages that are under way. Between interfaces the network is perfect: nothing is in the
+/// way of anything else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Network {
     /// For reports.
@@ -15,12 +16,14 @@ pub struct Network {
     pub gap_secs: f64,
     /// G: seconds per byte.
     pub byte_secs: f64,
-    /// What messages from so many bytes on take instead, longest first: factors of the latency and of the seconds per byte.
+    /// What messages from so many bytes on take instead, longest first: factors of the latency and
+    /// of the seconds per byte.
     pub corrections: &'static [(usize, f64, f64)],
 }
 
-/// The corrections with which SimGrid 3.32 simulates MPI unless it is told otherwise (`smpi/lat-factor`, `smpi/bw-factor`): measured on gigabit Ethernet, where TCP
-/// and the protocols of MPI make long messages late. The factors of bytes are the inverse of those of bandwidth.
+/// The corrections with which SimGrid 3.32 simulates MPI unless it is told otherwise
+/// (`smpi/lat-factor`, `smpi/bw-factor`): measured on gigabit Ethernet, where TCP and the protocols
+/// of MPI make long messages late. The factors of bytes are the inverse of those of bandwidth.
 const SMPI: &[(usize, f64, f64)] = &[
     (65_472, 11.6436, 1.0 / 0.940_694),
     (15_424, 3.48845, 1.0 / 0.697_866),

@@ -1,7 +1,9 @@
-//! Whose turn it is: what has the lowest virtual time is done first, so that every message finds the network as it would be then.
+//! Whose turn it is: what has the lowest virtual time is done first, so that every message finds
+//! the network as it would be then.
 //!
-//! Ranks are threads. Between two calls a rank computes, and up to a few ranks do so at once: they cannot disturb each other. A call takes effect when no
-//! other rank can do anything earlier: a computing rank counts with the time at which it began.
+//! Ranks are threads. Between two calls a rank computes, and up to a few ranks do so at once: they
+//! cannot disturb each other. A call takes effect when no other rank can do anything earlier: a
+//! computing rank counts with the time at which it began.
 use super::flows::Flows;
 use super::network::Network;
 use std::collections::VecDeque;
@@ -39,7 +41,8 @@ pub(super) enum State {
     Ready,
     /// In a call that takes effect at its clock.
     Acting,
-    /// In a call that takes effect when one of these is there, or at the deadline: at `earliest_secs`, as far as is known.
+    /// In a call that takes effect when one of these is there, or at the deadline: at
+    /// `earliest_secs`, as far as is known.
     Waiting { wanted: Vec<PostedReceive>, deadline_secs: f64, earliest_secs: f64 },
     /// Its call may take effect.
     Granted,
@@ -122,8 +125,8 @@ impl Schedule {
         mail.message
     }
 
-    /// The share of a message has changed: only for those it goes to does that change anything. (When all ranks looked, at
-    /// 128 ranks that was three quarters of all computing.)
+    /// The share of a message has changed: only for those it goes to does that change anything.
+    /// (When all ranks looked, at 128 ranks that was three quarters of all computing.)
     fn reevaluate_receivers(&mut self) {
         for rank in self.flows.take_receivers() {
             self.reevaluate(rank);
@@ -137,11 +140,13 @@ impl Schedule {
 
     /// Makes a rank wait.
     pub(super) fn wait(&mut self, rank: usize, wanted: Vec<PostedReceive>, deadline_secs: f64) {
-        self.ranks[rank].state = State::Waiting { wanted, deadline_secs, earliest_secs: deadline_secs };
+        self.ranks[rank].state =
+            State::Waiting { wanted, deadline_secs, earliest_secs: deadline_secs };
         self.reevaluate(rank);
     }
 
-    /// To be called when something has changed for a rank that may wait: a message was sent to it, or another rank has gone.
+    /// To be called when something has changed for a rank that may wait: a message was sent to it,
+    /// or another rank has gone.
     pub(super) fn reevaluate(&mut self, rank: usize) {
         let r = &self.ranks[rank];
         let State::Waiting { wanted, deadline_secs, .. } = &r.state else { return };
@@ -170,8 +175,10 @@ impl Schedule {
         let computing = self.ranks.iter().filter(|r| matches!(r.state, State::Computing)).count();
         let mut free = self.cores.saturating_sub(computing);
         while free > 0 {
-            let ready = (0..self.ranks.len()).filter(|&r| matches!(self.ranks[r].state, State::Ready));
-            let first = ready.min_by(|&a, &b| self.ranks[a].clock_secs.total_cmp(&self.ranks[b].clock_secs));
+            let ready =
+                (0..self.ranks.len()).filter(|&r| matches!(self.ranks[r].state, State::Ready));
+            let first = ready
+                .min_by(|&a, &b| self.ranks[a].clock_secs.total_cmp(&self.ranks[b].clock_secs));
             let Some(rank) = first else { break };
             self.ranks[rank].state = State::Computing;
             wake(rank);
@@ -180,7 +187,8 @@ impl Schedule {
         let next = loop {
             let times = (0..self.ranks.len()).map(|r| (self.earliest_secs(r), r));
             let next = times.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            // A message that is through leaves its part to others, which then arrive earlier than was known.
+            // A message that is through leaves its part to others, which then arrive earlier than
+            // was known.
             let until_secs = next.map_or(0.0, |next| next.0);
             if !until_secs.is_finite() || !self.flows.end_next(until_secs) {
                 break next;
@@ -201,7 +209,8 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    /// The times that ranks wait for, as they are known and as all of them would find them if they looked now.
+    /// The times that ranks wait for, as they are known and as all of them would find them if they
+    /// looked now.
     fn known_and_found(schedule: &mut Schedule) -> [Vec<f64>; 2] {
         let times = |s: &Schedule| (0..s.ranks.len()).map(|rank| s.earliest_secs(rank)).collect();
         let known = times(schedule);
@@ -215,12 +224,15 @@ mod tests {
         let mut schedule = Schedule::new(RANKS, Network::QDR, RANKS);
         let mut bits = 1_u64;
         let mut random = |below: usize| {
-            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            bits = bits
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (bits >> 33) as usize % below
         };
         // Every rank but the first waits for the oldest message of each of the others.
         for rank in 1..RANKS {
-            let wanted = (0..RANKS).map(|source| PostedReceive { source, tag: 3, index: 0 }).collect();
+            let wanted =
+                (0..RANKS).map(|source| PostedReceive { source, tag: 3, index: 0 }).collect();
             schedule.wait(rank, wanted, 1.0 + rank as f64);
         }
         let mut now_secs = 0.0;
@@ -244,8 +256,9 @@ mod tests {
                                 schedule.take(rank, source, 0);
                             }
                         }
-                        let wanted =
-                            (0..RANKS).map(|source| PostedReceive { source, tag: 3, index: 0 }).collect();
+                        let wanted = (0..RANKS)
+                            .map(|source| PostedReceive { source, tag: 3, index: 0 })
+                            .collect();
                         schedule.wait(rank, wanted, now_secs + 1.0);
                     }
                 }

@@ -47,8 +47,8 @@ fn who_lets_messages_leave_waits_for_as_many_as_it_must() {
         }
         ends
     });
-    // Sent at 1 and 2, four seconds of wire each: alone for a second, then shared. The first has three seconds left at 2, so it ends at 8, and
-    // the second, which then has one left, at 9.
+    // Sent at 1 and 2, four seconds of wire each: alone for a second, then shared. The first has
+    // three seconds left at 2, so it ends at 8, and the second, which then has one left, at 9.
     assert_eq!(ends[0], [2.0, 2.0, 8.0, 9.0]);
 }
 
@@ -58,7 +58,8 @@ fn a_message_sent_later_in_real_time_but_earlier_in_virtual_time_is_taken_first(
         let order = results(3, |mut comm| {
             match comm.rank() {
                 0 => {
-                    let mut posted: Vec<_> = [1, 2].map(|r| comm.post_recv(r, 0, 8).unwrap()).into();
+                    let mut posted: Vec<_> =
+                        [1, 2].map(|r| comm.post_recv(r, 0, 8).unwrap()).into();
                     let first = comm.wait_any(&mut posted, LONG).unwrap().source;
                     let second = comm.wait_any(&mut posted, LONG).unwrap().source;
                     return vec![first, second];

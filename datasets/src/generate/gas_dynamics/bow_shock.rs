@@ -1,7 +1,9 @@
-//! Stand-off and shape of the detached shock in front of a blunt body: Billig's correlations of experiments.
+//! Stand-off and shape of the detached shock in front of a blunt body: Billig's correlations of
+//! experiments.
 //!
-//! F. S. Billig, "Shock-wave shapes around spherical- and cylindrical-nosed bodies", J. Spacecraft and Rockets 4(6), 1967,
-//! pages 822-823. They hold to a few percent from about Mach 2 upwards in air.
+//! F. S. Billig, "Shock-wave shapes around spherical- and cylindrical-nosed bodies", J. Spacecraft
+//! and Rockets 4(6), 1967, pages 822-823. They hold to a few percent from about Mach 2 upwards in
+//! air.
 
 use super::theta_beta_m::mach_angle_rad;
 use super::{GasError, check_supersonic};
@@ -29,8 +31,8 @@ pub struct BowShock {
 }
 
 impl BowShock {
-    /// The shock of a nose followed by an afterbody whose own attached shock would have `far_angle_rad`; `None` for a
-    /// parallel afterbody, whose shock decays to a Mach wave.
+    /// The shock of a nose followed by an afterbody whose own attached shock would have
+    /// `far_angle_rad`; `None` for a parallel afterbody, whose shock decays to a Mach wave.
     pub fn billig(
         nose: Nose,
         mach: f64,
@@ -39,12 +41,14 @@ impl BowShock {
     ) -> Result<Self, GasError> {
         check_supersonic(super::GAMMA_AIR, mach)?;
         let (stand_off, vertex) = match nose {
-            Nose::Sphere => {
-                (0.143 * (3.24 / (mach * mach)).exp(), 1.143 * (0.54 / (mach - 1.0).powf(1.2)).exp())
-            }
-            Nose::Cylinder => {
-                (0.386 * (4.67 / (mach * mach)).exp(), 1.386 * (1.8 / (mach - 1.0).powf(0.75)).exp())
-            }
+            Nose::Sphere => (
+                0.143 * (3.24 / (mach * mach)).exp(),
+                1.143 * (0.54 / (mach - 1.0).powf(1.2)).exp(),
+            ),
+            Nose::Cylinder => (
+                0.386 * (4.67 / (mach * mach)).exp(),
+                1.386 * (1.8 / (mach - 1.0).powf(0.75)).exp(),
+            ),
         };
         let mach_angle = mach_angle_rad(mach);
         let far = far_angle_rad.unwrap_or(mach_angle);
@@ -64,8 +68,8 @@ impl BowShock {
         })
     }
 
-    /// Position of the shock along the stream at distance `r` from the axis, from the foremost point of the nose, positive
-    /// downstream (Billig's equation with his x reversed and moved).
+    /// Position of the shock along the stream at distance `r` from the axis, from the foremost
+    /// point of the nose, positive downstream (Billig's equation with his x reversed and moved).
     pub fn x_m(&self, r_m: f64) -> f64 {
         let t = self.far_angle_rad.tan();
         let s = r_m * t / self.vertex_radius_m;
@@ -93,7 +97,8 @@ mod tests {
         assert!((shock.stand_off_m / 2.0 - 0.660).abs() < 5e-4);
         let far_away = BowShock::billig(Nose::Sphere, 1e6, 1.0, None).unwrap();
         assert!(
-            (far_away.stand_off_m - 0.143).abs() < 1e-9 && (far_away.vertex_radius_m - 1.143).abs() < 1e-6
+            (far_away.stand_off_m - 0.143).abs() < 1e-9
+                && (far_away.vertex_radius_m - 1.143).abs() < 1e-6
         );
     }
 
@@ -109,6 +114,9 @@ mod tests {
             assert!((1.0 / slope - shock.angle_rad(r).tan()).abs() < 1e-5, "{r}");
         }
         assert!((shock.angle_rad(1e6) - 0.4).abs() < 1e-6);
-        assert!(BowShock::billig(Nose::Sphere, 6.0, 0.5, Some(0.1)).is_err(), "below the Mach angle");
+        assert!(
+            BowShock::billig(Nose::Sphere, 6.0, 0.5, Some(0.1)).is_err(),
+            "below the Mach angle"
+        );
     }
 }

@@ -1,5 +1,6 @@
-//! Steady compressible flow of a perfect gas in closed form or by one ordinary differential equation: the flows whose
-//! shocks are known exactly, so that a picture of them can be checked with a ruler.
+//! Steady compressible flow of a perfect gas in closed form or by one ordinary differential
+//! equation: the flows whose shocks are known exactly, so that a picture of them can be checked
+//! with a ruler.
 //!
 //! | module | what | source |
 //! |---|---|---|
@@ -10,8 +11,8 @@
 //! | [`taylor_maccoll`] | the flow about a circular cone at zero incidence | Taylor and Maccoll 1933 |
 //! | [`bow_shock`] | stand-off and shape of a detached shock | Billig 1967, J. Spacecraft and Rockets 4(6) |
 //!
-//! Angles are in radians, from the direction of the free stream. `gamma` is the ratio of specific heats; it must be
-//! between 1 (exclusive) and 2.
+//! Angles are in radians, from the direction of the free stream. `gamma` is the ratio of specific
+//! heats; it must be between 1 (exclusive) and 2.
 //!
 //! ```
 //! use datasets::generate::gas_dynamics::theta_beta_m::{Branch, shock_angle_rad};
@@ -39,13 +40,18 @@ pub enum GasError {
         least: f64,
     },
     /// Not a gas.
-    #[error("the ratio of specific heats is {gamma}; it must be greater than 1 and at most 2 (air: 1.4)")]
+    #[error(
+        "the ratio of specific heats is {gamma}; it must be greater than 1 and at most 2 (air: 1.4)"
+    )]
     Gamma {
         /// What was given.
         gamma: f64,
     },
     /// An angle outside its range.
-    #[error("{what} is {given_degrees} degrees; it must be from {least_degrees} to {most_degrees} degrees")]
+    #[error(
+        "{what} is {given_degrees} degrees; it must be from {least_degrees} to {most_degrees} \
+         degrees"
+    )]
     Angle {
         /// Which angle.
         what: &'static str,
@@ -58,7 +64,8 @@ pub enum GasError {
     },
     /// The body is too blunt for an attached shock.
     #[error(
-        "at Mach {mach} the shock detaches from {body} of more than {most_degrees:.4} degrees (half angle), and this has \
+        "at Mach {mach} the shock detaches from {body} of more than {most_degrees:.4} degrees \
+         (half angle), and this has \
          {given_degrees} degrees; give a smaller angle or a higher Mach number, or use a blunt body"
     )]
     Detached {
@@ -115,8 +122,8 @@ fn check_supersonic(gamma: f64, mach: f64) -> Result<(), GasError> {
     if mach.is_finite() && mach > 1.0 { Ok(()) } else { Err(GasError::Mach { mach, least: 1.0 }) }
 }
 
-/// The zero of a continuous `f` that changes its sign between `low` and `high` (in either order; it may be zero at
-/// `high`), to the last bit that bisection can tell.
+/// The zero of a continuous `f` that changes its sign between `low` and `high` (in either order; it
+/// may be zero at `high`), to the last bit that bisection can tell.
 fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let positive_at_low = f(low) > 0.0;
     loop {

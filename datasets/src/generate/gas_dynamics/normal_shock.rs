@@ -1,4 +1,5 @@
-//! The jump across a normal shock (Rankine-Hugoniot), and the pressure behind it where the gas comes to rest.
+//! The jump across a normal shock (Rankine-Hugoniot), and the pressure behind it where the gas
+//! comes to rest.
 
 use super::{GasError, check_gamma, isentropic};
 
@@ -17,8 +18,8 @@ pub struct Jump {
     pub normal_mach_behind: f64,
 }
 
-/// The jump for a stream that hits the shock with `normal_mach` at right angles (NACA 1135 eq. 93-99). At exactly 1 it is
-/// no jump; below 1 there is no shock, which is an error.
+/// The jump for a stream that hits the shock with `normal_mach` at right angles (NACA 1135 eq.
+/// 93-99). At exactly 1 it is no jump; below 1 there is no shock, which is an error.
 pub fn normal_shock(gamma: f64, normal_mach: f64) -> Result<Jump, GasError> {
     check_gamma(gamma)?;
     if !(normal_mach.is_finite() && normal_mach >= 1.0) {
@@ -42,8 +43,8 @@ pub(crate) fn jump(gamma: f64, normal_mach: f64) -> Jump {
     }
 }
 
-/// Pressure where the gas comes to rest behind a normal shock, over the pressure in front: Rayleigh's pitot formula
-/// (NACA 1135 eq. 100).
+/// Pressure where the gas comes to rest behind a normal shock, over the pressure in front:
+/// Rayleigh's pitot formula (NACA 1135 eq. 100).
 pub fn pitot_pressure(gamma: f64, mach: f64) -> Result<f64, GasError> {
     let j = normal_shock(gamma, mach)?;
     Ok(j.pressure / isentropic::pressure(gamma, j.normal_mach_behind))
@@ -90,7 +91,10 @@ mod tests {
         let momentum = p1 + u1 * u1 - (p1 * j.pressure + j.density * u2 * u2);
         assert!(momentum.abs() < 1e-13 * u1 * u1, "momentum {momentum}");
         let enthalpy = |t: f64, u: f64| t / (gamma - 1.0) + 0.5 * u * u;
-        assert!((enthalpy(1.0, u1) - enthalpy(j.temperature, u2)).abs() < 1e-13 * u1 * u1, "energy");
+        assert!(
+            (enthalpy(1.0, u1) - enthalpy(j.temperature, u2)).abs() < 1e-13 * u1 * u1,
+            "energy"
+        );
     }
 
     #[test]

@@ -1,23 +1,26 @@
 //! Supersonic flow about a circular cone at zero incidence: constant on every cone about the axis.
 //!
-//! G. I. Taylor and J. W. Maccoll, "The air pressure on a cone moving at high speeds", Proc. R. Soc. A 139, 1933. With
-//! velocities u (along the ray from the apex) and v (across it, towards growing angle) in units of the largest possible
-//! velocity, and a = (γ-1)/2 · (1 - u² - v²), the speed of sound squared:
+//! G. I. Taylor and J. W. Maccoll, "The air pressure on a cone moving at high speeds", Proc. R.
+//! Soc. A 139, 1933. With velocities u (along the ray from the apex) and v (across it, towards
+//! growing angle) in units of the largest possible velocity, and a = (γ-1)/2 · (1 - u² - v²), the
+//! speed of sound squared:
 //!
 //! ```text
 //! u' = v,   v' = (u v² - a (2 u + v cot θ)) / (a - v²),   ' = d/dθ
 //! ```
 //!
-//! integrated with RK4 from the shock (where the oblique jump gives u and v) towards the axis until v = 0, which is the
-//! cone. Steps are equal in ln tan(θ/2), so that slender cones, where the solution varies like ln θ, need no more care; behind
-//! weak shocks, where a - v² is nearly zero, they are shorter.
+//! integrated with RK4 from the shock (where the oblique jump gives u and v) towards the axis until
+//! v = 0, which is the cone. Steps are equal in ln tan(θ/2), so that slender cones, where the
+//! solution varies like ln θ, need no more care; behind weak shocks, where a - v² is nearly zero,
+//! they are shorter.
 
 use super::normal_shock::{Jump, jump};
 use super::theta_beta_m::{deflection_rad, mach_angle_rad};
 use super::{GasError, bisect, check_supersonic, isentropic};
 use std::f64::consts::FRAC_PI_2;
 
-/// RK4 steps per unit of ln tan(θ/2); the shock angles of the golden table change in the eighth digit when halved.
+/// RK4 steps per unit of ln tan(θ/2); the shock angles of the golden table change in the eighth
+/// digit when halved.
 const STEPS_PER_UNIT: f64 = 500.0;
 /// Cones below this (0.006 degrees) count as no cone.
 const LEAST_CONE_RAD: f64 = 1e-4;
@@ -61,7 +64,8 @@ pub struct ConeState {
     pub velocity: [f64; 2],
 }
 
-/// The flow about a cone of half angle `cone_rad`, on the weak branch, which is the one in experiments.
+/// The flow about a cone of half angle `cone_rad`, on the weak branch, which is the one in
+/// experiments.
 pub fn cone_flow(gamma: f64, mach: f64, cone_rad: f64) -> Result<ConeFlow, GasError> {
     check_supersonic(gamma, mach)?;
     let least = 0.1f64.to_radians();
@@ -98,15 +102,19 @@ pub fn detachment(gamma: f64, mach: f64) -> Result<(f64, f64), GasError> {
     let (mut low, mut high) = (mach_angle_rad(mach), FRAC_PI_2);
     while high - low > 1e-7 {
         let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
-        if cone_of_shock(gamma, mach, a) < cone_of_shock(gamma, mach, b) { low = a } else { high = b }
+        if cone_of_shock(gamma, mach, a) < cone_of_shock(gamma, mach, b) {
+            low = a
+        } else {
+            high = b
+        }
     }
     let shock = 0.5 * (low + high);
     Ok((cone_of_shock(gamma, mach, shock), shock))
 }
 
 impl ConeFlow {
-    /// The gas on the cone of half angle `angle_rad` about the axis: the free stream outside the shock, and the cone's
-    /// surface within the cone.
+    /// The gas on the cone of half angle `angle_rad` about the axis: the free stream outside the
+    /// shock, and the cone's surface within the cone.
     pub fn state(&self, angle_rad: f64) -> ConeState {
         if angle_rad > self.shock_rad {
             return ConeState {
@@ -133,12 +141,18 @@ impl ConeFlow {
         }
     }
 
-    /// Cubic Hermite interpolation between the integrator's steps, whose derivatives the equation gives.
+    /// Cubic Hermite interpolation between the integrator's steps, whose derivatives the equation
+    /// gives.
     fn velocity(&self, angle_rad: f64) -> [f64; 2] {
-        let i = self.samples.partition_point(|s| s.angle_rad > angle_rad).clamp(1, self.samples.len() - 1);
+        let i = self
+            .samples
+            .partition_point(|s| s.angle_rad > angle_rad)
+            .clamp(1, self.samples.len() - 1);
         let [a, b] = [self.samples[i - 1], self.samples[i]];
-        let (h, [da, db]) =
-            (b.angle_rad - a.angle_rad, [a, b].map(|s| derivative(self.gamma, s.angle_rad, s.velocity)));
+        let (h, [da, db]) = (
+            b.angle_rad - a.angle_rad,
+            [a, b].map(|s| derivative(self.gamma, s.angle_rad, s.velocity)),
+        );
         let t = (angle_rad - a.angle_rad) / h;
         let (t2, t3) = (t * t, t * t * t);
         [0, 1].map(|c| {
@@ -156,8 +170,8 @@ fn derivative(gamma: f64, angle_rad: f64, [u, v]: [f64; 2]) -> [f64; 2] {
     [v, (u * v * v - a * (2.0 * u + v / angle_rad.tan())) / (a - v * v)]
 }
 
-/// The step (in s, towards the axis) that changes (a - v²)² by 4 % at most, or the usual one where that is longer. Zero
-/// behind a Mach wave.
+/// The step (in s, towards the axis) that changes (a - v²)² by 4 % at most, or the usual one where
+/// that is longer. Zero behind a Mach wave.
 fn step_at(gamma: f64, now: Sample) -> f64 {
     let [u, v] = now.velocity;
     let a = 0.5 * (gamma - 1.0) * (1.0 - u * u - v * v);
@@ -185,9 +199,15 @@ fn rk4(gamma: f64, from: Sample, step: f64) -> Sample {
     Sample { angle_rad: end[0], velocity: [end[1], end[2]] }
 }
 
-/// Integrates from the shock to the cone with steps divided by `refinement`, and tells every step to `keep`; returns the
-/// cone's angle.
-fn integrate(gamma: f64, mach: f64, shock_rad: f64, refinement: f64, mut keep: impl FnMut(Sample)) -> f64 {
+/// Integrates from the shock to the cone with steps divided by `refinement`, and tells every step
+/// to `keep`; returns the cone's angle.
+fn integrate(
+    gamma: f64,
+    mach: f64,
+    shock_rad: f64,
+    refinement: f64,
+    mut keep: impl FnMut(Sample),
+) -> f64 {
     // Behind the shock.
     let normal_mach = (mach * shock_rad.sin()).max(1.0);
     let turn = deflection_rad(gamma, mach, shock_rad).max(0.0);
@@ -227,15 +247,16 @@ mod tests {
     #[test]
     fn twice_as_many_steps_change_nothing() {
         for (mach, shock) in [(3.0, 29.6f64), (2.0, 60.0), (1.5, 42.0), (2.0, 30.05)] {
-            let [once, twice] = [1.0, 2.0].map(|r| integrate(1.4, mach, shock.to_radians(), r, |_| ()));
+            let [once, twice] =
+                [1.0, 2.0].map(|r| integrate(1.4, mach, shock.to_radians(), r, |_| ()));
             assert!(once > 0.0 && (once - twice).abs() < 1e-8, "{mach} {shock}: {once} {twice}");
         }
     }
 
     #[test]
     fn surface_values_of_naca_1135() {
-        // Kopal's tables through NACA 1135, charts 5-7, and Sims (NASA SP-3004): M = 2, cone of 10 degrees: surface Mach
-        // number 1.834, pressure ratio 1.292.
+        // Kopal's tables through NACA 1135, charts 5-7, and Sims (NASA SP-3004): M = 2, cone of 10
+        // degrees: surface Mach number 1.834, pressure ratio 1.292.
         let flow = cone_flow(1.4, 2.0, 10f64.to_radians()).unwrap();
         let surface = flow.state(flow.cone_rad);
         assert!((surface.mach - 1.834).abs() < 2e-3, "{}", surface.mach);
@@ -277,6 +298,10 @@ mod tests {
         assert!(matches!(error, GasError::Detached { body: "a cone", .. }), "{error}");
         assert!(cone_flow(1.4, 2.0, 0.0).is_err() && cone_flow(1.4, 0.9, 0.2).is_err());
         let slender = cone_flow(1.4, 2.0, 0.5f64.to_radians()).unwrap();
-        assert!((slender.shock_rad - mach_angle_rad(2.0)).abs() < 1e-4, "{}", slender.shock_rad.to_degrees());
+        assert!(
+            (slender.shock_rad - mach_angle_rad(2.0)).abs() < 1e-4,
+            "{}",
+            slender.shock_rad.to_degrees()
+        );
     }
 }

@@ -26,9 +26,9 @@ pub struct ObliqueShock {
     pub mach_behind: f64,
 }
 
-/// The angle by which a shock at `shock_rad` turns the stream (NACA 1135 eq. 138):
-/// tan θ = 2 cot β (M² sin²β - 1) / (M² (γ + cos 2β) + 2). Zero at the Mach angle and at 90 degrees, negative (meaningless)
-/// below the Mach angle.
+/// The angle by which a shock at `shock_rad` turns the stream (NACA 1135 eq. 138): tan θ = 2 cot β
+/// (M² sin²β - 1) / (M² (γ + cos 2β) + 2). Zero at the Mach angle and at 90 degrees, negative
+/// (meaningless) below the Mach angle.
 pub fn deflection_rad(gamma: f64, mach: f64, shock_rad: f64) -> f64 {
     let m2 = mach * mach;
     let s = shock_rad.sin();
@@ -50,12 +50,18 @@ pub fn detachment(gamma: f64, mach: f64) -> Result<(f64, f64), GasError> {
     Ok((deflection_rad(gamma, mach, shock), shock))
 }
 
-/// Angle of the shock that turns the stream by `deflection_rad`. For no deflection it is the Mach angle (weak) or 90
-/// degrees (strong).
+/// Angle of the shock that turns the stream by `deflection_rad`. For no deflection it is the Mach
+/// angle (weak) or 90 degrees (strong).
 ///
-/// Found by bisection between Mach angle, detachment and 90 degrees, on each of which θ(β) is monotonic. The cubic in
-/// tan β has a closed form, but that loses all digits for small deflections (0/0); a test compares the two.
-pub fn shock_angle_rad(gamma: f64, mach: f64, deflection: f64, branch: Branch) -> Result<f64, GasError> {
+/// Found by bisection between Mach angle, detachment and 90 degrees, on each of which θ(β) is
+/// monotonic. The cubic in tan β has a closed form, but that loses all digits for small deflections
+/// (0/0); a test compares the two.
+pub fn shock_angle_rad(
+    gamma: f64,
+    mach: f64,
+    deflection: f64,
+    branch: Branch,
+) -> Result<f64, GasError> {
     let (most, at_most) = detachment(gamma, mach)?;
     if !(0.0..FRAC_PI_2).contains(&deflection) {
         return Err(GasError::Angle {
@@ -101,15 +107,15 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// Explicit solution of the cubic (Emanuel, "Gasdynamics: Theory and Applications", 1986; Anderson, "Modern
-    /// Compressible Flow", eq. 4.19): exact but ill-conditioned for small angles.
+    /// Explicit solution of the cubic (Emanuel, "Gasdynamics: Theory and Applications", 1986;
+    /// Anderson, "Modern Compressible Flow", eq. 4.19): exact but ill-conditioned for small angles.
     fn closed_form(gamma: f64, mach: f64, deflection: f64, branch: Branch) -> f64 {
         let (m2, t) = (mach * mach, deflection.tan());
         let a = 1.0 + 0.5 * (gamma - 1.0) * m2;
         let b = 1.0 + 0.5 * (gamma + 1.0) * m2;
         let lambda = ((m2 - 1.0).powi(2) - 3.0 * a * b * t * t).sqrt();
-        let chi =
-            ((m2 - 1.0).powi(3) - 9.0 * a * (a + 0.25 * (gamma + 1.0) * m2 * m2) * t * t) / lambda.powi(3);
+        let chi = ((m2 - 1.0).powi(3) - 9.0 * a * (a + 0.25 * (gamma + 1.0) * m2 * m2) * t * t)
+            / lambda.powi(3);
         let delta = if branch == Branch::Weak { 1.0 } else { 0.0 };
         let phase = (4.0 * PI * delta + chi.clamp(-1.0, 1.0).acos()) / 3.0;
         ((m2 - 1.0 + 2.0 * lambda * phase.cos()) / (3.0 * a * t)).atan()
@@ -138,12 +144,15 @@ mod tests {
     fn detachment_is_the_largest_deflection() {
         // NACA 1135, chart 2: M = 2 detaches at 22.97 degrees, with a shock of 64.67 degrees.
         let (most, shock) = detachment(1.4, 2.0).unwrap();
-        assert!((most.to_degrees() - 22.97).abs() < 0.01 && (shock.to_degrees() - 64.67).abs() < 0.01);
+        assert!(
+            (most.to_degrees() - 22.97).abs() < 0.01 && (shock.to_degrees() - 64.67).abs() < 0.01
+        );
         for d in [-1e-4, 1e-4] {
             assert!(deflection_rad(1.4, 2.0, shock + d) < most);
         }
         assert!(shock_angle_rad(1.4, 2.0, most, Branch::Weak).is_ok());
-        let error = shock_angle_rad(1.4, 2.0, 23f64.to_radians(), Branch::Weak).unwrap_err().to_string();
+        let error =
+            shock_angle_rad(1.4, 2.0, 23f64.to_radians(), Branch::Weak).unwrap_err().to_string();
         assert!(error.contains("22.97") && error.contains("smaller angle"), "{error}");
     }
 
@@ -159,8 +168,8 @@ mod tests {
 
     #[test]
     fn strong_shocks_leave_subsonic_and_weak_ones_mostly_supersonic_flow() {
-        let [weak, strong] =
-            [Branch::Weak, Branch::Strong].map(|b| oblique_shock(1.4, 2.0, 10f64.to_radians(), b).unwrap());
+        let [weak, strong] = [Branch::Weak, Branch::Strong]
+            .map(|b| oblique_shock(1.4, 2.0, 10f64.to_radians(), b).unwrap());
         assert!((weak.mach_behind - 1.6405).abs() < 1e-4, "{}", weak.mach_behind);
         assert!(strong.mach_behind < 1.0 && strong.jump.density > weak.jump.density);
     }

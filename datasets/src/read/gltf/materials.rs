@@ -6,7 +6,8 @@ use gltf::texture::{MagFilter, WrappingMode};
 use rt_core::texture::{Filter, Wrap};
 use std::path::Path;
 
-/// Textures of the file that have been asked for: their number in the scene, or nothing where they cannot be read.
+/// Textures of the file that have been asked for: their number in the scene, or nothing where they
+/// cannot be read.
 type TextureSlots = Vec<Option<Option<usize>>>;
 
 impl Reader {
@@ -19,20 +20,25 @@ impl Reader {
             let mut find = |texture: gltf::Texture<'_>, set: u32, what: &str| {
                 if set != 0 {
                     self.warnings.push(format!(
-                        "material `{name}` uses a second set of texture coordinates: {what} picture left out"
+                        "material `{name}` uses a second set of texture coordinates: {what} \
+                         picture left out"
                     ));
                     return None;
                 }
                 *slots[texture.index()].get_or_insert_with(|| self.texture(path, gltf, &texture))
             };
-            let color =
-                pbr.base_color_texture().and_then(|t| find(t.texture(), t.tex_coord(), "base colour"));
+            let color = pbr
+                .base_color_texture()
+                .and_then(|t| find(t.texture(), t.tex_coord(), "base colour"));
             let metallic_roughness = pbr
                 .metallic_roughness_texture()
                 .and_then(|t| find(t.texture(), t.tex_coord(), "metallic-roughness"));
-            let normal = m.normal_texture().and_then(|t| find(t.texture(), t.tex_coord(), "normal"));
-            let occlusion = m.occlusion_texture().and_then(|t| find(t.texture(), t.tex_coord(), "occlusion"));
-            let emissive = m.emissive_texture().and_then(|t| find(t.texture(), t.tex_coord(), "emissive"));
+            let normal =
+                m.normal_texture().and_then(|t| find(t.texture(), t.tex_coord(), "normal"));
+            let occlusion =
+                m.occlusion_texture().and_then(|t| find(t.texture(), t.tex_coord(), "occlusion"));
+            let emissive =
+                m.emissive_texture().and_then(|t| find(t.texture(), t.tex_coord(), "emissive"));
             let mut base_color = pbr.base_color_factor();
             if m.alpha_mode() == gltf::material::AlphaMode::Opaque {
                 base_color[3] = 1.0;
@@ -42,7 +48,9 @@ impl Reader {
                 base_color_texture: color,
                 alpha: match m.alpha_mode() {
                     gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
-                    gltf::material::AlphaMode::Mask => AlphaMode::Mask(m.alpha_cutoff().unwrap_or(0.5)),
+                    gltf::material::AlphaMode::Mask => {
+                        AlphaMode::Mask(m.alpha_cutoff().unwrap_or(0.5))
+                    }
                     gltf::material::AlphaMode::Blend => AlphaMode::Blend,
                 },
                 metallic: pbr.metallic_factor(),
@@ -62,12 +70,19 @@ impl Reader {
     }
 
     /// Reads a texture into the scene; `None`, and a warning, when its picture cannot be read.
-    fn texture(&mut self, path: &Path, gltf: &gltf::Gltf, texture: &gltf::Texture<'_>) -> Option<usize> {
+    fn texture(
+        &mut self,
+        path: &Path,
+        gltf: &gltf::Gltf,
+        texture: &gltf::Texture<'_>,
+    ) -> Option<usize> {
         let image = texture.source();
         let json = &gltf.as_json().images[image.index()];
         // The crate takes a picture without a source for granted not to be.
-        let has_source = json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
-        let picture = if has_source { self.picture(path, &image) } else { Err("it names no data".into()) };
+        let has_source =
+            json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
+        let picture =
+            if has_source { self.picture(path, &image) } else { Err("it names no data".into()) };
         match picture {
             Ok(picture) => {
                 let sampler = texture.sampler();
@@ -90,17 +105,19 @@ impl Reader {
         let name = image.name().unwrap_or("").to_string();
         match image.source() {
             gltf::image::Source::Uri { uri, .. } => {
-                let bytes = resource(path, uri).map_err(|e| match std::error::Error::source(&e) {
-                    Some(reason) => format!("{e}: {reason}"),
-                    None => e.to_string(),
-                })?;
+                let bytes =
+                    resource(path, uri).map_err(|e| match std::error::Error::source(&e) {
+                        Some(reason) => format!("{e}: {reason}"),
+                        None => e.to_string(),
+                    })?;
                 decode_texture(&name, &bytes, false)
             }
             gltf::image::Source::View { view, .. } => {
                 let buffer = &self.buffers[view.buffer().index()];
                 let end = view.offset().checked_add(view.length());
-                let bytes =
-                    end.and_then(|end| buffer.get(view.offset()..end)).ok_or("it lies outside its buffer")?;
+                let bytes = end
+                    .and_then(|end| buffer.get(view.offset()..end))
+                    .ok_or("it lies outside its buffer")?;
                 decode_texture(&name, bytes, false)
             }
         }

@@ -1,8 +1,10 @@
-//! glTF 2.0 (`.gltf` with its buffers, `.glb`): triangles, transforms, vertex colours, metallic-roughness materials with all their pictures.
+//! glTF 2.0 (`.gltf` with its buffers, `.glb`): triangles, transforms, vertex colours,
+//! metallic-roughness materials with all their pictures.
 //!
-//! The crate `gltf` checks the JSON; accessors are decoded here, because every offset and count has to be checked against
-//! the buffers. Not read: animation, skins, morph targets, cameras, lights, compressed meshes; extensions
-//! of materials but the index of refraction and the strength of emission.
+//! The crate `gltf` checks the JSON; accessors are decoded here, because every offset and count has
+//! to be checked against the buffers. Not read: animation, skins, morph targets, cameras, lights,
+//! compressed meshes; extensions of materials but the index of refraction and the strength of
+//! emission.
 
 mod materials;
 
@@ -91,12 +93,17 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         reader.warnings.push(format!("extensions that are not read: {}", not_read.join(", ")));
     }
     let Reader { scene, warnings, .. } = reader;
-    Ok(LoadedFile { format: FORMAT, content: Content::Scene(scene), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile {
+        format: FORMAT,
+        content: Content::Scene(scene),
+        warnings,
+        time_steps: Vec::new(),
+    })
 }
 
-/// The scene after the crate's own checks. Those index the accessors of primitives before they are checked (gltf-json
-/// 1.4.1, mesh.rs) and subtract the header from the length of a `.glb` file before they look at it (gltf 1.4.1,
-/// binary.rs), so that is done here first.
+/// The scene after the crate's own checks. Those index the accessors of primitives before they are
+/// checked (gltf-json 1.4.1, mesh.rs) and subtract the header from the length of a `.glb` file
+/// before they look at it (gltf 1.4.1, binary.rs), so that is done here first.
 fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
     if let Some([magic, _, length]) = bytes.as_chunks::<4>().0.first_chunk::<3>()
         && magic == b"glTF"
@@ -106,13 +113,16 @@ fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
         return Err(Fault::new(At::Byte(8), what, BROKEN));
     }
     let fault = |e: gltf::Error| {
-        let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) must be unpacked first";
+        let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) \
+                    must be unpacked first";
         Fault::new(At::Field("the JSON part".into()), e.to_string(), cure)
     };
-    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(fault)?;
+    let gltf::Gltf { document, blob } =
+        gltf::Gltf::from_slice_without_validation(bytes).map_err(fault)?;
     let json = document.as_json();
     let accessors = json.accessors.len();
-    let attributes = json.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
+    let attributes =
+        json.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
     if let Some(bad) = attributes.map(|a| a.value()).find(|&a| a >= accessors) {
         return Err(Fault::field("meshes", format!("accessor {bad} of {accessors}")));
     }
@@ -134,7 +144,9 @@ fn buffers(path: &Path, gltf: &gltf::Gltf) -> Result<Vec<Vec<u8>>, ReadError> {
 fn resource(path: &Path, uri: &str) -> Result<Vec<u8>, ReadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let fault = |what: &str| Fault::field("a data URI", what).in_file(path, FORMAT);
-        let Some((_, text)) = data.split_once(";base64,") else { return Err(fault("it is not base64")) };
+        let Some((_, text)) = data.split_once(";base64,") else {
+            return Err(fault("it is not base64"));
+        };
         let mut out = Vec::new();
         return match Decoder::new(text.as_bytes()).fill(&mut out, usize::MAX) {
             Ok(()) => Ok(out),
@@ -230,13 +242,17 @@ impl Reader {
             if found == n {
                 Ok(())
             } else {
-                Err(Fault::field(format!("{what} of `{name}`"), format!("{found} values for {n} vertices")))
+                Err(Fault::field(
+                    format!("{what} of `{name}`"),
+                    format!("{found} values for {n} vertices"),
+                ))
             }
         };
         if let Some(a) = p.get(&Semantic::Normals) {
             let normals = self.tuples::<3>(&a, &format!("normals of `{name}`"))?;
             one_per_vertex(normals.len(), "normals")?;
-            // Normals go with the inverse transpose; the cofactors are that without a division that may fail.
+            // Normals go with the inverse transpose; the cofactors are that without a division that
+            // may fail.
             let m = DMat3::from_mat4(world_from_node);
             let cofactors = DMat3::from_cols(
                 m.y_axis.cross(m.z_axis),
@@ -299,7 +315,8 @@ impl Reader {
         let stride = view.stride().unwrap_or(size).max(1);
         let buffer = &self.buffers[view.buffer().index()];
         let end = view.offset().checked_add(view.length());
-        let bytes = end.and_then(|end| buffer.get(view.offset()..end)).and_then(|b| b.get(a.offset()..));
+        let bytes =
+            end.and_then(|end| buffer.get(view.offset()..end)).and_then(|b| b.get(a.offset()..));
         let Some(bytes) = bytes else {
             let what = format!("it lies outside its buffer of {} bytes", buffer.len());
             return Err(Fault::new(at(), what, TRUNCATED));
@@ -315,8 +332,13 @@ impl Reader {
         Ok((0..count).map(|i| &bytes[i * stride..i * stride + size]).collect())
     }
 
-    /// The elements as `N` floats each; integers are fractions of their largest value when the file says so.
-    fn tuples<const N: usize>(&self, a: &gltf::Accessor<'_>, place: &str) -> Result<Vec<[f32; N]>, Fault> {
+    /// The elements as `N` floats each; integers are fractions of their largest value when the file
+    /// says so.
+    fn tuples<const N: usize>(
+        &self,
+        a: &gltf::Accessor<'_>,
+        place: &str,
+    ) -> Result<Vec<[f32; N]>, Fault> {
         if a.dimensions().multiplicity() != N {
             let what = format!("{:?} instead of {N} components", a.dimensions());
             return Err(Fault::field(place, what));
@@ -324,14 +346,26 @@ impl Reader {
         let kind = a.data_type();
         let scale = |max: f32| if a.normalized() { 1.0 / max } else { 1.0 };
         let value = |b: &[u8], c: usize| match kind {
-            DataType::F32 => f32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]]),
+            DataType::F32 => {
+                f32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]])
+            }
             DataType::U8 => f32::from(b[c]) * scale(255.0),
             DataType::I8 => f32::from(b[c] as i8) * scale(127.0),
-            DataType::U16 => f32::from(u16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(65535.0),
-            DataType::I16 => f32::from(i16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(32767.0),
-            DataType::U32 => u32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]]) as f32,
+            DataType::U16 => {
+                f32::from(u16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(65535.0)
+            }
+            DataType::I16 => {
+                f32::from(i16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(32767.0)
+            }
+            DataType::U32 => {
+                u32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]]) as f32
+            }
         };
-        Ok(self.elements(a, place)?.into_iter().map(|b| std::array::from_fn(|c| value(b, c))).collect())
+        Ok(self
+            .elements(a, place)?
+            .into_iter()
+            .map(|b| std::array::from_fn(|c| value(b, c)))
+            .collect())
     }
 
     fn indices(&self, a: &gltf::Accessor<'_>, name: &str) -> Result<Vec<u32>, Fault> {

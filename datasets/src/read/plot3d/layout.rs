@@ -1,9 +1,10 @@
 //! Which of PLOT3D's layouts a file has: nothing in the file says so, but its size does.
 //!
-//! Grid: [number of blocks], points per axis of each block, then per block all x, all y, all z and perhaps all iblank.
-//! Solution: the same head, then per block four reference numbers and the conserved variables. Fortran's unformatted
-//! files put each of these in a record between two length marks. Source: PLOT3D User's Manual (Walatka, Buning, Pierce
-//! and Elson, NASA TM 101067, 1990), chapter 8.
+//! Grid: [number of blocks], points per axis of each block, then per block all x, all y, all z and
+//! perhaps all iblank. Solution: the same head, then per block four reference numbers and the
+//! conserved variables. Fortran's unformatted files put each of these in a record between two
+//! length marks. Source: PLOT3D User's Manual (Walatka, Buning, Pierce and Elson, NASA TM 101067,
+//! 1990), chapter 8.
 
 use super::Plot3dOptions;
 use crate::model::Endian;
@@ -53,7 +54,14 @@ impl Layout {
                     for real in [4, 8] {
                         for records in [false, true] {
                             for endian in [Endian::Little, Endian::Big] {
-                                list.push(Layout { endian, records, multi_block, iblank, real, axes });
+                                list.push(Layout {
+                                    endian,
+                                    records,
+                                    multi_block,
+                                    iblank,
+                                    real,
+                                    axes,
+                                });
                             }
                         }
                     }
@@ -76,7 +84,11 @@ impl Layout {
 
     pub(super) fn int(&self, bytes: &[u8], at: usize) -> Option<u32> {
         let b: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
-        Some(if self.endian == Endian::Little { u32::from_le_bytes(b) } else { u32::from_be_bytes(b) })
+        Some(if self.endian == Endian::Little {
+            u32::from_le_bytes(b)
+        } else {
+            u32::from_be_bytes(b)
+        })
     }
 
     /// Bytes of the reals and iblanks of a block with `n` points.
@@ -88,7 +100,8 @@ impl Layout {
         }
     }
 
-    /// The sizes if the file has this layout: record marks agree, and the blocks fill the file but for zero padding.
+    /// The sizes if the file has this layout: record marks agree, and the blocks fill the file but
+    /// for zero padding.
     fn plan(self, role: Role, bytes: &[u8]) -> Option<Plan> {
         let mut at = 0usize;
         let mark = |at: &mut usize, len: u64| -> Option<()> {
@@ -145,15 +158,22 @@ impl Layout {
     }
 }
 
-/// The layout of `bytes`: the first one that fills the file exactly, else the first that does but for zero padding.
+/// The layout of `bytes`: the first one that fills the file exactly, else the first that does but
+/// for zero padding.
 pub(super) fn find(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Plan, Fault> {
     let mut plans: Vec<Plan> =
         Layout::candidates(role, options).into_iter().filter_map(|l| l.plan(role, bytes)).collect();
     plans.sort_by_key(|p| p.trailing);
     let found = plans.into_iter().next();
     found.ok_or_else(|| {
-        let what = format!("no PLOT3D layout gives a {} file of {} bytes", if role == Role::Grid { "grid" } else { "solution" }, bytes.len());
-        let cure = "check that the file is complete, and that it is a binary or text PLOT3D file with reals of 4 or 8 bytes; \
+        let what = format!(
+            "no PLOT3D layout gives a {} file of {} \
+                            bytes",
+            if role == Role::Grid { "grid" } else { "solution" },
+            bytes.len()
+        );
+        let cure = "check that the file is complete, and that it is a binary or text PLOT3D file \
+                    with reals of 4 or 8 bytes; \
                     restrictions in the options must be those of the file";
         Fault::new(At::Byte(0), what, cure)
     })

@@ -1,5 +1,6 @@
-//! PLOT3D grids and solutions: binary of either byte order, with or without Fortran's record marks, one or more blocks,
-//! plane or solid, with or without iblank; and plain text. The layout is found from the size of the file.
+//! PLOT3D grids and solutions: binary of either byte order, with or without Fortran's record marks,
+//! one or more blocks, plane or solid, with or without iblank; and plain text. The layout is found
+//! from the size of the file.
 
 mod layout;
 
@@ -16,8 +17,8 @@ pub(crate) const FORMAT: &str = "PLOT3D";
 /// What is known about the files beforehand; everything left `None` is found out.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Plot3dOptions {
-    /// The solution ("q") file. Without it, a file beside the grid with the usual name is taken: `nameq.bin` for
-    /// `namexyz.bin`, `name.q` for `name.xyz`, `.x`, `.g`, `.grid` or `.p3d`.
+    /// The solution ("q") file. Without it, a file beside the grid with the usual name is taken:
+    /// `nameq.bin` for `namexyz.bin`, `name.q` for `name.xyz`, `.x`, `.g`, `.grid` or `.p3d`.
     pub solution: Option<PathBuf>,
     /// Byte order.
     pub endian: Option<Endian>,
@@ -58,7 +59,9 @@ pub fn read(path: &Path, options: &Plot3dOptions) -> Result<LoadedFile, ReadErro
     let mut blocks = grid_blocks(&bytes, options).map_err(|mut f| {
         if !is_text(&bytes) && find(Role::Solution, &bytes, options).is_ok() {
             f.what = "it is a solution, and there is no grid beside it".into();
-            f.cure = "put the grid beside it (nameq.bin goes with namexyz.bin, name.q with name.xyz), or open the grid".into();
+            f.cure = "put the grid beside it (nameq.bin goes with namexyz.bin, name.q with \
+                      name.xyz), or open the grid"
+                .into();
         }
         f.in_file(&path, FORMAT)
     })?;
@@ -103,10 +106,13 @@ fn opened(mut blocks: Vec<StructuredGrid>, warnings: Vec<String>) -> LoadedFile 
 
 /// True when `bytes` have the size of a binary PLOT3D grid or solution.
 pub(crate) fn looks_like_plot3d(bytes: &[u8]) -> bool {
-    [Role::Grid, Role::Solution].into_iter().any(|r| find(r, bytes, &Plot3dOptions::default()).is_ok())
+    [Role::Grid, Role::Solution]
+        .into_iter()
+        .any(|r| find(r, bytes, &Plot3dOptions::default()).is_ok())
 }
 
-/// The existing file beside `path` whose name follows from it: by the end of the stem, or by the extension.
+/// The existing file beside `path` whose name follows from it: by the end of the stem, or by the
+/// extension.
 pub(crate) fn companion_file(
     path: &Path,
     stems: &[(&str, &str)],
@@ -133,7 +139,9 @@ pub(crate) fn companion_file(
 fn is_text(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     !head.is_empty()
-        && head.iter().all(|b| b.is_ascii_whitespace() || b"0123456789+-.eEdD,*nNaAiIfF".contains(b))
+        && head
+            .iter()
+            .all(|b| b.is_ascii_whitespace() || b"0123456789+-.eEdD,*nNaAiIfF".contains(b))
 }
 
 fn grid_blocks(bytes: &[u8], options: &Plot3dOptions) -> Result<Vec<StructuredGrid>, Fault> {
@@ -156,11 +164,15 @@ fn grid_blocks(bytes: &[u8], options: &Plot3dOptions) -> Result<Vec<StructuredGr
         let axes = b.reals.len() / n.max(1);
         let points = match &b.reals {
             Values::F32(v) => Points::F32(
-                (0..n).map(|i| std::array::from_fn(|c| if c < axes { v[c * n + i] } else { 0.0 })).collect(),
+                (0..n)
+                    .map(|i| std::array::from_fn(|c| if c < axes { v[c * n + i] } else { 0.0 }))
+                    .collect(),
             ),
             v => Points::F64(
                 (0..n)
-                    .map(|i| std::array::from_fn(|c| if c < axes { v.get_f64(c * n + i) } else { 0.0 }))
+                    .map(|i| {
+                        std::array::from_fn(|c| if c < axes { v.get_f64(c * n + i) } else { 0.0 })
+                    })
                     .collect(),
             ),
         };
@@ -169,8 +181,13 @@ fn grid_blocks(bytes: &[u8], options: &Plot3dOptions) -> Result<Vec<StructuredGr
     Ok(out)
 }
 
-/// Adds the arrays Density, Momentum and StagnationEnergy, named as VTK's reader names them, and the reference numbers.
-fn add_solution(grids: &mut [StructuredGrid], bytes: &[u8], options: &Plot3dOptions) -> Result<(), Fault> {
+/// Adds the arrays Density, Momentum and StagnationEnergy, named as VTK's reader names them, and
+/// the reference numbers.
+fn add_solution(
+    grids: &mut [StructuredGrid],
+    bytes: &[u8],
+    options: &Plot3dOptions,
+) -> Result<(), Fault> {
     let (dims, data) = if is_text(bytes) {
         text_blocks(Role::Solution, bytes, options)?
     } else {
@@ -194,7 +211,9 @@ fn add_solution(grids: &mut [StructuredGrid], bytes: &[u8], options: &Plot3dOpti
         // Density, two or three momenta, energy. Plane flows get a third momentum of 0.
         let momenta = variables - 2;
         let vector: Vec<usize> = (0..n)
-            .flat_map(|p| (0..3).map(move |c| if c < momenta { (c + 1) * n + p } else { usize::MAX }))
+            .flat_map(|p| {
+                (0..3).map(move |c| if c < momenta { (c + 1) * n + p } else { usize::MAX })
+            })
             .collect();
         a.point.push(DataArray::new("Density", 1, b.reals.slice(0..n)));
         a.point.push(DataArray::new("Momentum", 3, picked(&b.reals, &vector)));
@@ -213,8 +232,12 @@ fn add_solution(grids: &mut [StructuredGrid], bytes: &[u8], options: &Plot3dOpti
 /// The values at `at`; 0 where that is out of range (the third component of plane flows).
 fn picked(values: &Values, at: &[usize]) -> Values {
     match values {
-        Values::F32(v) => Values::F32(at.iter().map(|&i| v.get(i).copied().unwrap_or(0.0)).collect()),
-        v => Values::F64(at.iter().map(|&i| if i < v.len() { v.get_f64(i) } else { 0.0 }).collect()),
+        Values::F32(v) => {
+            Values::F32(at.iter().map(|&i| v.get(i).copied().unwrap_or(0.0)).collect())
+        }
+        v => {
+            Values::F64(at.iter().map(|&i| if i < v.len() { v.get_f64(i) } else { 0.0 }).collect())
+        }
     }
 }
 
@@ -240,15 +263,21 @@ fn binary_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bl
         let mut reference = Vec::new();
         if role == Role::Solution {
             cursor.take(mark, 1, "record marks")?;
-            let v =
-                Values::from_bytes(kind, cursor.take(4, layout.real, "reference numbers")?, layout.endian);
+            let v = Values::from_bytes(
+                kind,
+                cursor.take(4, layout.real, "reference numbers")?,
+                layout.endian,
+            );
             reference = (0..4).map(|i| v.get_f64(i)).collect();
             cursor.take(mark, 1, "record marks")?;
         }
         cursor.take(mark, 1, "record marks")?;
         let variables = if role == Role::Grid { layout.axes } else { layout.axes + 2 } as u64;
-        let reals =
-            Values::from_bytes(kind, cursor.take(n * variables, layout.real, "reals")?, layout.endian);
+        let reals = Values::from_bytes(
+            kind,
+            cursor.take(n * variables, layout.real, "reals")?,
+            layout.endian,
+        );
         let mut iblank = None;
         if layout.iblank
             && let Values::I32(v) =
@@ -262,7 +291,8 @@ fn binary_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bl
     Ok((dims, blocks))
 }
 
-/// Text: the same numbers in the same order. Whether there is a number of blocks follows from how many numbers there are.
+/// Text: the same numbers in the same order. Whether there is a number of blocks follows from how
+/// many numbers there are.
 fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Blocks, Fault> {
     let text = String::from_utf8_lossy(bytes);
     let words: Vec<&str> =
@@ -287,7 +317,8 @@ fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bloc
                     continue;
                 }
                 let Some(count) = (if multi { int(0) } else { Some(1) }) else { continue };
-                let Ok(count) = fits(u64::from(count), 1, words.len(), At::Byte(0), "blocks") else {
+                let Ok(count) = fits(u64::from(count), 1, words.len(), At::Byte(0), "blocks")
+                else {
                     continue;
                 };
                 let start = usize::from(multi);
@@ -310,7 +341,8 @@ fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bloc
                     })
                     .collect();
                 let Some(sizes) = sizes else { continue };
-                let (variables, reference) = if role == Role::Grid { (axes, 0) } else { (axes + 2, 4) };
+                let (variables, reference) =
+                    if role == Role::Grid { (axes, 0) } else { (axes + 2, 4) };
                 let per_point = variables + usize::from(iblank);
                 let total: usize = sizes.iter().map(|n| n * per_point + reference).sum();
                 if start + count * axes + total != words.len() {
@@ -343,8 +375,10 @@ fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bloc
             }
         }
     }
-    let what =
-        format!("{} numbers do not make a grid or solution of the size the first ones give", words.len());
+    let what = format!(
+        "{} numbers do not make a grid or solution of the size the first ones give",
+        words.len()
+    );
     Err(Fault::new(At::Byte(0), what, TRUNCATED))
 }
 

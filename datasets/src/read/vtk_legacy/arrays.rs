@@ -33,7 +33,8 @@ impl<'a> Input<'a> {
 
     fn need_word(&mut self, what: &str) -> Result<String, Fault> {
         let at = self.cursor.at();
-        self.text_word().ok_or_else(|| Fault::new(at, format!("the file ends before the {what}"), BROKEN))
+        self.text_word()
+            .ok_or_else(|| Fault::new(at, format!("the file ends before the {what}"), BROKEN))
     }
 
     /// The next word as a count.
@@ -120,7 +121,8 @@ impl<'a> Input<'a> {
             return self.field(section, out, warnings);
         }
         if keyword == "LOOKUP_TABLE" {
-            // A table of colours: name and number of entries. The files' own colour maps are not used.
+            // A table of colours: name and number of entries. The files' own colour maps are not
+            // used.
             let name = self.need_word("name of the lookup table")?;
             let n = self.count("size of the lookup table")?;
             let ty = if self.binary { "unsigned_char" } else { "float" };
@@ -183,9 +185,14 @@ impl<'a> Input<'a> {
             }
         };
         if components == 0 || components > 1 << 20 {
-            return Err(Fault::new(at, format!("array `{name}` has {components} components"), BROKEN));
+            return Err(Fault::new(
+                at,
+                format!("array `{name}` has {components} components"),
+                BROKEN,
+            ));
         }
-        let values = self.values(&ty, n.saturating_mul(components), &format!("values of `{name}`"))?;
+        let values =
+            self.values(&ty, n.saturating_mul(components), &format!("values of `{name}`"))?;
         push(section, out, DataArray::new(name, components as usize, values), keyword)
     }
 
@@ -228,7 +235,10 @@ impl<'a> Input<'a> {
                 continue;
             }
             if components > 1 << 20 {
-                return Err(Fault::field(format!("array `{name}`"), format!("{components} components")));
+                return Err(Fault::field(
+                    format!("array `{name}`"),
+                    format!("{components} components"),
+                ));
             }
             let values = self.values(&ty, total, &format!("values of `{name}`"))?;
             push(section, out, DataArray::new(name, components.max(1) as usize, values), "FIELD")?;
@@ -236,8 +246,8 @@ impl<'a> Input<'a> {
         Ok(())
     }
 
-    /// Texts: one a line and percent-encoded, or in binary files with their length in front (vtkDataWriter.cxx: the two high
-    /// bits of the first byte tell how many bytes the length has).
+    /// Texts: one a line and percent-encoded, or in binary files with their length in front
+    /// (vtkDataWriter.cxx: the two high bits of the first byte tell how many bytes the length has).
     fn texts(&mut self, count: u64, variants: bool) -> Result<Vec<String>, Fault> {
         if variants {
             let cure = "write the file again without variant arrays";
@@ -254,8 +264,8 @@ impl<'a> Input<'a> {
             let first = self.cursor.data.get(self.cursor.pos).copied().unwrap_or(0);
             let bytes = [8, 4, 2, 1][usize::from(first >> 6)];
             let head = self.cursor.take(1, bytes, "length of a text")?;
-            let len =
-                head.iter().fold(0u64, |n, &b| n << 8 | u64::from(b)) & (u64::MAX >> (64 - 8 * bytes + 2));
+            let len = head.iter().fold(0u64, |n, &b| n << 8 | u64::from(b))
+                & (u64::MAX >> (64 - 8 * bytes + 2));
             let text = self.cursor.take(len, 1, "letters of a text")?;
             texts.push(String::from_utf8_lossy(text).into_owned());
         }
@@ -263,7 +273,12 @@ impl<'a> Input<'a> {
     }
 }
 
-fn push(section: Section, out: &mut Attributes, array: DataArray, keyword: &str) -> Result<(), Fault> {
+fn push(
+    section: Section,
+    out: &mut Attributes,
+    array: DataArray,
+    keyword: &str,
+) -> Result<(), Fault> {
     let name = array.name.clone();
     match section {
         Section::Geometry => out.field.push(array),
@@ -288,7 +303,8 @@ fn push(section: Section, out: &mut Attributes, array: DataArray, keyword: &str)
     Ok(())
 }
 
-/// A scalar type by the name it has in legacy files. `vtkIdType` is written with 32 bits in binary files.
+/// A scalar type by the name it has in legacy files. `vtkIdType` is written with 32 bits in binary
+/// files.
 fn scalar_type(name: &str, binary: bool) -> Option<ScalarType> {
     Some(match name {
         "char" | "signed_char" | "vtktypeint8" => ScalarType::I8,

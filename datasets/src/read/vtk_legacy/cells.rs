@@ -30,8 +30,10 @@ impl Input<'_> {
             let ids = integers(&ids).map(Cells::id).collect();
             // The first offset is 0 and is not the end of a cell.
             return Cells::from_ends(integers(&offsets).skip(1), ids).map_err(|bad| {
-                let what =
-                    format!("{keyword}: cell {} ends at {}, outside {:?}", bad.cell, bad.end, bad.allowed);
+                let what = format!(
+                    "{keyword}: cell {} ends at {}, outside {:?}",
+                    bad.cell, bad.end, bad.allowed
+                );
                 Fault::new(at, what, BROKEN)
             });
         }
@@ -39,12 +41,14 @@ impl Input<'_> {
         let mut cells = Cells::new();
         let mut numbers = integers(&list);
         for cell in 0..number {
-            let n = numbers.next().and_then(|n| usize::try_from(n).ok()).filter(|&n| n <= list.len());
+            let n =
+                numbers.next().and_then(|n| usize::try_from(n).ok()).filter(|&n| n <= list.len());
             let ids: Option<Vec<u32>> =
                 n.and_then(|n| (0..n).map(|_| numbers.next().map(Cells::id)).collect());
             let Some(ids) = ids else {
-                let what =
-                    format!("{keyword}: cell {cell} of {number} does not fit in the list of {size} numbers");
+                let what = format!(
+                    "{keyword}: cell {cell} of {number} does not fit in the list of {size} numbers"
+                );
                 return Err(Fault::new(at, what, BROKEN));
             };
             cells.push(ids);
@@ -61,8 +65,9 @@ impl Input<'_> {
 }
 
 impl UnstructuredGrid {
-    /// In legacy files the "point ids" of a polyhedron are its faces: their number, then the size and ids of each.
-    /// Moves them to where they belong; the cell gets the distinct points of its faces.
+    /// In legacy files the "point ids" of a polyhedron are its faces: their number, then the size
+    /// and ids of each. Moves them to where they belong; the cell gets the distinct points of its
+    /// faces.
     pub(super) fn split_polyhedra(&mut self) -> Result<(), Fault> {
         if !self.types.contains(&POLYHEDRON) || !self.faces_of_cell.is_empty() {
             return Ok(());
@@ -76,7 +81,10 @@ impl UnstructuredGrid {
             } else {
                 let stream: Vec<i64> = ids.iter().map(|&k| i64::from(k)).collect();
                 if face_stream(&stream, &mut self.polyhedron_faces).is_none() {
-                    return Err(Fault::field("CELLS", format!("the faces of polyhedron {i} do not add up")));
+                    return Err(Fault::field(
+                        "CELLS",
+                        format!("the faces of polyhedron {i} do not add up"),
+                    ));
                 }
                 let mut points: Vec<u32> = Vec::new();
                 for f in first..self.polyhedron_faces.len() {

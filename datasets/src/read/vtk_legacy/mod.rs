@@ -1,7 +1,8 @@
-//! VTK's legacy files (`.vtk`), versions 1.0 to 5.1, ascii and binary (always most significant byte first).
+//! VTK's legacy files (`.vtk`), versions 1.0 to 5.1, ascii and binary (always most significant byte
+//! first).
 //!
-//! Source: "VTK File Formats" (Kitware), section "Simple legacy formats"; version 5 stores cells as offsets and
-//! connectivity. What VTK 9.7 writes in both versions is tested against.
+//! Source: "VTK File Formats" (Kitware), section "Simple legacy formats"; version 5 stores cells as
+//! offsets and connectivity. What VTK 9.7 writes in both versions is tested against.
 
 mod arrays;
 mod cells;
@@ -27,7 +28,12 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     let data = parse(bytes, &mut warnings).map_err(|f| f.in_file(path, FORMAT))?;
-    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() })
+    Ok(LoadedFile {
+        format: FORMAT,
+        content: Content::Data(data),
+        warnings,
+        time_steps: Vec::new(),
+    })
 }
 
 /// What the keywords read so far have said.
@@ -58,20 +64,23 @@ fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
     let first = input.cursor.line().unwrap_or_default();
     let version = first.trim().to_ascii_lowercase();
     let Some(version) = version.strip_prefix("# vtk datafile version").map(str::trim) else {
-        let cure = "a legacy VTK file begins with `# vtk DataFile Version`; this is another kind of file";
+        let cure =
+            "a legacy VTK file begins with `# vtk DataFile Version`; this is another kind of file";
         return Err(Fault::new(At::Line(1), "the first line is not that of a VTK file", cure));
     };
     let major: u32 = version.split('.').next().and_then(|v| v.parse().ok()).unwrap_or(3);
     input.offsets_and_connectivity = major >= 5;
     input.cursor.line();
-    input.binary = match input.cursor.line().unwrap_or_default().trim().to_ascii_uppercase().as_str() {
-        "ASCII" => false,
-        "BINARY" => true,
-        other => {
-            let what = format!("the third line is `{}`", other.chars().take(40).collect::<String>());
-            return Err(Fault::new(At::Line(3), what, "it must be ASCII or BINARY"));
-        }
-    };
+    input.binary =
+        match input.cursor.line().unwrap_or_default().trim().to_ascii_uppercase().as_str() {
+            "ASCII" => false,
+            "BINARY" => true,
+            other => {
+                let what =
+                    format!("the third line is `{}`", other.chars().take(40).collect::<String>());
+                return Err(Fault::new(At::Line(3), what, "it must be ASCII or BINARY"));
+            }
+        };
 
     let mut kind = String::new();
     let mut parts = Parts { dims: [0; 3], ..Default::default() };
@@ -117,8 +126,10 @@ fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
 
 /// The data set of kind `kind` from what was read.
 fn assemble(kind: &str, parts: Parts, warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
-    let Parts { points, mut poly, mut grid, dims, origin, spacing, coordinates, attributes } = parts;
-    let extent: [i32; 6] = std::array::from_fn(|i| if i % 2 == 0 { 0 } else { dims[i / 2].max(0) - 1 });
+    let Parts { points, mut poly, mut grid, dims, origin, spacing, coordinates, attributes } =
+        parts;
+    let extent: [i32; 6] =
+        std::array::from_fn(|i| if i % 2 == 0 { 0 } else { dims[i / 2].max(0) - 1 });
     let n = points.len();
     let bad = [&poly.verts, &poly.lines, &poly.polys, &poly.strips, &grid.cells]
         .iter()
@@ -141,15 +152,34 @@ fn assemble(kind: &str, parts: Parts, warnings: &mut Vec<String>) -> Result<Data
         }
         "STRUCTURED_POINTS" => {
             let spacing = spacing.unwrap_or(DVec3::ONE);
-            Dataset::ImageData(ImageData { extent, origin, spacing, direction: DMat3::IDENTITY, attributes })
+            Dataset::ImageData(ImageData {
+                extent,
+                origin,
+                spacing,
+                direction: DMat3::IDENTITY,
+                attributes,
+            })
         }
         "STRUCTURED_GRID" => Dataset::StructuredGrid(StructuredGrid { extent, points, attributes }),
-        "RECTILINEAR_GRID" => Dataset::RectilinearGrid(RectilinearGrid { extent, coordinates, attributes }),
-        "" => return Err(Fault::new(At::Field("the header".into()), "there is no DATASET line", BROKEN)),
+        "RECTILINEAR_GRID" => {
+            Dataset::RectilinearGrid(RectilinearGrid { extent, coordinates, attributes })
+        }
+        "" => {
+            return Err(Fault::new(
+                At::Field("the header".into()),
+                "there is no DATASET line",
+                BROKEN,
+            ));
+        }
         other => {
             let shown: String = other.chars().take(40).collect();
-            let cure = "convert it to POLYDATA, UNSTRUCTURED_GRID, STRUCTURED_POINTS, STRUCTURED_GRID or RECTILINEAR_GRID";
-            return Err(Fault::unsupported(At::Field("DATASET".into()), format!("`{shown}`"), cure));
+            let cure = "convert it to POLYDATA, UNSTRUCTURED_GRID, STRUCTURED_POINTS, \
+                        STRUCTURED_GRID or RECTILINEAR_GRID";
+            return Err(Fault::unsupported(
+                At::Field("DATASET".into()),
+                format!("`{shown}`"),
+                cure,
+            ));
         }
     })
 }

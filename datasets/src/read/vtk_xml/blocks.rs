@@ -1,9 +1,10 @@
 //! One binary array of a VTK XML file: length header, base64 or raw bytes, compressed blocks.
 //!
-//! Layout (VTK file formats guide, "XML file formats"; vtkXMLDataParser.cxx): uncompressed = number of bytes, bytes.
-//! Compressed = number of blocks, size of a block, size of the last block if it is partial (else 0), compressed size of
-//! each block, then the blocks. In base64 the header of compressed data is a padded piece of its own, whereas the length
-//! of uncompressed data is in one piece with it.
+//! Layout (VTK file formats guide, "XML file formats"; vtkXMLDataParser.cxx): uncompressed = number
+//! of bytes, bytes. Compressed = number of blocks, size of a block, size of the last block if it is
+//! partial (else 0), compressed size of each block, then the blocks. In base64 the header of
+//! compressed data is a padded piece of its own, whereas the length of uncompressed data is in one
+//! piece with it.
 
 use crate::model::Endian;
 use crate::read::base64::{BadByte, Decoder};
@@ -96,7 +97,8 @@ pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Resul
     let total = full.checked_mul(block_size).and_then(|n| n.checked_add(last)).unwrap_or(u64::MAX);
     if last > block_size || total > compressed.saturating_mul(MAX_RATIO) {
         let what = format!(
-            "{blocks} blocks of {block_size} bytes (last {last}) cannot come from {compressed} compressed bytes"
+            "{blocks} blocks of {block_size} bytes (last {last}) cannot come from {compressed} \
+             compressed bytes"
         );
         return Err(Fault::new(at(), what, BROKEN));
     }
@@ -118,10 +120,18 @@ pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Resul
         match got {
             Ok(n) if n == want => done += want,
             Ok(n) => {
-                return Err(Fault::new(at(), format!("block {i} gives {n} bytes instead of {want}"), BROKEN));
+                return Err(Fault::new(
+                    at(),
+                    format!("block {i} gives {n} bytes instead of {want}"),
+                    BROKEN,
+                ));
             }
             Err(e) => {
-                return Err(Fault::new(at(), format!("block {i} cannot be decompressed: {e}"), TRUNCATED));
+                return Err(Fault::new(
+                    at(),
+                    format!("block {i} cannot be decompressed: {e}"),
+                    TRUNCATED,
+                ));
             }
         }
     }
@@ -175,19 +185,25 @@ impl<'a> Source<'a> {
                 let result = decoder.fill(out, len);
                 self.pos += decoder.pos;
                 if let Err(BadByte { pos, byte }) = result {
-                    // Appended text is followed by the closing tag, where data that is too short ends.
+                    // Appended text is followed by the closing tag, where data that is too short
+                    // ends.
                     if byte == b'<' || byte == b'_' {
                         return Err(self.ended(&format!("{len} bytes ({} found)", out.len())));
                     }
                     let what = format!("byte {byte:#04x} after {pos} letters is not base64");
-                    return Err(Fault::new(At::Field(format!("array `{}`", self.name)), what, BROKEN));
+                    return Err(Fault::new(
+                        At::Field(format!("array `{}`", self.name)),
+                        what,
+                        BROKEN,
+                    ));
                 }
             }
         }
         Ok(())
     }
 
-    /// A header of `len` bytes. In base64 it is followed by what its last quartet holds beyond it, if that is not padding.
+    /// A header of `len` bytes. In base64 it is followed by what its last quartet holds beyond it,
+    /// if that is not padding.
     fn piece(&mut self, len: usize) -> Result<Vec<u8>, Fault> {
         let mut out = Vec::new();
         if len <= self.most_bytes_left().saturating_add(2) {

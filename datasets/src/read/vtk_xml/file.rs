@@ -23,9 +23,16 @@ pub(crate) fn split(bytes: &[u8]) -> Result<XmlWithAppendedData<'_>, Fault> {
         None => (bytes, &bytes[bytes.len()..]),
         Some(tag) => {
             let Some(close) = find(b">", tag) else {
-                return Err(Fault::new(At::Byte(tag as u64), "the AppendedData tag does not end", BROKEN));
+                return Err(Fault::new(
+                    At::Byte(tag as u64),
+                    "the AppendedData tag does not end",
+                    BROKEN,
+                ));
             };
-            let data = bytes[close..].iter().position(|&b| b == b'_').map_or(bytes.len(), |i| close + i + 1);
+            let data = bytes[close..]
+                .iter()
+                .position(|&b| b == b'_')
+                .map_or(bytes.len(), |i| close + i + 1);
             (&bytes[..=close], &bytes[data..])
         }
     };
@@ -56,28 +63,44 @@ pub(crate) struct XmlFile<'a> {
 
 /// Options that keep small texts from growing into large trees.
 pub(crate) fn parse_tree(text: &str) -> Result<roxmltree::Document<'_>, Fault> {
-    let options = roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: u32::MAX, ..Default::default() };
+    let options =
+        roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: u32::MAX, ..Default::default() };
     roxmltree::Document::parse_with_options(text, options).map_err(|e| {
-        Fault::new(At::Line(u64::from(e.pos().row)), format!("the XML cannot be parsed: {e}"), BROKEN)
+        Fault::new(
+            At::Line(u64::from(e.pos().row)),
+            format!("the XML cannot be parsed: {e}"),
+            BROKEN,
+        )
     })
 }
 
 impl<'a> XmlFile<'a> {
-    pub(crate) fn new(tree: &'a roxmltree::Document<'a>, appended: &'a [u8]) -> Result<Self, Fault> {
+    pub(crate) fn new(
+        tree: &'a roxmltree::Document<'a>,
+        appended: &'a [u8],
+    ) -> Result<Self, Fault> {
         let root = tree.root_element();
         if root.tag_name().name() != "VTKFile" {
             let what = format!("the first element is `{}`, not `VTKFile`", root.tag_name().name());
-            return Err(Fault::new(At::Field("the XML".into()), what, "this is another kind of XML file"));
+            return Err(Fault::new(
+                At::Field("the XML".into()),
+                what,
+                "this is another kind of XML file",
+            ));
         }
         let endian = match root.attribute("byte_order") {
             None | Some("LittleEndian") => Endian::Little,
             Some("BigEndian") => Endian::Big,
-            Some(other) => return Err(bad_attribute(root, "byte_order", other, "LittleEndian or BigEndian")),
+            Some(other) => {
+                return Err(bad_attribute(root, "byte_order", other, "LittleEndian or BigEndian"));
+            }
         };
         let header_bytes = match root.attribute("header_type") {
             None | Some("UInt32") => 4,
             Some("UInt64") => 8,
-            Some(other) => return Err(bad_attribute(root, "header_type", other, "UInt32 or UInt64")),
+            Some(other) => {
+                return Err(bad_attribute(root, "header_type", other, "UInt32 or UInt64"));
+            }
         };
         // An unreadable compressor is an error only once an array needs it.
         let encoding = match root.attribute("compressor") {
@@ -89,7 +112,8 @@ impl<'a> XmlFile<'a> {
                 Err(Fault::unsupported(
                     At::Field("attribute `compressor` of VTKFile".into()),
                     format!("{name} compression"),
-                    "write it again with ZLib or LZ4 compression, or with none (in ParaView: Save Data, Compressor Type)",
+                    "write it again with ZLib or LZ4 compression, or with none (in ParaView: Save \
+                     Data, Compressor Type)",
                 ))
             }
         }
@@ -103,7 +127,8 @@ impl<'a> XmlFile<'a> {
         Ok(XmlFile { root, encoding, appended, appended_is_raw })
     }
 
-    /// The array in element `node`. `Ok(None)` is an array of a type that is skipped, after a warning.
+    /// The array in element `node`. `Ok(None)` is an array of a type that is skipped, after a
+    /// warning.
     pub(crate) fn array(
         &self,
         node: Node<'_, '_>,
@@ -121,7 +146,9 @@ impl<'a> XmlFile<'a> {
             Some(text) => match text.trim().parse::<usize>() {
                 Ok(0) | Ok(1) => 1,
                 Ok(n) => n,
-                Err(_) => return Err(bad_attribute(node, "NumberOfComponents", text, "a whole number")),
+                Err(_) => {
+                    return Err(bad_attribute(node, "NumberOfComponents", text, "a whole number"));
+                }
             },
         };
         let values = match node.attribute("format").unwrap_or("ascii") {
@@ -129,25 +156,35 @@ impl<'a> XmlFile<'a> {
                 let text = node.text().unwrap_or("");
                 Values::from_words(kind, text.split_ascii_whitespace()).map_err(|w| {
                     let shown: String = w.chars().take(40).collect();
-                    Fault::new(place(), format!("`{shown}` is not a number of type {kind_name}"), BROKEN)
+                    Fault::new(
+                        place(),
+                        format!("`{shown}` is not a number of type {kind_name}"),
+                        BROKEN,
+                    )
                 })?
             }
             "binary" => {
                 let e = self.encoding.clone()?;
-                let bytes = decode(EncodedBytes::Base64(node.text().unwrap_or("").as_bytes()), e, &name)?;
+                let bytes =
+                    decode(EncodedBytes::Base64(node.text().unwrap_or("").as_bytes()), e, &name)?;
                 self.typed(kind, bytes, e, &name)?
             }
             "appended" => {
                 let e = self.encoding.clone()?;
                 let text = node.attribute("offset").unwrap_or("");
-                let offset = text.trim().parse::<usize>().ok().filter(|&o| o <= self.appended.len());
+                let offset =
+                    text.trim().parse::<usize>().ok().filter(|&o| o <= self.appended.len());
                 let Some(offset) = offset else {
-                    let allowed = format!("at most {}, where the appended data ends", self.appended.len());
+                    let allowed =
+                        format!("at most {}, where the appended data ends", self.appended.len());
                     return Err(bad_attribute(node, "offset", text, &allowed));
                 };
                 let rest = &self.appended[offset..];
-                let stored =
-                    if self.appended_is_raw { EncodedBytes::Raw(rest) } else { EncodedBytes::Base64(rest) };
+                let stored = if self.appended_is_raw {
+                    EncodedBytes::Raw(rest)
+                } else {
+                    EncodedBytes::Base64(rest)
+                };
                 self.typed(kind, decode(stored, e, &name)?, e, &name)?
             }
             other => return Err(bad_attribute(node, "format", other, "ascii, binary or appended")),
@@ -159,9 +196,16 @@ impl<'a> XmlFile<'a> {
         Ok(Some(DataArray { name, components, values }))
     }
 
-    fn typed(&self, kind: ScalarType, bytes: Vec<u8>, e: Encoding, name: &str) -> Result<Values, Fault> {
+    fn typed(
+        &self,
+        kind: ScalarType,
+        bytes: Vec<u8>,
+        e: Encoding,
+        name: &str,
+    ) -> Result<Values, Fault> {
         if !bytes.len().is_multiple_of(kind.size()) {
-            let what = format!("{} bytes are no whole number of {} values", bytes.len(), kind.vtk_name());
+            let what =
+                format!("{} bytes are no whole number of {} values", bytes.len(), kind.vtk_name());
             return Err(Fault::field(format!("array `{name}`"), what));
         }
         Ok(match kind {
@@ -175,7 +219,10 @@ impl<'a> XmlFile<'a> {
         let name = node.attribute("Name").unwrap_or("");
         let bytes = match node.attribute("format").unwrap_or("ascii") {
             "ascii" => {
-                match Values::from_words(ScalarType::U8, node.text().unwrap_or("").split_ascii_whitespace()) {
+                match Values::from_words(
+                    ScalarType::U8,
+                    node.text().unwrap_or("").split_ascii_whitespace(),
+                ) {
                     Ok(Values::U8(v)) => v,
                     _ => {
                         return Err(Fault::field(
@@ -193,10 +240,16 @@ impl<'a> XmlFile<'a> {
             _ => {
                 let offset = node.attribute("offset").and_then(|t| t.trim().parse::<usize>().ok());
                 let Some(rest) = offset.and_then(|o| self.appended.get(o..)) else {
-                    return Err(Fault::field(format!("array `{name}`"), "its offset is outside the file"));
+                    return Err(Fault::field(
+                        format!("array `{name}`"),
+                        "its offset is outside the file",
+                    ));
                 };
-                let stored =
-                    if self.appended_is_raw { EncodedBytes::Raw(rest) } else { EncodedBytes::Base64(rest) };
+                let stored = if self.appended_is_raw {
+                    EncodedBytes::Raw(rest)
+                } else {
+                    EncodedBytes::Base64(rest)
+                };
                 decode(stored, self.encoding.clone()?, name)?
             }
         };
@@ -219,7 +272,12 @@ pub(crate) fn scalar_type(name: &str) -> Option<ScalarType> {
 }
 
 /// The fault of an attribute with a value that is not allowed.
-pub(crate) fn bad_attribute(node: Node<'_, '_>, attribute: &str, value: &str, allowed: &str) -> Fault {
+pub(crate) fn bad_attribute(
+    node: Node<'_, '_>,
+    attribute: &str,
+    value: &str,
+    allowed: &str,
+) -> Fault {
     let value: String = value.chars().take(60).collect();
     let name = node.attribute("Name").map(|n| format!(" `{n}`")).unwrap_or_default();
     let at = At::Field(format!("attribute `{attribute}` of {}{name}", node.tag_name().name()));

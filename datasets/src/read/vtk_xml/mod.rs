@@ -1,8 +1,10 @@
-//! VTK's XML files: one data set (`.vti .vtp .vtu .vtr .vts`), or a list of other files (`.pvti … .pvd .vtm`).
+//! VTK's XML files: one data set (`.vti .vtp .vtu .vtr .vts`), or a list of other files (`.pvti …
+//! .pvd .vtm`).
 //!
-//! All encodings (ascii, inline base64, appended base64, appended raw), both header types, both byte orders, ZLib and LZ4
-//! compression. ParaView writes appended raw data without compression unless told otherwise; VTK's writers base64 with ZLib.
-//! LZMA is refused by name. Source: "VTK File Formats" (Kitware), and what VTK 9.7 and ParaView 5.11 write.
+//! All encodings (ascii, inline base64, appended base64, appended raw), both header types, both
+//! byte orders, ZLib and LZ4 compression. ParaView writes appended raw data without compression
+//! unless told otherwise; VTK's writers base64 with ZLib. LZMA is refused by name. Source: "VTK
+//! File Formats" (Kitware), and what VTK 9.7 and ParaView 5.11 write.
 
 pub(crate) mod blocks;
 mod file;
@@ -49,7 +51,10 @@ fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, Rea
     let kind = file.root.attribute("type").unwrap_or("").to_string();
     let set = file.root.children().find(|n| n.is_element() && n.tag_name().name() == kind);
     let Some(set) = set else {
-        return Err(fault(Fault::field("VTKFile", format!("it has no element `{kind}`, its own type"))));
+        return Err(fault(Fault::field(
+            "VTKFile",
+            format!("it has no element `{kind}`, its own type"),
+        )));
     };
     let data = if pieces::KINDS.contains(&kind.as_str()) {
         let pieces = pieces::pieces(&file, set, &mut warnings).map_err(fault)?;
@@ -65,7 +70,8 @@ fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, Rea
     {
         parallel::multi_block(path, set, depth, 0, &mut warnings)?
     } else {
-        let known = "PolyData, UnstructuredGrid, ImageData, RectilinearGrid, StructuredGrid, their parallel forms, \
+        let known = "PolyData, UnstructuredGrid, ImageData, RectilinearGrid, StructuredGrid, their \
+                     parallel forms, \
                      Collection and vtkMultiBlockDataSet are";
         let at = At::Field("attribute `type` of VTKFile".into());
         return Err(fault(Fault::unsupported(

@@ -1,4 +1,5 @@
-//! Files that name other files: parallel pieces (`.pvti` and so on), time series (`.pvd`), blocks (`.vtm`).
+//! Files that name other files: parallel pieces (`.pvti` and so on), time series (`.pvd`), blocks
+//! (`.vtm`).
 
 use super::file::bad_attribute;
 use super::{FORMAT, merged, read_nested};
@@ -28,11 +29,12 @@ pub(super) fn pieces(
         }
         list.push(data);
     }
-    // Lattice pieces with ghost layers overlap; the overlaps agree, so laying them over each other is right. Ghost cells of
-    // other kinds carry `vtkGhostType` and are left out when a surface is made.
+    // Lattice pieces with ghost layers overlap; the overlaps agree, so laying them over each other
+    // is right. Ghost cells of other kinds carry `vtkGhostType` and are left out when a surface is
+    // made.
     let data = merged(serial, list, warnings).map_err(|f| f.in_file(path, FORMAT))?;
-    if let Some(whole) =
-        super::file::attribute_numbers::<i32, 6>(set, "WholeExtent").map_err(|f| f.in_file(path, FORMAT))?
+    if let Some(whole) = super::file::attribute_numbers::<i32, 6>(set, "WholeExtent")
+        .map_err(|f| f.in_file(path, FORMAT))?
     {
         let found = match &data {
             Dataset::ImageData(d) => d.extent,
@@ -48,9 +50,18 @@ pub(super) fn pieces(
 }
 
 /// The data set in `file`, which `path` names.
-fn nested(path: &Path, file: &Path, depth: usize, warnings: &mut Vec<String>) -> Result<Dataset, ReadError> {
+fn nested(
+    path: &Path,
+    file: &Path,
+    depth: usize,
+    warnings: &mut Vec<String>,
+) -> Result<Dataset, ReadError> {
     let is_legacy = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtk"));
-    let opened = if is_legacy { crate::read::vtk_legacy::read(file)? } else { read_nested(file, depth + 1)? };
+    let opened = if is_legacy {
+        crate::read::vtk_legacy::read(file)?
+    } else {
+        read_nested(file, depth + 1)?
+    };
     // Pieces repeat each other's warnings; once is enough.
     for w in opened.warnings {
         if !warnings.contains(&w) {
@@ -125,7 +136,8 @@ pub(super) fn multi_block(
     }
     let mut blocks = Vec::new();
     for node in set.children().filter(|n| n.is_element()) {
-        let number = || node.attribute("index").map_or_else(|| blocks.len().to_string(), str::to_string);
+        let number =
+            || node.attribute("index").map_or_else(|| blocks.len().to_string(), str::to_string);
         let name = node.attribute("name").map_or_else(number, str::to_string);
         let data = match node.tag_name().name() {
             "DataSet" | "Piece" => match node.attribute("file") {

@@ -2,8 +2,8 @@
 
 use super::file::{XmlFile, attribute_numbers, bad_attribute};
 use crate::model::{
-    Attributes, Cells, DataArray, Dataset, ImageData, Points, PolyData, RectilinearGrid, StructuredGrid,
-    UnstructuredGrid, Values,
+    Attributes, Cells, DataArray, Dataset, ImageData, Points, PolyData, RectilinearGrid,
+    StructuredGrid, UnstructuredGrid, Values,
 };
 use crate::read::error::{At, BROKEN, Fault};
 use glam::{DMat3, DVec3};
@@ -81,7 +81,12 @@ fn check_counts(piece: Node<'_, '_>, data: &Dataset) -> Result<(), Fault> {
         if let Some(text) = piece.attribute(attribute)
             && text.trim().parse() != Ok(found)
         {
-            return Err(bad_attribute(piece, attribute, text, &format!("{found}, as its arrays have it")));
+            return Err(bad_attribute(
+                piece,
+                attribute,
+                text,
+                &format!("{found}, as its arrays have it"),
+            ));
         }
     }
     Ok(())
@@ -122,7 +127,9 @@ fn point_and_cell_data(
             _ => continue,
         };
         let mut arrays: Vec<DataArray> = Vec::new();
-        for node in section.children().filter(|n| n.has_tag_name("DataArray") || n.has_tag_name("Array")) {
+        for node in
+            section.children().filter(|n| n.has_tag_name("DataArray") || n.has_tag_name("Array"))
+        {
             // A file may hold several times of one array; the first is the one shown.
             if node.has_attribute("TimeStep")
                 && arrays.iter().any(|a| Some(a.name.as_str()) == node.attribute("Name"))
@@ -137,7 +144,8 @@ fn point_and_cell_data(
                 arrays.push(array);
             }
         }
-        let marked = |what: &str| section.attribute(what).filter(|n| !n.is_empty()).map(str::to_string);
+        let marked =
+            |what: &str| section.attribute(what).filter(|n| !n.is_empty()).map(str::to_string);
         if of_points {
             out.point.extend(arrays);
             out.point_normals = marked("Normals");
@@ -159,14 +167,20 @@ fn named_array(
     name: &str,
     warnings: &mut Vec<String>,
 ) -> Result<Option<DataArray>, Fault> {
-    let node = section.children().find(|n| n.has_tag_name("DataArray") && n.attribute("Name") == Some(name));
+    let node = section
+        .children()
+        .find(|n| n.has_tag_name("DataArray") && n.attribute("Name") == Some(name));
     match node {
         Some(node) => file.array(node, warnings),
         None => Ok(None),
     }
 }
 
-fn points(file: &XmlFile<'_>, piece: Node<'_, '_>, warnings: &mut Vec<String>) -> Result<Points, Fault> {
+fn points(
+    file: &XmlFile<'_>,
+    piece: Node<'_, '_>,
+    warnings: &mut Vec<String>,
+) -> Result<Points, Fault> {
     let node = piece
         .children()
         .find(|n| n.has_tag_name("Points"))
@@ -216,7 +230,13 @@ fn cells(
     let connectivity = named_array(file, section, names[0], warnings)?;
     let ends = named_array(file, section, names[1], warnings)?;
     let (Some(connectivity), Some(ends)) = (connectivity, ends) else { return Ok(Cells::new()) };
-    cells_from_arrays(&connectivity.values, &ends.values, section.tag_name().name(), num_points, warnings)
+    cells_from_arrays(
+        &connectivity.values,
+        &ends.values,
+        section.tag_name().name(),
+        num_points,
+        warnings,
+    )
 }
 
 pub(crate) fn cells_from_arrays(
@@ -286,14 +306,18 @@ fn unstructured(
     } else if let Some(stream) = named_array(file, section, "faces", warnings)?
         && let Some(ends) = named_array(file, section, "faceoffsets", warnings)?
     {
-        // Before: one stream per cell: number of faces, then per face its number of points and their ids; -1 for no polyhedron.
+        // Before: one stream per cell: number of faces, then per face its number of points and
+        // their ids; -1 for no polyhedron.
         let stream: Vec<i64> = integers(&stream.values).collect();
         let mut start = 0usize;
         for (cell, end) in integers(&ends.values).enumerate() {
             let first = d.polyhedron_faces.len();
             if let Ok(end) = usize::try_from(end) {
                 let bad = || {
-                    Fault::field("faces of Cells", format!("the faces of cell {cell} do not end at {end}"))
+                    Fault::field(
+                        "faces of Cells",
+                        format!("the faces of cell {cell} do not end at {end}"),
+                    )
                 };
                 let slice = stream.get(start..end).ok_or_else(bad)?;
                 face_stream(slice, &mut d.polyhedron_faces).ok_or_else(bad)?;
@@ -305,7 +329,8 @@ fn unstructured(
     Ok(Dataset::UnstructuredGrid(d))
 }
 
-/// Appends the faces of one polyhedron: count, then per face its size and ids. `None` when the numbers do not add up.
+/// Appends the faces of one polyhedron: count, then per face its size and ids. `None` when the
+/// numbers do not add up.
 pub(crate) fn face_stream(stream: &[i64], faces: &mut Cells) -> Option<()> {
     let mut at = 1;
     for _ in 0..*stream.first()? {
@@ -318,9 +343,13 @@ pub(crate) fn face_stream(stream: &[i64], faces: &mut Cells) -> Option<()> {
 }
 
 impl UnstructuredGrid {
-    /// Sets which faces belong to each cell from ends into `list`. The list must name the faces in order, as VTK writes it;
-    /// otherwise the faces are copied into that order.
-    fn polyhedra_from_lists(&mut self, ends: impl Iterator<Item = i64>, list: &[i64]) -> Result<(), Fault> {
+    /// Sets which faces belong to each cell from ends into `list`. The list must name the faces in
+    /// order, as VTK writes it; otherwise the faces are copied into that order.
+    fn polyhedra_from_lists(
+        &mut self,
+        ends: impl Iterator<Item = i64>,
+        list: &[i64],
+    ) -> Result<(), Fault> {
         let mut ordered = Cells::new();
         let mut start = 0;
         for (cell, end) in ends.enumerate() {
@@ -331,8 +360,11 @@ impl UnstructuredGrid {
                 return Err(Fault::field("polyhedron_offsets of Cells", what));
             };
             for &face in faces {
-                let Some(i) = usize::try_from(face).ok().filter(|&i| i < self.polyhedron_faces.len()) else {
-                    let what = format!("cell {cell} names face {face} of {}", self.polyhedron_faces.len());
+                let Some(i) =
+                    usize::try_from(face).ok().filter(|&i| i < self.polyhedron_faces.len())
+                else {
+                    let what =
+                        format!("cell {cell} names face {face} of {}", self.polyhedron_faces.len());
                     return Err(Fault::field("polyhedron_to_faces of Cells", what));
                 };
                 ordered.push(self.polyhedron_faces.get(i).iter().copied());

@@ -1,4 +1,5 @@
-//! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of OpenGL's types.
+//! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of
+//! OpenGL's types.
 
 use super::FIRST_SEGMENT;
 use crate::interpose::context::{Context, ImmediateModeTarget};
@@ -9,9 +10,10 @@ use crate::state::enums::*;
 const MOST_NAMES: i32 = 1 << 20;
 
 impl Context {
-    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is one of our pieces; programs that count their lists (Survex's
-    /// aven) end there. So they get the names after the greatest of their own, as Mesa gives them, and an empty list of the driver's for each. `None` leaves
-    /// the call to the driver.
+    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is
+    /// one of our pieces; programs that count their lists (Survex's aven) end there. So they get
+    /// the names after the greatest of their own, as Mesa gives them, and an empty list of the
+    /// driver's for each. `None` leaves the call to the driver.
     pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
         if self.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glGenLists between Begin and End");
@@ -25,7 +27,10 @@ impl Context {
         }
         let first = {
             let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
-            let last = lists.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_SEGMENT)?;
+            let last = lists
+                .greatest
+                .checked_add(n.cast_unsigned())
+                .filter(|last| *last < FIRST_SEGMENT)?;
             std::mem::replace(&mut lists.greatest, last) + 1
         };
         // Where a list is compiled its piece ends before.

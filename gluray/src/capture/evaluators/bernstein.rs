@@ -1,7 +1,9 @@
-//! Points of Bézier curves and surfaces (OpenGL 1.1, section 5.1): sums of Bernstein polynomials, by Horner's scheme.
+//! Points of Bézier curves and surfaces (OpenGL 1.1, section 5.1): sums of Bernstein polynomials,
+//! by Horner's scheme.
 //!
-//! With s = 1 - t, and b(i) = C(n, i) · p(i) · t^i, the curve of degree n is ((b(0)·s + b(1))·s + …)·s + b(n). The order of the operations is Mesa's, so that
-//! lines over a surface, which the driver draws, lie where we put the surface.
+//! With s = 1 - t, and b(i) = C(n, i) · p(i) · t^i, the curve of degree n is ((b(0)·s + b(1))·s +
+//! …)·s + b(n). The order of the operations is Mesa's, so that lines over a surface, which the
+//! driver draws, lie where we put the surface.
 
 /// The point of a curve at `t`, of `N` values. There is a control point at least.
 pub(super) fn curve<const N: usize>(
@@ -30,14 +32,21 @@ pub(super) fn curve<const N: usize>(
     sum
 }
 
-/// The point of a surface, whose control points come row by row: all of the first in `u`, and so on.
-pub(super) fn surface<const N: usize>(points: &[[f32; N]], orders: [usize; 2], at: [f32; 2]) -> [f32; N] {
+/// The point of a surface, whose control points come row by row: all of the first in `u`, and so
+/// on.
+pub(super) fn surface<const N: usize>(
+    points: &[[f32; N]],
+    orders: [usize; 2],
+    at: [f32; 2],
+) -> [f32; N] {
     let ([rows, columns], [u, v]) = (orders, at);
     if columns > rows {
-        let across = (0..columns).map(|j| curve((0..rows).map(|i| points[i * columns + j]), rows, u));
+        let across =
+            (0..columns).map(|j| curve((0..rows).map(|i| points[i * columns + j]), rows, u));
         curve(across, columns, v)
     } else {
-        let along = points.chunks_exact(columns.max(1)).map(|row| curve(row.iter().copied(), columns, v));
+        let along =
+            points.chunks_exact(columns.max(1)).map(|row| curve(row.iter().copied(), columns, v));
         curve(along, rows, u)
     }
 }
@@ -50,8 +59,9 @@ mod tests {
     fn defined(points: &[f64], t: f64) -> f64 {
         let n = points.len() - 1;
         let binomial = |i: usize| (0..i).fold(1.0, |b, k| b * (n - k) as f64 / (k + 1) as f64);
-        let term =
-            |(i, p): (usize, &f64)| binomial(i) * t.powi(i as i32) * (1.0 - t).powi((n - i) as i32) * p;
+        let term = |(i, p): (usize, &f64)| {
+            binomial(i) * t.powi(i as i32) * (1.0 - t).powi((n - i) as i32) * p
+        };
         points.iter().enumerate().map(term).sum()
     }
 
@@ -67,7 +77,10 @@ mod tests {
                 let [found] = curve(points.iter().map(|p| [*p as f32]), order, t as f32);
                 let (right, size) = (defined(&points, t), 1.4_f64.powi(order as i32).max(1.0));
                 let far = if t > 1.0 { size } else { 1.0 };
-                assert!((f64::from(found) - right).abs() < 2e-5 * far, "{order} {t}: {found} {right}");
+                assert!(
+                    (f64::from(found) - right).abs() < 2e-5 * far,
+                    "{order} {t}: {found} {right}"
+                );
             }
         }
     }
@@ -81,10 +94,16 @@ mod tests {
             let found = surface(&points, [rows, columns], [u as f32, v as f32]);
             for k in 0..2 {
                 let row = |i: usize| {
-                    points[i * columns..][..columns].iter().map(|p| f64::from(p[k])).collect::<Vec<_>>()
+                    points[i * columns..][..columns]
+                        .iter()
+                        .map(|p| f64::from(p[k]))
+                        .collect::<Vec<_>>()
                 };
                 let along: Vec<f64> = (0..rows).map(|i| defined(&row(i), v)).collect();
-                assert!((f64::from(found[k]) - defined(&along, u)).abs() < 1e-5, "{rows} {columns}");
+                assert!(
+                    (f64::from(found[k]) - defined(&along, u)).abs() < 1e-5,
+                    "{rows} {columns}"
+                );
             }
         }
     }

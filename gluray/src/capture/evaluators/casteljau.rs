@@ -1,10 +1,13 @@
-//! A point of a Bézier surface with both tangents, for `GL_AUTO_NORMAL`: de Casteljau's algorithm, which has the tangents before its last step.
+//! A point of a Bézier surface with both tangents, for `GL_AUTO_NORMAL`: de Casteljau's algorithm,
+//! which has the tangents before its last step.
 //!
-//! While the net of control points is more than two points wide either way, four neighbours become one, first along `u` and then along `v`. Surfaces whose
-//! orders differ are left with two lines of points, and go on as curves: of the points between the lines, and of their differences. The order of the
-//! operations is Mesa's, as in [`super::bernstein`].
+//! While the net of control points is more than two points wide either way, four neighbours become
+//! one, first along `u` and then along `v`. Surfaces whose orders differ are left with two lines of
+//! points, and go on as curves: of the points between the lines, and of their differences. The
+//! order of the operations is Mesa's, as in [`super::bernstein`].
 
-/// A point of the surface, and its derivatives but for a positive factor. Both orders are at least 2.
+/// A point of the surface, and its derivatives but for a positive factor. Both orders are at least
+/// 2.
 pub(super) fn point_and_tangents<const N: usize>(
     points: &[[f32; N]],
     orders: [usize; 2],
@@ -18,7 +21,8 @@ pub(super) fn point_and_tangents<const N: usize>(
         for i in 0..rows - 1 {
             for j in 0..columns - 1 {
                 let [here, below] = [i * across + j, (i + 1) * across + j];
-                net[here] = along_v(along_u(net[here], net[below]), along_u(net[here + 1], net[below + 1]));
+                net[here] =
+                    along_v(along_u(net[here], net[below]), along_u(net[here + 1], net[below + 1]));
             }
         }
         (rows, columns) = (rows - 1, columns - 1);
@@ -48,7 +52,8 @@ pub(super) fn point_and_tangents<const N: usize>(
     }
 }
 
-/// The end of de Casteljau's algorithm for a curve: its point, and the difference of the two that it lies between.
+/// The end of de Casteljau's algorithm for a curve: its point, and the difference of the two that
+/// it lies between.
 fn last_two<const N: usize>(mut points: Vec<[f32; N]>, t: f32) -> ([f32; N], [f32; N]) {
     let between = mix(t);
     for left in (2..points.len()).rev() {
@@ -68,7 +73,8 @@ fn less<const N: usize>(a: [f32; N], b: [f32; N]) -> [f32; N] {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-/// The unit normal from a point and the tangents; of a rational surface, whose fourth value is w, by the quotient rule. Zero where tangents are parallel.
+/// The unit normal from a point and the tangents; of a rational surface, whose fourth value is w,
+/// by the quotient rule. Zero where tangents are parallel.
 pub(super) fn normal([point, du, dv]: [[f32; 4]; 3], rational: bool) -> [f32; 3] {
     let tangent = |d: [f32; 4]| -> [f32; 3] {
         std::array::from_fn(|k| if rational { d[k] * point[3] - d[3] * point[k] } else { d[k] })
@@ -95,7 +101,8 @@ mod tests {
                 .map(|i| [(i * 31 % 17) as f32 / 8.0, (i * 7 % 11) as f32 / 5.0])
                 .collect();
             let at = [0.3, 0.6];
-            let place = |du: f32, dv: f32| bernstein::surface(&points, orders, [at[0] + du, at[1] + dv]);
+            let place =
+                |du: f32, dv: f32| bernstein::surface(&points, orders, [at[0] + du, at[1] + dv]);
             let [point, du, dv] = point_and_tangents(&points, orders, at);
             let h = 1e-2;
             // Difference quotients, over the degrees that the tangents leave out.
@@ -120,7 +127,10 @@ mod tests {
         let twice = tangents.map(|v| v.map(|x| 2.0 * x));
         let (a, b) = (normal(tangents, true), normal(twice, true));
         assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-6), "{a:?} {b:?}");
-        assert_eq!(normal([[0.0; 4], [1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]], false), [0.0, 0.0, 1.0]);
+        assert_eq!(
+            normal([[0.0; 4], [1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]], false),
+            [0.0, 0.0, 1.0]
+        );
         assert_eq!(normal([[0.0; 4], [1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]], false), [0.0; 3]);
     }
 }

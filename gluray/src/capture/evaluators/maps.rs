@@ -1,4 +1,5 @@
-//! The maps of evaluators that are switched on, as the driver has them, and what they come to at a point.
+//! The maps of evaluators that are switched on, as the driver has them, and what they come to at a
+//! point.
 
 use super::{bernstein, casteljau};
 use crate::interpose::driver::gl;
@@ -44,7 +45,8 @@ pub(crate) struct EvaluatorMaps {
     tex: Option<ControlPointMap>,
 }
 
-/// Targets in the order that OpenGL numbers them in from `GL_MAP1_COLOR_4` and `GL_MAP2_COLOR_4` on.
+/// Targets in the order that OpenGL numbers them in from `GL_MAP1_COLOR_4` and `GL_MAP2_COLOR_4`
+/// on.
 const COLOR_4: u32 = 0;
 const NORMAL: u32 = 2;
 const TEXTURE_COORD_1: u32 = 3;
@@ -121,12 +123,16 @@ impl EvaluatorMaps {
         turned.then_some("automatic normals over a domain that runs backwards")
     }
 
-    /// The vertex at a point of the domain. `None` when there is no map of vertices: then nothing is drawn.
+    /// The vertex at a point of the domain. `None` when there is no map of vertices: then nothing
+    /// is drawn.
     pub(crate) fn at(&self, at: [f32; 2]) -> Option<EvaluatedVertex> {
         let map = self.vertex.as_ref()?;
         let of = |m: &Option<ControlPointMap>| m.as_ref().map(|m| m.at(at));
-        let mut out =
-            EvaluatedVertex { color: of(&self.color), tex: of(&self.tex), ..EvaluatedVertex::default() };
+        let mut out = EvaluatedVertex {
+            color: of(&self.color),
+            tex: of(&self.tex),
+            ..EvaluatedVertex::default()
+        };
         if self.auto_normal && self.unsupported().is_none() {
             let found = casteljau::point_and_tangents(&map.points, map.orders, map.inner(at));
             out.position = map.filled(found[0]);
@@ -144,13 +150,23 @@ mod tests {
     use super::*;
 
     fn map(points: &[[f32; 4]], orders: [usize; 2], size: usize) -> Option<ControlPointMap> {
-        Some(ControlPointMap { points: points.to_vec(), size, orders, first: [1.0, 2.0], scale: [0.5, 0.25] })
+        Some(ControlPointMap {
+            points: points.to_vec(),
+            size,
+            orders,
+            first: [1.0, 2.0],
+            scale: [0.5, 0.25],
+        })
     }
 
     #[test]
     fn domains_are_mapped_and_what_no_map_gives_stays_current() {
-        let corners =
-            [[0.0, 0.0, 0.0, 0.0], [0.0, 4.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [2.0, 4.0, 1.0, 0.0]];
+        let corners = [
+            [0.0, 0.0, 0.0, 0.0],
+            [0.0, 4.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0, 0.0],
+            [2.0, 4.0, 1.0, 0.0],
+        ];
         let mut maps = EvaluatorMaps {
             vertex: map(&corners, [2, 2], 3),
             tex: map(&corners, [2, 2], 2),
@@ -170,8 +186,11 @@ mod tests {
     #[test]
     fn automatic_normals_that_drivers_do_not_agree_on_are_told_by_name() {
         let points = [[0.0; 4]; 4];
-        let mut maps =
-            EvaluatorMaps { vertex: map(&points, [2, 2], 3), auto_normal: true, ..EvaluatorMaps::default() };
+        let mut maps = EvaluatorMaps {
+            vertex: map(&points, [2, 2], 3),
+            auto_normal: true,
+            ..EvaluatorMaps::default()
+        };
         assert_eq!(maps.unsupported(), None);
         maps.vertex.as_mut().unwrap().scale[1] = -0.25;
         assert!(maps.unsupported().unwrap().contains("backwards"));

@@ -1,5 +1,6 @@
-//! Geometry that moved: the same triangles at other places, as when a program animates a time step or a deformation. Its structure is that of before
-//! with boxes made anew (a sixth of a build, with the copy), as long as that leaves rays nearly as fast.
+//! Geometry that moved: the same triangles at other places, as when a program animates a time step
+//! or a deformation. Its structure is that of before with boxes made anew (a sixth of a build, with
+//! the copy), as long as that leaves rays nearly as fast.
 
 use super::Geometry;
 use rt_core::bvh::{self, BuildOptions, Instance, World};
@@ -8,11 +9,13 @@ use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Growth of the expected work of a ray, against the tree when it was built, up to which moved triangles keep it. At 1.6 packets take a quarter longer, at 1.9
-/// a third (`RefitReport::cost_growth`); a build takes as long as two frames.
+/// Growth of the expected work of a ray, against the tree when it was built, up to which moved
+/// triangles keep it. At 1.6 packets take a quarter longer, at 1.9 a third
+/// (`RefitReport::cost_growth`); a build takes as long as two frames.
 const MOST_GROWTH: f64 = 1.8;
 
-/// The structure of `mesh`, made from that of `before`; `None` where there is none or where it would be too slow.
+/// The structure of `mesh`, made from that of `before`; `None` where there is none or where it
+/// would be too slow.
 pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<World>> {
     let old = before.structure_now()?;
     let start = Instant::now();
@@ -20,7 +23,8 @@ pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<Wo
     let geometry = bvh::Geometry::Mesh(before.mesh.clone());
     let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
     let mut world =
-        World::build_sharing(vec![geometry], vec![instance], &BuildOptions::default(), Some(&old)).ok()?;
+        World::build_sharing(vec![geometry], vec![instance], &BuildOptions::default(), Some(&old))
+            .ok()?;
     let report = world.refit(0, mesh.clone()).ok()?;
     crate::host::report::span("builds", "refit", 0, start.elapsed());
     (report.absent == 0 && report.cost_growth <= MOST_GROWTH).then(|| Arc::new(world))
@@ -75,7 +79,8 @@ mod tests {
         let mut fresh = GeometryCache::default();
         let g = fresh.of_runs(&sheet(0.2, false), &runs, &QuadSplit::default());
         let world = g.world(&mut BuildCounts::default()).expect("a mesh that can be built");
-        let ray: Ray = world.ray_from_world(Vec3::new(20.3, 30.6, 50.0).as_dvec3(), -Vec3::Z.as_dvec3()).0;
+        let ray: Ray =
+            world.ray_from_world(Vec3::new(20.3, 30.6, 50.0).as_dvec3(), -Vec3::Z.as_dvec3()).0;
         assert_eq!(world.closest(&ray), Some(moved));
     }
 }

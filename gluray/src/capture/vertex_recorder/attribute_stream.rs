@@ -13,7 +13,12 @@ pub(super) struct AttributeStream<const N: usize> {
 
 impl<const N: usize> Default for AttributeStream<N> {
     fn default() -> Self {
-        AttributeStream { varying: false, constant: [0.0; N], values: Vec::new(), spares: Vec::new() }
+        AttributeStream {
+            varying: false,
+            constant: [0.0; N],
+            values: Vec::new(),
+            spares: Vec::new(),
+        }
     }
 }
 

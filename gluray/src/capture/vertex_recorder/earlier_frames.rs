@@ -16,7 +16,8 @@ pub(super) struct EarlierBatch {
     runs: Vec<PrimitiveRun>,
     kind: QuadSplit,
     frame: u64,
-    /// Its normals when nobody needs them any more, and the version of the attributes that they are of.
+    /// Its normals when nobody needs them any more, and the version of the attributes that they are
+    /// of.
     normals: Option<(Vec<[f32; 3]>, u64)>,
     /// What else the attributes of that version are, where that is the same for all vertices.
     constants: Option<ConstantAttributes>,
@@ -34,7 +35,8 @@ pub(super) struct ConstantAttributes {
 }
 
 impl VertexRecorder {
-    /// Normals are not all the same: those of the earlier batch are compared with, or all are written down.
+    /// Normals are not all the same: those of the earlier batch are compared with, or all are
+    /// written down.
     #[cold]
     pub(super) fn vary_normals(&mut self) {
         let expected = self.expected.as_ref().and_then(|mesh| {
@@ -72,7 +74,8 @@ impl VertexRecorder {
         if self.positions.len() >= WORTH_FOLLOWING {
             let (geometry, mesh) = (geometry.clone(), geometry.mesh.clone());
             let (runs, kind, frame) = (self.runs.clone(), kind.clone(), self.frame);
-            let e = EarlierBatch { geometry, mesh, runs, kind, frame, normals: None, constants: None };
+            let e =
+                EarlierBatch { geometry, mesh, runs, kind, frame, normals: None, constants: None };
             self.earlier.insert(self.positions[0].map(f32::to_bits), e);
         }
     }
@@ -90,7 +93,8 @@ impl VertexRecorder {
         self.earlier.get_mut(&first).filter(|e| Arc::ptr_eq(&e.geometry, geometry))
     }
 
-    /// Attributes that nobody needs any more: their memory serves again, and the normals are what is compared with next.
+    /// Attributes that nobody needs any more: their memory serves again, and the normals are what
+    /// is compared with next.
     pub(crate) fn recycle(&mut self, a: Attributes, geometry: &Arc<Geometry>) {
         let version = a.version;
         let mut normals = a.normals;
@@ -107,7 +111,8 @@ impl VertexRecorder {
         self.tex.recycle(a.tex);
     }
 
-    /// Names the attributes of a batch that may come again: those that are what they were in the frame before have the name that they had. 0 for others.
+    /// Names the attributes of a batch that may come again: those that are what they were in the
+    /// frame before have the name that they had. 0 for others.
     pub(super) fn version(&mut self, geometry: &Arc<Geometry>) -> u64 {
         let one = self.normals.constant.map(f32::to_bits);
         let mut constants = ConstantAttributes {
@@ -124,7 +129,8 @@ impl VertexRecorder {
         let mut version = constants.version;
         if plain {
             if let Some(before) = before {
-                let unchanged = if varying { kept == Some(before.version) && !changed } else { true };
+                let unchanged =
+                    if varying { kept == Some(before.version) && !changed } else { true };
                 constants.version = before.version;
                 if unchanged && constants == before {
                     version = before.version;

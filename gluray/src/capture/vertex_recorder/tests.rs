@@ -142,7 +142,8 @@ fn a_normal_that_differs_in_one_bit_makes_another_version_and_the_same_ones_do_n
     let constant = vec![[0.0, 0.0, 1.0]; 3000];
     let one = lit_frame(&mut r, &mut cache, &points, &constant);
     assert_eq!(lit_frame(&mut r, &mut cache, &points, &constant), one);
-    let half: Vec<[f32; 3]> = (0..3000).map(|i| if i < 1000 { constant[0] } else { normals[i] }).collect();
+    let half: Vec<[f32; 3]> =
+        (0..3000).map(|i| if i < 1000 { constant[0] } else { normals[i] }).collect();
     let mixed = lit_frame(&mut r, &mut cache, &points, &half);
     assert_ne!(mixed, one);
     assert_eq!(lit_frame(&mut r, &mut cache, &points, &half), mixed);

@@ -1,4 +1,5 @@
-//! Pictures on surfaces: a texture of VTK's actor that multiplies the lit colour, or that a physically based material has its colour from.
+//! Pictures on surfaces: a texture of VTK's actor that multiplies the lit colour, or that a
+//! physically based material has its colour from.
 
 use super::Image;
 use super::program::VtkProgram;
@@ -15,7 +16,8 @@ impl VtkProgram {
         self.picture.as_ref()
     }
 
-    /// Texture coordinates of a vertex, of which those from number `first` on are meant, after the program's matrix for them.
+    /// Texture coordinates of a vertex, of which those from number `first` on are meant, after the
+    /// program's matrix for them.
     fn transformed_coordinates(&self, a: &Attributes, vertex: usize, first: usize) -> [f32; 2] {
         let c = a.tex.at(vertex);
         let (s, t) = (c[first], c[first + 1]);
@@ -59,14 +61,24 @@ impl VtkProgram {
             ActorTexture::Rgb => [r, g, b, 1.0],
             ActorTexture::Grey => [r, r, r, 1.0],
             ActorTexture::GreyAlpha => [r, r, r, g],
-            ActorTexture::Rgba | ActorTexture::Albedo | ActorTexture::AlbedoAlone => [r, g, b, alpha],
+            ActorTexture::Rgba | ActorTexture::Albedo | ActorTexture::AlbedoAlone => {
+                [r, g, b, alpha]
+            }
         })
     }
 
     /// The colour and alpha of a lit fragment with the picture on it.
-    pub(super) fn under_picture(&self, lit: [f32; 4], picture: Option<[f32; 4]>, front: bool) -> [f32; 4] {
+    pub(super) fn under_picture(
+        &self,
+        lit: [f32; 4],
+        picture: Option<[f32; 4]>,
+        front: bool,
+    ) -> [f32; 4] {
         match picture {
-            Some(p) if self.signature.actor_texture.is_over_all() && (front || self.picture_on_backs) => {
+            Some(p)
+                if self.signature.actor_texture.is_over_all()
+                    && (front || self.picture_on_backs) =>
+            {
                 std::array::from_fn(|k| lit[k] * p[k])
             }
             _ => lit,
@@ -86,6 +98,8 @@ impl VtkProgram {
 
     /// The picture, where it lies on a single colour.
     pub(super) fn picture_alone(&self) -> Option<&Arc<Image>> {
-        self.picture.as_ref().filter(|_| self.overrides || self.signature.colors == ColorSource::Uniform)
+        self.picture
+            .as_ref()
+            .filter(|_| self.overrides || self.signature.colors == ColorSource::Uniform)
     }
 }

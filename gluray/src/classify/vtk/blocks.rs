@@ -6,8 +6,7 @@ use super::signature::ActorTexture;
 /// Most lights that VTK writes into a shader.
 pub(super) const MOST_LIGHTS: usize = 6;
 
-// ---- Vertex shaders -------------------------------------------------------------------------------------------------
-
+// ---- Vertex shaders -----------------------------------------------------------------------------
 /// Colours, normals, texture coordinates.
 pub(super) const VERTEX_COLOR: &str = "vertexColorVSOutput = scalarColor;";
 pub(super) const VERTEX_NORMAL: &str = "normalVCVSOutput = normalMatrix * normalMC;";
@@ -28,8 +27,7 @@ pub(super) const CLIPPED_LATER: &str = "clipVertexMC = vertexMC;";
 pub(super) const VERTEX_VIEW: &str = "vertexVCVSOutput = MCVCMatrix * vertexMC;";
 pub(super) const VERTEX_PLACE: &str = "gl_Position = MCDCMatrix * vertexMC;";
 
-// ---- The geometry shader that measures edges ------------------------------------------------------------------------
-
+// ---- The geometry shader that measures edges ----------------------------------------------------
 /// VTK 9.1 and 9.2 have one that also makes triangles larger than they are; that one is not known.
 pub(super) const MEASURES: &str = "vec2 pos[4];
      for (int i = 0; i < 3; i++)
@@ -53,7 +51,8 @@ pub(super) const MEASURES: &str = "vec2 pos[4];
      if (mod(edgeValues, 2.0) < 1.0) edgeEqn[0].z = lineWidth;";
 /// Its loop over the corners, which go through as they are. It is split here: `split` wants whole
 /// blocks.
-pub(super) const CORNERS: [&str; 3] = ["for(inti=0;i<3;i++)", "{", "gl_PrimitiveID=gl_PrimitiveIDIn;"];
+pub(super) const CORNERS: [&str; 3] =
+    ["for(inti=0;i<3;i++)", "{", "gl_PrimitiveID=gl_PrimitiveIDIn;"];
 pub(super) const CLIPS_LATER: &str = "for (int planeNum = 0; planeNum < numClipPlanes; planeNum++)
      { clipDistancesVSOutput[planeNum] = dot(clipPlanes[planeNum], clipVertexMC[i]); }";
 pub(super) const GOES_THROUGH: [&str; 5] =
@@ -61,8 +60,7 @@ pub(super) const GOES_THROUGH: [&str; 5] =
 pub(super) const EMITS: [&str; 4] =
     ["gl_Position=gl_in[i].gl_Position;", "EmitVertex();", "}", "EndPrimitive();"];
 
-// ---- Fragment shaders, from their beginning to their end -------------------------------------------------------------
-
+// ---- Fragment shaders, from their beginning to their end ----------------------------------------
 pub(super) const VIEW: &str = "vec4 vertexVC = vertexVCVSOutput;";
 
 /// What normals of triangles are made of; VTK 9.7 keeps the differences away from underflow, the
@@ -74,7 +72,8 @@ pub(super) const DIFFERENCES: [&str; 2] = [
 ];
 
 /// The slope of the surface, for depths that are moved back.
-pub(super) const SLOPE: &str = "float cscale = length(vec2(dFdx(gl_FragCoord.z), dFdy(gl_FragCoord.z)));";
+pub(super) const SLOPE: &str =
+    "float cscale = length(vec2(dFdx(gl_FragCoord.z), dFdy(gl_FragCoord.z)));";
 /// Depths that are moved back, without and with the slope, in VTK 9.1 to 9.6 and in 9.7.
 pub(super) const MOVED: [&str; 2] = [
     "gl_FragDepth = gl_FragCoord.z + 1.0*cOffset/65000;",
@@ -135,7 +134,8 @@ pub(super) const CELLS: &str =
 pub(super) const OF_TEXTURE: &str = "vec3 ambientColor = ambientIntensity * texColor.rgb;
      vec3 diffuseColor = diffuseIntensity * texColor.rgb;
      float opacity = opacityUniform * texColor.a;";
-pub(super) const OF_VERTICES: &str = "vec3 ambientColor = ambientIntensity * vertexColorVSOutput.rgb;
+pub(super) const OF_VERTICES: &str =
+    "vec3 ambientColor = ambientIntensity * vertexColorVSOutput.rgb;
      vec3 diffuseColor = diffuseIntensity * vertexColorVSOutput.rgb;
      float opacity = opacityUniform * vertexColorVSOutput.a;";
 pub(super) const OF_UNIFORMS: &str = "vec3 ambientColor = ambientIntensity * ambientColorUniform;
@@ -180,7 +180,8 @@ pub(super) const EDGES: &str = "float edist[3];
 pub(super) const SMOOTH: &str = "vec3 normalVCVSOutput = normalize(normalVCVSOutput);
      if (gl_FrontFacing == false) { normalVCVSOutput = -normalVCVSOutput; }";
 pub(super) const FLAT: &str = "vec3 normalVCVSOutput = normalize(cross(fdx,fdy));
-     if (cameraParallel == 1 && normalVCVSOutput.z < 0.0) { normalVCVSOutput = -1.0*normalVCVSOutput; }
+     if (cameraParallel == 1 && normalVCVSOutput.z < 0.0) { normalVCVSOutput = \
+     -1.0*normalVCVSOutput; }
      if (cameraParallel == 0 && dot(normalVCVSOutput,vertexVC.xyz) > 0.0)
      { normalVCVSOutput = -1.0*normalVCVSOutput; }";
 
@@ -196,7 +197,8 @@ pub(super) const HEADLIGHT: &str = "float df = max(0.000001, normalVCVSOutput.z)
 pub(super) const LEAST_AT_EYE: [&str; 2] = ["max(0.000001,", "max(0.0,"];
 pub(super) const LEAST_ELSEWHERE: [&str; 2] = ["max(1e-5,", "max(0.0,"];
 /// Before and after lights elsewhere.
-pub(super) const SUNS: &str = "vec3 diffuse = vec3(0,0,0); vec3 specular = vec3(0,0,0); float df; float sf;";
+pub(super) const SUNS: &str =
+    "vec3 diffuse = vec3(0,0,0); vec3 specular = vec3(0,0,0); float df; float sf;";
 pub(super) const LAMPS: &str = "vec3 diffuse = vec3(0,0,0); vec3 specular = vec3(0,0,0);
      vec3 vertLightDirectionVC; float attenuation; float df; float sf;";
 pub(super) const SUMMED: &str = "diffuse = diffuse * diffuseColor;
@@ -205,7 +207,8 @@ pub(super) const SUMMED: &str = "diffuse = diffuse * diffuseColor;
 /// A light from far away.
 pub(super) const SUN: &str = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC#));
      diffuse += (df * lightColor#);
-     sf = sign(df)*pow(max(1e-5, dot(reflect(lightDirectionVC#, normalVCVSOutput), normalize(-vertexVC.xyz))),
+     sf = sign(df)*pow(max(1e-5, dot(reflect(lightDirectionVC#, normalVCVSOutput), \
+     normalize(-vertexVC.xyz))),
        specularPower);
      specular += (sf * lightColor#);";
 /// A light that may have a place and a cone.
@@ -237,7 +240,8 @@ pub(super) const LAMP: &str = "attenuation = 1.0;
 /// The colour of a physically based material: the surface's, or by a texture with what becomes of
 /// its alpha.
 pub(super) const ALBEDO: &str = "vec3 albedo = diffuseColor;";
-pub(super) const ALBEDO_OF_TEXTURE: &str = "vec4 albedoSample = texture(albedoTex, tcoordVCVSOutput);
+pub(super) const ALBEDO_OF_TEXTURE: &str =
+    "vec4 albedoSample = texture(albedoTex, tcoordVCVSOutput);
      vec3 albedo = albedoSample.rgb * diffuseColor;";
 pub(super) const ALBEDO_ALPHA: [(ActorTexture, &str); 2] = [
     (ActorTexture::Albedo, "opacity = opacityUniform * albedoSample.a;"),
@@ -344,5 +348,6 @@ pub(super) const MOST_BEFORE: usize = 4;
 
 pub(super) const DISCARDS: &str = "if (fragOutput0.a <= 0.0) { discard; }";
 /// Sums for translucency that needs no order.
-pub(super) const WEIGHTED: &str = "fragOutput0 = vec4(fragOutput0.rgb * fragOutput0.a, fragOutput0.a);
+pub(super) const WEIGHTED: &str =
+    "fragOutput0 = vec4(fragOutput0.rgb * fragOutput0.a, fragOutput0.a);
      fragOutput1.r = fragOutput0.a;";

@@ -35,7 +35,11 @@ pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<ArraySource,
 }
 
 /// Colours of `count` triangles from number `first` on.
-pub(super) fn colors(source: &ArraySource, first: usize, count: usize) -> Result<Arc<Image>, &'static str> {
+pub(super) fn colors(
+    source: &ArraySource,
+    first: usize,
+    count: usize,
+) -> Result<Arc<Image>, &'static str> {
     let packed = source.read_range(first, count)?;
     if packed.size != 4 {
         return Err("colours of cells without four components");
@@ -47,7 +51,11 @@ pub(super) fn colors(source: &ArraySource, first: usize, count: usize) -> Result
 }
 
 /// Which sides of `count` triangles from number `first` on are edges of their cells.
-pub(super) fn sides(source: &ArraySource, first: usize, count: usize) -> Result<Arc<Vec<u8>>, &'static str> {
+pub(super) fn sides(
+    source: &ArraySource,
+    first: usize,
+    count: usize,
+) -> Result<Arc<Vec<u8>>, &'static str> {
     let packed = source.read_range(first, count)?;
     match (packed.kind, packed.size) {
         (UNSIGNED_BYTE, 1) => Ok(Arc::new(packed.bytes)),

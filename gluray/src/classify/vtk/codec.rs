@@ -61,7 +61,8 @@ impl VtkProgram {
         self
     }
 
-    /// Lights that the program computes with and that are not there; also those that are more than can be.
+    /// Lights that the program computes with and that are not there; also those that are more than
+    /// can be.
     pub(crate) fn missing_lights(&self) -> usize {
         let most = crate::trace::occlusion::MOST_LIGHTS;
         usize::from(self.signature.headlight && self.lights.is_empty())
@@ -75,7 +76,8 @@ impl Wire for VtkProgram {
         self.normal_matrix.put(out);
         self.signature.put(out);
         [self.ambient, self.diffuse, self.specular].put(out);
-        [self.ambient_intensity, self.diffuse_intensity, self.specular_power, self.opacity].put(out);
+        [self.ambient_intensity, self.diffuse_intensity, self.specular_power, self.opacity]
+            .put(out);
         [self.parallel, self.overrides].put(out);
         self.lights.put(out);
         (self.back, self.physical).put(out);

@@ -1,4 +1,5 @@
-//! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own, that of back faces, edges, lights.
+//! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own, that of
+//! back faces, edges, lights.
 
 use super::program::{CellEdges, PbrMaterial, ProgramLight, VtkProgram};
 use super::signature::{ActorTexture, ColorSource};
@@ -53,16 +54,20 @@ impl ProgramLight {
         let mut share = 1.0 / (constant + linear * distance + quadratic * distance * distance);
         if lamp.cone_deg < 90.0 {
             let cosine = dot(direction, self.direction);
-            share *=
-                if cosine >= lamp.cone_deg.to_radians().cos() { cosine.powf(lamp.exponent) } else { 0.0 };
+            share *= if cosine >= lamp.cone_deg.to_radians().cos() {
+                cosine.powf(lamp.exponent)
+            } else {
+                0.0
+            };
         }
         (direction, share)
     }
 }
 
 impl PbrMaterial {
-    /// Reflected light by that which comes along `l`, as VTK has it: Lambert's and an isotropic GGX lobe with the height-correlated Smith term and
-    /// Schlick's Fresnel factor. `cosines` are those of the half vector with the normal, the view, the light, and of half vector and light.
+    /// Reflected light by that which comes along `l`, as VTK has it: Lambert's and an isotropic GGX
+    /// lobe with the height-correlated Smith term and Schlick's Fresnel factor. `cosines` are those
+    /// of the half vector with the normal, the view, the light, and of half vector and light.
     fn reflected(&self, albedo: V3, [n_h, n_v, n_l, h_l]: [f32; 4]) -> V3 {
         use std::f32::consts::PI;
         let f0 = mix([self.base; 3], albedo, self.metallic);
@@ -74,8 +79,10 @@ impl PbrMaterial {
         let d = (n_h * a2 - n_h) * n_h + 1.0;
         let lobe = a2 / (PI * d * d).max(self.least_divisor);
         let r2 = self.roughness * self.roughness;
-        let (ggx_v, ggx_l) =
-            (n_l * (r2 + n_v * (n_v - r2 * n_v)).sqrt(), n_v * (r2 + n_l * (n_l - r2 * n_l)).sqrt());
+        let (ggx_v, ggx_l) = (
+            n_l * (r2 + n_v * (n_v - r2 * n_v)).sqrt(),
+            n_v * (r2 + n_l * (n_l - r2 * n_l)).sqrt(),
+        );
         let visible = 0.5 / (ggx_v + ggx_l);
         std::array::from_fn(|k| {
             let f = f0[k] + (f90[k] - f0[k]) * schlick;
@@ -90,9 +97,11 @@ impl CellEdges {
         let sides = self.sides.get(at.prim).copied().unwrap_or(7);
         let [vx, vy, vw, vh] = self.viewport;
         let p = corners.map(|c| {
-            [(c[0] / c[3] * 0.5 + 0.5) * vw + vx, (c[1] / c[3] * 0.5 + 0.5) * vh + vy].map(f64::from)
+            [(c[0] / c[3] * 0.5 + 0.5) * vw + vx, (c[1] / c[3] * 0.5 + 0.5) * vh + vy]
+                .map(f64::from)
         });
-        let cross = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
+        let cross =
+            (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
         let turn = if cross < 0.0 { -1.0 } else { 1.0 };
         let [mx, my] = at.sample_offset.map(f64::from);
         let (px, py) = match at.pixel {
@@ -120,7 +129,8 @@ impl CellEdges {
 }
 
 impl VtkProgram {
-    /// Colour and alpha of vertices, triangles or the colour map; no colour where the uniforms' are taken.
+    /// Colour and alpha of vertices, triangles or the colour map; no colour where the uniforms' are
+    /// taken.
     pub(super) fn own_color(
         &self,
         a: &Attributes,
@@ -169,7 +179,8 @@ impl VtkProgram {
             surface.diffuse = self.diffuse.map(|v| v * self.diffuse_intensity);
         }
         if let Some(edges) = &self.edges {
-            let corners = mesh.triangle(at.prim).map(|p| transform(&self.clip_from_object, p.to_array()));
+            let corners =
+                mesh.triangle(at.prim).map(|p| transform(&self.clip_from_object, p.to_array()));
             let line = edges.share(corners, at) * edges.opacity;
             surface.diffuse = mix(surface.diffuse, [0.0; 3], line);
             surface.ambient = mix(surface.ambient, edges.color, line);
@@ -199,8 +210,11 @@ impl VtkProgram {
         let normal = if self.signature.flat {
             let e = |k: usize| -> V3 { std::array::from_fn(|c| view[k][c] - view[0][c]) };
             let (p, q) = (e(1), e(2));
-            let n =
-                normalized([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]);
+            let n = normalized([
+                p[1] * q[2] - p[2] * q[1],
+                p[2] * q[0] - p[0] * q[2],
+                p[0] * q[1] - p[1] * q[0],
+            ]);
             let away = if self.parallel { n[2] < 0.0 } else { dot(n, point) > 0.0 };
             if away { n.map(|v| -v) } else { n }
         } else {
@@ -331,8 +345,13 @@ mod tests {
 
     #[test]
     fn a_rough_metal_reflects_less_along_the_normal_than_a_smooth_one_and_has_no_diffuse_part() {
-        let p =
-            PbrMaterial { metallic: 1.0, roughness: 0.9, base: 0.04, tint: [1.0; 3], least_divisor: 1e-8 };
+        let p = PbrMaterial {
+            metallic: 1.0,
+            roughness: 0.9,
+            base: 0.04,
+            tint: [1.0; 3],
+            least_divisor: 1e-8,
+        };
         let smooth = PbrMaterial { roughness: 0.2, ..p };
         let along = [1.0, 1.0, 1.0, 1.0];
         let (rough, shiny) = (p.reflected([0.5; 3], along), smooth.reflected([0.5; 3], along));
@@ -367,7 +386,8 @@ mod tests {
         assert_eq!(edges(7).share(corners, &at(5, 5)), 0.0, "inside");
         // The same place by the corners' weights: 6.5 and 0.5 of 20.
         let weights = [0.65, 0.325, 0.025];
-        let by_weights = edges(1).share(corners, &FragmentSample { pixel: None, weights, ..at(0, 0) });
+        let by_weights =
+            edges(1).share(corners, &FragmentSample { pixel: None, weights, ..at(0, 0) });
         assert!((by_weights - 0.5).abs() < 1e-5, "{by_weights}");
     }
 }

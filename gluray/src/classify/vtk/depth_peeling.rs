@@ -1,11 +1,14 @@
-//! VTK's dual depth peeling (Bavoil and Myers 2008), which draws translucent surfaces six times or more, as one draw of ours.
+//! VTK's dual depth peeling (Bavoil and Myers 2008), which draws translucent surfaces six times or
+//! more, as one draw of ours.
 //!
-//! The driver draws the first pass, which finds how far surfaces reach; the texture it makes is also the depth of what is opaque. In the pass that would
-//! peel the first layers nothing is drawn: all surfaces are traced, blended by depth, and put where VTK gathers the layers that are nearest. It asks
-//! how many pixels that pass changed farther back, hears that there were none, and is done. So all of VTK's own steps after that are right as they are.
+//! The driver draws the first pass, which finds how far surfaces reach; the texture it makes is
+//! also the depth of what is opaque. In the pass that would peel the first layers nothing is drawn:
+//! all surfaces are traced, blended by depth, and put where VTK gathers the layers that are
+//! nearest. It asks how many pixels that pass changed farther back, hears that there were none, and
+//! is done. So all of VTK's own steps after that are right as they are.
 //!
-//! Only when every draw of the first pass was a surface that we know is anything taken out of the second. Text, lines or volumes among them leave the
-//! whole to the driver.
+//! Only when every draw of the first pass was a surface that we know is anything taken out of the
+//! second. Text, lines or volumes among them leave the whole to the driver.
 
 use super::signature::TranslucencyPass;
 use crate::capture::geometry_cache::BuildCounts;
@@ -54,15 +57,20 @@ impl DepthPeeling {
 }
 
 impl Context {
-    /// What becomes of a draw of a pass for translucency; the reason when the driver draws it. `Ok`: it is to be taken.
-    pub(super) fn check_peeling_pass(&mut self, pass: TranslucencyPass) -> Result<(), &'static str> {
+    /// What becomes of a draw of a pass for translucency; the reason when the driver draws it.
+    /// `Ok`: it is to be taken.
+    pub(super) fn check_peeling_pass(
+        &mut self,
+        pass: TranslucencyPass,
+    ) -> Result<(), &'static str> {
         const PEELED: &str = "translucent surfaces that VTK peels";
         if pass == TranslucencyPass::Weighted {
             return self.check_weighted_pass();
         }
         let peeling = &mut self.programs.peeling;
         let settings = &self.config.settings;
-        let traced = settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
+        let traced =
+            settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         match pass {
             TranslucencyPass::No | TranslucencyPass::Weighted => Ok(()),
             TranslucencyPass::Depths => {
@@ -89,7 +97,8 @@ impl Context {
         }
     }
 
-    /// Whether a peeled surface can be traced: but for what peeling itself sets, its state is that of any surface.
+    /// Whether a peeled surface can be traced: but for what peeling itself sets, its state is that
+    /// of any surface.
     pub(super) fn check_peeled_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
         (state.more_draw_buffers, state.blend, state.depth_test) = (false, false, true);
         (state.depth_mask, state.depth_func) = (true, LEQUAL);
@@ -127,8 +136,9 @@ impl Context {
         };
         let same = self.state.framebuffer == self.programs.peeling.framebuffer;
         let Some((target, before)) = there.filter(|_| same) else {
-            self.counters
-                .warn("depth peeling did not go as VTK's does: translucent surfaces are lost".into());
+            self.counters.warn(
+                "depth peeling did not go as VTK's does: translucent surfaces are lost".into(),
+            );
             return;
         };
         let start = Instant::now();

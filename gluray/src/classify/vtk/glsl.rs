@@ -142,7 +142,8 @@ fn assigns(statement: &str, name: &str) -> bool {
 
 /// FNV-1a, which is the same on all machines.
 fn digest(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// The source with lines put together that end in `\`, and a blank for each comment.
@@ -219,7 +220,8 @@ fn output_declaration(text: &str, stage: ShaderStage) -> Option<Option<String>> 
     let words: Vec<&str> = text.split_whitespace().collect();
     let plain = |name: &str| {
         let name = name.split('[').next().unwrap_or("");
-        let is_name = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
+        let is_name =
+            !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
         is_name.then(|| name.to_owned())
     };
     let of_edges = words.first() == Some(&"noperspective");
@@ -263,10 +265,15 @@ mod tests {
 
     #[test]
     fn statements_keep_their_order_and_their_braces() {
-        let text = "#version 150\n/* a */ void main()\n{ for (int i = 0; i < 3; i++) { a\\\n = b; ; } // c\n if (d) e = 1; else { f; } }";
-        let expected = ["for(inti=0;i<3;i++)", "{", "a=b;", "}", "if(d)e=1;", "else", "{", "f;", "}"];
+        let text = "#version 150\n/* a */ void main()\n{ for (int i = 0; i < 3; i++) { a\\\n = b; \
+                    ; } // c\n if (d) e = 1; else { f; } }";
+        let expected =
+            ["for(inti=0;i<3;i++)", "{", "a=b;", "}", "if(d)e=1;", "else", "{", "f;", "}"];
         assert_eq!(read(text).expect("known"), expected);
-        assert_eq!(read("void main() { if (a); { b; } }").expect("known"), ["if(a);", "{", "b;", "}"]);
+        assert_eq!(
+            read("void main() { if (a); { b; } }").expect("known"),
+            ["if(a);", "{", "b;", "}"]
+        );
         assert_eq!(read("void main() { a = b; // c = d;\n/* e; */ }").expect("known"), ["a=b;"]);
     }
 
@@ -274,7 +281,10 @@ mod tests {
     fn conditions_are_decided_or_make_the_source_unknown() {
         let with = |lines: &str| read(&format!("#version 150\nvoid main() {{\n{lines}\n}}"));
         assert_eq!(with("#ifdef GL_ES\na;\n#else\nb;\n#endif").expect("known"), ["b;"]);
-        assert_eq!(with("#ifndef GL_ES\na;\n#ifdef CLEAR_COAT\nb;\n#endif\n#endif").expect("known"), ["a;"]);
+        assert_eq!(
+            with("#ifndef GL_ES\na;\n#ifdef CLEAR_COAT\nb;\n#endif\n#endif").expect("known"),
+            ["a;"]
+        );
         assert_eq!(with("#ifdef GL_ES\n#if 1\na;\n#endif\n#endif").expect("known"), [""; 0]);
         for unknown in [
             "#if 0\na;\n#endif",
@@ -293,7 +303,9 @@ mod tests {
 
     #[test]
     fn declarations_and_functions_beside_main_are_known_ones() {
-        let with = |text: &str, stage| statements(&format!("{text} void main() {{ a; }}"), stage).is_some();
+        let with = |text: &str, stage| {
+            statements(&format!("{text} void main() {{ a; }}"), stage).is_some()
+        };
         let known = [
             "in vec4 vertexVCVSOutput;",
             "uniform float x; uniform vec4 clipPlanes[6];",
@@ -324,9 +336,13 @@ mod tests {
 
     #[test]
     fn what_is_not_balanced_is_unknown() {
-        for text in
-            ["void main() { a; ", "void main() { a; } }", "void main() { a }", "void main() { (a; }", ""]
-        {
+        for text in [
+            "void main() { a; ",
+            "void main() { a; } }",
+            "void main() { a }",
+            "void main() { (a; }",
+            "",
+        ] {
             assert_eq!(read(text), None, "{text}");
         }
     }

@@ -180,7 +180,8 @@ impl VtkProgram {
             false => (0..signature.lights).map(light).collect(),
         };
         let times = |name: &str, factor: &str| value::<3>(program, name).map(|v| v * one(factor));
-        let planes = if signature.clipped { number("numClipPlanes").clamp(0, MOST_PLANES) } else { 0 };
+        let planes =
+            if signature.clipped { number("numClipPlanes").clamp(0, MOST_PLANES) } else { 0 };
         VtkProgram {
             clip_from_object: value(program, "MCDCMatrix"),
             view_from_object: value(program, "MCVCMatrix"),
@@ -270,13 +271,21 @@ impl VtkProgram {
             && self.picture_is_opaque()
             && match self.signature.colors {
                 ColorSource::Uniform => true,
-                ColorSource::Map | ColorSource::PerCell => self.map.as_ref().is_some_and(|m| m.is_opaque()),
+                ColorSource::Map | ColorSource::PerCell => {
+                    self.map.as_ref().is_some_and(|m| m.is_opaque())
+                }
                 ColorSource::PerVertex => (0..vertices).all(|i| attributes.colors.at(i)[3] == 1.0),
             }
     }
 
     /// Diffuse colour with its coefficient, and opacity; with the picture on it.
-    pub(crate) fn base(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
+    pub(crate) fn base(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        prim: usize,
+        w: [f32; 3],
+    ) -> ([f32; 3], f32) {
         let (color, alpha) = self.ground(a, mesh, prim, w);
         match self.picture_at(a, mesh, prim, w, None) {
             Some([r, g, b, share]) => ([color[0] * r, color[1] * g, color[2] * b], alpha * share),
@@ -285,14 +294,20 @@ impl VtkProgram {
     }
 
     /// The same without the picture.
-    pub(crate) fn ground(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> ([f32; 3], f32) {
+    pub(crate) fn ground(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        prim: usize,
+        w: [f32; 3],
+    ) -> ([f32; 3], f32) {
         let (own, alpha) = self.own_color(a, mesh, prim, w);
         let unlit = if self.signature.lit { 0.0 } else { self.ambient_intensity };
         let color: [f32; 3] = match own {
             Some(c) => c.map(|v| v * (self.diffuse_intensity + unlit)),
-            None => {
-                std::array::from_fn(|k| self.diffuse[k] * self.diffuse_intensity + self.ambient[k] * unlit)
-            }
+            None => std::array::from_fn(|k| {
+                self.diffuse[k] * self.diffuse_intensity + self.ambient[k] * unlit
+            }),
         };
         (color, alpha * self.opacity)
     }
@@ -303,8 +318,12 @@ impl VtkProgram {
         let factor = self.diffuse_intensity + unlit;
         match (self.signature.colors, &self.map) {
             (ColorSource::PerVertex, _) if !self.overrides => ProgramColorSource::PerVertex(factor),
-            (ColorSource::Map, Some(map)) if !self.overrides => ProgramColorSource::Map(map, factor),
-            (ColorSource::PerCell, Some(map)) if !self.overrides => ProgramColorSource::PerCell(map, factor),
+            (ColorSource::Map, Some(map)) if !self.overrides => {
+                ProgramColorSource::Map(map, factor)
+            }
+            (ColorSource::PerCell, Some(map)) if !self.overrides => {
+                ProgramColorSource::PerCell(map, factor)
+            }
             _ => self
                 .picture_alone()
                 .map_or(ProgramColorSource::Constant, |image| ProgramColorSource::Picture(image)),
@@ -317,7 +336,10 @@ impl VtkProgram {
             (self.edges.is_some(), "edges of cells"),
             (self.back.is_some(), "materials of back faces"),
             (self.physical.is_some(), "VTK's rules for physically based materials"),
-            (self.picture.is_some() && self.picture_alone().is_none(), "pictures over other colours"),
+            (
+                self.picture.is_some() && self.picture_alone().is_none(),
+                "pictures over other colours",
+            ),
         ];
         left_out.into_iter().filter_map(|(there, what)| there.then_some(what))
     }
@@ -346,7 +368,13 @@ impl VtkProgram {
     }
 
     /// Shading normal in eye space.
-    pub(crate) fn smooth_normal(&self, a: &Attributes, mesh: &TriMesh, prim: usize, w: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn smooth_normal(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        prim: usize,
+        w: [f32; 3],
+    ) -> [f32; 3] {
         let corners = mesh.indices[prim].map(|i| i as usize);
         match self.eye_from_normal() {
             Some(m) => {

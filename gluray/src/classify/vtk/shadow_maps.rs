@@ -1,7 +1,10 @@
-//! VTK's own shadows: it draws surfaces as ever, then depths as lights see them, then all surfaces again over themselves, with shadows.
+//! VTK's own shadows: it draws surfaces as ever, then depths as lights see them, then all surfaces
+//! again over themselves, with shadows.
 //!
-//! Drawing over needs depths that are equal to the last bit, which rays and the driver do not have. So surfaces are the driver's where shadow maps are in use. The
-//! first frame tells that too late: surfaces were traced before the first map was drawn. There the driver's second draw is moved a little to the viewer.
+//! Drawing over needs depths that are equal to the last bit, which rays and the driver do not have.
+//! So surfaces are the driver's where shadow maps are in use. The first frame tells that too late:
+//! surfaces were traced before the first map was drawn. There the driver's second draw is moved a
+//! little to the viewer.
 
 use super::signature::SHADOW_MAP;
 use crate::interpose::context::Context;
@@ -10,7 +13,8 @@ use crate::state::enums::*;
 
 /// Frames for which a shadow map is taken to be in use.
 const IN_USE_FRAMES: u64 = 3;
-/// How much nearer surfaces are drawn over traced ones: factor and units of polygon offset. A whole factor would bring back faces before front faces at silhouettes.
+/// How much nearer surfaces are drawn over traced ones: factor and units of polygon offset. A whole
+/// factor would bring back faces before front faces at silhouettes.
 const NEARER: (f32, f32) = (-1.0 / 64.0, -8.0);
 
 /// Shadow maps of a context.
@@ -25,7 +29,8 @@ pub(super) struct ShadowMaps {
 }
 
 impl Context {
-    /// Whether a surface can be traced that VTK may draw again; `signature` is what is known of its program.
+    /// Whether a surface can be traced that VTK may draw again; `signature` is what is known of its
+    /// program.
     pub(super) fn is_drawn_once<T>(
         &mut self,
         signature: &Result<T, &'static str>,
@@ -50,10 +55,12 @@ impl Context {
         let s = &self.state;
         let is_map = self.programs.signatures.get(&s.program) == Some(&Err(SHADOW_MAP));
         let again = maps.last_traced == Some(now) && now < maps.until && s.program != 0 && !is_map;
-        if !again || !s.depth_test || !s.depth_mask || s.depth_func != LEQUAL || maps.kept.is_some() {
+        if !again || !s.depth_test || !s.depth_mask || s.depth_func != LEQUAL || maps.kept.is_some()
+        {
             return;
         }
-        let offset = [POLYGON_OFFSET_FACTOR, POLYGON_OFFSET_UNITS].map(|what| gl::floats::<1>(what)[0]);
+        let offset =
+            [POLYGON_OFFSET_FACTOR, POLYGON_OFFSET_UNITS].map(|what| gl::floats::<1>(what)[0]);
         maps.kept = Some((gl::is_enabled(POLYGON_OFFSET_FILL), offset));
         gl::enable(POLYGON_OFFSET_FILL);
         gl::polygon_offset(offset[0] + NEARER.0, offset[1] + NEARER.1);

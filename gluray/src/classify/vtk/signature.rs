@@ -39,7 +39,10 @@ pub(super) enum ActorTexture {
 impl ActorTexture {
     /// True when light and all is multiplied.
     pub(super) fn is_over_all(self) -> bool {
-        matches!(self, ActorTexture::Rgba | ActorTexture::Rgb | ActorTexture::Grey | ActorTexture::GreyAlpha)
+        matches!(
+            self,
+            ActorTexture::Rgba | ActorTexture::Rgb | ActorTexture::Grey | ActorTexture::GreyAlpha
+        )
     }
 }
 
@@ -106,8 +109,8 @@ impl StatementReader<'_> {
     }
 
     fn take_all(&mut self, piece: &[impl AsRef<str>]) -> bool {
-        let there =
-            self.left.len() >= piece.len() && self.left.iter().zip(piece).all(|(s, p)| s == p.as_ref());
+        let there = self.left.len() >= piece.len()
+            && self.left.iter().zip(piece).all(|(s, p)| s == p.as_ref());
         if there {
             self.left = &self.left[piece.len()..];
         }
@@ -162,7 +165,8 @@ impl VtkShaderSignature {
             t.read_geometry(geometry).ok_or("a geometry or tessellation shader")?;
         }
         t.read_vertex(&vs).ok_or(NOT_VTK)?;
-        let actor_texture = text.contains("texture(actortexture") || text.contains("texture(albedoTex");
+        let actor_texture =
+            text.contains("texture(actortexture") || text.contains("texture(albedoTex");
         t.read_fragment(&fs).ok_or(if actor_texture { PICTURE } else { UNKNOWN })?;
         t.lobes_have_an_end = t.physical && text.contains(LOBES_HAVE_AN_END);
         Ok(t)
@@ -294,14 +298,17 @@ impl VtkShaderSignature {
         if physical {
             let lights = read_physical(r)?;
             self.lit = true;
-            (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
+            (self.headlight, self.lights, self.placed) =
+                (lights.head, lights.others, lights.placed);
         } else if !r.take(UNLIT) {
             let lights = self.read_lights(r)?;
             self.lit = true;
-            (self.headlight, self.lights, self.placed) = (lights.head, lights.others, lights.placed);
+            (self.headlight, self.lights, self.placed) =
+                (lights.head, lights.others, lights.placed);
         }
         let one_kind = self.headlight != (self.lights > 0);
-        let known = (!self.lit || one_kind) && self.lights <= MOST_LIGHTS && (physical || !self.linear);
+        let known =
+            (!self.lit || one_kind) && self.lights <= MOST_LIGHTS && (physical || !self.linear);
         known.then_some(())
     }
 
@@ -358,7 +365,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const VERTEX: &str = "#version 150\nin vec4 vertexMC; // a comment\nvoid main()\n{\n  vertexVCVSOutput = MCVCMatrix * vertexMC;\n  gl_Position = MCDCMatrix * vertexMC;\n}\n";
+    const VERTEX: &str = "#version 150\nin vec4 vertexMC; // a comment\nvoid main()\n{\n  \
+                          vertexVCVSOutput = MCVCMatrix * vertexMC;\n  gl_Position = MCDCMatrix * \
+                          vertexMC;\n}\n";
 
     /// Pieces of a fragment shader, in VTK's order.
     #[derive(Clone)]
@@ -419,7 +428,8 @@ mod tests {
     fn headlights_and_light_kits_are_told_apart() {
         let head = with_light(HEADLIGHT).expect("known");
         assert!(head.headlight && head.lit && head.lights == 0 && !head.cosines_from_zero);
-        let before = with_light(HEADLIGHT.replace(LEAST_AT_EYE[0], LEAST_AT_EYE[1])).expect("known");
+        let before =
+            with_light(HEADLIGHT.replace(LEAST_AT_EYE[0], LEAST_AT_EYE[1])).expect("known");
         assert!(before.headlight && before.cosines_from_zero);
         let kit = |begin: &str, light: &str, n| [begin, &numbered(light, n), SUMMED].concat();
         let far = with_light(kit(SUNS, SUN, 5)).expect("known");
@@ -429,7 +439,10 @@ mod tests {
         let of_9_1 = SUN.replace(LEAST_ELSEWHERE[0], LEAST_ELSEWHERE[1]);
         let old = with_light(kit(SUNS, &of_9_1, 2)).expect("known");
         assert!(old.lights == 2 && old.cosines_from_zero);
-        assert!(with_light(kit(LAMPS, LAMP.split_once(';').expect("two").1, 1)).is_err(), "not all of it");
+        assert!(
+            with_light(kit(LAMPS, LAMP.split_once(';').expect("two").1, 1)).is_err(),
+            "not all of it"
+        );
         assert!(with_light(kit(SUNS, SUN, MOST_LIGHTS + 1)).is_err(), "too many");
         assert!(with_light(kit(SUNS, SUN, 0)).is_err(), "lit by nothing");
         let twice = kit(SUNS, SUN, 1).replace("sign(df)", "sign(df)*2.0");
@@ -467,7 +480,8 @@ mod tests {
         let geometry = |more: &str| {
             let (corners, emits) = (CORNERS.concat(), EMITS.concat());
             format!(
-                "void main() {{ {MEASURES} {corners} vertexVCGSOutput = vertexVCVSOutput[i]; {more} {emits} }}"
+                "void main() {{ {MEASURES} {corners} vertexVCGSOutput = vertexVCVSOutput[i]; \
+                 {more} {emits} }}"
             )
         };
         let edges = with(|p| p.edges = EDGES.into());
@@ -479,7 +493,10 @@ mod tests {
         }
         assert!(edges.read().is_err(), "nobody measures");
         let plain = Parts::default().text();
-        assert!(VtkShaderSignature::read(VERTEX, &geometry(""), &plain).is_err(), "nobody draws them");
+        assert!(
+            VtkShaderSignature::read(VERTEX, &geometry(""), &plain).is_err(),
+            "nobody draws them"
+        );
     }
 
     #[test]
@@ -491,7 +508,9 @@ mod tests {
                 let t = whole.read().expect("known");
                 assert!(t.physical && t.lit && t.lights == n && t.headlight == (n == 0));
                 assert!(with_light(light.clone() + SUMMED).is_err(), "two colours");
-                assert!(with_light(light.replace("float ao = 1.0", "float ao = texture(ao)")).is_err());
+                assert!(
+                    with_light(light.replace("float ao = 1.0", "float ao = texture(ao)")).is_err()
+                );
                 let colored = |light: &str| {
                     with(|p| {
                         p.light = light.into();
@@ -548,7 +567,8 @@ mod tests {
     #[test]
     fn physically_based_materials_have_colours_from_pictures() {
         for (actor_texture, alpha) in ALBEDO_ALPHA {
-            let light = [ALBEDO_OF_TEXTURE, alpha, PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat();
+            let light =
+                [ALBEDO_OF_TEXTURE, alpha, PHYSICAL, PHYSICAL_HEADLIGHT, PHYSICAL_ENDS[0]].concat();
             let t = with_light(light.clone()).expect("known");
             assert!(t.physical && t.actor_texture == actor_texture);
             let other = light.replace("albedoSample.rgb *", "albedoSample.rgb +");
@@ -558,8 +578,9 @@ mod tests {
 
     #[test]
     fn normals_out_of_differences_are_known_with_and_without_a_scale() {
-        let flat =
-            |differences: &str| with(|p| (p.depth, p.normal) = (differences.into(), FLAT.into())).read();
+        let flat = |differences: &str| {
+            with(|p| (p.depth, p.normal) = (differences.into(), FLAT.into())).read()
+        };
         for differences in DIFFERENCES {
             assert!(flat(differences).expect("known").flat, "{differences}");
         }
@@ -574,8 +595,9 @@ mod tests {
             (TranslucencyPass::Layers, PEEL_LAYERS, PEELED_LAYERS),
             (TranslucencyPass::Layers, &layers, PEELED_LAYERS),
         ] {
-            let pass =
-                |begin: &str, end: &str| with(|p| (p.depth, p.end) = (begin.into(), end.into())).read();
+            let pass = |begin: &str, end: &str| {
+                with(|p| (p.depth, p.end) = (begin.into(), end.into())).read()
+            };
             let commented = end.replace("fragOutput0 = frag;", "fragOutput0 = frag; // the back\n");
             let known = pass(begin, &commented);
             assert_eq!(known.map(|t| (t.peel, t.headlight)), Ok((peel, true)));
@@ -647,7 +669,10 @@ mod tests {
                 let mut less = whole.clone();
                 let gone = less.remove(at);
                 // Some pieces are there or not; what remains is then another surface.
-                assert!(read(&less) != read(&whole) || gone.starts_with("vec4vertexVC"), "without {gone}");
+                assert!(
+                    read(&less) != read(&whole) || gone.starts_with("vec4vertexVC"),
+                    "without {gone}"
+                );
                 let mut twice = whole.clone();
                 twice.insert(at, gone.clone());
                 assert!(!is_known(&twice), "twice {gone}");
@@ -658,7 +683,9 @@ mod tests {
                 conditional[at] = format!("#if 0\n{gone}\n#endif");
                 assert!(!is_known(&conditional), "in a condition: {gone}");
                 if gone.ends_with(';') {
-                    for head in ["if (false)", "if (gl_FrontFacing)", "for (int k = 0; k < 2; k++)", ""] {
+                    for head in
+                        ["if (false)", "if (gl_FrontFacing)", "for (int k = 0; k < 2; k++)", ""]
+                    {
                         let mut inside = whole.clone();
                         inside[at] = format!("{head} {{ {gone} }}");
                         assert!(!is_known(&inside), "{head} {{ {gone} }}");
@@ -689,7 +716,8 @@ mod tests {
             kind in 0_usize..8,
             at in any::<prop::sample::Index>(),
             added in prop::sample::select(vec![
-                "discard;", "return;", "diffuse *= 0.5;", "fragOutput0.r = 1.0;", "{", "}", "{ }", "else",
+                "discard;", "return;", "diffuse *= 0.5;", "fragOutput0.r = \
+                                                           1.0;", "{", "}", "{ }", "else",
                 "#define pow(a, b) 1.0", "#line 3", "if (opacity > 2.0) discard;", "opacity = 0.5;",
                 "float other;", "normalVCVSOutput = -normalVCVSOutput;", "gl_FragDepth = 0.5;",
             ])

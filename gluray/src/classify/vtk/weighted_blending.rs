@@ -1,7 +1,9 @@
-//! VTK's translucency without peeling (weighted sums after McGuire and Bavoil 2013): each layer is added up, whatever its order, and a pass of the program's divides.
+//! VTK's translucency without peeling (weighted sums after McGuire and Bavoil 2013): each layer is
+//! added up, whatever its order, and a pass of the program's divides.
 //!
-//! All layers before the opaque surfaces are found by rays, as for depth peeling, and their sums go through the program's own blending: what the driver draws
-//! into the same sums (lines, text, what is not known) is added as it would be.
+//! All layers before the opaque surfaces are found by rays, as for depth peeling, and their sums go
+//! through the program's own blending: what the driver draws into the same sums (lines, text, what
+//! is not known) is added as it would be.
 
 use crate::capture::draw::Draw;
 use crate::capture::geometry_cache::BuildCounts;
@@ -57,7 +59,8 @@ impl Context {
     /// Whether a draw into such sums can be taken: the reason when not.
     pub(super) fn check_weighted_pass(&self) -> Result<(), &'static str> {
         let (s, settings) = (&self.state, &self.config.settings);
-        let traced = settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
+        let traced =
+            settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         let adds = [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA].map(gl::word)
             == [ONE, ONE, ZERO, ONE_MINUS_SRC_ALPHA]
             && [BLEND_EQUATION, BLEND_EQUATION_ALPHA].map(gl::word) == [FUNC_ADD; 2];
@@ -132,7 +135,8 @@ impl Context {
 
     fn add_sums(&mut self, sums: &WeightedSums) {
         if !self.programs.weighted.prepare(self.presenter.vertex_array()) {
-            self.counters.count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
+            self.counters
+                .count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
             return;
         }
         let p = &mut self.programs.weighted;
@@ -143,7 +147,8 @@ impl Context {
             p.size = [r.w.max(p.size[0]), r.h.max(p.size[1])];
         }
         let formats = [(RGBA32F, RGBA), (R32F, RED)];
-        let data: [&[u8]; 2] = [bytemuck::cast_slice(&sums.colors), bytemuck::cast_slice(&sums.weights)];
+        let data: [&[u8]; 2] =
+            [bytemuck::cast_slice(&sums.colors), bytemuck::cast_slice(&sums.weights)];
         for (unit, (inner, format)) in formats.into_iter().enumerate() {
             gl::active_texture(TEXTURE0 + unit as u32);
             gl::bind_texture(TEXTURE_2D, p.textures[unit]);

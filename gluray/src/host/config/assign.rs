@@ -41,11 +41,14 @@ pub struct SettingError {
     pub cure: String,
 }
 
-/// The settings with all assignments that make sense, later ones over earlier ones, and what is wrong with the others.
+/// The settings with all assignments that make sense, later ones over earlier ones, and what is
+/// wrong with the others.
 pub fn assign(base: &Settings, assignments: &[Assignment]) -> (Settings, Vec<SettingError>) {
     let mut errors = Vec::new();
     // A tree of plain values: settings always make one.
-    let Ok(Value::Object(mut tree)) = serde_json::to_value(base) else { return (base.clone(), errors) };
+    let Ok(Value::Object(mut tree)) = serde_json::to_value(base) else {
+        return (base.clone(), errors);
+    };
     for a in assignments {
         match checked(a) {
             Ok(value) => put(&mut tree, &a.path, value),
@@ -109,7 +112,8 @@ fn checked(a: &Assignment) -> Result<Value, SettingError> {
             return wrong(
                 "has a key that no object has".into(),
                 format!(
-                    "keys have 1 to {MAX_OBJECT_KEY} letters, digits, `-`, `_`, `:` or `#`; `gluray explain` lists them"
+                    "keys have 1 to {MAX_OBJECT_KEY} letters, digits, `-`, `_`, `:` or `#`; \
+                     `gluray explain` lists them"
                 ),
             );
         }
@@ -132,7 +136,8 @@ fn object_of(path: &str) -> Option<&str> {
 fn fits(kind: Kind, value: &Value) -> bool {
     let three = || -> Option<[f64; 3]> {
         let list = value.as_array().filter(|l| l.len() == 3)?;
-        let numbers: Vec<f64> = list.iter().filter_map(Value::as_f64).filter(|v| v.is_finite()).collect();
+        let numbers: Vec<f64> =
+            list.iter().filter_map(Value::as_f64).filter(|v| v.is_finite()).collect();
         numbers.try_into().ok()
     };
     match kind {
@@ -143,9 +148,8 @@ fn fits(kind: Kind, value: &Value) -> bool {
         Kind::Real { low, high } => value.as_f64().is_some_and(|v| (low..=high).contains(&v)),
         Kind::Word { words } => value.as_str().is_some_and(|v| words.contains(&v)),
         Kind::Color => three().is_some_and(|v| v.iter().all(|c| (0.0..=1.0).contains(c))),
-        Kind::Direction => {
-            three().is_some_and(|v| v.iter().any(|c| c.abs() > 1e-6) && v.iter().all(|c| c.abs() < 1e6))
-        }
+        Kind::Direction => three()
+            .is_some_and(|v| v.iter().any(|c| c.abs() > 1e-6) && v.iter().all(|c| c.abs() < 1e6)),
     }
 }
 
@@ -165,7 +169,11 @@ pub(super) fn give(field: &Field) -> String {
 fn unknown(path: &str) -> String {
     let own = path.rsplit('.').next().unwrap_or(path);
     let near = FIELDS.iter().map(|f| {
-        (distance(path, f.path).min(distance(own, f.path.rsplit('.').next().unwrap_or(f.path)) + 1), f.path)
+        (
+            distance(path, f.path)
+                .min(distance(own, f.path.rsplit('.').next().unwrap_or(f.path)) + 1),
+            f.path,
+        )
     });
     match near.min() {
         Some((d, name)) if d <= 3 => format!("did you mean `{name}`?"),
@@ -204,7 +212,8 @@ mod tests {
     use crate::host::config::{Mode, Surface};
 
     fn one(path: &str, value: Value) -> Result<Settings, String> {
-        let (settings, errors) = assign(&Settings::default(), &[Assignment::new("test.toml", path, value)]);
+        let (settings, errors) =
+            assign(&Settings::default(), &[Assignment::new("test.toml", path, value)]);
         match errors.first() {
             None => Ok(settings),
             Some(e) => {
@@ -234,7 +243,9 @@ mod tests {
         );
         assert!(one("a.b.c.d.e", json!(1)).unwrap_err().contains("there are: enabled, mode"));
         assert!(
-            one("effects.aperture_radius", json!(-1)).unwrap_err().contains("from 0 to 1 (of the diagonal)")
+            one("effects.aperture_radius", json!(-1))
+                .unwrap_err()
+                .contains("from 0 to 1 (of the diagonal)")
         );
     }
 
@@ -272,14 +283,18 @@ mod tests {
         ];
         let (s, errors) = assign(&Settings::default(), &all);
         assert!(errors.is_empty(), "{errors:?}");
-        assert_eq!((s.mode, s.material.mirror, s.material.surface), (Mode::Rich, None, Some(Surface::Metal)));
+        assert_eq!(
+            (s.mode, s.material.mirror, s.material.surface),
+            (Mode::Rich, None, Some(Surface::Metal))
+        );
         assert_eq!(s.material_of("k1").surface, Some(Surface::Glass));
         assert_eq!(s.material_of("k2").surface, Some(Surface::Metal));
     }
 
     #[test]
     fn distances_are_those_of_levenshtein() {
-        for (a, b, d) in [("", "abc", 3), ("kitten", "sitting", 3), ("shadow", "shadows", 1), ("ab", "ba", 2)]
+        for (a, b, d) in
+            [("", "abc", 3), ("kitten", "sitting", 3), ("shadow", "shadows", 1), ("ab", "ba", 2)]
         {
             assert_eq!(distance(a, b), d, "{a} {b}");
         }

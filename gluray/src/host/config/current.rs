@@ -1,4 +1,5 @@
-//! The settings of this process: read once when they are first asked for, replaced when the panel says so.
+//! The settings of this process: read once when they are first asked for, replaced when the panel
+//! says so.
 
 use super::fields::{FIELDS, Field};
 use super::load::Sources;
@@ -43,7 +44,8 @@ impl Config {
     }
 }
 
-/// Paths of settings that the library obeys today. The panel disables the others, and whoever sets one is told in the report.
+/// Paths of settings that the library obeys today. The panel disables the others, and whoever sets
+/// one is told in the report.
 pub(crate) const SUPPORTED_SETTINGS: &[&str] = &[
     "asynchronous",
     "enabled",
@@ -83,14 +85,18 @@ pub(crate) const SUPPORTED_SETTINGS: &[&str] = &[
 fn unsupported_settings(settings: &Settings) -> Vec<String> {
     let tree = |s: &Settings| serde_json::to_value(s).unwrap_or_default();
     let (now, usual) = (tree(settings), tree(&Settings::default()));
-    let value =
-        |tree: &serde_json::Value, path: &str| tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned();
-    let in_vain =
-        |f: &&Field| !SUPPORTED_SETTINGS.contains(&f.path) && value(&now, f.path) != value(&usual, f.path);
+    let value = |tree: &serde_json::Value, path: &str| {
+        tree.pointer(&format!("/{}", path.replace('.', "/"))).cloned()
+    };
+    let in_vain = |f: &&Field| {
+        !SUPPORTED_SETTINGS.contains(&f.path) && value(&now, f.path) != value(&usual, f.path)
+    };
     let mut out: Vec<String> = FIELDS
         .iter()
         .filter(in_vain)
-        .map(|f| format!("`{}` is set, and this version of the library does not obey it yet", f.path))
+        .map(|f| {
+            format!("`{}` is set, and this version of the library does not obey it yet", f.path)
+        })
         .collect();
     // What changes nothing in this mode is said, too, and in which it would.
     let elsewhere = |f: &&Field| {
@@ -106,8 +112,12 @@ fn unsupported_settings(settings: &Settings) -> Vec<String> {
             f.modes.join(", ")
         )
     }));
-    if !settings.objects.is_empty() && !SUPPORTED_SETTINGS.iter().any(|p| p.starts_with("material.")) {
-        out.push("`objects` are set, and this version of the library does not obey them yet".into());
+    if !settings.objects.is_empty()
+        && !SUPPORTED_SETTINGS.iter().any(|p| p.starts_with("material."))
+    {
+        out.push(
+            "`objects` are set, and this version of the library does not obey them yet".into(),
+        );
     }
     out
 }
@@ -147,7 +157,11 @@ mod tests {
         let settings = Settings { enabled: false, asynchronous: true, ..Settings::default() };
         let told = unsupported_settings(&settings);
         let expected = usize::from(!SUPPORTED_SETTINGS.contains(&"asynchronous"));
-        assert_eq!(told.iter().filter(|t| t.contains("`asynchronous`")).count(), expected, "{told:?}");
+        assert_eq!(
+            told.iter().filter(|t| t.contains("`asynchronous`")).count(),
+            expected,
+            "{told:?}"
+        );
         assert_eq!(told.len(), expected, "{told:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! Settings from environment variables: `GLURAY_EFFECTS_SHADOWS=off` is `effects.shadows = false`.
 //!
-//! The command line of `gluray run` uses the same variables: they are how it reaches the library in the program.
+//! The command line of `gluray run` uses the same variables: they are how it reaches the library in
+//! the program.
 
 use super::assign::{Assignment, SettingError};
 use super::fields::{FIELDS, Field, Kind};
@@ -17,7 +18,10 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_RUN_DIR", "folder that reports are written to"),
     ("GLURAY_RANKS", "sockets of helpers that trace as well, with `:` between them"),
     ("GLURAY_LIBRARY", "the library that `gluray run` puts into programs"),
-    ("GLURAY_GLX_VENDOR", "GLX vendor that we stand in front of; without it the one that GLVND would take"),
+    (
+        "GLURAY_GLX_VENDOR",
+        "GLX vendor that we stand in front of; without it the one that GLVND would take",
+    ),
     ("GLURAY_EGL_VENDOR", "the same for EGL: names or libraries, with `:` between them"),
 ];
 
@@ -81,7 +85,9 @@ pub fn parse(field: &Field, text: &str) -> Value {
             _ => as_it_is(),
         },
         Kind::Word { .. } => as_it_is(),
-        Kind::Color => hex_color(text).or_else(|| numbers(text)).map_or_else(as_it_is, |v| json!(v)),
+        Kind::Color => {
+            hex_color(text).or_else(|| numbers(text)).map_or_else(as_it_is, |v| json!(v))
+        }
         Kind::Direction => numbers(text).map_or_else(as_it_is, |v| json!(v)),
     }
 }
@@ -90,7 +96,9 @@ pub fn parse(field: &Field, text: &str) -> Value {
 fn hex_color(text: &str) -> Option<Vec<f64>> {
     let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii())?;
     (0..3)
-        .map(|i| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok().map(|v| f64::from(v) / 255.0))
+        .map(|i| {
+            u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok().map(|v| f64::from(v) / 255.0)
+        })
         .collect()
 }
 
@@ -103,14 +111,18 @@ pub fn parse_pair(origin: &str, text: &str) -> Result<Assignment, SettingError> 
         cure,
     };
     let Some((path, value)) = text.split_once('=') else {
-        return Err(error("has no value".into(), "write NAME=VALUE, for example effects.shadows=on".into()));
+        return Err(error(
+            "has no value".into(),
+            "write NAME=VALUE, for example effects.shadows=on".into(),
+        ));
     };
     let path = path.trim();
     let value = super::fields::find(path).map_or_else(|| json!(value), |f| parse(f, value));
     Ok(Assignment::new(origin, path, value))
 }
 
-/// The assignments in variables, in the order of the settings, and variables that begin as ours do and are none.
+/// The assignments in variables, in the order of the settings, and variables that begin as ours do
+/// and are none.
 pub fn assignments(variables: &[(String, String)]) -> (Vec<Assignment>, Vec<SettingError>) {
     let mut out = Vec::new();
     let mut known: Vec<String> = OTHER_VARIABLES.iter().map(|(n, _)| (*n).to_owned()).collect();
@@ -118,22 +130,29 @@ pub fn assignments(variables: &[(String, String)]) -> (Vec<Assignment>, Vec<Sett
         let name = variable_of(field.path);
         // An empty variable is one that a script left unset.
         if let Some((_, text)) = variables.iter().find(|(n, v)| *n == name && !v.is_empty()) {
-            out.push(Assignment::new(format!("environment variable {name}"), field.path, parse(field, text)));
+            out.push(Assignment::new(
+                format!("environment variable {name}"),
+                field.path,
+                parse(field, text),
+            ));
         }
         known.push(name);
     }
-    // Objects have keys with any case, which variables keep: GLURAY_OBJECTS takes `KEY.color=#ff0000 KEY.mirror=0.3`.
+    // Objects have keys with any case, which variables keep: GLURAY_OBJECTS takes
+    // `KEY.color=#ff0000 KEY.mirror=0.3`.
     let mut errors = Vec::new();
     if let Some((_, text)) = variables.iter().find(|(n, _)| n == OBJECTS) {
         for pair in text.split_whitespace() {
-            match parse_pair(&format!("environment variable {OBJECTS}"), &format!("objects.{pair}")) {
+            match parse_pair(&format!("environment variable {OBJECTS}"), &format!("objects.{pair}"))
+            {
                 Ok(a) => out.push(a),
                 Err(e) => errors.push(e),
             }
         }
     }
-    for (name, _) in
-        variables.iter().filter(|(n, _)| n.starts_with("GLURAY_") && !known.contains(n) && n != OBJECTS)
+    for (name, _) in variables
+        .iter()
+        .filter(|(n, _)| n.starts_with("GLURAY_") && !known.contains(n) && n != OBJECTS)
     {
         errors.push(SettingError {
             origin: "environment".into(),
@@ -173,7 +192,10 @@ mod tests {
         let (s, errors) = assign(&Settings::default(), &list);
         assert!(errors.is_empty(), "{errors:?}");
         assert_eq!((s.mode, s.effects.shadows, s.samples), (Mode::Rich, false, 1));
-        assert_eq!((s.material.color, s.lights.added_direction), (Some([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]));
+        assert_eq!(
+            (s.material.color, s.lights.added_direction),
+            (Some([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0])
+        );
         assert_eq!(s.material_of("Ab").mirror, Some(0.5));
     }
 
@@ -194,9 +216,12 @@ mod tests {
         assert_eq!(
             errors,
             [
-                "environment: `GLURAY_MODE` is not UTF-8: \"rich\u{fffd}\"; set it to text; it counts as not set",
-                "environment: `HOME` is not UTF-8: \"/home/a\u{fffd}\"; set it to text; it counts as not set",
-                "environment: `GLURAY_\u{fffd}` is not UTF-8: \"1\"; set it to text; it counts as not set",
+                "environment: `GLURAY_MODE` is not UTF-8: \"rich\u{fffd}\"; set it to text; it \
+                 counts as not set",
+                "environment: `HOME` is not UTF-8: \"/home/a\u{fffd}\"; set it to text; it counts \
+                 as not set",
+                "environment: `GLURAY_\u{fffd}` is not UTF-8: \"1\"; set it to text; it counts as \
+                 not set",
             ]
         );
     }
@@ -209,14 +234,17 @@ mod tests {
             ("GLURAY_OBJECTS", "k"),
         ]));
         assert!(
-            errors.iter().any(|e| e.to_string().contains("`GLURAY_MODUS` is no variable of gluray")),
+            errors
+                .iter()
+                .any(|e| e.to_string().contains("`GLURAY_MODUS` is no variable of gluray")),
             "{errors:?}"
         );
         assert!(errors.iter().any(|e| e.to_string().contains("write NAME=VALUE")), "{errors:?}");
         let (_, errors) = assign(&Settings::default(), &list);
         assert_eq!(
             errors[0].to_string(),
-            "environment variable GLURAY_SAMPLES: `samples` is \"many\"; give a whole number from 1 to 4096"
+            "environment variable GLURAY_SAMPLES: `samples` is \"many\"; give a whole number from \
+             1 to 4096"
         );
     }
 

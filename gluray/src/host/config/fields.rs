@@ -109,9 +109,13 @@ pub const FIELDS: &[Field] = &[
     field("asynchronous", Kind::Switch, "show each frame one frame late and trace it meanwhile")
         .only_in(&["match", "phong", "enhance"]),
     field("effects.shadows", Kind::Switch, "rays to the lights").only_in(RAYS),
-    field("effects.light_radius_deg", real(0.0, 45.0), "half the angle of lights; 0 for sharp shadows")
-        .unit("degrees")
-        .only_in(&["rich", "enhance", "path"]),
+    field(
+        "effects.light_radius_deg",
+        real(0.0, 45.0),
+        "half the angle of lights; 0 for sharp shadows",
+    )
+    .unit("degrees")
+    .only_in(&["rich", "enhance", "path"]),
     field(
         "effects.ambient_occlusion_samples",
         Kind::Whole { low: 0, high: 1024 },
@@ -153,14 +157,17 @@ pub const FIELDS: &[Field] = &[
     field("material.specular", real(0.0, 1.0), "strength of the highlight").optional(),
     field("material.shininess", real(0.0, 10_000.0), "exponent of the highlight").optional(),
     field("material.mirror", real(0.0, 1.0), "share of mirror reflection").optional().only_in(LONG),
-    field("material.roughness", real(0.0, 1.0), "of a metal: 0 polished to 1 dull").optional().only_in(LONG),
+    field("material.roughness", real(0.0, 1.0), "of a metal: 0 polished to 1 dull")
+        .optional()
+        .only_in(LONG),
     field("material.ior", real(1.0, 4.0), "refractive index of glass").optional().only_in(LONG),
     field("material.emission", real(0.0, 1000.0), "light given off, times the colour").optional(),
 ];
 
 /// The field of a path; `objects.KEY.color` is of the field `material.color`.
 pub fn find(path: &str) -> Option<&'static Field> {
-    let material = path.strip_prefix("objects.").and_then(|rest| rest.split_once('.')).map(|(_, name)| name);
+    let material =
+        path.strip_prefix("objects.").and_then(|rest| rest.split_once('.')).map(|(_, name)| name);
     FIELDS.iter().find(|f| match material {
         Some(name) => f.path.strip_prefix("material.") == Some(name),
         None => f.path == path,
@@ -177,7 +184,11 @@ mod tests {
         match value {
             Value::Object(map) => {
                 for (k, v) in map {
-                    leaves(&if prefix.is_empty() { k.clone() } else { format!("{prefix}.{k}") }, v, out);
+                    leaves(
+                        &if prefix.is_empty() { k.clone() } else { format!("{prefix}.{k}") },
+                        v,
+                        out,
+                    );
                 }
             }
             _ => out.push(prefix.to_owned()),
@@ -199,8 +210,10 @@ mod tests {
     #[test]
     fn the_table_and_the_structs_have_the_same_settings() {
         // Set all, so that what is optional is written, too.
-        let all: Vec<Assignment> =
-            FIELDS.iter().map(|f| Assignment::new("test", f.path, extremes(f.values)[0].clone())).collect();
+        let all: Vec<Assignment> = FIELDS
+            .iter()
+            .map(|f| Assignment::new("test", f.path, extremes(f.values)[0].clone()))
+            .collect();
         let (settings, errors) = assign(&Settings::default(), &all);
         assert!(errors.is_empty(), "{errors:?}");
         let mut written = Vec::new();

@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// It cannot be read.
-    #[error("{}: cannot be read; check the name given by GLURAY_CONFIG or --config", path.display())]
+    #[error("{}: cannot be read; check the name given by GLURAY_CONFIG or \
+             --config", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -63,12 +64,16 @@ impl ConfigFile {
                     before.len() - before.rfind('\n').map_or(0, |n| n + 1) + 1
                 )
             });
-            FileError::Syntax { path: path.into(), text: format!("{at}{}", e.message().replace('\n', ", ")) }
+            FileError::Syntax {
+                path: path.into(),
+                text: format!("{at}{}", e.message().replace('\n', ", ")),
+            }
         })?;
         Ok(ConfigFile { path: path.into(), tree })
     }
 
-    /// The file that is read when none is named: `gluray/gluray.toml` in `XDG_CONFIG_HOME` or `~/.config`.
+    /// The file that is read when none is named: `gluray/gluray.toml` in `XDG_CONFIG_HOME` or
+    /// `~/.config`.
     pub fn usual_path(variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
         crate::host::folders::config(variable).map(|f| f.join("gluray.toml"))
     }
@@ -79,7 +84,8 @@ impl ConfigFile {
         tables.into_iter().flat_map(|t| t.keys().map(String::as_str)).collect()
     }
 
-    /// The assignments for a program that is known by any of `names`: those for all, then those for each name in turn.
+    /// The assignments for a program that is known by any of `names`: those for all, then those for
+    /// each name in turn.
     pub fn assignments(&self, names: &[String]) -> Vec<Assignment> {
         let mut out = Vec::new();
         let origin = self.path.display().to_string();
@@ -96,9 +102,11 @@ impl ConfigFile {
                             let origin = format!("{origin} [program.{name}]");
                             own.iter().for_each(|(k, v)| flatten(&origin, k, v, &mut out));
                         }
-                        Some(other) => {
-                            out.push(Assignment::new(&origin, format!("program.{name}"), json(other)))
-                        }
+                        Some(other) => out.push(Assignment::new(
+                            &origin,
+                            format!("program.{name}"),
+                            json(other),
+                        )),
                         None => {}
                     }
                 }
@@ -108,18 +116,22 @@ impl ConfigFile {
         out
     }
 
-    /// The assignments for all programs and for every program by name: what a check of the whole file looks at.
+    /// The assignments for all programs and for every program by name: what a check of the whole
+    /// file looks at.
     pub fn all_assignments(&self) -> Vec<Assignment> {
         let names: Vec<String> = self.programs().into_iter().map(str::to_owned).collect();
         self.assignments(&names)
     }
 }
 
-/// Tables become longer paths. A table where a value belongs stays whole, so that it is named as the wrong value it is.
+/// Tables become longer paths. A table where a value belongs stays whole, so that it is named as
+/// the wrong value it is.
 fn flatten(origin: &str, path: &str, value: &toml::Value, out: &mut Vec<Assignment>) {
     match value {
         toml::Value::Table(table)
-            if super::fields::find(path).is_none() && !table.is_empty() && path.matches('.').count() < 3 =>
+            if super::fields::find(path).is_none()
+                && !table.is_empty()
+                && path.matches('.').count() < 3 =>
         {
             table.iter().for_each(|(k, v)| flatten(origin, &format!("{path}.{k}"), v, out));
         }
@@ -149,12 +161,17 @@ mod tests {
         (s, errors.iter().map(ToString::to_string).collect())
     }
 
-    const TEXT: &str = "mode = \"rich\"\nsamples = 4\n[effects]\nshadows = false\n[program.gmsh]\nsamples = 9\n[program.gmsh.objects.3f2a]\ncolor = [1, 0.5, 0]\n[program.\"my prog\".effects]\nshadows = true\n";
+    const TEXT: &str = "mode = \"rich\"\nsamples = 4\n[effects]\nshadows = \
+                        false\n[program.gmsh]\nsamples = 9\n[program.gmsh.objects.3f2a]\ncolor = \
+                        [1, 0.5, 0]\n[program.\"my prog\".effects]\nshadows = true\n";
 
     #[test]
     fn programs_have_their_own_over_what_is_for_all() {
         let (all, errors) = settings(TEXT, &["glxgears"]);
-        assert_eq!((all.mode, all.samples, all.effects.shadows, errors.len()), (Mode::Rich, 4, false, 0));
+        assert_eq!(
+            (all.mode, all.samples, all.effects.shadows, errors.len()),
+            (Mode::Rich, 4, false, 0)
+        );
         let (gmsh, errors) = settings(TEXT, &["gmsh"]);
         assert_eq!((gmsh.samples, gmsh.mode, errors.len()), (9, Mode::Rich, 0));
         assert_eq!(gmsh.material_of("3f2a").color, Some([1.0, 0.5, 0.0]));
@@ -173,9 +190,13 @@ mod tests {
             ("samples = 1.5", "gluray.toml: `samples` is 1.5; give a whole number from 1 to 4096"),
             (
                 "[program.gmsh]\nmode = 3",
-                "gluray.toml [program.gmsh]: `mode` is 3; give one of match, phong, rich, enhance, path",
+                "gluray.toml [program.gmsh]: `mode` is 3; give one of match, phong, rich, enhance, \
+                 path",
             ),
-            ("[effects]\nfocus = nan", "gluray.toml: `effects.focus` is \"NaN\"; give a number from 0 to 1"),
+            (
+                "[effects]\nfocus = nan",
+                "gluray.toml: `effects.focus` is \"NaN\"; give a number from 0 to 1",
+            ),
             ("[mode]\nname = 3", "gluray.toml: `mode` is {\"name\":3}; give one of"),
             ("effects = 3", "gluray.toml: `effects` is no setting"),
             ("program = 3", "gluray.toml: `program` is no setting"),
@@ -195,14 +216,17 @@ mod tests {
         let (sender, receiver) = std::sync::mpsc::channel();
         std::thread::spawn(move || sender.send(ConfigFile::read(&path).map_err(|e| e.to_string())));
         // Whoever waits for a writer waits for ever; the time is for a busy machine.
-        let answer = receiver.recv_timeout(std::time::Duration::from_secs(60)).expect("nobody is waited for");
+        let answer = receiver
+            .recv_timeout(std::time::Duration::from_secs(60))
+            .expect("nobody is waited for");
         assert!(answer.is_err_and(|e| e.contains("gluray.toml")));
     }
 
     #[test]
     fn broken_files_say_where() {
-        let e =
-            ConfigFile::parse(Path::new("a.toml"), "mode = \"rich\"\nsamples = = 4").unwrap_err().to_string();
+        let e = ConfigFile::parse(Path::new("a.toml"), "mode = \"rich\"\nsamples = = 4")
+            .unwrap_err()
+            .to_string();
         assert!(e.starts_with("a.toml: line 2, column 11: "), "{e}");
         let e = ConfigFile::read(Path::new("/nowhere/a.toml")).unwrap_err().to_string();
         assert!(e.contains("/nowhere/a.toml") && e.contains("GLURAY_CONFIG"), "{e}");

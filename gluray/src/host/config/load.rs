@@ -39,13 +39,17 @@ impl Sources {
         let arguments: Vec<String> =
             std::env::args_os().take(8).map(|a| a.to_string_lossy().into_owned()).collect();
         let executable = std::fs::read_link("/proc/self/exe").ok();
-        Sources { refused, ..Sources::new(variables, program_names(executable.as_deref(), &arguments)) }
+        Sources {
+            refused,
+            ..Sources::new(variables, program_names(executable.as_deref(), &arguments))
+        }
     }
 
     /// Of a program with these variables.
     pub fn new(variables: Vec<(String, String)>, program: Vec<String>) -> Sources {
-        let get =
-            |name: &str| variables.iter().find(|(n, v)| n == name && !v.is_empty()).map(|(_, v)| v.clone());
+        let get = |name: &str| {
+            variables.iter().find(|(n, v)| n == name && !v.is_empty()).map(|(_, v)| v.clone())
+        };
         let named = get("GLURAY_CONFIG").map(PathBuf::from);
         let file = named.clone().or_else(|| ConfigFile::usual_path(get));
         Sources { file, file_is_required: named.is_some(), program, variables, refused: Vec::new() }
@@ -82,17 +86,18 @@ impl Sources {
     }
 }
 
-/// The names a program goes by in `[program.NAME]`: its executable's, that of its first argument when it is another, and, for an
-/// interpreter, its script's without folder.
+/// The names a program goes by in `[program.NAME]`: its executable's, that of its first argument
+/// when it is another, and, for an interpreter, its script's without folder.
 pub fn program_names(executable: Option<&Path>, arguments: &[String]) -> Vec<String> {
     let base = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned());
     let mut names: Vec<String> = executable.and_then(base).into_iter().collect();
     names.extend(arguments.first().and_then(|a| base(Path::new(a))));
-    const INTERPRETERS: [&str; 8] = ["python", "perl", "wish", "tclsh", "ruby", "sh", "bash", "java"];
+    const INTERPRETERS: [&str; 8] =
+        ["python", "perl", "wish", "tclsh", "ruby", "sh", "bash", "java"];
     let interpreted = names.iter().any(|n| {
-        INTERPRETERS
-            .iter()
-            .any(|i| n.strip_prefix(i).is_some_and(|v| v.chars().all(|c| c.is_ascii_digit() || c == '.')))
+        INTERPRETERS.iter().any(|i| {
+            n.strip_prefix(i).is_some_and(|v| v.chars().all(|c| c.is_ascii_digit() || c == '.'))
+        })
     });
     if interpreted {
         let script = arguments.iter().skip(1).find(|a| !a.starts_with('-'));
@@ -125,7 +130,12 @@ mod tests {
     fn defaults_then_file_then_program_then_environment() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("gluray.toml");
-        std::fs::write(&path, "mode = \"phong\"\nsamples = 2\n[program.gmsh]\nsamples = 3\nquality = \"best\"\n[program.gmsh.effects]\nshadows = 7\n").unwrap();
+        std::fs::write(
+            &path,
+            "mode = \"phong\"\nsamples = 2\n[program.gmsh]\nsamples = 3\nquality \
+                               = \"best\"\n[program.gmsh.effects]\nshadows = 7\n",
+        )
+        .unwrap();
         let config = path.to_str().unwrap();
         let load = |variables: &[(&str, &str)], program: &str| {
             Sources::new(pairs(variables), vec![program.into()]).load()
@@ -137,18 +147,26 @@ mod tests {
             "no file is no fault"
         );
         let other = load(&[("GLURAY_CONFIG", config)], "glxgears");
-        assert_eq!((other.settings.mode, other.settings.samples, other.problems.len()), (Mode::Phong, 2, 0));
+        assert_eq!(
+            (other.settings.mode, other.settings.samples, other.problems.len()),
+            (Mode::Phong, 2, 0)
+        );
         let gmsh = load(&[("GLURAY_CONFIG", config), ("GLURAY_SAMPLES", "5")], "gmsh");
         assert_eq!((gmsh.settings.samples, gmsh.settings.mode), (5, Mode::Phong));
         assert_eq!(gmsh.settings.quality, crate::host::config::Quality::Best);
         assert!(gmsh.settings.effects.shadows, "the wrong value is left out, the rest is taken");
         assert_eq!(gmsh.problems.len(), 1);
-        assert!(gmsh.problems[0].contains("[program.gmsh]: `effects.shadows` is 7"), "{:?}", gmsh.problems);
+        assert!(
+            gmsh.problems[0].contains("[program.gmsh]: `effects.shadows` is 7"),
+            "{:?}",
+            gmsh.problems
+        );
     }
 
     #[test]
     fn a_named_file_must_be_there_and_make_sense() {
-        let missing = Sources::new(pairs(&[("GLURAY_CONFIG", "/nowhere/g.toml")]), Vec::new()).load();
+        let missing =
+            Sources::new(pairs(&[("GLURAY_CONFIG", "/nowhere/g.toml")]), Vec::new()).load();
         assert!(
             missing.problems.len() == 1 && missing.problems[0].contains("/nowhere/g.toml"),
             "{:?}",
@@ -159,15 +177,23 @@ mod tests {
         std::fs::create_dir(&path).unwrap();
         std::fs::write(path.join("gluray.toml"), "mode = ").unwrap();
         let broken =
-            Sources::new(pairs(&[("XDG_CONFIG_HOME", dir.path().to_str().unwrap())]), Vec::new()).load();
-        assert!(broken.problems.len() == 1 && broken.problems[0].contains("line 1"), "{:?}", broken.problems);
+            Sources::new(pairs(&[("XDG_CONFIG_HOME", dir.path().to_str().unwrap())]), Vec::new())
+                .load();
+        assert!(
+            broken.problems.len() == 1 && broken.problems[0].contains("line 1"),
+            "{:?}",
+            broken.problems
+        );
         assert_eq!(broken.settings, Settings::default());
     }
 
     #[test]
     fn scripts_go_by_their_own_name_too() {
         let names = |exe: &str, args: &[&str]| {
-            program_names(Some(Path::new(exe)), &args.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>())
+            program_names(
+                Some(Path::new(exe)),
+                &args.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>(),
+            )
         };
         assert_eq!(names("/usr/bin/gmsh", &["gmsh", "a.geo"]), ["gmsh"]);
         assert_eq!(

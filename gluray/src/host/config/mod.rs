@@ -3,11 +3,13 @@
 //! ```text
 //!   defaults < file (all programs) < file ([program.NAME]) < environment = command line < control panel
 //! ```
-//! Every layer is a list of assignments `path = value` (`effects.shadows = true`); [`fields`] knows each path with its kind, its range and the
-//! modes in which it changes anything, and [`assign()`] is the only way in. So a wrong name, type or number is told in the same words wherever it
-//! comes from, and the panel draws its controls from the same table.
+//! Every layer is a list of assignments `path = value` (`effects.shadows = true`); [`fields`] knows
+//! each path with its kind, its range and the modes in which it changes anything, and [`assign()`]
+//! is the only way in. So a wrong name, type or number is told in the same words wherever it comes
+//! from, and the panel draws its controls from the same table.
 //!
-//! Nothing here knows OpenGL: plain data, read by the library in the program and by our own program.
+//! Nothing here knows OpenGL: plain data, read by the library in the program and by our own
+//! program.
 
 pub mod assign;
 mod current;

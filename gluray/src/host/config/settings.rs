@@ -220,7 +220,8 @@ pub struct Settings {
     pub quality: Quality,
     /// Threads that render; 0 for all cores.
     pub threads: u32,
-    /// Show each frame one frame late, and trace it while the program makes the next (section 4.1.2).
+    /// Show each frame one frame late, and trace it while the program makes the next (section
+    /// 4.1.2).
     pub asynchronous: bool,
     /// What rays are spent on.
     pub effects: Effects,

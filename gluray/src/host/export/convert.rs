@@ -55,10 +55,9 @@ fn to_world_space(o: &Object, with_normals: bool, report: &mut ConvertReport) ->
             turn.x_axis.cross(turn.y_axis),
         );
         let side = if turn.determinant() < 0.0 { -1.0 } else { 1.0 };
-        let own = o
-            .normals
-            .iter()
-            .map(|n| (side * (cofactor * DVec3::from(n.map(f64::from)))).normalize_or_zero().as_vec3());
+        let own = o.normals.iter().map(|n| {
+            (side * (cofactor * DVec3::from(n.map(f64::from)))).normalize_or_zero().as_vec3()
+        });
         normals = own.collect();
         let computed = normals.is_empty();
         normals.resize(positions.len(), Vec3::ZERO);
@@ -76,7 +75,8 @@ fn to_world_space(o: &Object, with_normals: bool, report: &mut ConvertReport) ->
         }
     }
     let constant = o.color.map(|c| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8);
-    let colors = if o.colors.is_empty() { vec![constant; positions.len()] } else { o.colors.clone() };
+    let colors =
+        if o.colors.is_empty() { vec![constant; positions.len()] } else { o.colors.clone() };
     WorldSpaceMesh { positions, normals, triangles, colors }
 }
 
@@ -85,18 +85,20 @@ fn wanted(o: &Object, keys: &[String]) -> bool {
     keys.is_empty() || keys.contains(&o.key)
 }
 
-/// The objects with these keys (all, when there is none) as one mesh with colours, and with normals when any has some. OpenGL's colours are what the
-/// screen gets, so they count as sRGB.
+/// The objects with these keys (all, when there is none) as one mesh with colours, and with normals
+/// when any has some. OpenGL's colours are what the screen gets, so they count as sRGB.
 pub fn to_mesh(scene: &Scene, keys: &[String]) -> (TriMesh, ConvertReport) {
     let (mesh, _, report) = merge_objects(scene, keys);
     (mesh, report)
 }
 
-/// The same as polygons for VTK. The cell array `object` numbers the objects, whose keys stand in the text `object keys` in that order.
+/// The same as polygons for VTK. The cell array `object` numbers the objects, whose keys stand in
+/// the text `object keys` in that order.
 pub fn to_poly_data(scene: &Scene, keys: &[String]) -> (PolyData, ConvertReport) {
     let (mesh, triangles, report) = merge_objects(scene, keys);
     let mut poly = PolyData::from_trimesh(&mesh);
-    let numbers = triangles.iter().enumerate().flat_map(|(i, (_, n))| std::iter::repeat_n(i as i32, *n));
+    let numbers =
+        triangles.iter().enumerate().flat_map(|(i, (_, n))| std::iter::repeat_n(i as i32, *n));
     poly.attributes.cell.push(DataArray::new("object", 1, Values::I32(numbers.collect())));
     let names = triangles.into_iter().map(|(key, _)| key).collect();
     poly.attributes.text.push(("object keys".into(), names));
@@ -137,7 +139,10 @@ mod tests {
     #[test]
     fn objects_lie_where_their_matrices_put_them() {
         let (mesh, report) = to_mesh(&example(), &[]);
-        assert_eq!((mesh.positions.len(), mesh.indices.len(), report), (7, 3, ConvertReport::default()));
+        assert_eq!(
+            (mesh.positions.len(), mesh.indices.len(), report),
+            (7, 3, ConvertReport::default())
+        );
         let at = |i: usize| mesh.origin + mesh.positions[i].as_dvec3();
         assert_eq!((at(1), at(5)), (DVec3::new(1.0, 0.0, 0.0), DVec3::new(11.0, 1.0, 0.0)));
         assert_eq!(mesh.indices[2], [3, 5, 6]);
@@ -178,7 +183,10 @@ mod tests {
         scene.objects[1].positions[1][0] = f32::NAN;
         scene.objects[0].normals[0] = [0.0; 3];
         let (mesh, report) = to_mesh(&scene, &[]);
-        assert_eq!((mesh.indices.len(), report), (2, ConvertReport { nowhere: 1, without_direction: 1 }));
+        assert_eq!(
+            (mesh.indices.len(), report),
+            (2, ConvertReport { nowhere: 1, without_direction: 1 })
+        );
         assert_eq!(report.warnings().len(), 2);
         let (poly, _) = to_poly_data(&scene, &[]);
         let object = poly.attributes.cell_array("object").unwrap();

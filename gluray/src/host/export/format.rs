@@ -23,7 +23,8 @@ pub struct Scene {
     pub program: String,
     /// In which frame.
     pub frame: u64,
-    /// What the axes of the world are, in words: OpenGL has no world, so the library says which frame it took.
+    /// What the axes of the world are, in words: OpenGL has no world, so the library says which
+    /// frame it took.
     pub space: String,
     /// What was traced.
     pub objects: Vec<Object>,
@@ -133,10 +134,18 @@ pub fn write_scene(path: &Path, scene: &Scene) -> Result<(), SceneError> {
     if let Some(what) = scene.objects.iter().find_map(Object::fault) {
         return Err(broken(path, what, "leave that object out"));
     }
-    let objects =
-        scene.objects.iter().map(Object::counts).collect::<Result<_, _>>().map_err(|e| io(e.into()))?;
-    let header =
-        Header { program: scene.program.clone(), frame: scene.frame, space: scene.space.clone(), objects };
+    let objects = scene
+        .objects
+        .iter()
+        .map(Object::counts)
+        .collect::<Result<_, _>>()
+        .map_err(|e| io(e.into()))?;
+    let header = Header {
+        program: scene.program.clone(),
+        frame: scene.frame,
+        space: scene.space.clone(),
+        objects,
+    };
     let name = path.file_name().ok_or_else(|| io(io::ErrorKind::InvalidInput.into()))?;
     let mut partial = name.to_os_string();
     partial.push(format!(".{}.partial", std::process::id()));
@@ -200,7 +209,8 @@ pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
             .zip(c.triangles.checked_mul(12))
             .and_then(|(v, t)| v.checked_add(t));
         let sum = bytes.and_then(|b| expected.checked_add(b));
-        expected = sum.ok_or_else(|| broken(path, "its counts are too large for any file", AGAIN))?;
+        expected =
+            sum.ok_or_else(|| broken(path, "its counts are too large for any file", AGAIN))?;
     }
     if expected != length {
         return Err(broken(
@@ -210,8 +220,12 @@ pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
         ));
     }
 
-    let mut scene =
-        Scene { program: header.program, frame: header.frame, space: header.space, objects: Vec::new() };
+    let mut scene = Scene {
+        program: header.program,
+        frame: header.frame,
+        space: header.space,
+        objects: Vec::new(),
+    };
     for (i, c) in header.objects.into_iter().enumerate() {
         let (n, m) = (c.vertices as usize, c.triangles as usize);
         if let Some(other) = c.has.iter().find(|h| !["normals", "colors"].contains(&h.as_str())) {
@@ -223,8 +237,8 @@ pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
         }
         let has = |what: &str| if c.has.iter().any(|h| h == what) { n } else { 0 };
         let (normals, colors) = (has("normals"), has("colors"));
-        let mut o: Object =
-            serde_json::from_value(c.object).map_err(|e| broken(path, format!("object {i}: {e}"), AGAIN))?;
+        let mut o: Object = serde_json::from_value(c.object)
+            .map_err(|e| broken(path, format!("object {i}: {e}"), AGAIN))?;
         let mut triples = |count: usize| -> Result<Vec<[[u8; 4]; 3]>, SceneError> {
             let mut bytes = vec![0; 12 * count];
             file.read_exact(&mut bytes).map_err(io)?;
@@ -277,7 +291,12 @@ pub(super) mod tests {
             normals: Vec::new(),
             ..a.clone()
         };
-        Scene { program: "test".into(), frame: 3, space: "the viewer's".into(), objects: vec![a, b] }
+        Scene {
+            program: "test".into(),
+            frame: 3,
+            space: "the viewer's".into(),
+            objects: vec![a, b],
+        }
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! ```text
 //!   library ── [`write_scene`] ── .gluray file ([format]) ── `gluray export` ── [convert] ── PLY, GLB, VTP (datasets' writers)
 //! ```
-//! The library writes the plain file when asked by the panel or by `GLURAY_DUMP`: one pass over its arrays, without any conversion in somebody
-//! else's process.
+//! The library writes the plain file when asked by the panel or by `GLURAY_DUMP`: one pass over its
+//! arrays, without any conversion in somebody else's process.
 
 pub mod convert;
 pub mod format;

@@ -67,7 +67,9 @@ impl MessageReader {
     /// Who it is, if it knows the token and speaks our version.
     async fn hello(&mut self, secret: &Secret) -> Option<Hello> {
         match self.message(MAX_HELLO_BYTES).await? {
-            ToPanel::Hello { version: VERSION, token, hello } if same(&token, secret.token()) => Some(*hello),
+            ToPanel::Hello { version: VERSION, token, hello } if same(&token, secret.token()) => {
+                Some(*hello)
+            }
             _ => None,
         }
     }

@@ -1,7 +1,9 @@
-//! How programs find the panel: an address and a secret, from the environment or from a file that only their user can read.
+//! How programs find the panel: an address and a secret, from the environment or from a file that
+//! only their user can read.
 //!
-//! The file is `panel.json` in `$XDG_RUNTIME_DIR/gluray`, with mode 0600, and goes when the panel ends. A file of another user, or one that others
-//! may read, is not believed. An address off loopback is not believed wherever it comes from.
+//! The file is `panel.json` in `$XDG_RUNTIME_DIR/gluray`, with mode 0600, and goes when the panel
+//! ends. A file of another user, or one that others may read, is not believed. An address off
+//! loopback is not believed wherever it comes from.
 
 use crate::host::folders;
 use serde::{Deserialize, Serialize};
@@ -13,8 +15,9 @@ use std::path::{Path, PathBuf};
 /// Hexadecimal digits of each half of a secret: 128 bits.
 const HALF: usize = 32;
 
-/// What both ends know: the library says the first half, the panel answers with the second. So neither a program that does not belong to the
-/// user nor one that took over the panel's port gets anywhere.
+/// What both ends know: the library says the first half, the panel answers with the second. So
+/// neither a program that does not belong to the user nor one that took over the panel's port gets
+/// anywhere.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Secret(String);
@@ -80,7 +83,8 @@ pub enum PanelEndpointError {
     #[error("there is no folder for running programs; set XDG_RUNTIME_DIR")]
     NoFolder,
     /// The folder or file is open to others.
-    #[error("{}: {what}; only its user may have it: remove it, or set XDG_RUNTIME_DIR to a folder of your own", path.display())]
+    #[error("{}: {what}; only its user may have it: remove it, or set XDG_RUNTIME_DIR to a folder \
+             of your own", path.display())]
     NotPrivate {
         /// The file or folder.
         path: PathBuf,
@@ -98,13 +102,15 @@ pub enum PanelEndpointError {
 }
 
 impl PanelEndpoint {
-    /// By `GLURAY_PANEL` and `GLURAY_PANEL_SECRET`, when both are set and make sense, else by the file.
+    /// By `GLURAY_PANEL` and `GLURAY_PANEL_SECRET`, when both are set and make sense, else by the
+    /// file.
     pub fn find(variable: impl Fn(&str) -> Option<String>) -> Option<PanelEndpoint> {
         let named = variable("GLURAY_PANEL").zip(variable("GLURAY_PANEL_SECRET"));
         let endpoint = match named {
-            Some((address, secret)) => {
-                PanelEndpoint { address: address.parse().ok()?, secret: Secret::try_from(secret).ok()? }
-            }
+            Some((address, secret)) => PanelEndpoint {
+                address: address.parse().ok()?,
+                secret: Secret::try_from(secret).ok()?,
+            },
             None => PanelEndpoint::read(&file_in(&folders::runtime(variable)?))?,
         };
         endpoint.address.ip().is_loopback().then_some(endpoint)
@@ -122,13 +128,18 @@ impl PanelEndpoint {
         serde_json::from_str::<PanelEndpoint>(&text).ok().filter(|m| m.address.ip().is_loopback())
     }
 
-    /// Writes the file into a folder, which is made when it is not there. It is removed when the guard goes.
+    /// Writes the file into a folder, which is made when it is not there. It is removed when the
+    /// guard goes.
     pub fn publish(&self, folder: &Path) -> Result<EndpointFile, PanelEndpointError> {
         let io = |path: &Path| {
             let path = path.to_path_buf();
             move |source| PanelEndpointError::Io { path, source }
         };
-        std::fs::DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(io(folder))?;
+        std::fs::DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(folder)
+            .map_err(io(folder))?;
         let about = std::fs::symlink_metadata(folder).map_err(io(folder))?;
         if !about.is_dir() || Some(about.uid()) != folders::user_id() || about.mode() & 0o022 != 0 {
             let what = "is no folder of yours, or others may write to it".into();
@@ -139,8 +150,11 @@ impl PanelEndpoint {
         let write = || -> io::Result<()> {
             // What an earlier process of this number left.
             let _ = std::fs::remove_file(&temporary);
-            let mut file =
-                std::fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&temporary)?;
+            let mut file = std::fs::OpenOptions::new()
+                .write(true)
+                .create_new(true)
+                .mode(0o600)
+                .open(&temporary)?;
             file.write_all(&serde_json::to_vec(self).map_err(io::Error::other)?)?;
             std::fs::rename(&temporary, &path)
         };
@@ -189,7 +203,10 @@ mod tests {
         assert_eq!(std::fs::metadata(&path).unwrap().mode() & 0o777, 0o600);
         assert_eq!(std::fs::metadata(&folder).unwrap().mode() & 0o777, 0o700);
         let runtime = dir.path().to_str().unwrap().to_owned();
-        assert_eq!(PanelEndpoint::find(|n| (n == "XDG_RUNTIME_DIR").then(|| runtime.clone())), Some(m));
+        assert_eq!(
+            PanelEndpoint::find(|n| (n == "XDG_RUNTIME_DIR").then(|| runtime.clone())),
+            Some(m)
+        );
 
         // Another panel takes over; the first one's end does not take its file away.
         let second = endpoint("127.0.0.1:10");
@@ -213,11 +230,13 @@ mod tests {
         assert_eq!(PanelEndpoint::read(&path), None, "not on loopback");
         let secret = String::from(Secret::of([1; HALF]));
         let by_variables = |address: &str, secret: &str| {
-            let set = [("GLURAY_PANEL", address.to_owned()), ("GLURAY_PANEL_SECRET", secret.to_owned())];
+            let set =
+                [("GLURAY_PANEL", address.to_owned()), ("GLURAY_PANEL_SECRET", secret.to_owned())];
             PanelEndpoint::find(move |n| set.iter().find(|(k, _)| *k == n).map(|(_, v)| v.clone()))
         };
         assert!(
-            by_variables("127.0.0.1:80", &secret).is_some() && by_variables("[::1]:80", &secret).is_some()
+            by_variables("127.0.0.1:80", &secret).is_some()
+                && by_variables("[::1]:80", &secret).is_some()
         );
         for (address, secret) in
             [("10.0.0.1:80", secret.as_str()), ("localhost", &secret), ("127.0.0.1:80", "short")]

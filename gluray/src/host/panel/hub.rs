@@ -124,7 +124,12 @@ impl Hub {
         };
         inner.programs.insert(
             id,
-            ProgramEntry { shown, hello_problems: hello.problems, history: VecDeque::new(), outgoing },
+            ProgramEntry {
+                shown,
+                hello_problems: hello.problems,
+                history: VecDeque::new(),
+                outgoing,
+            },
         );
         drop(inner);
         self.notify();
@@ -193,14 +198,20 @@ impl Hub {
     }
 
     /// Sets some settings and takes changes of others back; all or nothing.
-    pub fn change(&self, id: u64, set: BTreeMap<String, Value>, reset: &[String]) -> Result<(), HubError> {
+    pub fn change(
+        &self,
+        id: u64,
+        set: BTreeMap<String, Value>,
+        reset: &[String],
+    ) -> Result<(), HubError> {
         let mut inner = self.lock();
-        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(HubError::Gone(id))?;
+        let e =
+            inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(HubError::Gone(id))?;
         let mut assignments = e.shown.assignments.clone();
         assignments.retain(|path, _| {
-            !reset
-                .iter()
-                .any(|r| r == path || path.strip_prefix(r.as_str()).is_some_and(|rest| rest.starts_with('.')))
+            !reset.iter().any(|r| {
+                r == path || path.strip_prefix(r.as_str()).is_some_and(|rest| rest.starts_with('.'))
+            })
         });
         assignments.extend(set);
         if assignments.len() > MAX_ASSIGNMENTS {
@@ -225,7 +236,8 @@ impl Hub {
     /// Asks a program for its scene.
     pub fn export(&self, id: u64) -> Result<(), HubError> {
         let mut inner = self.lock();
-        let e = inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(HubError::Gone(id))?;
+        let e =
+            inner.programs.get_mut(&id).filter(|e| e.shown.running).ok_or(HubError::Gone(id))?;
         e.outgoing.try_send(ToProgram::Export {}).map_err(|_| HubError::Busy)?;
         e.shown.exported = None;
         Ok(())
@@ -240,7 +252,8 @@ impl Hub {
             let mut at = &mut section;
             let (folders, name) = path.rsplit_once('.').unwrap_or(("", path));
             for folder in folders.split('.').filter(|f| !f.is_empty()) {
-                let next = at.entry(folder).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+                let next =
+                    at.entry(folder).or_insert_with(|| toml::Value::Table(toml::Table::new()));
                 match next {
                     toml::Value::Table(next) => at = next,
                     _ => return Err(HubError::Setting(format!("`{path}` has no place in a file"))),
@@ -251,7 +264,8 @@ impl Hub {
                 at.insert(name.to_owned(), value);
             }
         }
-        let program = toml::Table::from_iter([(e.shown.program.clone(), toml::Value::Table(section))]);
+        let program =
+            toml::Table::from_iter([(e.shown.program.clone(), toml::Value::Table(section))]);
         let file = toml::Table::from_iter([("program".to_owned(), toml::Value::Table(program))]);
         toml::to_string(&file).map_err(|e| HubError::Setting(e.to_string()))
     }
@@ -269,11 +283,20 @@ mod tests {
     #[test]
     fn changes_add_up_are_taken_back_and_become_a_file_that_means_the_same() {
         let hub = Hub::default();
-        let (id, mut messages) = hub.register(Hello { program: "my prog".into(), ..Hello::default() });
-        hub.change(id, set(&[("mode", json!("rich")), ("objects.a1.color", json!([1, 0.5, 0]))]), &[])
-            .unwrap();
-        hub.change(id, set(&[("samples", json!(4)), ("material.mirror", json!(0.5))]), &["mode".into()])
-            .unwrap();
+        let (id, mut messages) =
+            hub.register(Hello { program: "my prog".into(), ..Hello::default() });
+        hub.change(
+            id,
+            set(&[("mode", json!("rich")), ("objects.a1.color", json!([1, 0.5, 0]))]),
+            &[],
+        )
+        .unwrap();
+        hub.change(
+            id,
+            set(&[("samples", json!(4)), ("material.mirror", json!(0.5))]),
+            &["mode".into()],
+        )
+        .unwrap();
         let mut last = None;
         while let Ok(m) = messages.try_recv() {
             last = Some(m);
@@ -286,7 +309,8 @@ mod tests {
         assert_eq!(last, Some(ToProgram::Change { assignments: expected.clone() }));
 
         let text = hub.toml(id).unwrap();
-        let file = crate::host::config::ConfigFile::parse(std::path::Path::new("x"), &text).unwrap();
+        let file =
+            crate::host::config::ConfigFile::parse(std::path::Path::new("x"), &text).unwrap();
         let from_file = assign(&Settings::default(), &file.assignments(&["my prog".into()]));
         let list: Vec<Assignment> =
             expected.iter().map(|(p, v)| Assignment::new("panel", p, v.clone())).collect();
@@ -300,7 +324,8 @@ mod tests {
     fn nonsense_changes_nothing_and_who_is_gone_cannot_be_changed() {
         let hub = Hub::default();
         let (id, mut messages) = hub.register(Hello::default());
-        let e = hub.change(id, set(&[("samples", json!(4)), ("mode", json!("x"))]), &[]).unwrap_err();
+        let e =
+            hub.change(id, set(&[("samples", json!(4)), ("mode", json!("x"))]), &[]).unwrap_err();
         assert!(e.to_string().contains("`mode` is \"x\""), "{e}");
         assert!(messages.try_recv().is_err() && hub.programs()[0].assignments.is_empty());
         assert_eq!(hub.change(99, BTreeMap::new(), &[]), Err(HubError::Gone(99)));
@@ -318,7 +343,8 @@ mod tests {
     fn a_program_that_reads_nothing_and_one_that_says_much_cost_a_fixed_amount() {
         let hub = Hub::default();
         let (id, _messages) = hub.register(Hello::default());
-        let results: Vec<_> = (1..100).map(|i| hub.change(id, set(&[("samples", json!(i))]), &[])).collect();
+        let results: Vec<_> =
+            (1..100).map(|i| hub.change(id, set(&[("samples", json!(i))]), &[])).collect();
         assert!(results.contains(&Err(HubError::Busy)));
         for frame in 0..2000 {
             hub.handle_message(

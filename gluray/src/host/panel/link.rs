@@ -1,16 +1,19 @@
-//! The library's end of the link. It lives in somebody else's program, so it never waits, starts no thread and says nothing.
+//! The library's end of the link. It lives in somebody else's program, so it never waits, starts no
+//! thread and says nothing.
 //!
-//! Once a frame the library calls [`Link::poll`] and [`Link::frame`]: some microseconds when there is a panel, one look at the clock when there is
-//! none. A connection on loopback is made or refused at once by the kernel; should the panel's queue be full, `CONNECT_PATIENCE` is lost, and the next
-//! attempts come more and more rarely. What the panel does not read is dropped, the newest first: a slow panel costs no memory.
+//! Once a frame the library calls [`Link::poll`] and [`Link::frame`]: some microseconds when there
+//! is a panel, one look at the clock when there is none. A connection on loopback is made or
+//! refused at once by the kernel; should the panel's queue be full, `CONNECT_PATIENCE` is lost, and
+//! the next attempts come more and more rarely. What the panel does not read is dropped, the newest
+//! first: a slow panel costs no memory.
 //!
-//! A process that forked leaves the link to its parent. All settings that arrive go through [`crate::host::config::assign()`]: what is
-//! wrong is refused by name, and the rest is taken.
+//! A process that forked leaves the link to its parent. All settings that arrive go through
+//! [`crate::host::config::assign()`]: what is wrong is refused by name, and the rest is taken.
 
 use super::endpoint::{PanelEndpoint, same};
 use super::protocol::{
-    FRAMES_PER_SEC, FrameStats, Hello, Lines, MAX_CHANGE_BYTES, MAX_OBJECTS, ObjectInfo, ToPanel, ToProgram,
-    VERSION, clipped, line,
+    FRAMES_PER_SEC, FrameStats, Hello, Lines, MAX_CHANGE_BYTES, MAX_OBJECTS, ObjectInfo, ToPanel,
+    ToProgram, VERSION, clipped, line,
 };
 use crate::host::config::{Assignment, Settings, assign};
 use std::collections::BTreeMap;
@@ -81,14 +84,16 @@ impl std::fmt::Debug for Link {
 }
 
 impl Link {
-    /// A link that finds its panel by the environment or the file, see [`PanelEndpoint::find`]. Nothing is tried before the first
-    /// [`Link::poll`].
+    /// A link that finds its panel by the environment or the file, see [`PanelEndpoint::find`].
+    /// Nothing is tried before the first [`Link::poll`].
     pub fn new(hello: Hello) -> Link {
         // Read once: the program may change its environment while we look.
         let names = ["GLURAY_PANEL", "GLURAY_PANEL_SECRET", "XDG_RUNTIME_DIR"];
         let set = names.map(|n| (n, crate::host::folders::variable(n)));
         Link::with(hello, move || {
-            PanelEndpoint::find(|name| set.iter().find(|(n, _)| *n == name).and_then(|(_, v)| v.clone()))
+            PanelEndpoint::find(|name| {
+                set.iter().find(|(n, _)| *n == name).and_then(|(_, v)| v.clone())
+            })
         })
     }
 
@@ -120,7 +125,8 @@ impl Link {
         self.connection.as_ref().is_some_and(|c| c.welcome)
     }
 
-    /// Reads what the panel sent and writes what waits. Call once a frame. When the panel goes away its settings go with it.
+    /// Reads what the panel sent and writes what waits. Call once a frame. When the panel goes away
+    /// its settings go with it.
     pub fn poll(&mut self) -> Option<PanelCommand> {
         let now = Instant::now();
         if self.connection.is_none() {
@@ -141,7 +147,8 @@ impl Link {
                 self.connection = None;
                 self.next_attempt = now + self.retry;
                 let before = std::mem::replace(&mut self.in_force, self.hello.settings.clone());
-                (before != self.in_force).then(|| PanelCommand::Settings(Box::new(self.in_force.clone())))
+                (before != self.in_force)
+                    .then(|| PanelCommand::Settings(Box::new(self.in_force.clone())))
             }
         }
     }
@@ -252,8 +259,10 @@ impl Link {
     }
 
     fn change(&mut self, assignments: BTreeMap<String, serde_json::Value>) -> Option<PanelCommand> {
-        let list: Vec<Assignment> =
-            assignments.into_iter().map(|(path, value)| Assignment::new("panel", path, value)).collect();
+        let list: Vec<Assignment> = assignments
+            .into_iter()
+            .map(|(path, value)| Assignment::new("panel", path, value))
+            .collect();
         let (settings, errors) = assign(&self.hello.settings, &list);
         let refused = errors.iter().take(20).map(ToString::to_string).collect();
         let changed = settings != self.in_force;

@@ -5,8 +5,9 @@
 //!   [link]: one poll per frame ── TCP, lines of JSON ── [hub] ── HTTP, token in every address ── page
 //!           ^ never waits              [protocol]       [links], [routes]
 //! ```
-//! Both listeners are on loopback and refuse to be anywhere else. The library finds the panel by `GLURAY_PANEL` or by the file that
-//! [`endpoint`] describes; the panel may start before or after the program.
+//! Both listeners are on loopback and refuse to be anywhere else. The library finds the panel by
+//! `GLURAY_PANEL` or by the file that [`endpoint`] describes; the panel may start before or after
+//! the program.
 
 pub mod endpoint;
 pub mod link;

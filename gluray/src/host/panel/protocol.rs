@@ -11,7 +11,8 @@
 //! | panel | `change` | all of the panel's assignments so far; they replace the ones before |
 //! | panel | `export` | asks for the scene as a file |
 //!
-//! A line that is too long, is no such object or comes before its time ends the connection and changes nothing else.
+//! A line that is too long, is no such object or comes before its time ends the connection and
+//! changes nothing else.
 
 use crate::host::config::Settings;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -154,7 +155,8 @@ pub enum ToProgram {
 
 /// A message as a line.
 pub fn line(message: &impl Serialize) -> Option<Vec<u8>> {
-    // Messages hold numbers, text and lists: only a number that is not finite could fail, and becomes `null`.
+    // Messages hold numbers, text and lists: only a number that is not finite could fail, and
+    // becomes `null`.
     let mut bytes = serde_json::to_vec(message).ok()?;
     bytes.push(b'\n');
     Some(bytes)
@@ -186,8 +188,14 @@ impl Lines {
     }
 
     /// The next message, if a whole line is there.
-    pub fn next<T: DeserializeOwned>(&mut self, longest: usize) -> Option<Result<T, ProtocolError>> {
-        let end = self.bytes[self.searched..].iter().position(|b| *b == b'\n').map(|at| self.searched + at);
+    pub fn next<T: DeserializeOwned>(
+        &mut self,
+        longest: usize,
+    ) -> Option<Result<T, ProtocolError>> {
+        let end = self.bytes[self.searched..]
+            .iter()
+            .position(|b| *b == b'\n')
+            .map(|at| self.searched + at);
         let Some(end) = end else {
             self.searched = self.bytes.len();
             return (self.bytes.len() > longest).then_some(Err(ProtocolError::TooLong));
@@ -242,7 +250,11 @@ mod tests {
                 lines.push(part);
                 found.extend(all(&mut lines, 1000));
             }
-            assert_eq!(found, messages.iter().cloned().map(Ok).collect::<Vec<_>>(), "in steps of {step}");
+            assert_eq!(
+                found,
+                messages.iter().cloned().map(Ok).collect::<Vec<_>>(),
+                "in steps of {step}"
+            );
         }
     }
 

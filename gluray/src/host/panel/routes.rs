@@ -1,4 +1,5 @@
-//! The page's addresses. All lie below the token; whoever does not know it learns nothing, not even which addresses there are.
+//! The page's addresses. All lie below the token; whoever does not know it learns nothing, not even
+//! which addresses there are.
 //!
 //! | address | |
 //! |---|---|
@@ -10,8 +11,8 @@
 //! | `POST /change` | `{"id":1,"set":{"mode":"rich"},"reset":["samples"]}` |
 //! | `POST /export` | `{"id":1}` |
 //!
-//! The `Host` must be this server (a name of somebody else's that leads to 127.0.0.1 is refused), and so must the `Origin`, when a browser
-//! sends one.
+//! The `Host` must be this server (a name of somebody else's that leads to 127.0.0.1 is refused),
+//! and so must the `Origin`, when a browser sends one.
 
 use super::endpoint::same;
 use super::hub::{Hub, HubError};
@@ -104,7 +105,8 @@ async fn guarded(State(app): State<AppState>, request: Request, next: Next) -> R
     for (name, value) in [
         (
             "content-security-policy",
-            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
+             connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
         ),
         ("referrer-policy", "no-referrer"),
         ("x-content-type-options", "nosniff"),
@@ -133,8 +135,9 @@ impl IntoResponse for HubError {
 
 /// JSON of a body, whatever content type it claims.
 fn parsed<T: DeserializeOwned>(body: &Bytes) -> Result<T, Box<Response>> {
-    serde_json::from_slice(body)
-        .map_err(|e| Box::new(error(StatusCode::BAD_REQUEST, &format!("the request makes no sense: {e}"))))
+    serde_json::from_slice(body).map_err(|e| {
+        Box::new(error(StatusCode::BAD_REQUEST, &format!("the request makes no sense: {e}")))
+    })
 }
 
 async fn index() -> Response {
@@ -158,7 +161,10 @@ struct AfterQuery {
     after: u64,
 }
 
-async fn state(State(app): State<AppState>, Query(AfterQuery { after }): Query<AfterQuery>) -> Response {
+async fn state(
+    State(app): State<AppState>,
+    Query(AfterQuery { after }): Query<AfterQuery>,
+) -> Response {
     let mut changes = app.hub.changes.subscribe();
     if after > 0 {
         tokio::time::sleep(CALM).await;
@@ -178,7 +184,10 @@ struct ProgramQuery {
     id: u64,
 }
 
-async fn history(State(app): State<AppState>, Query(ProgramQuery { id }): Query<ProgramQuery>) -> Response {
+async fn history(
+    State(app): State<AppState>,
+    Query(ProgramQuery { id }): Query<ProgramQuery>,
+) -> Response {
     match app.hub.history(id) {
         Some(frames) => axum::Json(frames).into_response(),
         None => HubError::Gone(id).into_response(),

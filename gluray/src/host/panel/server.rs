@@ -14,7 +14,8 @@ use std::time::Duration;
 pub enum PanelError {
     /// Off loopback.
     #[error(
-        "{0} can be reached from other machines; the panel listens on loopback only: give 127.0.0.1 or [::1]"
+        "{0} can be reached from other machines; the panel listens on loopback only: give \
+         127.0.0.1 or [::1]"
     )]
     NotLoopback(IpAddr),
     /// Nothing can listen there.
@@ -47,7 +48,8 @@ const TICK: Duration = Duration::from_millis(50);
 /// How long connections may take to finish at the end.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Serves page and links until `cancel` is set. `folder` is where programs look for the panel. `ready` gets the addresses once both are open.
+/// Serves page and links until `cancel` is set. `folder` is where programs look for the panel.
+/// `ready` gets the addresses once both are open.
 pub fn serve(
     address: SocketAddr,
     folder: Option<PathBuf>,
@@ -59,10 +61,15 @@ pub fn serve(
     }
     let start = |e: &dyn std::fmt::Display| PanelError::Start(e.to_string());
     let (mut secret, mut token) = ([0; 32], [0; 16]);
-    getrandom::fill(&mut secret).and_then(|()| getrandom::fill(&mut token)).map_err(|e| start(&e))?;
-    let (secret, token) = (Secret::of(secret), token.iter().map(|b| format!("{b:02x}")).collect::<String>());
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|e| start(&e))?;
+    getrandom::fill(&mut secret)
+        .and_then(|()| getrandom::fill(&mut token))
+        .map_err(|e| start(&e))?;
+    let (secret, token) =
+        (Secret::of(secret), token.iter().map(|b| format!("{b:02x}")).collect::<String>());
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|e| start(&e))?;
     let bind = |address: SocketAddr| {
         let listen = move |source| PanelError::Listen { address, source };
         let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
@@ -84,7 +91,8 @@ pub fn serve(
         let links = tokio::spawn(connections::accept(link, hub, secret));
         let ending = Arc::new(tokio::sync::Notify::new());
         let told = ending.clone();
-        let server = axum::serve(page, app).with_graceful_shutdown(async move { told.notified().await });
+        let server =
+            axum::serve(page, app).with_graceful_shutdown(async move { told.notified().await });
         let server = tokio::spawn(async move { server.await });
         while !cancel.load(Ordering::Relaxed) && !server.is_finished() {
             tokio::time::sleep(TICK).await;

@@ -1,4 +1,5 @@
-//! Chrome's trace event format ("Trace Event Format", Google, complete events), which Perfetto reads, too.
+//! Chrome's trace event format ("Trace Event Format", Google, complete events), which Perfetto
+//! reads, too.
 
 use super::{Span, in_order_of_appearance};
 use serde_json::{Value, json};
@@ -6,10 +7,12 @@ use serde_json::{Value, json};
 /// The trace: a thread for each track, a complete event for each span, in microseconds.
 pub fn chrome_trace(program: &str, spans: &[Span]) -> Value {
     let tracks = in_order_of_appearance(spans, |s| &s.track);
-    let first = spans.iter().filter(|s| s.is_sound()).map(|s| s.start_ms).fold(f64::INFINITY, f64::min);
+    let first =
+        spans.iter().filter(|s| s.is_sound()).map(|s| s.start_ms).fold(f64::INFINITY, f64::min);
     let number = |track: &str| tracks.iter().position(|t| *t == track).unwrap_or(0) + 1;
-    let mut events =
-        vec![json!({"ph": "M", "name": "process_name", "pid": 1, "tid": 0, "args": {"name": program}})];
+    let mut events = vec![
+        json!({"ph": "M", "name": "process_name", "pid": 1, "tid": 0, "args": {"name": program}}),
+    ];
     for track in &tracks {
         events.push(json!({"ph": "M", "name": "thread_name", "pid": 1, "tid": number(track), "args": {"name": track}}));
     }
@@ -44,10 +47,15 @@ mod tests {
         let events = trace["traceEvents"].as_array().unwrap();
         let named: Vec<&Value> = events.iter().filter(|e| e["ph"] == "X").collect();
         assert_eq!(named.len(), 2, "what no clock says is left out");
-        assert_eq!((named[0]["ts"].as_f64(), named[0]["dur"].as_f64()), (Some(2000.0), Some(2500.0)));
+        assert_eq!(
+            (named[0]["ts"].as_f64(), named[0]["dur"].as_f64()),
+            (Some(2000.0), Some(2500.0))
+        );
         assert_eq!(named[1]["ts"], 0.0, "the trace begins with its first event");
-        let thread =
-            events.iter().find(|e| e["name"] == "thread_name" && e["tid"] == named[1]["tid"]).unwrap();
+        let thread = events
+            .iter()
+            .find(|e| e["name"] == "thread_name" && e["tid"] == named[1]["tid"])
+            .unwrap();
         assert_eq!(thread["args"]["name"], "build");
     }
 }

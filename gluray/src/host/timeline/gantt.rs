@@ -1,4 +1,5 @@
-//! A Gantt chart as SVG: a row for each thread, a box for each span, a line at the end of each frame.
+//! A Gantt chart as SVG: a row for each thread, a box for each span, a line at the end of each
+//! frame.
 
 use super::{Span, in_order_of_appearance};
 use std::fmt::Write as _;
@@ -25,10 +26,12 @@ const RIGHT: f64 = 16.0;
 const TOP: f64 = 34.0;
 const ROW: f64 = 30.0;
 const BOX: f64 = 22.0;
-/// Told apart by people who see colours otherwise, too (Okabe and Ito 2008), and beyond eight by their order.
+/// Told apart by people who see colours otherwise, too (Okabe and Ito 2008), and beyond eight by
+/// their order.
 const COLORS: [&str; 8] =
     ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#f0e442", "#999999"];
-/// Boxes narrower than this are joined with their neighbours of the same phase: a run of minutes would make a file of gigabytes.
+/// Boxes narrower than this are joined with their neighbours of the same phase: a run of minutes
+/// would make a file of gigabytes.
 const NARROWEST: f64 = 0.25;
 
 /// The chart. Spans outside the window are left out; an empty list gives a chart that says so.
@@ -36,9 +39,9 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
     let sound: Vec<&Span> = spans.iter().filter(|s| s.is_sound()).collect();
     let tracks = in_order_of_appearance(spans, |s| &s.track);
     let phases = in_order_of_appearance(spans, |s| &s.phase);
-    let all = sound
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s.start_ms), b.max(s.end_ms())]);
+    let all = sound.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| {
+        [a.min(s.start_ms), b.max(s.end_ms())]
+    });
     let [from, to] = options.window_ms.unwrap_or(if sound.is_empty() { [0.0, 1.0] } else { all });
     let to = if to > from { to } else { from + 1.0 };
     let width = f64::from(options.width.max(300));
@@ -54,10 +57,14 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
         let _ = writeln!(s, "{text}");
     };
     line(format_args!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"12\">"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
+         viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"12\">"
     ));
     line(format_args!("<rect width=\"100%\" height=\"100%\" fill=\"white\"/>"));
-    line(format_args!("<text x=\"{LEFT}\" y=\"18\" font-size=\"14\">{}</text>", escaped(&options.title)));
+    line(format_args!(
+        "<text x=\"{LEFT}\" y=\"18\" font-size=\"14\">{}</text>",
+        escaped(&options.title)
+    ));
 
     // Time: a grid at round numbers.
     let step = round_step((to - from) / 8.0);
@@ -103,13 +110,15 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
             .collect();
         own.sort_by(|a, b| a.start_ms.total_cmp(&b.start_ms));
         for b in boxes(&own, x(from), x(to), x) {
-            let color = COLORS[phases.iter().position(|p| *p == b.phase).unwrap_or(0) % COLORS.len()];
+            let color =
+                COLORS[phases.iter().position(|p| *p == b.phase).unwrap_or(0) % COLORS.len()];
             let text = match b.count {
                 1 => format!("{} frame {} {:.3} ms", b.phase, b.frame, b.ms),
                 n => format!("{} {n} times, {:.3} ms", b.phase, b.ms),
             };
             line(format_args!(
-                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{BOX}\" fill=\"{color}\"><title>{}</title></rect>",
+                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{BOX}\" \
+                 fill=\"{color}\"><title>{}</title></rect>",
                 b.left,
                 y + 0.5 * (ROW - BOX),
                 (b.right - b.left).max(NARROWEST),
@@ -138,7 +147,8 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
     if marks.len() < inner as usize / 8 {
         for ms in &marks {
             line(format_args!(
-                "<line x1=\"{0:.2}\" y1=\"{TOP}\" x2=\"{0:.2}\" y2=\"{bottom}\" stroke=\"#333\" stroke-dasharray=\"3 3\"/>",
+                "<line x1=\"{0:.2}\" y1=\"{TOP}\" x2=\"{0:.2}\" y2=\"{bottom}\" stroke=\"#333\" \
+                 stroke-dasharray=\"3 3\"/>",
                 x(*ms)
             ));
         }
@@ -153,8 +163,12 @@ pub fn gantt_svg(spans: &[Span], options: &GanttOptions) -> String {
         );
         let inside = |s: &&&Span| s.phase == **phase && s.end_ms() >= from && s.start_ms <= to;
         // Nothing adds up to -0.0, which nobody wants to read.
-        let sum =
-            sound.iter().filter(inside).map(|s| s.end_ms().min(to) - s.start_ms.max(from)).sum::<f64>() + 0.0;
+        let sum = sound
+            .iter()
+            .filter(inside)
+            .map(|s| s.end_ms().min(to) - s.start_ms.max(from))
+            .sum::<f64>()
+            + 0.0;
         line(format_args!(
             "<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"11\" height=\"11\" fill=\"{}\"/>",
             y - 10.0,
@@ -185,15 +199,25 @@ fn boxes<'a>(own: &[&'a Span], least: f64, most: f64, x: impl Fn(f64) -> f64) ->
     for s in own {
         let (left, right) = (x(s.start_ms).clamp(least, most), x(s.end_ms()).clamp(least, most));
         let narrow = right - left < NARROWEST;
-        let last =
-            out.iter_mut().rev().take(4).find(|l| narrow && l.phase == s.phase && left - l.right < NARROWEST);
+        let last = out
+            .iter_mut()
+            .rev()
+            .take(4)
+            .find(|l| narrow && l.phase == s.phase && left - l.right < NARROWEST);
         match last {
             Some(l) => {
                 l.right = l.right.max(right);
                 l.ms += s.ms;
                 l.count += 1;
             }
-            None => out.push(GanttBox { phase: &s.phase, frame: s.frame, left, right, ms: s.ms, count: 1 }),
+            None => out.push(GanttBox {
+                phase: &s.phase,
+                frame: s.frame,
+                left,
+                right,
+                ms: s.ms,
+                count: 1,
+            }),
         }
     }
     out
@@ -221,7 +245,8 @@ mod tests {
         Span { track: track.into(), phase: phase.into(), frame, start_ms, ms }
     }
 
-    /// Numbers of an attribute of all elements of a kind, read by an XML parser: the chart must be well-formed.
+    /// Numbers of an attribute of all elements of a kind, read by an XML parser: the chart must be
+    /// well-formed.
     fn attributes(svg: &str, tag: &str, name: &str) -> Vec<f64> {
         let begin = format!("<{tag} ");
         let elements = svg.lines().filter(|l| l.starts_with(&begin));
@@ -239,16 +264,24 @@ mod tests {
         ];
         let options = GanttOptions { width: 1126, ..GanttOptions::default() };
         let svg = gantt_svg(&spans, &options);
-        // 1000 pixels for 100 ms, from 110 on. The first rectangle is the ground, the last three are the legend.
+        // 1000 pixels for 100 ms, from 110 on. The first rectangle is the ground, the last three
+        // are the legend.
         let (x, w) = (attributes(&svg, "rect", "x"), attributes(&svg, "rect", "width"));
-        assert_eq!((&x[..3], &w[..3]), (&[110.0, 360.0, 610.0][..], &[250.0, 750.0, 500.0][..]), "{svg}");
-        assert!(svg.contains("capture 25.0 ms") && svg.contains(">build<") && svg.ends_with("</svg>\n"));
+        assert_eq!(
+            (&x[..3], &w[..3]),
+            (&[110.0, 360.0, 610.0][..], &[250.0, 750.0, 500.0][..]),
+            "{svg}"
+        );
+        assert!(
+            svg.contains("capture 25.0 ms") && svg.contains(">build<") && svg.ends_with("</svg>\n")
+        );
     }
 
     #[test]
     fn many_short_spans_make_a_small_picture_and_lose_no_time() {
-        let spans: Vec<Span> =
-            (0..100_000).map(|i| span("program", "trace", i / 10, i as f64 * 0.01, 0.008)).collect();
+        let spans: Vec<Span> = (0..100_000)
+            .map(|i| span("program", "trace", i / 10, i as f64 * 0.01, 0.008))
+            .collect();
         let svg = gantt_svg(&spans, &GanttOptions::default());
         assert!(svg.len() < 1_000_000, "{} bytes", svg.len());
         assert!(svg.contains("trace 800.0 ms"));
@@ -260,7 +293,9 @@ mod tests {
             &[span("a<b", "\"c\"&", 1, 0.0, 1.0), span("x", "y", 1, f64::NAN, 1.0)],
             &GanttOptions { title: "<script>".into(), ..GanttOptions::default() },
         );
-        assert!(svg.contains("&lt;script&gt;") && svg.contains("a&lt;b") && !svg.contains("<script>"));
+        assert!(
+            svg.contains("&lt;script&gt;") && svg.contains("a&lt;b") && !svg.contains("<script>")
+        );
         assert!(gantt_svg(&[], &GanttOptions::default()).contains("nothing was recorded"));
     }
 

@@ -1,4 +1,5 @@
-//! Spans as they end. A fixed number is kept: the newest, because what a person asks about happened just now.
+//! Spans as they end. A fixed number is kept: the newest, because what a person asks about happened
+//! just now.
 
 use super::Span;
 use std::collections::VecDeque;

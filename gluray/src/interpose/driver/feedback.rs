@@ -1,4 +1,5 @@
-//! The driver's functions of transform feedback and of looking into programs, with slices in place of pointers.
+//! The driver's functions of transform feedback and of looking into programs, with slices in place
+//! of pointers.
 
 use super::driver;
 use core::ffi::{CStr, c_char, c_void};

@@ -109,10 +109,12 @@ pub(crate) fn is_enabled(cap: u32) -> bool {
     is_enabled_raw(cap) != 0
 }
 
-// More than the answer to any query has, but for those of lists that no standard limits: they are not asked for.
+// More than the answer to any query has, but for those of lists that no standard limits: they are
+// not asked for.
 const ROOM: usize = 32;
 
-/// True when the answer may be longer than [`ROOM`]: formats of compressed textures, program binaries and shader binaries.
+/// True when the answer may be longer than [`ROOM`]: formats of compressed textures, program
+/// binaries and shader binaries.
 fn is_of_a_list(what: u32) -> bool {
     matches!(what, 0x86a3 | 0x87ff | 0x8df8)
 }
@@ -215,7 +217,8 @@ fn map_orders(target: u32) -> [i32; 2] {
     [out[0], out[1]]
 }
 
-/// Orders in both parameters of an evaluator's map, and the values of its control points, of which each has `size`. A curve's second order is 1.
+/// Orders in both parameters of an evaluator's map, and the values of its control points, of which
+/// each has `size`. A curve's second order is 1.
 pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2], Vec<f32>) {
     // No map has more values a point.
     const MOST: usize = 4;
@@ -228,7 +231,8 @@ pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2]
     (orders, out)
 }
 
-/// What kind of numbers the colour buffer of the framebuffer object in use has that `attachment` names; 0 when nobody knows.
+/// What kind of numbers the colour buffer of the framebuffer object in use has that `attachment`
+/// names; 0 when nobody knows.
 pub(crate) fn component_type(attachment: u32) -> u32 {
     let (target, what) =
         (crate::state::enums::DRAW_FRAMEBUFFER, crate::state::enums::ATTACHMENT_COMPONENT_TYPE);
@@ -247,7 +251,8 @@ pub(crate) fn vertex_attrib_address(at: u32) -> usize {
     out as usize
 }
 
-/// A new texture. Where programs may choose names themselves, as many do, ours is one that they do not choose: a generated one could be a program's next.
+/// A new texture. Where programs may choose names themselves, as many do, ours is one that they do
+/// not choose: a generated one could be a program's next.
 pub(crate) fn gen_texture(core: bool) -> u32 {
     static NAMES: AtomicU32 = AtomicU32::new(0x6c75_7261);
     if !core {
@@ -270,7 +275,8 @@ pub(crate) fn tex_image(inner: i32, w: i32, h: i32, format: u32, kind: u32) {
     tex_image_2d(0x0de1, 0, inner, w, h, 0, format, kind, core::ptr::null());
 }
 
-/// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels, or of a kind that we do not know.
+/// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels,
+/// or of a kind that we do not know.
 pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8]) {
     use crate::state::enums::{FLOAT, RED, RGBA, UNSIGNED_BYTE};
     let bytes = match (format, kind) {
@@ -280,11 +286,16 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
     };
     let (w, h) = (w.max(0), h.max(0));
     assert!(data.len() as i64 >= i64::from(w) * i64::from(h) * bytes, "too few texels");
-    // Whatever rows the program has: those of `data` follow one another, and lie in our memory. Alignment, row length, skipped rows and pixels.
+    // Whatever rows the program has: those of `data` follow one another, and lie in our memory.
+    // Alignment, row length, skipped rows and pixels.
     const UNPACK: [(u32, i32); 4] = [(0x0cf5, 1), (0x0cf2, 0), (0x0cf3, 0), (0x0cf4, 0)];
     const PIXEL_UNPACK_BUFFER: u32 = 0x88ec;
     let before = UNPACK.map(|(what, _)| int(what));
-    UNPACK.into_iter().zip(before).filter(|(u, b)| u.1 != *b).for_each(|(u, _)| pixel_storei(u.0, u.1));
+    UNPACK
+        .into_iter()
+        .zip(before)
+        .filter(|(u, b)| u.1 != *b)
+        .for_each(|(u, _)| pixel_storei(u.0, u.1));
     let buffer = word(0x88ef);
     if buffer != 0 {
         bind_buffer(PIXEL_UNPACK_BUFFER, 0);
@@ -293,13 +304,19 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
     if buffer != 0 {
         bind_buffer(PIXEL_UNPACK_BUFFER, buffer);
     }
-    UNPACK.into_iter().zip(before).filter(|(u, b)| u.1 != *b).for_each(|(u, b)| pixel_storei(u.0, b));
+    UNPACK
+        .into_iter()
+        .zip(before)
+        .filter(|(u, b)| u.1 != *b)
+        .for_each(|(u, b)| pixel_storei(u.0, b));
 }
 
-/// Proof that texels are read as they are: [`with_raw_pixel_reads`] alone gives it, for the time of its call.
+/// Proof that texels are read as they are: [`with_raw_pixel_reads`] alone gives it, for the time of
+/// its call.
 pub(crate) struct RawPixelTransfer(());
 
-/// Texels of a level of the bound 1-D or 2-D texture: what the driver is going to write, whatever a caller thinks. `None` for other targets and from 2^26 texels on.
+/// Texels of a level of the bound 1-D or 2-D texture: what the driver is going to write, whatever a
+/// caller thinks. `None` for other targets and from 2^26 texels on.
 fn texels_of(target: u32, level: i32) -> Option<usize> {
     use crate::state::enums::{TEXTURE_1D, TEXTURE_2D, TEXTURE_HEIGHT, TEXTURE_WIDTH};
     if !matches!(target, TEXTURE_1D | TEXTURE_2D) {
@@ -351,7 +368,8 @@ pub(crate) fn only_sample(i: u32) -> u32 {
     before[0].cast_unsigned()
 }
 
-/// Has all samples written again. Masks of the program's own are not traced, so there is none to switch on.
+/// Has all samples written again. Masks of the program's own are not traced, so there is none to
+/// switch on.
 pub(crate) fn all_samples(mask: u32) {
     disable(SAMPLE_MASK);
     sample_maski(0, mask);
@@ -375,7 +393,8 @@ pub(crate) fn reset_pixel_transfer() {
     TRANSFER.into_iter().for_each(|(what, plain)| pixel_transferf(what, plain));
 }
 
-/// Runs `f` while texels are read as they are: rows that follow one another, into memory and not into a buffer, without the program's scales and biases.
+/// Runs `f` while texels are read as they are: rows that follow one another, into memory and not
+/// into a buffer, without the program's scales and biases.
 pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) -> R {
     // Swapped bytes, row length, skipped rows and pixels, alignment; of volumes nothing is read.
     const PACK: [(u32, i32); 5] = [(0x0d00, 0), (0x0d02, 0), (0x0d03, 0), (0x0d04, 0), (0x0d05, 4)];
@@ -412,7 +431,9 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
 /// Depths of the framebuffer from its lower left corner on, row by row.
 pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
     let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
-    with_raw_pixel_reads(|_| read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast()));
+    with_raw_pixel_reads(|_| {
+        read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast())
+    });
     out
 }
 
@@ -436,7 +457,8 @@ pub(crate) fn shader_log(shader: u32) -> String {
     String::from_utf8_lossy(&out[..n.clamp(0, MOST as i32 - 1) as usize]).into_owned()
 }
 
-/// True when the driver takes 2-D textures of this kind. Changes nothing but what is remembered of questions like this one.
+/// True when the driver takes 2-D textures of this kind. Changes nothing but what is remembered of
+/// questions like this one.
 pub(crate) fn has_texture_format(inner: i32, format: u32, kind: u32) -> bool {
     const PROXY_TEXTURE_2D: u32 = 0x8064;
     tex_image_2d(PROXY_TEXTURE_2D, 0, inner, 16, 16, 0, format, kind, core::ptr::null());

@@ -1,7 +1,8 @@
 //! The driver: finding its functions, and calling them.
 //!
-//! Under `LD_PRELOAD` the driver is `libGL.so.1` (`libEGL.so.1`), opened by name: `RTLD_NEXT` finds nothing when the program itself
-//! opened it with `dlopen`. As a GLVND vendor library it is the vendor that we stand in front of.
+//! Under `LD_PRELOAD` the driver is `libGL.so.1` (`libEGL.so.1`), opened by name: `RTLD_NEXT` finds
+//! nothing when the program itself opened it with `dlopen`. As a GLVND vendor library it is the
+//! vendor that we stand in front of.
 //!
 //! This is a room for unsafe code.
 #![allow(unsafe_code, reason = "a room: calls into a C library that is found at run time")]
@@ -52,7 +53,8 @@ pub(crate) unsafe fn call_dlsym(handle: *mut c_void, name: &CStr) -> *const () {
         return p;
     }
     // SAFETY: the signature of dlsym.
-    let f: unsafe extern "C" fn(*mut c_void, *const c_char) -> *const () = unsafe { core::mem::transmute(p) };
+    let f: unsafe extern "C" fn(*mut c_void, *const c_char) -> *const () =
+        unsafe { core::mem::transmute(p) };
     // SAFETY: as the caller promises.
     unsafe { f(handle, name.as_ptr()) }
 }
@@ -84,28 +86,37 @@ fn open(library: &CStr) -> *mut c_void {
     unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_LOCAL) }
 }
 
-/// Puts GLVND's functions before Mesa's where libraries that are opened later look for OpenGL's. When a first context is made Mesa puts its own there (those of
-/// libglapi): calls of plugins, and of libraries that a script opens (libGLU), would go past GLVND, and so past us. Our own would not do in their place, because
-/// GLVND has to hear of `glXMakeCurrent`.
+/// Puts GLVND's functions before Mesa's where libraries that are opened later look for OpenGL's.
+/// When a first context is made Mesa puts its own there (those of libglapi): calls of plugins, and
+/// of libraries that a script opens (libGLU), would go past GLVND, and so past us. Our own would
+/// not do in their place, because GLVND has to hear of `glXMakeCurrent`.
 pub(crate) fn put_glvnd_first() {
     let open = |library: &CStr, how| {
         // SAFETY: a C string.
-        !unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_GLOBAL | how) }.is_null()
+        !unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_GLOBAL | how) }
+            .is_null()
     };
     // One that is there already, else the one without GLX.
-    let _ =
-        [(c"libGL.so.1", libc::RTLD_NOLOAD), (c"libOpenGL.so.0", libc::RTLD_NOLOAD), (c"libOpenGL.so.0", 0)]
-            .into_iter()
-            .any(|(library, how)| open(library, how));
+    let _ = [
+        (c"libGL.so.1", libc::RTLD_NOLOAD),
+        (c"libOpenGL.so.0", libc::RTLD_NOLOAD),
+        (c"libOpenGL.so.0", 0),
+    ]
+    .into_iter()
+    .any(|(library, how)| open(library, how));
 }
 
-/// `__glx_Main` or `__egl_Main` of those vendors that GLVND would have taken without us, the first first; of GLX's one alone.
+/// `__glx_Main` or `__egl_Main` of those vendors that GLVND would have taken without us, the first
+/// first; of GLX's one alone.
 pub(crate) fn vendor_mains(egl: bool) -> Vec<*const ()> {
     let get = crate::host::folders::variable;
     let (libraries, main): (Vec<String>, _) = match egl {
         true => {
             let vendors = crate::interpose::glvnd::egl_vendors(get);
-            (vendors.iter().map(|v| crate::interpose::glvnd::egl_library(&v.name)).collect(), c"__egl_Main")
+            (
+                vendors.iter().map(|v| crate::interpose::glvnd::egl_library(&v.name)).collect(),
+                c"__egl_Main",
+            )
         }
         false => {
             let vendors = crate::interpose::glvnd::glx_vendors(get);
@@ -162,7 +173,8 @@ fn find(name: &CStr) -> *const () {
         return get;
     }
     // SAFETY: both functions of this name take a C string.
-    let get: unsafe extern "C" fn(*const c_char) -> *const () = unsafe { core::mem::transmute(get) };
+    let get: unsafe extern "C" fn(*const c_char) -> *const () =
+        unsafe { core::mem::transmute(get) };
     // SAFETY: a C string.
     unsafe { get(name.as_ptr()) }
 }
@@ -212,7 +224,8 @@ macro_rules! driver {
         $vis fn $name($($a: $t),*) $(-> $r)? {
             static SLOT: AtomicPtr<()> = AtomicPtr::new(core::ptr::null_mut());
             let p = $crate::interpose::driver::cached(&SLOT, $gl);
-            // SAFETY: the signature that OpenGL (GLX, EGL) gives this name; pointers come from slices in `gl` or from the program.
+            // SAFETY: the signature that OpenGL (GLX, EGL) gives this name; pointers come from
+            // slices in `gl` or from the program.
             unsafe {
                 let f: unsafe extern "C" fn($($t),*) $(-> $r)? = core::mem::transmute(p);
                 f($($a),*)

@@ -26,7 +26,8 @@ impl<S: Read + Write> Stream for S {}
 /// The names that the server of a display gives for its screen, the best first; the error says why
 /// there are none.
 pub(super) fn vendor_names(display: &str, authority: Option<&Path>) -> Result<Vec<String>, String> {
-    let (host, number) = display.rsplit_once(':').ok_or_else(|| format!("`{display}` is no display"))?;
+    let (host, number) =
+        display.rsplit_once(':').ok_or_else(|| format!("`{display}` is no display"))?;
     let number: u16 = number
         .split('.')
         .next()
@@ -42,7 +43,8 @@ fn connect(host: &str, number: u16) -> std::io::Result<Box<dyn Stream>> {
     if host.is_empty() || host == "unix" {
         let path = format!("/tmp/.X11-unix/X{number}");
         let abstract_name = SocketAddr::from_abstract_name(&path)?;
-        let stream = UnixStream::connect(&path).or_else(|_| UnixStream::connect_addr(&abstract_name))?;
+        let stream =
+            UnixStream::connect(&path).or_else(|_| UnixStream::connect_addr(&abstract_name))?;
         stream.set_read_timeout(Some(PATIENCE))?;
         stream.set_write_timeout(Some(PATIENCE))?;
         return Ok(Box::new(stream));
@@ -85,7 +87,11 @@ fn word<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     std::array::from_fn(|k| bytes[at + k])
 }
 
-fn ask(stream: &mut dyn Stream, cookie: Option<&[u8]>, screen: u32) -> std::io::Result<Vec<String>> {
+fn ask(
+    stream: &mut dyn Stream,
+    cookie: Option<&[u8]>,
+    screen: u32,
+) -> std::io::Result<Vec<String>> {
     let refused = |what: &str| std::io::Error::other(what.to_owned());
     let (name, data) = cookie.map_or((&b""[..], &b""[..]), |c| (COOKIE, c));
     let mut hello = vec![b'l', 0, 11, 0, 0, 0];
@@ -182,7 +188,8 @@ mod tests {
     #[test]
     fn a_server_names_vendors_for_its_screen_to_who_has_the_cookie() {
         let (display, server) = fake(Some("nvidia mesa"));
-        let number = display.rsplit_once(':').and_then(|(_, n)| n.split_once('.')).expect("a number").0;
+        let number =
+            display.rsplit_once(':').and_then(|(_, n)| n.split_once('.')).expect("a number").0;
         let mut file = Vec::new();
         for (of, data) in [("1", b"wrong"), (number, b"right")] {
             file.extend([1, 0]);
@@ -194,7 +201,10 @@ mod tests {
         let place = tempfile::tempdir().expect("a folder");
         let authority = place.path().join("authority");
         std::fs::write(&authority, file).expect("a file");
-        assert_eq!(vendor_names(&display, Some(&authority)), Ok(vec!["nvidia".into(), "mesa".into()]));
+        assert_eq!(
+            vendor_names(&display, Some(&authority)),
+            Ok(vec!["nvidia".into(), "mesa".into()])
+        );
         let proof = server.join().expect("a server");
         assert!(proof.starts_with(COOKIE) && proof[20..].starts_with(b"right"), "{proof:?}");
     }

@@ -1,19 +1,27 @@
 //! Who owns a context, and the way from a hook to the one that is current on its thread.
 //!
-//! A context is owned by the slot of the thread it is current on ([`install`], [`take`]) or by whoever holds its box. Nothing else in the
-//! library has its address, so the argument that nobody gets two `&mut Context` is in this file alone:
+//! A context is owned by the slot of the thread it is current on ([`install`], [`take`]) or by
+//! whoever holds its box. Nothing else in the library has its address, so the argument that nobody
+//! gets two `&mut Context` is in this file alone:
 //!
-//! 1. *One thread.* The address stands in the thread's own [`SLOT`], and, for the one thread that got hold of [`OWNER`], in [`HOT`] as well: a
-//!    thread-local look-up in a shared library costs as much as the rest of a vertex. [`OWNER`] says whose it is. It goes from 0 to `me`
-//!    by a compare-and-exchange of that thread, and from `me` and `me | 1` to anything else by stores of that thread alone. So a thread that reads its own
-//!    name in [`OWNER`] reads what it wrote itself, nobody else has written [`OWNER`] or [`HOT`] since, and [`HOT`] is the address that it put there. A thread that reads
-//!    anything else leaves [`HOT`] alone. What two threads do at the same time therefore does not matter: each transition is one atomic step, and a thread
+//! 1. *One thread.* The address stands in the thread's own [`SLOT`], and, for the one thread that
+//!    got hold of [`OWNER`], in [`HOT`] as well: a thread-local look-up in a shared library costs
+//!    as much as the rest of a vertex. [`OWNER`] says whose it is. It goes from 0 to `me` by a
+//!    compare-and-exchange of that thread, and from `me` and `me | 1` to anything else by stores of
+//!    that thread alone. So a thread that reads its own name in [`OWNER`] reads what it wrote
+//!    itself, nobody else has written [`OWNER`] or [`HOT`] since, and [`HOT`] is the address that
+//!    it put there. A thread that reads anything else leaves [`HOT`] alone. What two threads do at
+//!    the same time therefore does not matter: each transition is one atomic step, and a thread
 //!    that comes second finds another's name and keeps to its slot.
-//! 2. *One at a time.* While a reference is lent, the thread is busy: `OWNER` is `me | 1` where this thread has it, and `ThreadSlot::busy` elsewhere. Both ways look, and lend nothing
-//!    then (a driver that we call may call us: its debug callback is the program's). [`fast_call`] needs no mark of its own: what it runs calls nothing but us.
-//! 3. *Names of threads.* `me` is the address of the thread's control block, which no two threads that live have in common (System V ABI for x86-64, `fs:0`). A thread that
-//!    ends gives its name up with its slot, in the slot's destructor, before another can be made in its place. A child of a fork has one thread; names of threads that only its
-//!    parent has are given up there, because their memory is handed out again ([`after_fork`]).
+//! 2. *One at a time.* While a reference is lent, the thread is busy: `OWNER` is `me | 1` where
+//!    this thread has it, and `ThreadSlot::busy` elsewhere. Both ways look, and lend nothing then
+//!    (a driver that we call may call us: its debug callback is the program's). [`fast_call`] needs
+//!    no mark of its own: what it runs calls nothing but us.
+//! 3. *Names of threads.* `me` is the address of the thread's control block, which no two threads
+//!    that live have in common (System V ABI for x86-64, `fs:0`). A thread that ends gives its name
+//!    up with its slot, in the slot's destructor, before another can be made in its place. A child
+//!    of a fork has one thread; names of threads that only its parent has are given up there,
+//!    because their memory is handed out again ([`after_fork`]).
 
 use crate::capture::immediate_mode::FastPathResult;
 use crate::interpose::context::Context;
@@ -44,7 +52,8 @@ impl Drop for ThreadSlot {
         let context = self.context.replace(null_mut());
         if !context.is_null() {
             super::thread_leaves();
-            // SAFETY: of `Box::into_raw` in `install`; the slot owned it, and nobody can ask the slot any more.
+            // SAFETY: of `Box::into_raw` in `install`; the slot owned it, and nobody can ask the
+            // slot any more.
             drop(unsafe { Box::from_raw(context) });
         }
     }
@@ -54,9 +63,11 @@ impl Drop for ThreadSlot {
 #[inline(always)]
 fn me() -> usize {
     let out: usize;
-    // SAFETY: the ABI of x86-64 has the address of the thread's control block there, which the C library sets up before any code of ours runs.
+    // SAFETY: the ABI of x86-64 has the address of the thread's control block there, which the C
+    // library sets up before any code of ours runs.
     unsafe {
-        core::arch::asm!("mov {}, fs:[0]", out(reg) out, options(pure, nomem, nostack, preserves_flags));
+        core::arch::asm!("mov {}, \
+                          fs:[0]", out(reg) out, options(pure, nomem, nostack, preserves_flags));
     }
     out
 }
@@ -78,11 +89,13 @@ extern "C" fn after_fork() {
     }
 }
 
-/// `context` is current on this thread, which had none. Given back when the thread is ending, and has no place for it.
+/// `context` is current on this thread, which had none. Given back when the thread is ending, and
+/// has no place for it.
 pub(crate) fn install(context: Box<Context>) -> Result<(), Box<Context>> {
     static FORKS: Once = Once::new();
     FORKS.call_once(|| {
-        // SAFETY: the handler is a function of ours that touches two atomics; the library is never unloaded (`-z nodelete`).
+        // SAFETY: the handler is a function of ours that touches two atomics; the library is never
+        // unloaded (`-z nodelete`).
         unsafe { libc::pthread_atfork(None, None, Some(after_fork)) };
     });
     if SLOT.try_with(|slot| !slot.context.get().is_null()) != Ok(false) {
@@ -107,15 +120,21 @@ pub(crate) fn take() -> Option<Box<Context>> {
         slot.context.replace(null_mut())
     });
     let context = taken.unwrap_or(null_mut());
-    // SAFETY: of `Box::into_raw` in `install`; neither the slot nor the statics have it any more, and it is not lent.
+    // SAFETY: of `Box::into_raw` in `install`; neither the slot nor the statics have it any more,
+    // and it is not lent.
     (!context.is_null()).then(|| unsafe { Box::from_raw(context) })
 }
 
-/// The short way of a call, with the current context; [`FastPathResult::Slow`] when the context has to be looked up, and after a fault.
+/// The short way of a call, with the current context; [`FastPathResult::Slow`] when the context has
+/// to be looked up, and after a fault.
 ///
-/// `f` must not be handed on to anything that is not inlined: see [`FastPathResult`]. It must not call anything that may call us.
+/// `f` must not be handed on to anything that is not inlined: see [`FastPathResult`]. It must not
+/// call anything that may call us.
 #[inline(always)]
-pub(super) fn fast_call(index: usize, f: impl FnOnce(&mut Context) -> FastPathResult) -> FastPathResult {
+pub(super) fn fast_call(
+    index: usize,
+    f: impl FnOnce(&mut Context) -> FastPathResult,
+) -> FastPathResult {
     if OWNER.load(Relaxed) != me() {
         return FastPathResult::Slow;
     }
@@ -125,14 +144,15 @@ pub(super) fn fast_call(index: usize, f: impl FnOnce(&mut Context) -> FastPathRe
             // In builds for tests alone: here a load would be felt.
             crate::interpose::panic_guard::inject_at(index);
         }
-        // SAFETY: this thread owns it and it is not lent, for that is what `OWNER` says (1 and 2 above).
+        // SAFETY: this thread owns it and it is not lent, for that is what `OWNER` says (1 and 2
+        // above).
         f(unsafe { &mut *hot })
     };
     crate::interpose::panic_guard::caught(call).unwrap_or(FastPathResult::Slow)
 }
 
-/// The long way of a call: `f` with the current context, whose answer says whether that was all. False also without a context and after a fault: then the
-/// driver is to be called.
+/// The long way of a call: `f` with the current context, whose answer says whether that was all.
+/// False also without a context and after a fault: then the driver is to be called.
 #[inline(always)]
 pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
     if crate::interpose::panic_guard::happened() {
@@ -183,7 +203,8 @@ impl Drop for LentSlot<'_> {
     }
 }
 
-/// Calls `f` with the current context. `None` without a context, and when we are called by the driver that we called.
+/// Calls `f` with the current context. `None` without a context, and when we are called by the
+/// driver that we called.
 #[inline]
 pub(crate) fn with_context<R>(f: impl FnOnce(&mut Context) -> R) -> Option<R> {
     let me = me();
@@ -208,7 +229,8 @@ fn with_slot<R>(f: impl FnOnce(&mut Context) -> R) -> Option<R> {
             return None;
         }
         let _lent = LentSlot(slot);
-        // SAFETY: the slot owns it, it is this thread's, and not in `HOT`; until `_lent` goes nobody else gets it.
+        // SAFETY: the slot owns it, it is this thread's, and not in `HOT`; until `_lent` goes
+        // nobody else gets it.
         Some(f(unsafe { &mut *context }))
     };
     SLOT.try_with(look_up).ok().flatten()
@@ -246,7 +268,8 @@ mod tests {
         std::thread::spawn(|| {
             put(2);
             assert_eq!((by_step(), with_context(|c| c.handle())), (None, Some(2)));
-            let inner = with_context(|_| (by_step(), with_context(|c| c.handle()), take().is_none()));
+            let inner =
+                with_context(|_| (by_step(), with_context(|c| c.handle()), take().is_none()));
             assert_eq!(inner, Some((None, None, true)), "lent once");
         })
         .join()
@@ -255,12 +278,14 @@ mod tests {
         assert_eq!(inner, Some((None, None, true)), "lent once");
         assert!(install(Box::new(Context::for_tests(9))).is_err(), "there is one");
         // A panic gives back what was lent.
-        let panicked = std::panic::catch_unwind(|| with_context(|_| std::panic::resume_unwind(Box::new(()))));
+        let panicked =
+            std::panic::catch_unwind(|| with_context(|_| std::panic::resume_unwind(Box::new(()))));
         assert!(panicked.is_err() && by_step() == Some(1));
         assert_eq!(take().map(|c| c.handle()), Some(1));
         assert_eq!((by_step(), with_context(|c| c.handle())), (None, None));
 
-        // Threads that make contexts current in turns: the short way goes from hand to hand, and each call finds its own context or none.
+        // Threads that make contexts current in turns: the short way goes from hand to hand, and
+        // each call finds its own context or none.
         const THREADS: usize = 4;
         const TURNS: usize = 20_000;
         let together = Barrier::new(THREADS);

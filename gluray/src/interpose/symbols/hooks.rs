@@ -1,5 +1,5 @@
-//! Hooks of the calls that are taken apart. Each hands its arguments to the current context, whose method says whether that
-//! was all; if not, the driver gets the call as it came.
+//! Hooks of the calls that are taken apart. Each hands its arguments to the current context, whose
+//! method says whether that was all; if not, the driver gets the call as it came.
 //!
 //! The build script reads this file: a line that begins with `fn gl…(` or `fn egl…(` is a hook.
 
@@ -248,7 +248,8 @@ book_hooks! {
     fn glDeleteLists(first: u32, n: Int) => |c| c.delete_lists(first, n);
 }
 
-/// The same for calls after which others see what this context has written to textures: told of like others before they run, and again after.
+/// The same for calls after which others see what this context has written to textures: told of
+/// like others before they run, and again after.
 macro_rules! publishing_hooks {
     ($(fn $name:ident();)*) => { $(
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name() {
@@ -285,8 +286,7 @@ pub(in crate::interpose::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32
     given.unwrap_or_else(|| driver!(glGenLists(n): (Int) -> u32))
 }
 
-// ---- Addresses ------------------------------------------------------------------------------------------------------
-
+// ---- Addresses ----------------------------------------------------------------------------------
 macro_rules! get_proc_address {
     ($($name:ident)*) => { $(
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name(name: *const c_char) -> *const () {
@@ -301,11 +301,11 @@ macro_rules! get_proc_address {
 }
 get_proc_address! { glXGetProcAddress glXGetProcAddressARB eglGetProcAddress }
 
-// ---- Contexts -------------------------------------------------------------------------------------------------------
-
+// ---- Contexts -----------------------------------------------------------------------------------
 type Handle = *mut c_void;
 
-/// Brackets a change of the current context: what is pending is drawn with the old one, then the books follow.
+/// Brackets a change of the current context: what is pending is drawn with the old one, then the
+/// books follow.
 fn making_current(index: usize, context: Handle, real: impl FnOnce() -> u32) -> u32 {
     let leave = || {
         crate::interpose::panic_guard::inject_at(index);
@@ -441,7 +441,10 @@ pub(in crate::interpose::symbols) unsafe extern "C" fn eglCreateContext(
     )
 }
 
-pub(in crate::interpose::symbols) unsafe extern "C" fn glXDestroyContext(display: Handle, context: Handle) {
+pub(in crate::interpose::symbols) unsafe extern "C" fn glXDestroyContext(
+    display: Handle,
+    context: Handle,
+) {
     destroyed(at::glXDestroyContext, context);
     driver!(glXDestroyContext(display, context): (Handle, Handle));
 }

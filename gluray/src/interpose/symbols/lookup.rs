@@ -61,8 +61,7 @@ pub(super) fn replaced(name: *const c_char, driver: *const ()) -> *const () {
     trampoline(name).unwrap_or(driver)
 }
 
-// ---- GLVND ----------------------------------------------------------------------------------------------------------
-
+// ---- GLVND --------------------------------------------------------------------------------------
 type Imports = [*const (); 10];
 type VendorMain = unsafe extern "C" fn(u32, *const c_void, *mut c_void, *mut Imports) -> c_int;
 
@@ -72,7 +71,11 @@ unsafe extern "C" fn glx_address(name: *const c_char) -> *const () {
     let driver = driver::vendor_address(text, false);
     let ours = || {
         crate::interpose::panic_guard::injected("address");
-        if text.to_bytes().starts_with(b"glXGetProcAddress") { driver } else { replaced(name, driver) }
+        if text.to_bytes().starts_with(b"glXGetProcAddress") {
+            driver
+        } else {
+            replaced(name, driver)
+        }
     };
     caught(ours).unwrap_or(driver)
 }
@@ -84,8 +87,8 @@ unsafe extern "C" fn egl_address(name: *const c_char) -> *const () {
     let ours = || {
         crate::interpose::panic_guard::injected("address");
         if driver.is_null() && EGL_CHOSEN.load(Relaxed) == NOBODY {
-            // GLVND asks before there is a display; our trampoline finds the function of whoever has
-            // it then.
+            // GLVND asks before there is a display; our trampoline finds the function of whoever
+            // has it then.
             let of_any = egl_drivers().iter().map(|d| of_driver(d, name)).find(|f| !f.is_null());
             driver = of_any.unwrap_or(driver);
         }
@@ -155,8 +158,10 @@ unsafe extern "C" fn __egl_Main(
     }
     let Some(first) = all.first() else { return 0 };
     let table = imports.cast::<*const ()>();
-    for (i, f) in first.0.iter().enumerate().filter(|(i, f)| *i < egl::PATCHES.end || !f.is_null()) {
-        // SAFETY: GLVND's table; what is beyond its first ten members a driver writes by its version.
+    for (i, f) in first.0.iter().enumerate().filter(|(i, f)| *i < egl::PATCHES.end || !f.is_null())
+    {
+        // SAFETY: GLVND's table; what is beyond its first ten members a driver writes by its
+        // version.
         unsafe { *table.add(i) = *f };
     }
     driver::set_vendor(first.0[egl::GET_PROC_ADDRESS], true);
@@ -216,7 +221,11 @@ fn of_driver(driver: &Driver, name: *const c_char) -> *const () {
         return core::ptr::null();
     }
     // SAFETY: the driver's `getProcAddress`, with GLVND's own string.
-    unsafe { core::mem::transmute::<*const (), unsafe extern "C" fn(*const c_char) -> *const ()>(get)(name) }
+    unsafe {
+        core::mem::transmute::<*const (), unsafe extern "C" fn(*const c_char) -> *const ()>(get)(
+            name,
+        )
+    }
 }
 
 /// The function of the driver that was chosen, or of the first.
@@ -235,14 +244,17 @@ unsafe extern "C" fn egl_display(
 ) -> *mut c_void {
     type GetDisplay = unsafe extern "C" fn(u32, *mut c_void, *const c_void) -> *mut c_void;
     let chosen = EGL_CHOSEN.load(Relaxed);
-    for (i, driver) in egl_drivers().iter().enumerate().filter(|(i, _)| chosen == NOBODY || chosen == *i) {
+    for (i, driver) in
+        egl_drivers().iter().enumerate().filter(|(i, _)| chosen == NOBODY || chosen == *i)
+    {
         let get = driver.0[egl::GET_DISPLAY];
         if get.is_null() {
             continue;
         }
         // SAFETY: the driver's `getPlatformDisplay`, with GLVND's own arguments.
-        let display =
-            unsafe { core::mem::transmute::<*const (), GetDisplay>(get)(platform, native, attributes) };
+        let display = unsafe {
+            core::mem::transmute::<*const (), GetDisplay>(get)(platform, native, attributes)
+        };
         if !display.is_null() {
             EGL_CHOSEN.store(i, Relaxed);
             driver::set_vendor(driver.0[egl::GET_PROC_ADDRESS], true);
@@ -267,7 +279,9 @@ unsafe extern "C" fn egl_vendor_string(name: c_int) -> *const c_char {
         return core::ptr::null();
     }
     // SAFETY: the driver's `getVendorString`.
-    unsafe { core::mem::transmute::<*const (), unsafe extern "C" fn(c_int) -> *const c_char>(f)(name) }
+    unsafe {
+        core::mem::transmute::<*const (), unsafe extern "C" fn(c_int) -> *const c_char>(f)(name)
+    }
 }
 
 /// Every driver keeps the number of a function: it is not known yet whose displays there will be.
@@ -277,7 +291,9 @@ unsafe extern "C" fn egl_dispatch_index(name: *const c_char, index: c_int) {
         if !f.is_null() {
             // SAFETY: the driver's `setDispatchIndex`, with GLVND's own arguments.
             unsafe {
-                core::mem::transmute::<*const (), unsafe extern "C" fn(*const c_char, c_int)>(f)(name, index);
+                core::mem::transmute::<*const (), unsafe extern "C" fn(*const c_char, c_int)>(f)(
+                    name, index,
+                );
             }
         }
     }

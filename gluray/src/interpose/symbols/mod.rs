@@ -1,12 +1,17 @@
-//! The OpenGL library that programs see: one trampoline per entry point, a table of where each goes, and the hooks.
+//! The OpenGL library that programs see: one trampoline per entry point, a table of where each
+//! goes, and the hooks.
 //!
-//! A trampoline has no prototype: it jumps through [`TABLE`] with all registers as the program left them. Calls that may change
-//! state are *watched*: while [`ARMED`] is set we are told before they run (`slow`), at a price of some ten nanoseconds; as soon as
-//! nobody needs to know, they cost one comparison. This is what lets the driver keep all state: we ask it when a draw comes, and
-//! only again after a watched call.
+//! A trampoline has no prototype: it jumps through [`TABLE`] with all registers as the program left
+//! them. Calls that may change state are *watched*: while [`ARMED`] is set we are told before they
+//! run (`slow`), at a price of some ten nanoseconds; as soon as nobody needs to know, they cost one
+//! comparison. This is what lets the driver keep all state: we ask it when a draw comes, and only
+//! again after a watched call.
 //!
 //! This is a room for unsafe code: everything here is called by programs we do not know.
-#![allow(unsafe_code, reason = "a room: exported OpenGL symbols are called by programs we do not know")]
+#![allow(
+    unsafe_code,
+    reason = "a room: exported OpenGL symbols are called by programs we do not know"
+)]
 #![allow(non_snake_case, reason = "the names of OpenGL")]
 
 mod current_context;
@@ -51,8 +56,9 @@ include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
 
 /// Where each trampoline goes: `lazy` at first, then our hook or the driver's function.
 static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
-/// Zero while watched calls need not be reported: exactly one thread has a context, and nobody asked. Bit 0 says that somebody asked; above it are the threads that have
-/// a context, less one. In one word, so that none of the two changes unseen while the other is looked at.
+/// Zero while watched calls need not be reported: exactly one thread has a context, and nobody
+/// asked. Bit 0 says that somebody asked; above it are the threads that have a context, less one.
+/// In one word, so that none of the two changes unseen while the other is looked at.
 static ARMED: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
 /// Watched calls that went straight to the driver.
 static CALLS: AtomicU64 = AtomicU64::new(0);
@@ -76,7 +82,8 @@ pub(crate) fn is_alone() -> bool {
     ARMED.load(Relaxed) & !1 == 0
 }
 
-/// A thread gets a context. From now on, and until as many have left, all watched calls are reported when it is not the only one.
+/// A thread gets a context. From now on, and until as many have left, all watched calls are
+/// reported when it is not the only one.
 pub(crate) fn thread_enters() {
     ARMED.fetch_add(2, Relaxed);
 }
@@ -86,7 +93,8 @@ pub(crate) fn thread_leaves() {
     ARMED.fetch_sub(2, Relaxed);
 }
 
-/// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists, since those that we compiled are ours to play.
+/// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists,
+/// since those that we compiled are ours to play.
 fn stays_hooked(index: usize) -> bool {
     let name = NAMES[index].to_bytes();
     let kept: [&[u8]; 7] = [
@@ -132,7 +140,8 @@ pub(crate) fn at_exit() {
 extern "C" fn resolve(index: usize) -> *const () {
     crate::interpose::panic_guard::in_program();
     // Also what is called for the first time after a fault.
-    let hook = HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || stays_hooked(index));
+    let hook =
+        HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || stays_hooked(index));
     let target = crate::interpose::panic_guard::caught(|| match hook {
         Some(hook) => hook.0,
         None => {
@@ -147,7 +156,8 @@ extern "C" fn resolve(index: usize) -> *const () {
 
 /// After a fault in the search for a function of the driver's: found, or nothing is called.
 fn forward_plainly(index: usize) -> *const () {
-    crate::interpose::panic_guard::caught(|| driver::forward(index)).unwrap_or(hooks::no_context as *const ())
+    crate::interpose::panic_guard::caught(|| driver::forward(index))
+        .unwrap_or(hooks::no_context as *const ())
 }
 
 extern "C" fn on_state_call(index: usize) {
@@ -162,7 +172,8 @@ extern "C" fn on_state_call(index: usize) {
     });
 }
 
-/// Entry `index` of those that were ours before a fault: the thread's context hands over what it has swallowed, and the driver is called.
+/// Entry `index` of those that were ours before a fault: the thread's context hands over what it
+/// has swallowed, and the driver is called.
 extern "C" fn left(index: usize) -> *const () {
     leave_at(index);
     forward_plainly(index)
@@ -193,13 +204,20 @@ fn leave_at(index: usize) {
 #[unsafe(naked)]
 unsafe extern "C" fn lazy() {
     core::arch::naked_asm!(
-        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
-        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
-        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "push rbp", "mov rbp, \
+                     rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], \
+                                                                        xmm2", "movdqu [rsp+48], \
+                                                                                xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], \
+                                                           xmm6", "movdqu [rsp+112], xmm7",
         "mov edi, r11d", "call {resolve}", "mov r10, rax",
-        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
-        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
-        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, \
+                                                                                 [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, \
+                                                                                    [rsp+112]",
+        "add rsp, \
+         128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
         resolve = sym resolve
     )
 }
@@ -208,13 +226,20 @@ unsafe extern "C" fn lazy() {
 #[unsafe(naked)]
 unsafe extern "C" fn leaving() {
     core::arch::naked_asm!(
-        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
-        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
-        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "push rbp", "mov rbp, \
+                     rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], \
+                                                                        xmm2", "movdqu [rsp+48], \
+                                                                                xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], \
+                                                           xmm6", "movdqu [rsp+112], xmm7",
         "mov edi, r11d", "call {left}", "mov r10, rax",
-        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
-        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
-        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, \
+                                                                                 [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, \
+                                                                                    [rsp+112]",
+        "add rsp, \
+         128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
         left = sym left
     )
 }
@@ -223,13 +248,20 @@ unsafe extern "C" fn leaving() {
 #[unsafe(naked)]
 unsafe extern "C" fn slow() {
     core::arch::naked_asm!(
-        "push rbp", "mov rbp, rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
-        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], xmm2", "movdqu [rsp+48], xmm3",
-        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], xmm6", "movdqu [rsp+112], xmm7",
+        "push rbp", "mov rbp, \
+                     rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
+        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], \
+                                                                        xmm2", "movdqu [rsp+48], \
+                                                                                xmm3",
+        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], \
+                                                           xmm6", "movdqu [rsp+112], xmm7",
         "mov edi, r11d", "call {on_state_call}",
-        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, [rsp+48]",
-        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, [rsp+112]",
-        "add rsp, 128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp",
+        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, \
+                                                                                 [rsp+48]",
+        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, \
+                                                                                    [rsp+112]",
+        "add rsp, \
+         128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp",
         "lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]",
         on_state_call = sym on_state_call, table = sym TABLE
     )
@@ -256,16 +288,22 @@ mod tests {
         let mut seen = 0;
         for (i, name) in NAMES.iter().enumerate().filter(|(_, n)| starts(n.to_bytes())) {
             seen += 1;
-            assert!(CLASSES[i] & always == 0 || HOOKS[i].is_some(), "{name:?} costs ten nanoseconds");
+            assert!(
+                CLASSES[i] & always == 0 || HOOKS[i].is_some(),
+                "{name:?} costs ten nanoseconds"
+            );
         }
         assert!(seen > 100, "{seen}");
     }
 
     #[test]
     fn the_table_of_injected_faults_has_every_hook() {
-        let hooks: Vec<&str> =
-            (0..COUNT).filter(|i| HOOKS[*i].is_some()).map(|i| NAMES[i].to_str().expect("ASCII")).collect();
-        let mut listed: Vec<&str> = include_str!("../../../tests/programs/hooks.txt").lines().collect();
+        let hooks: Vec<&str> = (0..COUNT)
+            .filter(|i| HOOKS[*i].is_some())
+            .map(|i| NAMES[i].to_str().expect("ASCII"))
+            .collect();
+        let mut listed: Vec<&str> =
+            include_str!("../../../tests/programs/hooks.txt").lines().collect();
         listed.sort_unstable();
         assert_eq!(listed, hooks, "tests/programs/hooks.txt is what tests/faults.rs walks through");
     }

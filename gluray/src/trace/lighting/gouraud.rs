@@ -1,7 +1,9 @@
-//! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`LightingSetup::vertex`] for many.
+//! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`LightingSetup::vertex`]
+//! for many.
 //!
-//! The order of sums is that of the scalar code. Vectors are written out, because compilers unroll loops over 16 lanes before they see that they are vectors.
-//! Only powers are another function: exact to a millionth for exponents up to OpenGL's 128.
+//! The order of sums is that of the scalar code. Vectors are written out, because compilers unroll
+//! loops over 16 lanes before they see that they are vectors. Only powers are another function:
+//! exact to a millionth for exponents up to OpenGL's 128.
 
 use super::LightingSetup;
 use super::powers::powers;
@@ -127,7 +129,10 @@ fn gather<const N: usize>(values: &Values<N>, vertices: &[usize; LANES], used: u
                     continue;
                 }
                 if let Some(b) = p.bytes.get(vertices[l] * N..vertices[l] * N + N) {
-                    put(l, std::array::from_fn(|k| (f32::from(b[k].cast_signed()) / 127.0).max(-1.0)));
+                    put(
+                        l,
+                        std::array::from_fn(|k| (f32::from(b[k].cast_signed()) / 127.0).max(-1.0)),
+                    );
                 }
             }
         }
@@ -163,8 +168,9 @@ fn rows<const N: usize>(p: &PackedArray) -> &[[f32; N]] {
 impl LightingSetup<'_> {
     /// True when [`LightingSetup::fragments`] has the colours that the scalar code has.
     pub(crate) fn lights_blocks(&self, a: &Attributes) -> bool {
-        let aligned =
-            |p: &PackedArray| p.kind != FLOAT || bytemuck::try_cast_slice::<u8, f32>(&p.bytes).is_ok();
+        let aligned = |p: &PackedArray| {
+            p.kind != FLOAT || bytemuck::try_cast_slice::<u8, f32>(&p.bytes).is_ok()
+        };
         let fits = match &a.normals {
             Values::Packed(p) => aligned(p),
             _ => true,
@@ -177,7 +183,8 @@ impl LightingSetup<'_> {
         fits && colors_fit && a.material_of.is_empty() && s.texture.is_none() && s.fog.is_none()
     }
 
-    /// Colours of 16 fragments: `triangles` are their vertices, `weights` those of the corners, `back` says whose back side is seen.
+    /// Colours of 16 fragments: `triangles` are their vertices, `weights` those of the corners,
+    /// `back` says whose back side is seen.
     #[inline(always)]
     #[allow(clippy::too_many_arguments, reason = "rows of a block")]
     pub(crate) fn fragments<S: Simd>(
@@ -217,7 +224,8 @@ impl LightingSetup<'_> {
         FragmentColors { rgba }
     }
 
-    /// Primary and secondary colours of the vertices in the lanes of `used`, from the side that `back` says.
+    /// Primary and secondary colours of the vertices in the lanes of `used`, from the side that
+    /// `back` says.
     #[inline(always)]
     pub(super) fn vertices<S: Simd>(
         &self,
@@ -230,9 +238,12 @@ impl LightingSetup<'_> {
     ) -> LaneColors<S> {
         let s = self.state;
         let color = match &a.colors {
-            Values::Constant(c) => {
-                [V::splat(simd, c[0]), V::splat(simd, c[1]), V::splat(simd, c[2]), V::splat(simd, c[3])]
-            }
+            Values::Constant(c) => [
+                V::splat(simd, c[0]),
+                V::splat(simd, c[1]),
+                V::splat(simd, c[2]),
+                V::splat(simd, c[3]),
+            ],
             colors => {
                 let rows = gather(colors, vertices, used);
                 [
@@ -257,8 +268,11 @@ impl LightingSetup<'_> {
                     (rows[0][l], rows[1][l], rows[2][l]) = (p.x, p.y, p.z);
                 }
             }
-            let [x, y, z] =
-                [V::from_slice(simd, &rows[0]), V::from_slice(simd, &rows[1]), V::from_slice(simd, &rows[2])];
+            let [x, y, z] = [
+                V::from_slice(simd, &rows[0]),
+                V::from_slice(simd, &rows[1]),
+                V::from_slice(simd, &rows[2]),
+            ];
             let m = &s.model_view;
             let w = x * m[3] + y * m[7] + z * m[11] + m[15];
             for k in 0..3 {
@@ -267,8 +281,11 @@ impl LightingSetup<'_> {
         }
         let mut normal = [zero; 3];
         let rows = gather(&a.normals, vertices, used);
-        let [x, y, z] =
-            [V::from_slice(simd, &rows[0]), V::from_slice(simd, &rows[1]), V::from_slice(simd, &rows[2])];
+        let [x, y, z] = [
+            V::from_slice(simd, &rows[0]),
+            V::from_slice(simd, &rows[1]),
+            V::from_slice(simd, &rows[2]),
+        ];
         let n = &self.normal_matrix;
         for k in 0..3 {
             normal[k] = x * n[0][k] + y * n[1][k] + z * n[2][k];
@@ -284,7 +301,10 @@ impl LightingSetup<'_> {
         for l in 0..LANES {
             backs |= u64::from(back[l]) << l;
         }
-        let pick = SideSelect { back: mask32x16::from_bitmask(simd, backs), two: s.two_side && backs != 0 };
+        let pick = SideSelect {
+            back: mask32x16::from_bitmask(simd, backs),
+            two: s.two_side && backs != 0,
+        };
         if pick.two {
             for k in 0..3 {
                 normal[k] = pick.back.select(-normal[k], normal[k]);
@@ -309,7 +329,8 @@ impl LightingSetup<'_> {
         color: [V<S>; 4],
         pick: SideSelect<S>,
     ) -> Surface<S> {
-        let (faces, what) = self.state.color_material.map_or((&[][..], 0), |(face, w)| (sides(face), w));
+        let (faces, what) =
+            self.state.color_material.map_or((&[][..], 0), |(face, w)| (sides(face), w));
         let faces = [faces.contains(&0), faces.contains(&1)];
         let by = |tracked: bool| [faces[0] && tracked, faces[1] && tracked];
         let ambient = by(what == AMBIENT || what == AMBIENT_AND_DIFFUSE);
@@ -331,17 +352,27 @@ impl LightingSetup<'_> {
                 || pick.two && behind.specular[..3] != [0.0; 3],
         };
         for k in 0..3 {
-            out.ambient[k] = pick.of(simd, [front.ambient[k], behind.ambient[k]], ambient, color[k]);
-            out.diffuse[k] = pick.of(simd, [front.diffuse[k], behind.diffuse[k]], diffuse, color[k]);
-            out.specular[k] = pick.of(simd, [front.specular[k], behind.specular[k]], specular, color[k]);
-            out.emission[k] = pick.of(simd, [front.emission[k], behind.emission[k]], emission, color[k]);
+            out.ambient[k] =
+                pick.of(simd, [front.ambient[k], behind.ambient[k]], ambient, color[k]);
+            out.diffuse[k] =
+                pick.of(simd, [front.diffuse[k], behind.diffuse[k]], diffuse, color[k]);
+            out.specular[k] =
+                pick.of(simd, [front.specular[k], behind.specular[k]], specular, color[k]);
+            out.emission[k] =
+                pick.of(simd, [front.emission[k], behind.emission[k]], emission, color[k]);
         }
         out
     }
 
     /// Primary and secondary colours.
     #[inline(always)]
-    fn lit<S: Simd>(&self, simd: S, m: &Surface<S>, eye: [V<S>; 3], normal: [V<S>; 3]) -> LaneColors<S> {
+    fn lit<S: Simd>(
+        &self,
+        simd: S,
+        m: &Surface<S>,
+        eye: [V<S>; 3],
+        normal: [V<S>; 3],
+    ) -> LaneColors<S> {
         let s = self.state;
         let (zero, one) = (V::splat(simd, 0.0), V::splat(simd, 1.0));
         let (mut primary, mut specular) = ([zero; 4], [zero; 3]);
@@ -349,7 +380,8 @@ impl LightingSetup<'_> {
             primary[k] = m.emission[k] + m.ambient[k] * s.model_ambient[k];
         }
         for p in &self.lights {
-            let at = |v: [f32; 3]| [V::splat(simd, v[0]), V::splat(simd, v[1]), V::splat(simd, v[2])];
+            let at =
+                |v: [f32; 3]| [V::splat(simd, v[0]), V::splat(simd, v[1]), V::splat(simd, v[2])];
             let (mut to_light, mut strength) = (at(p.to_light), one);
             if !p.directional {
                 let [c, lin, q] = p.light.attenuation;
@@ -378,7 +410,8 @@ impl LightingSetup<'_> {
             }
             let half = if s.local_viewer {
                 let towards = normalized(simd, eye);
-                let half = [to_light[0] - towards[0], to_light[1] - towards[1], to_light[2] - towards[2]];
+                let half =
+                    [to_light[0] - towards[0], to_light[1] - towards[1], to_light[2] - towards[2]];
                 normalized(simd, half)
             } else if p.directional {
                 at(p.half)
@@ -422,7 +455,8 @@ mod tests {
     use fearless_simd::{Level, dispatch};
     use rt_core::glam::Vec3;
 
-    /// Every kind of light, both sides, tracked colours, local viewer: blocks have the colours of single vertices.
+    /// Every kind of light, both sides, tracked colours, local viewer: blocks have the colours of
+    /// single vertices.
     #[test]
     fn blocks_are_lit_like_single_vertices() {
         let material = |v: f32| Material {
@@ -445,8 +479,9 @@ mod tests {
         let positions: Vec<Vec3> = (0..48)
             .map(|i| Vec3::new((i % 7) as f32 - 3.0, (i % 5) as f32 - 2.0, -4.0 - (i % 3) as f32))
             .collect();
-        let normals =
-            (0..48).map(|i| [((i * 5) % 9) as f32 - 4.0, ((i * 7) % 11) as f32 - 5.0, 1.0 + (i % 4) as f32]);
+        let normals = (0..48).map(|i| {
+            [((i * 5) % 9) as f32 - 4.0, ((i * 7) % 11) as f32 - 5.0, 1.0 + (i % 4) as f32]
+        });
         let colors = (0..48).map(|i| [(i % 3) as f32 * 0.5, 0.25, (i % 2) as f32, 0.5]).collect();
         let mut a = Attributes::constant(&CurrentAttributes::default());
         a.materials = vec![[material(1.0), material(0.5)]];
@@ -455,7 +490,9 @@ mod tests {
         let mut compared = 0;
         for case in 0..64 {
             let state = Snapshot {
-                model_view: [0.8, 0.1, 0., 0., -0.1, 0.9, 0., 0., 0., 0.2, 1.1, 0., 0.1, 0.2, -0.3, 1.],
+                model_view: [
+                    0.8, 0.1, 0., 0., -0.1, 0.9, 0., 0., 0., 0.2, 1.1, 0., 0.1, 0.2, -0.3, 1.,
+                ],
                 lighting: case & 1 == 0,
                 two_side: case & 2 != 0,
                 local_viewer: case & 4 != 0,
@@ -480,13 +517,16 @@ mod tests {
                     let i = triangles[l][k] as usize;
                     let lit = setup.vertex(&a, i, positions[i].to_array());
                     for c in 0..4 {
-                        wanted[c] +=
-                            w * lit.primary[side][c] + if c < 3 { w * lit.secondary[side][c] } else { 0.0 };
+                        wanted[c] += w * lit.primary[side][c]
+                            + if c < 3 { w * lit.secondary[side][c] } else { 0.0 };
                     }
                 }
                 for c in 0..4 {
                     let (ours, one) = (all.rgba[c][l], wanted[c].clamp(0.0, 1.0));
-                    assert!((ours - one).abs() < 1e-5, "case {case}, lane {l}, {c}: {ours} for {one}");
+                    assert!(
+                        (ours - one).abs() < 1e-5,
+                        "case {case}, lane {l}, {c}: {ours} for {one}"
+                    );
                     compared += 1;
                 }
             }

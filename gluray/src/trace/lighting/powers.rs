@@ -3,7 +3,8 @@
 use fearless_simd::{Simd, SimdBase, SimdNarrow, SimdWiden, f32x16, f64x8};
 use rt_core::ray::LANES;
 
-/// The base-two logarithm of a positive normal number: exponent, and a series in (m - 1) / (m + 1) for the mantissa.
+/// The base-two logarithm of a positive normal number: exponent, and a series in (m - 1) / (m + 1)
+/// for the mantissa.
 #[inline(always)]
 fn log2(x: f32) -> f64 {
     let bits = x.to_bits();
@@ -14,7 +15,8 @@ fn log2(x: f32) -> f64 {
     let t = (m - 1.0) / (m + 1.0);
     let s = t * t;
     // 2 / ln 2 · (t + t³/3 + t⁵/5 + …), |t| < 0.172
-    let series = 1.0 + s * (1.0 / 3.0 + s * (0.2 + s * (1.0 / 7.0 + s * (1.0 / 9.0 + s * (1.0 / 11.0)))));
+    let series =
+        1.0 + s * (1.0 / 3.0 + s * (0.2 + s * (1.0 / 7.0 + s * (1.0 / 9.0 + s * (1.0 / 11.0)))));
     exponent + 2.885_390_081_777_926_8 * t * series
 }
 
@@ -28,7 +30,8 @@ fn exp2(x: f64) -> f32 {
     let e = 1.0
         + f * (1.0
             + f * (0.5
-                + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0 + f / 5040.0))))));
+                + f * (1.0 / 6.0
+                    + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f * (1.0 / 720.0 + f / 5040.0))))));
     let scale = f64::from(f32::from_bits(((whole + 127).max(0).cast_unsigned()) << 23));
     (e * scale) as f32
 }
@@ -63,7 +66,12 @@ fn whole_powers<S: Simd>(simd: S, x: f32x16<S>, e: u32) -> f32x16<S> {
 
 /// Powers from 0 on, of one whole exponent where there is such.
 #[inline(always)]
-pub(super) fn powers<S: Simd>(simd: S, x: f32x16<S>, e: f32x16<S>, whole: Option<u32>) -> f32x16<S> {
+pub(super) fn powers<S: Simd>(
+    simd: S,
+    x: f32x16<S>,
+    e: f32x16<S>,
+    whole: Option<u32>,
+) -> f32x16<S> {
     if let Some(whole) = whole {
         return whole_powers(simd, x, whole);
     }
@@ -85,10 +93,16 @@ mod tests {
             let x = i as f32 / 1000.0;
             for e in [0.0, 0.5, 1.0, 2.0, 17.3, 40.0, 128.0] {
                 let (ours, libms) = (power(x, e), if e == 0.0 { 1.0 } else { x.powf(e) });
-                assert!((ours - libms).abs() <= 1e-6 * libms + 1e-37, "{x}^{e}: {ours} for {libms}");
+                assert!(
+                    (ours - libms).abs() <= 1e-6 * libms + 1e-37,
+                    "{x}^{e}: {ours} for {libms}"
+                );
                 if e.fract() == 0.0 {
                     let whole = dispatch!(Level::new(), simd => whole_powers(simd, f32x16::splat(simd, x), e as u32)[0]);
-                    assert!((whole - libms).abs() <= 1e-6 * libms + 1e-37, "{x}^{e}: {whole} for {libms}");
+                    assert!(
+                        (whole - libms).abs() <= 1e-6 * libms + 1e-37,
+                        "{x}^{e}: {whole} for {libms}"
+                    );
                 }
             }
         }

@@ -94,7 +94,9 @@ mod tests {
         a.normals = Values::PerVertex(normals);
         for two_side in [false, true] {
             let state = Snapshot {
-                model_view: [0.8, 0.1, 0., 0., -0.1, 0.9, 0., 0., 0., 0.2, 1.1, 0., 0.1, 0.2, -0.3, 1.],
+                model_view: [
+                    0.8, 0.1, 0., 0., -0.1, 0.9, 0., 0., 0., 0.2, 1.1, 0., 0.1, 0.2, -0.3, 1.,
+                ],
                 lighting: true,
                 normalize: true,
                 two_side,
@@ -117,12 +119,21 @@ mod tests {
                 for side in 0..2 {
                     let (p, q) = (lit.primary[side], one.primary[side]);
                     let (s, t) = (lit.secondary[side], one.secondary[side]);
-                    assert!(p.iter().zip(q).all(|(a, b)| (a - b).abs() < 1e-5), "{i}: {p:?} for {q:?}");
-                    assert!(s.iter().zip(t).all(|(a, b)| (a - b).abs() < 1e-5), "{i}: {s:?} for {t:?}");
+                    assert!(
+                        p.iter().zip(q).all(|(a, b)| (a - b).abs() < 1e-5),
+                        "{i}: {p:?} for {q:?}"
+                    );
+                    assert!(
+                        s.iter().zip(t).all(|(a, b)| (a - b).abs() < 1e-5),
+                        "{i}: {s:?} for {t:?}"
+                    );
                     dark += usize::from(s == [0.0; 3]);
                 }
             }
-            assert!((n / 10..2 * n - n / 10).contains(&dark), "the test is about nothing: {dark} of {n}");
+            assert!(
+                (n / 10..2 * n - n / 10).contains(&dark),
+                "the test is about nothing: {dark} of {n}"
+            );
         }
     }
 }

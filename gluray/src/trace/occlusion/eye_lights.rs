@@ -49,8 +49,11 @@ fn square_above_floor(light: [f32; 4], projection: DMat4, model_view: DMat4) -> 
         specular: [0.0; 4],
         ..Material::default()
     };
-    let current =
-        CurrentAttributes { normal: [0.0, 0.0, 1.0], materials: [white; 2], ..CurrentAttributes::default() };
+    let current = CurrentAttributes {
+        normal: [0.0, 0.0, 1.0],
+        materials: [white; 2],
+        ..CurrentAttributes::default()
+    };
     let light = GlLight {
         diffuse: [1.0; 4],
         position: light,
@@ -156,7 +159,8 @@ fn by_paths(light: [f32; 4]) -> [f32; 2] {
     let view = View::of(&draws[0]).expect("a view");
     let (ready, settings) = (prepared(&draws), settings(Mode::Path));
     let rect = Rect { x: 0, y: 0, w: N, h: N };
-    let colors = PathTracer::default().picture(&ready, &view, 0, rect, &settings, 0, RowShare::WHOLE);
+    let colors =
+        PathTracer::default().picture(&ready, &view, 0, rect, &settings, 0, RowShare::WHOLE);
     assert_eq!(colors.warnings, Vec::<String>::new());
     [true, false].map(|which| {
         let is_of = |k: usize| is_shadowed(k as i32 % N, k as i32 / N) == which;

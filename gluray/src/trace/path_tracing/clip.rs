@@ -8,7 +8,12 @@ pub(super) fn above(mesh: &TriMesh, plane: [f64; 4]) -> TriMesh {
     let height: Vec<f64> = mesh
         .positions
         .iter()
-        .map(|p| plane[0] * f64::from(p.x) + plane[1] * f64::from(p.y) + plane[2] * f64::from(p.z) + plane[3])
+        .map(|p| {
+            plane[0] * f64::from(p.x)
+                + plane[1] * f64::from(p.y)
+                + plane[2] * f64::from(p.z)
+                + plane[3]
+        })
         .collect();
     let mut out = ClippedMesh { mesh: mesh.clone() };
     out.mesh.indices.clear();

@@ -55,7 +55,8 @@ pub(super) fn part(
     warnings: &mut Vec<String>,
 ) -> Option<DrawInstance> {
     let m = eye_from_object(p.draw);
-    if m.row(3).truncate().length() > 1e-6 * m.row(3).w.abs() || m.row(3).w == 0.0 || !m.is_finite() {
+    if m.row(3).truncate().length() > 1e-6 * m.row(3).w.abs() || m.row(3).w == 0.0 || !m.is_finite()
+    {
         warn(warnings, "a draw whose model-view matrix is projective is left out");
         return None;
     }
@@ -69,11 +70,14 @@ pub(super) fn part(
     let appearance = match &p.draw.shading {
         Shading::Fixed => fixed(p, warnings),
         Shading::Program(known) => {
-            known.unsupported_in_path_mode().for_each(|what| warn(warnings, &format!("{what} are left out")));
+            known
+                .unsupported_in_path_mode()
+                .for_each(|what| warn(warnings, &format!("{what} are left out")));
             program(p)
         }
     };
-    let mut mesh = TriMesh::new(p.draw.geometry.mesh.positions.clone(), p.draw.geometry.mesh.indices.clone());
+    let mut mesh =
+        TriMesh::new(p.draw.geometry.mesh.positions.clone(), p.draw.geometry.mesh.indices.clone());
     // The outside is what OpenGL calls front.
     if (linear.determinant() < 0.0) ^ view.mirrored ^ !s.front_is_ccw {
         mesh.indices.iter_mut().for_each(|t| t.swap(0, 1));
@@ -88,7 +92,8 @@ pub(super) fn part(
     for plane in p.clip_planes() {
         mesh = clip::above(&mesh, *plane);
     }
-    let bytes = |v: &Option<Attribute<Vec3>>| v.as_ref().map_or(Vec::new(), |a| bytemuck_vec(&a.values));
+    let bytes =
+        |v: &Option<Attribute<Vec3>>| v.as_ref().map_or(Vec::new(), |a| bytemuck_vec(&a.values));
     let key = hash(&[
         &p.draw.geometry.key.to_ne_bytes(),
         bytemuck::cast_slice(&mesh.indices),
@@ -126,7 +131,9 @@ fn material(p: &Prepared<'_>, appearance: &SurfaceAppearance, settings: &Setting
         return Material { model: SurfaceModel::Unlit, ..base };
     };
     let model = match ray_material.surface {
-        Surface::Metal if e.reflections => SurfaceModel::Metal { roughness: ray_material.roughness },
+        Surface::Metal if e.reflections => {
+            SurfaceModel::Metal { roughness: ray_material.roughness }
+        }
         Surface::Glass if e.refraction => {
             let model = SurfaceModel::Dielectric { ior: ray_material.ior, absorption: [0.0; 3] };
             return Material {
@@ -170,11 +177,16 @@ fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> SurfaceAppearance {
         let o = &a.materials[*i as usize][0];
         (o.specular, o.emission, o.shininess) != (m.specular, m.emission, m.shininess)
     }) {
-        warn(warnings, "highlight and emission that change within a draw are those of its first vertex");
+        warn(
+            warnings,
+            "highlight and emission that change within a draw are those of its first vertex",
+        );
     }
     let alpha = |c: [f32; 4]| if s.blend { c } else { [c[0], c[1], c[2], 1.0] };
     let colors = varies.then(|| match s.flat {
-        true => Attribute::per_face(indices.iter().map(|t| alpha(p.base_of_vertex(t[2] as usize))).collect()),
+        true => Attribute::per_face(
+            indices.iter().map(|t| alpha(p.base_of_vertex(t[2] as usize))).collect(),
+        ),
         false => Attribute::per_vertex((0..n).map(|i| alpha(p.base_of_vertex(i))).collect()),
     });
     let texture = match (&s.texture, &p.image) {
@@ -196,8 +208,9 @@ fn fixed(p: &Prepared<'_>, warnings: &mut Vec<String>) -> SurfaceAppearance {
         color: rgb(first),
         colors,
         texture,
-        normals: (s.lighting && !s.flat)
-            .then(|| Attribute::per_vertex((0..n).map(|i| Vec3::from_array(a.normals.at(i))).collect())),
+        normals: (s.lighting && !s.flat).then(|| {
+            Attribute::per_vertex((0..n).map(|i| Vec3::from_array(a.normals.at(i))).collect())
+        }),
         emission: if s.lighting { rgb(m.emission) } else { [0.0; 3] },
         opacity: if s.blend && !varies { first[3] } else { 1.0 },
         lit: s.lighting.then_some((rgb(m.specular), m.shininess, PhongForm::HalfVector)),
@@ -209,14 +222,18 @@ fn program(p: &Prepared<'_>) -> SurfaceAppearance {
     let Shading::Program(program) = &p.draw.shading else { unreachable!("the caller has looked") };
     let (a, mesh) = (&*p.draw.attributes, &*p.draw.geometry.mesh);
     let n = mesh.positions.len();
-    let (constant, opacity) =
-        if mesh.indices.is_empty() { ([1.0; 3], 1.0) } else { program.ground(a, mesh, 0, [1.0, 0.0, 0.0]) };
+    let (constant, opacity) = if mesh.indices.is_empty() {
+        ([1.0; 3], 1.0)
+    } else {
+        program.ground(a, mesh, 0, [1.0, 0.0, 0.0])
+    };
     // VTK's normals have a matrix of their own; the scene has one for positions and normals.
     let to_object = p.normal_from_eye();
     let normals = program.eye_from_normal().map(|m| {
         let each = |i: usize| {
             let v = a.normals.at(i);
-            let eye: [f32; 3] = std::array::from_fn(|r| m[r] * v[0] + m[3 + r] * v[1] + m[6 + r] * v[2]);
+            let eye: [f32; 3] =
+                std::array::from_fn(|r| m[r] * v[0] + m[3 + r] * v[1] + m[6 + r] * v[2]);
             to_object * Vec3::from_array(eye)
         };
         Attribute::per_vertex((0..n).map(each).collect())
@@ -249,7 +266,8 @@ fn program(p: &Prepared<'_>) -> SurfaceAppearance {
         }
     };
     let smooth = normals.is_some();
-    let highlight = if program.has_headlight() { PhongForm::TowardsLight } else { PhongForm::Mirrored };
+    let highlight =
+        if program.has_headlight() { PhongForm::TowardsLight } else { PhongForm::Mirrored };
     let constant_ambient = program.ambient_light();
     SurfaceAppearance {
         color: color.map(|v| v.max(0.0)),

@@ -1,4 +1,5 @@
-//! OpenGL's fog over path-traced pictures: by the depth of the surface that a pixel sees, as on the traced colours of the other modes.
+//! OpenGL's fog over path-traced pictures: by the depth of the surface that a pixel sees, as on the
+//! traced colours of the other modes.
 //!
 //! What is seen in mirrors or through glass has the fog of the mirror or the glass.
 
@@ -34,7 +35,8 @@ impl Unprojection {
     }
 }
 
-/// Fog over what `surfaces`, the draws that have it, cover of a picture in which the nearest surfaces of all draws are at `all`.
+/// Fog over what `surfaces`, the draws that have it, cover of a picture in which the nearest
+/// surfaces of all draws are at `all`.
 pub(crate) fn over(
     colors: &mut ColorImage,
     view: &View,
@@ -51,7 +53,9 @@ pub(crate) fn over(
     let rect = colors.rect;
     for (i, c) in colors.rgba.iter_mut().enumerate() {
         let (x, y) = (rect.x + i as i32 % rect.w, rect.y + i as i32 / rect.w);
-        let Some(depth) = seen(all, x, y).filter(|d| seen(surfaces, x, y) == Some(*d)) else { continue };
+        let Some(depth) = seen(all, x, y).filter(|d| seen(surfaces, x, y) == Some(*d)) else {
+            continue;
+        };
         let ndc = view.ndc(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let left = factor(fog, eye.distance(ndc, depth));
         // Premultiplied: where a silhouette covers half a pixel there is half of the fog.
@@ -84,15 +88,22 @@ mod tests {
     fn fog_is_that_of_the_distance_and_of_half_a_pixel_half() {
         // A frustum of 90 degrees from 1 to 100, a pixel in its middle at distance 10.
         let (a, b) = (-101.0 / 99.0, -200.0 / 99.0);
-        let projection =
-            DMat4::from_cols_array(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.]);
+        let projection = DMat4::from_cols_array(&[
+            1., 0., 0., 0., 0., 1., 0., 0., 0., 0., a, -1., 0., 0., b, 0.,
+        ]);
         let rect = Rect { x: 0, y: 0, w: 3, h: 1 };
         let view = View::new(projection, rect).expect("a camera");
         let depth = (((-10.0 * a + b) / 10.0) * 0.5 + 0.5) as f32;
         let layer = |depth| Layer { rect, color: Vec::new(), depth, covered: 0 };
         let all = layer(vec![depth, UNCOVERED, 0.25]);
         let fogged = layer(vec![depth, UNCOVERED, UNCOVERED]);
-        let fog = Fog { mode: LINEAR, start: 5.0, end: 25.0, color: [1.0, 0.0, 0.5, 1.0], ..Fog::default() };
+        let fog = Fog {
+            mode: LINEAR,
+            start: 5.0,
+            end: 25.0,
+            color: [1.0, 0.0, 0.5, 1.0],
+            ..Fog::default()
+        };
         let mut colors = ColorImage {
             rect,
             rgba: vec![[0.4, 0.4, 0.4, 1.0], [0.2, 0.2, 0.2, 0.5], [0.4, 0.4, 0.4, 1.0]],

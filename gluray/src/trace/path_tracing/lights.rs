@@ -47,11 +47,13 @@ fn of_opengl(l: &GlLight, radius_rad: f64, eye: Eye) -> Option<Light> {
         attenuation: l.attenuation,
         ..Light::directional(DVec3::Z).with_color(color)
     };
-    let place = if w == 0.0 { LightPosition::Directional(at) } else { LightPosition::Positional(at) };
+    let place =
+        if w == 0.0 { LightPosition::Directional(at) } else { LightPosition::Positional(at) };
     if radius > 0.0 || !place.follows_rays_of(eye) {
         return Some(light);
     }
-    // Said so, the renderer leaves shadow rays out where the eye cannot see what they would find, and only there.
+    // Said so, the renderer leaves shadow rays out where the eye cannot see what they would find,
+    // and only there.
     let kind = match light.kind {
         LightKind::Directional { angular_radius_rad, .. } => {
             LightKind::Directional { to_light: DVec3::Z, angular_radius_rad }
@@ -85,26 +87,34 @@ pub(super) fn of(
         Shading::Fixed => {
             let s = &first.draw.state;
             if lit.iter().any(|p| p.draw.state.lights != s.lights) {
-                warnings
-                    .push("mode path: lights differ between draws; those of the largest light all".into());
+                warnings.push(
+                    "mode path: lights differ between draws; those of the largest light all".into(),
+                );
             }
-            // Ambient light as light from everywhere: as bright on a diffuse surface as OpenGL's on the ambient colours that there are.
+            // Ambient light as light from everywhere: as bright on a diffuse surface as OpenGL's on
+            // the ambient colours that there are.
             let total: [f32; 3] = s.lights.iter().fold(sane(s.model_ambient), |sum, l| {
                 let a = sane(l.ambient);
                 std::array::from_fn(|k| sum[k] + a[k])
             });
             let m = &first.draw.attributes.materials_at(0)[0];
-            let tracked =
-                s.color_material.is_some_and(|(_, what)| what == crate::state::enums::AMBIENT_AND_DIFFUSE);
+            let tracked = s
+                .color_material
+                .is_some_and(|(_, what)| what == crate::state::enums::AMBIENT_AND_DIFFUSE);
             let sum = |c: [f32; 4]| c[0] + c[1] + c[2];
-            let share =
-                if tracked { 1.0 } else { (sum(m.ambient) / sum(m.diffuse).max(1e-6)).clamp(0.0, 1.0) };
+            let share = if tracked {
+                1.0
+            } else {
+                (sum(m.ambient) / sum(m.diffuse).max(1e-6)).clamp(0.0, 1.0)
+            };
             (0..3).for_each(|k| ambient[k] += total[k] * share);
             s.lights.iter().filter_map(|l| of_opengl(l, radius_rad, first.eye)).collect()
         }
-        Shading::Program(program) => {
-            program.lights.iter().filter_map(|l| of_opengl(&l.as_opengl(), radius_rad, first.eye)).collect()
-        }
+        Shading::Program(program) => program
+            .lights
+            .iter()
+            .filter_map(|l| of_opengl(&l.as_opengl(), radius_rad, first.eye))
+            .collect(),
     };
     if !settings.effects.shadows {
         lamps.iter_mut().for_each(|l| l.shadows = false);

@@ -1,7 +1,8 @@
 //! Mode `path`: rt-core's path tracer over the frame's draws, for publication.
 //!
-//! Each view becomes a scene in eye space. The first picture of something still has all samples that are set; a program that draws the same again gets
-//! the mean of all pictures so far, so a window left alone becomes smoother. Equal runs give equal pictures.
+//! Each view becomes a scene in eye space. The first picture of something still has all samples
+//! that are set; a program that draws the same again gets the mean of all pictures so far, so a
+//! window left alone becomes smoother. Equal runs give equal pictures.
 
 mod clip;
 mod draw_instance;
@@ -70,8 +71,12 @@ impl PathTracer {
     ) -> ColorImage {
         let rect = rect.and(view.viewport);
         let mut warnings = Vec::new();
-        let nothing =
-            |warnings| ColorImage { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
+        let nothing = |warnings| ColorImage {
+            rect: Rect::default(),
+            rgba: Vec::new(),
+            rays: Vec::new(),
+            warnings,
+        };
         if rect.is_empty() {
             return nothing(warnings);
         }
@@ -84,7 +89,8 @@ impl PathTracer {
         };
         let camera = camera(draws, view, settings, &scene, &mut warnings);
         let samples = settings.samples.max(LEAST_SAMPLES);
-        let key = hash(&[&key.to_ne_bytes(), format!("{rect:?} {camera:?} {settings:?}").as_bytes()]);
+        let key =
+            hash(&[&key.to_ne_bytes(), format!("{rect:?} {camera:?} {settings:?}").as_bytes()]);
         let before = self.progressive.remove(&number).filter(|s| s.key == key);
         if let Some(still) = before.as_ref().filter(|s| s.samples >= MOST_SAMPLES) {
             let rgba = still.mean.clone();
@@ -111,7 +117,8 @@ impl PathTracer {
         ColorImage { rect, rgba: mean, rays: fresh.rays, warnings }
     }
 
-    /// The rows of a share of the picture with number `picture` of a view that rests. `rect` is within the viewport.
+    /// The rows of a share of the picture with number `picture` of a view that rests. `rect` is
+    /// within the viewport.
     #[expect(clippy::too_many_arguments, reason = "what helpers are told, one by one")]
     pub(crate) fn picture(
         &mut self,
@@ -124,8 +131,12 @@ impl PathTracer {
         share: RowShare,
     ) -> ColorImage {
         let mut warnings = Vec::new();
-        let nothing =
-            |warnings| ColorImage { rect: Rect::default(), rgba: Vec::new(), rays: Vec::new(), warnings };
+        let nothing = |warnings| ColorImage {
+            rect: Rect::default(),
+            rgba: Vec::new(),
+            rays: Vec::new(),
+            warnings,
+        };
         let (scene, _) = match self.scene(draws, view, number, settings, &mut warnings) {
             Ok(made) => made,
             Err(why) => return nothing(vec![why]),
@@ -158,7 +169,8 @@ impl PathTracer {
                 Ok(output) => output,
                 Err(e) => return nothing(vec![format!("mode path: {e}")]),
             };
-            // Every path ends some time, and colours that are mixed may have an alpha of one less a rounding: neither is news.
+            // Every path ends some time, and colours that are mixed may have an alpha of one less a
+            // rounding: neither is news.
             let known = |w: &String| w.contains("max_bounces") || w.contains("drawn opaque");
             let told = output.report.warnings.into_iter().filter(|w| !known(w));
             warnings.extend(told.map(|w| format!("mode path: {w}")));
@@ -214,7 +226,8 @@ impl PathTracer {
         let (lamps, ambient) = lights::of(draws, settings, warnings);
         keys.extend(format!("{lamps:?} {ambient:?}").bytes());
         scene.lights = lamps;
-        scene.environment = ambient.iter().any(|v| *v > 0.0).then_some(Environment::Constant(ambient));
+        scene.environment =
+            ambient.iter().any(|v| *v > 0.0).then_some(Environment::Constant(ambient));
         // What its attributes make of the alphas is found out by making it anew.
         let scene = scene_checked(scene)?;
         Ok((scene, hash(&[&keys])))

@@ -22,7 +22,8 @@ pub(crate) enum BaseFormat {
 /// Texels, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Texels {
-    /// Eight bits a component, as most textures have: a quarter of the memory, and read from the driver by copying.
+    /// Eight bits a component, as most textures have: a quarter of the memory, and read from the
+    /// driver by copying.
     Bytes(Vec<[u8; 4]>),
     /// What has other sizes.
     Floats(Vec<[f32; 4]>),
@@ -64,7 +65,14 @@ pub(crate) struct Image {
     pub(super) border: [f32; 4],
 }
 
-crate::cluster::codec::wire_enum!(BaseFormat { Alpha, Luminance, LuminanceAlpha, Intensity, Rgb, Rgba });
+crate::cluster::codec::wire_enum!(BaseFormat {
+    Alpha,
+    Luminance,
+    LuminanceAlpha,
+    Intensity,
+    Rgb,
+    Rgba
+});
 
 impl Wire for Level {
     fn put(&self, out: &mut Vec<u8>) {
@@ -82,10 +90,15 @@ impl Wire for Level {
     }
     fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let (width, height): (usize, usize) = Wire::get(from)?;
-        let texels =
-            if Wire::get(from)? { Texels::Floats(from.pods()?) } else { Texels::Bytes(from.pods()?) };
+        let texels = if Wire::get(from)? {
+            Texels::Floats(from.pods()?)
+        } else {
+            Texels::Bytes(from.pods()?)
+        };
         if width.checked_mul(height) != Some(texels.len()) || texels.len() == 0 {
-            return Err(from.fault(format!("an image of {width} x {height} with {} texels", texels.len())));
+            return Err(
+                from.fault(format!("an image of {width} x {height} with {} texels", texels.len()))
+            );
         }
         Ok(Level { width, height, texels })
     }
@@ -110,7 +123,8 @@ impl Wire for Image {
     }
 }
 
-/// What components stand for, from the sizes of red, green, blue, alpha, luminance and intensity: formats are too many to know all by name.
+/// What components stand for, from the sizes of red, green, blue, alpha, luminance and intensity:
+/// formats are too many to know all by name.
 fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> BaseFormat {
     match (red > 0, alpha > 0, luminance > 0, intensity > 0) {
         (_, _, _, true) => BaseFormat::Intensity,
@@ -129,17 +143,19 @@ type VersionedImage = (u64, Option<Arc<Image>>);
 #[derive(Default)]
 pub(crate) struct Images {
     images: HashMap<(u32, u32), VersionedImage>,
-    /// Memory of an image that has gone: programs that replace a texture in each frame replace it by one of its size.
+    /// Memory of an image that has gone: programs that replace a texture in each frame replace it
+    /// by one of its size.
     spare: Vec<[u8; 4]>,
     /// How many were read from the driver.
     pub(crate) read: u64,
 }
 
 impl Images {
-    /// The image of a texture; `None` when it is incomplete (then OpenGL leaves texturing out) or cannot be followed.
+    /// The image of a texture; `None` when it is incomplete (then OpenGL leaves texturing out) or
+    /// cannot be followed.
     ///
-    /// Nothing is read before something is drawn with it. Images of earlier versions can never be asked for again and go at once, so that no
-    /// more are held than the program has.
+    /// Nothing is read before something is drawn with it. Images of earlier versions can never be
+    /// asked for again and go at once, so that no more are held than the program has.
     pub(crate) fn get(&mut self, target: u32, name: u32, version: u64) -> Option<Arc<Image>> {
         if let Some((v, image)) = self.images.get(&(target, name))
             && *v == version
@@ -166,7 +182,8 @@ impl Images {
 
 /// Reads a texture by its name: what is bound may be another by now.
 fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
-    let bound = gl::word(if target == TEXTURE_1D { TEXTURE_BINDING_1D } else { TEXTURE_BINDING_2D });
+    let bound =
+        gl::word(if target == TEXTURE_1D { TEXTURE_BINDING_1D } else { TEXTURE_BINDING_2D });
     if bound != name {
         gl::bind_texture(target, name);
     }
@@ -186,7 +203,8 @@ const COMPONENT_SIZES: [u32; 6] = [0x805c, 0x805d, 0x805e, 0x805f, 0x8060, 0x806
 
 fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let of_level = |n: i32, what| gl::tex_level_i::<1>(target, n, what)[0];
-    let size = |n: i32| [TEXTURE_WIDTH, TEXTURE_HEIGHT].map(|what| of_level(n, what).max(0) as usize);
+    let size =
+        |n: i32| [TEXTURE_WIDTH, TEXTURE_HEIGHT].map(|what| of_level(n, what).max(0) as usize);
     let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0].cast_unsigned();
     let first = parameter(TEXTURE_BASE_LEVEL).min(31).cast_signed();
     let [width, height] = size(first);
@@ -194,8 +212,10 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
         return None;
     }
     let format = of_level(first, TEXTURE_INTERNAL_FORMAT).cast_unsigned();
-    let filters = Filters::query(target, parameter(TEXTURE_MIN_FILTER), parameter(TEXTURE_MAG_FILTER));
-    // Complete means: all levels are there down to one texel or the last that is allowed, in one format.
+    let filters =
+        Filters::query(target, parameter(TEXTURE_MIN_FILTER), parameter(TEXTURE_MAG_FILTER));
+    // Complete means: all levels are there down to one texel or the last that is allowed, in one
+    // format.
     let smallest = first + width.max(height).ilog2().cast_signed();
     let last = match filters.mip {
         Mip::None => first,
@@ -205,8 +225,9 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
         return None;
     }
     let halved = |n: i32| [width, height].map(|v| (v >> (n - first)).max(1));
-    let is_complete = (first + 1..=last)
-        .all(|n| size(n) == halved(n) && of_level(n, TEXTURE_INTERNAL_FORMAT).cast_unsigned() == format);
+    let is_complete = (first + 1..=last).all(|n| {
+        size(n) == halved(n) && of_level(n, TEXTURE_INTERNAL_FORMAT).cast_unsigned() == format
+    });
     if !is_complete {
         return None;
     }
@@ -215,7 +236,8 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
     let sizes = COMPONENT_SIZES.map(|what| of_level(first, what));
     let whole = !signed && sizes.iter().all(|bits| matches!(bits, 0 | 8));
     // Decoded before they are filtered, as the driver does.
-    let encoded = matches!(format, 0x8c40..=0x8c4f) && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
+    let encoded =
+        matches!(format, 0x8c40..=0x8c4f) && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
     let levels = (first..=last).map(|n| {
         let [width, height] = halved(n);
         let texels = if whole && !encoded {
@@ -291,10 +313,12 @@ impl Image {
             Texels::Bytes(v) => v.iter().all(|t| t[3] == 255),
             Texels::Floats(v) => v.iter().all(|t| t[3] == 1.0),
         };
-        self.levels.iter().all(opaque) && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
+        self.levels.iter().all(opaque)
+            && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
     }
 
-    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it cannot be one.
+    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it
+    /// cannot be one.
     pub(crate) fn as_texture(&self) -> Option<Texture> {
         let rgba = |t: [f32; 4]| match self.base {
             BaseFormat::Alpha => [1.0, 1.0, 1.0, t[3]],

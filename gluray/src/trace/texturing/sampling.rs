@@ -1,7 +1,8 @@
 //! Texels at a fragment: wrapping, filters, and the choice among mipmaps.
 //!
-//! The footprint of a pixel is the longer of the two derivatives (compatibility profile specification, equation 8.7), taken as llvmpipe takes them: the
-//! differences within each two by two pixels.
+//! The footprint of a pixel is the longer of the two derivatives (compatibility profile
+//! specification, equation 8.7), taken as llvmpipe takes them: the differences within each two by
+//! two pixels.
 
 use super::image::{Image, Level};
 use crate::interpose::driver::gl;
@@ -40,7 +41,8 @@ const TEXTURE_LOD_BIAS: u32 = 0x8501;
 /// The driver's limit for levels of detail that it does not look at.
 const DEEPEST: f32 = 14.0;
 
-/// A logarithm as llvmpipe has it: of the square, from one power of two to the next along a straight line, so up to 0.043 too small.
+/// A logarithm as llvmpipe has it: of the square, from one power of two to the next along a
+/// straight line, so up to 0.043 too small.
 fn log2(rho: f32) -> f32 {
     let square = rho * rho;
     let whole = square.log2().floor();
@@ -63,12 +65,14 @@ impl Filters {
                 0x2700 | 0x2701 => Mip::Nearest,
                 _ => Mip::Linear,
             },
-            bias: one(TEXTURE_LOD_BIAS) + gl::tex_env_f::<1>(TEXTURE_FILTER_CONTROL, TEXTURE_LOD_BIAS)[0],
+            bias: one(TEXTURE_LOD_BIAS)
+                + gl::tex_env_f::<1>(TEXTURE_FILTER_CONTROL, TEXTURE_LOD_BIAS)[0],
             lod: [one(TEXTURE_MIN_LOD), one(TEXTURE_MAX_LOD)],
         }
     }
 
-    /// What a footprint of `rho` texels means: whether the texture is made smaller, the level, and the share of the level after it.
+    /// What a footprint of `rho` texels means: whether the texture is made smaller, the level, and
+    /// the share of the level after it.
     fn choose(&self, rho: f32, last: usize) -> (bool, usize, f32) {
         let [least, most] = [self.lod[0].max(0.0), self.lod[1]];
         let plain = self.bias == 0.0 && least == 0.0 && most >= DEEPEST;
@@ -160,7 +164,8 @@ impl Image {
         let (i, j) = (x.floor(), y.floor());
         let (a, b) = (x - i, y - j);
         let (i, j) = (i as i64, j as i64);
-        let [p, q, r, u] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.texel(level, i + dx, j + dy));
+        let [p, q, r, u] =
+            [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.texel(level, i + dx, j + dy));
         std::array::from_fn(|k| {
             let (lo, hi) = (p[k] + (q[k] - p[k]) * a, r[k] + (u[k] - r[k]) * a);
             lo + (hi - lo) * b

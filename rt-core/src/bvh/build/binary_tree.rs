@@ -1,4 +1,5 @@
-//! Binary trees over one fragment of the primitives: what every builder makes and the collapse reads.
+//! Binary trees over one fragment of the primitives: what every builder makes and the collapse
+//! reads.
 
 use crate::bvh::layout::wide::LEAF_SIZE;
 use crate::math::Aabb;
@@ -7,7 +8,8 @@ use crate::math::Aabb;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BinaryNode {
     pub(crate) bounds: Aabb,
-    /// A leaf's first place in [`BinaryTree::ids`]; an inner node's left child, with the right one behind it.
+    /// A leaf's first place in [`BinaryTree::ids`]; an inner node's left child, with the right one
+    /// behind it.
     pub(crate) first: u32,
     /// Primitives of a leaf; 0 for inner nodes.
     pub(crate) count: u32,
@@ -43,10 +45,16 @@ impl BinaryTree {
         self.nodes.push(NEW);
     }
 
-    /// Makes `node` a leaf of up to four primitives, which take the places from `first` on. Ascending numbers: with ties in t the first of a
-    /// leaf wins, whatever the order of partitioning.
+    /// Makes `node` a leaf of up to four primitives, which take the places from `first` on.
+    /// Ascending numbers: with ties in t the first of a leaf wins, whatever the order of
+    /// partitioning.
     #[inline]
-    pub(crate) fn make_leaf(&mut self, node: usize, first: usize, prims: impl ExactSizeIterator<Item = u32>) {
+    pub(crate) fn make_leaf(
+        &mut self,
+        node: usize,
+        first: usize,
+        prims: impl ExactSizeIterator<Item = u32>,
+    ) {
         let count = prims.len();
         let n = &mut self.nodes[node];
         (n.first, n.count) = (first as u32, count as u32);
@@ -66,7 +74,8 @@ impl BinaryTree {
         left
     }
 
-    /// The surface area heuristic's cost relative to the root's area: expected nodes and leaves a ray through the root's box meets.
+    /// The surface area heuristic's cost relative to the root's area: expected nodes and leaves a
+    /// ray through the root's box meets.
     #[cfg(test)]
     pub(crate) fn cost(&self) -> f64 {
         let sum: f64 = self.nodes.iter().map(|n| n.bounds.half_area() as f64).sum();

@@ -1,5 +1,6 @@
-//! Where to cut a set of primitives: the surface area heuristic over bins (Wald, "On fast Construction of SAH-based Bounding Volume
-//! Hierarchies", 2007), with a leaf of up to four primitives costing one test.
+//! Where to cut a set of primitives: the surface area heuristic over bins (Wald, "On fast
+//! Construction of SAH-based Bounding Volume Hierarchies", 2007), with a leaf of up to four
+//! primitives costing one test.
 
 use super::prim_ref::{Box4, PrimRef, SetBounds};
 use crate::bvh::layout::wide::LEAF_SIZE;
@@ -10,11 +11,12 @@ use std::ops::Range;
 
 /// Most bins per axis.
 const MAX_BINS: usize = 16;
-/// Sets at least this large are binned in parallel, in pieces of this size (fixed, so that the tree does not depend on the threads).
+/// Sets at least this large are binned in parallel, in pieces of this size (fixed, so that the tree
+/// does not depend on the threads).
 const PARALLEL_CHUNK: usize = 1 << 16;
 
-/// Sets at least this large fill two sets of bins in turn: neighbours often fall into the same bin, and the second would wait for what the
-/// first has just stored (6 % of a build).
+/// Sets at least this large fill two sets of bins in turn: neighbours often fall into the same bin,
+/// and the second would wait for what the first has just stored (6 % of a build).
 const TWO_SETS: usize = 96;
 
 /// Leaf tests that `n` primitives cost.
@@ -38,16 +40,21 @@ struct BinMap {
     scale: Vec4,
 }
 
-/// Adding 2²³ to a float in [0, 2²³) rounds it to an integer that stands in the low bits: the conversion in one addition.
+/// Adding 2²³ to a float in [0, 2²³) rounds it to an integer that stands in the low bits: the
+/// conversion in one addition.
 const ROUND: Vec4 = Vec4::splat(8_388_608.0);
 
 impl BinMap {
     fn new(b: &SetBounds, bins: usize) -> Self {
         let extent = b.center2_hi - b.center2_lo;
-        // Zero extent (and overflow to infinity) gives scale 0: everything in bin 0, and no cut on that axis.
+        // Zero extent (and overflow to infinity) gives scale 0: everything in bin 0, and no cut on
+        // that axis.
         let k = (bins - 1) as f32;
         let inv = |e: f32| if e > 0.0 && (k / e).is_finite() { k / e } else { 0.0 };
-        BinMap { lo: b.center2_lo, scale: Vec4::new(inv(extent.x), inv(extent.y), inv(extent.z), 0.0) }
+        BinMap {
+            lo: b.center2_lo,
+            scale: Vec4::new(inv(extent.x), inv(extent.y), inv(extent.z), 0.0),
+        }
     }
 
     #[inline(always)]
@@ -66,7 +73,8 @@ impl BinMap {
     fn longest_axis(&self) -> Range<usize> {
         let s = self.scale.to_array();
         // The longest has the smallest scale; scale 0 means no extent at all.
-        let longest = (0..3).filter(|&a| s[a] > 0.0).min_by(|&a, &b| s[a].total_cmp(&s[b])).unwrap_or(0);
+        let longest =
+            (0..3).filter(|&a| s[a] > 0.0).min_by(|&a, &b| s[a].total_cmp(&s[b])).unwrap_or(0);
         longest..longest + 1
     }
 }
@@ -110,8 +118,8 @@ impl Bins {
         }
     }
 
-    /// The cut with the smallest cost area(left)·tests(left) + area(right)·tests(right); `None` when all primitives share one bin in
-    /// every axis.
+    /// The cut with the smallest cost area(left)·tests(left) + area(right)·tests(right); `None`
+    /// when all primitives share one bin in every axis.
     #[inline(always)]
     fn best_cut<S: Simd>(&self, simd: S, bins: usize, axes: Range<usize>) -> Option<Cut> {
         let tests = |n: u32| leaf_tests(n as usize);
@@ -193,8 +201,8 @@ impl SplitPlane {
     }
 }
 
-/// Room for a search, and the instructions to use. Every level gives the same cuts: there are only minima, and arithmetic without fused
-/// operations.
+/// Room for a search, and the instructions to use. Every level gives the same cuts: there are only
+/// minima, and arithmetic without fused operations.
 pub(crate) struct SearchSpace {
     level: Level,
     even: Bins,
@@ -208,7 +216,14 @@ impl SearchSpace {
 
     /// Fills `self.even`.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, refs: &[PrimRef], map: &BinMap, bins: usize, axes: Range<usize>) {
+    fn fill<S: Simd>(
+        &mut self,
+        simd: S,
+        refs: &[PrimRef],
+        map: &BinMap,
+        bins: usize,
+        axes: Range<usize>,
+    ) {
         self.even.clear(bins, axes.clone());
         if refs.len() < TWO_SETS {
             for p in refs {
@@ -298,11 +313,11 @@ fn find_plane_of_many<S: Simd>(
     all.even.best_plane(simd, map, bins, axes)
 }
 
-/// Cuts `from` (at least two) at the best place: the two sides are the parts of `to`, which is as long. `None` when no cut separates the
-/// primitives.
+/// Cuts `from` (at least two) at the best place: the two sides are the parts of `to`, which is as
+/// long. `None` when no cut separates the primitives.
 ///
-/// Every primitive is written to both ends and only one end moves on: no branch depends on the data, which a processor would often guess
-/// wrong.
+/// Every primitive is written to both ends and only one end moves on: no branch depends on the
+/// data, which a processor would often guess wrong.
 pub(crate) fn split_into<'a>(
     from: &[PrimRef],
     to: &'a mut [PrimRef],
@@ -314,7 +329,8 @@ pub(crate) fn split_into<'a>(
     let to = &mut to[..from.len()];
     let mut i = 0;
     for (done, p) in from.iter().enumerate() {
-        // Places i.. and ..=from the other end are free; together they are as many as primitives are left.
+        // Places i.. and ..=from the other end are free; together they are as many as primitives
+        // are left.
         let j = from.len() - 1 - (done - i);
         to[i] = *p;
         to[j] = *p;

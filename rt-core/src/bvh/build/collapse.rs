@@ -1,11 +1,14 @@
 //! From a binary tree to 8-wide nodes.
 //!
-//! Which binary nodes become wide nodes decides how many nodes a ray meets and how full they are. Opening always the child with the largest
-//! surface leaves many nodes half empty; choosing by dynamic programming over "the cheapest way to stand for this subtree with at most i
-//! roots" is optimal for the given binary tree (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
-//! BVHs", HPG 2017, section 3). Leaves are what the builder made them, so the cost is the summed surface of the wide nodes alone.
-//! Measured on nested isosurfaces (1 M triangles, balanced preset): 5.95 children a node and 3.66 triangles a leaf, 56 bytes a triangle; greedy
-//! opening with the leaves of that time took 63.6. Rays take the same time with both (0.98 to 1.05, geometric mean 1.00).
+//! Which binary nodes become wide nodes decides how many nodes a ray meets and how full they are.
+//! Opening always the child with the largest surface leaves many nodes half empty; choosing by
+//! dynamic programming over "the cheapest way to stand for this subtree with at most i roots" is
+//! optimal for the given binary tree (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal
+//! on GPUs Through Compressed Wide BVHs", HPG 2017, section 3). Leaves are what the builder made
+//! them, so the cost is the summed surface of the wide nodes alone. Measured on nested isosurfaces
+//! (1 M triangles, balanced preset): 5.95 children a node and 3.66 triangles a leaf, 56 bytes a
+//! triangle; greedy opening with the leaves of that time took 63.6. Rays take the same time with
+//! both (0.98 to 1.05, geometric mean 1.00).
 
 use super::binary_tree::BinaryTree;
 use crate::bvh::layout::wide::WIDTH;
@@ -16,7 +19,8 @@ pub(crate) const NO_CHILD: u32 = u32::MAX;
 /// The wide nodes of a fragment, parents before children in depth-first order.
 #[derive(Debug, Default)]
 pub(crate) struct WidePlan {
-    /// Binary nodes that are the children of each wide node: leaves of the binary tree first, then the roots of further wide nodes.
+    /// Binary nodes that are the children of each wide node: leaves of the binary tree first, then
+    /// the roots of further wide nodes.
     pub(crate) nodes: Vec<[u32; WIDTH]>,
     /// Leaves in the fragment.
     pub(crate) leaves: usize,
@@ -36,8 +40,8 @@ pub(crate) fn plan(tree: &BinaryTree) -> WidePlan {
     planner.plan
 }
 
-/// `[i − 1]`: cost of a subtree with at most i roots, i = 1..=8. The last place holds the cost of being spread over exactly the eight places
-/// of a node of its own.
+/// `[i − 1]`: cost of a subtree with at most i roots, i = 1..=8. The last place holds the cost of
+/// being spread over exactly the eight places of a node of its own.
 type Costs = [f32; WIDTH];
 
 struct Planner<'t> {
@@ -86,7 +90,8 @@ impl Planner<'_> {
         let mut children = [NO_CHILD; WIDTH];
         let mut count = 0;
         self.spread(node, WIDTH, &mut children, &mut count);
-        // Leaves first: they stand right behind their node. Stable, so that the order is the binary tree's.
+        // Leaves first: they stand right behind their node. Stable, so that the order is the binary
+        // tree's.
         let mut ordered = [NO_CHILD; WIDTH];
         let is_leaf = |c: &&u32| self.tree.nodes[**c as usize].is_leaf();
         let leaves = children[..count].iter().filter(is_leaf);

@@ -1,13 +1,15 @@
-//! Binary trees improved by the reinsertion optimiser of the crate obvhs (Meister and Bittner, "Parallel Reinsertion for Bounding
-//! Volume Hierarchy Optimization", 2018).
+//! Binary trees improved by the reinsertion optimiser of the crate obvhs (Meister and Bittner,
+//! "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", 2018).
 //!
-//! It runs within a fragment of the primitives, which bounds its memory and its time. What obvhs 0.4 cannot take is kept from it:
+//! It runs within a fragment of the primitives, which bounds its memory and its time. What obvhs
+//! 0.4 cannot take is kept from it:
 //! - Boxes whose surface overflows f32 lead to comparisons of NaN, which panic: `None` here.
 //! - Trees may become as deep as there are primitives: `None` beyond [`MAX_BINARY_DEPTH`].
-//! - The optimiser's stack has a fixed size, twice the depth that the tree claims: it is told the true depth before every pass.
+//! - The optimiser's stack has a fixed size, twice the depth that the tree claims: it is told the
+//!   true depth before every pass.
 //!
-//! obvhs' builder (PLOC, Meister and Bittner 2018) was a preset once. It took longer than [`super::sah_tree`] with few bins, and
-//! rays through its trees took longer, too.
+//! obvhs' builder (PLOC, Meister and Bittner 2018) was a preset once. It took longer than
+//! [`super::sah_tree`] with few bins, and rays through its trees took longer, too.
 
 use super::binary_tree::BinaryTree;
 use crate::bvh::layout::wide::LEAF_SIZE;
@@ -17,7 +19,8 @@ use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 
 /// Deeper trees are refused.
 pub(super) const MAX_BINARY_DEPTH: usize = 50;
-/// Boxes with more than this half area are refused: sums and products of a few of them must stay finite.
+/// Boxes with more than this half area are refused: sums and products of a few of them must stay
+/// finite.
 const LARGEST_HALF_AREA: f32 = 1e30;
 
 /// False for NaN as well.
@@ -25,8 +28,8 @@ fn is_ordinary(b: Aabb) -> bool {
     b.half_area() <= LARGEST_HALF_AREA
 }
 
-/// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot take it. Each pass tries that part of the nodes which has
-/// the largest surface.
+/// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot take it. Each pass
+/// tries that part of the nodes which has the largest surface.
 pub(crate) fn reinsert(tree: &BinaryTree, passes: &[f32]) -> Option<BinaryTree> {
     if !is_ordinary(tree.nodes[0].bounds) {
         return None;
@@ -37,7 +40,9 @@ pub(crate) fn reinsert(tree: &BinaryTree, passes: &[f32]) -> Option<BinaryTree> 
         bvh.max_depth = depth_of(&bvh.nodes).max(obvhs::bvh2::DEFAULT_MAX_STACK_DEPTH);
         optimizer.run(&mut bvh, part, Some(vec![1.0]));
     }
-    to_binary_tree(&bvh, &tree.ids, |leaf| Aabb::new(leaf.aabb().min.into(), leaf.aabb().max.into()))
+    to_binary_tree(&bvh, &tree.ids, |leaf| {
+        Aabb::new(leaf.aabb().min.into(), leaf.aabb().max.into())
+    })
 }
 
 /// Breadth first, since the optimiser takes the first nodes for the largest.
@@ -76,9 +81,13 @@ fn depth_of(nodes: &[Bvh2Node]) -> usize {
     deepest
 }
 
-/// Renumbers the nodes, makes subtrees of up to four primitives leaves, and computes boxes anew from `leaf_bounds`. The leaves of `bvh`
-/// refer to places in `ids`.
-fn to_binary_tree(bvh: &Bvh2, ids: &[u32], leaf_bounds: impl Fn(&Bvh2Node) -> Aabb) -> Option<BinaryTree> {
+/// Renumbers the nodes, makes subtrees of up to four primitives leaves, and computes boxes anew
+/// from `leaf_bounds`. The leaves of `bvh` refer to places in `ids`.
+fn to_binary_tree(
+    bvh: &Bvh2,
+    ids: &[u32],
+    leaf_bounds: impl Fn(&Bvh2Node) -> Aabb,
+) -> Option<BinaryTree> {
     // ---- Primitives below each node. The optimiser does not number parents before children.
     let mut counts = vec![0u32; bvh.nodes.len()];
     let mut depths = vec![0u8; bvh.nodes.len()];
@@ -107,7 +116,8 @@ fn to_binary_tree(bvh: &Bvh2, ids: &[u32], leaf_bounds: impl Fn(&Bvh2Node) -> Aa
     for &i in order.iter().rev() {
         let n = &bvh.nodes[i as usize];
         let first = n.first_index as usize;
-        counts[i as usize] = if n.is_leaf() { n.prim_count } else { counts[first] + counts[first + 1] };
+        counts[i as usize] =
+            if n.is_leaf() { n.prim_count } else { counts[first] + counts[first + 1] };
     }
 
     // ---- The new tree, parents first.

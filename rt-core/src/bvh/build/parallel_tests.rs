@@ -80,11 +80,13 @@ fn builders(threads: usize, shapes: usize, primitives: usize) -> usize {
         more: Condvar::new(),
         built: Mutex::default(),
     });
-    let shape =
-        |number| Geometry::Shape(Arc::new(BlockingShape { number, primitives, meeting: meeting.clone() }));
+    let shape = |number| {
+        Geometry::Shape(Arc::new(BlockingShape { number, primitives, meeting: meeting.clone() }))
+    };
     let geometries = (0..shapes).map(shape).collect();
     let world = pool(threads).install(|| {
-        World::build(geometries, everywhere(shapes), &BuildOptions::default()).expect("sound shapes")
+        World::build(geometries, everywhere(shapes), &BuildOptions::default())
+            .expect("sound shapes")
     });
     assert_eq!(world.report().primitives, shapes * primitives);
     assert_eq!(meeting.built.lock().unwrap().len(), shapes);
@@ -113,7 +115,8 @@ fn worlds_of_many_geometries_do_not_depend_on_the_number_of_threads() {
     let n = geometries.len();
     let build = |threads| {
         pool(threads).install(|| {
-            World::build(geometries.clone(), everywhere(n), &BuildOptions::default()).expect("sound meshes")
+            World::build(geometries.clone(), everywhere(n), &BuildOptions::default())
+                .expect("sound meshes")
         })
     };
     let words = |w: &World| -> Vec<Vec<u32>> {
@@ -135,15 +138,17 @@ fn worlds_of_many_geometries_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn of_several_errors_the_first_is_told_whatever_the_threads() {
-    let bad =
-        |values| TriMesh { colors: Some(Attribute::per_face(vec![[1.0; 4]; values])), ..noise_soup(10, 1) };
+    let bad = |values| TriMesh {
+        colors: Some(Attribute::per_face(vec![[1.0; 4]; values])),
+        ..noise_soup(10, 1)
+    };
     let mut geometries = vec![Geometry::Mesh(Arc::new(noise_soup(10, 2))); 300];
     for (i, values) in [(77, 3), (78, 4), (200, 5)] {
         geometries[i] = Geometry::Mesh(Arc::new(bad(values)));
     }
     for threads in [1, 4] {
-        let built =
-            pool(threads).install(|| World::build(geometries.clone(), vec![], &BuildOptions::default()));
+        let built = pool(threads)
+            .install(|| World::build(geometries.clone(), vec![], &BuildOptions::default()));
         let error = built.err().expect("three meshes are wrong");
         assert!(matches!(error, BuildError::Mesh { geometry: 77, .. }), "{error}");
     }

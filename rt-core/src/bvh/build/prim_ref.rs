@@ -6,10 +6,12 @@ use glam::Vec4;
 
 /// Box and number of a primitive in 32 bytes.
 ///
-/// Low corner, number, negative high corner, −2: with the high corner negated, one minimum over eight lanes grows a box.
+/// Low corner, number, negative high corner, −2: with the high corner negated, one minimum over
+/// eight lanes grows a box.
 ///
-/// The number has bit 30 set, so that it reads as an ordinary float: a plain small integer would be a denormal, and vector additions that
-/// touch denormals are a hundred times slower on some machines.
+/// The number has bit 30 set, so that it reads as an ordinary float: a plain small integer would be
+/// a denormal, and vector additions that touch denormals are a hundred times slower on some
+/// machines.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(32))]
 pub(crate) struct PrimRef([f32; 8]);
@@ -130,12 +132,16 @@ impl Box4 {
 
     #[inline(always)]
     pub(crate) fn grow<S: Simd>(&mut self, simd: S, p: &PrimRef) {
-        f32x8::from_slice(simd, &self.0).min(f32x8::from_slice(simd, &p.0)).store_slice(&mut self.0);
+        f32x8::from_slice(simd, &self.0)
+            .min(f32x8::from_slice(simd, &p.0))
+            .store_slice(&mut self.0);
     }
 
     #[inline(always)]
     pub(crate) fn union<S: Simd>(&mut self, simd: S, o: &Box4) {
-        f32x8::from_slice(simd, &self.0).min(f32x8::from_slice(simd, &o.0)).store_slice(&mut self.0);
+        f32x8::from_slice(simd, &self.0)
+            .min(f32x8::from_slice(simd, &o.0))
+            .store_slice(&mut self.0);
     }
 
     /// Half the surface area; only called on boxes that hold something.

@@ -1,4 +1,5 @@
-//! A fragment's binary tree by the surface area heuristic, top down: bins for large sets, every cut of the sorted order for small ones.
+//! A fragment's binary tree by the surface area heuristic, top down: bins for large sets, every cut
+//! of the sorted order for small ones.
 
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{SahConfig, SearchSpace, halve, leaf_tests, split_into};
@@ -10,8 +11,9 @@ use std::ops::Range;
 
 /// Sets up to this size are cut by trying every place along each axis.
 const SWEEP: usize = 8;
-/// Below this depth sets are halved instead of cut by cost. Cost-driven cuts of adversarial input (sizes that grow like 2^k) can
-/// peel off one primitive at a time; halving bounds the depth by this plus log2 of the count, and with it the traversal stack.
+/// Below this depth sets are halved instead of cut by cost. Cost-driven cuts of adversarial input
+/// (sizes that grow like 2^k) can peel off one primitive at a time; halving bounds the depth by
+/// this plus log2 of the count, and with it the traversal stack.
 pub(super) const MAX_COST_DEPTH: usize = 36;
 
 /// The tree over `refs` (at least one), whose order is lost; `spare` is as long.
@@ -37,7 +39,8 @@ struct SahTree {
 }
 
 impl SahTree {
-    /// Fills `node` with `refs`, which are the fragment's primitives from place `first` on; `spare` is as long.
+    /// Fills `node` with `refs`, which are the fragment's primitives from place `first` on; `spare`
+    /// is as long.
     fn build(
         &mut self,
         node: usize,
@@ -65,7 +68,8 @@ impl SahTree {
             self.build(child + 1, right, spare, &bounds[1], first + at, depth + 1);
             return;
         }
-        let cut = by_cost.then(|| split_into(refs, spare, bounds, self.sah, &mut self.space)).flatten();
+        let cut =
+            by_cost.then(|| split_into(refs, spare, bounds, self.sah, &mut self.space)).flatten();
         // The cut moved everything to `spare`; halves stay where they are.
         let (s, spare) = match cut {
             Some(s) => (s, refs),
@@ -84,7 +88,8 @@ fn longest_axis(bounds: &SetBounds) -> Range<usize> {
     axis..axis + 1
 }
 
-/// Sorts `refs` (two to eight) along the axis with the cheapest cut; returns how many go left and the boxes of both sides.
+/// Sorts `refs` (two to eight) along the axis with the cheapest cut; returns how many go left and
+/// the boxes of both sides.
 #[inline(always)]
 fn sweep<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
     simd.vectorize(
@@ -94,7 +99,11 @@ fn sweep<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, 
 }
 
 #[inline(always)]
-fn sweep_body<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
+fn sweep_body<S: Simd>(
+    simd: S,
+    refs: &mut [PrimRef],
+    axes: Range<usize>,
+) -> (usize, [SetBounds; 2]) {
     let n = refs.len();
     let mut copy = [refs[0]; SWEEP];
     copy[..n].copy_from_slice(refs);
@@ -125,10 +134,12 @@ fn sweep_body<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (us
     (at, [left, right].map(SetBounds::of))
 }
 
-/// The places of the first `n` primitives sorted by centre, in the low three bits: `[i][axis]` is the i-th along an axis.
+/// The places of the first `n` primitives sorted by centre, in the low three bits: `[i][axis]` is
+/// the i-th along an axis.
 ///
-/// Keys are the centres with their last three bits replaced by the place, so they differ, and a sorting network (19 exchanges, Knuth vol. 3,
-/// section 5.3.4) sorts all axes at once without a branch.
+/// Keys are the centres with their last three bits replaced by the place, so they differ, and a
+/// sorting network (19 exchanges, Knuth vol. 3, section 5.3.4) sorts all axes at once without a
+/// branch.
 #[inline(always)]
 fn orders(refs: &[PrimRef; SWEEP], n: usize) -> [[u32; 4]; SWEEP] {
     // Finite even where the sum of two coordinates overflows: NaN would break the network.
@@ -175,7 +186,8 @@ mod tests {
                 assert_eq!(all, (0..n).collect::<Vec<_>>(), "case {case} axis {axis}");
                 for w in places[..n].windows(2) {
                     // Twice the centre, as far as it can be told from a larger one.
-                    let center2 = |i: usize| (2.0 * refs[i].bounds().min[axis]).clamp(-1.7e38, 1.7e38);
+                    let center2 =
+                        |i: usize| (2.0 * refs[i].bounds().min[axis]).clamp(-1.7e38, 1.7e38);
                     let [a, b] = [w[0], w[1]].map(center2);
                     assert!(a <= b + 1e-6 * b.abs().max(a.abs()), "case {case}: {a} before {b}");
                 }

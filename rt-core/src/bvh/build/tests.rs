@@ -36,7 +36,8 @@ fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> (World, TreeStats) {
     (world, facts)
 }
 
-/// Whether f32 rays can be aimed at single triangles of a mesh, so that trying every triangle in f64 must give the same.
+/// Whether f32 rays can be aimed at single triangles of a mesh, so that trying every triangle in
+/// f64 must give the same.
 #[derive(PartialEq)]
 enum Aim {
     Exact,
@@ -46,7 +47,8 @@ enum Aim {
     Nowhere,
 }
 
-/// Every preset builds a sound tree over `mesh`, all find the same, and that is what trying every triangle finds.
+/// Every preset builds a sound tree over `mesh`, all find the same, and that is what trying every
+/// triangle finds.
 fn check(mesh: TriMesh, aim: Aim, what: &str) {
     let mesh = Arc::new(mesh);
     let usable: Vec<usize> = (0..mesh.indices.len()).filter(|&i| mesh.is_renderable(i)).collect();
@@ -63,8 +65,9 @@ fn check(mesh: TriMesh, aim: Aim, what: &str) {
             Ray::new(o, if i % 2 == 0 { at_triangle } else { anywhere } - o)
         })
         .collect();
-    let mut expected: Option<Vec<Option<u32>>> = (aim == Aim::Exact)
-        .then(|| rays.iter().map(|ray| brute_force::closest(&mesh, ray).map(|(_, prim)| prim)).collect());
+    let mut expected: Option<Vec<Option<u32>>> = (aim == Aim::Exact).then(|| {
+        rays.iter().map(|ray| brute_force::closest(&mesh, ray).map(|(_, prim)| prim)).collect()
+    });
     for quality in BuildQuality::ALL {
         let (world, facts) = build(&mesh, quality);
         assert_eq!(facts.primitives, usable.len(), "{what} {quality:?}");
@@ -95,7 +98,9 @@ fn one_to_nine_triangles() {
 #[test]
 fn triangles_with_nan_and_infinite_vertices_are_counted_and_left_out() {
     let mut mesh = noise_soup(2000, 4);
-    for (i, bad) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().cycle().take(300).enumerate() {
+    for (i, bad) in
+        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().cycle().take(300).enumerate()
+    {
         mesh.positions[i * 20][i % 3] = bad;
     }
     mesh.indices[1000] = [0, 1, 1_000_000];
@@ -108,17 +113,23 @@ fn triangles_without_area() {
     let mut r = SplitMix64::new(2);
     check(soup_of((0..5000).map(|_| [r.direction(); 3])), Aim::BelowRounding, "points");
     check(soup_of((0..5000).map(|_| [Vec3::ONE; 3])), Aim::BelowRounding, "one point");
-    check(soup_of((0..5000).map(|i| [Vec3::ZERO, Vec3::X * i as f32, Vec3::X])), Aim::Nowhere, "on a line");
+    check(
+        soup_of((0..5000).map(|i| [Vec3::ZERO, Vec3::X * i as f32, Vec3::X])),
+        Aim::Nowhere,
+        "on a line",
+    );
 }
 
 #[test]
 fn spacing_that_halves_stays_within_the_traversal_stack() {
-    let at = |x: f32| [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 0.3 * x, 0.0), Vec3::new(x, 0.0, 0.3 * x)];
+    let at =
+        |x: f32| [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 0.3 * x, 0.0), Vec3::new(x, 0.0, 0.3 * x)];
     check(soup_of((0..120).map(|k| at(2f32.powi(-k)))), Aim::BelowRounding, "2^-k");
     check(soup_of((-60..60).map(|k| at(2f32.powi(k)))), Aim::BelowRounding, "2^k both ways");
     // Along all three axes and both directions, many times over.
     let spread = (0..12_000).map(|i| {
-        let (k, axis, sign) = (i % 100, (i / 100 % 3) as usize, if i / 300 % 2 == 0 { 1.0 } else { -1.0 });
+        let (k, axis, sign) =
+            (i % 100, (i / 100 % 3) as usize, if i / 300 % 2 == 0 { 1.0 } else { -1.0 });
         at(sign * 2f32.powi(-k)).map(|p| {
             let v = p.to_array();
             Vec3::new(v[axis], v[(axis + 1) % 3], v[(axis + 2) % 3]) + Vec3::splat(i as f32 * 1e-9)
@@ -141,7 +152,11 @@ fn equal_boxes_on_a_line_and_in_a_grid() {
         "grid",
     );
     // Costs that only grow along the line.
-    check(soup_of((0..3000).map(|i| at(Vec3::X * (i * i) as f32))), Aim::BelowRounding, "growing gaps");
+    check(
+        soup_of((0..3000).map(|i| at(Vec3::X * (i * i) as f32))),
+        Aim::BelowRounding,
+        "growing gaps",
+    );
 }
 
 #[test]
@@ -177,7 +192,8 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mesh = Arc::new(noise_soup(150_000, 12));
     for quality in BuildQuality::ALL {
         let trees = [1, 2, 7].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let pool =
+                rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             let options = BuildOptions { quality, ..Default::default() };
             pool.install(|| World::from_mesh(mesh.clone(), &options).expect("a valid mesh"))
         });
@@ -190,11 +206,16 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn nodes_and_leaves_are_well_filled() {
     let mesh = Arc::new(sphere(6));
-    for (quality, per_leaf, per_node) in [(BuildQuality::Fast, 3.4, 5.0), (BuildQuality::Balanced, 3.5, 5.0)]
+    for (quality, per_leaf, per_node) in
+        [(BuildQuality::Fast, 3.4, 5.0), (BuildQuality::Balanced, 3.5, 5.0)]
     {
         let (_, f) = build(&mesh, quality);
-        let (leaf, node) = (f.primitives as f64 / f.leaves as f64, f.children as f64 / f.nodes as f64);
-        assert!(leaf > per_leaf && node > per_node, "{quality:?}: {leaf:.2} a leaf, {node:.2} a node");
+        let (leaf, node) =
+            (f.primitives as f64 / f.leaves as f64, f.children as f64 / f.nodes as f64);
+        assert!(
+            leaf > per_leaf && node > per_node,
+            "{quality:?}: {leaf:.2} a leaf, {node:.2} a node"
+        );
     }
 }
 
@@ -228,8 +249,11 @@ fn what_obvhs_cannot_take_is_built_by_sah_and_noted() {
         .collect();
     let bounds = SetBounds::of(&refs);
     assert!(
-        reinsert(&sah_tree(&mut refs.clone(), &mut refs.clone(), &bounds, THOROUGH, Level::new()), &[1.0])
-            .is_none()
+        reinsert(
+            &sah_tree(&mut refs.clone(), &mut refs.clone(), &bounds, THOROUGH, Level::new()),
+            &[1.0]
+        )
+        .is_none()
     );
     refs.sort_unstable_by_key(PrimRef::id);
     let config = BuilderConfig { method: Method::Reinsertion, sah: THOROUGH };

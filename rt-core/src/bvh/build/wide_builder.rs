@@ -1,8 +1,9 @@
 //! From primitives to an 8-wide hierarchy, top down and in parallel.
 //!
-//! Large sets are cut in two recursively (each half its own task) down to fragments. Each fragment becomes a binary tree, and a plan which of
-//! its nodes stay as wide ones; then sizes are known, the arena is made, and every fragment writes its own part of it. Sizes of tasks and
-//! fragments are fixed, so the tree is the same for any number of threads.
+//! Large sets are cut in two recursively (each half its own task) down to fragments. Each fragment
+//! becomes a binary tree, and a plan which of its nodes stay as wide ones; then sizes are known,
+//! the arena is made, and every fragment writes its own part of it. Sizes of tasks and fragments
+//! are fixed, so the tree is the same for any number of threads.
 
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{SahConfig, SearchSpace, Split, halve, split_into};
@@ -25,9 +26,11 @@ const FRAGMENT_DEPTH: usize = MAX_COST_DEPTH + MAX_FRAGMENT_LOG2 as usize;
 /// Largest size of a fragment, as a power of two.
 const MAX_FRAGMENT_LOG2: u32 = 16;
 
-// Whatever the input, no path is longer than the traversal stack allows: sets of up to 2^30 primitives are halved down to fragments of 2^14.
-const _: () =
-    assert!(MAX_LARGE_CUTS + 16 + FRAGMENT_DEPTH <= MAX_DEPTH && MAX_BINARY_DEPTH <= FRAGMENT_DEPTH);
+// Whatever the input, no path is longer than the traversal stack allows: sets of up to 2^30
+// primitives are halved down to fragments of 2^14.
+const _: () = assert!(
+    MAX_LARGE_CUTS + 16 + FRAGMENT_DEPTH <= MAX_DEPTH && MAX_BINARY_DEPTH <= FRAGMENT_DEPTH
+);
 
 /// How to make the binary tree of a fragment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,14 +117,16 @@ pub(crate) fn build_wide<W: LeafWriter>(
         write_node(&mut units, &[]);
         return WideBvh { units, bounds: Aabb::EMPTY, depth: 1 };
     }
-    let bounds = refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
+    let bounds =
+        refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
     let level = Level::new();
     let mut spare = refs.clone();
     let root = collapse_cuts(fragments(&mut refs, &mut spare, &bounds, config, level, 0));
     let (fallbacks, all) = root.fallbacks();
     if fallbacks > 0 {
         notes.push(format!(
-            "{fallbacks} of {all} parts built by the surface area heuristic alone: obvhs does not take their sizes or makes too deep a tree"
+            "{fallbacks} of {all} parts built by the surface area heuristic alone: obvhs does not \
+             take their sizes or makes too deep a tree"
         ));
     }
     // The boxes are in the trees now: 64 bytes a primitive less while the arena is written.
@@ -140,7 +145,8 @@ pub(crate) fn build_wide<W: LeafWriter>(
     WideBvh { units, bounds: bounds.aabb(), depth }
 }
 
-/// Cuts sets down to fragments, both sides of each cut in parallel, and plans these. `spare` is as long as `refs`.
+/// Cuts sets down to fragments, both sides of each cut in parallel, and plans these. `spare` is as
+/// long as `refs`.
 fn fragments(
     refs: &mut [PrimRef],
     spare: &mut [PrimRef],
@@ -153,8 +159,9 @@ fn fragments(
         return CutTree::Fragment(Fragment::new(refs, spare, bounds, config, level));
     }
     let by_cost = depth < MAX_LARGE_CUTS;
-    let cut =
-        by_cost.then(|| split_into(refs, spare, bounds, config.sah, &mut SearchSpace::new(level))).flatten();
+    let cut = by_cost
+        .then(|| split_into(refs, spare, bounds, config.sah, &mut SearchSpace::new(level)))
+        .flatten();
     // The cut moved everything to `spare`; halves stay where they are.
     let (Split { left, left_bounds, right, right_bounds }, spare) = match cut {
         Some(s) => (s, refs),
@@ -168,8 +175,8 @@ fn fragments(
     CutTree::Cut(Box::new([l, r]), bounds.aabb())
 }
 
-/// Wide nodes above the fragments: always opens the set with the largest surface until there are eight. Few enough not to need the
-/// collapse of [`plan`].
+/// Wide nodes above the fragments: always opens the set with the largest surface until there are
+/// eight. Few enough not to need the collapse of [`plan`].
 fn collapse_cuts(root: CutTree) -> TopNode {
     let (pair, bounds) = match root {
         CutTree::Fragment(f) => return TopNode::Fragment(f),
@@ -189,7 +196,9 @@ fn collapse_cuts(root: CutTree) -> TopNode {
             }
         }
         let Some((i, _)) = largest else { break };
-        let CutTree::Cut(pair, _) = sets.swap_remove(i) else { unreachable!("fragments have no area here") };
+        let CutTree::Cut(pair, _) = sets.swap_remove(i) else {
+            unreachable!("fragments have no area here")
+        };
         sets.extend(*pair);
     }
     TopNode::Wide(sets.into_iter().map(collapse_cuts).collect(), bounds)
@@ -206,7 +215,9 @@ impl TopNode {
     /// Nodes on the longest path from here to a leaf.
     fn depth(&self) -> usize {
         match self {
-            TopNode::Wide(children, _) => 1 + children.iter().map(TopNode::depth).max().unwrap_or(0),
+            TopNode::Wide(children, _) => {
+                1 + children.iter().map(TopNode::depth).max().unwrap_or(0)
+            }
             TopNode::Fragment(f) => f.plan.depth,
         }
     }
@@ -214,9 +225,10 @@ impl TopNode {
     /// Fragments that obvhs could not build, and all fragments.
     fn fallbacks(&self) -> (usize, usize) {
         match self {
-            TopNode::Wide(children, _) => {
-                children.iter().map(TopNode::fallbacks).fold((0, 0), |(f, n), (g, m)| (f + g, n + m))
-            }
+            TopNode::Wide(children, _) => children
+                .iter()
+                .map(TopNode::fallbacks)
+                .fold((0, 0), |(f, n), (g, m)| (f + g, n + m)),
             TopNode::Fragment(f) => (f.fell_back as usize, 1),
         }
     }
@@ -235,7 +247,8 @@ impl TopNode {
     fn write<W: LeafWriter>(self, writer: &W, base: usize, out: &mut [Unit]) -> ChildRef {
         match self {
             TopNode::Fragment(f) => {
-                let mut w = FragmentWriter { fragment: &f, writer, base, out, next_node: 0, next_unit: 0 };
+                let mut w =
+                    FragmentWriter { fragment: &f, writer, base, out, next_node: 0, next_unit: 0 };
                 if f.plan.nodes.is_empty() { w.leaf(0) } else { w.node() }
             }
             TopNode::Wide(children, _) => {

@@ -3,7 +3,8 @@
 use crate::math::{Aabb, exp2i};
 use glam::{DVec3, Vec3};
 
-/// Local = (object − center) · scale, where object space is the geometry's own f64 coordinates before the instance's transform.
+/// Local = (object − center) · scale, where object space is the geometry's own f64 coordinates
+/// before the instance's transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LocalFrame {
     pub(crate) center: DVec3,
@@ -21,7 +22,8 @@ impl LocalFrame {
         let far = center.abs().max_element() > 4.0 * size;
         let shift = if far { center.as_dvec3() } else { DVec3::ZERO };
         let reach = if far { size } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
-        // The triangle test multiplies three lengths: with these limits it stays between 1e-27 and 1e27.
+        // The triangle test multiplies three lengths: with these limits it stays between 1e-27 and
+        // 1e27.
         let scale = if reach > 0.0 && !(1e-6..=1e9).contains(&reach) {
             exp2i(-(reach.log2().round() as i32)) as f64
         } else {

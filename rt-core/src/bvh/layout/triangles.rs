@@ -6,7 +6,8 @@ use crate::math::Aabb;
 use crate::mesh::TriMesh;
 use glam::Vec3;
 
-/// Units of a leaf: nine rows of four floats (x, y, z of the first, second and third vertices) and a row of four triangle numbers.
+/// Units of a leaf: nine rows of four floats (x, y, z of the first, second and third vertices) and
+/// a row of four triangle numbers.
 pub(crate) const TRI_LEAF_UNITS: usize = 5;
 
 /// Row `row` (0..=8) of a leaf: one coordinate of one vertex of the four triangles.
@@ -95,12 +96,15 @@ impl LeafWriter for TriWriter<'_> {
 
 /// A primitive's box, wider by 2⁻²⁰ of its largest extent.
 ///
-/// The triangle test rounds the corners after the shear: an edge moves by up to 5·2⁻²⁴ of the triangle's extent (7 with the box's own rounding),
-/// which next to a ray that starts close to a large triangle is far more than the slack of the slab test. The test's decision is consistent, its
-/// neighbour across the edge leaves the ray to it; so a box that stands exactly on the edge must not say no. (Measured on a cube, rays from 10⁻⁶
-/// to 1 of its size off an edge, aimed 10⁻⁹ to 10⁻⁶ beside it: 68 of 454,656 were lost to tight boxes.)
+/// The triangle test rounds the corners after the shear: an edge moves by up to 5·2⁻²⁴ of the
+/// triangle's extent (7 with the box's own rounding), which next to a ray that starts close to a
+/// large triangle is far more than the slack of the slab test. The test's decision is consistent,
+/// its neighbour across the edge leaves the ray to it; so a box that stands exactly on the edge
+/// must not say no. (Measured on a cube, rays from 10⁻⁶ to 1 of its size off an edge, aimed 10⁻⁹ to
+/// 10⁻⁶ beside it: 68 of 454,656 were lost to tight boxes.)
 ///
-/// Always wider than the corners, so that a ray in the plane of a box's side meets the box whatever the sign of a zero in its direction.
+/// Always wider than the corners, so that a ray in the plane of a box's side meets the box whatever
+/// the sign of a zero in its direction.
 #[inline]
 pub(crate) fn widened(b: Aabb) -> Aabb {
     let margin = b.extent().max_element() * (8.0 * f32::EPSILON);

@@ -1,9 +1,10 @@
 //! The memory layout of an 8-wide bounding volume hierarchy.
 //!
-//! Nodes and leaves live in one array of 32-byte units. A node is 7 units: the six planes of its eight children's boxes, one row of
-//! eight floats each (x low, x high, y low, y high, z low, z high), and a row of child references. A leaf follows close to its parent,
-//! so both often share a page. 32-byte units instead of 64-byte lines: a triangle leaf is 160 bytes, which touches three cache lines
-//! wherever it starts, and 16 M triangles take 55 bytes each instead of 66.
+//! Nodes and leaves live in one array of 32-byte units. A node is 7 units: the six planes of its
+//! eight children's boxes, one row of eight floats each (x low, x high, y low, y high, z low, z
+//! high), and a row of child references. A leaf follows close to its parent, so both often share a
+//! page. 32-byte units instead of 64-byte lines: a triangle leaf is 160 bytes, which touches three
+//! cache lines wherever it starts, and 16 M triangles take 55 bytes each instead of 66.
 
 use crate::math::Aabb;
 use glam::Vec3;
@@ -17,7 +18,8 @@ pub(crate) const NODE_UNITS: usize = 7;
 /// The row of child references.
 pub(crate) const CHILD_ROW: usize = 6;
 
-/// Deepest tree the traversal stack is made for: each node on the path leaves at most seven siblings behind.
+/// Deepest tree the traversal stack is made for: each node on the path leaves at most seven
+/// siblings behind.
 pub(crate) const MAX_DEPTH: usize = (STACK_SIZE - WIDTH) / (WIDTH - 1);
 /// Entries of a traversal stack.
 pub(crate) const STACK_SIZE: usize = 640;
@@ -63,7 +65,10 @@ impl ChildRef {
     }
 
     pub(crate) fn leaf(unit: usize, count: usize) -> Self {
-        debug_assert!(unit < Self::MAX_UNITS && (1..=LEAF_SIZE).contains(&count), "leaf {unit} of {count}");
+        debug_assert!(
+            unit < Self::MAX_UNITS && (1..=LEAF_SIZE).contains(&count),
+            "leaf {unit} of {count}"
+        );
         ChildRef(Self::LEAF | ((count as u32 - 1) << 29) | unit as u32)
     }
 

@@ -129,7 +129,11 @@ fn instances_and_far_away_meshes_follow() {
     let instances: Vec<Instance> = (0..5)
         .map(|i| Instance {
             geometry: 0,
-            world_from_object: DAffine3::from_translation(DVec3::new(3.0 * i as f64 - 6.0, 0.0, 0.0)),
+            world_from_object: DAffine3::from_translation(DVec3::new(
+                3.0 * i as f64 - 6.0,
+                0.0,
+                0.0,
+            )),
         })
         .collect();
     let build = |m: &Arc<TriMesh>| {
@@ -159,8 +163,16 @@ fn other_triangles_are_refused_and_the_world_stays() {
     other.indices[5].swap(0, 1);
     let (t, v) = (mesh.indices.len(), mesh.positions.len());
     for (new, geometry, expected) in [
-        (fewer, 0, RefitError::Topology { geometry: 0, what: "triangles", expected: t, found: t - 1 }),
-        (more, 0, RefitError::Topology { geometry: 0, what: "vertices", expected: v, found: v + 1 }),
+        (
+            fewer,
+            0,
+            RefitError::Topology { geometry: 0, what: "triangles", expected: t, found: t - 1 },
+        ),
+        (
+            more,
+            0,
+            RefitError::Topology { geometry: 0, what: "vertices", expected: v, found: v + 1 },
+        ),
         (other, 0, RefitError::Indices { geometry: 0, triangle: 5 }),
         (mesh.clone(), 1, RefitError::NoSuchGeometry { geometry: 1, count: 1 }),
     ] {

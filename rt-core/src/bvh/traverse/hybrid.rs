@@ -1,10 +1,12 @@
 //! Sixteen rays in any direction: together while they share the way, then two by two.
 //!
-//! Ambient-occlusion and bounce rays of neighbouring points fly apart, so packets with common bounds do not pay (measured: sorting 16,384 of them by
-//! direction into packets took 1.7 times the single rays' time). But they start close together: the nodes around their origins, most of the way down the
-//! tree, are the same for all. There a box is tested against sixteen rays at once; a subtree that only a few of them meet is left to [`super::pair`],
-//! which tests eight boxes against one ray, for two rays in turns. (The idea is that of Benthin et al., "Combining Single and Packet-Ray Tracing for Arbitrary Ray
-//! Distributions on the Intel MIC Architecture", 2012.)
+//! Ambient-occlusion and bounce rays of neighbouring points fly apart, so packets with common
+//! bounds do not pay (measured: sorting 16,384 of them by direction into packets took 1.7 times the
+//! single rays' time). But they start close together: the nodes around their origins, most of the
+//! way down the tree, are the same for all. There a box is tested against sixteen rays at once; a
+//! subtree that only a few of them meet is left to [`super::pair`], which tests eight boxes against
+//! one ray, for two rays in turns. (The idea is that of Benthin et al., "Combining Single and
+//! Packet-Ray Tracing for Arbitrary Ray Distributions on the Intel MIC Architecture", 2012.)
 
 use super::pair::{RayQueue, RayTask, traverse_pairs};
 use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, inflate_t};
@@ -17,8 +19,10 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
 
-/// With this many rays or fewer a subtree is walked by each for itself. Found on ambient occlusion (any hit) and on rays with random ends (closest hit) among one
-/// million triangles, by their ratios to Embree in separate runs: 8 instead of 5 loses 1 to 4 % for the former, 5 or 12 instead of 8 a tenth for the latter.
+/// With this many rays or fewer a subtree is walked by each for itself. Found on ambient occlusion
+/// (any hit) and on rays with random ends (closest hit) among one million triangles, by their
+/// ratios to Embree in separate runs: 8 instead of 5 loses 1 to 4 % for the former, 5 or 12 instead
+/// of 8 a tenth for the latter.
 const MAX_SINGLE_RAYS_ANY: u32 = 5;
 const MAX_SINGLE_RAYS_CLOSEST: u32 = 8;
 
@@ -31,7 +35,8 @@ struct Entry {
     rays: u16,
 }
 
-/// The rays of `active` lanes against a triangle hierarchy; answers go into `hits` (for occlusion, `prim` 0 where something is on the ray).
+/// The rays of `active` lanes against a triangle hierarchy; answers go into `hits` (for occlusion,
+/// `prim` 0 where something is on the ray).
 #[inline(never)]
 pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(
     simd: S,
@@ -90,16 +95,19 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
             // ---- Each for itself from here, two at a time.
             let (setups, start) = (&setups, child);
             if ANY {
-                let mut queue = AnyQueue::<EXACT> { setups, t: &t, start, met, hits, active: &mut active };
+                let mut queue =
+                    AnyQueue::<EXACT> { setups, t: &t, start, met, hits, active: &mut active };
                 traverse_pairs::<S, _, false>(simd, bvh, &mut queue);
             } else {
-                let mut queue = ClosestQueue::<EXACT> { setups, t: &mut t, start, met, hits, instance };
+                let mut queue =
+                    ClosestQueue::<EXACT> { setups, t: &mut t, start, met, hits, instance };
                 traverse_pairs::<S, _, true>(simd, bvh, &mut queue);
             }
             continue;
         }
 
-        // ---- A node for many: each child's box against all rays. The rays differ in octant, so both planes of an axis are sorted per ray.
+        // ---- A node for many: each child's box against all rays. The rays differ in octant, so
+        // both planes of an axis are sorted per ray.
         count(Counter::Nodes, 1);
         let at = child.unit();
         let node: &[Unit; NODE_UNITS] =
@@ -113,7 +121,8 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
                 break;
             }
             count(Counter::GroupBoxes, 1);
-            let lo: [f32x16<S>; 3] = three!(|a| (f32x16::splat(simd, node[2 * a].0[slot]) - o[a]) * rcp[a]);
+            let lo: [f32x16<S>; 3] =
+                three!(|a| (f32x16::splat(simd, node[2 * a].0[slot]) - o[a]) * rcp[a]);
             let hi: [f32x16<S>; 3] =
                 three!(|a| (f32x16::splat(simd, node[2 * a + 1].0[slot]) - o[a]) * rcp[a]);
             let near = lo[0].min(hi[0]).max(lo[1].min(hi[1])).max(lo[2].min(hi[2]).max(t_min));
@@ -123,8 +132,10 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
                 continue;
             }
             prefetch::<4>(units, ChildRef(refs[slot]).unit());
-            // Rays outside `hit` may have smaller numbers here; as an order of visits that is good enough.
-            let distance = if ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
+            // Rays outside `hit` may have smaller numbers here; as an order of visits that is good
+            // enough.
+            let distance =
+                if ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
             stack.push(Entry { distance, child: refs[slot], rays: hit });
         }
         if !ANY {
@@ -191,7 +202,13 @@ impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for AnyQueue<'_, 'r, EXACT>
         }
         let lane = take_lane(&mut self.met);
         let (ray, t_max) = (&self.setups[lane], self.t[lane]);
-        Some(RayTask { number: lane, ray, t_max, start: self.start, leaf: AnyLeaf::new(ray, t_max) })
+        Some(RayTask {
+            number: lane,
+            ray,
+            t_max,
+            start: self.start,
+            leaf: AnyLeaf::new(ray, t_max),
+        })
     }
 
     #[inline(always)]

@@ -6,8 +6,9 @@ pub(crate) mod pair;
 pub(crate) mod single;
 pub(crate) mod triangle_leaf;
 
-/// `[f(0), f(1), f(2)]` written out. Closures handed to library functions such as `array::from_fn` are compiled without the instruction set of
-/// the function around them, and every vector operation in them becomes a call (measured: half the speed).
+/// `[f(0), f(1), f(2)]` written out. Closures handed to library functions such as `array::from_fn`
+/// are compiled without the instruction set of the function around them, and every vector operation
+/// in them becomes a call (measured: half the speed).
 macro_rules! three {
     (|$i:ident| $e:expr) => {{
         [

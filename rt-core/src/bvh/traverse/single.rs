@@ -9,23 +9,28 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
-/// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴, so that a box is never missed whose triangle the ray meets.
+/// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴, so that a box is never missed
+/// whose triangle the ray meets.
 ///
-/// Ize ("Robust BVH Ray Traversal", JCGT 2013) has 6 u for the slab test by itself. The triangle test shears with a slope that carries roundings of
-/// its own, which turns the ray against the slabs by 3 u at either end, and multiplying with this factor rounds once more. What the triangle test
-/// loses in proportion to the triangle instead of the distance is in the boxes: [`crate::bvh::layout::triangles::widened`]. So boxes decide nothing: single
-/// rays, packets and every tree give the same answer.
+/// Ize ("Robust BVH Ray Traversal", JCGT 2013) has 6 u for the slab test by itself. The triangle
+/// test shears with a slope that carries roundings of its own, which turns the ray against the
+/// slabs by 3 u at either end, and multiplying with this factor rounds once more. What the triangle
+/// test loses in proportion to the triangle instead of the distance is in the boxes:
+/// [`crate::bvh::layout::triangles::widened`]. So boxes decide nothing: single rays, packets and
+/// every tree give the same answer.
 pub(crate) const BOX_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// A little beyond `t`, for skipping boxes: a triangle's `t` and its box's distance round differently, and of two surfaces at the same place both must
-/// be seen for the lower number to win.
+/// A little beyond `t`, for skipping boxes: a triangle's `t` and its box's distance round
+/// differently, and of two surfaces at the same place both must be seen for the lower number to
+/// win.
 #[inline(always)]
 pub(crate) fn inflate_t(t: f32) -> f32 {
     t * (1.0 + 32.0 * f32::EPSILON)
 }
 
-/// Smallest direction component as it enters a reciprocal, 2⁻¹²⁴: the reciprocal is finite, which keeps 0·∞ out of the slab test. Not larger: local
-/// space of a mesh of size 10²⁵ has directions of 10⁻²⁵.
+/// Smallest direction component as it enters a reciprocal, 2⁻¹²⁴: the reciprocal is finite, which
+/// keeps 0·∞ out of the slab test. Not larger: local space of a mesh of size 10²⁵ has directions of
+/// 10⁻²⁵.
 pub(crate) const MIN_COMPONENT: f32 = 4.0 * f32::MIN_POSITIVE;
 
 /// What a ray needs in every step, computed once.
@@ -33,7 +38,8 @@ pub(crate) const MIN_COMPONENT: f32 = 4.0 * f32::MIN_POSITIVE;
 pub(crate) struct RaySetup {
     pub(crate) origin: [f32; 3],
     pub(crate) rcp: [f32; 3],
-    /// Row of the plane the ray meets first, per axis; the other one is that row with the lowest bit flipped.
+    /// Row of the plane the ray meets first, per axis; the other one is that row with the lowest
+    /// bit flipped.
     pub(crate) near: [usize; 3],
     pub(crate) shear: Shear,
     pub(crate) t_min: f32,
@@ -52,21 +58,28 @@ impl RaySetup {
         let rcp = d.map(safe_reciprocal);
         // Near planes follow the sign of the reciprocal, so that -0.0 and +0.0 agree with it.
         let near = std::array::from_fn(|a| 2 * a + (rcp[a] < 0.0) as usize);
-        RaySetup { origin: ray.origin.to_array(), rcp, near, shear: Shear::new(d), t_min: ray.t_min }
+        RaySetup {
+            origin: ray.origin.to_array(),
+            rcp,
+            near,
+            shear: Shear::new(d),
+            t_min: ray.t_min,
+        }
     }
 }
 
 /// What happens at a leaf.
 pub(crate) trait LeafTest<S: Simd> {
-    /// Tests the primitives of `leaf`; lowers `skip_t`, the distance from which boxes are skipped, to [`inflate_t`] the closest hit so far. Returns true when
-    /// the search is over.
+    /// Tests the primitives of `leaf`; lowers `skip_t`, the distance from which boxes are skipped,
+    /// to [`inflate_t`] the closest hit so far. Returns true when the search is over.
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 }
 
-/// Walks the leaves whose boxes the ray meets before `t_max`, widened by rounding errors in every mode: it costs nothing. `ORDERED` goes to the nearest
-/// child first (any-hit queries do not care).
+/// Walks the leaves whose boxes the ray meets before `t_max`, widened by rounding errors in every
+/// mode: it costs nothing. `ORDERED` goes to the nearest child first (any-hit queries do not care).
 ///
-/// Never inlined: one body per instruction set, leaf kind and mode. Inlined into its callers it multiplied the compile time by thirty.
+/// Never inlined: one body per instruction set, leaf kind and mode. Inlined into its callers it
+/// multiplied the compile time by thirty.
 #[inline(never)]
 pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
@@ -108,11 +121,13 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
-    // The slack enters the far planes' reciprocals, which costs nothing in the loop. Far distances below zero never matter: t_min is not below.
+    // The slack enters the far planes' reciprocals, which costs nothing in the loop. Far distances
+    // below zero never matter: t_min is not below.
     let slack = f32x8::splat(simd, BOX_SLACK);
     let rcp_far: [f32x8<S>; 3] = three!(|a| rcp[a] * slack);
     let [nx, ny, nz] = ray.near;
-    // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it non-negative.
+    // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it
+    // non-negative.
     let mut memory = StackMemory::<u64, STACK_SIZE>::new();
     let mut stack = Stack::empty(&mut memory);
     let mut current = start;
@@ -130,7 +145,8 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
             let plane = |row: usize, axis: usize, rcp: f32x8<S>| {
                 (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp
             };
-            let near = plane(nx, 0, rcp[0]).max(plane(ny, 1, rcp[1])).max(plane(nz, 2, rcp[2]).max(t_min));
+            let near =
+                plane(nx, 0, rcp[0]).max(plane(ny, 1, rcp[1])).max(plane(nz, 2, rcp[2]).max(t_min));
             let far = plane(nx ^ 1, 0, rcp_far[0]).min(plane(ny ^ 1, 1, rcp_far[1])).min(plane(
                 nz ^ 1,
                 2,
@@ -155,8 +171,9 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     }
 }
 
-/// Where to go from a node of which the boxes in `mask` are met, at the distances `near`: the nearest child when `ORDERED`, any otherwise; the others wait on the
-/// stack. `None`: what comes next is on the stack.
+/// Where to go from a node of which the boxes in `mask` are met, at the distances `near`: the
+/// nearest child when `ORDERED`, any otherwise; the others wait on the stack. `None`: what comes
+/// next is on the stack.
 #[inline(always)]
 pub(super) fn push_children<S: Simd, const ORDERED: bool>(
     units: &[Unit],
@@ -190,7 +207,8 @@ pub(super) fn push_children<S: Simd, const ORDERED: bool>(
         }
         return Some(child);
     }
-    // Up to three are sorted in registers: which of two boxes is nearer is a coin toss, so no branch may ask.
+    // Up to three are sorted in registers: which of two boxes is nearer is a coin toss, so no
+    // branch may ask.
     let (a, b) = (entry(first), entry(mask.trailing_zeros() as usize));
     mask &= mask - 1;
     let (e0, e1) = (a.min(b), a.max(b));

@@ -50,7 +50,8 @@ impl<'r, const EXACT: bool> ClosestLeaf<'r, EXACT> {
 
     #[inline(always)]
     pub(crate) fn new(ray: &'r RaySetup, t_max: f32) -> Self {
-        // Number 0 with t_max: nothing at exactly t_max can win the tie, which makes the range half-open.
+        // Number 0 with t_max: nothing at exactly t_max can win the tie, which makes the range
+        // half-open.
         ClosestLeaf { ray, best: ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false } }
     }
 }
@@ -101,7 +102,9 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for AnyLeaf<'_, EXACT> {
     #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
         count(Counter::Primitives, 1);
-        let Some(c) = test_leaf::<S, EXACT>(simd, leaf_floats(units, leaf), self.ray) else { return false };
+        let Some(c) = test_leaf::<S, EXACT>(simd, leaf_floats(units, leaf), self.ray) else {
+            return false;
+        };
         let hit = c.inside
             & c.t.simd_ge(f32x4::splat(simd, self.ray.t_min))
             & c.t.simd_lt(f32x4::splat(simd, self.t_max));

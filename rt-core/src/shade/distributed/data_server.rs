@@ -35,11 +35,13 @@ impl CameraHits {
 
     /// Sixteen bits for every sixteen slots: set where something was hit.
     pub fn mask(&self) -> impl Iterator<Item = u16> + '_ {
-        let bits = |h: &HitBlock| (0..LANES).fold(0u16, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
+        let bits =
+            |h: &HitBlock| (0..LANES).fold(0u16, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
         self.work.hits.iter().map(bits)
     }
 
-    /// Colours of all slots where something was hit, in frames where [`DistributedFrame::needs_only_local_light`].
+    /// Colours of all slots where something was hit, in frames where
+    /// [`DistributedFrame::needs_only_local_light`].
     pub fn colors(&mut self, frame: &DistributedFrame<'_>) -> &[[f32; 4]] {
         let Some(area) = self.area else { return &[] };
         let mut pixels = std::mem::take(&mut self.work.pixels);
@@ -47,7 +49,15 @@ impl CameraHits {
         pixels.resize(PIXELS, [0.0; 4]);
         let mut layers = TileLayers::new(Layers::COLOR, 0.0, false);
         let mut stats = RayStats::default();
-        local::light(&frame.context, &area, &mut layers, &self.work, &mut pixels, false, &mut stats);
+        local::light(
+            &frame.context,
+            &area,
+            &mut layers,
+            &self.work,
+            &mut pixels,
+            false,
+            &mut stats,
+        );
         self.work.pixels = pixels;
         &self.work.pixels
     }
@@ -86,10 +96,22 @@ impl DistributedFrame<'_> {
         area.sample = if let Pass::Color(sample) = pass { sample } else { 0 };
         let (sample, mut stats) = (self.sample_of(pass), RayStats::default());
         let work = &mut out.work;
-        generate_camera_rays(&self.context, &area, &mut work.current.blocks, sample, &mut stats, None);
+        generate_camera_rays(
+            &self.context,
+            &area,
+            &mut work.current.blocks,
+            sample,
+            &mut stats,
+            None,
+        );
         work.hits.resize(PIXELS / LANES, HitBlock::MISS);
         let world = &self.context.scene.world;
-        world.closest_stream(&work.current.blocks, &mut work.hits, Coherence::Coherent, InstanceFilter::All);
+        world.closest_stream(
+            &work.current.blocks,
+            &mut work.hits,
+            Coherence::Coherent,
+            InstanceFilter::All,
+        );
         prefetch_surfaces(&self.context, &work.hits);
         (out.area, out.rays) = (Some(area), stats.primary);
     }
@@ -105,9 +127,15 @@ impl DistributedFrame<'_> {
         self.context.depth_and_distance(self.context.ndc(x, y, [0.5; 2]), ray, hit)
     }
 
-    /// What rays of any kind meet here, one answer each. Neighbouring rays should be similar. With `pixels` (tile and slot of each, for camera
-    /// rays of a pass that fills geometry layers) the answers have depth and distance.
-    pub fn closest(&self, rays: &[Ray], pixels: Option<&[(u32, u16)]>, out: &mut Vec<Option<ShadingHit>>) {
+    /// What rays of any kind meet here, one answer each. Neighbouring rays should be similar. With
+    /// `pixels` (tile and slot of each, for camera rays of a pass that fills geometry layers) the
+    /// answers have depth and distance.
+    pub fn closest(
+        &self,
+        rays: &[Ray],
+        pixels: Option<&[(u32, u16)]>,
+        out: &mut Vec<Option<ShadingHit>>,
+    ) {
         let blocks = RayBlock::from_rays(rays);
         let mut hits = vec![HitBlock::MISS; blocks.len()];
         let world = &self.context.scene.world;
@@ -116,7 +144,8 @@ impl DistributedFrame<'_> {
         for (i, ray) in rays.iter().enumerate() {
             let answer = hits[i / LANES].get(i % LANES).map(|hit| {
                 let mut shading_hit = self.shading_hit(ray, &hit);
-                let place = pixels.and_then(|p| p.get(i)).map(|&(t, s)| (self.tiles.get(t as usize), s));
+                let place =
+                    pixels.and_then(|p| p.get(i)).map(|&(t, s)| (self.tiles.get(t as usize), s));
                 if let Some((Some(area), slot)) = place {
                     (shading_hit.depth, shading_hit.distance) =
                         self.depth_and_distance(area, slot, ray, &hit);
@@ -127,8 +156,8 @@ impl DistributedFrame<'_> {
         }
     }
 
-    /// What light rays meet here that may let light through, one answer each; or [`ShadingHit::blocked`] where something opaque is in the way,
-    /// wherever that is.
+    /// What light rays meet here that may let light through, one answer each; or
+    /// [`ShadingHit::blocked`] where something opaque is in the way, wherever that is.
     pub fn light_hits(&self, rays: &[Ray], out: &mut Vec<Option<ShadingHit>>) {
         let mut blocks = RayBlock::from_rays(rays);
         let (world, marks) = (&self.context.scene.world, self.context.transmissive.as_slice());
@@ -144,11 +173,18 @@ impl DistributedFrame<'_> {
             }
         }
         let mut hits = vec![HitBlock::MISS; blocks.len()];
-        world.closest_stream(&blocks, &mut hits, Coherence::Incoherent, InstanceFilter::Marked(marks));
+        world.closest_stream(
+            &blocks,
+            &mut hits,
+            Coherence::Incoherent,
+            InstanceFilter::Marked(marks),
+        );
         let answer = |(i, ray): (usize, &Ray)| {
             let (block, lane) = (i / LANES, i % LANES);
             match opaque {
-                Some(instance) if ended[block] >> lane & 1 != 0 => Some(ShadingHit::blocked(instance as u32)),
+                Some(instance) if ended[block] >> lane & 1 != 0 => {
+                    Some(ShadingHit::blocked(instance as u32))
+                }
                 _ => hits[block].get(lane).map(|hit| self.shading_hit(ray, &hit)),
             }
         };
@@ -156,8 +192,9 @@ impl DistributedFrame<'_> {
         out.extend(rays.iter().enumerate().map(answer));
     }
 
-    /// Of every light ray of every point, whether something here is in its way: [`DistributedFrame::light_rays_per_point`] bits a point, in whole
-    /// words of 64, the lowest bit first. Rays that no material could need may be left out; their bits are 0.
+    /// Of every light ray of every point, whether something here is in its way:
+    /// [`DistributedFrame::light_rays_per_point`] bits a point, in whole words of 64, the lowest
+    /// bit first. Rays that no material could need may be left out; their bits are 0.
     pub fn occlusion_bits(
         &self,
         points: &[LightPoint],
@@ -218,11 +255,13 @@ impl DistributedFrame<'_> {
         let OcclusionScratch { rays, open, hemisphere_samples, .. } = work;
         rays.clear();
         open.clear();
-        open.extend(points.iter().enumerate().filter(|(_, p)| p.sky).map(|(i, p)| OcclusionPoint {
-            index: i as u32,
-            light: Vec3::ZERO,
-            sampler: self.context.sampler(p.pixel[0], p.pixel[1], sample),
-            dimension: p.stream.wrapping_add(SampleDimension::AMBIENT_OCCLUSION),
+        open.extend(points.iter().enumerate().filter(|(_, p)| p.sky).map(|(i, p)| {
+            OcclusionPoint {
+                index: i as u32,
+                light: Vec3::ZERO,
+                sampler: self.context.sampler(p.pixel[0], p.pixel[1], sample),
+                dimension: p.stream.wrapping_add(SampleDimension::AMBIENT_OCCLUSION),
+            }
         }));
         dispatch!(self.context.level, simd => directions(simd, &self.context, open, ao.rays, hemisphere_samples));
         let mut direction = 0;
@@ -237,7 +276,13 @@ impl DistributedFrame<'_> {
         }
     }
 
-    fn trace_into_bits(&self, coherent: bool, work: &mut OcclusionScratch, words: usize, out: &mut [u64]) {
+    fn trace_into_bits(
+        &self,
+        coherent: bool,
+        work: &mut OcclusionScratch,
+        words: usize,
+        out: &mut [u64],
+    ) {
         let rays = &mut work.rays;
         work.traced += rays.targets.len() as u64;
         rays.blocked.clear();

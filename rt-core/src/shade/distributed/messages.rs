@@ -23,8 +23,8 @@ impl ShadingHit {
     /// Words of [`ShadingHit::to_words`].
     pub const WORDS: usize = 20;
 
-    /// For a light ray: something opaque of this scene is in its way, so that nothing else matters. It comes before every hit. `instance`
-    /// is one through which no light passes.
+    /// For a light ray: something opaque of this scene is in its way, so that nothing else matters.
+    /// It comes before every hit. `instance` is one through which no light passes.
     pub fn blocked(instance: u32) -> ShadingHit {
         let surface = SurfacePoint {
             point: Vec3::ZERO,
@@ -44,7 +44,8 @@ impl ShadingHit {
         self.t == f32::NEG_INFINITY
     }
 
-    /// Whether this hit comes before another one of the same ray: nearer, or as near and of a lower instance and primitive.
+    /// Whether this hit comes before another one of the same ray: nearer, or as near and of a lower
+    /// instance and primitive.
     pub fn is_before(&self, other: &ShadingHit) -> bool {
         let key = |m: &ShadingHit| (m.instance, m.primitive);
         self.t < other.t || (self.t == other.t && key(self) < key(other))
@@ -69,7 +70,8 @@ impl ShadingHit {
         out
     }
 
-    /// What [`ShadingHit::to_words`] was made of. [`super::TileState::process_hits`] refuses what no scene can have answered.
+    /// What [`ShadingHit::to_words`] was made of. [`super::TileState::process_hits`] refuses what
+    /// no scene can have answered.
     pub fn from_words(words: &[u32; ShadingHit::WORDS]) -> ShadingHit {
         let f = |i: usize| f32::from_bits(words[i]);
         ShadingHit {
@@ -121,9 +123,11 @@ impl LightPoint {
         self.point
     }
 
-    /// For sending: nine words for a point of a flat surface that the camera sees, at most thirteen.
+    /// For sending: nine words for a point of a flat surface that the camera sees, at most
+    /// thirteen.
     pub fn write(&self, out: &mut Vec<u32>) {
-        let flat = self.normal.to_array().map(f32::to_bits) == self.face_normal.to_array().map(f32::to_bits);
+        let flat = self.normal.to_array().map(f32::to_bits)
+            == self.face_normal.to_array().map(f32::to_bits);
         let flag = |on: bool, bit: u32| if on { bit } else { 0 };
         let flags = flag(self.lamps, LAMPS)
             | flag(self.sky, SKY)
@@ -141,7 +145,8 @@ impl LightPoint {
         }
     }
 
-    /// What [`LightPoint::write`] wrote, and the rest; `None` when there is less, or something else.
+    /// What [`LightPoint::write`] wrote, and the rest; `None` when there is less, or something
+    /// else.
     pub fn read(words: &[u32]) -> Option<(LightPoint, &[u32])> {
         let (&[flags, pixel, error], mut rest) = words.split_first_chunk::<3>()?;
         let vector = |rest: &mut &[u32]| {
@@ -165,7 +170,10 @@ impl LightPoint {
         let (lamps, sky) = (flags & LAMPS != 0, flags & SKY != 0);
         let pixel = [pixel & 0xffff, pixel >> 16];
         let point_error = f32::from_bits(error);
-        Some((LightPoint { pixel, lamps, sky, stream, point, point_error, face_normal, normal }, rest))
+        Some((
+            LightPoint { pixel, lamps, sky, stream, point, point_error, face_normal, normal },
+            rest,
+        ))
     }
 }
 

@@ -1,18 +1,22 @@
 //! Frames whose rays are answered by whoever calls.
 //!
-//! [`crate::render::render`] asks one world for every hit. Here the caller stands in between, so that a scene may be larger than what one
-//! process holds: those who hold parts of it (see [`crate::bvh::World::build_part`]) say what rays meet, and those who own a part of the picture
-//! do everything else. Rays go in waves: all that a tile can send before it needs an answer. The same functions do the same arithmetic in the
-//! same order as in a frame of one piece, so the picture has the same bits.
+//! [`crate::render::render`] asks one world for every hit. Here the caller stands in between, so
+//! that a scene may be larger than what one process holds: those who hold parts of it (see
+//! [`crate::bvh::World::build_part`]) say what rays meet, and those who own a part of the picture
+//! do everything else. Rays go in waves: all that a tile can send before it needs an answer. The
+//! same functions do the same arithmetic in the same order as in a frame of one piece, so the
+//! picture has the same bits.
 //!
 //! Of a tile, its owner asks in turn:
-//! 1. [`TileState::begin`], then for [`TileState::rays`] what each meets first; the answers go to [`TileState::process_hits`].
-//! 2. If there is light to be asked for: either [`TileState::light_points`], answered with one bit per ray
-//!    ([`TileState::apply_occlusion`]), or, where light passes through surfaces, [`TileState::light_rays`] layer by layer
-//!    ([`TileState::process_light_hits`]).
+//! 1. [`TileState::begin`], then for [`TileState::rays`] what each meets first; the answers go to
+//!    [`TileState::process_hits`].
+//! 2. If there is light to be asked for: either [`TileState::light_points`], answered with one bit
+//!    per ray ([`TileState::apply_occlusion`]), or, where light passes through surfaces,
+//!    [`TileState::light_rays`] layer by layer ([`TileState::process_light_hits`]).
 //! 3. [`TileState::advance`] shades and says whether there is another wave.
 //!
-//! Holders answer with [`DistributedFrame::camera_hits`], [`DistributedFrame::closest`], [`DistributedFrame::occlusion_bits`] and [`DistributedFrame::light_hits`].
+//! Holders answer with [`DistributedFrame::camera_hits`], [`DistributedFrame::closest`],
+//! [`DistributedFrame::occlusion_bits`] and [`DistributedFrame::light_hits`].
 
 mod data_server;
 mod messages;
@@ -55,10 +59,12 @@ pub struct DistributedFrame<'a> {
 }
 
 impl<'a> DistributedFrame<'a> {
-    /// Checks everything. `needed` are the effects that the whole scene needs ([`Effects::required_by`]): a part may seem to need less.
+    /// Checks everything. `needed` are the effects that the whole scene needs
+    /// ([`Effects::required_by`]): a part may seem to need less.
     ///
     /// # Errors
-    /// As [`crate::render::render`]; and [`RenderError::Unsupported`] for options that stop a frame early, which nobody alone can decide here.
+    /// As [`crate::render::render`]; and [`RenderError::Unsupported`] for options that stop a frame
+    /// early, which nobody alone can decide here.
     pub fn new(
         scene: &'a Scene,
         needed: Effects,
@@ -70,12 +76,16 @@ impl<'a> DistributedFrame<'a> {
             && !plan.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
         {
             plan.warnings.push(
-                "maps of roughness, metalness, emission and occlusion are left out where several render a frame with shadows or reflections: only bent \
+                "maps of roughness, metalness, emission and occlusion are left out where several \
+                 render a frame with shadows or reflections: only bent \
                  normals travel"
                     .into(),
             );
         }
-        if options.time_limit.is_some() || options.max_error_levels.is_some() || options.cancel.is_some() {
+        if options.time_limit.is_some()
+            || options.max_error_levels.is_some()
+            || options.cancel.is_some()
+        {
             return Err(RenderError::Unsupported {
                 what: "stopping early (time_limit, max_error_levels, cancel)",
                 with: "in a frame that several render together",
@@ -114,12 +124,14 @@ impl<'a> DistributedFrame<'a> {
         &self.warnings
     }
 
-    /// Of each volume of the frame whether it is a medium. Those may be held in bricks; projections see whole volumes.
+    /// Of each volume of the frame whether it is a medium. Those may be held in bricks; projections
+    /// see whole volumes.
     pub fn media(&self) -> Vec<bool> {
         self.context.volumes.iter().map(|(volume, _)| volume.is_medium()).collect()
     }
 
-    /// The way of a ray, in render space, through the volumes up to `t_end`. `held` may give a part in place of what the scene has as a volume.
+    /// The way of a ray, in render space, through the volumes up to `t_end`. `held` may give a part
+    /// in place of what the scene has as a volume.
     pub fn ray_segments<'v>(
         &'v self,
         ray: &Ray,
@@ -129,11 +141,21 @@ impl<'a> DistributedFrame<'a> {
         let place = |(i, (volume, object_from_render)): (usize, &(&'v Volume, DAffine3))| {
             (held(i).unwrap_or(volume), volumes::in_object_space(ray, object_from_render))
         };
-        RaySegments::new(self.context.volumes.iter().enumerate().map(place).collect(), ray.t_min, t_end)
+        RaySegments::new(
+            self.context.volumes.iter().enumerate().map(place).collect(),
+            ray.t_min,
+            t_end,
+        )
     }
 
-    /// What a ray shows that collects `mixed` in the media: the same where the scene has no projections, which must be here whole.
-    pub fn composite_projections(&self, ray: &Ray, t_end: f32, mixed: VolumeSample) -> VolumeSample {
+    /// What a ray shows that collects `mixed` in the media: the same where the scene has no
+    /// projections, which must be here whole.
+    pub fn composite_projections(
+        &self,
+        ray: &Ray,
+        t_end: f32,
+        mixed: VolumeSample,
+    ) -> VolumeSample {
         if self.context.volumes.iter().all(|(volume, _)| volume.is_medium()) {
             return mixed;
         }
@@ -176,17 +198,21 @@ impl<'a> DistributedFrame<'a> {
         geometry.then_some(Pass::Geometry).into_iter().chain((0..colors).map(Pass::Color)).collect()
     }
 
-    /// True when colours need nothing but camera rays: holders then know the colours of their own hits
-    /// ([`CameraHits::colors`]), and owners only choose among them ([`TileState::select_colors`]).
+    /// True when colours need nothing but camera rays: holders then know the colours of their own
+    /// hits ([`CameraHits::colors`]), and owners only choose among them
+    /// ([`TileState::select_colors`]).
     pub fn needs_only_local_light(&self) -> bool {
         local::is_sufficient(&self.context)
     }
 
-    /// True when [`Pass::Color`] also fills the geometry layers, from what [`TileState::record_geometry`] is given or `process_hits` meets.
+    /// True when [`Pass::Color`] also fills the geometry layers, from what
+    /// [`TileState::record_geometry`] is given or `process_hits` meets.
     pub fn records_geometry(&self, pass: Pass) -> bool {
         match pass {
             Pass::Geometry => true,
-            Pass::Color(sample) => sample == 0 && self.wants_geometry() && self.recorded_with_color(),
+            Pass::Color(sample) => {
+                sample == 0 && self.wants_geometry() && self.recorded_with_color()
+            }
         }
     }
 
@@ -195,14 +221,17 @@ impl<'a> DistributedFrame<'a> {
         self.context.light_passes_surfaces()
     }
 
-    /// Rays that a point may send towards light: bits that [`DistributedFrame::occlusion_bits`] gives for each point.
+    /// Rays that a point may send towards light: bits that [`DistributedFrame::occlusion_bits`]
+    /// gives for each point.
     pub fn light_rays_per_point(&self) -> u32 {
         self.context.sky_number + self.sky_rays()
     }
 
-    /// How far ambient occlusion looks, when it is the only reason for rays that leave a camera ray's hit.
+    /// How far ambient occlusion looks, when it is the only reason for rays that leave a camera
+    /// ray's hit.
     pub fn ambient_occlusion_only_distance(&self) -> Option<f64> {
-        let alone = self.context.effects.without(Effects::DEPTH_OF_FIELD) == Effects::AMBIENT_OCCLUSION;
+        let alone =
+            self.context.effects.without(Effects::DEPTH_OF_FIELD) == Effects::AMBIENT_OCCLUSION;
         self.context.scene.ambient_occlusion.filter(|_| alone).map(|ao| ao.distance)
     }
 
@@ -254,7 +283,8 @@ impl<'a> DistributedFrame<'a> {
             let (x, y, w) = (row(0), row(1), row(3));
             // A corner beside or behind the eye has no place in the picture.
             let reach = (world - self.eye()).length();
-            let in_front = w.is_finite() && (w > 1e-6 * reach || self.context.camera.eye().is_none());
+            let in_front =
+                w.is_finite() && (w > 1e-6 * reach || self.context.camera.eye().is_none());
             if !in_front {
                 return everywhere;
             }
@@ -265,7 +295,8 @@ impl<'a> DistributedFrame<'a> {
             }
         }
         // Rays are anywhere in their pixels, and f32.
-        let margin = 1.0 + 1e-4 * f64::from(self.context.options.width.max(self.context.options.height));
+        let margin =
+            1.0 + 1e-4 * f64::from(self.context.options.width.max(self.context.options.height));
         let meets = |t: &TileArea| {
             let (x, y) = (f64::from(t.x), f64::from(t.y));
             let right = x + f64::from(t.width) + margin;
@@ -279,8 +310,7 @@ impl<'a> DistributedFrame<'a> {
         self.context.camera.eye().unwrap_or(self.context.origin)
     }
 
-    // ---- The finished picture -----------------------------------------------------------------------------------
-
+    // ---- The finished picture -------------------------------------------------------------------
     /// A picture without any tile.
     pub fn blank_frame(&self) -> Frame {
         let area = self.context.options.area();
@@ -312,7 +342,8 @@ impl<'a> DistributedFrame<'a> {
         sizes.iter().filter(|(l, _)| self.context.options.layers.contains(*l)).map(|(_, n)| n).sum()
     }
 
-    /// Puts what [`TileState::encode`] gave for tile `tile` into the picture. False when it is no tile of this frame or of another length.
+    /// Puts what [`TileState::encode`] gave for tile `tile` into the picture. False when it is no
+    /// tile of this frame or of another length.
     #[must_use]
     pub fn decode_tile(&self, frame: &mut Frame, tile: usize, words: &[u32]) -> bool {
         let Some(t) = self.tiles.get(tile) else { return false };
@@ -324,7 +355,8 @@ impl<'a> DistributedFrame<'a> {
         let mut next = || words.next().unwrap_or_default();
         for y in 0..t.height {
             for x in 0..t.width {
-                let i = (t.y - area.y + y) as usize * area.width as usize + (t.x - area.x + x) as usize;
+                let i =
+                    (t.y - area.y + y) as usize * area.width as usize + (t.x - area.x + x) as usize;
                 if let Some(c) = frame.color.get_mut(i) {
                     *c = std::array::from_fn(|_| f32::from_bits(next()));
                 }

@@ -4,7 +4,8 @@ use super::super::shadow::LightRayState;
 use super::super::tile::{PIXELS, TileArea, TileLayers};
 use super::super::wavefront::{LightRayResult, OcclusionSource, RayKind, RecordedRay};
 use super::super::{
-    Workspace, accumulate_radiance, add_light, generate_camera_wavefront, local, process_hits, spawn_rays,
+    Workspace, accumulate_radiance, add_light, generate_camera_wavefront, local, process_hits,
+    spawn_rays,
 };
 use super::{DistributedFrame, LightPoint, Pass, ShadingHit};
 use crate::effects::Effects;
@@ -112,13 +113,14 @@ impl TileState {
         work.scattered.clear();
     }
 
-    /// Number of answers that [`TileState::process_hits`] wants: one per ray of the wave, waiting or not.
+    /// Number of answers that [`TileState::process_hits`] wants: one per ray of the wave, waiting
+    /// or not.
     pub fn num_rays(&self) -> usize {
         self.work.current.states.len()
     }
 
-    /// Rays that wait for an answer, with their place in it and the slot of their pixel. The first wave of a pass has the rays of
-    /// [`DistributedFrame::camera_hits`], ray k in slot k.
+    /// Rays that wait for an answer, with their place in it and the slot of their pixel. The first
+    /// wave of a pass has the rays of [`DistributedFrame::camera_hits`], ray k in slot k.
     pub fn rays(&self) -> impl Iterator<Item = (usize, u16, Ray)> + '_ {
         let wave = &self.work.current;
         wave.states.iter().enumerate().filter_map(|(i, state)| {
@@ -127,8 +129,8 @@ impl TileState {
         })
     }
 
-    /// In frames where [`DistributedFrame::needs_only_local_light`]: the colours of the nearest hits, slot by slot; `None` for the background. Ends
-    /// the pass.
+    /// In frames where [`DistributedFrame::needs_only_local_light`]: the colours of the nearest
+    /// hits, slot by slot; `None` for the background. Ends the pass.
     ///
     /// # Errors
     /// When there are not as many colours as slots.
@@ -143,7 +145,15 @@ impl TileState {
         work.hits.resize(PIXELS / LANES, HitBlock::MISS);
         let mut pixels = std::mem::take(&mut work.pixels);
         let mut no_stats = RayStats::default();
-        local::light(&frame.context, &self.area, &mut self.layers, work, &mut pixels, false, &mut no_stats);
+        local::light(
+            &frame.context,
+            &self.area,
+            &mut self.layers,
+            work,
+            &mut pixels,
+            false,
+            &mut no_stats,
+        );
         for (pixel, color) in pixels.iter_mut().zip(colors) {
             *pixel = color.unwrap_or(*pixel);
         }
@@ -152,7 +162,8 @@ impl TileState {
         Ok(())
     }
 
-    /// Fills the geometry layers from what the pixels' camera rays met, slot by slot: for frames of [`TileState::select_colors`].
+    /// Fills the geometry layers from what the pixels' camera rays met, slot by slot: for frames of
+    /// [`TileState::select_colors`].
     pub fn record_geometry(&mut self, hits: &[Option<ShadingHit>]) {
         for (slot, hits) in hits.iter().enumerate().take(PIXELS) {
             if let Some(m) = hits {
@@ -166,10 +177,13 @@ impl TileState {
         }
     }
 
-    /// Where volumes are held in bricks: the rays that wait, which end where `hits` has something. What they collect on their way goes to [`TileState::set_volume_samples`].
+    /// Where volumes are held in bricks: the rays that wait, which end where `hits` has something.
+    /// What they collect on their way goes to [`TileState::set_volume_samples`].
     pub fn volume_rays(&self, hits: &[Option<ShadingHit>]) -> Vec<VolumeRay> {
-        let end = |i: usize, ray: &Ray| hits.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
-        let way = |(place, _, ray): (usize, u16, Ray)| VolumeRay { place, ray, t_end: end(place, &ray) };
+        let end =
+            |i: usize, ray: &Ray| hits.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
+        let way =
+            |(place, _, ray): (usize, u16, Ray)| VolumeRay { place, ray, t_end: end(place, &ray) };
         if self.pass == Pass::Geometry { Vec::new() } else { self.rays().map(way).collect() }
     }
 
@@ -177,7 +191,10 @@ impl TileState {
     ///
     /// # Errors
     /// When there are not as many answers as rays.
-    pub fn set_volume_samples(&mut self, collected: Vec<VolumeSample>) -> Result<(), ProtocolError> {
+    pub fn set_volume_samples(
+        &mut self,
+        collected: Vec<VolumeSample>,
+    ) -> Result<(), ProtocolError> {
         self.expect("number of crossings", collected.len(), self.num_rays())?;
         self.work.volume_samples = collected;
         Ok(())
@@ -222,7 +239,8 @@ impl TileState {
         Ok(())
     }
 
-    /// Geometry layers of first surfaces; in a pass of its own, rays go on behind surfaces that are too transparent.
+    /// Geometry layers of first surfaces; in a pass of its own, rays go on behind surfaces that are
+    /// too transparent.
     fn record_wave(&mut self, frame: &DistributedFrame<'_>, hits: &[Option<ShadingHit>]) {
         let transparent = frame.context.effects.contains(Effects::TRANSPARENCY);
         for (i, m) in hits.iter().enumerate() {
@@ -250,8 +268,7 @@ impl TileState {
         }
     }
 
-    // ---- Light --------------------------------------------------------------------------------------------------
-
+    // ---- Light ----------------------------------------------------------------------------------
     /// Runs the lights once to see which rays they would send.
     fn find_light_rays(&mut self, frame: &DistributedFrame<'_>) {
         let before: Vec<Vec3> = self.work.points.iter().map(|p| p.radiance).collect();
@@ -305,16 +322,20 @@ impl TileState {
 
     /// Of each of [`TileState::light_points`] the slot of its pixel.
     pub fn slots_of_points(&self) -> impl Iterator<Item = u16> + '_ {
-        let slot = |p: &LightPoint| TileArea::slot(p.pixel[0] - self.area.x, p.pixel[1] - self.area.y) as u16;
+        let slot = |p: &LightPoint| {
+            TileArea::slot(p.pixel[0] - self.area.x, p.pixel[1] - self.area.y) as u16
+        };
         self.points.iter().map(slot)
     }
 
-    /// Of each light ray that matters, its point among [`TileState::light_points`] and the ray: to find out whom to ask.
+    /// Of each light ray that matters, its point among [`TileState::light_points`] and the ray: to
+    /// find out whom to ask.
     pub fn light_rays_of_points(&self) -> impl Iterator<Item = (usize, Ray)> + '_ {
         self.waiting.iter().map(|r| (self.place[r.point as usize] as usize, r.ray))
     }
 
-    /// Takes the bits of [`DistributedFrame::occlusion_bits`] for all [`TileState::light_points`]; those of several holders are joined by *or*.
+    /// Takes the bits of [`DistributedFrame::occlusion_bits`] for all [`TileState::light_points`];
+    /// those of several holders are joined by *or*.
     ///
     /// # Errors
     /// When there is another number of words.
@@ -328,7 +349,11 @@ impl TileState {
         let passage = |r: &RecordedRay| {
             let first = self.place[r.point as usize] as usize * words;
             let hit = bits[first + r.number as usize / 64] >> (r.number % 64) & 1 != 0;
-            LightRayResult { transmittance: if hit { Vec3::ZERO } else { Vec3::ONE }, hit, continued: 0 }
+            LightRayResult {
+                transmittance: if hit { Vec3::ZERO } else { Vec3::ONE },
+                hit,
+                continued: 0,
+            }
         };
         let given: Vec<LightRayResult> = self.waiting.iter().map(passage).collect();
         self.add_light(frame, given);
@@ -340,8 +365,8 @@ impl TileState {
         self.waiting.iter().map(|r| r.ray).filter(|r| r.t_max >= r.t_min)
     }
 
-    /// Takes what [`DistributedFrame::light_hits`] says of each of [`TileState::light_rays`]: of several holders, the answer that
-    /// [`ShadingHit::is_before`] the others.
+    /// Takes what [`DistributedFrame::light_hits`] says of each of [`TileState::light_rays`]: of
+    /// several holders, the answer that [`ShadingHit::is_before`] the others.
     ///
     /// # Errors
     /// When the answers do not fit the rays.
@@ -359,8 +384,14 @@ impl TileState {
             let behind = match answers.next() {
                 Some(Some(m)) => {
                     let Some(resolved) = frame.context.instances.get(m.instance as usize) else {
-                        let (found, expected) = (m.instance as u64, frame.context.instances.len() as u64);
-                        return Err(ProtocolError { tile: self.tile, what: "an instance", found, expected });
+                        let (found, expected) =
+                            (m.instance as u64, frame.context.instances.len() as u64);
+                        return Err(ProtocolError {
+                            tile: self.tile,
+                            what: "an instance",
+                            found,
+                            expected,
+                        });
                     };
                     self.stats.light_closest += u64::from(!m.is_blocked());
                     self.stats.light_lookups += u64::from(!m.is_blocked());
@@ -430,10 +461,9 @@ impl TileState {
         }
     }
 
-    // ---- The result ---------------------------------------------------------------------------------------------
-
-    /// The finished tile, pixel by pixel and row by row: colour, depth, distance, normal, ids, cost, as far as wanted. See
-    /// [`DistributedFrame::decode_tile`].
+    // ---- The result -----------------------------------------------------------------------------
+    /// The finished tile, pixel by pixel and row by row: colour, depth, distance, normal, ids,
+    /// cost, as far as wanted. See [`DistributedFrame::decode_tile`].
     pub fn encode(&self, frame: &DistributedFrame<'_>) -> Vec<u32> {
         let options = frame.context.options;
         let has = |l| options.layers.contains(l);
@@ -470,8 +500,17 @@ impl TileState {
         ProtocolError { tile: self.tile, what, found, expected }
     }
 
-    fn expect(&self, what: &'static str, found: usize, expected: usize) -> Result<(), ProtocolError> {
-        if found == expected { Ok(()) } else { Err(self.wrong(what, found as u64, expected as u64)) }
+    fn expect(
+        &self,
+        what: &'static str,
+        found: usize,
+        expected: usize,
+    ) -> Result<(), ProtocolError> {
+        if found == expected {
+            Ok(())
+        } else {
+            Err(self.wrong(what, found as u64, expected as u64))
+        }
     }
 }
 

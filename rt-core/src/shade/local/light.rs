@@ -1,4 +1,5 @@
-//! Light on sixteen surfaces of one material: the lobes and lights of [`super::radiance`], lane by lane the same bits.
+//! Light on sixteen surfaces of one material: the lobes and lights of [`super::radiance`], lane by
+//! lane the same bits.
 
 use super::FrameContext;
 use crate::effects::Effects;
@@ -19,7 +20,8 @@ enum Lobe {
     Phong { diffuse: f32, specular: Vec3, shininess: f32, highlight: PhongForm },
 }
 
-/// Microfacets are left to the scalar code: their many special cases are worth it only where a scene is made of them.
+/// Microfacets are left to the scalar code: their many special cases are worth it only where a
+/// scene is made of them.
 pub(super) fn supports(model: &SurfaceModel) -> bool {
     !matches!(model, SurfaceModel::Metal { .. } | SurfaceModel::Pbr { .. })
 }
@@ -145,13 +147,16 @@ fn power_block<S: Simd>(simd: S, x: f32x16<S>, n: f32) -> f32x16<S> {
     result
 }
 
-/// Direction to a light without size and the share of it that arrives, as [`crate::shade::direct::incident_from`].
+/// Direction to a light without size and the share of it that arrives, as
+/// [`crate::shade::direct::incident_from`].
 #[inline(always)]
 fn incident<S: Simd>(simd: S, light: &ResolvedLight, points: &Rows3) -> (Vec3x16<S>, f32x16<S>) {
     let v = |x: f32| f32x16::splat(simd, x);
     let (one, zero) = (v(1.0), v(0.0));
     let from = match light.kind {
-        ResolvedLightKind::Directional { to_light } => return (Vec3x16::splat(simd, to_light), one),
+        ResolvedLightKind::Directional { to_light } => {
+            return (Vec3x16::splat(simd, to_light), one);
+        }
         ResolvedLightKind::Point { position }
         | ResolvedLightKind::Spot { position, .. }
         | ResolvedLightKind::Cone { position, .. }
@@ -243,7 +248,9 @@ pub(super) fn store_pixels<S: Simd>(simd: S, rows: &[Row; 4], out: &mut [[f32; 4
             let (ga_low, ga_high) = row(g).interleave(row(a));
             let (first, second) = rb_low.interleave(ga_low);
             let (third, fourth) = rb_high.interleave(ga_high);
-            for (quarter, out) in [first, second, third, fourth].into_iter().zip(out.chunks_exact_mut(4)) {
+            for (quarter, out) in
+                [first, second, third, fourth].into_iter().zip(out.chunks_exact_mut(4))
+            {
                 quarter.store_slice(out.as_flattened_mut());
             }
         },
@@ -259,7 +266,8 @@ pub(super) fn merge<S: Simd>(simd: S, lanes: u16, new: &Rows3, rows: &mut [Row; 
             use fearless_simd::SimdMask;
             let on = mask32x16::from_bitmask(simd, lanes as u64);
             for c in 0..3 {
-                let (n, o) = (f32x16::from_slice(simd, &new.0[c]), f32x16::from_slice(simd, &rows[c]));
+                let (n, o) =
+                    (f32x16::from_slice(simd, &new.0[c]), f32x16::from_slice(simd, &rows[c]));
                 on.select(n, o).store_slice(&mut rows[c]);
             }
             let a = f32x16::from_slice(simd, &rows[3]);

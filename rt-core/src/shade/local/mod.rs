@@ -1,7 +1,10 @@
-//! Frames that need nothing but camera rays: trace, look up, light, done. No waves, no ray states, no points kept.
+//! Frames that need nothing but camera rays: trace, look up, light, done. No waves, no ray states,
+//! no points kept.
 //!
-//! The same lights and lobes as the general loop, sixteen pixels at a time. Half of the time beyond tracing was waiting for vertices (measured on a million triangles, one after
-//! the other: 30 of 60 ns per pixel), so a tile first asks for its triangles, then for their vertices, and only then looks at them.
+//! The same lights and lobes as the general loop, sixteen pixels at a time. Half of the time beyond
+//! tracing was waiting for vertices (measured on a million triangles, one after the other: 30 of 60
+//! ns per pixel), so a tile first asks for its triangles, then for their vertices, and only then
+//! looks at them.
 
 mod light;
 
@@ -41,7 +44,12 @@ pub(super) fn render_tile(
     generate_camera_rays(context, area, &mut work.current.blocks, sample, stats, out.cost_mut());
     work.hits.resize(PIXELS / LANES, HitBlock::MISS);
     let world = &context.scene.world;
-    world.closest_stream(&work.current.blocks, &mut work.hits, Coherence::Coherent, InstanceFilter::All);
+    world.closest_stream(
+        &work.current.blocks,
+        &mut work.hits,
+        Coherence::Coherent,
+        InstanceFilter::All,
+    );
     let first = sample.is_none_or(|s| s == 0);
     let mut pixels = std::mem::take(if first { &mut out.color } else { &mut work.pixels });
     pixels.resize(PIXELS, [0.0; 4]);
@@ -100,7 +108,8 @@ fn light_hits<S: Simd, const POINT: bool>(
         let mut left = hit;
         while left != 0 {
             let instance = hits.instance[left.trailing_zeros() as usize];
-            let same = (0..LANES).fold(0u16, |m, l| m | ((hits.instance[l] == instance) as u16) << l);
+            let same =
+                (0..LANES).fold(0u16, |m, l| m | ((hits.instance[l] == instance) as u16) << l);
             let lanes = left & same;
             left &= !lanes;
             let resolved = &context.instances[instance as usize];
@@ -118,15 +127,29 @@ fn light_hits<S: Simd, const POINT: bool>(
                     shading_points.normal.set(lane, shading_point.normal);
                     radiance.set(
                         lane,
-                        self::radiance(context, material, parameters.as_ref(), &shading_point, ray.dir),
+                        self::radiance(
+                            context,
+                            material,
+                            parameters.as_ref(),
+                            &shading_point,
+                            ray.dir,
+                        ),
                     );
                 }
             } else if light::supports(&material.model) {
-                light::radiance_block(simd, context, material, &shading_points, rays, &mut radiance);
+                light::radiance_block(
+                    simd,
+                    context,
+                    material,
+                    &shading_points,
+                    rays,
+                    &mut radiance,
+                );
             } else {
                 for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
                     let (shading_point, dir) = (shading_points.get(lane), rays.get(lane).dir);
-                    radiance.set(lane, self::radiance(context, material, None, &shading_point, dir));
+                    radiance
+                        .set(lane, self::radiance(context, material, None, &shading_point, dir));
                 }
             }
             light::merge(simd, lanes, &radiance, &mut rows);
@@ -157,7 +180,8 @@ fn fill_background(
     }
 }
 
-/// Radiance of one surface towards the origin of a ray with direction `dir`: what [`light::radiance_block`] does for sixteen.
+/// Radiance of one surface towards the origin of a ray with direction `dir`: what
+/// [`light::radiance_block`] does for sixteen.
 fn radiance(
     context: &FrameContext<'_>,
     material: &Material,
@@ -175,11 +199,13 @@ fn radiance(
     let ShadingPoint { normal, color, .. } = *shading_point;
     for light in &context.lights {
         let incident = incident_from(light, shading_point.point, None);
-        let answer = response(model, normal, color, view, incident.dir, light.color, light.highlight);
+        let answer =
+            response(model, normal, color, view, incident.dir, light.color, light.highlight);
         radiance += answer * (arriving * incident.strength);
     }
     if let Some(mean) = &context.irradiance {
-        radiance += ambient_albedo(model, color, context.effects) * mean.for_normal(normal) * ambient;
+        radiance +=
+            ambient_albedo(model, color, context.effects) * mean.for_normal(normal) * ambient;
     }
     radiance
 }

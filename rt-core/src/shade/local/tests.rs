@@ -40,7 +40,8 @@ fn towards_light(mut m: Material) -> Material {
     m
 }
 
-/// Every path through look-up and lighting, in pieces small enough for blocks to see several of them.
+/// Every path through look-up and lighting, in pieces small enough for blocks to see several of
+/// them.
 fn mixed_scene() -> Scene {
     let mut r = SplitMix64::new(11);
     let mut b = SceneBuilder::new();
@@ -74,8 +75,10 @@ fn mixed_scene() -> Scene {
     // Triangles whose normals f32 cannot square, and a shape.
     let mut tiny = noise_soup(40, 99);
     tiny.positions.iter_mut().for_each(|p| *p *= 1e-12);
-    let (g, m) =
-        (b.geometry(crate::bvh::Geometry::Mesh(Arc::new(tiny))), b.material(Material::matte([1.0; 3])));
+    let (g, m) = (
+        b.geometry(crate::bvh::Geometry::Mesh(Arc::new(tiny))),
+        b.material(Material::matte([1.0; 3])),
+    );
     let large = DAffine3::from_scale(DVec3::splat(0.6e12));
     b.instance(g, large, Appearance::new(m));
     let balls = Spheres::new((0..20).map(|_| r.direction()).collect(), Radii::Common(0.1)).unwrap();
@@ -98,7 +101,8 @@ fn mixed_scene() -> Scene {
         let kind = LightKind::Cone { position, direction, inner_rad, outer_rad: 0.5 };
         b.light(Light { kind, shadows: false, ..Light::headlight() });
     }
-    b.environment = Some(Environment::Gradient { bottom: [0.1; 3], top: [0.2, 0.3, 0.5], up: Vec3::Y });
+    b.environment =
+        Some(Environment::Gradient { bottom: [0.1; 3], top: [0.2, 0.3, 0.5], up: Vec3::Y });
     b.background = Background::Gradient { bottom: [0.0; 3], top: [0.3; 3] };
     b.build().unwrap()
 }
@@ -132,7 +136,9 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
                         met[hit.instance as usize] += 1;
                         let resolved = context.instance_at(&hit);
                         let shading_point = resolved.shading_point::<true>(&ray, &hit);
-                        one.record(&context, &area, slot as u16, &ray, &hit, || shading_point.normal);
+                        one.record(&context, &area, slot as u16, &ray, &hit, || {
+                            shading_point.normal
+                        });
                         radiance(&context, resolved.material, None, &shading_point, ray.dir)
                             .extend(1.0)
                             .to_array()
@@ -150,7 +156,10 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
                 );
             }
             assert!(out.depth == one.depth && out.distance == one.distance, "depth at {level:?}");
-            assert!(out.instance == one.instance && out.primitive == one.primitive, "ids at {level:?}");
+            assert!(
+                out.instance == one.instance && out.primitive == one.primitive,
+                "ids at {level:?}"
+            );
             assert!(out.normal == one.normal, "normals at {level:?}");
         }
     }

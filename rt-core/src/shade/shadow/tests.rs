@@ -1,4 +1,5 @@
-//! Light through layers: which rays need to know what comes next, and that the picture is that of rays which all do.
+//! Light through layers: which rays need to know what comes next, and that the picture is that of
+//! rays which all do.
 
 use crate::bvh::{BuildOptions, Geometry};
 use crate::camera::Camera;
@@ -35,12 +36,16 @@ fn builder(simd: Option<SimdLevel>, balls: usize) -> SceneBuilder {
     let mut b = SceneBuilder::new();
     b.build_options = BuildOptions { simd, ..BuildOptions::default() };
     b.mesh(square(0.0, 3.0), Material::matte([0.8; 3]));
-    let (g, m) = (b.geometry(Geometry::Mesh(Arc::new(sphere(2)))), b.material(Material::matte([0.6; 3])));
+    let (g, m) =
+        (b.geometry(Geometry::Mesh(Arc::new(sphere(2)))), b.material(Material::matte([0.6; 3])));
     for k in 0..balls {
         let (a, r) = (k as f64 * 0.9, 0.6 + 1.5 * k as f64 / balls as f64);
         let place = DVec3::new(r * a.cos(), r * a.sin(), 0.5 + 0.1 * (k % 3) as f64);
-        let small =
-            DAffine3::from_scale_rotation_translation(DVec3::splat(0.3), glam::DQuat::IDENTITY, place);
+        let small = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(0.3),
+            glam::DQuat::IDENTITY,
+            place,
+        );
         b.instance(g, small, Appearance::new(m));
     }
     b.light(Light::point(DVec3::new(1.0, 1.0, 4.0)));
@@ -50,7 +55,8 @@ fn builder(simd: Option<SimdLevel>, balls: usize) -> SceneBuilder {
     b
 }
 
-/// A pane, a ball of glass, a shape with alpha, a mesh with alpha at some corners, a side that is not drawn.
+/// A pane, a ball of glass, a shape with alpha, a mesh with alpha at some corners, a side that is
+/// not drawn.
 fn see_through_things(b: &mut SceneBuilder) {
     b.mesh(square(1.6, 0.9), Material::matte([0.9, 0.5, 0.4]).with_opacity(0.4));
     b.mesh(square(1.2, 0.7), Material::matte([1.0; 3]).with_sides(Sides::BackOnly));
@@ -67,12 +73,14 @@ fn see_through_things(b: &mut SceneBuilder) {
     let colors = vec![[0.2, 0.9, 0.3, 0.5], [0.9, 0.9, 0.2, 1.0]];
     b.shape(Arc::new(spheres.with_colors(colors).unwrap()), Material::matte([1.0; 3]));
     let mut leaf = square(2.0, 0.5);
-    leaf.colors = Some(Attribute::per_vertex((0..4).map(|k| [0.7, 0.7, 0.7, k as f32 / 3.0]).collect()));
+    leaf.colors =
+        Some(Attribute::per_vertex((0..4).map(|k| [0.7, 0.7, 0.7, k as f32 / 3.0]).collect()));
     b.mesh(leaf, Material::matte([1.0; 3]));
 }
 
-/// Colours, as bits, and counters of a picture of four tiles. `marked`: every instance counts as one that may let light through, so that every
-/// ray to light is asked for its closest hit, layer by layer.
+/// Colours, as bits, and counters of a picture of four tiles. `marked`: every instance counts as
+/// one that may let light through, so that every ray to light is asked for its closest hit, layer
+/// by layer.
 fn draw(scene: &Scene, options: &RenderOptions, marked: bool) -> (Vec<[u32; 4]>, RayStats) {
     let mut effects = Effects::required_by(scene);
     if options.path_tracing {
@@ -106,14 +114,20 @@ fn light_through_layers_has_the_bits_of_closest_hits_alone() {
         see_through_things(&mut b);
         let scene = b.build().unwrap();
         for path_tracing in [false, true] {
-            let options =
-                RenderOptions { path_tracing, samples: 2, ..RenderOptions::new(2 * TILE, 2 * TILE) };
+            let options = RenderOptions {
+                path_tracing,
+                samples: 2,
+                ..RenderOptions::new(2 * TILE, 2 * TILE)
+            };
             let (picture, counted) = draw(&scene, &options, false);
             let (expected, all) = draw(&scene, &options, true);
             let differ = picture.iter().zip(&expected).filter(|(a, b)| a != b).count();
             assert_eq!(differ, 0, "{balls} balls at {level:?}, path tracing {path_tracing}");
             assert_eq!(counted.shadow_blocked, all.shadow_blocked, "{level:?}");
-            assert_eq!(counted.ambient_occlusion_blocked, all.ambient_occlusion_blocked, "{level:?}");
+            assert_eq!(
+                counted.ambient_occlusion_blocked, all.ambient_occlusion_blocked,
+                "{level:?}"
+            );
             assert_eq!(counted.primary, all.primary);
             assert!(all.shadow_blocked > 500 && counted.light_lookups > 100, "{counted:?}");
             assert!(counted.light_closest < all.light_closest, "{counted:?} of {all:?}");
@@ -148,7 +162,8 @@ fn one_transparent_instance_does_not_make_every_light_ray_look_for_its_closest_h
 
 #[test]
 fn an_opaque_surface_blocks_light_where_a_transparent_one_coincides() {
-    // A decal with the lower number on an opaque plate: which of the two is met first must not let light through the plate.
+    // A decal with the lower number on an opaque plate: which of the two is met first must not let
+    // light through the plate.
     for decal_first in [true, false] {
         let mut b = SceneBuilder::new();
         b.mesh(square(0.0, 3.0), Material::matte([1.0; 3]));

@@ -2,7 +2,8 @@ use super::*;
 use serde_json::json;
 
 fn session(rest: &str) -> Session {
-    let scene = Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{rest}")).unwrap();
+    let scene =
+        Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{rest}")).unwrap();
     let array = |name: &str| ArrayInfo { name: name.into(), range: [0.0, 1.0] };
     Session::new(scene, vec![array("r"), array("T")], Vec::new()).unwrap()
 }
@@ -15,7 +16,9 @@ fn scene(s: &Session) -> Scene {
 fn a_change_merges_and_null_is_the_custom() {
     let s = session("");
     assert_eq!(
-        s.edit(&json!({"film": {"exposure": 2.0, "size": [64, 32]}, "view": {"direction": "30,15"}})),
+        s.edit(
+            &json!({"film": {"exposure": 2.0, "size": [64, 32]}, "view": {"direction": "30,15"}})
+        ),
         Ok(2)
     );
     assert_eq!((scene(&s).film.exposure, scene(&s).film.size), (Some(2.0), [64, 32]));
@@ -27,7 +30,8 @@ fn a_change_merges_and_null_is_the_custom() {
 #[test]
 fn what_is_chosen_by_kind_is_replaced_whole() {
     let s = session("");
-    let cutoff = json!({"technique": {"kind": "schlieren", "cutoff": {"kind": "circle", "radius_m": 1e-3}}});
+    let cutoff =
+        json!({"technique": {"kind": "schlieren", "cutoff": {"kind": "circle", "radius_m": 1e-3}}});
     s.edit(&cutoff).unwrap();
     let TechniqueSpec::Schlieren { cutoff } = scene(&s).technique else { panic!() };
     assert_eq!(cutoff, CutoffSpec::Circle { radius_m: 1e-3, center_m: [0.0; 2] });
@@ -35,7 +39,9 @@ fn what_is_chosen_by_kind_is_replaced_whole() {
 
 #[test]
 fn another_technique_leaves_nothing_behind_and_comes_back_as_it_was() {
-    let s = session("[light]\nsource = { kind = \"circle\", diameter_m = 2e-3 }\n[film]\nexposure = 0.7");
+    let s = session(
+        "[light]\nsource = { kind = \"circle\", diameter_m = 2e-3 }\n[film]\nexposure = 0.7",
+    );
     for name in TechniqueSpec::NAMES {
         s.edit(&json!({"technique": {"kind": name}})).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(scene(&s).technique.name(), name);
@@ -65,8 +71,14 @@ fn refusals_say_why_and_change_nothing() {
         (json!({"film": {"siez": 3}}), "siez"),
         (json!({"sampling": {"method": "photons", "samples": 1_000_000}}), "at most 4096"),
         (json!({"technique": {"kind": "magic"}}), "there are: shadowgraph"),
-        (json!({"flow": {"multifield": {"fields": {"u": {"knots": [[0, 0]]}}}}}), "there is no array `u`"),
-        (json!({"flow": {"multifield": {"fields": {"T": {"knots": [[1, 0], [0, 0]]}}}}}), "multifield `T`"),
+        (
+            json!({"flow": {"multifield": {"fields": {"u": {"knots": [[0, 0]]}}}}}),
+            "there is no array `u`",
+        ),
+        (
+            json!({"flow": {"multifield": {"fields": {"T": {"knots": [[1, 0], [0, 0]]}}}}}),
+            "multifield `T`",
+        ),
     ] {
         let RefusedChange(text) = s.edit(&patch).unwrap_err();
         assert!(text.contains(word), "{patch}: {text}");
@@ -78,7 +90,8 @@ fn refusals_say_why_and_change_nothing() {
 #[test]
 fn curves_replace_the_density_and_give_it_back() {
     let s = session("");
-    s.edit(&json!({"flow": {"multifield": {"fields": {"T": {"knots": [[0, 0], [1, -1e-4]]}}}}})).unwrap();
+    s.edit(&json!({"flow": {"multifield": {"fields": {"T": {"knots": [[0, 0], [1, -1e-4]]}}}}}))
+        .unwrap();
     assert!(scene(&s).flow.density.is_none() && scene(&s).flow.multifield.is_some());
     s.edit(&json!({"flow": {"multifield": null}})).unwrap();
     assert_eq!(scene(&s).flow.density.as_deref(), Some("r"));
@@ -89,10 +102,13 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
     let s = session("");
     let source = scene(&s).effective().light.source;
     let stroke = |points, rgb| Paint { on: Canvas::Filter, points, radius_m: 1e-4, rgb };
-    let painted = s.paint(&stroke(vec![[0.0, 0.0], [1e-4, 0.0], [1e-4, 0.0]], [1.0, 0.0, 0.0])).unwrap();
+    let painted =
+        s.paint(&stroke(vec![[0.0, 0.0], [1e-4, 0.0], [1e-4, 0.0]], [1.0, 0.0, 0.0])).unwrap();
     // The second point repeats itself.
     assert_eq!((painted.added, painted.generation), (2, 2));
-    let TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(p) } = scene(&s).technique else { panic!() };
+    let TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(p) } = scene(&s).technique else {
+        panic!()
+    };
     assert_eq!(p.strokes.len(), 3, "the knife is the first");
     assert_eq!(scene(&s).light.source, source);
     assert!(Scene::from_toml(&s.toml().unwrap()).is_ok());

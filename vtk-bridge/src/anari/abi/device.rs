@@ -15,8 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use answers::{
-    destroy, discard_frame, frame_ready, get_property, map_frame, new_extension_object, object_info,
-    object_subtypes, parameter_info, proc_address, render_frame, unmap_frame,
+    destroy, discard_frame, frame_ready, get_property, map_frame, new_extension_object,
+    object_info, object_subtypes, parameter_info, proc_address, render_frame, unmap_frame,
 };
 
 /// `anari::DeviceImpl`: table, then its two members, then ours.
@@ -45,7 +45,8 @@ impl DeviceObject {
         listener: Callback,
     ) -> *mut c_void {
         let device = Device::new(Box::new(listener), Arc::new(Callbacks(Arc::clone(&own))));
-        let staged = Mutex::new((default_callback.map_or(0, |f| f as usize), default_user as usize));
+        let staged =
+            Mutex::new((default_callback.map_or(0, |f| f as usize), default_user as usize));
         let this = Box::into_raw(Box::new(DeviceObject {
             table: TABLE.functions.as_ptr(),
             default_callback,
@@ -70,7 +71,9 @@ unsafe fn guard<T>(this: This, default: T, f: impl FnOnce(&DeviceObject) -> T) -
     match catch_unwind(AssertUnwindSafe(|| f(object))) {
         Ok(value) => value,
         Err(_) => {
-            object.device.report(Severity::Error, "internal error: the device panicked; please report it");
+            object
+                .device
+                .report(Severity::Error, "internal error: the device panicked; please report it");
             default
         }
     }
@@ -84,10 +87,10 @@ fn object(h: Handle) -> Object {
     h.0 as Object
 }
 
-// ---- Making objects -------------------------------------------------------------------------------------------------
-
+// ---- Making objects -----------------------------------------------------------------------------
 /// # Safety
-/// As ANARI asks of `anariNewArray`: `app` is null or `dims` elements that stay readable until the array is released.
+/// As ANARI asks of `anariNewArray`: `app` is null or `dims` elements that stay readable until the
+/// array is released.
 unsafe fn new_array(
     this: This,
     app: *const c_void,
@@ -99,10 +102,12 @@ unsafe fn new_array(
 ) -> Object {
     let make = |d: &DeviceObject| {
         let element = DataType(element);
-        let Some(bytes) = d.device.check_array(kind, element, dims) else { return std::ptr::null_mut() };
+        let Some(bytes) = d.device.check_array(kind, element, dims) else {
+            return std::ptr::null_mut();
+        };
         // SAFETY: the caller promised this memory; `bytes` is the size of `dims` elements.
-        let memory =
-            (!app.is_null()).then(|| unsafe { AppMemory::new(app, bytes, deleter.map(|f| (f, user))) });
+        let memory = (!app.is_null())
+            .then(|| unsafe { AppMemory::new(app, bytes, deleter.map(|f| (f, user))) });
         object(d.device.new_array(kind, element, dims, memory))
     };
     // SAFETY: called through the table of a device of ours.
@@ -185,8 +190,7 @@ plain_constructors! {
     new_frame: FRAME;
 }
 
-// ---- Parameters -----------------------------------------------------------------------------------------------------
-
+// ---- Parameters ---------------------------------------------------------------------------------
 /// The value at `mem`; `None` for types that have none.
 ///
 /// # Safety
@@ -206,7 +210,8 @@ unsafe fn raw(given: DataType, mem: *const c_void) -> Option<Raw> {
         return Some(Raw::Text(unsafe { text(mem.cast()) }));
     }
     let size = given.size()?;
-    // SAFETY: all other types are passed by the address of a value of that size; bytes have no alignment.
+    // SAFETY: all other types are passed by the address of a value of that size; bytes have no
+    // alignment.
     let bytes = unsafe { std::slice::from_raw_parts(mem.cast::<u8>(), size) }.to_vec();
     let word = || bytes.first_chunk::<8>().map_or(0, |b| u64::from_ne_bytes(*b));
     Some(match given.0 {
@@ -216,14 +221,23 @@ unsafe fn raw(given: DataType, mem: *const c_void) -> Option<Raw> {
     })
 }
 
-unsafe extern "C" fn set_parameter(this: This, o: Object, name: Name, given: u32, mem: *const c_void) {
+unsafe extern "C" fn set_parameter(
+    this: This,
+    o: Object,
+    name: Name,
+    given: u32,
+    mem: *const c_void,
+) {
     let set = |d: &DeviceObject| {
         // SAFETY: ANARI's contract for the arguments.
         let (name, value) = unsafe { (text(name), raw(DataType(given), mem)) };
         let Some(value) = value else {
             d.device.report(
                 Severity::Error,
-                &format!("parameter `{name}` of type {} has no value: it is not set", DataType(given)),
+                &format!(
+                    "parameter `{name}` of type {} has no value: it is not set",
+                    DataType(given)
+                ),
             );
             return;
         };
@@ -268,7 +282,8 @@ unsafe extern "C" fn unset_parameter(this: This, o: Object, name: Name) {
 unsafe extern "C" fn unset_all_parameters(this: This, o: Object) {
     let unset = |d: &DeviceObject| {
         if o == this.cast() {
-            *lock(&d.staged) = (d.default_callback.map_or(0, |f| f as usize), d.default_user as usize);
+            *lock(&d.staged) =
+                (d.default_callback.map_or(0, |f| f as usize), d.default_user as usize);
         } else {
             d.device.unset_parameter(handle(o), None);
         }
@@ -356,15 +371,15 @@ unsafe extern "C" fn commit(this: This, o: Object) {
         // SAFETY: zero is `None`; else the program gave it as a parameter of type STATUS_CALLBACK.
         let function = unsafe { std::mem::transmute::<usize, Option<StatusCallback>>(function) };
         // SAFETY: the program keeps it valid while the device has it as a parameter.
-        let callback = unsafe { Callback::new(function, user as *const c_void, Arc::clone(&d.own)) };
+        let callback =
+            unsafe { Callback::new(function, user as *const c_void, Arc::clone(&d.own)) };
         d.device.set_listener(Box::new(callback));
     };
     // SAFETY: called through the table of a device of ours.
     unsafe { guard(this, (), commit) }
 }
 
-// ---- Lifetime -------------------------------------------------------------------------------------------------------
-
+// ---- Lifetime -----------------------------------------------------------------------------------
 unsafe extern "C" fn release(this: This, o: Object) {
     if o != this.cast() {
         // SAFETY: called through the table of a device of ours.

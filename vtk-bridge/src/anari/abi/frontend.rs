@@ -1,7 +1,9 @@
 //! Which of the two forms of `anari::LibraryImpl` the loader in this process has.
 //!
-//! Between two releases of the SDK a virtual function was put into the middle of the class. Both forms are in use (pynari 1.2.6 brings the older), nothing that is
-//! passed tells them apart, and the loader that has the new function also exports `anariNewInitializedDevice`: that is looked for.
+//! Between two releases of the SDK a virtual function was put into the middle of the class. Both
+//! forms are in use (pynari 1.2.6 brings the older), nothing that is passed tells them apart, and
+//! the loader that has the new function also exports `anariNewInitializedDevice`: that is looked
+//! for.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 
@@ -14,7 +16,8 @@ struct Seen {
     initialized_devices: bool,
 }
 
-/// Whether the loader calls `newInitializedDevice`. A loader that cannot be found (it may be linked into the program) is taken for a current one.
+/// Whether the loader calls `newInitializedDevice`. A loader that cannot be found (it may be linked
+/// into the program) is taken for a current one.
 pub(super) fn has_initialized_devices() -> bool {
     // SAFETY: looks a name up in the modules that are visible to all.
     let global = unsafe { !libc::dlsym(libc::RTLD_DEFAULT, MARK.as_ptr()).is_null() };
@@ -27,7 +30,11 @@ pub(super) fn has_initialized_devices() -> bool {
     seen.initialized_devices || !seen.any
 }
 
-unsafe extern "C" fn look(module: *mut libc::dl_phdr_info, _size: usize, seen: *mut c_void) -> c_int {
+unsafe extern "C" fn look(
+    module: *mut libc::dl_phdr_info,
+    _size: usize,
+    seen: *mut c_void,
+) -> c_int {
     // SAFETY: the C library gives a valid module; `seen` is what `has_initialized_devices` passed.
     let (name, seen) = unsafe { ((*module).dlpi_name, &mut *seen.cast::<Seen>()) };
     // SAFETY: names of modules end with 0.
@@ -44,7 +51,8 @@ fn is_loader(name: &CStr) -> bool {
 }
 
 fn exports_mark(name: *const c_char) -> bool {
-    // SAFETY: NOLOAD only gives another reference to a module that is in the process; it is given back below.
+    // SAFETY: NOLOAD only gives another reference to a module that is in the process; it is given
+    // back below.
     unsafe {
         let module = libc::dlopen(name, libc::RTLD_LAZY | libc::RTLD_NOLOAD);
         if module.is_null() {

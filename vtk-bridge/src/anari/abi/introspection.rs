@@ -1,4 +1,5 @@
-//! Answers to `anariGetObjectSubtypes`, `anariGetObjectInfo` and `anariGetParameterInfo`, made once from the schema and never freed.
+//! Answers to `anariGetObjectSubtypes`, `anariGetObjectInfo` and `anariGetParameterInfo`, made once
+//! from the schema and never freed.
 
 use super::text::{StaticList, forever};
 use crate::anari::data_type::DataType;
@@ -45,7 +46,8 @@ pub(super) struct Introspection {
     extensions: StaticList,
 }
 
-// SAFETY: all pointers lead to memory of this value or to strings that are never freed, and nothing is changed after `get` made it.
+// SAFETY: all pointers lead to memory of this value or to strings that are never freed, and nothing
+// is changed after `get` made it.
 unsafe impl Send for Introspection {}
 // SAFETY: as above.
 unsafe impl Sync for Introspection {}
@@ -73,7 +75,9 @@ impl Introspection {
                 .collect();
             parameters.push(ParameterEntry { name: std::ptr::null(), data_type: 0 });
             let channels = (object.kind == DataType::FRAME).then(|| {
-                StaticList::new(object.parameters().map(|p| p.name).filter(|n| n.starts_with("channel.")))
+                StaticList::new(
+                    object.parameters().map(|p| p.name).filter(|n| n.starts_with("channel.")),
+                )
             });
             let info = ObjectInfo {
                 about: forever(object.about),
@@ -86,7 +90,10 @@ impl Introspection {
         }
         Introspection {
             objects,
-            subtypes: subtypes.into_iter().map(|(kind, names)| (kind, StaticList::new(names))).collect(),
+            subtypes: subtypes
+                .into_iter()
+                .map(|(kind, names)| (kind, StaticList::new(names)))
+                .collect(),
             extensions: StaticList::new(named.iter().map(String::as_str)),
         }
     }
@@ -137,7 +144,9 @@ impl Introspection {
         wanted: DataType,
     ) -> *const c_void {
         let none = std::ptr::null();
-        let Some(p) = self.object(kind, subtype).and_then(|o| o.by_name.get(parameter)) else { return none };
+        let Some(p) = self.object(kind, subtype).and_then(|o| o.by_name.get(parameter)) else {
+            return none;
+        };
         // Numbers are kept with as many components as any type needs; fewer are a part of them.
         let floats = |v: &Vec<f32>| {
             let bytes = wanted.size().unwrap_or(usize::MAX);
@@ -148,7 +157,8 @@ impl Introspection {
             }
         };
         let is_whole = matches!(wanted, DataType::INT32 | DataType::UINT32 | DataType::BOOL);
-        let whole = |v: Option<&u32>| v.filter(|_| is_whole).map_or(none, |v| std::ptr::from_ref(v).cast());
+        let whole =
+            |v: Option<&u32>| v.filter(|_| is_whole).map_or(none, |v| std::ptr::from_ref(v).cast());
         match name {
             "description" if wanted == DataType::STRING => p.about.cast(),
             "sourceExtension" if wanted == DataType::STRING => p.extension.cast(),

@@ -11,7 +11,8 @@ use crate::capi::guarded;
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
-/// `anari::LibraryImpl`: table, then the members that the loader reads (`libraryHandle()` is not virtual).
+/// `anari::LibraryImpl`: table, then the members that the loader reads (`libraryHandle()` is not
+/// virtual).
 #[repr(C)]
 struct LibraryObject {
     table: *const *const c_void,
@@ -81,13 +82,21 @@ static OLD_TABLE: OldTable = OldTable {
     unload_module,
 };
 
-/// The library object over ANARI's loader's arguments: the loaded module, and a status callback for devices without their own.
+/// The library object over ANARI's loader's arguments: the loaded module, and a status callback for
+/// devices without their own.
 ///
 /// # Safety
-/// `callback` is null or an `ANARIStatusCallback` that may be called with `user` as long as the library or one of its devices exists.
-pub unsafe fn new_library(module: *mut c_void, callback: *const c_void, user: *const c_void) -> *mut c_void {
-    // SAFETY: a null pointer is `None`; any other is a function of this type, as the caller promised.
-    let callback = unsafe { std::mem::transmute::<*const c_void, Option<StatusCallback>>(callback) };
+/// `callback` is null or an `ANARIStatusCallback` that may be called with `user` as long as the
+/// library or one of its devices exists.
+pub unsafe fn new_library(
+    module: *mut c_void,
+    callback: *const c_void,
+    user: *const c_void,
+) -> *mut c_void {
+    // SAFETY: a null pointer is `None`; any other is a function of this type, as the caller
+    // promised.
+    let callback =
+        unsafe { std::mem::transmute::<*const c_void, Option<StatusCallback>>(callback) };
     let table = if has_initialized_devices() {
         (&raw const TABLE.destroy).cast()
     } else {
@@ -125,7 +134,8 @@ unsafe extern "C" fn new_device(this: This, subtype: *const c_char) -> *mut c_vo
 }
 
 /// # Safety
-/// As ANARI asks of `anariNewDevice`: a library object of ours, and a string that ends with 0 or null.
+/// As ANARI asks of `anariNewDevice`: a library object of ours, and a string that ends with 0 or
+/// null.
 unsafe fn make_device(this: This, subtype: *const c_char) -> *mut c_void {
     // SAFETY: the loader calls with the object that it got from us, which nobody changes.
     let library = unsafe { &*this };
@@ -160,7 +170,10 @@ unsafe extern "C" fn new_initialized_device(
     unsafe { new_device(this, subtype) }
 }
 
-unsafe extern "C" fn device_extensions(_this: This, _subtype: *const c_char) -> *const *const c_char {
+unsafe extern "C" fn device_extensions(
+    _this: This,
+    _subtype: *const c_char,
+) -> *const *const c_char {
     guarded(std::ptr::null(), || Introspection::get().extensions())
 }
 

@@ -13,17 +13,20 @@ pub(crate) struct AppMemory {
     deleter: Option<(Deleter, *const c_void)>,
 }
 
-// SAFETY: the memory belongs to no thread; ANARI lets the device read it, and call the deleter, from any thread.
+// SAFETY: the memory belongs to no thread; ANARI lets the device read it, and call the deleter,
+// from any thread.
 unsafe impl Send for AppMemory {}
-// SAFETY: as above; the device only reads, and the program promises (ANARI 1.0, "Array objects") not to write while the array is not mapped.
+// SAFETY: as above; the device only reads, and the program promises (ANARI 1.0, "Array objects")
+// not to write while the array is not mapped.
 unsafe impl Sync for AppMemory {}
 
 impl AppMemory {
     /// `bytes` bytes from `start`.
     ///
     /// # Safety
-    /// They stay readable until this value is dropped, and are not written to but between the program's map and unmap of the array;
-    /// `deleter` may be called with its user pointer and `start` once.
+    /// They stay readable until this value is dropped, and are not written to but between the
+    /// program's map and unmap of the array; `deleter` may be called with its user pointer and
+    /// `start` once.
     pub(crate) unsafe fn new(
         start: *const c_void,
         bytes: usize,
@@ -34,9 +37,11 @@ impl AppMemory {
 
     pub(crate) fn copy(&self) -> Vec<u8> {
         let mut out = vec![0; self.bytes];
-        // SAFETY: `new` promised `bytes` readable bytes at `start`; `out` is as long, and new memory overlaps nothing. Bytes have no
-        // alignment.
-        unsafe { std::ptr::copy_nonoverlapping(self.start.cast::<u8>(), out.as_mut_ptr(), self.bytes) };
+        // SAFETY: `new` promised `bytes` readable bytes at `start`; `out` is as long, and new
+        // memory overlaps nothing. Bytes have no alignment.
+        unsafe {
+            std::ptr::copy_nonoverlapping(self.start.cast::<u8>(), out.as_mut_ptr(), self.bytes)
+        };
         out
     }
 
@@ -65,8 +70,8 @@ pub(crate) struct OwnMemory {
     bytes: usize,
 }
 
-// SAFETY: the program promises (ANARI 1.0, `anariMapArray`) not to write but between map and unmap, and the device reads only outside of
-// that (`Array::mapped` is checked by its callers).
+// SAFETY: the program promises (ANARI 1.0, `anariMapArray`) not to write but between map and unmap,
+// and the device reads only outside of that (`Array::mapped` is checked by its callers).
 unsafe impl Sync for OwnMemory {}
 
 impl OwnMemory {
@@ -79,18 +84,24 @@ impl OwnMemory {
     pub(crate) fn from_bytes(bytes: &[u8]) -> OwnMemory {
         let own = OwnMemory::zeroed(bytes.len());
         // SAFETY: `own` has room for `bytes.len()` bytes, was just made and is seen by nobody else.
-        unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), own.address().cast::<u8>(), bytes.len()) };
+        unsafe {
+            std::ptr::copy_nonoverlapping(bytes.as_ptr(), own.address().cast::<u8>(), bytes.len())
+        };
         own
     }
 
     pub(crate) fn copy(&self) -> Vec<u8> {
         let mut out = vec![0; self.bytes];
-        // SAFETY: the words hold at least `bytes` bytes, all of them initialised; the program does not write now (see `Sync`).
-        unsafe { std::ptr::copy_nonoverlapping(self.address().cast::<u8>(), out.as_mut_ptr(), self.bytes) };
+        // SAFETY: the words hold at least `bytes` bytes, all of them initialised; the program does
+        // not write now (see `Sync`).
+        unsafe {
+            std::ptr::copy_nonoverlapping(self.address().cast::<u8>(), out.as_mut_ptr(), self.bytes)
+        };
         out
     }
 
-    /// Where the program may write; stays the same for the life of this value. Not null, also without bytes.
+    /// Where the program may write; stays the same for the life of this value. Not null, also
+    /// without bytes.
     pub(crate) fn address(&self) -> *mut c_void {
         self.words.as_ptr().cast_mut().cast()
     }

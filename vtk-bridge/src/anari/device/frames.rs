@@ -1,4 +1,5 @@
-//! Drawing: from a frame's committed parameters to an order for the renderer, and its pixels to the program.
+//! Drawing: from a frame's committed parameters to an order for the renderer, and its pixels to the
+//! program.
 
 use super::Device;
 use crate::anari::data_type::DataType;
@@ -65,7 +66,13 @@ impl Device {
         self.report_diagnostics(diagnostics);
         let made = match camera_made {
             Ok(made) => made,
-            Err(e) => return self.about(&camera, Severity::Error, format!("the frame is not drawn: {e}")),
+            Err(e) => {
+                return self.about(
+                    &camera,
+                    Severity::Error,
+                    format!("the frame is not drawn: {e}"),
+                );
+            }
         };
 
         let channels: BTreeMap<&'static str, DataType> = schema::find(DataType::FRAME, "")
@@ -77,7 +84,9 @@ impl Device {
             .collect();
         let accumulate = frame.bool("accumulation", false).then(|| {
             let mut key: Vec<u64> = size.iter().map(|s| u64::from(*s)).collect();
-            [&world, &camera, &renderer].into_iter().for_each(|o| fingerprint(o, &|_| true, &mut key));
+            [&world, &camera, &renderer]
+                .into_iter()
+                .for_each(|o| fingerprint(o, &|_| true, &mut key));
             key
         });
         let sums = lock(&self.sums).entry(handle).or_default().clone();
@@ -105,12 +114,18 @@ impl Device {
         Box::new(move |said| {
             let about = |severity, text: String| {
                 let text = format!("{title}: {text}");
-                Message { source, source_type: DataType::FRAME, severity, code: Code::InvalidArgument, text }
+                Message {
+                    source,
+                    source_type: DataType::FRAME,
+                    severity,
+                    code: Code::InvalidArgument,
+                    text,
+                }
             };
             match said {
-                Ok(warnings) => {
-                    warnings.into_iter().for_each(|w| status.tell_once(&about(Severity::Warning, w)))
-                }
+                Ok(warnings) => warnings
+                    .into_iter()
+                    .for_each(|w| status.tell_once(&about(Severity::Warning, w))),
                 Err(why) => status.tell(&about(Severity::Error, format!("it is not drawn: {why}"))),
             }
         })
@@ -154,12 +169,20 @@ impl Device {
         }
     }
 
-    /// Pixels of a channel, with their type and the size of the picture; valid until the channel is unmapped.
-    pub fn map_frame(&self, handle: Handle, channel: &str) -> Option<(*const c_void, [u32; 2], DataType)> {
+    /// Pixels of a channel, with their type and the size of the picture; valid until the channel is
+    /// unmapped.
+    pub fn map_frame(
+        &self,
+        handle: Handle,
+        channel: &str,
+    ) -> Option<(*const c_void, [u32; 2], DataType)> {
         let frame = self.frame(handle, "anariMapFrame")?;
         // Older programs leave out the prefix.
-        let name =
-            if channel.starts_with("channel.") { channel.to_owned() } else { format!("channel.{channel}") };
+        let name = if channel.starts_with("channel.") {
+            channel.to_owned()
+        } else {
+            format!("channel.{channel}")
+        };
         let Some(picture) = frame::finish(&frame) else {
             self.about(
                 &frame,
@@ -170,7 +193,15 @@ impl Device {
         };
         let Some(pixels) = picture.channels.get(name.as_str()) else {
             let have: Vec<_> = picture.channels.keys().collect();
-            self.about(&frame, Severity::Error, format!("`{channel}` cannot be mapped: the frame has {have:?}; set the parameter to a type and draw again"));
+            self.about(
+                &frame,
+                Severity::Error,
+                format!(
+                    "`{channel}` cannot be mapped: the frame \
+                                                         has {have:?}; set the parameter to a type \
+                                                         and draw again"
+                ),
+            );
             return None;
         };
         let mapped = (pixels.pixels.address(), picture.size, pixels.data_type);
@@ -222,7 +253,8 @@ mod tests {
             d.set_parameter(o, name, t, v);
             d.commit(o);
         };
-        // A ball at the origin (arrays of the device's own memory are zeros), placed by an instance.
+        // A ball at the origin (arrays of the device's own memory are zeros), placed by an
+        // instance.
         let array = |t| d.new_array(DataType::ARRAY1D, t, [1, 1, 1], None);
         let ball = d.new_object(DataType::GEOMETRY, "sphere");
         put(ball, "vertex.position", DataType::ARRAY1D, Raw::Handle(array(DataType::FLOAT32_VEC3)));
@@ -243,8 +275,10 @@ mod tests {
         fill(group, "surface", DataType::SURFACE, surface);
         put(instance, "group", DataType::GROUP, Raw::Handle(group));
         fill(world, "instance", DataType::INSTANCE, instance);
-        let (camera, renderer) =
-            (d.new_object(DataType::CAMERA, "perspective"), d.new_object(DataType::RENDERER, "default"));
+        let (camera, renderer) = (
+            d.new_object(DataType::CAMERA, "perspective"),
+            d.new_object(DataType::RENDERER, "default"),
+        );
         for (name, t, o) in [
             ("camera", DataType::CAMERA, camera),
             ("renderer", DataType::RENDERER, renderer),

@@ -66,15 +66,23 @@ pub(super) fn over(
 }
 
 /// Colour pixels with `N` components of an already upright picture.
-pub(super) fn color<const N: usize>(pixels: impl Iterator<Item = [f32; 4]>, data_type: DataType) -> Channel {
+pub(super) fn color<const N: usize>(
+    pixels: impl Iterator<Item = [f32; 4]>,
+    data_type: DataType,
+) -> Channel {
     let linear = |p: [f32; 4]| <[f32; N]>::try_from(&p[..N]).unwrap_or([0.0; N]);
     let out = match data_type {
-        DataType::FLOAT32_VEC4 | DataType::FLOAT32_VEC3 => Pixels::Floats(pixels.flat_map(linear).collect()),
+        DataType::FLOAT32_VEC4 | DataType::FLOAT32_VEC3 => {
+            Pixels::Floats(pixels.flat_map(linear).collect())
+        }
         DataType::UFIXED8_RGBA_SRGB | DataType::UFIXED8_RGB_SRGB => {
             // Alpha stays linear.
-            let encode =
-                |(c, v): (usize, f32)| byte(if c == 3 { v } else { linear_to_srgb(v.clamp(0.0, 1.0)) });
-            Pixels::Bytes(pixels.flat_map(|p| linear(p).into_iter().enumerate().map(encode)).collect())
+            let encode = |(c, v): (usize, f32)| {
+                byte(if c == 3 { v } else { linear_to_srgb(v.clamp(0.0, 1.0)) })
+            };
+            Pixels::Bytes(
+                pixels.flat_map(|p| linear(p).into_iter().enumerate().map(encode)).collect(),
+            )
         }
         _ => Pixels::Bytes(pixels.flat_map(|p| linear(p).map(byte)).collect()),
     };
@@ -117,7 +125,9 @@ pub(super) fn numbers(frame: &Frame, ids: &[Ids], number: impl Fn(&Ids, u32) -> 
 pub(super) fn blank(data_type: DataType, pixels: usize) -> Channel {
     let n = data_type.components().max(1) * pixels;
     let pixels = match data_type {
-        DataType::FLOAT32 | DataType::FLOAT32_VEC3 | DataType::FLOAT32_VEC4 => Pixels::Floats(vec![0.0; n]),
+        DataType::FLOAT32 | DataType::FLOAT32_VEC3 | DataType::FLOAT32_VEC4 => {
+            Pixels::Floats(vec![0.0; n])
+        }
         DataType::FIXED16_VEC3 => Pixels::Shorts(vec![0; n]),
         DataType::UINT32 => Pixels::Words(vec![u32::MAX; n]),
         _ => Pixels::Bytes(vec![0; n]),

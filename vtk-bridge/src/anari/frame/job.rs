@@ -65,7 +65,8 @@ impl Job {
         self.cancel.store(true, Ordering::Relaxed);
     }
 
-    /// Waits for the picture. Called from the drawing itself, as a completion callback may do, it does not wait.
+    /// Waits for the picture. Called from the drawing itself, as a completion callback may do, it
+    /// does not wait.
     pub(crate) fn wait(&self) -> Arc<FrameImage> {
         let mut picture = lock(&self.picture);
         loop {
@@ -111,15 +112,18 @@ fn run(order: Order, job: &Job) {
     *lock(&job.thread) = Some(std::thread::current().id());
     let started = Instant::now();
     let size = [order.view.options.width, order.view.options.height];
-    // rt-core reports a panic in a tile as an error; this is for everything else, so that nobody waits for ever.
+    // rt-core reports a panic in a tile as an error; this is for everything else, so that nobody
+    // waits for ever.
     let drawn = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| draw(&order, job)));
-    let drawn =
-        drawn.unwrap_or_else(|_| Err("internal error: the drawing panicked; please report it".to_owned()));
+    let drawn = drawn.unwrap_or_else(|_| {
+        Err("internal error: the drawing panicked; please report it".to_owned())
+    });
     let (mut picture, told) = match drawn {
         Ok((picture, warnings)) => (picture, Ok(warnings)),
         Err(why) => {
             let pixels = size[0] as usize * size[1] as usize;
-            let channels = order.channels.iter().map(|(name, t)| (*name, blank(*t, pixels))).collect();
+            let channels =
+                order.channels.iter().map(|(name, t)| (*name, blank(*t, pixels))).collect();
             (FrameImage { channels, ..FrameImage::default() }, Err(why))
         }
     };
@@ -135,13 +139,16 @@ fn run(order: Order, job: &Job) {
     job.over_signal.notify_all();
 }
 
-/// The world with its acceleration structures: that of the last frame when nothing of it has changed.
+/// The world with its acceleration structures: that of the last frame when nothing of it has
+/// changed.
 fn build(compiled: &CompiledWorld) -> Result<Arc<World>, String> {
     let mut built = lock(&compiled.built);
     if let Some(old) = &*built {
         let same = |(a, b): (&Geometry, &Geometry)| match (a, b) {
             (Geometry::Mesh(a), Geometry::Mesh(b)) => Arc::ptr_eq(a, b),
-            (Geometry::Shape(a), Geometry::Shape(b)) => std::ptr::addr_eq(Arc::as_ptr(a), Arc::as_ptr(b)),
+            (Geometry::Shape(a), Geometry::Shape(b)) => {
+                std::ptr::addr_eq(Arc::as_ptr(a), Arc::as_ptr(b))
+            }
             _ => false,
         };
         let all = old.geometries().len() == compiled.geometries.len()
@@ -151,7 +158,8 @@ fn build(compiled: &CompiledWorld) -> Result<Arc<World>, String> {
         }
     }
     let (geometries, instances) = (compiled.geometries.clone(), compiled.instances.clone());
-    let world = World::build_sharing(geometries, instances, &BuildOptions::default(), built.as_deref());
+    let world =
+        World::build_sharing(geometries, instances, &BuildOptions::default(), built.as_deref());
     let world = Arc::new(world.map_err(|e| e.to_string())?);
     *built = Some(world.clone());
     Ok(world)
@@ -165,12 +173,20 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
     let mut scene = Scene::new(world);
     scene.appearances.clone_from(&compiled.appearances);
     scene.materials.clone_from(&compiled.materials);
-    scene.lights =
-        compiled.lights.iter().copied().map(|l| if view.shadows { l } else { l.without_shadows() }).collect();
+    scene.lights = compiled
+        .lights
+        .iter()
+        .copied()
+        .map(|l| if view.shadows { l } else { l.without_shadows() })
+        .collect();
     scene.environment.clone_from(&compiled.environment);
-    scene.background =
-        if compiled.environment.is_some() { Background::Environment } else { Background::Transparent };
-    // Ambient light comes from everywhere, so mirrors see it; next to a picture of the sky it only adds to what is diffuse.
+    scene.background = if compiled.environment.is_some() {
+        Background::Environment
+    } else {
+        Background::Transparent
+    };
+    // Ambient light comes from everywhere, so mirrors see it; next to a picture of the sky it only
+    // adds to what is diffuse.
     match view.ambient {
         Some(color) if compiled.environment.is_none() => {
             scene.environment = Some(Environment::Constant(color))
@@ -197,7 +213,9 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
     let mut warnings = Vec::new();
     if options.path_tracing && !scene.volumes.is_empty() {
         options.path_tracing = false;
-        warnings.push("the path tracer has no volumes: the renderer `default` draws this world".to_owned());
+        warnings.push(
+            "the path tracer has no volumes: the renderer `default` draws this world".to_owned(),
+        );
     }
     if let Some(key) = &order.accumulate {
         if sums.key != *key {

@@ -1,7 +1,8 @@
 //! Attributes: named values on geometries that materials and samplers ask for.
 //!
-//! An attribute comes from the instance, else from the geometry: per corner of a face, per vertex, per primitive or for the whole (ANARI 1.0, section
-//! "Geometry"). What nobody gives is (0, 0, 0, 1).
+//! An attribute comes from the instance, else from the geometry: per corner of a face, per vertex,
+//! per primitive or for the whole (ANARI 1.0, section "Geometry"). What nobody gives is (0, 0, 0,
+//! 1).
 
 use crate::anari::object::{Object, Value};
 use rt_core::glam::{DAffine3, DMat3, DVec3};
@@ -21,7 +22,8 @@ pub const NAMES: &[&str] = &[
 ];
 
 /// Names of the attributes that geometries and instances carry.
-pub(crate) const SLOTS: &[&str] = &["color", "attribute0", "attribute1", "attribute2", "attribute3"];
+pub(crate) const SLOTS: &[&str] =
+    &["color", "attribute0", "attribute1", "attribute2", "attribute3"];
 
 /// Where an attribute comes from.
 #[derive(Clone)]
@@ -43,13 +45,15 @@ pub(crate) enum Source {
 /// How primitives of the renderer belong to vertices and primitives of the ANARI geometry.
 #[derive(Default)]
 pub(crate) struct Topology {
-    /// Vertices of each primitive of the renderer: one, two or three in use. Empty when there are no vertices.
+    /// Vertices of each primitive of the renderer: one, two or three in use. Empty when there are
+    /// no vertices.
     pub(crate) vertices: Vec<[u32; 3]>,
     /// Elements of the arrays `faceVarying.*`.
     pub(crate) corners: Vec<[u32; 3]>,
     /// ANARI's number of each primitive.
     pub(crate) numbers: Numbers,
-    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t; else it has ANARI's vertices.
+    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t; else it has ANARI's
+    /// vertices.
     pub(crate) unshared: bool,
 }
 
@@ -96,7 +100,9 @@ impl Source {
             "worldPosition" | "objectPosition" => {
                 return Some(Source::Position { world: name.starts_with('w') });
             }
-            "worldNormal" | "objectNormal" => return Some(Source::Normal { world: name.starts_with('w') }),
+            "worldNormal" | "objectNormal" => {
+                return Some(Source::Normal { world: name.starts_with('w') });
+            }
             slot if SLOTS.contains(&slot) => {}
             _ => return None,
         }
@@ -108,7 +114,8 @@ impl Source {
             return Some(Source::Uniform(v));
         }
         let array = |prefix: &str| {
-            let values = geometry.object(&format!("{prefix}.{name}"))?.with_array(|a| a.attributes())?;
+            let values =
+                geometry.object(&format!("{prefix}.{name}"))?.with_array(|a| a.attributes())?;
             (!values.is_empty()).then(|| Arc::new(values))
         };
         Some(if let Some(v) = array("faceVarying") {
@@ -124,7 +131,8 @@ impl Source {
 
     /// The value at a place; elements past the end of an array are (0, 0, 0, 1).
     pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
-        let get = |v: &[[f32; 4]], i: u32| v.get(i as usize).copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let get =
+            |v: &[[f32; 4]], i: u32| v.get(i as usize).copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
         let mix = |v: &[[f32; 4]], ids: &[[u32; 3]]| {
             let Some(ids) = ids.get(p.primitive as usize) else { return [0.0, 0.0, 0.0, 1.0] };
             let mut sum = [0f32; 4];
@@ -141,7 +149,9 @@ impl Source {
             Source::Vertex(v) => mix(v, &p.topology.vertices),
             Source::FaceVarying(v) => mix(v, &p.topology.corners),
             Source::Position { world: false } => vector(p.point),
-            Source::Position { world: true } => vector(p.world_from_object.transform_point3(p.point)),
+            Source::Position { world: true } => {
+                vector(p.world_from_object.transform_point3(p.point))
+            }
             Source::Normal { world: false } => vector(p.normal),
             Source::Normal { world: true } => {
                 let m: DMat3 = p.world_from_object.matrix3.inverse().transpose();

@@ -5,7 +5,8 @@ use crate::anari::object::Object;
 use rt_core::camera::{Camera, CameraError, ThinLens};
 use rt_core::glam::{DMat4, DVec3, DVec4};
 
-/// The camera for a frame of `size` pixels of a scene within `bounds`; an error says what is wrong with its parameters.
+/// The camera for a frame of `size` pixels of a scene within `bounds`; an error says what is wrong
+/// with its parameters.
 pub(crate) fn camera_of(
     camera: &Object,
     size: [u32; 2],

@@ -1,4 +1,5 @@
-//! Geometries: from arrays to the renderer's meshes and shapes, with how their primitives belong to vertices.
+//! Geometries: from arrays to the renderer's meshes and shapes, with how their primitives belong to
+//! vertices.
 
 use super::Diagnostics;
 use super::attribute::{Numbers, Topology};
@@ -9,14 +10,17 @@ use rt_core::bvh::Geometry;
 use rt_core::glam::{DVec3, Vec3, Vec4};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::ray::Ray;
-use rt_core::shapes::{Cylinders, Isosurface, Radii, Shape, ShapeHit, ShapeSurface, Spheres, Tubes};
+use rt_core::shapes::{
+    Cylinders, Isosurface, Radii, Shape, ShapeHit, ShapeSurface, Spheres, Tubes,
+};
 use std::sync::{Arc, OnceLock};
 
 /// A geometry without its look.
 pub(crate) struct Part {
     pub(crate) body: Body,
     pub(crate) topology: Arc<Topology>,
-    /// A mesh as a shape, made when a paint needs it; always the same one, so that looks share its tree.
+    /// A mesh as a shape, made when a paint needs it; always the same one, so that looks share its
+    /// tree.
     triangles: OnceLock<Arc<dyn Shape>>,
 }
 
@@ -70,7 +74,10 @@ pub(crate) fn is_appearance_parameter(name: &str) -> bool {
 }
 
 /// Makes what the renderer needs. Faults become notes, and what is unusable is left out.
-pub(crate) fn compile_geometry(geometry: &Object, diagnostics: &mut Diagnostics) -> CompiledGeometry {
+pub(crate) fn compile_geometry(
+    geometry: &Object,
+    diagnostics: &mut Diagnostics,
+) -> CompiledGeometry {
     let part = match geometry.subtype.as_str() {
         "triangle" => polygons::<3>(geometry, diagnostics),
         "quad" => polygons::<4>(geometry, diagnostics),
@@ -99,14 +106,14 @@ fn shape_bounds(shape: &dyn Shape) -> Option<[DVec3; 2]> {
     Some([shape.origin() + all.min.as_dvec3(), shape.origin() + all.max.as_dvec3()])
 }
 
-// ---- Arrays ---------------------------------------------------------------------------------------------------------
-
+// ---- Arrays -------------------------------------------------------------------------------------
 fn positions(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Vec<Vec3>> {
     let found = geometry.object("vertex.position").and_then(|a| a.with_array(|a| a.vectors()));
     if found.is_none() {
         diagnostics.error(
             geometry,
-            "`vertex.position` is not set, so it has no shape; set it to an array of FLOAT32_VEC3 and commit",
+            "`vertex.position` is not set, so it has no shape; set it to an array of FLOAT32_VEC3 \
+             and commit",
         );
     }
     let points: Vec<Vec3> = found?.into_iter().map(Vec3::from).collect();
@@ -114,7 +121,10 @@ fn positions(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Vec<Vec
     if bad > 0 {
         diagnostics.warn(
             geometry,
-            format!("{bad} of {} vertices are NaN or infinite; what uses them is left out", points.len()),
+            format!(
+                "{bad} of {} vertices are NaN or infinite; what uses them is left out",
+                points.len()
+            ),
         );
     }
     Some(points)
@@ -126,7 +136,8 @@ fn elements<const N: usize>(
     vertices: usize,
     diagnostics: &mut Diagnostics,
 ) -> (Vec<[u32; N]>, Numbers) {
-    let listed = geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<N>()));
+    let listed =
+        geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<N>()));
     let all = listed.unwrap_or_else(|| {
         let one = |i: usize| std::array::from_fn(|k| (i * N + k) as u32);
         (0..vertices / N).map(one).collect()
@@ -137,7 +148,15 @@ fn elements<const N: usize>(
     }
     let total = all.len();
     let kept: Vec<(u32, [u32; N])> = (0..).zip(all).filter(|(_, e)| fits(e)).collect();
-    diagnostics.warn(geometry, format!("{} of {total} primitives name vertices past the last one ({vertices} vertices); they are left out", total - kept.len()));
+    diagnostics.warn(
+        geometry,
+        format!(
+            "{} of {total} primitives name vertices past the last one \
+                                        ({vertices} vertices); they are left \
+                                        out",
+            total - kept.len()
+        ),
+    );
     let (numbers, elements) = kept.into_iter().unzip();
     (elements, Numbers::Listed(numbers))
 }
@@ -145,12 +164,12 @@ fn elements<const N: usize>(
 /// Radii by `index`, from an array or the parameter `radius`.
 fn radii(geometry: &Object, array: &str, default: f32) -> impl Fn(u32) -> f32 + use<> {
     let listed = geometry.object(array).and_then(|a| a.with_array(|a| a.scalars()));
-    // A radius past the end of its array is none at all: the renderer counts and leaves out what has no radius.
+    // A radius past the end of its array is none at all: the renderer counts and leaves out what
+    // has no radius.
     move |i| listed.as_ref().map_or(default, |r| r.get(i as usize).copied().unwrap_or(0.0))
 }
 
-// ---- Triangles and quads --------------------------------------------------------------------------------------------
-
+// ---- Triangles and quads ------------------------------------------------------------------------
 fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
     let points = positions(geometry, diagnostics)?;
     let (faces, numbers) = elements::<N>(geometry, points.len(), diagnostics);
@@ -158,7 +177,8 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
         Numbers::Listed(l) => l[i],
         _ => i as u32,
     };
-    // A quad is the triangles (0, 1, 3) and (2, 3, 1), as Embree cuts it: the diagonal goes from corner 1 to corner 3.
+    // A quad is the triangles (0, 1, 3) and (2, 3, 1), as Embree cuts it: the diagonal goes from
+    // corner 1 to corner 3.
     let cuts: &[[usize; 3]] = if N == 3 { &[[0, 1, 2]] } else { &[[0, 1, 3], [2, 3, 1]] };
     let mut topology = Topology::default();
     let mut owners = Vec::new();
@@ -181,23 +201,28 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
     let normals = |name: &str| geometry.object(name).and_then(|a| a.with_array(|a| a.vectors()));
     let (of_corners, of_vertices) = (normals("faceVarying.normal"), normals("vertex.normal"));
     let expected = if topology.unshared { topology.vertices.len() * 3 } else { points.len() };
-    let pick = |list: &[[f32; 3]], id: u32| list.get(id as usize).map_or(Vec3::ZERO, |n| Vec3::from(*n));
+    let pick =
+        |list: &[[f32; 3]], id: u32| list.get(id as usize).map_or(Vec3::ZERO, |n| Vec3::from(*n));
     let values: Option<Vec<Vec3>> = match (&of_corners, &of_vertices) {
-        (Some(list), _) => Some(topology.corners.iter().flatten().map(|&c| pick(list, c)).collect()),
+        (Some(list), _) => {
+            Some(topology.corners.iter().flatten().map(|&c| pick(list, c)).collect())
+        }
         (None, Some(list)) if topology.unshared => {
             Some(topology.vertices.iter().flatten().map(|&v| pick(list, v)).collect())
         }
         (None, Some(list)) => Some((0..points.len() as u32).map(|v| pick(list, v)).collect()),
         (None, None) => None,
     };
-    for (name, list, needed) in
-        [("faceVarying.normal", &of_corners, faces.len() * N), ("vertex.normal", &of_vertices, points.len())]
-    {
+    for (name, list, needed) in [
+        ("faceVarying.normal", &of_corners, faces.len() * N),
+        ("vertex.normal", &of_vertices, points.len()),
+    ] {
         if let Some(list) = list.as_ref().filter(|l| l.len() < needed) {
             diagnostics.warn(
                 geometry,
                 format!(
-                    "`{name}` has {} elements, {needed} are needed; without the others faces are flat",
+                    "`{name}` has {} elements, {needed} are needed; without the others faces are \
+                     flat",
                     list.len()
                 ),
             );
@@ -206,7 +231,8 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
 
     let mut mesh = if topology.unshared {
         let corners = topology.vertices.iter().flatten().map(|&v| points[v as usize]).collect();
-        let indices = (0..topology.vertices.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let indices =
+            (0..topology.vertices.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         TriMesh::new(corners, indices)
     } else {
         TriMesh::new(points, topology.vertices.clone())
@@ -216,10 +242,12 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
     Some(Part::new(Body::Mesh(mesh.into()), topology))
 }
 
-/// Tangents of a mesh's vertices, per corner before per vertex; what is missing is 0, where normal maps then change nothing.
+/// Tangents of a mesh's vertices, per corner before per vertex; what is missing is 0, where normal
+/// maps then change nothing.
 fn tangents(geometry: &Object, topology: &Topology, vertices: usize) -> Option<Vec<Vec4>> {
     let list = |name: &str| geometry.object(name).and_then(|a| a.with_array(|a| a.attributes()));
-    let at = |list: &[[f32; 4]], i: u32| list.get(i as usize).map_or(Vec4::ZERO, |t| Vec4::from(*t));
+    let at =
+        |list: &[[f32; 4]], i: u32| list.get(i as usize).map_or(Vec4::ZERO, |t| Vec4::from(*t));
     if let Some(of_corners) = list("faceVarying.tangent") {
         return Some(topology.corners.iter().flatten().map(|&c| at(&of_corners, c)).collect());
     }
@@ -231,8 +259,7 @@ fn tangents(geometry: &Object, topology: &Topology, vertices: usize) -> Option<V
     })
 }
 
-// ---- Round things ---------------------------------------------------------------------------------------------------
-
+// ---- Round things -------------------------------------------------------------------------------
 /// Says what a shape leaves out, and wraps it.
 fn shape_part(
     geometry: &Object,
@@ -256,8 +283,11 @@ fn spheres(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
     let radius = radii(geometry, "vertex.radius", geometry.f32("radius", 1.0));
     let centers = spheres.iter().map(|[v]| points[*v as usize]).collect();
     let each = spheres.iter().map(|[v]| radius(*v)).collect();
-    let topology =
-        Topology { vertices: spheres.iter().map(|[v]| [*v; 3]).collect(), numbers, ..Topology::default() };
+    let topology = Topology {
+        vertices: spheres.iter().map(|[v]| [*v; 3]).collect(),
+        numbers,
+        ..Topology::default()
+    };
     let shape = Spheres::new(centers, Radii::Each(each)).map(|s| Arc::new(s) as Arc<dyn Shape>);
     shape_part(geometry, shape, Weights::First, topology, diagnostics)
 }
@@ -279,7 +309,8 @@ fn cylinders(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
     };
     let points = pairs.iter().flatten().map(|v| points[*v as usize]).collect();
     let caps = geometry.text("caps").unwrap_or_default();
-    let all = [matches!(caps.as_str(), "first" | "both"), matches!(caps.as_str(), "second" | "both")];
+    let all =
+        [matches!(caps.as_str(), "first" | "both"), matches!(caps.as_str(), "second" | "both")];
     let listed = geometry.object("vertex.cap").and_then(|a| a.with_array(|a| a.scalars()));
     let closed: Vec<[bool; 2]> = pairs
         .iter()
@@ -337,10 +368,12 @@ impl Shape for HalfOpen {
 fn curve(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
     let points = positions(geometry, diagnostics)?;
     let radius = radii(geometry, "vertex.radius", geometry.f32("radius", 1.0));
-    let listed = geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<1>()));
+    let listed =
+        geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<1>()));
     let total = listed.as_ref().map_or(points.len().saturating_sub(1), Vec::len);
     let all = listed.unwrap_or_else(|| (0..total as u32).map(|i| [i]).collect());
-    // Segments in the order of their vertices, so that chains are found whatever order the program has them in.
+    // Segments in the order of their vertices, so that chains are found whatever order the program
+    // has them in.
     let mut segments: Vec<(u32, u32)> = (0..)
         .zip(&all)
         .map(|(number, [v])| (*v, number))
@@ -350,7 +383,8 @@ fn curve(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
         diagnostics.warn(
             geometry,
             format!(
-                "{} of {total} segments name vertices past the last one ({} vertices); they are left out",
+                "{} of {total} segments name vertices past the last one ({} vertices); they are \
+                 left out",
                 total - segments.len(),
                 points.len()
             ),
@@ -378,7 +412,8 @@ fn curve(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
         offsets.push(chain.len() as u32);
     }
     let topology = Topology { vertices, numbers: Numbers::Listed(numbers), ..Topology::default() };
-    let shape = Tubes::new(chain, &offsets, Radii::Each(each)).map(|s| Arc::new(s) as Arc<dyn Shape>);
+    let shape =
+        Tubes::new(chain, &offsets, Radii::Each(each)).map(|s| Arc::new(s) as Arc<dyn Shape>);
     shape_part(geometry, shape, Weights::Along, topology, diagnostics)
 }
 
@@ -392,7 +427,8 @@ fn isosurfaces(geometry: &Object, diagnostics: &mut Diagnostics) -> CompiledGeom
     if is_nearest(&field) {
         diagnostics.warn(
             geometry,
-            "its field's `filter` is \"nearest\", which has no isosurfaces: it is interpolated linearly",
+            "its field's `filter` is \"nearest\", which has no isosurfaces: it is interpolated \
+             linearly",
         );
     }
     let isovalues: Vec<f32> = match geometry.parameters().get("isovalue") {
@@ -410,7 +446,8 @@ fn isosurfaces(geometry: &Object, diagnostics: &mut Diagnostics) -> CompiledGeom
                     diagnostics.warn(
                         geometry,
                         format!(
-                            "isovalue {isovalue} is outside of the field's range {:?}: nothing to draw",
+                            "isovalue {isovalue} is outside of the field's range {:?}: nothing to \
+                             draw",
                             grid.range()
                         ),
                     );

@@ -1,4 +1,5 @@
-//! Lights. ANARI gives radiometric quantities, the renderer what a white surface becomes: irradiance over π.
+//! Lights. ANARI gives radiometric quantities, the renderer what a white surface becomes:
+//! irradiance over π.
 
 use super::Diagnostics;
 use crate::anari::object::Object;
@@ -39,11 +40,15 @@ pub(crate) fn light_of(
         return quad(light, color, place, diagnostics);
     }
     let position = place.transform_point3(DVec3::from_array(light.vector("position", [0.0; 3])));
-    let direction = place.transform_vector3(DVec3::from_array(light.vector("direction", [0.0, 0.0, -1.0])));
+    let direction =
+        place.transform_vector3(DVec3::from_array(light.vector("direction", [0.0, 0.0, -1.0])));
     if !(position.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
         diagnostics.error(
             light,
-            format!("its place {position} or direction {direction} is not finite or zero: it gives no light"),
+            format!(
+                "its place {position} or direction {direction} is not finite or zero: it gives \
+                     no light"
+            ),
         );
         return None;
     }
@@ -55,7 +60,8 @@ pub(crate) fn light_of(
         // NaN fails the comparison too.
         let any = outer > 0.0 && inner >= 0.0;
         if !any {
-            diagnostics.warn(light, "`openingAngle` or `falloffAngle` leaves no cone: it gives no light");
+            diagnostics
+                .warn(light, "`openingAngle` or `falloffAngle` leaves no cone: it gives no light");
         }
         any.then_some((inner, outer))
     };
@@ -63,13 +69,16 @@ pub(crate) fn light_of(
     let (kind, strength, attenuation) = match light.subtype.as_str() {
         "directional" => {
             let half = 0.5 * number("angularDiameter").unwrap_or(0.0).clamp(0.0, 3.0);
-            // The irradiance of a disk of uniform radiance L straight ahead is π L sin² of its radius.
-            let sized = number("radiance").filter(|_| half > 0.0).map(|l| PI * l * half.sin().powi(2));
+            // The irradiance of a disk of uniform radiance L straight ahead is π L sin² of its
+            // radius.
+            let sized =
+                number("radiance").filter(|_| half > 0.0).map(|l| PI * l * half.sin().powi(2));
             let kind = LightKind::Directional { to_light: -direction, angular_radius_rad: half };
             (kind, sized.or(number("irradiance")).unwrap_or(1.0), [1.0, 0.0, 0.0])
         }
         "point" => {
-            let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * PI * radius * radius);
+            let sized =
+                number("radiance").filter(|_| radius > 0.0).map(|l| l * PI * radius * radius);
             (LightKind::Point { position, radius }, sized.unwrap_or(per_angle), [0.0, 0.0, 1.0])
         }
         "ring" => {
@@ -86,27 +95,38 @@ pub(crate) fn light_of(
                 if !(0.0..radius).contains(&inner_radius) {
                     diagnostics.error(
                         light,
-                        format!("`innerRadius` is {inner_radius}; it must be from 0 to below the radius {radius}: it gives no light"),
+                        format!(
+                            "`innerRadius` is {inner_radius}; it must be from 0 to below the \
+                                 radius {radius}: it gives no light"
+                        ),
                     );
                     return None;
                 }
                 LightKind::Ring { position, direction, inner_radius, radius, inner_rad, outer_rad }
             } else {
-                diagnostics
-                    .warn(light, "`radius` is 0: it shines from a point, into the half space before it");
+                diagnostics.warn(
+                    light,
+                    "`radius` is 0: it shines from a point, into the half space before it",
+                );
                 LightKind::Cone { position, direction, inner_rad, outer_rad }
             };
             (kind, sized.unwrap_or(ahead), [0.0, 0.0, 1.0])
         }
         _ => {
             let (inner_rad, outer_rad) = cone(light)?;
-            (LightKind::Cone { position, direction, inner_rad, outer_rad }, per_angle, [0.0, 0.0, 1.0])
+            (
+                LightKind::Cone { position, direction, inner_rad, outer_rad },
+                per_angle,
+                [0.0, 0.0, 1.0],
+            )
         }
     };
     if !(strength.is_finite() && strength >= 0.0) {
         diagnostics.error(
             light,
-            format!("its strength is {strength}; it must be finite and not negative: it gives no light"),
+            format!(
+                "its strength is {strength}; it must be finite and not negative: it gives no light"
+            ),
         );
         return None;
     }
@@ -130,7 +150,8 @@ fn quad(
         diagnostics.error(
             light,
             format!(
-                "its corner {corner} is not finite, or its edges {a} and {b} span no area: it gives no light"
+                "its corner {corner} is not finite, or its edges {a} and {b} span no area: it \
+                 gives no light"
             ),
         );
         return None;
@@ -148,7 +169,9 @@ fn quad(
     if !(strength.is_finite() && strength >= 0.0) {
         diagnostics.error(
             light,
-            format!("its strength is {strength}; it must be finite and not negative: it gives no light"),
+            format!(
+                "its strength is {strength}; it must be finite and not negative: it gives no light"
+            ),
         );
         return None;
     }
@@ -159,7 +182,8 @@ fn quad(
     Some(CompiledLight::Light(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 
-/// The picture turned so that the renderer, which knows only which way is up, has its middle in the right direction.
+/// The picture turned so that the renderer, which knows only which way is up, has its middle in the
+/// right direction.
 fn environment(
     light: &Object,
     color: [f64; 3],
@@ -171,9 +195,11 @@ fn environment(
         diagnostics.error(light, "`radiance` is not set or has no texels: it gives no light");
         return None;
     };
-    let up =
-        place.transform_vector3(DVec3::from_array(light.vector("up", [0.0, 0.0, 1.0]))).normalize_or_zero();
-    let forward = place.transform_vector3(DVec3::from_array(light.vector("direction", [1.0, 0.0, 0.0])));
+    let up = place
+        .transform_vector3(DVec3::from_array(light.vector("up", [0.0, 0.0, 1.0])))
+        .normalize_or_zero();
+    let forward =
+        place.transform_vector3(DVec3::from_array(light.vector("direction", [1.0, 0.0, 0.0])));
     let forward = (forward - up * up.dot(forward)).normalize_or_zero();
     if up == DVec3::ZERO || forward == DVec3::ZERO {
         diagnostics.error(light, "`up` and `direction` are zero or parallel: it gives no light");
@@ -187,14 +213,18 @@ fn environment(
         for i in 0..width {
             let angle = ((i as f64 + 0.5) / width as f64 - 0.5) * 2.0 * PI;
             let d = east * angle.cos() + north * angle.sin();
-            // Column of the program's picture: its middle is `direction`, and it goes to the right seen from inside.
+            // Column of the program's picture: its middle is `direction`, and it goes to the right
+            // seen from inside.
             let u = 0.5 + d.dot(right).atan2(d.dot(forward)) / (2.0 * PI);
             let x = u * width as f64 - 0.5;
             let (low, part) = (x.floor(), (x - x.floor()) as f32);
             let at = |k: i64| row[k.rem_euclid(width as i64) as usize];
             let (a, b) = (at(low as i64), at(low as i64 + 1));
-            let c: [f32; 3] = std::array::from_fn(|c| (a[c] + (b[c] - a[c]) * part) * color[c] as f32);
-            turned.push([c[0], c[1], c[2], 1.0].map(|v: f32| if v.is_finite() { v.max(0.0) } else { 0.0 }));
+            let c: [f32; 3] =
+                std::array::from_fn(|c| (a[c] + (b[c] - a[c]) * part) * color[c] as f32);
+            turned.push(
+                [c[0], c[1], c[2], 1.0].map(|v: f32| if v.is_finite() { v.max(0.0) } else { 0.0 }),
+            );
         }
     }
     let mut image = match Texture::from_linear(width, height, turned) {
@@ -213,5 +243,9 @@ fn environment(
         );
         return None;
     }
-    Some(CompiledLight::Environment(Environment::Image { image: image.into(), up: up.as_vec3(), scale }))
+    Some(CompiledLight::Environment(Environment::Image {
+        image: image.into(),
+        up: up.as_vec3(),
+        scale,
+    }))
 }

@@ -16,7 +16,8 @@ pub(crate) fn model_of(material: &Object, diagnostics: &mut Diagnostics) -> Mate
     }
     let mut unit = |name: &str, default: f32| {
         // What varies is looked up at the hits; here it must only be able to reflect.
-        let varies = matches!(material.parameters().get(name), Some(Value::Text(_) | Value::Object(_)));
+        let varies =
+            matches!(material.parameters().get(name), Some(Value::Text(_) | Value::Object(_)));
         let v = if varies { 1.0 } else { material.f32(name, default) };
         if (0.0..=1.0).contains(&v) {
             return v;
@@ -27,18 +28,28 @@ pub(crate) fn model_of(material: &Object, diagnostics: &mut Diagnostics) -> Mate
     let (metallic, roughness) = (unit("metallic", 1.0), unit("roughness", 1.0));
     let (strength, transmission) = (unit("specular", 0.0), unit("transmission", 0.0));
     let ior = ior_of(material).unwrap_or_else(|ior| {
-        diagnostics.warn(material, format!("`ior` is {ior}; it must be finite and at least 1: 1.5 is used"));
+        diagnostics.warn(
+            material,
+            format!("`ior` is {ior}; it must be finite and at least 1: 1.5 is used"),
+        );
         1.5
     });
     if transmission > 0.0 && transmission < 1.0 {
-        diagnostics.warn(material, format!("`transmission` is {transmission}; there is nothing between 0 (opaque) and 1 (glass): the nearer is used"));
+        diagnostics.warn(
+            material,
+            format!(
+                "`transmission` is {transmission}; there is nothing \
+                                            between 0 (opaque) and 1 (glass): the nearer is used"
+            ),
+        );
     }
     out.model = if transmission >= 0.5 {
         // Beer and Lambert: white light has the attenuation colour after the attenuation distance.
         let distance = material.f32("attenuationDistance", f32::INFINITY);
         let color = material.vector("attenuationColor", [1.0; 3]);
-        let absorption =
-            color.map(|c| (-(c.clamp(1e-6, 1.0) as f32).ln() / distance.max(f32::MIN_POSITIVE)).min(1e30));
+        let absorption = color.map(|c| {
+            (-(c.clamp(1e-6, 1.0) as f32).ln() / distance.max(f32::MIN_POSITIVE)).min(1e30)
+        });
         SurfaceModel::Dielectric { ior, absorption }
     } else {
         // KHR_materials_specular, which ANARI follows: reflectance at normal incidence, scaled.
@@ -55,7 +66,10 @@ pub(crate) fn model_of(material: &Object, diagnostics: &mut Diagnostics) -> Mate
     } else {
         diagnostics.warn(
             material,
-            format!("`emissive` is {emission:?}; it must be finite and not negative: it gives off no light"),
+            format!(
+                "`emissive` is {emission:?}; it must be finite and not negative: it gives off \
+                     no light"
+            ),
         );
     }
     out
@@ -71,7 +85,8 @@ fn normal_reflectance(ior: f32) -> f32 {
     ((ior - 1.0) / (ior + 1.0)).powi(2)
 }
 
-/// The attribute or sampler that a parameter names; `None` where it is a number, not set, or cannot be used.
+/// The attribute or sampler that a parameter names; `None` where it is a number, not set, or cannot
+/// be used.
 fn varying(
     material: &Object,
     name: &str,
@@ -85,12 +100,16 @@ fn varying(
             if source.is_none() {
                 diagnostics.error(
                     material,
-                    format!("`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"),
+                    format!(
+                        "`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"
+                    ),
                 );
             }
             source.map(Input::Attribute)
         }
-        Value::Object(sampler) => Sampler::of(sampler, geometry, instance, diagnostics).map(Input::Sampler),
+        Value::Object(sampler) => {
+            Sampler::of(sampler, geometry, instance, diagnostics).map(Input::Sampler)
+        }
         Value::Bytes(..) | Value::Pointer(..) => None,
     }
 }
@@ -129,7 +148,8 @@ pub(crate) fn surface_color_of(
     diagnostics: &mut Diagnostics,
 ) -> SurfaceColor {
     let name = if material.subtype == "physicallyBased" { "baseColor" } else { "color" };
-    let default = if material.subtype == "physicallyBased" { [1.0; 4] } else { [0.8, 0.8, 0.8, 1.0] };
+    let default =
+        if material.subtype == "physicallyBased" { [1.0; 4] } else { [0.8, 0.8, 0.8, 1.0] };
     let mut input = |name: &str, default: [f32; 4]| {
         if let Some(Value::Bytes(t, b)) = material.parameters().get(name) {
             return Input::Constant(t.attribute(b));
@@ -149,7 +169,9 @@ pub(crate) fn surface_color_of(
 pub(crate) fn uses_world_space(material: &Object) -> bool {
     material.parameters().values().any(|v| match v {
         Value::Text(t) => t.starts_with("world"),
-        Value::Object(sampler) => sampler.text("inAttribute").is_some_and(|t| t.starts_with("world")),
+        Value::Object(sampler) => {
+            sampler.text("inAttribute").is_some_and(|t| t.starts_with("world"))
+        }
         _ => false,
     })
 }

@@ -1,4 +1,5 @@
-//! What varies over a surface besides colour and opacity, looked up at the hits: numbers, emission, bent normals.
+//! What varies over a surface besides colour and opacity, looked up at the hits: numbers, emission,
+//! bent normals.
 
 use super::attribute::{HitPoint, Topology};
 use super::sampler::Sampler;
@@ -23,7 +24,8 @@ pub(crate) struct MaterialInputs {
 
 impl MaterialInputs {
     pub(crate) fn varies(&self) -> bool {
-        let inputs = [&self.metallic, &self.roughness, &self.specular, &self.emissive, &self.occlusion];
+        let inputs =
+            [&self.metallic, &self.roughness, &self.specular, &self.emissive, &self.occlusion];
         inputs.into_iter().any(Option::is_some) || self.normal.is_some()
     }
 }
@@ -40,7 +42,9 @@ pub(crate) struct BoundMaterialInputs {
 
 impl std::fmt::Debug for BoundMaterialInputs {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("BoundMaterialInputs").field("weights", &self.weights).finish_non_exhaustive()
+        f.debug_struct("BoundMaterialInputs")
+            .field("weights", &self.weights)
+            .finish_non_exhaustive()
     }
 }
 
@@ -55,11 +59,15 @@ impl MaterialMaps for BoundMaterialInputs {
             world_from_object: &self.world_from_object,
         };
         let g = &self.material_inputs;
-        let first = |input: &Option<Input>, other: f32| input.as_ref().map_or(other, |i| i.at(&here)[0]);
+        let first =
+            |input: &Option<Input>, other: f32| input.as_ref().map_or(other, |i| i.at(&here)[0]);
         let mut out = BsdfParameters {
             metallic: first(&g.metallic, base.metallic),
             roughness: first(&g.roughness, base.roughness),
-            specular: g.specular.as_ref().map_or(base.specular, |i| i.at(&here)[0] * g.normal_reflectance),
+            specular: g
+                .specular
+                .as_ref()
+                .map_or(base.specular, |i| i.at(&here)[0] * g.normal_reflectance),
             ambient: first(&g.occlusion, base.ambient),
             ..base
         };
@@ -75,7 +83,8 @@ impl MaterialMaps for BoundMaterialInputs {
 }
 
 impl BoundMaterialInputs {
-    /// The frame is that of the mesh's tangents, else that in which the sampler's attribute grows along the triangle.
+    /// The frame is that of the mesh's tangents, else that in which the sampler's attribute grows
+    /// along the triangle.
     fn mapped_normal(
         &self,
         sampler: &Sampler,

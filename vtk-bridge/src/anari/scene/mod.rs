@@ -1,4 +1,5 @@
-//! From committed objects to a scene of rt-core: each file turns one kind of object into what the renderer takes.
+//! From committed objects to a scene of rt-core: each file turns one kind of object into what the
+//! renderer takes.
 
 pub mod attribute;
 mod camera;
@@ -27,7 +28,13 @@ impl Diagnostics {
     pub(crate) fn add(&mut self, about: &Object, severity: Severity, text: impl std::fmt::Display) {
         let code = if severity <= Severity::Warning { Code::InvalidArgument } else { Code::Ok };
         let text = format!("{}: {text}", about.title());
-        self.0.push(Message { source: about.handle, source_type: about.kind, severity, code, text });
+        self.0.push(Message {
+            source: about.handle,
+            source_type: about.kind,
+            severity,
+            code,
+            text,
+        });
     }
 
     pub(crate) fn warn(&mut self, about: &Object, text: impl std::fmt::Display) {

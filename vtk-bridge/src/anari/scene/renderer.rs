@@ -38,7 +38,8 @@ impl FrameBackground {
         };
         let ((x0, x1, fx), (y0, y1, fy)) = (split(x, size[0]), split(y, size[1]));
         let t = |x: usize, y: usize| texels[y * size[0] + x];
-        let mix = |a: [f32; 4], b: [f32; 4], f: f32| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * f);
+        let mix =
+            |a: [f32; 4], b: [f32; 4], f: f32| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * f);
         mix(mix(t(x0, y0), t(x1, y0), fx), mix(t(x0, y1), t(x1, y1), fx), fy)
     }
 }
@@ -54,8 +55,10 @@ pub(crate) fn renderer_settings(
         let Some(v) = renderer.numbers(name).map(|v| v[0]) else { return default };
         let used = v.clamp(f64::from(least), f64::from(most)) as u32;
         if f64::from(used) != v {
-            diagnostics
-                .warn(renderer, format!("`{name}` is {v}; it must be {least} to {most}: {used} is used"));
+            diagnostics.warn(
+                renderer,
+                format!("`{name}` is {v}; it must be {least} to {most}: {used} is used"),
+            );
         }
         used
     };
@@ -73,8 +76,10 @@ pub(crate) fn renderer_settings(
     let color = renderer.vector("ambientColor", [1.0; 3]).map(|c| c as f32 * radiance);
     let usable = color.iter().all(|c| c.is_finite() && *c >= 0.0);
     if !usable {
-        diagnostics
-            .warn(renderer, format!("the ambient light {color:?} is not finite or negative: there is none"));
+        diagnostics.warn(
+            renderer,
+            format!("the ambient light {color:?} is not finite or negative: there is none"),
+        );
     }
     let ambient = (usable && color != [0.0; 3]).then_some(color);
     let distance = f64::from(renderer.f32("ambientOcclusionDistance", f32::INFINITY));
@@ -86,7 +91,8 @@ pub(crate) fn renderer_settings(
         diagnostics.warn(
             renderer,
             format!(
-                "`ambientOcclusionDistance` is {distance}; it must be positive: ambient light is not dimmed"
+                "`ambientOcclusionDistance` is {distance}; it must be positive: ambient light is \
+                 not dimmed"
             ),
         );
         None
@@ -95,13 +101,20 @@ pub(crate) fn renderer_settings(
     let backdrop = match renderer.parameters().get("background") {
         Some(Value::Bytes(t, b)) => FrameBackground::Color(t.attribute(b)),
         Some(Value::Object(a)) => {
-            let picture =
-                a.with_array(|a| ([a.dims[0], a.dims[1]], a.attributes())).filter(|(_, t)| !t.is_empty());
+            let picture = a
+                .with_array(|a| ([a.dims[0], a.dims[1]], a.attributes()))
+                .filter(|(_, t)| !t.is_empty());
             picture.map_or(FrameBackground::Color([0.0, 0.0, 0.0, 1.0]), |(size, texels)| {
                 FrameBackground::Picture { size, texels }
             })
         }
         _ => FrameBackground::Color([0.0, 0.0, 0.0, 1.0]),
     };
-    RendererSettings { options, ambient, occlusion, shadows: renderer.bool("shadows", true), backdrop }
+    RendererSettings {
+        options,
+        ambient,
+        occlusion,
+        shadows: renderer.bool("shadows", true),
+        backdrop,
+    }
 }

@@ -87,8 +87,10 @@ impl Sampler {
             }
             _ => Step::Image(Arc::new(image(sampler, diagnostics)?)),
         };
-        let (out_transform, out_offset) =
-            (matrix(sampler, "outTransform"), DVec4::from_array(sampler.vector("outOffset", [0.0; 4])));
+        let (out_transform, out_offset) = (
+            matrix(sampler, "outTransform"),
+            DVec4::from_array(sampler.vector("outOffset", [0.0; 4])),
+        );
         Some(Sampler { input, step, out_transform, out_offset })
     }
 
@@ -97,7 +99,11 @@ impl Sampler {
             Step::Nothing => self.input.at(p),
             Step::Primitive { values, offset } => {
                 let i = u64::from(p.topology.number(p.primitive)).saturating_add(*offset);
-                usize::try_from(i).ok().and_then(|i| values.get(i)).copied().unwrap_or([0.0, 0.0, 0.0, 1.0])
+                usize::try_from(i)
+                    .ok()
+                    .and_then(|i| values.get(i))
+                    .copied()
+                    .unwrap_or([0.0, 0.0, 0.0, 1.0])
             }
             Step::Image(image) => image.at(image.coordinate(self.input.at(p))),
         };
@@ -125,7 +131,8 @@ impl Sampler {
         self.input.at(p)
     }
 
-    /// The renderer's texture, with `finish` applied to every texel, for domain [`Domain::Texture`].
+    /// The renderer's texture, with `finish` applied to every texel, for domain
+    /// [`Domain::Texture`].
     pub(crate) fn texture(&self, finish: impl Fn([f32; 4]) -> [f32; 4]) -> Option<Texture> {
         let Step::Image(image) = &self.step else { return None };
         let texels = image.texels.iter().map(|t| finish(self.output(*t))).collect();
@@ -160,7 +167,8 @@ fn image(sampler: &Object, diagnostics: &mut Diagnostics) -> Option<Image> {
         })
     });
     let Some((dims, texels)) = read.filter(|(_, t)| !t.is_empty()) else {
-        diagnostics.error(sampler, "`image` is not set or has no texels, so there is nothing to sample");
+        diagnostics
+            .error(sampler, "`image` is not set or has no texels, so there is nothing to sample");
         return None;
     };
     let names: &[&str] =
@@ -176,8 +184,11 @@ fn image(sampler: &Object, diagnostics: &mut Diagnostics) -> Option<Image> {
         }
     }
     let border_color = sampler.vector("borderColor", [0.0; 4]).map(|v| v as f32);
-    let filter =
-        if sampler.text("filter").as_deref() == Some("nearest") { Filter::Nearest } else { Filter::Bilinear };
+    let filter = if sampler.text("filter").as_deref() == Some("nearest") {
+        Filter::Nearest
+    } else {
+        Filter::Bilinear
+    };
     let in_offset = DVec4::from_array(sampler.vector("inOffset", [0.0; 4]));
     Some(Image {
         dims,
@@ -193,7 +204,8 @@ fn image(sampler: &Object, diagnostics: &mut Diagnostics) -> Option<Image> {
 }
 
 impl Image {
-    /// Matrices are applied to the attribute without division by its fourth component, so coordinates are linear wherever the attribute is.
+    /// Matrices are applied to the attribute without division by its fourth component, so
+    /// coordinates are linear wherever the attribute is.
     fn fits_a_texture(&self) -> bool {
         let affine = self.in_transform.is_finite() && self.in_offset.is_finite();
         affine && self.dimensions < 3 && self.border == [false; 3]
@@ -281,7 +293,10 @@ mod tests {
     fn block_of_texels_is_exact_at_centres_and_linear_between() {
         let block = ramp([2, 2, 2], 3, Wrap::Clamp, Filter::Bilinear);
         let at = |x: f64, y: f64, z: f64| block.at(DVec4::new(x, y, z, 1.0))[0];
-        assert_eq!((at(0.25, 0.25, 0.25), at(0.75, 0.25, 0.25), at(0.25, 0.25, 0.75)), (0.0, 1.0, 4.0));
+        assert_eq!(
+            (at(0.25, 0.25, 0.25), at(0.75, 0.25, 0.25), at(0.25, 0.25, 0.75)),
+            (0.0, 1.0, 4.0)
+        );
         assert_eq!(at(0.5, 0.5, 0.5), 3.5);
         assert_eq!(at(f64::NAN, 9.0, -9.0), 2.0);
     }

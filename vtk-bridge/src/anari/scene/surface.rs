@@ -1,7 +1,9 @@
-//! A geometry with its look: the cheapest way of the renderer that shows the material's colour exactly.
+//! A geometry with its look: the cheapest way of the renderer that shows the material's colour
+//! exactly.
 //!
-//! Constant colours go into the material, values per face and per vertex into the appearance, pictures become textures (all three need no
-//! new acceleration structure on meshes, pictures one when they come and go). Everything else is computed at the hits: see [`super::surface_color`].
+//! Constant colours go into the material, values per face and per vertex into the appearance,
+//! pictures become textures (all three need no new acceleration structure on meshes, pictures one
+//! when they come and go). Everything else is computed at the hits: see [`super::surface_color`].
 
 use super::attribute::{Domain, HitPoint, Topology};
 use super::geometry::{Body, Part};
@@ -92,7 +94,8 @@ pub(crate) fn compile_surface(
                 return colored_shape(part, model, surface_color, world_from_object);
             };
             let opacity = surface_color.opacity.at(&no_hit)[0];
-            let Some(texture) = sampler.texture(|texel| surface_color.finish(texel, || opacity)) else {
+            let Some(texture) = sampler.texture(|texel| surface_color.finish(texel, || opacity))
+            else {
                 return colored_shape(part, model, surface_color, world_from_object);
             };
             let mut coordinates = vec![Default::default(); mesh.positions.len()];
@@ -144,12 +147,18 @@ fn domain_of(surface_color: &SurfaceColor) -> Domain {
     };
     let (color, opacity) = (
         of(&surface_color.color),
-        if surface_color.mode == AlphaMode::Opaque { Domain::Constant } else { of(&surface_color.opacity) },
+        if surface_color.mode == AlphaMode::Opaque {
+            Domain::Constant
+        } else {
+            of(&surface_color.opacity)
+        },
     );
     let steps = matches!(surface_color.mode, AlphaMode::Mask { .. });
     match color.max(opacity) {
         // A threshold between vertices, or a product of two values that both change, is not linear.
-        Domain::Linear | Domain::Texture if steps || color.min(opacity) > Domain::Constant => Domain::Hit,
+        Domain::Linear | Domain::Texture if steps || color.min(opacity) > Domain::Constant => {
+            Domain::Hit
+        }
         // Textures hold colours, not opacities.
         Domain::Texture if color != Domain::Texture => Domain::Hit,
         domain => domain,

@@ -1,4 +1,5 @@
-//! The colour of a surface at a hit, where it is more than the renderer's meshes can hold: on shapes, and for blocks of texels, thresholds and products.
+//! The colour of a surface at a hit, where it is more than the renderer's meshes can hold: on
+//! shapes, and for blocks of texels, thresholds and products.
 
 use super::attribute::{HitPoint, Source, Topology};
 use super::sampler::Sampler;
@@ -152,14 +153,16 @@ impl TriangleShape {
         Some([p(a)?, p(b)?, p(c)?])
     }
 
-    /// Distance and weights of the second and third corner, in f64 from f32 input: the products of the edge functions are exact to
-    /// 2⁻⁵³, so that neighbours along an edge agree for all but the rarest rays.
+    /// Distance and weights of the second and third corner, in f64 from f32 input: the products of
+    /// the edge functions are exact to 2⁻⁵³, so that neighbours along an edge agree for all but the
+    /// rarest rays.
     fn meet(&self, prim: u32, ray: &Ray) -> Option<(f64, f64, f64)> {
         let o = ray.origin.as_dvec3();
         let [a, b, c] = self.corners(prim)?.map(|p| p.as_dvec3() - o);
         let d = ray.dir.as_dvec3();
-        // Signed volumes against the ray: the three have one sign where the ray passes between the edges (Woop, Benthin and Wald,
-        // "Watertight Ray/Triangle Intersection", 2013, section 3, without the shear).
+        // Signed volumes against the ray: the three have one sign where the ray passes between the
+        // edges (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013, section 3,
+        // without the shear).
         let (u, v, w) = (d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a)));
         let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
         let sum = u + v + w;
@@ -186,7 +189,8 @@ impl Shape for TriangleShape {
         if corners.iter().any(|p| !p.is_finite()) {
             return Aabb::EMPTY;
         }
-        // One step outwards: a ray may meet a triangle that is flat in an axis with a rounding error.
+        // One step outwards: a ray may meet a triangle that is flat in an axis with a rounding
+        // error.
         let b = Aabb::from_points(&corners);
         let (down, up) = (|v: f32| v.next_down(), |v: f32| v.next_up());
         Aabb::new(
@@ -202,7 +206,8 @@ impl Shape for TriangleShape {
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
-        let (u, v) = self.meet(prim, ray).map_or((f64::from(hit.u), f64::from(hit.v)), |(_, u, v)| (u, v));
+        let (u, v) =
+            self.meet(prim, ray).map_or((f64::from(hit.u), f64::from(hit.v)), |(_, u, v)| (u, v));
         let corners = self.corners(prim).unwrap_or_default();
         let [a, b, c] = corners.map(|p| p.as_dvec3());
         let point = a * (1.0 - u - v) + b * u + c * v;
@@ -221,6 +226,12 @@ impl Shape for TriangleShape {
         let rounded = point.as_vec3();
         // Half an ulp of each coordinate and a few roundings of the weights in f64.
         let point_error = (1.8 * 2f64.powi(-24) * size + f64::from(f32::MIN_POSITIVE)) as f32;
-        ShapeSurface { point: rounded, point_error, normal: normal.as_vec3(), scalar: None, color: None }
+        ShapeSurface {
+            point: rounded,
+            point_error,
+            normal: normal.as_vec3(),
+            scalar: None,
+            color: None,
+        }
     }
 }

@@ -17,7 +17,8 @@ pub(crate) fn grid_of(field: &Object, diagnostics: &mut Diagnostics) -> Option<A
     }
     let data = field.object("data").and_then(|a| a.with_array(|a| (a.dims, a.scalars())));
     let Some((dims, values)) = data else {
-        diagnostics.error(field, "`data` is not set; set it to a three-dimensional array and commit");
+        diagnostics
+            .error(field, "`data` is not set; set it to a three-dimensional array and commit");
         return None;
     };
     let origin = DVec3::from_array(field.vector("origin", [0.0; 3]));
@@ -71,7 +72,8 @@ pub(crate) fn volume_of(volume: &Object, diagnostics: &mut Diagnostics) -> Optio
             format!("{bad} components of `color` are NaN, infinite or negative; they count as 0"),
         );
     }
-    // Opacity and the colours' alpha multiply; both are linear between their own points, so their product is sampled at the points of both.
+    // Opacity and the colours' alpha multiply; both are linear between their own points, so their
+    // product is sampled at the points of both.
     let points: Vec<[f32; 2]> = knots(opacities.len(), colors.len())
         .into_iter()
         .map(|x| {
@@ -81,8 +83,10 @@ pub(crate) fn volume_of(volume: &Object, diagnostics: &mut Diagnostics) -> Optio
         })
         .collect();
     let unit = volume.f32("unitDistance", 1.0);
-    let transfer = TransferFunction::from_opacity(ColorMap::new(colors, [low, high]), &points, unit);
-    let interpolation = if is_nearest(&field) { Interpolation::Nearest } else { Interpolation::Linear };
+    let transfer =
+        TransferFunction::from_opacity(ColorMap::new(colors, [low, high]), &points, unit);
+    let interpolation =
+        if is_nearest(&field) { Interpolation::Nearest } else { Interpolation::Linear };
     let options = VolumeOptions { interpolation, ..VolumeOptions::default() };
     let made = transfer
         .map_err(|e| e.to_string())

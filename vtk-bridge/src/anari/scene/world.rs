@@ -1,7 +1,8 @@
 //! Worlds: everything placed, with what is expensive kept from frame to frame.
 //!
-//! What is kept has a fingerprint of the values it was made from, with a count of changes for arrays: a new colour makes new colours, a new matrix moves
-//! an instance, and only new arrays of a geometry's shape make a new acceleration structure.
+//! What is kept has a fingerprint of the values it was made from, with a count of changes for
+//! arrays: a new colour makes new colours, a new matrix moves an instance, and only new arrays of a
+//! geometry's shape make a new acceleration structure.
 
 use super::Diagnostics;
 use super::attribute::{SLOTS, Topology};
@@ -116,7 +117,8 @@ impl CompiledWorld {
             diagnostics,
         };
         compiler.out.built = old.built.clone();
-        let here = Placement { world_from_object: DAffine3::IDENTITY, instance: None, id: u32::MAX };
+        let here =
+            Placement { world_from_object: DAffine3::IDENTITY, instance: None, id: u32::MAX };
         match world.kind {
             DataType::INSTANCE => compiler.instance(world),
             _ => {
@@ -194,8 +196,9 @@ impl WorldCompiler<'_> {
             let mut key = Vec::new();
             fingerprint(&volume, &|_| true, &mut key);
             let diagnostics = &mut *self.diagnostics;
-            let made =
-                cached(&self.old.volumes, &mut self.cache.volumes, key, || volume_of(&volume, diagnostics));
+            let made = cached(&self.old.volumes, &mut self.cache.volumes, key, || {
+                volume_of(&volume, diagnostics)
+            });
             let Some(medium) = made.as_ref() else { continue };
             let grid = medium.grid();
             self.grow(Some([grid.origin, grid.max_corner()]), &placement.world_from_object);
@@ -208,10 +211,14 @@ impl WorldCompiler<'_> {
             match light_of(&light, &placement.world_from_object, self.diagnostics) {
                 Some(CompiledLight::Light(lamp)) => self.out.lights.push(lamp),
                 Some(CompiledLight::Environment(_)) if self.out.environment.is_some() => {
-                    self.diagnostics
-                        .warn(&light, "a world can have one picture around it; this one is left out");
+                    self.diagnostics.warn(
+                        &light,
+                        "a world can have one picture around it; this one is left out",
+                    );
                 }
-                Some(CompiledLight::Environment(environment)) => self.out.environment = Some(environment),
+                Some(CompiledLight::Environment(environment)) => {
+                    self.out.environment = Some(environment)
+                }
                 None => {}
             }
         }
@@ -221,22 +228,26 @@ impl WorldCompiler<'_> {
         if !surface.bool("visible", true) {
             return;
         }
-        let (Some(geometry), Some(material)) = (surface.object("geometry"), surface.object("material"))
+        let (Some(geometry), Some(material)) =
+            (surface.object("geometry"), surface.object("material"))
         else {
-            self.diagnostics.error(surface, "`geometry` or `material` is not set, so it is not drawn");
+            self.diagnostics
+                .error(surface, "`geometry` or `material` is not set, so it is not drawn");
             return;
         };
         if !geometry.known || !material.known {
             let which = if geometry.known { &material } else { &geometry };
-            self.diagnostics.error(surface, format!("it is not drawn: this device has no {}", which.title()));
+            self.diagnostics
+                .error(surface, format!("it is not drawn: this device has no {}", which.title()));
             return;
         }
         let mut key = Vec::new();
         fingerprint(&geometry, &|name| !is_appearance_parameter(name), &mut key);
         let diagnostics = &mut *self.diagnostics;
-        let compiled = cached(&self.old.geometries, &mut self.cache.geometries, key.clone(), || {
-            compile_geometry(&geometry, diagnostics)
-        });
+        let compiled =
+            cached(&self.old.geometries, &mut self.cache.geometries, key.clone(), || {
+                compile_geometry(&geometry, diagnostics)
+            });
         self.grow(compiled.bounds, &placement.world_from_object);
         let diagnostics = &mut *self.diagnostics;
 
@@ -253,8 +264,10 @@ impl WorldCompiler<'_> {
         }
         let surfaces = cached(&self.old.surfaces, &mut self.cache.surfaces, key, || {
             let model = model_of(&material, diagnostics);
-            let surface_color = surface_color_of(&material, &geometry, placement.instance, diagnostics);
-            let material_inputs = material_inputs_of(&material, &geometry, placement.instance, diagnostics);
+            let surface_color =
+                surface_color_of(&material, &geometry, placement.instance, diagnostics);
+            let material_inputs =
+                material_inputs_of(&material, &geometry, placement.instance, diagnostics);
             if material_inputs.as_ref().is_some_and(|g| g.normal.is_some())
                 && !compiled.parts.iter().all(Part::is_mesh)
             {
@@ -270,7 +283,9 @@ impl WorldCompiler<'_> {
             compiled
                 .parts
                 .iter()
-                .map(|part| compile_surface(part, &model, &surface_color, material_inputs.as_ref(), place))
+                .map(|part| {
+                    compile_surface(part, &model, &surface_color, material_inputs.as_ref(), place)
+                })
                 .collect()
         });
         let object = surface.u32("id", u32::MAX);
@@ -284,11 +299,13 @@ impl WorldCompiler<'_> {
                 out.geometries.push(d.geometry.clone());
                 out.geometries.len() - 1
             });
-            out.instances.push(Instance { geometry: index, world_from_object: placement.world_from_object });
-            let material = *self.materials.entry(std::ptr::from_ref(d) as usize).or_insert_with(|| {
-                out.materials.push(d.material.clone());
-                out.materials.len() - 1
-            });
+            out.instances
+                .push(Instance { geometry: index, world_from_object: placement.world_from_object });
+            let material =
+                *self.materials.entry(std::ptr::from_ref(d) as usize).or_insert_with(|| {
+                    out.materials.push(d.material.clone());
+                    out.materials.len() - 1
+                });
             let mut appearance = d.appearance.clone();
             appearance.material = material;
             out.appearances.push(appearance);

@@ -4,8 +4,12 @@ use super::{COLORS, DataType, ObjectSchema, Parameter};
 
 const VEC4: &[DataType] = &[DataType::FLOAT32_VEC4];
 const NORMALS: &[DataType] = &[DataType::FLOAT32_VEC3, DataType::FIXED16_VEC3];
-const TANGENTS: &[DataType] =
-    &[DataType::FLOAT32_VEC4, DataType::FLOAT32_VEC3, DataType::FIXED16_VEC3, DataType::FIXED16_VEC4];
+const TANGENTS: &[DataType] = &[
+    DataType::FLOAT32_VEC4,
+    DataType::FLOAT32_VEC3,
+    DataType::FIXED16_VEC3,
+    DataType::FIXED16_VEC4,
+];
 const POSITIONS: &[DataType] = &[DataType::FLOAT32_VEC3];
 const RADII: &[DataType] = &[DataType::FLOAT32];
 const CAPS: &[&str] = &["none", "first", "second", "both"];
@@ -14,7 +18,11 @@ const POSITION: Parameter =
     Parameter::array("vertex.position", POSITIONS, "places in object space").required();
 
 const UNIFORM: &[Parameter] = &[
-    Parameter::new("color", VEC4, "colour of the whole geometry, for materials that ask for the attribute"),
+    Parameter::new(
+        "color",
+        VEC4,
+        "colour of the whole geometry, for materials that ask for the attribute",
+    ),
     Parameter::new("attribute0", VEC4, "value for the whole geometry"),
     Parameter::new("attribute1", VEC4, "value for the whole geometry"),
     Parameter::new("attribute2", VEC4, "value for the whole geometry"),
@@ -52,11 +60,16 @@ const POLYGON: &[Parameter] = &[
 ];
 
 const fn index(elements: &'static [DataType]) -> Parameter {
-    Parameter::array("primitive.index", elements, "vertices of each primitive; consecutive ones when not set")
+    Parameter::array(
+        "primitive.index",
+        elements,
+        "vertices of each primitive; consecutive ones when not set",
+    )
 }
 
 const RADIUS: Parameter =
-    Parameter::new("radius", &[DataType::FLOAT32], "radius where no array gives one").floats(&[1.0]);
+    Parameter::new("radius", &[DataType::FLOAT32], "radius where no array gives one")
+        .floats(&[1.0]);
 const CAP: Parameter =
     Parameter::new("caps", &[DataType::STRING], "which ends are closed").text("none", CAPS);
 const VERTEX_CAP: Parameter =
@@ -140,7 +153,8 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                 Parameter::array(
                     "primitive.index",
                     &[DataType::UINT32, DataType::UINT64],
-                    "first vertex of each segment; the second is the next one. One chain when not set",
+                    "first vertex of each segment; the second is the next one. One chain when not \
+                     set",
                 ),
                 RADIUS,
                 Parameter::array("vertex.radius", RADII, "a radius per vertex"),

@@ -1,5 +1,5 @@
-//! What objects and parameters the device knows: one table for checking what programs set, and for telling them what they may set
-//! (ANARI 1.0, section "Object and parameter info").
+//! What objects and parameters the device knows: one table for checking what programs set, and for
+//! telling them what they may set (ANARI 1.0, section "Object and parameter info").
 //!
 //! A parameter is in the table only if it changes what the device does.
 
@@ -64,7 +64,11 @@ impl Parameter {
         }
     }
 
-    const fn array(name: &'static str, elements: &'static [DataType], about: &'static str) -> Parameter {
+    const fn array(
+        name: &'static str,
+        elements: &'static [DataType],
+        about: &'static str,
+    ) -> Parameter {
         Parameter { elements, ..Parameter::new(name, &[DataType::ARRAY1D], about) }
     }
 
@@ -125,7 +129,8 @@ impl ObjectSchema {
     }
 }
 
-const NAME: &[Parameter] = &[Parameter::new("name", &[DataType::STRING], "what messages call the object")];
+const NAME: &[Parameter] =
+    &[Parameter::new("name", &[DataType::STRING], "what messages call the object")];
 
 /// Everything the device can make.
 pub fn objects() -> impl Iterator<Item = &'static ObjectSchema> {

@@ -36,7 +36,13 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "everything that is drawn",
         &[&[Parameter::array("instance", &[DataType::INSTANCE], "placed groups")], CONTENT],
     ),
-    object(DataType::GROUP, "", "", "surfaces, volumes and lights that belong together", &[CONTENT]),
+    object(
+        DataType::GROUP,
+        "",
+        "",
+        "surfaces, volumes and lights that belong together",
+        &[CONTENT],
+    ),
     object(
         DataType::INSTANCE,
         "transform",
@@ -52,7 +58,10 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                         &[DataType::FLOAT32_MAT4, DataType::ARRAY1D],
                         "object to world; an array for many copies",
                     )
-                    .floats(&[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+                    .floats(&[
+                        1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
+                        1.0,
+                    ])
                 },
                 Parameter {
                     elements: &[DataType::UINT32],
@@ -100,7 +109,8 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             },
             Parameter::new("origin", &[DataType::FLOAT32_VEC3], "place of the first grid point")
                 .floats(&[0.0; 3]),
-            Parameter::new("spacing", &[DataType::FLOAT32_VEC3], "distance of grid points").floats(&[1.0; 3]),
+            Parameter::new("spacing", &[DataType::FLOAT32_VEC3], "distance of grid points")
+                .floats(&[1.0; 3]),
             Parameter::new("filter", &[DataType::STRING], "how scalars are combined, in volumes")
                 .text("linear", &["linear", "nearest"]),
         ]],

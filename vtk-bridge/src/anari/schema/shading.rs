@@ -2,7 +2,8 @@
 
 use super::{COLORS, DataType, ObjectSchema, Parameter};
 
-const IDENTITY: &[f32] = &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+const IDENTITY: &[f32] =
+    &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 const COLOR_INPUT: &[DataType] =
     &[DataType::FLOAT32_VEC3, DataType::SAMPLER, DataType::STRING, DataType::FLOAT32_VEC4];
 const SCALAR_INPUT: &[DataType] = &[DataType::FLOAT32, DataType::SAMPLER, DataType::STRING];
@@ -11,15 +12,21 @@ const VEC3: &[DataType] = &[DataType::FLOAT32_VEC3];
 const STRING: &[DataType] = &[DataType::STRING];
 
 const OPACITY: &[Parameter] = &[
-    Parameter::new("opacity", SCALAR_INPUT, "1 opaque to 0 invisible; a number, attribute or sampler")
-        .floats(&[1.0]),
+    Parameter::new(
+        "opacity",
+        SCALAR_INPUT,
+        "1 opaque to 0 invisible; a number, attribute or sampler",
+    )
+    .floats(&[1.0]),
     Parameter::new(
         "alphaMode",
         STRING,
         "whether opacity and the colour's alpha count, gradually or with a threshold",
     )
     .text("opaque", &["opaque", "blend", "mask"]),
-    Parameter::new("alphaCutoff", FLOAT, "threshold of the mode `mask`").floats(&[0.5]).between(0.0, 1.0),
+    Parameter::new("alphaCutoff", FLOAT, "threshold of the mode `mask`")
+        .floats(&[0.5])
+        .between(0.0, 1.0),
 ];
 
 const MATTE: &[Parameter] = &[Parameter::new(
@@ -32,9 +39,14 @@ const MATTE: &[Parameter] = &[Parameter::new(
 const PHYSICALLY_BASED: &[Parameter] = &[
     Parameter::new("baseColor", COLOR_INPUT, "linear RGB, an attribute's name or a sampler")
         .floats(&[1.0, 1.0, 1.0]),
-    Parameter::new("metallic", SCALAR_INPUT, "0 dielectric to 1 metal; a number, attribute or sampler")
-        .floats(&[1.0])
-        .between(0.0, 1.0),
+    Parameter::new(
+        "metallic",
+        SCALAR_INPUT,
+        "0 dielectric to 1 metal; a number, attribute or \
+                                              sampler",
+    )
+    .floats(&[1.0])
+    .between(0.0, 1.0),
     Parameter::new("roughness", SCALAR_INPUT, "0 mirror to 1 dull; a number, attribute or sampler")
         .floats(&[1.0])
         .between(0.0, 1.0),
@@ -49,11 +61,17 @@ const PHYSICALLY_BASED: &[Parameter] = &[
         "radiance given off: linear RGB, an attribute's name or a sampler",
     )
     .floats(&[0.0, 0.0, 0.0]),
-    Parameter::new("occlusion", &[DataType::SAMPLER], "share of ambient and reflected light that gets in"),
+    Parameter::new(
+        "occlusion",
+        &[DataType::SAMPLER],
+        "share of ambient and reflected light that \
+                                                       gets in",
+    ),
     Parameter::new(
         "specular",
         SCALAR_INPUT,
-        "strength of the dielectric reflection, times that of `ior`; a number, attribute or sampler",
+        "strength of the dielectric reflection, times that of `ior`; a number, attribute or \
+         sampler",
     )
     .floats(&[0.0])
     .between(0.0, 1.0),
@@ -76,19 +94,33 @@ const PHYSICALLY_BASED: &[Parameter] = &[
 ];
 
 const IN_OUT: &[Parameter] = &[
-    Parameter::new("inTransform", &[DataType::FLOAT32_MAT4], "matrix on the attribute before the look-up")
-        .floats(IDENTITY),
-    Parameter::new("inOffset", &[DataType::FLOAT32_VEC4], "added to the attribute after the matrix")
-        .floats(&[0.0; 4]),
-    Parameter::new("filter", STRING, "how texels are combined").text("linear", &["nearest", "linear"]),
-    Parameter::new("borderColor", &[DataType::FLOAT32_VEC4], "what lies outside with clampToBorder")
-        .floats(&[0.0; 4])
-        .of("KHR_SAMPLER_IMAGExD_CLAMP_TO_BORDER"),
+    Parameter::new(
+        "inTransform",
+        &[DataType::FLOAT32_MAT4],
+        "matrix on the attribute before the look-up",
+    )
+    .floats(IDENTITY),
+    Parameter::new(
+        "inOffset",
+        &[DataType::FLOAT32_VEC4],
+        "added to the attribute after the matrix",
+    )
+    .floats(&[0.0; 4]),
+    Parameter::new("filter", STRING, "how texels are combined")
+        .text("linear", &["nearest", "linear"]),
+    Parameter::new(
+        "borderColor",
+        &[DataType::FLOAT32_VEC4],
+        "what lies outside with clampToBorder",
+    )
+    .floats(&[0.0; 4])
+    .of("KHR_SAMPLER_IMAGExD_CLAMP_TO_BORDER"),
 ];
 const OUT: &[Parameter] = &[
     Parameter::new("inAttribute", STRING, "the attribute to look up")
         .text("attribute0", super::super::scene::attribute::NAMES),
-    Parameter::new("outTransform", &[DataType::FLOAT32_MAT4], "matrix on the result").floats(IDENTITY),
+    Parameter::new("outTransform", &[DataType::FLOAT32_MAT4], "matrix on the result")
+        .floats(IDENTITY),
     Parameter::new("outOffset", &[DataType::FLOAT32_VEC4], "added to the result after the matrix")
         .floats(&[0.0; 4]),
 ];
@@ -109,10 +141,13 @@ const POSITION: Parameter =
     Parameter::new("position", VEC3, "place in the space of its group or world").floats(&[0.0; 3]);
 const INTENSITY: Parameter = Parameter::new("intensity", FLOAT, "W/sr").floats(&[1.0]);
 const OPENING_ANGLE: Parameter =
-    Parameter::new("openingAngle", FLOAT, "full angle of the cone, radians").floats(&[std::f32::consts::PI]);
+    Parameter::new("openingAngle", FLOAT, "full angle of the cone, radians")
+        .floats(&[std::f32::consts::PI]);
 const FALLOFF_ANGLE: Parameter =
-    Parameter::new("falloffAngle", FLOAT, "angle between the rim and full intensity, radians").floats(&[0.1]);
-const POWER: Parameter = Parameter::new("power", FLOAT, "W in all directions; comes before `intensity`");
+    Parameter::new("falloffAngle", FLOAT, "angle between the rim and full intensity, radians")
+        .floats(&[0.1]);
+const POWER: Parameter =
+    Parameter::new("power", FLOAT, "W in all directions; comes before `intensity`");
 
 const fn object(
     kind: DataType,
@@ -173,7 +208,13 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             .whole(0),
         ]],
     ),
-    object(DataType::SAMPLER, "transform", "KHR_SAMPLER_TRANSFORM", "an attribute times a matrix", &[OUT]),
+    object(
+        DataType::SAMPLER,
+        "transform",
+        "KHR_SAMPLER_TRANSFORM",
+        "an attribute times a matrix",
+        &[OUT],
+    ),
     object(
         DataType::LIGHT,
         "directional",
@@ -183,9 +224,14 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             LIGHT,
             &[
                 DIRECTION,
-                Parameter::new("irradiance", FLOAT, "W/m² on a surface that faces it").floats(&[1.0]),
+                Parameter::new("irradiance", FLOAT, "W/m² on a surface that faces it")
+                    .floats(&[1.0]),
                 Parameter::new("angularDiameter", FLOAT, "size in the sky, radians").floats(&[0.0]),
-                Parameter::new("radiance", FLOAT, "W/(sr m²); comes before `irradiance` when it has a size"),
+                Parameter::new(
+                    "radiance",
+                    FLOAT,
+                    "W/(sr m²); comes before `irradiance` when it has a size",
+                ),
             ],
         ],
     ),
@@ -201,7 +247,11 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                 INTENSITY,
                 POWER,
                 Parameter::new("radius", FLOAT, "radius of the sphere").floats(&[0.0]),
-                Parameter::new("radiance", FLOAT, "W/(sr m²); comes before the others when it has a radius"),
+                Parameter::new(
+                    "radiance",
+                    FLOAT,
+                    "W/(sr m²); comes before the others when it has a radius",
+                ),
             ],
         ],
     ),
@@ -222,11 +272,16 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
             &[
                 Parameter::new("position", VEC3, "a corner, in the space of its group or world")
                     .floats(&[0.0; 3]),
-                Parameter::new("edge1", VEC3, "from there to a neighbouring corner").floats(&[1.0, 0.0, 0.0]),
+                Parameter::new("edge1", VEC3, "from there to a neighbouring corner")
+                    .floats(&[1.0, 0.0, 0.0]),
                 Parameter::new("edge2", VEC3, "from there to the other neighbouring corner")
                     .floats(&[0.0, 1.0, 0.0]),
-                Parameter::new("side", STRING, "which side shines; the front is where edge1 x edge2 points")
-                    .text("front", &["front", "back", "both"]),
+                Parameter::new(
+                    "side",
+                    STRING,
+                    "which side shines; the front is where edge1 x edge2 points",
+                )
+                .text("front", &["front", "back", "both"]),
                 INTENSITY,
                 POWER,
                 Parameter::new("radiance", FLOAT, "W/(sr m²); comes before the others"),
@@ -249,7 +304,11 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                 Parameter::new("innerRadius", FLOAT, "radius of its hole").floats(&[0.0]),
                 INTENSITY,
                 POWER,
-                Parameter::new("radiance", FLOAT, "W/(sr m²); comes before the others when it has a radius"),
+                Parameter::new(
+                    "radiance",
+                    FLOAT,
+                    "W/(sr m²); comes before the others when it has a radius",
+                ),
             ],
         ],
     ),
@@ -261,12 +320,18 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         &[
             LIGHT,
             &[
-                Parameter::new("up", VEC3, "which way the picture's top is").floats(&[0.0, 0.0, 1.0]),
-                Parameter::new("direction", VEC3, "where the picture's middle is").floats(&[1.0, 0.0, 0.0]),
+                Parameter::new("up", VEC3, "which way the picture's top is")
+                    .floats(&[0.0, 0.0, 1.0]),
+                Parameter::new("direction", VEC3, "where the picture's middle is")
+                    .floats(&[1.0, 0.0, 0.0]),
                 Parameter {
                     elements: &[DataType::FLOAT32_VEC3],
-                    ..Parameter::new("radiance", &[DataType::ARRAY2D], "the picture, latitude by longitude")
-                        .required()
+                    ..Parameter::new(
+                        "radiance",
+                        &[DataType::ARRAY2D],
+                        "the picture, latitude by longitude",
+                    )
+                    .required()
                 },
                 Parameter::new("layout", STRING, "how the picture is spread")
                     .text("equirectangular", &["equirectangular"]),

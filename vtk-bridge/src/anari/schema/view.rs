@@ -64,7 +64,8 @@ const AMBIENT_OCCLUSION: &[Parameter] = &[
     )
     .whole(0)
     .between(0.0, 4096.0),
-    Parameter::new("ambientOcclusionDistance", FLOAT, "how far surfaces dim").floats(&[f32::INFINITY]),
+    Parameter::new("ambientOcclusionDistance", FLOAT, "how far surfaces dim")
+        .floats(&[f32::INFINITY]),
 ];
 
 const fn object(
@@ -94,7 +95,12 @@ pub(super) const CHANNELS: &[Parameter] = &[
         "",
         "the picture; its rows begin at the bottom",
     ),
-    channel("channel.depth", &[DataType::FLOAT32], "", "distance from the eye; infinite where nothing is"),
+    channel(
+        "channel.depth",
+        &[DataType::FLOAT32],
+        "",
+        "distance from the eye; infinite where nothing is",
+    ),
     channel(
         "channel.normal",
         &[DataType::FIXED16_VEC3, DataType::FLOAT32_VEC3],
@@ -113,7 +119,12 @@ pub(super) const CHANNELS: &[Parameter] = &[
         "KHR_FRAME_CHANNEL_PRIMITIVE_ID",
         "number of the primitive",
     ),
-    channel("channel.objectId", &[DataType::UINT32], "KHR_FRAME_CHANNEL_OBJECT_ID", "`id` of the surface"),
+    channel(
+        "channel.objectId",
+        &[DataType::UINT32],
+        "KHR_FRAME_CHANNEL_OBJECT_ID",
+        "`id` of the surface",
+    ),
     channel(
         "channel.instanceId",
         &[DataType::UINT32],
@@ -183,10 +194,15 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
                 Parameter::new("world", &[DataType::WORLD], "what is drawn").required(),
                 Parameter::new("renderer", &[DataType::RENDERER], "how it is drawn").required(),
                 Parameter::new("camera", &[DataType::CAMERA], "from where it is seen").required(),
-                Parameter::new("size", &[DataType::UINT32_VEC2], "pixels per row, and rows").required(),
-                Parameter::new("accumulation", FLAG, "frames of the same scene add to their samples")
-                    .whole(0)
-                    .of("KHR_FRAME_ACCUMULATION"),
+                Parameter::new("size", &[DataType::UINT32_VEC2], "pixels per row, and rows")
+                    .required(),
+                Parameter::new(
+                    "accumulation",
+                    FLAG,
+                    "frames of the same scene add to their samples",
+                )
+                .whole(0)
+                .of("KHR_FRAME_ACCUMULATION"),
                 Parameter::new(
                     "frameCompletionCallback",
                     &[DataType::FRAME_COMPLETION_CALLBACK],
@@ -210,7 +226,11 @@ pub(super) const OBJECTS: &[ObjectSchema] = &[
         "rt-core, a ray tracer for scientific visualization on the CPU",
         &[&[
             Parameter::new("statusCallback", &[DataType::STATUS_CALLBACK], "takes messages"),
-            Parameter::new("statusCallbackUserData", &[DataType::VOID_POINTER], "handed to that function"),
+            Parameter::new(
+                "statusCallbackUserData",
+                &[DataType::VOID_POINTER],
+                "handed to that function",
+            ),
         ]],
     ),
     object(

@@ -58,7 +58,9 @@ impl Pair {
 }
 
 fn change(list: &[(&str, serde_json::Value)]) -> ToProgram {
-    ToProgram::Change { assignments: list.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect() }
+    ToProgram::Change {
+        assignments: list.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect(),
+    }
 }
 
 #[test]
@@ -82,10 +84,13 @@ fn settings_come_through_and_are_confirmed() {
     assert_eq!(settings, *s);
     assert_eq!(refused, ["panel: `samples` is 0; give a whole number from 1 to 4096"]);
 
-    // A change replaces the ones before; the same again is no wish; the end of the panel is the end of its settings.
+    // A change replaces the ones before; the same again is no wish; the end of the panel is the end
+    // of its settings.
     p.say(&change(&[("mode", "rich".into())]));
     let wishes = p.until(|_, w| !w.is_empty());
-    assert!(matches!(&wishes[0], PanelCommand::Settings(s) if s.effects.ambient_occlusion_samples == 8));
+    assert!(
+        matches!(&wishes[0], PanelCommand::Settings(s) if s.effects.ambient_occlusion_samples == 8)
+    );
     p.say(&change(&[("mode", "rich".into())]));
     p.say(&ToProgram::Export {});
     assert_eq!(p.until(|_, w| !w.is_empty()), [PanelCommand::Export]);
@@ -105,7 +110,10 @@ fn who_does_not_know_the_answer_is_not_listened_to() {
         p.say(&first);
         p.say(&change(&[("mode", "rich".into())]));
         let wishes = p.until(|link, _| link.connection.is_none());
-        assert!(wishes.is_empty() && p.link.in_force == Settings::default(), "{first:?}: {wishes:?}");
+        assert!(
+            wishes.is_empty() && p.link.in_force == Settings::default(),
+            "{first:?}: {wishes:?}"
+        );
     }
 }
 
@@ -137,12 +145,18 @@ fn frames_are_thinned_to_means_and_a_panel_that_does_not_read_costs_nothing() {
         second.frame > 1 && (second.frame_ms - 2.0).abs() < 1e-9 && second.rays["primary"] == 100,
         "{second:?}"
     );
-    // Two system calls a poll on a loaded machine; the bound is for a wait that should not be there.
+    // Two system calls a poll on a loaded machine; the bound is for a wait that should not be
+    // there.
     assert!(elapsed < Duration::from_secs(10), "{elapsed:?} for 50 000 frames");
 
     // Megabytes that nobody reads.
     let many: Vec<ObjectInfo> = (0..MAX_OBJECTS as u64)
-        .map(|i| ObjectInfo { key: format!("k{i}"), name: "x".repeat(500), triangles: i, color: None })
+        .map(|i| ObjectInfo {
+            key: format!("k{i}"),
+            name: "x".repeat(500),
+            triangles: i,
+            color: None,
+        })
         .collect();
     let begin = Instant::now();
     for i in 0..100 {
@@ -180,7 +194,8 @@ proptest! {
         known in any::<bool>(),
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 1..300),
-            "\\{\"type\":\"(change|welcome|export|hello)\"[ -~]{0,80}\\}?".prop_map(String::into_bytes),
+            "\\{\"type\":\"(change|welcome|export|hello)\"[ \
+             -~]{0,80}\\}?".prop_map(String::into_bytes),
             "[\\[\\{\"]{1,2000}".prop_map(String::into_bytes),
         ],
     ) {

@@ -24,10 +24,15 @@ impl PacketLimits {
 }
 
 impl Packet {
-    /// Fills the packet from at most sixteen blocks. False when the rays do not share an octant and a dominant axis, or when one of them is
-    /// not finite or outside `limits`.
+    /// Fills the packet from at most sixteen blocks. False when the rays do not share an octant and
+    /// a dominant axis, or when one of them is not finite or outside `limits`.
     #[inline(never)]
-    pub(crate) fn load<S: Simd>(&mut self, simd: S, blocks: &[RayBlock], limits: &PacketLimits) -> bool {
+    pub(crate) fn load<S: Simd>(
+        &mut self,
+        simd: S,
+        blocks: &[RayBlock],
+        limits: &PacketLimits,
+    ) -> bool {
         simd.vectorize(
             #[inline(always)]
             || self.load_body(simd, blocks, limits),
@@ -39,10 +44,12 @@ impl Packet {
         debug_assert!(blocks.len() <= GROUPS, "{} groups", blocks.len());
         let v = |x: f32| f32x16::splat(simd, x);
 
-        // ---- Which lanes hold rays. The first ray stands for the packet and fills empty lanes, so that they widen no interval.
+        // ---- Which lanes hold rays. The first ray stands for the packet and fills empty lanes, so
+        // that they widen no interval.
         self.active = [0; GROUPS];
         self.hit = [0; GROUPS];
-        // Number 0 at the ray's own limit: nothing at exactly t_max can win the tie, which makes the range half-open.
+        // Number 0 at the ray's own limit: nothing at exactly t_max can win the tie, which makes
+        // the range half-open.
         self.prim = [[0; LANES]; GROUPS];
         self.groups = 0;
         for (g, b) in blocks.iter().enumerate() {
@@ -88,7 +95,8 @@ impl Packet {
             let d: [f32x16<S>; 3] = three!(|a| filled(simd, d_rows[a], on));
             let o: [f32x16<S>; 3] = three!(|a| filled(simd, o_rows[a], on));
             let abs: [f32x16<S>; 3] = three!(|a| d[a].abs());
-            // At least as large as the axes after it, larger than those before it: ties go to the lower axis, as for single rays.
+            // At least as large as the axes after it, larger than those before it: ties go to the
+            // lower axis, as for single rays.
             let [x, y, z] = abs;
             same &= match kz {
                 0 => x.simd_ge(y) & x.simd_ge(z) & x.simd_gt(v(0.0)),
@@ -150,10 +158,12 @@ impl Packet {
             near.store_slice(&mut self.origin_near[a]);
             far.store_slice(&mut self.origin_far[a]);
         }
-        (reduce_rows::<S, true>(simd, &self.t, 1) * v(inflate_t(1.0))).store_slice(&mut self.group_t);
+        (reduce_rows::<S, true>(simd, &self.t, 1) * v(inflate_t(1.0)))
+            .store_slice(&mut self.group_t);
         reduce_rows::<S, false>(simd, &self.t_min, 1).store_slice(&mut self.group_t_min);
 
-        // ---- Shears of the groups, as differences from the middle: leaves test triangles' edges against them.
+        // ---- Shears of the groups, as differences from the middle: leaves test triangles' edges
+        // against them.
         if self.common_origin {
             for a in 0..2 {
                 let lo = reduce_rows::<S, false>(simd, &self.shear.as_flattened()[a..], 3);
@@ -180,8 +190,9 @@ fn filled<S: Simd>(simd: S, row: &Row, on: Option<(mask32x16<S>, usize)>) -> f32
     }
 }
 
-/// Sixteen reductions over sixteen lanes each: lane g of the result is the smallest (or largest) of `rows[g * stride]`. Halves of two rows are compared at a time, so
-/// the whole takes fifteen steps instead of sixteen times four and as many transfers to scalar registers.
+/// Sixteen reductions over sixteen lanes each: lane g of the result is the smallest (or largest) of
+/// `rows[g * stride]`. Halves of two rows are compared at a time, so the whole takes fifteen steps
+/// instead of sixteen times four and as many transfers to scalar registers.
 #[inline(always)]
 fn reduce_rows<S: Simd, const MAX: bool>(simd: S, rows: &[Row], stride: usize) -> f32x16<S> {
     #[inline(always)]

@@ -1,10 +1,12 @@
-//! Up to 256 rays at a time, for rays that go the same way: tiles of primary rays, shadow rays to one light, sorted ambient occlusion rays.
+//! Up to 256 rays at a time, for rays that go the same way: tiles of primary rays, shadow rays to
+//! one light, sorted ambient occlusion rays.
 //!
-//! Two levels of bounds do most of the work. All rays of a packet share one octant, so intervals of their reciprocal directions (and origins)
-//! bound every ray's distance to a plane. A node's eight children are tested against the whole packet at once, and a child that survives
-//! against the intervals of its sixteen groups of sixteen rays at once; only groups that reach a leaf test its triangles, sixteen rays at a
-//! time. (Interval packets: Boulos et al. 2006, Overbeck et al. 2008; two levels: measured in this project, 1.2 to 2 times faster than flat
-//! packets of 64 or 256.)
+//! Two levels of bounds do most of the work. All rays of a packet share one octant, so intervals of
+//! their reciprocal directions (and origins) bound every ray's distance to a plane. A node's eight
+//! children are tested against the whole packet at once, and a child that survives against the
+//! intervals of its sixteen groups of sixteen rays at once; only groups that reach a leaf test its
+//! triangles, sixteen rays at a time. (Interval packets: Boulos et al. 2006, Overbeck et al. 2008;
+//! two levels: measured in this project, 1.2 to 2 times faster than flat packets of 64 or 256.)
 //!
 //! The triangle test is the single ray's, operation by operation, so both give the same bits.
 
@@ -43,7 +45,8 @@ pub(crate) struct Packet {
     active: [u16; GROUPS],
     /// Lanes that have one.
     pub(crate) hit: [u16; GROUPS],
-    // Per group: intervals of reciprocal directions (per axis smallest and largest) and origins, and the largest t.
+    // Per group: intervals of reciprocal directions (per axis smallest and largest) and origins,
+    // and the largest t.
     rcp_bounds: [[Row; 2]; 3],
     /// The end of the origins' interval that makes near planes nearest, and the other one.
     origin_near: [Row; 3],
@@ -61,12 +64,14 @@ pub(crate) struct Packet {
     shear_bounds: [[Row; 2]; 2],
     /// Largest difference from `shear_mid` of all groups.
     shear_span: [f32; 2],
-    /// Whether testing groups' rays one by one against boxes pays with a common origin, learned from the packets before: closest hits, occlusion.
+    /// Whether testing groups' rays one by one against boxes pays with a common origin, learned
+    /// from the packets before: closest hits, occlusion.
     slabs: [SlabHeuristic; 2],
 }
 
-/// Whether rays' own box tests throw out enough of the groups whose intervals meet a box. They do for shadow rays of points at many depths and not
-/// for tiles of pixels; no measure of the intervals told these apart as well as trying. Answers do not depend on it.
+/// Whether rays' own box tests throw out enough of the groups whose intervals meet a box. They do
+/// for shadow rays of points at many depths and not for tiles of pixels; no measure of the
+/// intervals told these apart as well as trying. Answers do not depend on it.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlabHeuristic {
     /// Groups tested and kept lately.
@@ -90,16 +95,21 @@ struct SlabCounts {
 impl SlabHeuristic {
     /// Every so many packets the tests are tried again.
     const TRIAL: u8 = 16;
-    /// Beyond this share of kept groups the tests cost more than they save. Measured shares on one million triangles: 0.83 and 0.94 for pixels (orbit, close by),
-    /// where the tests cost a tenth of the time; 0.66 and 0.93 for rays from a light, where they save a third and cost a quarter.
+    /// Beyond this share of kept groups the tests cost more than they save. Measured shares on one
+    /// million triangles: 0.83 and 0.94 for pixels (orbit, close by), where the tests cost a tenth
+    /// of the time; 0.66 and 0.93 for rays from a light, where they save a third and cost a
+    /// quarter.
     const KEPT: f32 = 0.75;
-    /// With fewer rays than this in a group that is tested, the packet falls apart, and the tests find the few rays that had better go on alone. One value tried: rays from a light
-    /// among pipes took 94 instead of 133 ms, among isosurfaces nothing changed.
+    /// With fewer rays than this in a group that is tested, the packet falls apart, and the tests
+    /// find the few rays that had better go on alone. One value tried: rays from a light among
+    /// pipes took 94 instead of 133 ms, among isosurfaces nothing changed.
     const RAYS: f32 = 5.0;
 
     fn next(&mut self) -> bool {
         self.since = if self.since >= Self::TRIAL { 0 } else { self.since + 1 };
-        self.kept <= Self::KEPT * self.tested || self.rays <= Self::RAYS * self.tested || self.since == 0
+        self.kept <= Self::KEPT * self.tested
+            || self.rays <= Self::RAYS * self.tested
+            || self.since == 0
     }
 
     fn learn(&mut self, SlabCounts { tested, kept, rays }: SlabCounts) {
@@ -176,7 +186,8 @@ impl Packet {
                     hit.select(load_row(simd, &self.t[g]), infinity).store_slice(&mut h.t);
                     hit.select(load_row(simd, &self.u[g]), zero).store_slice(&mut h.u);
                     hit.select(load_row(simd, &self.v[g]), zero).store_slice(&mut h.v);
-                    hit.select(u32x16::from_slice(simd, &self.prim[g]), none).store_slice(&mut h.prim);
+                    hit.select(u32x16::from_slice(simd, &self.prim[g]), none)
+                        .store_slice(&mut h.prim);
                     hit.select(u32x16::splat(simd, instance), none).store_slice(&mut h.instance);
                 }
             },
@@ -184,9 +195,14 @@ impl Packet {
     }
 
     /// Traces the loaded rays against a triangle hierarchy.
-    pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(&mut self, simd: S, bvh: &WideBvh) {
+    pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(
+        &mut self,
+        simd: S,
+        bvh: &WideBvh,
+    ) {
         if !self.common_origin {
-            // Intervals of origins and directions together say little: measured seven times slower without the rays' own tests.
+            // Intervals of origins and directions together say little: measured seven times slower
+            // without the rays' own tests.
             self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, false>);
         } else if self.slabs[ANY as usize].next() {
             let slabs = self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
@@ -196,8 +212,14 @@ impl Packet {
         }
     }
 
-    /// The leaves of a hierarchy that some group of the packet may reach before its limit, with the distance to the leaf's box.
-    pub(crate) fn collect<S: Simd>(&mut self, simd: S, bvh: &WideBvh, out: &mut Vec<(f32, ChildRef)>) {
+    /// The leaves of a hierarchy that some group of the packet may reach before its limit, with the
+    /// distance to the leaf's box.
+    pub(crate) fn collect<S: Simd>(
+        &mut self,
+        simd: S,
+        bvh: &WideBvh,
+        out: &mut Vec<(f32, ChildRef)>,
+    ) {
         self.walk::<S, _, false>(simd, bvh, &mut CollectLeaves(out));
     }
 }
@@ -207,7 +229,8 @@ trait PacketLeaf<S: Simd> {
     /// All rays start at one point.
     const COMMON: bool;
 
-    /// `reached` are the groups whose bounds meet the leaf's box, first at `distance`. Returns the groups whose limits changed.
+    /// `reached` are the groups whose bounds meet the leaf's box, first at `distance`. Returns the
+    /// groups whose limits changed.
     fn leaf(
         &mut self,
         packet: &mut Packet,
@@ -236,7 +259,15 @@ impl<S: Simd> PacketLeaf<S> for CollectLeaves<'_> {
     const COMMON: bool = false;
 
     #[inline(always)]
-    fn leaf(&mut self, _: &mut Packet, _: S, _: &[Unit], leaf: ChildRef, _: u16, distance: f32) -> u16 {
+    fn leaf(
+        &mut self,
+        _: &mut Packet,
+        _: S,
+        _: &[Unit],
+        leaf: ChildRef,
+        _: u16,
+        distance: f32,
+    ) -> u16 {
         self.0.push((distance, leaf));
         0
     }

@@ -1,6 +1,8 @@
-//! A subtree that only a few rays of a packet meet: each of them walks it for itself, two at a time.
+//! A subtree that only a few rays of a packet meet: each of them walks it for itself, two at a
+//! time.
 //!
-//! Rays that leave each other spread over the groups, a lane here and one there, and every box and triangle would still be tested against sixteen.
+//! Rays that leave each other spread over the groups, a lane here and one there, and every box and
+//! triangle would still be tested against sixteen.
 
 use super::Packet;
 use crate::bvh::WideBvh;
@@ -13,11 +15,13 @@ use crate::ray::LANES;
 use crate::stats::{Counter, count};
 use fearless_simd::Simd;
 
-/// With this many rays or fewer: two pairs. Not tuned; with it, shadow rays from a surface gained 6 % in the whole view of one million triangles (records `peers` before and after).
+/// With this many rays or fewer: two pairs. Not tuned; with it, shadow rays from a surface gained 6
+/// % in the whole view of one million triangles (records `peers` before and after).
 pub(super) const MAX_SINGLE_RAYS: usize = 4;
 
 impl Packet {
-    /// What a ray needs to go on alone: the packet's own numbers, so that its answers stay the same bits.
+    /// What a ray needs to go on alone: the packet's own numbers, so that its answers stay the same
+    /// bits.
     #[inline(always)]
     fn setup(&self, g: usize, lane: usize) -> RaySetup {
         let [kx, ky, kz] = self.axes;
@@ -33,7 +37,8 @@ impl Packet {
         }
     }
 
-    /// The rays of `lanes` in the groups of `reached`, at most [`MAX_SINGLE_RAYS`], through the subtree at `start`. Returns the groups with new hits.
+    /// The rays of `lanes` in the groups of `reached`, at most [`MAX_SINGLE_RAYS`], through the
+    /// subtree at `start`. Returns the groups with new hits.
     #[inline(never)]
     pub(super) fn switch_to_single<S: Simd, const EXACT: bool, const ANY: bool>(
         &mut self,
@@ -146,8 +151,13 @@ impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for ClosestRays<'_, 'r, EXA
         let (number, ray, g, lane) = self.0.take()?;
         let p = &self.0.packet;
         let found = p.hit[g] >> lane & 1 == 1;
-        let best =
-            ClosestTri { t: p.t[g][lane], u: p.u[g][lane], v: p.v[g][lane], prim: p.prim[g][lane], found };
+        let best = ClosestTri {
+            t: p.t[g][lane],
+            u: p.u[g][lane],
+            v: p.v[g][lane],
+            prim: p.prim[g][lane],
+            found,
+        };
         let leaf = ClosestLeaf::continuing(ray, best);
         Some(RayTask { number, ray, t_max: best.t, start: self.0.start, leaf })
     }

@@ -44,12 +44,14 @@ impl<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool> PacketLeaf
     }
 }
 
-/// From this many groups on, a leaf's triangles are tested against the groups' bounds before they are tested against rays. Measured on one million
-/// triangles: always 43.8 ms in orbit (few groups a leaf) and 16.6 ms close by; never 36.9 and 18.1.
+/// From this many groups on, a leaf's triangles are tested against the groups' bounds before they
+/// are tested against rays. Measured on one million triangles: always 43.8 ms in orbit (few groups
+/// a leaf) and 16.6 ms close by; never 36.9 and 18.1.
 const CULL: u32 = 6;
 
-/// The edge functions of four triangles over a packet's shears: `k + a·δx + b·δy` with δ the difference from the middle shear, signed so that rays inside
-/// have none below `-margin`. All zero where the orientation is not certain.
+/// The edge functions of four triangles over a packet's shears: `k + a·δx + b·δy` with δ the
+/// difference from the middle shear, signed so that rays inside have none below `-margin`. All zero
+/// where the orientation is not certain.
 struct EdgeFunctions {
     k: [[f32; 4]; 3],
     a: [[f32; 4]; 3],
@@ -60,9 +62,11 @@ struct EdgeFunctions {
 impl Packet {
     /// Edge functions for [`Packet::cull_groups`].
     ///
-    /// With one origin, the test's sheared corner is p(δ) = p₀ − δ·z, and the product difference of two of them is linear in δ: the term in δx·δy
-    /// cancels. Error bound: let Z be the largest |z|, L the largest |p₀| plus the largest |δ| times Z. Corners are rounded by at most u·(Z + L) in the
-    /// test and 3·u·(Z + L) here, and every product is below 2·L²; all in all the two differ by less than 54·u·L·(Z + L). `margin` has 64.
+    /// With one origin, the test's sheared corner is p(δ) = p₀ − δ·z, and the product difference of
+    /// two of them is linear in δ: the term in δx·δy cancels. Error bound: let Z be the largest
+    /// |z|, L the largest |p₀| plus the largest |δ| times Z. Corners are rounded by at most u·(Z +
+    /// L) in the test and 3·u·(Z + L) here, and every product is below 2·L²; all in all the two
+    /// differ by less than 54·u·L·(Z + L). `margin` has 64.
     #[inline(always)]
     fn edge_functions<S: Simd>(&self, simd: S, abc: &[[f32x4<S>; 3]; 3]) -> EdgeFunctions {
         let v = |x: f32| f32x4::splat(simd, x);
@@ -73,16 +77,21 @@ impl Packet {
         let z: [f32x4<S>; 3] = three!(|i| abc[i][2]);
         // Pairs (p, q) of the test's u, v and w: p.x·q.y − p.y·q.x.
         const PAIRS: [[usize; 2]; 3] = [[2, 1], [0, 2], [1, 0]];
-        let k: [f32x4<S>; 3] = three!(|e| x[PAIRS[e][0]] * y[PAIRS[e][1]] - y[PAIRS[e][0]] * x[PAIRS[e][1]]);
-        let a: [f32x4<S>; 3] = three!(|e| y[PAIRS[e][0]] * z[PAIRS[e][1]] - z[PAIRS[e][0]] * y[PAIRS[e][1]]);
-        let b: [f32x4<S>; 3] = three!(|e| z[PAIRS[e][0]] * x[PAIRS[e][1]] - x[PAIRS[e][0]] * z[PAIRS[e][1]]);
+        let k: [f32x4<S>; 3] =
+            three!(|e| x[PAIRS[e][0]] * y[PAIRS[e][1]] - y[PAIRS[e][0]] * x[PAIRS[e][1]]);
+        let a: [f32x4<S>; 3] =
+            three!(|e| y[PAIRS[e][0]] * z[PAIRS[e][1]] - z[PAIRS[e][0]] * y[PAIRS[e][1]]);
+        let b: [f32x4<S>; 3] =
+            three!(|e| z[PAIRS[e][0]] * x[PAIRS[e][1]] - x[PAIRS[e][0]] * z[PAIRS[e][1]]);
         let far = z[0].abs().max(z[1].abs()).max(z[2].abs());
         let lateral: [f32x4<S>; 3] = three!(|i| x[i].abs().max(y[i].abs()));
         let lateral = lateral[0].max(lateral[1]).max(lateral[2]) + dx.max(dy) * far;
         // The smallest normal number covers products that underflow.
         let margin = lateral * (far + lateral) * v(32.0 * f32::EPSILON) + v(f32::MIN_POSITIVE);
-        // The sum of the three has the sign of the triangle's orientation. Where the packet sees only one side, rays inside have no edge of the other sign.
-        let reach = (a[0] + a[1] + a[2]).abs() * dx + (b[0] + b[1] + b[2]).abs() * dy + v(4.0) * margin;
+        // The sum of the three has the sign of the triangle's orientation. Where the packet sees
+        // only one side, rays inside have no edge of the other sign.
+        let reach =
+            (a[0] + a[1] + a[2]).abs() * dx + (b[0] + b[1] + b[2]).abs() * dy + v(4.0) * margin;
         let sum = k[0] + k[1] + k[2];
         let (plus, minus) = (sum.simd_gt(reach), (-sum).simd_gt(reach));
         let sign = plus.select(v(1.0), minus.select(v(-1.0), v(0.0)));
@@ -115,14 +124,17 @@ impl Packet {
             let (a, b) = (edges.a[e][j], edges.b[e][j]);
             let x = load_row(simd, &self.shear_bounds[0][(a > 0.0) as usize]);
             let y = load_row(simd, &self.shear_bounds[1][(b > 0.0) as usize]);
-            f32x16::splat(simd, edges.k[e][j]) + x * f32x16::splat(simd, a) + y * f32x16::splat(simd, b)
+            f32x16::splat(simd, edges.k[e][j])
+                + x * f32x16::splat(simd, a)
+                + y * f32x16::splat(simd, b)
         });
         let largest = largest[0].min(largest[1]).min(largest[2]);
         // NaN stays in.
         !(largest.simd_lt(f32x16::splat(simd, -edges.margin[j])).to_bitmask() as u16)
     }
 
-    /// The triangles of a leaf against the groups that reached it. Returns the groups with new hits.
+    /// The triangles of a leaf against the groups that reached it. Returns the groups with new
+    /// hits.
     #[inline(always)]
     fn triangles<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool>(
         &mut self,
@@ -140,8 +152,11 @@ impl Packet {
             self.corner::<S, COMMON>(simd, floats, 1),
             self.corner::<S, COMMON>(simd, floats, 2),
         ];
-        let edges =
-            if COMMON && reached.count_ones() >= CULL { Some(self.edge_functions(simd, &abc)) } else { None };
+        let edges = if COMMON && reached.count_ones() >= CULL {
+            Some(self.edge_functions(simd, &abc))
+        } else {
+            None
+        };
         let [a, b, c] = abc;
         let corners: [[f32; 4]; 9] = [
             a[0].to_array(),

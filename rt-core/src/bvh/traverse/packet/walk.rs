@@ -20,7 +20,8 @@ struct Entry {
     groups: u16,
 }
 
-/// Smallest distance to a plane over intervals of origins (`o` is the end that makes it smallest) and reciprocal directions.
+/// Smallest distance to a plane over intervals of origins (`o` is the end that makes it smallest)
+/// and reciprocal directions.
 #[inline(always)]
 fn nearest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
     let p = plane - o;
@@ -44,7 +45,13 @@ fn planes(node: &[Unit; NODE_UNITS], near: [usize; 3], slot: usize) -> [f32; 6] 
 impl Packet {
     /// Groups that may meet the box with these planes before `group_t`, by their intervals.
     #[inline(always)]
-    fn groups_in_box<S: Simd>(&self, simd: S, planes: &[f32; 6], group_t: f32x16<S>, common: bool) -> u16 {
+    fn groups_in_box<S: Simd>(
+        &self,
+        simd: S,
+        planes: &[f32; 6],
+        group_t: f32x16<S>,
+        common: bool,
+    ) -> u16 {
         let (n, f): ([f32x16<S>; 3], [f32x16<S>; 3]) = if common {
             // One origin: the sign of a plane's offset says which end of the interval is nearest.
             let p: [f32; 3] = three!(|a| planes[a] - self.origin_near[a][0]);
@@ -74,7 +81,8 @@ impl Packet {
         near.simd_le(far).to_bitmask() as u16
     }
 
-    /// `SLABS`: groups whose intervals meet a box are tested ray by ray before they go on. Returns how many were and what came of it.
+    /// `SLABS`: groups whose intervals meet a box are tested ray by ray before they go on. Returns
+    /// how many were and what came of it.
     #[inline(never)]
     pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
         &mut self,
@@ -105,8 +113,10 @@ impl Packet {
         let [nx, ny, nz] = near_rows;
 
         // ---- Bounds of the groups, and of the whole packet for eight boxes at a time.
-        let all_lo: [f32x8<S>; 3] = three!(|a| v8(load_row(simd, &self.rcp_bounds[a][0]).reduce_min()));
-        let all_hi: [f32x8<S>; 3] = three!(|a| v8(load_row(simd, &self.rcp_bounds[a][1]).reduce_max()));
+        let all_lo: [f32x8<S>; 3] =
+            three!(|a| v8(load_row(simd, &self.rcp_bounds[a][0]).reduce_min()));
+        let all_hi: [f32x8<S>; 3] =
+            three!(|a| v8(load_row(simd, &self.rcp_bounds[a][1]).reduce_max()));
         let positive = [nx & 1 == 0, ny & 1 == 0, nz & 1 == 0];
         let all_near: [f32x8<S>; 3] = three!(|a| {
             let o = load_row(simd, &self.origin_near[a]);
@@ -127,8 +137,9 @@ impl Packet {
         let mut node_at = 0;
         let mut groups = self.groups;
         'nodes: loop {
-            // ---- A node: its eight boxes against the packet, then each that is met against the groups. Testing the groups here, for all children in a
-            // row, lets their long chains of operations overlap; at the pop they would wait for one another.
+            // ---- A node: its eight boxes against the packet, then each that is met against the
+            // groups. Testing the groups here, for all children in a row, lets their long chains of
+            // operations overlap; at the pop they would wait for one another.
             count(Counter::Nodes, 1);
             let node: &[Unit; NODE_UNITS] =
                 units[node_at..node_at + NODE_UNITS].try_into().expect("a slice of that length");
@@ -151,13 +162,17 @@ impl Packet {
                     mask &= mask - 1;
                     count(Counter::GroupBoxes, 1);
                     let reached =
-                        self.groups_in_box(simd, &planes(node, near_rows, i), group_t, L::COMMON) & groups;
+                        self.groups_in_box(simd, &planes(node, near_rows, i), group_t, L::COMMON)
+                            & groups;
                     if reached == 0 {
                         continue;
                     }
                     prefetch::<4>(units, ChildRef(refs[i]).unit());
                     let place = (node_at * 8 + i) as u64;
-                    stack.push(Entry { key: ((near[i].to_bits() as u64) << 32) | place, groups: reached });
+                    stack.push(Entry {
+                        key: ((near[i].to_bits() as u64) << 32) | place,
+                        groups: reached,
+                    });
                 }
                 stack.sort_descending_from(base);
             }
@@ -177,8 +192,13 @@ impl Packet {
                 let mut rays = u32::MAX;
                 if SLABS {
                     slabs.tested += reached.count_ones();
-                    (reached, rays) =
-                        self.cull_rays(simd, &planes(node, near_rows, slot), reached, L::COMMON, &mut lanes);
+                    (reached, rays) = self.cull_rays(
+                        simd,
+                        &planes(node, near_rows, slot),
+                        reached,
+                        L::COMMON,
+                        &mut lanes,
+                    );
                     slabs.kept += reached.count_ones();
                     slabs.rays += rays;
                     if reached == 0 {
@@ -193,7 +213,12 @@ impl Packet {
                 if !SLABS {
                     // Hits found since the push may lie before the leaf.
                     count(Counter::GroupBoxes, 1);
-                    reached &= self.groups_in_box(simd, &planes(node, near_rows, slot), group_t, L::COMMON);
+                    reached &= self.groups_in_box(
+                        simd,
+                        &planes(node, near_rows, slot),
+                        group_t,
+                        L::COMMON,
+                    );
                     if reached == 0 {
                         continue;
                     }
@@ -221,7 +246,8 @@ impl Packet {
         slabs
     }
 
-    /// Of the groups in `reached`, those with a ray that meets the box, and how many rays do; `lanes` gets which. The intervals of rays with different origins or diverging directions say
+    /// Of the groups in `reached`, those with a ray that meets the box, and how many rays do;
+    /// `lanes` gets which. The intervals of rays with different origins or diverging directions say
     /// little far away; this test is each ray's own.
     #[inline(always)]
     fn cull_rays<S: Simd>(

@@ -9,18 +9,20 @@ use crate::anari::status::Severity;
 use crate::capi::guarded;
 use std::ffi::{c_char, c_int, c_void};
 
-// ---- Questions ------------------------------------------------------------------------------------------------------
-
+// ---- Questions ----------------------------------------------------------------------------------
 /// Writes a property where the program wants it, if it asks for the right type and has enough room.
 ///
 /// # Safety
 /// `mem` may be written to for `size` bytes.
 unsafe fn write(property: &Property, wanted: DataType, mem: *mut c_void, size: u64) -> bool {
     let (fits, bytes) = match property {
-        Property::I32(v) => (matches!(wanted, DataType::INT32 | DataType::UINT32), v.to_ne_bytes().to_vec()),
+        Property::I32(v) => {
+            (matches!(wanted, DataType::INT32 | DataType::UINT32), v.to_ne_bytes().to_vec())
+        }
         Property::U64(v) => (wanted == DataType::UINT64, v.to_ne_bytes().to_vec()),
         Property::Floats(v) => {
-            let fits = matches!(wanted.0, 1068..=1071 | 2008..=2011) && wanted.size() == Some(4 * v.len());
+            let fits =
+                matches!(wanted.0, 1068..=1071 | 2008..=2011) && wanted.size() == Some(4 * v.len());
             (fits, v.iter().flat_map(|f| f.to_ne_bytes()).collect())
         }
         Property::Text(t) => {
@@ -34,7 +36,8 @@ unsafe fn write(property: &Property, wanted: DataType, mem: *mut c_void, size: u
     if !fits || mem.is_null() || (bytes.len() as u64) > size {
         return false;
     }
-    // SAFETY: the caller promised `size` bytes, and there are no more than that; both are bytes and do not overlap.
+    // SAFETY: the caller promised `size` bytes, and there are no more than that; both are bytes and
+    // do not overlap.
     unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), mem.cast::<u8>(), bytes.len()) };
     true
 }
@@ -59,7 +62,10 @@ pub(super) unsafe extern "C" fn get_property(
             && !mem.is_null()
         {
             // SAFETY: there is room for a pointer; it may be unaligned.
-            unsafe { mem.cast::<*const *const c_char>().write_unaligned(Introspection::get().extensions()) };
+            unsafe {
+                mem.cast::<*const *const c_char>()
+                    .write_unaligned(Introspection::get().extensions())
+            };
             return 1;
         }
         let property = if of_device {
@@ -109,8 +115,7 @@ pub(super) unsafe extern "C" fn parameter_info(
     })
 }
 
-// ---- Frames ---------------------------------------------------------------------------------------------------------
-
+// ---- Frames -------------------------------------------------------------------------------------
 pub(super) unsafe extern "C" fn map_frame(
     this: This,
     o: Object,
@@ -156,9 +161,12 @@ pub(super) unsafe extern "C" fn discard_frame(this: This, o: Object) {
     unsafe { guard(this, (), |d| d.device.discard_frame(handle(o))) }
 }
 
-// ---- The rest -------------------------------------------------------------------------------------------------------
-
-pub(super) unsafe extern "C" fn new_extension_object(this: This, kind: Name, subtype: Name) -> Object {
+// ---- The rest -----------------------------------------------------------------------------------
+pub(super) unsafe extern "C" fn new_extension_object(
+    this: This,
+    kind: Name,
+    subtype: Name,
+) -> Object {
     let refuse = |d: &DeviceObject| {
         // SAFETY: strings that end with 0, or null.
         let (kind, subtype) = unsafe { (text(kind), text(subtype)) };
