@@ -2,10 +2,11 @@
 //!
 //! The steps are a list in [`plan`]; [`runner`] runs them and prints what each cost; [`peers`]
 //! finds and installs the software of others that some tests compare with; [`licences`] checks what
-//! we link against.
+//! we link against; [`package`] checks what we publish.
 
 mod licences;
 mod main_job;
+mod package;
 mod peers;
 mod plan;
 mod runner;

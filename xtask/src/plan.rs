@@ -6,7 +6,7 @@
 //! profile, whose members are optimised: also `main-job`.
 
 use crate::runner::{Context, Outcome};
-use crate::{licences, main_job, runner};
+use crate::{licences, main_job, package, runner};
 
 /// One check.
 #[derive(Debug)]
@@ -75,6 +75,12 @@ pub(crate) const STEPS: &[Step] = &[
         tells: "cargo-deny agrees, also about sources, duplicates and other platforms; needs \
                 cargo-deny",
         action: Action::Call(runner::cargo_deny),
+    },
+    Step {
+        name: "package",
+        tells: "every published member makes a package that has its licences, its README and all \
+                files it includes",
+        action: Action::Call(package::check),
     },
     Step {
         name: "clippy",
