@@ -556,12 +556,15 @@ fn main() {
             pub(in crate::interpose::symbols) unsafe extern \"C\" fn {name}({args}) {{ {read} \
             match current_context::fast_call({index}, |c| {step}) {{
                 FastPathResult::Done => (),
-                FastPathResult::Driver if let Some(known) = found({index}) => {{
+                FastPathResult::Driver => match found({index}) {{
+                    Some(known) => {{
+                        // SAFETY: as above.
+                        let f: unsafe extern \"C\" fn({types}) = unsafe {{ \
+                        core::mem::transmute(known) }};
+                        // SAFETY: as above.
+                        unsafe {{ f({call}) }} }}
                     // SAFETY: as above.
-                    let f: unsafe extern \"C\" fn({types}) = unsafe {{ core::mem::transmute(known) \
-                    }};
-                    // SAFETY: as above.
-                    unsafe {{ f({call}) }} }}
+                    None => unsafe {{ {name}_slow({call}) }} }},
                 // SAFETY: as above.
                 _ => unsafe {{ {name}_slow({call}) }} }} }}"
         )
