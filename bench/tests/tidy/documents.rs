@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
+use crate::counted::exceptions;
 use crate::tree::{File, files, root, words};
 
 /// Files that documents link to and that are still to be made, and by what.
@@ -18,7 +19,7 @@ fn document(path: &str) -> File {
 }
 
 /// The lines of a document outside its code blocks, with their numbers.
-fn prose(file: &File) -> impl Iterator<Item = (usize, &str)> {
+pub(crate) fn prose(file: &File) -> impl Iterator<Item = (usize, &str)> {
     let mut in_code = false;
     file.text.lines().enumerate().filter_map(move |(i, line)| {
         let fence = line.trim_start().starts_with("```");
@@ -234,6 +235,110 @@ fn architecture_names_every_room() {
             "ARCHITECTURE.md does not say why {room} needs `unsafe`"
         );
     }
+}
+
+// ---- READMEs of members -------------------------------------------------------------------------
+/// The sections of every member's README, in this order; others may stand between.
+const README_SECTIONS: &[&str] = &["## Use it", "## Read on", "## Invariants"];
+
+fn readme_faults(member: &str, text: &str) -> Vec<String> {
+    let mut faults = Vec::new();
+    if text.lines().next() != Some(&format!("# {member}")) {
+        faults.push(format!("{member}/README.md: the first line is not `# {member}`"));
+    }
+    let headings: Vec<&str> = text.lines().filter(|l| l.starts_with("## ")).collect();
+    let mut from = 0;
+    for section in README_SECTIONS {
+        match headings[from..].iter().position(|h| h.starts_with(section)) {
+            Some(at) => from += at + 1,
+            None => faults.push(format!("{member}/README.md: `{section}` is missing or misplaced")),
+        }
+    }
+    faults
+}
+
+#[test]
+fn readmes_of_members_have_the_same_order() {
+    let readmes = crate::manifests::members().into_keys();
+    let faults: Vec<_> = readmes
+        .flat_map(|member| readme_faults(&member, &document(&format!("{member}/README.md")).text))
+        .collect();
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn planted_readmes_out_of_order_are_found() {
+    let good = "# m\n\n## Use it\n\n## What it does\n\n## Read on\n\n## Invariants\n";
+    assert_eq!(readme_faults("m", good), Vec::<String>::new());
+    assert_eq!(readme_faults("n", good).len(), 1, "another name");
+    assert_eq!(readme_faults("m", &good.replace("## Read on", "## More")).len(), 1);
+    let swapped = "# m\n## Read on\n## Use it\n## Invariants\n";
+    assert_eq!(readme_faults("m", swapped).len(), 1);
+}
+
+// ---- The map of the sources ---------------------------------------------------------------------
+/// Files and folders that a document names in backticks, each with its line and the section it
+/// stands in.
+fn named_paths(file: &File) -> Vec<(usize, &str, &str)> {
+    let (mut section, mut found) = ("", Vec::new());
+    for (number, line) in prose(file) {
+        section = line.strip_prefix("## ").unwrap_or(section);
+        for span in line.split('`').skip(1).step_by(2) {
+            let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+            let ends = [".rs", ".md", ".py", ".csv", ".json", ".toml", ".wgsl", ".cxx", ".h"];
+            if span.chars().all(plain)
+                && (span.contains('/') || ends.iter().any(|e| span.ends_with(e)))
+            {
+                found.push((number, section, span));
+            }
+        }
+    }
+    found
+}
+
+/// A path is the end of a path of the tree; a bare name is one of the member whose section it
+/// stands in.
+fn lost_paths(file: &File, tree: &[String]) -> Vec<String> {
+    let members: BTreeSet<&str> = tree.iter().filter_map(|p| p.split('/').next()).collect();
+    let lost = named_paths(file).into_iter().filter(|(_, section, path)| {
+        let path = path.trim_start_matches("../").trim_end_matches('/');
+        let anywhere = path.contains('/') || !members.contains(section);
+        let of_section = |p: &str| anywhere || p.split('/').next() == Some(section);
+        // Folders are what files stand in; `a/b` may be the module `a/b.rs`.
+        let (inside, folder) = (format!("/{path}"), format!("/{path}/"));
+        let ends = [inside.clone(), inside.clone() + ".rs"];
+        !tree.iter().any(|p| {
+            let rooted = format!("/{p}");
+            rooted.starts_with(&folder)
+                || rooted == inside
+                || of_section(p)
+                    && (rooted.contains(&folder) || ends.iter().any(|e| rooted.ends_with(e)))
+        })
+    });
+    lost.map(|(line, _, path)| format!("{}:{line}: there is no {path}", file.path)).collect()
+}
+
+/// Paths that the map still names and that have moved.
+const LOST_PATHS: &[(&str, usize)] = &[("docs/src/appendix/code_map.md", 51)];
+
+#[test]
+fn the_map_of_the_sources_names_what_is_there() {
+    let map = document("docs/src/appendix/code_map.md");
+    assert!(named_paths(&map).len() > 20, "the map names hardly a file");
+    let tree: Vec<String> = files().into_iter().map(|f| f.path).collect();
+    let found: Vec<_> =
+        lost_paths(&map, &tree).into_iter().map(|fault| (map.path.clone(), fault)).collect();
+    let faults = exceptions("LOST_PATHS", LOST_PATHS, &found);
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn planted_lost_paths_are_found() {
+    let tree = ["m/src/a/b.rs", "n/src/c.rs", "docs/d.md"].map(str::to_owned);
+    let text = "# Map\n## m\n`a/b.rs`, `a/`, `a/b` and `a::b`, `1/2 x`, `docs/d.md`,\n`gone.rs`\n\
+                ## n\n`b.rs`, `c.rs`\n## Both\n`b.rs`\n";
+    let faults = lost_paths(&File::new("map.md", text), &tree);
+    assert_eq!(faults, ["map.md:4: there is no gone.rs", "map.md:6: there is no b.rs"]);
 }
 
 // ---- Experiments --------------------------------------------------------------------------------

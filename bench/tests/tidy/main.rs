@@ -5,7 +5,11 @@
 //! The checks read text, so they are rules for people who want to follow them, not a defence
 //! against tricks.
 
+mod counted;
 mod documents;
+mod interface;
 mod manifests;
+mod modules;
 mod sources;
 mod tree;
+mod width;

@@ -28,7 +28,7 @@ const ARROWS: &[(&str, May, &[&str])] = &[
 
 /// A dependency of one member on another.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Arrow {
+pub(crate) struct Arrow {
     from: String,
     to: String,
     /// Optional, or in tests only.
@@ -36,7 +36,7 @@ struct Arrow {
 }
 
 /// The members, with their arrows, as cargo sees them.
-fn members() -> BTreeMap<String, Vec<Arrow>> {
+pub(crate) fn members() -> BTreeMap<String, Vec<Arrow>> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
         .current_dir(root())

@@ -1,0 +1,238 @@
+//! Modules of one folder import each other in one direction: who reads them can begin somewhere.
+//!
+//! A module and the modules inside it are one thing here; what counts is what stands side by side.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::counted::exceptions;
+use crate::tree::{File, files, words};
+
+/// How many imports between the modules of a folder lie on a circle. What two modules need of each
+/// other belongs into a third.
+const CIRCLES: &[(&str, usize)] = &[
+    ("composite/src", 4),
+    ("datasets/src/model", 2),
+    ("datasets/src/read", 2),
+    ("gluray/src", 43),
+    ("gluray/src/capture", 4),
+    ("gluray/src/classify/vtk", 4),
+    ("gluray/src/cluster", 2),
+    ("gluray/src/interpose", 16),
+    ("gluray/src/present", 4),
+    ("gluray/src/state", 2),
+    ("gluray/src/trace", 2),
+    ("gluray/src/trace/texturing", 2),
+    ("rt-core/src", 60),
+    ("rt-core/src/bvh", 4),
+    ("rt-core/src/shade", 7),
+    ("schlieren/src", 4),
+    ("vtk-bridge/src", 4),
+    ("vtk-bridge/src/anari", 24),
+    ("xtask/src", 10),
+];
+
+/// The source files of one member, by module path: `[]` is main.rs, or lib.rs without one.
+type Modules<'a> = BTreeMap<Vec<&'a str>, &'a File>;
+/// An import between two modules of a folder, with a place where it is written.
+type Imports<'a> = BTreeMap<(&'a str, &'a str), String>;
+
+/// `bvh/layout/mod.rs` as `["bvh", "layout"]`.
+fn module_path(path: &str) -> Vec<&str> {
+    let mut parts: Vec<&str> = path.trim_end_matches(".rs").split('/').collect();
+    let last = parts.last().copied().unwrap_or_default();
+    if last == "mod" || (parts.len() == 1 && ["lib", "main"].contains(&last)) {
+        parts.pop();
+    }
+    parts
+}
+
+/// Code up to the module of unit tests, which may use what they like.
+fn without_tests(code: &str) -> &str {
+    code.find("#[cfg(test)]\nmod tests").map_or(code, |at| &code[..at])
+}
+
+/// The paths that begin with `crate` or `super`, each with its offset; groups in braces are taken
+/// apart.
+fn imports(code: &str) -> Vec<(usize, Vec<&str>)> {
+    let mut found = Vec::new();
+    for start in ["crate", "super"] {
+        for at in words(code, start) {
+            // `super::super::x` is one path, `$crate` one of a macro, `in crate::x` no import.
+            let before = &code[..at];
+            let begins = !["::", "$", "in "].iter().any(|end| before.ends_with(end));
+            if begins && code[at + start.len()..].starts_with("::") {
+                take_path(code, at, &mut Vec::new(), &mut |path| found.push((at, path.to_vec())));
+            }
+        }
+    }
+    found
+}
+
+/// Reads one path, or a tree of them, and returns the offset behind it.
+fn take_path<'a>(
+    code: &'a str,
+    mut at: usize,
+    path: &mut Vec<&'a str>,
+    found: &mut impl FnMut(&[&'a str]),
+) -> usize {
+    let depth = path.len();
+    loop {
+        at += code[at..].len() - code[at..].trim_start().len();
+        if let Some(group) = code[at..].strip_prefix('{') {
+            at = code.len() - group.len();
+            while !code[at..].starts_with('}') && at < code.len() {
+                at = take_path(code, at, path, found);
+                // What is left of an element is a new name, `as x`.
+                at += code[at..].find([',', '}']).unwrap_or(code.len() - at);
+                at += usize::from(code[at..].starts_with(','));
+                at += code[at..].len() - code[at..].trim_start().len();
+            }
+            path.truncate(depth);
+            return (at + 1).min(code.len());
+        }
+        let length = code[at..].find(|c: char| !(c.is_alphanumeric() || c == '_'));
+        let name = &code[at..at + length.unwrap_or(code.len() - at)];
+        at += name.len();
+        path.push(name);
+        match code[at..].strip_prefix("::") {
+            Some(_) => at += 2,
+            None => break,
+        }
+    }
+    found(path);
+    path.truncate(depth);
+    at
+}
+
+/// The module that a path written in `from` leads to: the deepest that there is.
+fn target<'a>(modules: &Modules<'a>, from: &[&'a str], path: &[&str]) -> Vec<&'a str> {
+    let mut at = from.to_vec();
+    for (i, name) in path.iter().enumerate() {
+        match *name {
+            "crate" if i == 0 => at.clear(),
+            "self" if i == 0 => {}
+            "super" => drop(at.pop()),
+            name => {
+                let child = modules
+                    .keys()
+                    .find(|m| m.len() > at.len() && m.starts_with(&at) && m[at.len()] == name);
+                match child {
+                    Some(child) => at.push(child[at.len()]),
+                    None => break,
+                }
+            }
+        }
+    }
+    at
+}
+
+/// Imports between modules side by side, for each folder of a member's sources.
+fn folders<'a>(modules: &Modules<'a>) -> BTreeMap<Vec<&'a str>, Imports<'a>> {
+    let mut folders: BTreeMap<Vec<&str>, Imports<'_>> = BTreeMap::new();
+    for (from, file) in modules {
+        for (at, path) in imports(without_tests(&file.code)) {
+            let to = target(modules, from, &path);
+            let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+            if let (Some(a), Some(b)) = (from.get(common), to.get(common)) {
+                let place = || format!("{}: {}", file.place(at), path.join("::"));
+                let folder = folders.entry(from[..common].to_vec()).or_default();
+                folder.entry((*a, *b)).or_insert_with(place);
+            }
+        }
+    }
+    folders
+}
+
+/// The modules that a module can be followed to.
+fn reached<'a>(imports: &Imports<'a>, from: &'a str) -> BTreeSet<&'a str> {
+    let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
+    while let Some(module) = open.pop() {
+        for (_, to) in imports.keys().filter(|(a, _)| *a == module) {
+            if seen.insert(*to) {
+                open.push(to);
+            }
+        }
+    }
+    seen
+}
+
+/// Whether a module is compiled for unit tests alone: `#[cfg(test)]` stands before its declaration.
+fn is_for_tests(modules: &Modules<'_>, module: &[&str]) -> bool {
+    (0..module.len()).any(|depth| {
+        let Some(parent) = modules.get(&module[..depth]) else { return false };
+        let declaration = format!("mod {};", module[depth]);
+        words(&parent.code, "mod").filter(|at| parent.code[*at..].starts_with(&declaration)).any(
+            |at| {
+                let before = parent.code[..at].trim_end_matches(|c| c != '\n' && c != ']');
+                before.trim_end().ends_with("#[cfg(test)]")
+            },
+        )
+    })
+}
+
+/// The imports of a member that lie on a circle: the folder, and the import with its place.
+fn circles(member: &str, files: &[File]) -> Vec<(String, String)> {
+    let source = format!("{member}/src/");
+    let mut modules: Modules<'_> = files
+        .iter()
+        .filter(|f| f.is_rust())
+        .filter_map(|f| Some((module_path(f.path.strip_prefix(&source)?), f)))
+        .collect();
+    let tests: Vec<_> = modules.keys().filter(|m| is_for_tests(&modules, m)).cloned().collect();
+    modules.retain(|m, _| !tests.contains(m));
+    let mut found = Vec::new();
+    for (folder, imports) in folders(&modules) {
+        let folder = (source.clone() + &folder.join("/")).trim_end_matches('/').to_owned();
+        for ((from, to), place) in &imports {
+            if reached(&imports, to).contains(from) {
+                found.push((folder.clone(), format!("{from} -> {to}: {place}")));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn modules_of_a_folder_import_in_one_direction() {
+    let all = files();
+    let members: BTreeSet<&str> = all
+        .iter()
+        .filter(|f| f.path.ends_with("/src/lib.rs") || f.path == "xtask/src/main.rs")
+        .map(File::member)
+        .collect();
+    assert!(members.len() > 7, "{members:?}");
+    let found: Vec<(String, String)> = members.iter().flat_map(|m| circles(m, &all)).collect();
+    let faults = exceptions("CIRCLES", CIRCLES, &found);
+    assert!(faults.is_empty(), "modules import each other in a circle\n{}", faults.join("\n"));
+}
+
+#[test]
+fn planted_imports_are_read() {
+    let code = "use crate::{a::{B, c as d}, e};\nuse super::super::f;\nfn g(h: &crate::i::J<K>) {}\n\
+                $crate::l!(); pub(crate) fn m() {} pub(in crate::n) struct O;";
+    let read: Vec<String> = imports(code).into_iter().map(|(_, p)| p.join("::")).collect();
+    assert_eq!(read, ["crate::a::B", "crate::a::c", "crate::e", "crate::i::J", "super::super::f"]);
+}
+
+#[test]
+fn planted_circles_are_found() {
+    let found = |files: &[(&str, &str)]| {
+        let files: Vec<File> = files.iter().map(|(path, text)| File::new(path, text)).collect();
+        circles("m", &files).into_iter().map(|(folder, _)| folder).collect::<Vec<_>>()
+    };
+    let (lib, b) = (("m/src/lib.rs", "use crate::a::A;"), ("m/src/b.rs", "use crate::c::C;"));
+    let inner = ("m/src/a/inner.rs", "use crate::b::B;");
+    let outside = ("m/src/d.rs", "use crate::a::A;");
+    let back = ("m/src/c.rs", "use super::a::A;");
+    assert_eq!(found(&[lib, inner, b, outside, back]), ["m/src"; 3], "a, b and c, but not d");
+    let tests = ("m/src/c.rs", "#[cfg(test)]\nmod tests {\n    use crate::a::A;\n}");
+    assert_eq!(found(&[lib, inner, b, tests]), [""; 0], "tests use what they like");
+    let only_tests = ("m/src/lib.rs", "mod a;\n#[cfg(test)]\npub(crate) mod c;");
+    assert_eq!(found(&[only_tests, inner, b, back]), [""; 0], "also in files of their own");
+    let parent = ("m/src/a/mod.rs", "use crate::a::inner::I;");
+    let child = ("m/src/a/inner.rs", "use super::A; use crate::X;");
+    assert_eq!(found(&[lib, parent, child]), [""; 0], "a module and its parts are one thing");
+    let twin = ("m/src/a/other.rs", "use super::inner::I;");
+    let pair = ("m/src/a/inner.rs", "use super::{other::O, A};");
+    assert_eq!(found(&[lib, pair, twin]), ["m/src/a"; 2]);
+}
