@@ -136,7 +136,8 @@ mod tests {
     #[test]
     fn includes_are_followed_from_the_file_that_has_them() {
         let text = "const A: &str = include_str!(\"../b/c.txt\");\n#[path = \"../../d/e.rs\"]\n\
-                    // include_str!(\"gone.txt\")\ninclude!(concat!(env!(\"OUT_DIR\"), \"/x.rs\"));\n";
+                    // include_str!(\"gone.txt\")\n\
+                    include!(concat!(env!(\"OUT_DIR\"), \"/x.rs\"));\n";
         assert_eq!(included("src/a/mod.rs", text), ["src/b/c.txt", "d/e.rs"]);
         assert_eq!(included("tests/x.rs", text), ["b/c.txt", "../d/e.rs"]);
     }
