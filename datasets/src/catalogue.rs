@@ -4,7 +4,8 @@
 //! ```
 //! use datasets::catalogue::{Data, find};
 //! let entry = find("icosphere")?;
-//! let Data::Mesh(ball) = entry.generate("small", Default::default(), &mut |_, _| true)? else { panic!("a mesh") };
+//! let made = entry.generate("small", Default::default(), &mut |_, _| true)?;
+//! let Data::Mesh(ball) = made else { panic!("a mesh") };
 //! assert_eq!(ball.num_triangles(), 1280);
 //! # Ok::<(), datasets::catalogue::CatalogueError>(())
 //! ```

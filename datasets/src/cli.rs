@@ -25,7 +25,8 @@
 //!     args.common.result(&args.count, || format!("{} things", args.count))?;
 //!     Ok(Status::Success)
 //! }
-//! // A program's main function is `fn main() -> ExitCode { run_main(|| work(std::env::args_os())) }`.
+//! // A program's main function is
+//! // `fn main() -> ExitCode { run_main(|| work(std::env::args_os())) }`.
 //! assert_eq!(status_of(work(["program", "--json", "3"])), Status::Success);
 //! assert_eq!(status_of(work(["program", "three"])), Status::Usage);
 //! ```

@@ -174,10 +174,17 @@ fn cases() -> u32 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: cases(),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
-    fn every_damage_is_survived(which in any::<prop::sample::Index>(), damages in prop::collection::vec(damage(), 1..4)) {
+    fn every_damage_is_survived(
+        which in any::<prop::sample::Index>(),
+        damages in prop::collection::vec(damage(), 1..4),
+    ) {
         thread_local!(static SAMPLES: Vec<sample_files::Sample> = sample_files::all());
         let (name, mut bytes) = SAMPLES.with(|s| s[which.index(s.len())].clone());
         damages.iter().for_each(|d| apply(&mut bytes, d));

@@ -22,7 +22,8 @@ pub const KINDS: usize = 5;
 
 #[cfg(feature = "stats")]
 thread_local! {
-    static COUNTERS: [std::cell::Cell<u64>; KINDS] = const { [const { std::cell::Cell::new(0) }; KINDS] };
+    static COUNTERS: [std::cell::Cell<u64>; KINDS] =
+        const { [const { std::cell::Cell::new(0) }; KINDS] };
 }
 
 /// Adds to a counter of this thread.

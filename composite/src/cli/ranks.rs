@@ -258,6 +258,9 @@ fn is_echo(error: &anyhow::Error) -> bool {
         |error: &CommError| matches!(error, CommError::Aborted { .. } | CommError::PeerLost { .. });
     error.chain().any(|cause| {
         cause.downcast_ref::<CommError>().is_some_and(of_comm)
-            || matches!(cause.downcast_ref::<CompositeError>(), Some(CompositeError::Comm(inner)) if of_comm(inner))
+            || matches!(
+                cause.downcast_ref::<CompositeError>(),
+                Some(CompositeError::Comm(inner)) if of_comm(inner)
+            )
     })
 }

@@ -24,7 +24,8 @@
 //! let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.5)];
 //! let mesh = TriMesh::new(corners, vec![[0, 1, 2], [1, 3, 2]]);
 //! let scene = Scene::new(World::from_mesh(mesh, &BuildOptions::default()).unwrap());
-//! let camera = Camera::perspective(DVec3::new(0.5, 0.5, 3.0), DVec3::new(0.5, 0.5, 0.0), DVec3::Y, 0.6, 1.0, [0.1, 10.0]).unwrap();
+//! let (eye, center) = (DVec3::new(0.5, 0.5, 3.0), DVec3::new(0.5, 0.5, 0.0));
+//! let camera = Camera::perspective(eye, center, DVec3::Y, 0.6, 1.0, [0.1, 10.0]).unwrap();
 //! let options = RenderOptions::new(64, 64);
 //!
 //! let partition = Partition::new(&scene, 2, &Split::Triangles);

@@ -82,7 +82,8 @@ pub(crate) fn average_row<F: LayeredFlow>(
         for i in (0..n).filter(|&i| scratch.fine[i] == fine) {
             let gas = scratch.sums[q * n + i] / (lines * spacing_m.x);
             for c in 0..q {
-                rows[c][i] = (scratch.sums[c * n + i] / scratch.sums[q * n + i]) as f32; // 0/0 in solids: NaN
+                // 0/0 in solids: NaN
+                rows[c][i] = (scratch.sums[c * n + i] / scratch.sums[q * n + i]) as f32;
             }
             // Rounding of sums of lengths must not make a full box "nearly full".
             rows[q][i] = if gas > 1.0 - 1e-9 { 1.0 } else { gas as f32 };

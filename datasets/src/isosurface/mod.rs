@@ -79,7 +79,8 @@ pub enum IsosurfaceError {
 /// use datasets::{generate::wavelet::Wavelet, isosurface};
 /// let grid = Wavelet::with_points(21).grid()?;
 /// let contour = isosurface::extract(&grid, &[157.0909652709961], Default::default())?;
-/// assert_eq!(contour.mesh.num_triangles(), 5480); // as ParaView's Wavelet and Contour with their defaults
+/// // As ParaView's Wavelet and Contour with their defaults.
+/// assert_eq!(contour.mesh.num_triangles(), 5480);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn extract(

@@ -179,7 +179,10 @@ macro_rules! into_values {
         }
     )* };
 }
-into_values!(i8 => I8, u8 => U8, i16 => I16, u16 => U16, i32 => I32, u32 => U32, i64 => I64, u64 => U64, f32 => F32, f64 => F64);
+into_values!(
+    i8 => I8, u8 => U8, i16 => I16, u16 => U16, i32 => I32, u32 => U32, i64 => I64, u64 => U64,
+    f32 => F32, f64 => F64
+);
 
 impl Values {
     /// No values of type `kind`.
@@ -262,7 +265,9 @@ impl Values {
     }
     /// Values `range`, same type.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Values {
-        with_type!(self.kind(), T, wrap => wrap(with_values!(self, v => v[range].iter().map(|&x| x as T).collect())))
+        with_type!(self.kind(), T, wrap => wrap(
+            with_values!(self, v => v[range].iter().map(|&x| x as T).collect())
+        ))
     }
     /// Appends `other`, which must have the same type; otherwise both become f64.
     pub fn append(&mut self, other: &Values) {

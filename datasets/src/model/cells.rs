@@ -182,7 +182,8 @@ impl CellType {
             14 | 27 | 37 | 74 | 81 => CellType::Solid(PYRAMID),
             15 => CellType::Solid(PENTAGONAL_PRISM),
             16 => CellType::Solid(HEXAGONAL_PRISM),
-            36 => CellType::Polygon(usize::MAX), // quadratic polygon: the first half are the corners
+            // Quadratic polygon: the first half are the corners.
+            36 => CellType::Polygon(usize::MAX),
             42 => CellType::Polyhedron,
             _ => CellType::Unknown,
         }

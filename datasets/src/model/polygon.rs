@@ -199,7 +199,8 @@ mod tests {
         let (list, _, division) =
             areas(&[[0., 0., 0.], [2., 2., 0.], [2., 0., 0.], [0., 3., 0.], [-1., 1., 0.]]);
         assert_eq!(list.len(), 3);
-        let _ = division; // either answer is right for a polygon that crosses itself; the loop must end
+        // Either answer is right for a polygon that crosses itself; the loop must end.
+        let _ = division;
     }
 
     #[test]

@@ -326,7 +326,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_a_table_or_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        fn any_bytes_are_a_table_or_an_error(
+            bytes in proptest::collection::vec(any::<u8>(), 0..200)
+        ) {
             if let Ok(t) = read_from_bytes(Path::new("t.csv"), &bytes) {
                 for name in t.columns() {
                     let _ = t.numbers(name);
@@ -338,7 +340,9 @@ mod tests {
         fn any_text_of_csv_characters_is_a_table_or_an_error(text in "[a-b\",;\t\n\r# \
                                                                       0-9.e-]{0,120}") {
             if let Ok(t) = table(&text) {
-                prop_assert!((0..t.len()).all(|r| (0..t.columns().len()).all(|c| t.cell(r, c).len() <= text.len())));
+                let columns = t.columns().len();
+                let fits = |r| (0..columns).all(|c| t.cell(r, c).len() <= text.len());
+                prop_assert!((0..t.len()).all(fits));
             }
         }
 

@@ -236,7 +236,8 @@ const MAX_SAMPLES: usize = 8;
 /// // 5³ points with the value x + 2y at unequal distance from the nodes of the new lattice.
 /// let image = ImageData::new([5, 5, 5], DVec3::ZERO, DVec3::splat(0.25));
 /// let mesh = Mesh::new(&Dataset::ImageData(image))?;
-/// let values: Vec<f64> = (0..mesh.num_points()).map(|i| mesh.point(i).x + 2.0 * mesh.point(i).y).collect();
+/// let points = (0..mesh.num_points()).map(|i| mesh.point(i));
+/// let values: Vec<f64> = points.map(|p| p.x + 2.0 * p.y).collect();
 /// let (low, high) = mesh.bounds();
 /// let lattice = Lattice::fit(low, high, mesh.typical_cell(), Resolution::Longest(8))?;
 /// let fine = resample(&mesh, Samples::Points(&values), &lattice, &Options::default())?;

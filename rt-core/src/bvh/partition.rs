@@ -51,10 +51,15 @@ impl World {
     /// ```
     /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::{DAffine3, Vec3}};
     /// let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(0.0, 0.0, 1.0)];
-    /// let whole = World::from_mesh(TriMesh::new(corners.clone(), vec![[0, 1, 2], [0, 1, 3]]), &BuildOptions::default())?;
+    /// let both = TriMesh::new(corners.clone(), vec![[0, 1, 2], [0, 1, 3]]);
+    /// let whole = World::from_mesh(both, &BuildOptions::default())?;
     /// let second = TriMesh::new(vec![corners[0], corners[1], corners[3]], vec![[0, 1, 2]]);
     /// let part = World::build_part(
-    ///     vec![Geometry::Mesh(second.into())], whole.instances().to_vec(), &whole.global_layout(), &BuildOptions::default())?;
+    ///     vec![Geometry::Mesh(second.into())],
+    ///     whole.instances().to_vec(),
+    ///     &whole.global_layout(),
+    ///     &BuildOptions::default(),
+    /// )?;
     /// let ray = Ray::new(Vec3::new(0.2, 9.0, 0.2), -Vec3::Y);
     /// assert_eq!(part.closest(&ray).map(|h| h.t), whole.closest(&ray).map(|h| h.t));
     /// # Ok::<(), Box<dyn std::error::Error>>(())

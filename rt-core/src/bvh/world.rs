@@ -337,10 +337,16 @@ impl World {
         let (ray, unit) = with_ordinary_length(ray);
         let hit = match self.robustness {
             Robustness::Fast => {
-                dispatch!(self.level, simd => self.closest_in::<_, false>(simd, &ray, InstanceFilter::All))
+                dispatch!(
+                    self.level,
+                    simd => self.closest_in::<_, false>(simd, &ray, InstanceFilter::All)
+                )
             }
             Robustness::Watertight => {
-                dispatch!(self.level, simd => self.closest_in::<_, true>(simd, &ray, InstanceFilter::All))
+                dispatch!(
+                    self.level,
+                    simd => self.closest_in::<_, true>(simd, &ray, InstanceFilter::All)
+                )
             }
         };
         hit.map(|h| Hit { t: h.t * unit, ..h })
@@ -354,10 +360,16 @@ impl World {
         let (ray, _) = with_ordinary_length(ray);
         match self.robustness {
             Robustness::Fast => {
-                dispatch!(self.level, simd => self.occluded_in::<_, false>(simd, &ray, InstanceFilter::All))
+                dispatch!(
+                    self.level,
+                    simd => self.occluded_in::<_, false>(simd, &ray, InstanceFilter::All)
+                )
             }
             Robustness::Watertight => {
-                dispatch!(self.level, simd => self.occluded_in::<_, true>(simd, &ray, InstanceFilter::All))
+                dispatch!(
+                    self.level,
+                    simd => self.occluded_in::<_, true>(simd, &ray, InstanceFilter::All)
+                )
             }
         }
     }

@@ -97,13 +97,14 @@ pub struct LeakCount {
 /// use rt_core::robustness::{RayTarget, LeakTest, QueryKind, RayOrigins};
 ///
 /// // A tetrahedron, and the same with one side left out.
-/// let corners = vec![Vec3::ONE, Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0)];
-/// let closed = TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]);
+/// let corners = [[1., 1., 1.], [1., -1., -1.], [-1., 1., -1.], [-1., -1., 1.]].map(Vec3::from);
+/// let closed = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]);
 /// let open = TriMesh { indices: closed.indices[..3].to_vec(), ..closed.clone() };
 /// let leaks = |mesh: &TriMesh| {
 ///     let world = World::from_mesh(mesh.clone(), &BuildOptions::default()).unwrap();
 ///     let start = RayOrigins::Ball { center: DVec3::ZERO, radius: 0.3 };
-///     LeakTest { world: &world, mesh: &closed, start, aim: RayTarget::Edge, seed: 1 }.count(QueryKind::Coherent, 10_000).leaks
+///     let test = LeakTest { world: &world, mesh: &closed, start, aim: RayTarget::Edge, seed: 1 };
+///     test.count(QueryKind::Coherent, 10_000).leaks
 /// };
 /// assert_eq!(leaks(&closed), 0);
 /// assert!(leaks(&open) > 0);

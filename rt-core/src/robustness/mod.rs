@@ -1,8 +1,8 @@
 //! Measurements of robustness, shared by the tests, which ask for perfection, and by the program
 //! `bench`, which runs more rays and compares.
 //!
-//! [`LeakTest`]: how many rays aimed at vertices, edges and points of a closed mesh get through. [`SelfShadowTest`]: how many secondary rays
-//! meet the surface that they start from.
+//! [`LeakTest`]: how many rays aimed at vertices, edges and points of a closed mesh get through.
+//! [`SelfShadowTest`]: how many secondary rays meet the surface that they start from.
 
 mod leaks;
 mod self_shadow;

@@ -67,7 +67,10 @@ pub(crate) fn add_ambient_light(
             open.push(OcclusionPoint { index: i as u32, light, sampler, dimension });
         }
         // ---- Directions over +z, sixteen at a time across points.
-        dispatch!(context.level, simd => directions(simd, context, open, count, hemisphere_samples));
+        dispatch!(
+            context.level,
+            simd => directions(simd, context, open, count, hemisphere_samples)
+        );
         // ---- Rays.
         rays.clear();
         rays.first_point = start as u32;

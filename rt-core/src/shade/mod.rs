@@ -197,7 +197,10 @@ fn generate_camera_rays(
     let through_lens = context.effects.contains(Effects::DEPTH_OF_FIELD) && sample.is_some();
     blocks.resize(PIXELS / LANES, RayBlock::INACTIVE);
     if through_lens
-        || !dispatch!(context.level, simd => generate_pinhole_rays(simd, context, area, blocks, sample))
+        || !dispatch!(
+            context.level,
+            simd => generate_pinhole_rays(simd, context, area, blocks, sample)
+        )
     {
         generate_single_rays(context, area, blocks, sample, through_lens);
     }
@@ -360,7 +363,10 @@ fn record_camera_hits(
     work: &Workspace,
 ) {
     for (b, (rays, hits)) in work.current.blocks.iter().zip(&work.hits).enumerate() {
-        dispatch!(context.level, simd => layers::record_block(simd, context, area, b, rays, hits, out));
+        dispatch!(
+            context.level,
+            simd => layers::record_block(simd, context, area, b, rays, hits, out)
+        );
         if context.options.layers.contains(Layers::NORMAL) {
             let hit = (0..LANES).fold(0u16, |m, l| m | ((hits.prim[l] != NO_HIT) as u16) << l);
             let normal =

@@ -110,7 +110,8 @@ pub struct VolumeReport {
 /// let transfer = TransferFunction::from_opacity(white, &[[0.0, 0.5]], 1.0).unwrap();
 /// let volume = Volume::new(fog.into(), transfer, VolumeOptions::default()).unwrap();
 /// let ray = Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X);
-/// let seen = volume.integrate(&ray, 0.0, f32::INFINITY, &VolumeQuality::Tolerance { levels: 0.5 });
+/// let quality = VolumeQuality::Tolerance { levels: 0.5 };
+/// let seen = volume.integrate(&ray, 0.0, f32::INFINITY, &quality);
 /// assert!((seen.rgba[3] - 0.5).abs() < 1e-6);
 /// ```
 /// Object space is f32 relative to [`Volume::origin`]; lengths are world units.

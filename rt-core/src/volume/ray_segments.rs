@@ -101,13 +101,16 @@ struct VolumeSegments<'a> {
 /// ```
 /// use rt_core::glam::{DVec3, UVec3, Vec3};
 /// use rt_core::{colormap::ColorMap, grid::Grid, ray::Ray, transfer_function::TransferFunction};
-/// use rt_core::volume::{Brick, RaySegments, PartialIntegral, Volume, VolumeOptions, VolumeQuality};
+/// use rt_core::volume::{Brick, PartialIntegral, RaySegments};
+/// use rt_core::volume::{Volume, VolumeOptions, VolumeQuality};
 /// let values = (0..33 * 9 * 9).map(|k| (k % 7) as f32 / 7.0).collect();
 /// let grid = Grid::new(UVec3::new(33, 9, 9), DVec3::ZERO, DVec3::ONE, values).unwrap();
 /// let white = ColorMap::new(vec![[1.0; 4]], [0.0, 1.0]);
 /// let transfer = TransferFunction::from_opacity(white, &[[0.0, 0.0], [1.0, 0.3]], 1.0).unwrap();
 /// let whole = Volume::new(grid.into(), transfer, VolumeOptions::default()).unwrap();
-/// let brick = |x: u32| whole.part(Brick { first: UVec3::new(x, 0, 0), end: UVec3::new(x + 2, 1, 1) });
+/// let brick = |x: u32| {
+///     whole.part(Brick { first: UVec3::new(x, 0, 0), end: UVec3::new(x + 2, 1, 1) })
+/// };
 /// let (near, far) = (brick(0), brick(2));
 ///
 /// let ray = Ray::new(Vec3::new(-1.0, 2.3, 4.1), Vec3::new(1.0, 0.1, 0.05));
@@ -115,7 +118,8 @@ struct VolumeSegments<'a> {
 /// let through = |part| RaySegments::new(vec![(part, ray)], 0.0, f32::INFINITY);
 /// let mut near_spans = 0;
 /// through(&whole).spans(|_, here| near_spans += usize::from(here[0].1.x < 2));
-/// let collected = through(&near).integrate_spans(0..near_spans, &quality, PartialIntegral::default());
+/// let begun = PartialIntegral::default();
+/// let collected = through(&near).integrate_spans(0..near_spans, &quality, begun);
 /// let collected = through(&far).integrate_spans(near_spans..usize::MAX, &quality, collected);
 /// assert_eq!(collected.sample(), whole.integrate(&ray, 0.0, f32::INFINITY, &quality));
 /// assert!(near.grid().values.len() < whole.grid().values.len());

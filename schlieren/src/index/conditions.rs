@@ -101,7 +101,9 @@ pub struct Answer {
 /// ```
 /// use schlieren::index::conditions::{Conditions, answer};
 /// // A row of NIST's table: 40 C, 120 kPa, 75 % humidity.
-/// let moist = Conditions { temperature_c: 40.0, pressure_pa: 120e3, humidity: 0.75, ..Default::default() };
+/// let (temperature_c, pressure_pa) = (40.0, 120e3);
+/// let moist =
+///     Conditions { temperature_c, pressure_pa, humidity: 0.75, ..Default::default() };
 /// let answer = answer(&moist)?;
 /// assert!((answer.n_minus_1 - 2.99418e-4).abs() < 1e-9 && answer.warnings.is_empty());
 /// # Ok::<(), schlieren::index::IndexError>(())

@@ -165,7 +165,10 @@ mod tests {
     proptest! {
         #[test]
         fn the_order_of_columns_and_extra_columns_change_nothing(
-            rows in proptest::collection::vec((0.3f64..1.69, -40f64..100.0, 2e5f64..3e5, 0f64..1.0, 0f64..2000.0), 1..8),
+            rows in proptest::collection::vec(
+                (0.3f64..1.69, -40f64..100.0, 2e5f64..3e5, 0f64..1.0, 0f64..2000.0),
+                1..8,
+            ),
             order in Just(vec![0usize, 1, 2, 3, 4, 5]).prop_shuffle(),
         ) {
             let names = ["lambda_um", "T_C", "p_Pa", "RH_frac", "CO2_ppm", "note"];
@@ -179,7 +182,12 @@ mod tests {
             a.write(&mut out).unwrap();
             let printed = csv::read_from_bytes(Path::new("out.csv"), &out).unwrap().numbers(RESULT).unwrap();
             for (i, r) in rows.iter().enumerate() {
-                let air = MoistAir { temperature_c: r.1, pressure_pa: r.2, relative_humidity: r.3, co2_ppm: r.4 };
+                let air = MoistAir {
+                    temperature_c: r.1,
+                    pressure_pa: r.2,
+                    relative_humidity: r.3,
+                    co2_ppm: r.4,
+                };
                 let expected = Ciddor::new(r.0).unwrap().n_minus_1(&air).unwrap();
                 prop_assert_eq!(a.n_minus_1()[i], expected);
                 // 12 significant digits.

@@ -36,7 +36,8 @@ use glam::DVec3;
 /// let trilinear = Trilinear::new(&field);
 /// let medium = InterpolatedMedium::new(&field, &trilinear);
 /// let diagonal = DVec3::ONE.normalize();
-/// let s = CellExact::new(&field).line_of_sight(&medium, DVec3::ZERO, diagonal, 48f64.sqrt(), Points::Two);
+/// let (march, length_m) = (CellExact::new(&field), 48f64.sqrt());
+/// let s = march.line_of_sight(&medium, DVec3::ZERO, diagonal, length_m, Points::Two);
 /// // From corner to corner, x = y = z = s/√3.
 /// assert!((s.path_m - 1e-5 * 64.0 * 48f64.sqrt() / 4.0).abs() < 1e-9);
 /// assert!((s.slope.x - 1e-5 * 16.0 * 48f64.sqrt() / 3.0).abs() < 1e-9);

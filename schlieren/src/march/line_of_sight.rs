@@ -367,7 +367,11 @@ fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, le
     let no_kinds: &mut [u8] = &mut [];
     let kind_rows = kinds.as_deref_mut().unwrap_or(no_kinds);
     let line = |v: usize, out: &mut [[f64; 3]], kinds: &mut [u8]| {
-        at_level!(level, simd => integrate_row(simd, field, frame, rows, step_m, [lo[0], lo[1] + v as f64 * step_m], out, kinds));
+        let start = [lo[0], lo[1] + v as f64 * step_m];
+        at_level!(
+            level,
+            simd => integrate_row(simd, field, frame, rows, step_m, start, out, kinds)
+        );
     };
     if kind_rows.is_empty() {
         sums.par_chunks_exact_mut(dims[0]).enumerate().for_each(|(v, out)| line(v, out, &mut []));

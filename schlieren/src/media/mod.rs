@@ -44,7 +44,8 @@
 //!     .with(Property::Absorption, Volume::uniform(3.0, &air)?)
 //!     .with(Property::Emission, Volume::uniform(0.5, &air)?);
 //! let view = View::along(Axis::Z, air.centre_m());
-//! let integrator = MediaIntegrator::new(&air, view, &media, &Property::ALL, Bend::Straight, 1.0, Default::default());
+//! let (bend, rest) = (Bend::Straight, Default::default());
+//! let integrator = MediaIntegrator::new(&air, view, &media, &Property::ALL, bend, 1.0, rest);
 //! let mut along = [MediaIntegrals::default()];
 //! integrator.collect(&[Start::default()], None, &mut along);
 //! assert!((along[0].optical_depth - 0.3).abs() < 1e-6);

@@ -13,7 +13,8 @@
 //! })?;
 //! let section = TestSection::of_fields(&scene, vec![blob], None)?;
 //! let picture = render(&scene, &section, Layers::NONE, &Control::default())?;
-//! // Light is bent away from the warm middle: to the left of it darker, to the right brighter than the background of 1/2.
+//! // Light is bent away from the warm middle: to the left of it darker, to the right brighter than
+//! // the background of 1/2.
 //! let [left, right] = [16 * 32 + 11, 16 * 32 + 20].map(|i: usize| picture.pixels[i][0]);
 //! assert!(left < 0.46 && right > 0.54, "{left} {right}");
 //! assert!((picture.pixels[0][0] - 0.5).abs() < 1e-3);

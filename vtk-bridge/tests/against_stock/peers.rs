@@ -56,7 +56,8 @@ pub(crate) fn display() -> Result<&'static str, String> {
             .map_err(|e| format!("sh: {e}"))?;
         let mut number = String::new();
         let stdout = child.stdout.as_mut().ok_or("no stdout")?;
-        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number).map_err(|e| e.to_string())?;
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
+            .map_err(|e| e.to_string())?;
         match number.trim().parse::<u32>() {
             Ok(n) => Ok((format!(":{n}"), child)),
             Err(_) => Err(format!("{} did not start", program.display())),

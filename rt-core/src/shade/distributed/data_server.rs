@@ -263,7 +263,10 @@ impl DistributedFrame<'_> {
                 dimension: p.stream.wrapping_add(SampleDimension::AMBIENT_OCCLUSION),
             }
         }));
-        dispatch!(self.context.level, simd => directions(simd, &self.context, open, ao.rays, hemisphere_samples));
+        dispatch!(
+            self.context.level,
+            simd => directions(simd, &self.context, open, ao.rays, hemisphere_samples)
+        );
         let mut direction = 0;
         for o in open.iter() {
             let over = Hemisphere::new(&points[o.index as usize].surface());

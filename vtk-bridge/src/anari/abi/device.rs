@@ -157,7 +157,11 @@ macro_rules! constructors {
     ($($name:ident: $kind:ident;)*) => {
         $(unsafe extern "C" fn $name(this: This, subtype: Name) -> Object {
             // SAFETY: ANARI passes a device of ours, and a string that ends with 0 or null.
-            unsafe { guard(this, std::ptr::null_mut(), |d| object(d.device.new_object(DataType::$kind, &text(subtype)))) }
+            unsafe {
+                guard(this, std::ptr::null_mut(), |d| {
+                    object(d.device.new_object(DataType::$kind, &text(subtype)))
+                })
+            }
         })*
     };
 }

@@ -233,7 +233,8 @@ mod tests {
             let hi = reduce_rows::<_, true>(simd, &rows, 1);
             for g in 0..16 {
                 assert_eq!(lo.as_slice()[g], rows[g].iter().copied().fold(f32::INFINITY, f32::min));
-                assert_eq!(hi.as_slice()[g], rows[g].iter().copied().fold(f32::NEG_INFINITY, f32::max));
+                let highest = rows[g].iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                assert_eq!(hi.as_slice()[g], highest);
             }
         });
     }
