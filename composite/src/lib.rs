@@ -9,8 +9,8 @@
 //! ```
 //! use composite::{Communicator, Frame, Options, threads};
 //!
-//! // Three ranks, an image of 2x1 pixels: rank r drew red r at depth 0.9 - 0.1 r, but only the last
-//! // rank the second pixel.
+//! // Three ranks, an image of 2x1 pixels: rank r drew red r at depth 0.9 - 0.1 r, but only the
+//! // last rank the second pixel.
 //! let results = threads::run(3, |mut comm| {
 //!     let r = comm.rank() as u8;
 //!     let depth = [[0.9, 0.8, 0.7][usize::from(r)], if r == 2 { 0.5 } else { 1.0 }];

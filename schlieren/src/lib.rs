@@ -30,8 +30,8 @@
 //! let warm = |p: DVec3| -1e-5 * (-p.length_squared() / (2.0 * 0.015f64.powi(2))).exp();
 //! let field = Field::from_fn([n; 3], [h; 3], DVec3::splat(-0.05), 1.000_27, warm)?;
 //!
-//! // The march that keeps deflections right within 1e-7 rad, and what it does to a ray 1.5 cm right
-//! // of the middle.
+//! // The march that keeps deflections right within 1e-7 rad, and what it does to a ray 1.5 cm
+//! // right of the middle.
 //! let plan = Plan::new(&field, Request { tolerance_rad: 1e-7, ..Request::default() });
 //! let paths = plan.paths(&field, View::along(Axis::Z, field.centre_m()));
 //! let mut exit = [Exit::UNDISTURBED];

@@ -274,7 +274,8 @@ proptest! {
                 part.merge_into(kernels, &mut layer, Side::Lower);
             }
             let mut image = planes::<P>(70, 5, |_, _| false);
-            part.copy_to_planes::<P>(Kernels::new(None), 70, &mut image.colors, &mut image.depths, &mut Vec::new());
+            let (colors, depths) = (&mut image.colors, &mut image.depths);
+            part.copy_to_planes::<P>(Kernels::new(None), 70, colors, depths, &mut Vec::new());
         }
     }
 }

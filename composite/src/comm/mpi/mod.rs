@@ -102,7 +102,8 @@ impl MpiComm {
     /// Starts MPI, if nobody has yet, with all ranks of the job.
     ///
     /// # Errors
-    /// [`MpiError`]: no launcher, no library, one with an unknown binary interface, or a second call.
+    /// [`MpiError`]: no launcher, no library, one with an unknown binary interface, or a second
+    /// call.
     pub fn world() -> Result<Self, MpiError> {
         Self::with_chunks(CHUNK_BYTES)
     }
