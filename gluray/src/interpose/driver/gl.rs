@@ -496,3 +496,103 @@ pub(crate) fn uniform_location(program: u32, name: &str) -> i32 {
 pub(crate) fn attrib_location(program: u32, name: &str) -> i32 {
     with_c_string(name, |p| get_attrib_location_raw(program, p)).unwrap_or(-1)
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::state::enums::{TEXTURE_2D, TEXTURE_HEIGHT, TEXTURE_WIDTH};
+    use std::cell::Cell;
+
+    thread_local! {
+        static IS_FAKED: Cell<bool> = const { Cell::new(false) };
+        /// Bytes of memory behind the pointer that texels were to be written to.
+        static ROOM_FOR_TEXELS: Cell<usize> = const { Cell::new(0) };
+    }
+
+    const SIZE: [i32; 2] = [16, 8];
+
+    /// A driver that writes as much as its own state is long, whatever the caller thinks.
+    pub(in crate::interpose::driver) fn fake(name: &str) -> Option<*const ()> {
+        if !IS_FAKED.get() {
+            return None;
+        }
+        match name {
+            "glGetTexLevelParameteriv" => Some(level as *const ()),
+            "glGetTexImage" => Some(texels as *const ()),
+            "glGetIntegerv" => Some(integers as *const ()),
+            "glGetShaderiv" => Some(shader as *const ()),
+            "glGetShaderSource" | "glGetShaderInfoLog" => Some(text as *const ()),
+            "glGetAttachedShaders" => Some(shaders as *const ()),
+            _ => None,
+        }
+    }
+
+    extern "C" fn level(_: u32, _: i32, what: u32, out: *mut i32) {
+        let at = [TEXTURE_WIDTH, TEXTURE_HEIGHT].iter().position(|w| *w == what);
+        // SAFETY: whoever asks has room for one number.
+        unsafe { out.write(at.map_or(0, |at| SIZE[at])) };
+    }
+
+    extern "C" fn texels(_: u32, _: i32, _: u32, kind: u32, out: *mut c_void) {
+        // SAFETY: memory of a vector's is the allocator's.
+        let room = unsafe { libc::malloc_usable_size(out) };
+        ROOM_FOR_TEXELS.set(room);
+        let bytes = (SIZE[0] * SIZE[1]) as usize * if kind == 0x1406 { 16 } else { 4 };
+        if room >= bytes {
+            // SAFETY: there is room, as the allocator says.
+            unsafe { out.cast::<u8>().write_bytes(1, bytes) };
+        }
+    }
+
+    /// The longest answers that any query of state has.
+    extern "C" fn integers(_: u32, out: *mut i32) {
+        (0..16).for_each(|i| {
+            // SAFETY: callers have room for any answer but those of lists.
+            unsafe { out.add(i).write(i as i32 + 7) };
+        });
+    }
+
+    extern "C" fn shader(_: u32, _: u32, out: *mut i32) {
+        // SAFETY: as of `level`.
+        unsafe { out.write(5) };
+    }
+
+    /// Says that it has written more than it was told there is room for.
+    extern "C" fn text(_: u32, room: i32, length: *mut i32, out: *mut c_char) {
+        (0..room.max(0) as usize).for_each(|i| {
+            // SAFETY: as far as the caller says.
+            unsafe { out.add(i).write(b'x' as c_char) };
+        });
+        // SAFETY: as of `level`.
+        unsafe { length.write(1 << 20) };
+    }
+
+    extern "C" fn shaders(_: u32, room: i32, count: *mut i32, out: *mut u32) {
+        (0..room.max(0) as usize).for_each(|i| {
+            // SAFETY: as far as the caller says.
+            unsafe { out.add(i).write(i as u32) };
+        });
+        // SAFETY: as of `level`.
+        unsafe { count.write(1 << 20) };
+    }
+
+    #[test]
+    fn a_driver_that_writes_more_than_its_caller_thinks_finds_room() {
+        IS_FAKED.set(true);
+        let n = (SIZE[0] * SIZE[1]) as usize;
+        let raw = RawPixelTransfer(());
+        let floats = tex_image_rgba(&raw, TEXTURE_2D, 0);
+        assert!(floats.len() == n && ROOM_FOR_TEXELS.get() >= 16 * n, "{}", ROOM_FOR_TEXELS.get());
+        // Memory that served a smaller texture before.
+        let bytes = tex_image_bytes(&raw, TEXTURE_2D, 0, vec![[0; 4]; 2]);
+        assert!(ROOM_FOR_TEXELS.get() >= 4 * n, "{}", ROOM_FOR_TEXELS.get());
+        assert_eq!(bytes, vec![[1; 4]; n]);
+        // One number is asked for, and sixteen are written.
+        assert_eq!((int(0x0ba2), ints::<4>(0x0ba2)), (7, [7, 8, 9, 10]));
+        // Lengths that are lies.
+        assert_eq!(source_of(1).len(), 6);
+        assert_eq!(shader_log(1).len(), 999);
+        assert_eq!(attached(1).len(), 16);
+        IS_FAKED.set(false);
+    }
+}
