@@ -153,3 +153,21 @@ fn an_edge_that_is_moved_by_a_pixel_is_found_in_corners_and_where_it_is_an_area(
     }
     assert!(!wrong_beyond_edges(&native, &ours).is_empty());
 }
+
+#[test]
+fn a_depth_beside_an_edge_may_continue_the_surface_and_no_more() {
+    const SIZE: usize = 32;
+    // Nearest at its edge, before a far background.
+    let curved = |end: usize| -> Vec<f32> {
+        let depth = |x: usize| if x < end { 0.5 - 1e-4 * (x * x) as f32 } else { 1.0 };
+        (0..SIZE * SIZE).map(|i| depth(i % SIZE)).collect()
+    };
+    let (native, at) = (curved(20), 16 * SIZE + 20);
+    let mut ours = native.clone();
+    ours[at] = curved(21)[at];
+    assert_eq!(depths_beyond_edges(SIZE, &native, &ours, 1e-6), Vec::<String>::new());
+    assert_eq!(depths_beyond_edges(SIZE, &ours, &native, 1e-6), Vec::<String>::new());
+    ours[at] = native[at - 1] + 3.0 * (native[at - 1] - native[at - 2]);
+    assert!(!depths_beyond_edges(SIZE, &native, &ours, 1e-6).is_empty());
+    assert!(!depths_beyond_edges(SIZE, &ours, &native, 1e-6).is_empty());
+}

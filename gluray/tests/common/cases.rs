@@ -33,6 +33,13 @@ pub(crate) struct Expected {
 /// Cases whose triangles the driver has to clip.
 const CLIPPED: [&str; 2] = ["vertices_behind_the_eye", "levels_and_limits_of_textures"];
 
+/// Cases whose depths have more rounding than others', and how many steps of 24 bits that may make.
+/// llvmpipe comes to a sample's depth from the pixel's by one more sum: five steps were measured.
+/// Where the two evaluated surfaces are seen nearly edge on, depth changes by half a million steps
+/// from pixel to pixel: six steps were measured.
+const ROUNDED: [(&str, f32); 3] =
+    [("samples_of_surfaces", 6.0), ("patches_of_every_order", 7.0), ("rational_surfaces", 7.0)];
+
 /// Asserts that colours are the driver's but for pixels on edges, and depths likewise to `steps` of
 /// 24 bits.
 pub(crate) fn assert_agrees(
@@ -50,6 +57,9 @@ pub(crate) fn assert_agrees(
     let is_off = |(a, b): &(&f32, &f32)| (**a - **b).abs() > steps / 16_777_216.0;
     let far = native_depth.iter().zip(depth).filter(is_off).count();
     assert!(far * 200 <= depth.len(), "{what}: {far} of {} depths are off", depth.len());
+    let steps = ROUNDED.iter().find(|(case, _)| *case == what).map_or(steps, |r| r.1);
+    let far = metrics::depths_beyond_edges(native.width, native_depth, depth, steps / 16_777_216.0);
+    assert!(far.is_empty(), "{what}: depths\n{}", far.join("\n"));
     m
 }
 

@@ -125,8 +125,9 @@ pub(crate) fn wrong_beyond_edges(native: &Picture, ours: &Picture) -> Vec<String
     out
 }
 
-/// The same for depths in rows of `w`: those of edges are between those of their neighbours, both
-/// ways.
+/// The same for depths in rows of `w`: those of edges are between those of their neighbours, or
+/// continue a surface that ends there, both ways. The last pixel of a silhouette is where its
+/// surface is nearest or farthest, so it need not be between any two.
 pub(crate) fn depths_beyond_edges(
     w: usize,
     native: &[f32],
@@ -143,6 +144,23 @@ pub(crate) fn depths_beyond_edges(
         let (lo, hi) = near.fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(v), hi.max(v)));
         (lo - slack..=hi + slack).contains(&one)
     };
+    // Three neighbouring pixels in a row. The lesser of their two steps is the surface's where an
+    // edge goes through them; the next step of a curved surface is up to twice as large.
+    let continues = |all: &[f32], x: usize, y: usize, one: f32| {
+        (0..9).filter(|k| *k != 4).any(|k| {
+            let (dx, dy) = (k % 3 - 1, k / 3 - 1);
+            let at = |far: i32| {
+                let x = usize::try_from(x as i32 + far * dx).ok().filter(|x| *x < w)?;
+                let y = usize::try_from(y as i32 + far * dy).ok().filter(|y| *y < h)?;
+                Some(all[y * w + x])
+            };
+            let (Some(a), Some(b), Some(c)) = (at(1), at(2), at(3)) else { return false };
+            let step = if (a - b).abs() < (b - c).abs() { a - b } else { b - c };
+            let (lo, hi) = (a.min(a + 2.0 * step), a.max(a + 2.0 * step));
+            (lo - slack..=hi + slack).contains(&one)
+        })
+    };
+    let is_there = |all: &[f32], x, y, one| is_between(all, x, y, one) || continues(all, x, y, one);
     let mut out = Vec::new();
     for y in 0..h {
         for x in (0..w).filter(|x| is_off(*x, y)) {
@@ -152,7 +170,7 @@ pub(crate) fn depths_beyond_edges(
                 && is_off(x + 1, y)
                 && is_off(x, y + 1)
                 && is_off(x + 1, y + 1);
-            if area || !is_between(ours, x, y, p) || !is_between(native, x, y, q) {
+            if area || !is_there(ours, x, y, p) || !is_there(native, x, y, q) {
                 let steps = (p - q) / slack;
                 out.push(format!(
                     "({x}, {y}): {p} and {q}, {steps:.1} times what may be, an area: {area}"
