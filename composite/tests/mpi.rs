@@ -296,9 +296,9 @@ fn without_a_launcher_mpi_says_so_and_ends_with_2() {
 /// Of fault `order`, where ranks share memory. Messages tell a barrier from a meeting by their
 /// tags, and end with a timeout.
 #[cfg(target_os = "linux")]
-const OUT_OF_STEP: &str = "ranks 0, 1 came to an all-gather and rank 2 to a barrier";
+const OUT_OF_STEP: &[&str] = &["ranks 0, 1 came to an all-gather and rank 2 to a barrier"];
 #[cfg(not(target_os = "linux"))]
-const OUT_OF_STEP: &str = "in vain";
+const OUT_OF_STEP: &[&str] = &["from rank 2", "at a barrier in vain"];
 
 /// The highest of three ranks fails; all must end, without success, and say these words.
 fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &str) {
@@ -327,7 +327,7 @@ fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
         "--mpi",
     );
     fault("size", &["another size", "unusable message"], &variables, "--mpi");
-    fault("order", &[OUT_OF_STEP], &variables, "--mpi");
+    fault("order", OUT_OF_STEP, &variables, "--mpi");
     fault("leaves", &["rank 2 on", "had enough"], &variables, "--mpi");
     fault("corrupt", &["checksum", "unusable message from rank 2"], &variables, "--mpi");
 }
@@ -340,7 +340,7 @@ fn ranks_that_read_late_do_not_take_a_barrier_for_what_they_expect() {
         ["check", "--mpi", "-n", "3", "--timeout", "5", "--linger-ms", "300", "--fault", "order"];
     let ran = run(&late, &[("COMPOSITE_MPIRUN", &mpirun)]);
     assert_ne!(ran.code, Some(0), "{}", ran.text);
-    assert!(ran.text.contains(OUT_OF_STEP), "{}", ran.text);
+    assert!(OUT_OF_STEP.iter().any(|words| ran.text.contains(words)), "{}", ran.text);
     assert!(!ran.text.contains("No such file"), "{}", ran.text);
 }
 
