@@ -32,6 +32,19 @@ pub enum FrameError {
         /// Its length in 32-bit words.
         words: usize,
     },
+    /// What a rank announced cannot be, or is not what it sent.
+    #[error(
+        "rank {rank} got numbers from rank {from} that cannot be ({reason}): all ranks must render \
+         the same scene, camera and options"
+    )]
+    Announced {
+        /// The receiver.
+        rank: usize,
+        /// The sender.
+        from: usize,
+        /// Which numbers, and what they break.
+        reason: String,
+    },
     /// An answer that no part of this scene can have given.
     #[error("rank {rank}: {source}: all ranks must render parts of the same scene")]
     Answer {

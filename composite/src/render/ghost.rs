@@ -129,6 +129,9 @@ pub(super) fn choose(
     let mut numbers = give;
     numbers.extend([triangles as u32, near_parts.min(u64::from(u32::MAX)) as u32]);
     let all = channel.all_gather(&numbers)?;
+    for (from, numbers) in all.iter().enumerate() {
+        check_announced(from, numbers).map_err(|reason| channel.announced_error(from, reason))?;
+    }
 
     // ---- Both costs, for the rank that has most to do.
     let sum = |f: &dyn Fn(&[u32]) -> f64| all.iter().map(|n| f(n)).sum::<f64>();
@@ -175,6 +178,25 @@ pub(super) fn choose(
     })
 }
 
+/// Of one rank: triangles that it gives to each rank, those it has, and other parts near them. Room
+/// is made by these numbers: a rank cannot give more triangles than it has, and none to itself.
+fn check_announced(from: usize, numbers: &[u32]) -> Result<(), String> {
+    let [give @ .., triangles, _near] = numbers else {
+        return Err(format!("{} numbers about ghost triangles", numbers.len()));
+    };
+    for (to, &given) in give.iter().enumerate() {
+        if to == from && given > 0 {
+            return Err(format!("{given} ghost triangles to itself"));
+        }
+        if given > *triangles {
+            return Err(format!(
+                "{given} ghost triangles to rank {to}, of {triangles} that it has"
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Exchanges the triangles and builds this rank's part with its rim.
 fn fetch(
     channel: &mut RankChannel<'_>,
@@ -218,8 +240,13 @@ fn fetch(
         Ok(())
     })?;
     for (from, words) in came {
-        add_triangles(&mut merged, &words)
+        let came = add_triangles(&mut merged, &words)
             .ok_or_else(|| channel.message_error(from, "ghost triangles", words.len()))?;
+        let announced = all[from][rank];
+        if came != announced as usize {
+            let reason = format!("{announced} ghost triangles were announced, and {came} came");
+            return Err(channel.announced_error(from, reason));
+        }
     }
     let geometries = merged.into_iter().map(|m| Geometry::Mesh(Arc::new(m))).collect();
     let instances = part.scene.world.instances().to_vec();
@@ -232,18 +259,24 @@ fn fetch(
     Ok(scene)
 }
 
-fn add_triangles(meshes: &mut [TriMesh], mut words: &[u32]) -> Option<()> {
+/// Adds triangles that came, and says how many. `None` when the words do not say what they should,
+/// or a mesh would have more vertices than can be numbered.
+fn add_triangles(meshes: &mut [TriMesh], mut words: &[u32]) -> Option<usize> {
+    let mut came = 0;
     for mesh in meshes {
         let (&[vertices, triangles], rest) = words.split_first_chunk::<2>()?;
         let (positions, rest) = rest.split_at_checked((vertices as usize).checked_mul(3)?)?;
         let (indices, rest) = rest.split_at_checked((triangles as usize).checked_mul(3)?)?;
         words = rest;
-        let first = mesh.positions.len() as u32;
+        came += triangles as usize;
+        // Below the last number, which says that there is no such vertex.
+        let first = u32::try_from(mesh.positions.len()).ok()?;
+        first.checked_add(vertices).filter(|&end| end < u32::MAX)?;
         let corner = |p: &[u32; 3]| Vec3::from_array(p.map(f32::from_bits));
         mesh.positions.extend(positions.as_chunks::<3>().0.iter().map(corner));
         // Numbers past the end stay so: such triangles are left out of the structure.
         let moved = |t: &[u32; 3]| t.map(|k| if k < vertices { k + first } else { u32::MAX });
         mesh.indices.extend(indices.as_chunks::<3>().0.iter().map(moved));
     }
-    words.is_empty().then_some(())
+    words.is_empty().then_some(came)
 }

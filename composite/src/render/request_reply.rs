@@ -121,6 +121,10 @@ impl<'a> RankChannel<'a> {
         FrameError::Message { rank: self.rank(), from, what, words }
     }
 
+    pub(super) fn announced_error(&self, from: usize, reason: String) -> FrameError {
+        FrameError::Announced { rank: self.rank(), from, reason }
+    }
+
     pub(super) fn send(&mut self, to: usize, tag: Tag, words: &[u32]) -> Result<(), FrameError> {
         let buffer = self.comm.buffer(message_bytes(words.len()));
         let message = encode_message(words, buffer);
@@ -252,6 +256,14 @@ impl<'a> RankChannel<'a> {
         let sources: Vec<(usize, usize)> =
             asked_by.map(|from| (from, lengths[from][rank] as usize)).collect();
         self.receive(Tag::Request, what, sources, |channel, from, request| {
+            let announced = lengths[from][rank] as usize;
+            if request.len() != announced {
+                let reason = format!(
+                    "{what}: a question of {announced} words was announced, and one of {} came",
+                    request.len()
+                );
+                return Err(channel.announced_error(from, reason));
+            }
             let reply = answer(&mut channel.report, &request);
             channel.record_span(Activity::Answer);
             let reply = reply.ok_or_else(|| channel.message_error(from, what, request.len()))?;

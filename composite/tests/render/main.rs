@@ -1,4 +1,5 @@
 //! The picture of many ranks is the picture of one node, bit for bit.
+mod lying_ranks;
 mod scenes;
 mod volumes;
 
