@@ -6,6 +6,7 @@ use datasets::generate::nested_wavelet::Size;
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface;
 use glam::{DQuat, DVec3, Vec3};
+use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -34,10 +35,14 @@ pub fn coarse_wavelet(points: u32) -> anyhow::Result<Arc<TriMesh>> {
 pub fn pipes(count: u32) -> Arc<TriMesh> {
     const SIDES: u32 = 24;
     const SEGMENTS: u32 = 8;
-    let mut random = Random::new(1);
+    let mut random = SplitMix64::new(1);
     let mut mesh = TriMesh::default();
     for _ in 0..count {
-        let place = DVec3::new(random.signed(), random.signed(), random.signed());
+        let place = DVec3::new(
+            random.between(-1.0, 1.0),
+            random.between(-1.0, 1.0),
+            random.between(-1.0, 1.0),
+        );
         let turn = DQuat::from_rotation_arc(DVec3::Z, random.direction());
         let radius = 0.004 * (1.0 + 4.0 * random.unit() * random.unit());
         let length = 0.2 + 1.3 * random.unit();
@@ -92,8 +97,10 @@ pub fn crumpled_sphere(level: u32, crumple: f64, center: DVec3) -> TriMesh {
             })
             .collect();
     }
-    let mut random = Random::new(7);
-    let place = |p: &DVec3| -> Vec3 { (*p * (1.0 + crumple * random.signed()) + center).as_vec3() };
+    let mut random = SplitMix64::new(7);
+    let place = |p: &DVec3| -> Vec3 {
+        (*p * (1.0 + crumple * random.between(-1.0, 1.0)) + center).as_vec3()
+    };
     TriMesh::new(points.iter().map(place).collect(), triangles)
 }
 
@@ -143,42 +150,6 @@ pub fn globe(meridians: u32, parallels: u32) -> TriMesh {
         }
     }
     mesh
-}
-
-/// A repeatable sequence (SplitMix64, Steele, Lea and Flood 2014).
-pub struct Random(u64);
-
-impl Random {
-    /// The sequence of a seed.
-    pub fn new(seed: u64) -> Random {
-        Random(seed)
-    }
-    /// The next 64 bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-    /// Uniform in 0..1.
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-    /// Uniform in -1..1.
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-    /// Below `n`, which is not 0.
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.unit() * n as f64) as usize
-    }
-    /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> DVec3 {
-        let z = self.signed();
-        let (sin, cos) = (self.unit() * TAU).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
 }
 
 #[cfg(test)]

@@ -10,15 +10,13 @@ use composite::{
     PremultipliedPixel, Rect, Report, SimdLevel, Strategy, composite_shared, shared_memory_group,
     threads,
 };
+use mix64::mix64;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-fn hash(mut x: u64) -> u64 {
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
+#[path = "../src/mix64.rs"]
+mod mix64;
 
 /// One rank's picture: colours, depths, where it drew.
 struct Picture {
@@ -51,14 +49,14 @@ fn picture(scene: &str, rank: usize, ranks: usize, size: u32) -> Picture {
                 "discs" => u * u + v * v < 1.0,
                 _ => {
                     u * u + v * v < 1.0
-                        && hash(((y * n + x) / 3) as u64 * 131 + rank as u64).is_multiple_of(6)
+                        && mix64(((y * n + x) / 3) as u64 * 131 + rank as u64).is_multiple_of(6)
                 }
             };
             if inside {
                 let at = y * n + x;
                 let depth = 0.5
                     + 0.1 * (u * v).sin() * 0.1
-                    + 0.3 * hash(rank as u64) as f32 / u64::MAX as f32;
+                    + 0.3 * mix64(rank as u64) as f32 / u64::MAX as f32;
                 made.depths[at] = depth;
                 made.colors[at] = [rank as u8, x as u8, y as u8, 255];
                 made.floats[at] = [0.1, 0.2, depth * 0.3, 0.4];

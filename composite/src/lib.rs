@@ -58,6 +58,7 @@ mod frame_exchange;
 mod in_memory;
 mod layer;
 mod merge;
+mod mix64;
 mod network_costs;
 mod node;
 mod pixel;

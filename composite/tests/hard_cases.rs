@@ -4,16 +4,17 @@ use composite::{
     Fragment, Frame, NetworkCosts, Options, PixelFormat, PremultipliedPixel, Rect, Strategy,
     composite_deep, composite_deep_serial, composite_serial, f16, threads,
 };
+use mix64::mix64;
+
+#[path = "../src/mix64.rs"]
+mod mix64;
 
 const STRATEGIES: [Strategy; 4] =
     [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 8 }];
 
 /// A number below 2^16 from four.
 fn noise(a: usize, b: usize, c: usize, d: usize) -> u64 {
-    let mut x = (a as u64) << 48 ^ (b as u64) << 32 ^ (c as u64) << 16 ^ d as u64;
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (x ^ (x >> 31)) & 0xffff
+    mix64((a as u64) << 48 ^ (b as u64) << 32 ^ (c as u64) << 16 ^ d as u64) & 0xffff
 }
 
 /// One rank's planes, half empty, with ties.

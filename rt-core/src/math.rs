@@ -2,6 +2,10 @@
 //!
 //! Lengths are in the unit of the scene; nothing here has a tolerance of its own.
 
+mod split_mix;
+
+pub use split_mix::{SplitMix64, mix64};
+
 use glam::{DVec3, Vec3};
 
 /// Axis-aligned box in `f32`. The empty box has `min > max` in every axis.

@@ -1,28 +1,25 @@
 //! Small shapes and numbers for tests.
 
+use crate::math::SplitMix64;
 use crate::mesh::TriMesh;
 use glam::Vec3;
 use std::collections::HashMap;
 
-/// A repeatable sequence (SplitMix64, Steele et al. 2014).
-pub(crate) struct SplitMix64(u64);
+/// The numbers of [`SplitMix64`] in single precision.
+pub(crate) struct Random(SplitMix64);
 
-impl SplitMix64 {
+impl Random {
     pub(crate) fn new(seed: u64) -> Self {
-        SplitMix64(seed)
+        Random(SplitMix64::new(seed))
     }
 
     pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
     /// Uniform in [0, 1).
     pub(crate) fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1u64 << 24) as f32
+        self.0.unit_f32()
     }
 
     /// Uniform on the unit sphere.
@@ -36,7 +33,7 @@ impl SplitMix64 {
 
 /// Triangles of many sizes at random places in the unit ball.
 pub(crate) fn noise_soup(n: usize, seed: u64) -> TriMesh {
-    let mut r = SplitMix64::new(seed);
+    let mut r = Random::new(seed);
     let mut mesh = TriMesh::default();
     for i in 0..n as u32 {
         let center = r.direction() * r.unit();

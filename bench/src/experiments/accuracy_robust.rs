@@ -10,7 +10,7 @@ use super::installed_tracers::InstalledBaselines;
 use crate::baselines::embree::{EmbreeScene, Options};
 use crate::baselines::obvhs::{Obvhs, Preset};
 use crate::baselines::{Tracer, count_hits};
-use crate::meshes::{self, Random};
+use crate::meshes;
 use crate::plot::{Axis, Plot, Series};
 use crate::rays::{HitBlock, RaySet};
 use crate::record::{Record, Row};
@@ -20,6 +20,7 @@ use crate::{clock, rays};
 use glam::DVec3;
 use rayon::prelude::*;
 use rt_core::bvh::{BuildOptions, Robustness};
+use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -194,21 +195,22 @@ fn count_leaks(case: &Case, tracers: &[TracerUnderTest<'_>]) -> Vec<Row> {
 /// rays go the same way and packets are used. Origins are rounded to f32 first, so that the
 /// direction is the difference of the numbers the tracer sees.
 fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
-    let mut random = Random::new(batch << 8 | aim as u64);
+    let mut random = SplitMix64::new(batch << 8 | aim as u64);
     let (mesh, packets) = (&case.mesh, batch % 2 == 1);
-    let point = |random: &mut Random| {
+    let point = |random: &mut SplitMix64| {
         let inside = random.direction() * random.unit().cbrt() * case.radius;
         (case.center + inside).as_vec3().as_dvec3()
     };
-    let (common, first) = (point(&mut random), random.below(mesh.num_triangles()));
+    let (common, first) = (point(&mut random), below(&mut random, mesh.num_triangles()));
     RaySet::pack((0..BATCH).map(|i| {
         let origin = if packets { common } else { point(&mut random) };
-        let triangle = if packets { first + i / 3 } else { random.below(mesh.num_triangles()) };
+        let triangle =
+            if packets { first + i / 3 } else { below(&mut random, mesh.num_triangles()) };
         let corners = mesh.triangle(triangle % mesh.num_triangles()).map(|p| p.as_dvec3());
         let direction = match aim {
-            Aim::Vertices => corners[random.below(3)] - origin,
+            Aim::Vertices => corners[below(&mut random, 3)] - origin,
             Aim::Edges => {
-                let k = random.below(3);
+                let k = below(&mut random, 3);
                 // The point is rounded to f32, as an application's would be.
                 let point = corners[k].lerp(corners[(k + 1) % 3], random.unit());
                 point.as_vec3().as_dvec3() - origin
@@ -217,6 +219,11 @@ fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
         };
         rays::Ray64 { origin, direction, t_max: f64::INFINITY }
     }))
+}
+
+/// Below `n`, which is not 0.
+fn below(random: &mut SplitMix64, n: usize) -> usize {
+    (random.unit() * n as f64) as usize
 }
 
 /// Leaks per million rays, by aim.

@@ -4,6 +4,7 @@ use crate::comm::Communicator;
 use crate::compositor::{Compositor, Options};
 use crate::error::CompositeError;
 use crate::frame::Frame;
+use crate::mix64::mix64;
 use crate::pixel::{Composite, DepthPixel, PremultipliedPixel};
 use crate::reference::composite_serial;
 use crate::strategies::Strategy;
@@ -41,10 +42,7 @@ const STRANGE: [f32; 12] = [
 
 /// A number below 2^16 from three.
 fn noise(a: usize, b: usize, c: usize) -> u64 {
-    let mut x = (a as u64) << 40 ^ (b as u64) << 20 ^ c as u64;
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (x ^ (x >> 31)) & 0xffff
+    mix64((a as u64) << 40 ^ (b as u64) << 20 ^ c as u64) & 0xffff
 }
 
 impl Case {

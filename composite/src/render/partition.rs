@@ -7,6 +7,7 @@ use rt_core::camera::Camera;
 use rt_core::effects::Effects;
 use rt_core::glam::swizzles::Vec4Swizzles;
 use rt_core::glam::{DAffine3, DVec3, UVec3};
+use rt_core::math::SplitMix64;
 use rt_core::scene::Scene;
 use rt_core::volume::Brick;
 use std::sync::Arc;
@@ -96,7 +97,8 @@ impl Partition {
         if let Split::Random { seed } = split {
             for (g, geometry) in scene.world.geometries().iter().enumerate() {
                 for p in 0..count(geometry) as u32 {
-                    let rank = mixed(*seed ^ (g as u64) << 40 ^ u64::from(p)) % parts as u64;
+                    let mut random = SplitMix64::new(*seed ^ (g as u64) << 40 ^ u64::from(p));
+                    let rank = random.bits() % parts as u64;
                     primitive_ids[rank as usize][g].push(p);
                 }
             }
@@ -191,14 +193,6 @@ fn count(geometry: &Geometry) -> usize {
         Geometry::Mesh(mesh) => mesh.indices.len(),
         Geometry::Shape(shape) => shape.num_primitives(),
     }
-}
-
-/// A well-mixed number (the finalizer of splitmix64).
-fn mixed(mut x: u64) -> u64 {
-    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ x >> 31
 }
 
 fn items(scene: &Scene, split: &Split) -> Vec<Item> {

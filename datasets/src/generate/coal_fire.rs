@@ -12,9 +12,9 @@
 use super::combustion_jet::{gas_fields, gas_row};
 use super::flame_sheet::{FlameSheet, Species};
 use super::flow::{Fields, Flow, FlowError};
-use super::random::Random;
 use super::turbulence::{Displacement, Turbulence, Vortex, Vortices};
 use glam::{DVec3, UVec3};
+use rt_core::math::SplitMix64;
 
 /// Points of table 5.1.
 pub const THESIS_DIMS: UVec3 = UVec3::new(402, 162, 162);
@@ -56,7 +56,7 @@ impl CoalFire {
         let mut flow =
             Flow::over(self.dims, DVec3::new(0.0, -side, -side), DVec3::new(LENGTH_M, side, side))?;
         let turbulence = Turbulence::new(&flow, 0.24, self.seed);
-        let mut random = Random::new(self.seed);
+        let mut random = SplitMix64::new(self.seed);
         // Rings of the shear layer near the pipe, doubling in size as they pair.
         let mut rings = Vec::new();
         let mut x = 0.7 * PIPE_M;

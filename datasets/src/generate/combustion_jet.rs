@@ -12,9 +12,9 @@
 
 use super::flame_sheet::{FlameSheet, Species};
 use super::flow::{Fields, Flow, FlowError, names};
-use super::random::Random;
 use super::turbulence::{Displacement, Turbulence, Vortex, Vortices};
 use glam::{DVec3, UVec3};
+use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
 /// Points of table 5.1.
@@ -73,7 +73,7 @@ impl CombustionJet {
 
     /// How fuel and oxidiser are mixed.
     pub(crate) fn mixing(&self, flow: &Flow) -> Mixing {
-        let mut random = Random::new(self.seed);
+        let mut random = SplitMix64::new(self.seed);
         let length = flow.spacing_m.x * (flow.dims.x - 1) as f64;
         // Rollers on both faces, staggered, about 3 slots apart; images left and right make them
         // periodic.

@@ -8,11 +8,11 @@
 //! at z = 0.
 
 use super::noise::{Noise, RowScratch};
-use super::random::Random;
 use crate::isosurface::{IsosurfaceError, Isosurfaces, Options, PlaneSource, extract_streamed};
 use crate::view::View;
 use glam::{DMat3, DVec2, DVec3, UVec3};
 use rayon::prelude::*;
+use rt_core::math::SplitMix64;
 
 /// The surface of matter.
 pub const ISO: f64 = 0.0;
@@ -47,7 +47,7 @@ impl Impact {
     /// The field on `points` x `points` x 0.8·`points` points (clamped to 16..=4096) with
     /// `fragments` ejecta.
     pub fn new(points: u32, fragments: usize, seed: u64) -> Self {
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         let fragments = (0..fragments)
             .map(|_| {
                 // Sizes by a power law, as fragments have; the fastest are the smallest and

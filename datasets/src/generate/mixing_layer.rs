@@ -13,11 +13,11 @@
 //! points). Along x and y the field is periodic.
 
 use super::noise::{Noise, RowScratch};
-use super::random::Random;
 use crate::isosurface::{IsosurfaceError, Isosurfaces, Options, PlaneSource, extract_streamed};
 use crate::view::View;
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
+use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
 /// Half heavy, half light: the value of the surface.
@@ -53,7 +53,7 @@ impl MixingLayer {
     /// size); between 16 and 8192, values outside are clamped.
     pub fn new(points: u32, seed: u64) -> Self {
         let points = points.clamp(16, 8192);
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         // Wave numbers in a ring; longer waves are higher.
         let modes: Vec<[f64; 4]> = (0..MODES)
             .map(|_| {

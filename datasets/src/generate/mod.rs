@@ -1,14 +1,15 @@
 //! Generators: every data set of the thesis as a deterministic function of its size.
 //!
 //! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random
-//! numbers come from [`random`], so the same parameters give the same data on every machine and any
-//! number of threads.
+//! numbers come from [`rt_core::math::SplitMix64`], so the same parameters give the same data on
+//! every machine and any number of threads.
 
 pub mod blunt_body;
 mod cell_average;
 pub mod coal_fire;
 pub mod combustion_jet;
 pub mod cone_shock;
+mod fibonacci;
 pub mod fire;
 mod flame_sheet;
 pub mod flow;
@@ -23,7 +24,6 @@ pub mod oblique_shock;
 pub mod plasma;
 mod plume;
 pub mod polylines;
-pub mod random;
 mod revolve;
 pub mod sample_fields;
 pub mod shapes;

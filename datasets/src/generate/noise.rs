@@ -5,9 +5,9 @@
 //! leaves about a dozen operations a point, which is what makes fields of 8 billion points
 //! affordable.
 
-use super::random::mix;
 #[cfg(test)]
 use glam::DVec3;
+use rt_core::math::mix64;
 
 /// Noise with `period` lattice cells per unit length along each axis that repeats after one unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +32,7 @@ impl Noise {
     fn gradient(&self, cell: [i64; 3]) -> [f32; 3] {
         let wrapped = |a: usize| cell[a].rem_euclid(self.period[a] as i64) as u64;
         let key = wrapped(0) | wrapped(1) << 21 | wrapped(2) << 42;
-        let h = mix(key ^ self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let h = mix64(key ^ self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         // Each component uniform in -1..1: not unit vectors, but isotropic enough once octaves are
         // added.
         [0, 21, 42].map(|shift| ((h >> shift & 0x1f_ffff) as f32) * (2.0 / 0x1f_ffff as f32) - 1.0)

@@ -10,12 +10,12 @@
 
 use super::noise::{Noise, RowScratch};
 use super::polylines::{Line, Polylines};
-use super::random::Random;
 use super::streamline::{StreamlineOptions, trace};
 use crate::isosurface::{IsosurfaceError, Isosurfaces, Options, PlaneSource, extract_streamed};
 use crate::view::View;
 use glam::{DVec2, DVec3, UVec3};
 use rayon::prelude::*;
+use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
 /// Density of the surface: the skin of the ropes.
@@ -47,7 +47,7 @@ impl Plasma {
     /// Density sampled with 2·`points` x `points` x `points` points; `points` is clamped to
     /// 16..=4096.
     pub fn new(points: u32, seed: u64) -> Self {
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         let wander = [random.between(0.0, TAU), random.between(0.0, TAU)];
         Plasma { points: points.clamp(16, 4096), seed, wander }
     }
@@ -89,7 +89,7 @@ impl Plasma {
     /// `count` field lines through random points near the sheet. The scalar is the field strength.
     pub fn streamtubes(&self, count: usize) -> Polylines {
         let line = |i: usize| -> Line {
-            let mut random = Random::new(self.seed ^ (i as u64 + 1) << 32);
+            let mut random = SplitMix64::new(self.seed ^ (i as u64 + 1) << 32);
             let seed = DVec3::new(
                 random.between(0.0, 2.0),
                 random.unit(),
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn magnetic_field_is_the_curl_of_the_flux_function() {
         let plasma = Plasma::new(16, 4);
-        let mut random = Random::new(5);
+        let mut random = SplitMix64::new(5);
         let h = 1e-6;
         for _ in 0..100 {
             let p = DVec3::new(random.between(0.0, 2.0), random.unit(), random.between(-0.4, 0.4));

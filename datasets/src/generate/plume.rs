@@ -2,9 +2,9 @@
 //! up into rings, and a column that necks in, breaks up and widens as it rises.
 
 use super::flow::Flow;
-use super::random::Random;
 use super::turbulence::{Displacement, Turbulence, Vortex, Vortices};
 use glam::DVec3;
+use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
 /// Proportions, in source radii.
@@ -40,7 +40,7 @@ pub(crate) struct Plume {
 
 impl Plume {
     pub(crate) fn new(flow: &Flow, shape: Shape, seed: u64) -> Plume {
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         let r0 = shape.source_radius_m;
         let rings = shape.rings.iter().map(|&height| {
             let z = (height + random.between(-0.1, 0.1)) * r0;

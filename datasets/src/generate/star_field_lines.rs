@@ -5,12 +5,13 @@
 //! (starspots), so lines are of all lengths, from small arcades to loops that leave the domain.
 //! Units: the star's radius is 1.
 
+use super::fibonacci::fibonacci_direction;
 use super::polylines::{Line, Polylines};
-use super::random::{Random, fibonacci_direction};
 use super::streamline::{StreamlineOptions, trace};
 use crate::view::View;
 use glam::DVec3;
 use rayon::prelude::*;
+use rt_core::math::SplitMix64;
 
 /// Lines in the thesis.
 pub const THESIS_LINES: usize = 48_000;
@@ -37,7 +38,7 @@ pub struct StarField {
 impl StarField {
     /// The field of this seed.
     pub fn new(seed: u64) -> Self {
-        let mut random = Random::new(seed);
+        let mut random = SplitMix64::new(seed);
         let mut dipoles = vec![Dipole { position: DVec3::ZERO, moment: DVec3::new(0.2, 0.1, 1.0) }];
         dipoles.extend((0..SPOTS).map(|_| Dipole {
             position: random.direction() * 0.8,
@@ -99,7 +100,7 @@ mod tests {
     #[test]
     fn field_has_no_divergence() {
         let field = StarField::new(1);
-        let mut random = Random::new(2);
+        let mut random = SplitMix64::new(2);
         for _ in 0..100 {
             let p = random.direction() * random.between(1.0, 4.0);
             let h = 1e-4;

@@ -11,6 +11,7 @@ use crate::host::config::{Mode, Settings};
 use crate::trace::Prepared;
 use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3, Vec3};
+use rt_core::math::SplitMix64;
 use rt_core::ray::Ray;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -229,21 +230,16 @@ impl<'a> RayScene<'a> {
 }
 
 /// Numbers that depend on the pixel alone, so that a still picture does not flicker.
-pub(crate) struct PixelRng(u64);
+pub(crate) struct PixelRng(SplitMix64);
 
 impl PixelRng {
     pub(crate) fn new((x, y): (i32, i32)) -> PixelRng {
-        PixelRng((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15)
+        PixelRng(SplitMix64::new((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15))
     }
 
     /// From 0 to below 1.
     pub(crate) fn next(&mut self) -> f64 {
-        // SplitMix64 (Steele, Lea and Flood 2014).
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        self.0.unit()
     }
 
     pub(crate) fn on_disk(&mut self) -> (f64, f64) {
@@ -278,6 +274,16 @@ mod tests {
         assert!(!LightPosition::Directional(DVec3::new(0.1, 0.0, 1.0)).follows_rays_of(parallel));
         assert!(!LightPosition::Directional(DVec3::NEG_Z).follows_rays_of(parallel));
         assert!(!LightPosition::Positional(DVec3::ZERO).follows_rays_of(parallel));
+    }
+
+    #[test]
+    fn pixels_keep_their_random_numbers() {
+        // Also of a pixel left of or above the picture, whose number is negative.
+        let mut random = PixelRng::new((3, -4));
+        assert_eq!(
+            [random.next(), random.next()].map(f64::to_bits),
+            [0x3fd8_0ac0_36c8_7516, 0x3fe3_cffc_8179_b04a]
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::*;
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::simd::SimdLevel;
-use crate::test_shapes::{SplitMix64, noise_soup, sphere};
+use crate::test_shapes::{Random, noise_soup, sphere};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub(crate) fn all_options() -> Vec<BuildOptions> {
 }
 
 fn random_rays(n: usize, seed: u64, spread: f32) -> Vec<Ray> {
-    let mut r = SplitMix64::new(seed);
+    let mut r = Random::new(seed);
     (0..n)
         .map(|_| {
             let o = r.direction() * 3.0;
@@ -201,7 +201,7 @@ fn many_places(n: usize) -> (Vec<Geometry>, Vec<Instance>) {
         Geometry::Mesh(Arc::new(sphere(2))),
         Geometry::Shape(Arc::new(balls)),
     ];
-    let mut r = SplitMix64::new(n as u64);
+    let mut r = Random::new(n as u64);
     let instances = (0..n)
         .map(|i| {
             let place = (r.direction() * r.unit()).as_dvec3();

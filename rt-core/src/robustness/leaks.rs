@@ -4,8 +4,9 @@
 //! where a tracer fails, so these are aimed there: exactly at vertices and edges, beside edges by a
 //! few roundings, and from close to the surface, where a triangle is large against its distance.
 
-use super::SplitMix64;
+use super::batch_numbers;
 use crate::bvh::{Coherence, InstanceFilter, World};
+use crate::math::SplitMix64;
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, NO_HIT, Ray, RayBlock};
 use glam::{DVec3, Vec3};
@@ -172,7 +173,7 @@ impl LeakTest<'_> {
 
     /// The rays of batch `batch`, in render space: 4096, each starting inside.
     pub fn rays(&self, batch: u64) -> Vec<Ray> {
-        let mut random = SplitMix64::for_batch(self.seed, batch);
+        let mut random = batch_numbers(self.seed, batch);
         let n = self.mesh.num_triangles();
         if n == 0 {
             return vec![Ray::new(Vec3::ZERO, Vec3::ZERO); BATCH];
@@ -185,9 +186,10 @@ impl LeakTest<'_> {
             .map(|i| {
                 let tile = (i / TILE).is_multiple_of(2);
                 if tile && i % TILE == 0 {
-                    first = random.below(n);
+                    first = below(&mut random, n);
                 }
-                let triangle = if tile { (first + i % TILE / 2) % n } else { random.below(n) };
+                let triangle =
+                    if tile { (first + i % TILE / 2) % n } else { below(&mut random, n) };
                 let corners = self.mesh.triangle(triangle).map(to_render);
                 let (on_surface, target) = self.target(corners, &mut random);
                 let new_origin = i % TILE == 0 || !tile;
@@ -201,7 +203,7 @@ impl LeakTest<'_> {
 
     /// A point of the triangle, and the point aimed at: the same or next to it.
     fn target(&self, corners: [DVec3; 3], random: &mut SplitMix64) -> (DVec3, Vec3) {
-        let k = random.below(3);
+        let k = below(random, 3);
         let (a, b, c) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
         let (on, off) = match self.aim {
             RayTarget::Vertex => (a, DVec3::ZERO),
@@ -232,4 +234,9 @@ impl LeakTest<'_> {
             }
         }
     }
+}
+
+/// Below `n`, which is not 0 and at most 2^32.
+fn below(random: &mut SplitMix64, n: usize) -> usize {
+    (((random.bits() >> 32) * n as u64) >> 32) as usize
 }

@@ -1,7 +1,7 @@
 //! Secondary rays that meet the surface they start from.
 
-use super::SplitMix64;
-use crate::math::orthonormal_basis;
+use super::batch_numbers;
+use crate::math::{SplitMix64, orthonormal_basis};
 use crate::ray::Ray;
 use crate::scene::Scene;
 use crate::surface::ResolvedInstance;
@@ -47,7 +47,7 @@ impl SelfShadowTest<'_> {
         if world.instances().is_empty() || world.bounds().is_empty() {
             return count;
         }
-        let mut random = SplitMix64::for_batch(self.seed, batch);
+        let mut random = batch_numbers(self.seed, batch);
         let resolved = ResolvedInstance::new(self.scene, 0);
         let (center, radius) = (world.bounds().center().as_dvec3(), world.bounds().radius() as f64);
         for _ in 0..BATCH {

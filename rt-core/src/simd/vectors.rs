@@ -145,12 +145,12 @@ impl<S: Simd> Vec3x16<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_shapes::SplitMix64;
+    use crate::test_shapes::Random;
     use fearless_simd::{Level, dispatch};
 
     #[test]
     fn lanes_have_the_bits_of_single_vectors() {
-        let mut r = SplitMix64::new(5);
+        let mut r = Random::new(5);
         let mut some = || {
             let mut rows = Rows3::ZERO;
             for lane in 0..LANES {

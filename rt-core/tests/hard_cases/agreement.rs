@@ -5,6 +5,7 @@ use crate::common::*;
 use crate::oracle::{self, check};
 use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, Robustness, World};
 use rt_core::glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
 use rt_core::ray::Ray;
 use rt_core::simd::SimdLevel;
@@ -155,7 +156,7 @@ fn single_rays_agree_with_the_f64_oracle() {
 
 /// Transforms of every kind that can be inverted.
 pub(crate) fn placements(n: usize, seed: u64, spread: f64) -> Vec<DAffine3> {
-    let mut r = Random(seed);
+    let mut r = SplitMix64::new(seed);
     (0..n)
         .map(|i| {
             let turn = DMat3::from_quat(DQuat::from_axis_angle(r.direction(), 6.0 * r.unit()));

@@ -3,39 +3,11 @@
 use glam::{DVec3, Vec3};
 use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, World};
 use rt_core::glam;
+use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{Hit, HitBlock, LANES, Ray, RayBlock};
 use rt_core::simd::SimdLevel;
 use std::collections::HashMap;
-
-/// A repeatable sequence (SplitMix64, Steele, Lea and Flood 2014).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    /// Uniform on the unit sphere.
-    pub(crate) fn direction(&mut self) -> DVec3 {
-        let z = 2.0 * self.unit() - 1.0;
-        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
-}
 
 /// Every preset and robustness mode at every instruction set.
 pub(crate) fn all_options() -> Vec<BuildOptions> {
@@ -223,7 +195,7 @@ pub(crate) fn cube(n: u32) -> TriMesh {
 
 /// Triangles of many sizes at random places in the unit ball.
 pub(crate) fn soup(n: usize, seed: u64) -> TriMesh {
-    let mut r = Random(seed);
+    let mut r = SplitMix64::new(seed);
     let mut mesh = TriMesh::default();
     for i in 0..n as u32 {
         let center = r.direction() * r.unit();
@@ -238,7 +210,7 @@ pub(crate) fn soup(n: usize, seed: u64) -> TriMesh {
 
 /// Rays from a sphere of radius 3 at the unit ball.
 pub(crate) fn inward_rays(n: usize, seed: u64) -> Vec<Ray> {
-    let mut r = Random(seed);
+    let mut r = SplitMix64::new(seed);
     (0..n)
         .map(|_| {
             let o = (r.direction() * 3.0).as_vec3();
@@ -267,7 +239,7 @@ pub(crate) fn camera(eye: Vec3, at: Vec3, half: f32, tiles: u32) -> Vec<Ray> {
 
 /// Triangles whose height is 10⁻³ to 10⁻⁸ of their length.
 pub(crate) fn needles(n: usize, seed: u64) -> TriMesh {
-    let mut r = Random(seed);
+    let mut r = SplitMix64::new(seed);
     let mut mesh = TriMesh::default();
     for i in 0..n as u32 {
         let a = r.direction() * r.unit();

@@ -4,6 +4,7 @@ use crate::common::*;
 use crate::oracle::check;
 use rt_core::bvh::{BuildError, BuildOptions, Geometry, Instance, Robustness, StreamError, World};
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec3};
+use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
 use rt_core::ray::{HitBlock, NO_HIT, Ray, RayBlock};
 use std::sync::Arc;
@@ -53,7 +54,7 @@ fn triangles_without_area_are_counted_and_harm_nothing() {
     let mut mesh = sphere(2, 1.0, DVec3::ZERO);
     let good = mesh.num_triangles();
     let rays = inward_rays(1500, 3);
-    let mut r = Random(5);
+    let mut r = SplitMix64::new(5);
     let clean = mesh.clone();
     for i in 0..500u32 {
         let n = mesh.positions.len() as u32;

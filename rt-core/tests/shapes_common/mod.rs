@@ -3,27 +3,25 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use glam::Vec3;
+use rt_core::math::SplitMix64;
 use rt_core::ray::Ray;
 use rt_core::shapes::{Shape, ShapeHit};
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every machine.
-pub(crate) struct Random(u64);
+/// The numbers of [`SplitMix64`] in single precision.
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
     pub(crate) fn new(seed: u64) -> Self {
-        Random(seed)
+        Random(SplitMix64::new(seed))
     }
 
     pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
-    /// Uniform in 0..1.
+    /// Uniform in [0, 1).
     pub(crate) fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 * (-24f32).exp2()
+        self.0.unit_f32()
     }
 
     /// Uniform in lo..hi.

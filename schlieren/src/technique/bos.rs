@@ -14,6 +14,7 @@ use super::Photon;
 use crate::optics::{Across, Optics};
 use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::view::View;
+use rt_core::math::mix64;
 
 /// A dotted background seen through the flow.
 #[derive(Debug, Clone, Copy)]
@@ -73,16 +74,9 @@ impl Dots {
         let word = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
             ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f).rotate_left(32)
             ^ u64::from(self.seed);
-        let bits = mix(mix(word));
+        let bits = mix64(mix64(word));
         [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / 4_294_967_296.0)
     }
-}
-
-/// 64 bits to 64 well-mixed bits (the finaliser of Steele, Lea and Flood's SplitMix, 2014).
-fn mix(x: u64) -> u64 {
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }
 
 /// Paths traced against the light, in the frame of the picture.

@@ -163,12 +163,12 @@ fn orders(refs: &[PrimRef; SWEEP], n: usize) -> [[u32; 4]; SWEEP] {
 mod tests {
     use super::*;
     use crate::math::Aabb;
-    use crate::test_shapes::SplitMix64;
+    use crate::test_shapes::Random;
     use glam::Vec3;
 
     #[test]
     fn orders_sort_every_axis_and_lose_nobody_even_at_the_ends_of_the_range() {
-        let mut r = SplitMix64::new(5);
+        let mut r = Random::new(5);
         for case in 0..2000 {
             let n = 2 + case % (SWEEP - 1);
             let huge = if case % 3 == 0 { f32::MAX } else { 1.0 };

@@ -11,7 +11,7 @@ use crate::bvh::{BuildOptions, BuildQuality, TreeStats, World};
 use crate::math::Aabb;
 use crate::mesh::TriMesh;
 use crate::ray::Ray;
-use crate::test_shapes::{SplitMix64, noise_soup, sphere};
+use crate::test_shapes::{Random, noise_soup, sphere};
 use fearless_simd::Level;
 use glam::Vec3;
 use std::sync::Arc;
@@ -53,7 +53,7 @@ fn check(mesh: TriMesh, aim: Aim, what: &str) {
     let mesh = Arc::new(mesh);
     let usable: Vec<usize> = (0..mesh.indices.len()).filter(|&i| mesh.is_renderable(i)).collect();
     let bounds = mesh.bounds();
-    let mut r = SplitMix64::new(9);
+    let mut r = Random::new(9);
     let size = bounds.radius();
     let middle = |t: usize| mesh.triangle(t).iter().sum::<Vec3>() / 3.0;
     let rays: Vec<Ray> = (0..60)
@@ -110,7 +110,7 @@ fn triangles_with_nan_and_infinite_vertices_are_counted_and_left_out() {
 
 #[test]
 fn triangles_without_area() {
-    let mut r = SplitMix64::new(2);
+    let mut r = Random::new(2);
     check(soup_of((0..5000).map(|_| [r.direction(); 3])), Aim::BelowRounding, "points");
     check(soup_of((0..5000).map(|_| [Vec3::ONE; 3])), Aim::BelowRounding, "one point");
     check(
@@ -240,7 +240,7 @@ fn reinsertion_lowers_the_cost() {
 
 #[test]
 fn what_obvhs_cannot_take_is_built_by_sah_and_noted() {
-    let mut r = SplitMix64::new(3);
+    let mut r = Random::new(3);
     let mut refs: Vec<PrimRef> = (0..3000)
         .map(|i| {
             let p = r.direction() * 1e19 * r.unit();

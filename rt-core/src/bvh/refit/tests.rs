@@ -1,11 +1,11 @@
 use super::*;
 use crate::bvh::{BuildOptions, BuildQuality, Instance};
 use crate::ray::Ray;
-use crate::test_shapes::{SplitMix64, noise_soup, sphere};
+use crate::test_shapes::{Random, noise_soup, sphere};
 use glam::{DAffine3, DVec3, Vec3};
 
 fn rays(n: usize, seed: u64) -> Vec<Ray> {
-    let mut r = SplitMix64::new(seed);
+    let mut r = Random::new(seed);
     (0..n)
         .map(|_| {
             let o = r.direction() * 4.0;
@@ -16,7 +16,7 @@ fn rays(n: usize, seed: u64) -> Vec<Ray> {
 
 /// Twisted around z, stretched and shaken.
 fn moved(mesh: &TriMesh, amount: f32) -> TriMesh {
-    let mut r = SplitMix64::new(17);
+    let mut r = Random::new(17);
     let mut mesh = mesh.clone();
     for p in &mut mesh.positions {
         let turn = glam::Quat::from_rotation_z(amount * p.z);
@@ -71,7 +71,7 @@ fn cost_growth_tells_when_vertices_have_been_shuffled_and_when_they_are_back() {
     let mesh = sphere(4);
     let mut world = World::from_mesh(mesh.clone(), &BuildOptions::default()).expect("valid");
     let mut shuffled = mesh.clone();
-    let mut r = SplitMix64::new(1);
+    let mut r = Random::new(1);
     for i in (1..shuffled.positions.len()).rev() {
         shuffled.positions.swap(i, (r.bits() % (i as u64 + 1)) as usize);
     }

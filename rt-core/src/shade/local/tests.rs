@@ -11,12 +11,12 @@ use crate::scene::{Appearance, Scene, SceneBuilder};
 use crate::shade::TILE;
 use crate::shapes::{Radii, Spheres};
 use crate::simd::SimdLevel;
-use crate::test_shapes::{SplitMix64, noise_soup};
+use crate::test_shapes::{Random, noise_soup};
 use glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 
 /// Triangles with attributes of every kind; `face` for one value per triangle.
-fn dressed(mesh: TriMesh, face: bool, r: &mut SplitMix64) -> TriMesh {
+fn dressed(mesh: TriMesh, face: bool, r: &mut Random) -> TriMesh {
     fn attribute<T>(face: bool, values: Vec<T>) -> Option<Attribute<T>> {
         Some(if face { Attribute::per_face(values) } else { Attribute::per_vertex(values) })
     }
@@ -43,7 +43,7 @@ fn towards_light(mut m: Material) -> Material {
 /// Every path through look-up and lighting, in pieces small enough for blocks to see several of
 /// them.
 fn mixed_scene() -> Scene {
-    let mut r = SplitMix64::new(11);
+    let mut r = Random::new(11);
     let mut b = SceneBuilder::new();
     let map = |log| {
         let colors = vec![[0.1, 0.2, 0.9, 1.0], [1.0, 0.8, 0.3, 1.0], [0.9, 0.1, 0.0, 1.0]];
