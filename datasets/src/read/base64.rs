@@ -1,5 +1,6 @@
 //! Base64 (RFC 4648) as VTK and glTF write it: several padded pieces may follow each other, white
-//! space may lie between.
+//! space may lie between. The crate `base64` decodes one piece without white space, whole, so it
+//! serves for writing only.
 
 /// Values of the letters; 64 marks a letter that does not belong.
 const TABLE: [u8; 256] = {
@@ -62,20 +63,6 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// Encodes one padded piece.
-pub(crate) fn encode(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let [a, b, c] = [chunk[0], *chunk.get(1).unwrap_or(&0), *chunk.get(2).unwrap_or(&0)];
-        let quartet = [a >> 2, (a << 4 | b >> 4) & 63, (b << 2 | c >> 6) & 63, c & 63];
-        for (i, q) in quartet.into_iter().enumerate() {
-            out.push(if i <= chunk.len() { LETTERS[q as usize] as char } else { '=' });
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,7 +79,7 @@ mod tests {
             ("foob", "Zm9vYg=="),
             ("foobar", "Zm9vYmFy"),
         ] {
-            assert_eq!(encode(plain.as_bytes()), coded);
+            assert_eq!(::base64::encode(plain), coded);
             let mut out = Vec::new();
             Decoder::new(coded.as_bytes()).fill(&mut out, usize::MAX).unwrap();
             assert_eq!(out, plain.as_bytes());

@@ -8,7 +8,6 @@ use super::{WriteError, write_file};
 use crate::model::{
     Attributes, Cells, DataArray, Dataset, PolyData, ScalarType, UnstructuredGrid, Values,
 };
-use crate::read::base64::encode;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -412,7 +411,7 @@ fn packed(bytes: &[u8], compress: bool) -> Vec<String> {
     if !compress {
         let mut all = number(bytes.len()).to_vec();
         all.extend_from_slice(bytes);
-        return vec![encode(&all)];
+        return vec![base64::encode(&all)];
     }
     let mut data = Vec::new();
     let mut sizes = Vec::new();
@@ -427,5 +426,5 @@ fn packed(bytes: &[u8], compress: bool) -> Vec<String> {
     let last = bytes.len() % BLOCK_BYTES;
     let header: Vec<u8> =
         [sizes.len(), BLOCK_BYTES, last].into_iter().chain(sizes).flat_map(number).collect();
-    vec![encode(&header), encode(&data)]
+    vec![base64::encode(&header), base64::encode(&data)]
 }

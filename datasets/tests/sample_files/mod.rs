@@ -335,7 +335,7 @@ pub(crate) fn gltf() -> Vec<u8> {
     data.extend([0u16, 1, 2].iter().flat_map(|x| x.to_le_bytes()));
     data.extend([0, 0]); // colours start at a multiple of four
     data.extend([255u8, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255]);
-    let text: String = base64(&data);
+    let text = base64::encode(&data);
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
 "nodes":[{{"children":[1],"translation":[10,0,0],"mesh":0}},{{"scale":[-2,2,2],"mesh":0,"name":"mirrored"}}],
@@ -357,7 +357,7 @@ pub(crate) fn glb() -> Vec<u8> {
     let (data, tail) = rest.split_once('"').unwrap();
     let mut json = format!("{head}{tail}").into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
-    let buffer = unbase64(data);
+    let buffer = base64::decode(data).unwrap();
     let mut out = b"glTF".to_vec();
     out.extend(2u32.to_le_bytes());
     out.extend((12 + 8 + json.len() as u32 + 8 + buffer.len() as u32).to_le_bytes());
@@ -365,35 +365,6 @@ pub(crate) fn glb() -> Vec<u8> {
         out.extend((chunk.len() as u32).to_le_bytes());
         out.extend(tag);
         out.extend(chunk);
-    }
-    out
-}
-
-const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-fn base64(bytes: &[u8]) -> String {
-    let mut out = String::new();
-    for c in bytes.chunks(3) {
-        let n = c.iter().fold(0u32, |n, &b| n << 8 | u32::from(b)) << (8 * (3 - c.len()));
-        for i in 0..4 {
-            out.push(if i <= c.len() {
-                LETTERS[(n >> (18 - 6 * i) & 63) as usize] as char
-            } else {
-                '='
-            });
-        }
-    }
-    out
-}
-
-fn unbase64(text: &str) -> Vec<u8> {
-    let mut out = Vec::new();
-    for q in text.as_bytes().chunks(4) {
-        let n = q
-            .iter()
-            .fold(0u32, |n, &b| n << 6 | LETTERS.iter().position(|&l| l == b).unwrap_or(0) as u32);
-        let bytes = [(n >> 16) as u8, (n >> 8) as u8, n as u8];
-        out.extend(&bytes[..3 - q.iter().filter(|&&b| b == b'=').count()]);
     }
     out
 }

@@ -145,7 +145,7 @@ impl Browser {
     /// The window's picture as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
-        from_base64(result["data"].as_str().expect("a picture"))
+        base64::decode(result["data"].as_str().expect("a picture")).expect("base64")
     }
 
     // ---- WebSocket (RFC 6455) -------------------------------------------------------------------
@@ -250,22 +250,4 @@ fn upgrade(host: &str, path: &str) -> TcpStream {
     }
     assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
     stream
-}
-
-fn from_base64(text: &str) -> Vec<u8> {
-    let value = |c: u8| match c {
-        b'A'..=b'Z' => c - b'A',
-        b'a'..=b'z' => c - b'a' + 26,
-        b'0'..=b'9' => c - b'0' + 52,
-        b'+' => 62,
-        _ => 63,
-    };
-    let mut bytes = Vec::with_capacity(text.len() * 3 / 4);
-    let digits: Vec<u8> = text.bytes().filter(|c| *c != b'=').map(value).collect();
-    for group in digits.chunks(4) {
-        let word =
-            group.iter().enumerate().fold(0u32, |w, (i, d)| w | u32::from(*d) << (18 - 6 * i));
-        bytes.extend(&word.to_be_bytes()[1..group.len()]);
-    }
-    bytes
 }
