@@ -121,6 +121,14 @@ pub fn round_to_f32(p: DVec3) -> Vec3 {
     p.as_vec3()
 }
 
+/// The middle one of `values`, of an even number the larger of the two: always a value that was
+/// there. `None` of nothing. The order is that of [`f64::total_cmp`], in which NaN is beyond
+/// infinity; the values are left in another order.
+pub fn median_high(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 /// The largest absolute coordinate.
 #[inline]
 pub fn max_abs(p: Vec3) -> f32 {
@@ -136,6 +144,15 @@ pub fn exp2i(k: i32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_median_is_one_of_the_values() {
+        assert_eq!(median_high(&mut []), None);
+        assert_eq!(median_high(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median_high(&mut [4.0, 1.0, 3.0, 2.0]), Some(3.0), "not the mean of two");
+        assert_eq!(median_high(&mut [f64::NAN, 1.0, 2.0]), Some(2.0), "NaN is the largest");
+        assert!(median_high(&mut [f64::NAN, 1.0]).is_some_and(f64::is_nan));
+    }
 
     #[test]
     fn basis_is_orthonormal_in_every_direction() {

@@ -13,6 +13,7 @@
 
 use crate::film::Framing;
 use crate::render::RenderOutput;
+use rt_core::math::median_high;
 
 /// A picture to measure in.
 #[derive(Debug, Clone)]
@@ -143,12 +144,12 @@ pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
             points_m[..i].iter().filter(|q| q[a] != p[a]).map(|q| (p[b] - q[b]) / (p[a] - q[a])),
         );
     }
-    let slope = median(&mut slopes)?;
+    let slope = median_high(&mut slopes)?;
     let offset = |p: &[f64; 2]| p[b] - slope * p[a];
-    let middle = median(&mut points_m.iter().map(offset).collect::<Vec<_>>())?;
+    let middle = median_high(&mut points_m.iter().map(offset).collect::<Vec<_>>())?;
     let off = |p: &[f64; 2]| (offset(p) - middle).abs();
     // 1.4826: standard deviation of a normal distribution over its median deviation.
-    let reach = 3.0 * 1.4826 * median(&mut points_m.iter().map(off).collect::<Vec<_>>())?;
+    let reach = 3.0 * 1.4826 * median_high(&mut points_m.iter().map(off).collect::<Vec<_>>())?;
     let kept: Vec<&[f64; 2]> = points_m.iter().filter(|p| off(p) <= reach).collect();
     let n = kept.len() as f64;
     let mean = [0, 1].map(|c| kept.iter().map(|p| p[c]).sum::<f64>() / n);
@@ -166,11 +167,6 @@ pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
         points: kept.len(),
         outliers: points_m.len() - kept.len(),
     })
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

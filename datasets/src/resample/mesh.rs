@@ -5,6 +5,7 @@ use super::ResampleError;
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
 use glam::DVec3;
 use rayon::prelude::*;
+use rt_core::math::median_high;
 use std::ops::Range;
 
 /// Bits of `vtkGhostType` (vtkDataSetAttributes.h): a hidden point, and cells that are refined
@@ -331,8 +332,7 @@ impl Mesh {
         };
         let mut sides: Vec<f64> =
             (0..self.cells).step_by(step).map(side).filter(|s| s.is_finite() && *s > 0.0).collect();
-        sides.sort_by(f64::total_cmp);
-        sides.get(sides.len() / 2).copied().unwrap_or(f64::NAN)
+        median_high(&mut sides).unwrap_or(f64::NAN)
     }
 
     /// The corners of a cell; panics when out of range.

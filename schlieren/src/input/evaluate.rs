@@ -6,6 +6,7 @@ use crate::index::ciddor::{self, Ciddor, MoistAir, ZERO_CELSIUS_K};
 use crate::index::conditions::Model;
 use crate::index::{Gas, IndexError, Mixture, mixture, plasma};
 use rayon::prelude::*;
+use rt_core::math::median_high;
 
 /// Densities of gases that people photograph, kg/m³, with room to spare: rarefied wind tunnels to
 /// supercritical injection.
@@ -35,12 +36,7 @@ fn spread(len: usize, value: impl Fn(usize) -> f64 + Sync) -> Option<Spread> {
     // Every so many, to be cheap: it serves a hint only.
     let step = (len / 10_001).max(1);
     let mut some: Vec<f64> = (0..len).step_by(step).map(&value).filter(|v| v.is_finite()).collect();
-    some.sort_by(f64::total_cmp);
-    (low <= high).then(|| Spread {
-        low,
-        high,
-        median: some.get(some.len() / 2).copied().unwrap_or(low),
-    })
+    (low <= high).then(|| Spread { low, high, median: median_high(&mut some).unwrap_or(low) })
 }
 
 /// n − 1 at every place; NaN where it cannot be.

@@ -3,6 +3,7 @@
 use super::lattice::LatticeValues;
 use super::{InputError, Options, Report, Role};
 use datasets::resample::Mark;
+use rt_core::math::median_high;
 
 /// How n0 is found.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -24,11 +25,7 @@ pub enum Reference {
 /// Median of the finite values; NaN when there is none.
 pub(super) fn median(values: &[f64]) -> f64 {
     let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    if finite.is_empty() {
-        return f64::NAN;
-    }
-    let middle = finite.len() / 2;
-    *finite.select_nth_unstable_by(middle, f64::total_cmp).1
+    median_high(&mut finite).unwrap_or(f64::NAN)
 }
 
 impl Reference {

@@ -11,6 +11,7 @@ use crate::strategies::Strategy;
 use crate::workload::{SyntheticFrame, Workload};
 use anyhow::Context as _;
 use datasets::cli::UsageError;
+use rt_core::math::median_high;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -368,9 +369,7 @@ fn count_differing(ours: &CompositeImage, theirs: IcetImage<'_>) -> u64 {
 }
 
 fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+    median_high(&mut values.to_vec()).unwrap_or(f64::NAN)
 }
 
 fn smallest(values: &[f64]) -> f64 {
