@@ -3,7 +3,7 @@
 use super::demo_args::DemoArgs;
 use super::rank_records::RankTimes;
 use super::ranks::RankComm;
-use super::{demo_data, gantt};
+use super::{demo_data, phase_sums};
 use crate::compositor::{Compositor, Options};
 use crate::frame::Frame;
 use crate::pixel::DepthPixel;
@@ -68,7 +68,7 @@ pub(super) fn demo(
                 scene,
                 1e3 * frame_secs
             );
-            std::fs::write(&plot, gantt::svg(&title, &lines))
+            std::fs::write(&plot, phase_sums::svg(&title, &lines))
                 .with_context(|| plot.display().to_string())?;
             let shown = DemoReport {
                 transport,
@@ -82,7 +82,7 @@ pub(super) fn demo(
             common.result(&shown, || {
                 format!(
                     "{title}\n{}\npicture: {}\nplot:    {}",
-                    gantt::table(&shown.ranks),
+                    phase_sums::table(&shown.ranks),
                     shown.picture.display(),
                     shown.plot.display()
                 )

@@ -1,143 +1,111 @@
-//! What each rank did in a frame, as a plot (SVG) and as a table with IceT's columns.
-use super::rank_records::RankTimes;
+//! A Gantt chart as SVG: a row for each rank, a bar for each span of time.
 use std::fmt::Write as _;
 
 const LEFT: f64 = 70.0;
-const PLOT_WIDTH: f64 = 760.0;
 const ROW: f64 = 22.0;
 const TOP: f64 = 64.0;
 
-/// Name, colour, and seconds of a rank.
-type Phase = (&'static str, &'static str, fn(&RankTimes) -> f64);
-
-/// The phases in the order in which they begin; the colours are Okabe and Ito's, which the
-/// colour-blind can tell apart.
-const PHASES: [Phase; 5] = [
-    ("render", "#009e73", |line| line.render_secs),
-    ("compress", "#56b4e9", |line| line.compress_secs),
-    ("send", "#e69f00", |line| line.send_secs),
-    ("blend", "#0072b2", |line| line.blend_secs),
-    ("collect", "#cc79a7", |line| line.collect_secs),
-];
-
-/// One bar for each rank. Phases of a frame alternate many times; a bar shows their sums one after
-/// the other.
-pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
-    let longest = lines.iter().map(|line| line.total_secs).fold(1e-9, f64::max);
-    let step = nice_step(1e3 * longest / 6.0);
-    let end_ms = (1e3 * longest / step).ceil() * step;
-    let x = |ms: f64| LEFT + PLOT_WIDTH * ms / end_ms;
-    let bottom = TOP + ROW * lines.len() as f64;
-    let mut text = String::new();
-    // Writing to a String cannot fail.
-    let _ = write!(
-        text,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" \
-         font-family=\"sans-serif\" font-size=\"12\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-         <text x=\"{LEFT}\" y=\"22\" font-size=\"14\">{}</text>\n",
-        LEFT + PLOT_WIDTH + 30.0,
-        bottom + 48.0,
-        escape(title)
-    );
-    for (index, (name, color, _)) in PHASES.iter().enumerate() {
-        let at = LEFT + 100.0 * index as f64;
-        let _ = writeln!(
-            text,
-            "<rect x=\"{at}\" y=\"36\" width=\"12\" height=\"12\" fill=\"{color}\"/>\
-             <text x=\"{}\" y=\"46\">{name}</text>",
-            at + 17.0
-        );
-    }
-    let mut tick = 0.0;
-    while tick <= end_ms * 1.0001 {
-        let _ = writeln!(
-            text,
-            "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"{TOP}\" y2=\"{bottom:.1}\" stroke=\"#dddddd\"/>\
-             <text x=\"{0:.1}\" y=\"{1:.1}\" text-anchor=\"middle\">{2}</text>",
-            x(tick),
-            bottom + 17.0,
-            trim(tick)
-        );
-        tick += step;
-    }
-    for (row, line) in lines.iter().enumerate() {
-        let y = TOP + ROW * row as f64;
-        let _ = writeln!(
-            text,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">rank {}</text>",
-            LEFT - 8.0,
-            y + 15.0,
-            line.rank
-        );
-        let mut from_ms = 0.0;
-        for (name, color, secs) in PHASES {
-            let ms = 1e3 * secs(line);
-            let _ = writeln!(
-                text,
-                "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{:.1}\" \
-                 fill=\"{color}\"><title>rank {}: {name} {ms:.3} ms</title></rect>",
-                x(from_ms),
-                y + 3.0,
-                PLOT_WIDTH * ms / end_ms,
-                ROW - 6.0,
-                line.rank
-            );
-            from_ms += ms;
-        }
-    }
-    let _ = write!(
-        text,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">ms since the frame began; sums of \
-         each phase, one after the other</text>\n</svg>\n",
-        LEFT + PLOT_WIDTH / 2.0,
-        bottom + 38.0
-    );
-    text
+/// What is drawn.
+pub(super) struct Chart<'a> {
+    pub(super) title: &'a str,
+    /// Names and colours of what bars stand for.
+    pub(super) legend: &'a [(&'static str, &'static str)],
+    /// Ranks and their bars, from the top.
+    pub(super) rows: Vec<(usize, Vec<Bar>)>,
+    /// The time axis goes from 0 to here.
+    pub(super) end_ms: f64,
+    /// Places on the axis and what is written there.
+    pub(super) ticks: Vec<(f64, String)>,
+    pub(super) tick_color: &'static str,
+    /// Under the axis.
+    pub(super) note: Option<&'static str>,
+    /// Length of the axis.
+    pub(super) axis_px: f64,
+    /// Right of the axis.
+    pub(super) margin_px: f64,
 }
 
-/// The same as a table.
-pub(super) fn table(lines: &[RankTimes]) -> String {
-    let mut text = format!(
-        "{:>4} {:>10} {:>12} {:>9} {:>8} {:>11} {:>9} {:>12}",
-        "rank",
-        "render ms",
-        "compress ms",
-        "blend ms",
-        "send ms",
-        "collect ms",
-        "total ms",
-        "bytes sent"
-    );
-    for line in lines {
+/// A span of time.
+pub(super) struct Bar {
+    pub(super) name: &'static str,
+    pub(super) color: &'static str,
+    pub(super) begin_ms: f64,
+    pub(super) ms: f64,
+}
+
+impl Chart<'_> {
+    pub(super) fn svg(&self) -> String {
+        let (width, margin) = (self.axis_px, self.margin_px);
+        let x = |ms: f64| LEFT + width * ms / self.end_ms;
+        let bottom = TOP + ROW * self.rows.len() as f64;
+        let mut text = String::new();
+        // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "\n{:>4} {:>10.3} {:>12.3} {:>9.3} {:>8.3} {:>11.3} {:>9.3} {:>12}",
-            line.rank,
-            1e3 * line.render_secs,
-            1e3 * line.compress_secs,
-            1e3 * line.blend_secs,
-            1e3 * line.send_secs,
-            1e3 * line.collect_secs,
-            1e3 * line.total_secs,
-            line.bytes_sent
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" \
+             font-family=\"sans-serif\" font-size=\"12\">\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
+             <text x=\"{LEFT}\" y=\"22\" font-size=\"14\">{}</text>\n",
+            LEFT + width + margin,
+            bottom + 48.0,
+            escaped(self.title)
         );
+        for (index, (name, color)) in self.legend.iter().enumerate() {
+            let at = LEFT + 100.0 * index as f64;
+            let _ = writeln!(
+                text,
+                "<rect x=\"{at}\" y=\"36\" width=\"12\" height=\"12\" fill=\"{color}\"/>\
+                 <text x=\"{}\" y=\"46\">{name}</text>",
+                at + 17.0
+            );
+        }
+        for (ms, label) in &self.ticks {
+            let _ = writeln!(
+                text,
+                "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"{TOP}\" y2=\"{bottom:.1}\" stroke=\"{2}\"/>\
+                 <text x=\"{0:.1}\" y=\"{1:.1}\" text-anchor=\"middle\">{label}</text>",
+                x(*ms),
+                bottom + 17.0,
+                self.tick_color
+            );
+        }
+        for (row, (rank, bars)) in self.rows.iter().enumerate() {
+            let y = TOP + ROW * row as f64;
+            let _ = writeln!(
+                text,
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">rank {rank}</text>",
+                LEFT - 8.0,
+                y + 15.0
+            );
+            for bar in bars {
+                let _ = writeln!(
+                    text,
+                    "<rect x=\"{:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{:.1}\" \
+                     fill=\"{}\"><title>rank {rank}: {} {:.3} ms</title></rect>",
+                    x(bar.begin_ms),
+                    y + 3.0,
+                    width * bar.ms / self.end_ms,
+                    ROW - 6.0,
+                    bar.color,
+                    bar.name,
+                    bar.ms
+                );
+            }
+        }
+        if let Some(note) = self.note {
+            let _ = writeln!(
+                text,
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{note}</text>",
+                LEFT + width / 2.0,
+                bottom + 38.0
+            );
+        }
+        text.push_str("</svg>\n");
+        text
     }
-    text
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `at_least`.
-fn nice_step(at_least: f64) -> f64 {
-    let power = 10_f64.powf(at_least.log10().floor());
-    [1.0, 2.0, 5.0].iter().map(|m| m * power).find(|step| *step >= at_least).unwrap_or(10.0 * power)
-}
-
-fn trim(number: f64) -> String {
-    let text = format!("{number:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_string()
-}
-
-fn escape(text: &str) -> String {
+fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
@@ -145,30 +113,19 @@ fn escape(text: &str) -> String {
 mod tests {
     use super::*;
 
-    fn line(rank: usize) -> RankTimes {
-        RankTimes {
-            rank,
-            render_secs: 0.004,
-            compress_secs: 0.001,
-            blend_secs: 0.002,
-            send_secs: 0.0005,
-            collect_secs: 0.0,
-            total_secs: 0.0075,
-            bytes_sent: 1234,
-        }
-    }
-
     #[test]
-    fn bars_are_as_long_as_their_phases_and_titles_cannot_break_the_file() {
-        let text = svg("a < b & c", &[line(0), line(1)]);
-        assert!(text.contains("a &lt; b &amp; c"));
-        // 4 ms of an axis of 8.
-        assert!(text.contains("width=\"380.00\""), "{text}");
-        assert_eq!(text.matches("rank 1: ").count(), PHASES.len());
-    }
-
-    #[test]
-    fn steps_of_the_axis_are_round() {
-        assert_eq!([0.9, 1.1, 3.0, 70.0].map(nice_step), [1.0, 2.0, 5.0, 100.0]);
+    fn titles_cannot_break_the_file() {
+        let chart = Chart {
+            title: "a < b & c",
+            legend: &[],
+            rows: Vec::new(),
+            end_ms: 1.0,
+            ticks: Vec::new(),
+            tick_color: "black",
+            note: None,
+            axis_px: 100.0,
+            margin_px: 0.0,
+        };
+        assert!(chart.svg().contains("a &lt; b &amp; c"));
     }
 }

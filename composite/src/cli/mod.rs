@@ -10,6 +10,7 @@ mod first_ranks;
 mod gantt;
 mod hard_cases;
 mod mpirun;
+mod phase_sums;
 mod rank_records;
 mod ranks;
 mod smpirun;
