@@ -1,10 +1,10 @@
 //! Cameras: any OpenGL projection · view matrix in f64, with an optional thin lens.
 //!
 //! A pixel's ray needs only three rows of the matrix. With `clip = M (world, 1)`, a perspective ray
-//! is `eye + t D(x, y)` where `D` solves *clip x, y, w of a direction = (x, y, 1)*, so `t` is clip
-//! w (for the usual matrices: eye depth) and the near and far rows never enter: a far/near ratio of
-//! 1e9 costs the rays no accuracy. A parallel ray uses rows x, y, z in the same way, with `t` in
-//! clip z. Pixel centres are OpenGL's; **row 0 is the top row**.
+//! is `eye + t D(x, y)` where `D` solves *clip x, y, w of a direction = (x, y, 1)*. So `t` is clip
+//! w (for the usual matrices: eye depth), and the near and far rows are not used: a far/near ratio
+//! of 1e9 does not reduce the accuracy of rays. A parallel ray uses rows x, y, z in the same way,
+//! with `t` in clip z. Pixel centres are OpenGL's; **row 0 is the top row**.
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
@@ -23,12 +23,12 @@ pub enum CameraError {
     /// NaN or infinity in an argument.
     #[error("camera {field} is {value}; every component must be finite")]
     NotFinite {
-        /// Which argument.
+        /// The argument.
         field: &'static str,
         /// The value, as text.
         value: String,
     },
-    /// The matrix maps the picture plane onto a line or a point.
+    /// The matrix maps the image plane onto a line or a point.
     #[error(
         "camera matrix is singular (rows x, y and {third} have determinant {determinant}); check \
          that eye and target differ, that up is not along the view, and that the picture has an \
@@ -37,13 +37,13 @@ pub enum CameraError {
     Singular {
         /// "w" for perspective, "z" for parallel projection.
         third: &'static str,
-        /// Determinant found.
+        /// The determinant.
         determinant: f64,
     },
     /// A number outside its range.
     #[error("camera {field} is {value}; it must be {rule}")]
     OutOfRange {
-        /// Which argument.
+        /// The argument.
         field: &'static str,
         /// The value.
         value: f64,
@@ -79,12 +79,12 @@ pub(crate) enum Projection {
         eye: DVec3,
         /// Right, up and backward.
         axes: DMat3,
-        /// NDC of the picture's lower left and upper right corner in the whole panorama.
+        /// NDC of the image's lower left and upper right corner in the whole panorama.
         region: [[f64; 2]; 2],
     },
 }
 
-/// A camera. See the module's text for its conventions.
+/// A camera. The module documentation describes its conventions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     pub(crate) clip_from_world: DMat4,
@@ -97,8 +97,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// From OpenGL's `projection * view` (clip from world): perspective or parallel, off-axis,
-    /// tiled, any.
+    /// A camera with OpenGL's `projection * view` (clip from world): any perspective or parallel
+    /// projection, also off-axis or tiled.
     ///
     /// ```
     /// use rt_core::{camera::Camera, glam::{DMat4, DVec3, dmat4, dvec4}};
@@ -187,7 +187,7 @@ impl Camera {
         Camera::from_matrix(projection * view(eye, target, up)?)
     }
 
-    /// A parallel camera (glOrtho · gluLookAt); `height` is the world height of the picture.
+    /// A parallel camera (glOrtho · gluLookAt); `height` is the world height of the image.
     pub fn orthographic(
         eye: DVec3,
         target: DVec3,
@@ -214,10 +214,10 @@ impl Camera {
         Camera::from_matrix(projection * view(eye, target, up)?)
     }
 
-    /// A camera that sees all around: an equirectangular panorama with `target` in its middle.
-    /// `region` is the part of the panorama that fills the picture, from the lower left (`[[0, 0],
-    /// [1, 1]]` for all of it). Window depth is 1 - 1 / (1 + distance), nothing is cut by near and
-    /// far planes, and [`Camera::clip_from_world`] is that of a right angle ahead.
+    /// A camera that sees in all directions: an equirectangular panorama with `target` in its
+    /// middle. `region` is the part of the panorama that fills the image, from the lower left
+    /// (`[[0, 0], [1, 1]]` for all of it). Window depth is 1 - 1 / (1 + distance). Near and far
+    /// planes clip nothing, and [`Camera::clip_from_world`] is that of a right angle ahead.
     pub fn omnidirectional(
         eye: DVec3,
         target: DVec3,
@@ -248,8 +248,8 @@ impl Camera {
         Ok(Camera { projection, near_far_clipping: false, ..ahead })
     }
 
-    /// The same camera with a lens. Refused for parallel projections and lenses without a positive
-    /// focus distance.
+    /// The same camera with a lens. Returns an error for parallel projections and for lenses
+    /// without a positive focus distance.
     pub fn with_lens(self, lens: ThinLens) -> Result<Camera, CameraError> {
         if !matches!(self.projection, Projection::Perspective { .. }) {
             return Err(CameraError::LensOnParallel);
@@ -266,7 +266,7 @@ impl Camera {
         Camera { depth_range, ..self }
     }
 
-    /// Checks what was set without a check.
+    /// Checks the values whose setters do not check them.
     pub(crate) fn check(&self) -> Result<(), CameraError> {
         let ends = self.depth_range;
         for (field, end) in [("depth_range[0]", ends[0]), ("depth_range[1]", ends[1])] {
@@ -275,7 +275,7 @@ impl Camera {
         Ok(())
     }
 
-    /// Whether surfaces before the near plane and behind the far plane are cut away, as OpenGL does
+    /// Whether surfaces before the near plane and behind the far plane are clipped, as in OpenGL
     /// (default: yes).
     pub fn with_near_far_clipping(self, near_far_clipping: bool) -> Camera {
         Camera { near_far_clipping, ..self }
@@ -299,7 +299,7 @@ impl Camera {
         }
     }
 
-    /// Unit viewing direction: normal of the picture plane, away from the viewer.
+    /// Unit viewing direction: normal of the image plane, away from the viewer.
     pub fn forward(&self) -> DVec3 {
         match self.projection {
             Projection::Perspective { .. } | Projection::Omnidirectional { .. } => {
@@ -318,8 +318,8 @@ impl Camera {
         DMat3::from_cols(right, back.cross(right), back)
     }
 
-    /// OpenGL's window depth of a world point: 0 (near) to 1 (far) unless the depth range says
-    /// otherwise. One f64 evaluation of matrix rows z and w; round it to f32 for a depth buffer.
+    /// OpenGL's window depth of a world point: 0 (near) to 1 (far) unless another depth range is
+    /// set. One f64 evaluation of matrix rows z and w; round it to f32 for a depth buffer.
     #[inline(always)]
     pub fn window_depth(&self, world: DVec3) -> f64 {
         let (z, w) = (self.clip_from_world.row(2), self.clip_from_world.row(3));
@@ -339,20 +339,20 @@ impl Camera {
         near + (far - near) * (1.0 - 1.0 / (1.0 + distance))
     }
 
-    /// Window depth where there is nothing: that of the far plane.
+    /// Window depth of the background: that of the far plane.
     pub fn background_depth(&self) -> f64 {
         self.depth_range[1]
     }
 
-    /// NDC of the point (`x`, `y`) of a picture of `size` pixels; pixel centres are at +0.5, y
-    /// grows downwards.
+    /// NDC of the point (`x`, `y`) of an image of `size` pixels; pixel centres are at +0.5, y grows
+    /// downwards.
     #[inline]
     pub fn ndc_of_pixel(x: f64, y: f64, size: [u32; 2]) -> [f64; 2] {
         [2.0 * x / size[0] as f64 - 1.0, 1.0 - 2.0 * y / size[1] as f64]
     }
 
-    /// The world ray through NDC (`x`, `y`) as origin and direction, in the parametrization of the
-    /// module's text: clip w for perspective, clip z + w over w (0 at the near plane, 2 at the far
+    /// The world ray through NDC (`x`, `y`) as origin and direction, parametrized as in the module
+    /// documentation: clip w for perspective, clip z + w over w (0 at the near plane, 2 at the far
     /// plane) for parallel projections.
     #[inline]
     pub fn world_ray(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
@@ -381,8 +381,8 @@ impl Camera {
         }
     }
 
-    /// Ray parameters of the near and far planes along [`Camera::world_ray`]; everything in front
-    /// of the eye without clipping.
+    /// Ray parameters of the near and far planes along [`Camera::world_ray`]; without clipping,
+    /// everything in front of the eye.
     pub(crate) fn near_far(&self, origin: DVec3, dir: DVec3) -> [f64; 2] {
         let parallel = matches!(self.projection, Projection::Parallel { .. });
         if !self.near_far_clipping {

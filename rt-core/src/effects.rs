@@ -1,8 +1,8 @@
-//! What a picture needs beyond primary rays and local lighting, as a set that the scene fills in by
-//! itself.
+//! The effects that an image needs in addition to primary rays and local lighting. By default the
+//! renderer determines them from the scene.
 //!
-//! The renderer runs one pass per effect over a tile of rays, and a pass outside the set is not
-//! entered at all: an unused effect costs one test per tile, and its ray counter in
+//! The renderer runs one pass per effect over a tile of rays. It never enters a pass outside the
+//! set: an unused effect costs one test per tile, and its ray counter in
 //! [`crate::ray_stats::RayStats`] stays 0.
 
 use crate::camera::Camera;
@@ -14,17 +14,17 @@ use std::fmt;
 pub struct Effects(u32);
 
 impl Effects {
-    /// Nothing but primary rays and local lighting.
+    /// Primary rays and local lighting only.
     pub const NONE: Effects = Effects(0);
     /// Rays to lights.
     pub const SHADOWS: Effects = Effects(1);
-    /// Shadow rays to points spread over lights that have a size.
+    /// Shadow rays to points distributed over lights that have a size.
     pub const SOFT_SHADOWS: Effects = Effects(1 << 1);
-    /// Rays over the hemisphere that dim ambient and environment light.
+    /// Rays over the hemisphere that attenuate ambient and environment light.
     pub const AMBIENT_OCCLUSION: Effects = Effects(1 << 2);
     /// Mirror reflection.
     pub const REFLECTION: Effects = Effects(1 << 3);
-    /// Reflection spread by roughness.
+    /// Reflection blurred by roughness.
     pub const GLOSSY_REFLECTION: Effects = Effects(1 << 4);
     /// Rays through dielectrics, with total internal reflection and absorption.
     pub const REFRACTION: Effects = Effects(1 << 5);
@@ -34,11 +34,11 @@ impl Effects {
     pub const DEPTH_OF_FIELD: Effects = Effects(1 << 7);
     /// Direct volume rendering.
     pub const VOLUMES: Effects = Effects(1 << 8);
-    /// Light over any number of bounces (replaces ambient occlusion and ambient light by what they
-    /// stand for).
+    /// Light over any number of bounces (replaces the approximations ambient occlusion and ambient
+    /// light).
     pub const PATH_TRACING: Effects = Effects(1 << 9);
 
-    /// Every effect with the name used in reports and on command lines.
+    /// Every effect with its name in reports and on command lines.
     pub const ALL: [(Effects, &'static str); 10] = [
         (Effects::SHADOWS, "shadows"),
         (Effects::SOFT_SHADOWS, "soft shadows"),
@@ -52,9 +52,9 @@ impl Effects {
         (Effects::PATH_TRACING, "path tracing"),
     ];
 
-    /// The effects without which `scene` would look different: read from its lights, materials,
-    /// attributes and volumes. The lens belongs to the camera ([`Effects::required_by_camera`]),
-    /// and path tracing is a choice of the render options.
+    /// The effects without which `scene` would look different, determined from its lights,
+    /// materials, attributes and volumes. The lens belongs to the camera
+    /// ([`Effects::required_by_camera`]), and path tracing is a render option.
     pub fn required_by(scene: &Scene) -> Effects {
         crate::scene::requirements(scene)
     }
@@ -95,7 +95,7 @@ impl Effects {
         Effects(self.0 & !other.0)
     }
 
-    /// This set, with `other` when `when` holds.
+    /// This set, united with `other` if `when` is true.
     #[must_use]
     pub const fn with_if(self, when: bool, other: Effects) -> Effects {
         if when { self.union(other) } else { self }

@@ -1,4 +1,4 @@
-//! The finished picture: colour and the other layers that were asked for.
+//! The rendered image: colour and the other requested layers.
 //!
 //! All layers are row by row, **row 0 at the top**, one value per pixel.
 
@@ -6,7 +6,7 @@ use crate::colormap::linear_to_srgb;
 use std::borrow::Cow;
 use std::ops::BitOr;
 
-/// Which layers to compute. What is not asked for is neither computed nor stored.
+/// Which layers to compute. Layers that are not requested are neither computed nor stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Layers(u32);
 
@@ -57,11 +57,11 @@ impl BitOr for Layers {
     }
 }
 
-/// A picture. A layer that was not asked for is empty.
+/// An image. A layer that was not requested is empty.
 ///
 /// `depth`, `distance`, `normal`, `instance` and `primitive` belong to the ray through the pixel's
-/// centre, whatever the number of samples and the lens: averaging them over a silhouette would make
-/// values that are on no surface.
+/// centre, for any number of samples and any lens. Averages over a silhouette would be values that
+/// lie on no surface.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Frame {
     /// Pixels per row.
@@ -77,14 +77,14 @@ pub struct Frame {
     /// Euclidean distance from the eye (parallel projection: from the near plane), world units;
     /// infinite where nothing is hit.
     pub distance: Vec<f32>,
-    /// Unit shading normal in world axes, turned as the material's sides say; zero where nothing is
+    /// Unit shading normal in world axes, oriented by the material's sides; zero where nothing is
     /// hit.
     pub normal: Vec<[f32; 3]>,
     /// Index of the instance; `u32::MAX` where nothing is hit.
     pub instance: Vec<u32>,
     /// Primitive within the instance's geometry; `u32::MAX` where nothing is hit.
     pub primitive: Vec<u32>,
-    /// Rays traced for the pixel, all samples and all kinds together.
+    /// Rays traced for the pixel, summed over all samples and kinds.
     pub cost: Vec<f32>,
 }
 
@@ -93,33 +93,33 @@ pub struct Frame {
 pub enum PlaneValues<'a> {
     /// Floating point.
     F32(Cow<'a, [f32]>),
-    /// Whole numbers.
+    /// Unsigned integers.
     U32(Cow<'a, [u32]>),
 }
 
 /// One channel of a frame, for image files with named channels (OpenEXR).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plane<'a> {
-    /// `R`, `depth.Z`, `normal.X`: the names that EXR viewers group by.
+    /// Channel name as EXR viewers group them: `R`, `depth.Z`, `normal.X`.
     pub name: &'static str,
-    /// Unit of the values, in words.
+    /// Unit of the values, as text.
     pub unit: &'static str,
     /// `width * height` values, top row first.
     pub values: PlaneValues<'a>,
 }
 
-/// How linear colour becomes 8 bits.
+/// How linear colour is converted to 8 bits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Encoding {
-    /// IEC 61966-2-1: what image files and screens expect of linear colour.
+    /// IEC 61966-2-1 (sRGB), which image files and screens expect.
     #[default]
     Srgb,
-    /// The numbers as they are, as OpenGL and VTK write without sRGB framebuffers.
+    /// No conversion, as OpenGL and VTK write without sRGB framebuffers.
     Direct,
 }
 
 impl Frame {
-    /// Index of pixel (`x`, `y`), y from the top. Panics outside.
+    /// Index of pixel (`x`, `y`), y from the top. Panics outside the image.
     #[inline]
     pub fn index(&self, x: u32, y: u32) -> usize {
         assert!(
@@ -131,7 +131,8 @@ impl Frame {
         y as usize * self.width as usize + x as usize
     }
 
-    /// Linear premultiplied RGBA of pixel (`x`, `y`). Panics outside and without the colour layer.
+    /// Linear premultiplied RGBA of pixel (`x`, `y`). Panics outside the image and without the
+    /// colour layer.
     pub fn color_at(&self, x: u32, y: u32) -> [f32; 4] {
         self.color[self.index(x, y)]
     }
@@ -180,8 +181,8 @@ impl Frame {
         out
     }
 
-    /// 8-bit RGBA, not premultiplied (as PNG wants it), times `exposure` before encoding. Values
-    /// are clamped to 0..=1; NaN becomes 0.
+    /// 8-bit RGBA, not premultiplied (as PNG requires), multiplied by `exposure` before encoding.
+    /// Values are clamped to 0..=1; NaN becomes 0.
     pub fn to_rgba8(&self, encoding: Encoding, exposure: f32) -> Vec<u8> {
         let mut out = Vec::with_capacity(self.color.len() * 4);
         for &[r, g, b, a] in &self.color {

@@ -1,5 +1,5 @@
-//! From tiles to rows of pixels: all at once from tiles that collect samples, or tile by tile while
-//! each is still in the cache.
+//! Copies tiles into rows of pixels: all at once where tiles accumulate samples, or tile by tile
+//! while each is still in the cache.
 
 use super::RenderOptions;
 use crate::camera::Camera;
@@ -15,7 +15,7 @@ pub(super) struct Tile {
     pub(super) samples: u32,
 }
 
-/// Tiles that cover the area to draw, row by row, in the memory of `old` ones where they fit.
+/// Tiles that cover the area to draw, row by row. Reuses the memory of `old` tiles where they fit.
 pub(super) fn tiles(options: &RenderOptions, camera: &Camera, old: Vec<Tile>) -> Vec<Tile> {
     let mut old = old.into_iter();
     let crop = options.area();
@@ -43,7 +43,7 @@ pub(super) fn tiles(options: &RenderOptions, camera: &Camera, old: Vec<Tile>) ->
     out
 }
 
-/// The picture so far, in the memory of `old` where it fits.
+/// The image so far. Reuses the memory of `old` where it fits.
 pub(super) fn assemble(options: &RenderOptions, tiles: &[Tile], old: Frame) -> Frame {
     let crop = options.area();
     let (width, height) = (crop.width as usize, crop.height as usize);
@@ -86,7 +86,7 @@ struct TileGrid<'a> {
 }
 
 impl TileGrid<'_> {
-    /// One layer in row order: each row of tiles fills its band of rows.
+    /// One layer in row order. Each row of tiles fills its band of rows.
     fn plane<T: Copy + Send + Sync>(
         &self,
         mut out: Vec<T>,
@@ -118,8 +118,8 @@ impl TileGrid<'_> {
     }
 }
 
-/// A picture of blank pixels, in the memory of `old` where it fits (whose pixels then stay what
-/// they were).
+/// An image of blank pixels. Reuses the memory of `old` where it fits; reused pixels keep their old
+/// values.
 pub(super) fn blank_frame(options: &RenderOptions, camera: &Camera, old: Frame) -> Frame {
     let crop = options.area();
     let n = crop.width as usize * crop.height as usize;
@@ -144,8 +144,8 @@ pub(super) fn blank_frame(options: &RenderOptions, camera: &Camera, old: Frame) 
     }
 }
 
-/// The pixels of a picture that belong to one row of tiles, or to one tile: of each layer the rows'
-/// pieces.
+/// The pixels of an image that belong to one row of tiles, or to one tile: slices of each layer's
+/// rows.
 pub(super) struct FrameSlices<'a> {
     pub(super) area: TileArea,
     color: Vec<&'a mut [[f32; 4]]>,
@@ -157,11 +157,11 @@ pub(super) struct FrameSlices<'a> {
     cost: Vec<&'a mut [f32]>,
 }
 
-/// Rows of tiles, each with its pixels.
+/// The rows of tiles, each with its pixels.
 pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<FrameSlices<'a>> {
     let crop = options.area();
     let size = crop.width as usize * TILE as usize;
-    // A layer that was not asked for has no bands.
+    // A layer that was not requested has no bands.
     fn next<'a, T>(chunks: &mut std::slice::ChunksMut<'a, T>) -> Vec<&'a mut [T]> {
         chunks.next().into_iter().collect()
     }
@@ -193,7 +193,7 @@ pub(super) fn bands<'a>(options: &RenderOptions, frame: &'a mut Frame) -> Vec<Fr
 }
 
 impl<'a> FrameSlices<'a> {
-    /// A row of tiles cut into its tiles.
+    /// Splits a row of tiles into its tiles.
     pub(super) fn tiles(self) -> Vec<FrameSlices<'a>> {
         let FrameSlices { area, color, depth, distance, normal, instance, primitive, cost } = self;
         let mut tiles: Vec<FrameSlices<'a>> = (0..area.width)
@@ -235,7 +235,7 @@ impl<'a> FrameSlices<'a> {
     pub(super) fn write(&mut self, tile: &TileLayers) {
         fn plane<T: Copy>(rows: &mut [&mut [T]], slots: &[T]) {
             for (y, row) in rows.iter_mut().enumerate() {
-                // Two neighbours in a row are neighbours along the curve, too.
+                // Two neighbours in a row are also neighbours along the Morton curve.
                 for (pair, out) in row.chunks_mut(2).enumerate() {
                     let slot = TileArea::slot(2 * pair as u32, y as u32);
                     out.copy_from_slice(&slots[slot..slot + out.len()]);

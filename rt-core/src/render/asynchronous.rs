@@ -1,9 +1,9 @@
-//! Rendering beside the program that asks for it, one frame behind.
+//! Renders in parallel with the calling program, one frame behind.
 //!
 //! The thesis (section 4.1.2) hides the time a program needs to prepare a frame behind the time the
-//! ray tracer needs for the frame before: at each buffer swap the program hands over frame N and
-//! gets frame N-1. The price is one frame of lag; the frame time becomes the larger of the two
-//! times instead of their sum.
+//! ray tracer needs for the previous frame. At each buffer swap the program submits frame N and
+//! receives frame N-1. The cost is one frame of latency; the frame time becomes the larger of the
+//! two times instead of their sum.
 
 use super::{RenderError, RenderOptions, RenderOutput, Renderer};
 use crate::camera::Camera;
@@ -19,7 +19,7 @@ struct Job {
     options: RenderOptions,
 }
 
-/// Renders on a thread of its own. Dropping it cancels the frame in work and waits for the thread.
+/// Renders on its own thread. Dropping it cancels the current frame and waits for the thread.
 pub struct AsyncRenderer {
     jobs: Option<Sender<Job>>,
     results: Receiver<Result<RenderOutput, RenderError>>,
@@ -29,7 +29,7 @@ pub struct AsyncRenderer {
 }
 
 impl AsyncRenderer {
-    /// Starts the thread. `threads` gives it a pool of its own, so that the program keeps the other
+    /// Starts the thread. `threads` gives it its own pool, so that the program keeps the other
     /// cores; `None` shares rayon's global pool.
     pub fn new(threads: Option<usize>) -> Result<AsyncRenderer, RenderError> {
         let no_worker = |e: &dyn std::fmt::Display| RenderError::NoWorker { reason: e.to_string() };
@@ -58,7 +58,7 @@ impl AsyncRenderer {
                         Some(pool) => pool.install(run),
                         None => run(),
                     };
-                    // Nobody waits any more: the renderer was dropped.
+                    // The receiver is gone: the renderer was dropped.
                     if outgoing.send(result).is_err() {
                         return;
                     }
@@ -74,8 +74,8 @@ impl AsyncRenderer {
         })
     }
 
-    /// Hands over frame N. Waits for frame N-1, starts frame N and returns frame N-1; `None` for
-    /// the first frame. An error belongs to frame N-1; frame N has been started all the same.
+    /// Submits frame N. Waits for frame N-1, starts frame N and returns frame N-1; `None` for the
+    /// first frame. An error belongs to frame N-1; frame N has been started nevertheless.
     pub fn submit(
         &mut self,
         scene: Arc<Scene>,
@@ -93,7 +93,7 @@ impl AsyncRenderer {
         previous
     }
 
-    /// Waits for the last frame handed over; `None` when there is none (or it was already taken).
+    /// Waits for the last submitted frame; `None` when there is none (or it was already returned).
     pub fn wait(&mut self) -> Result<Option<RenderOutput>, RenderError> {
         if !std::mem::replace(&mut self.in_flight, false) {
             return Ok(None);
@@ -111,7 +111,7 @@ impl Drop for AsyncRenderer {
         // Closing the channel ends the worker's loop.
         self.jobs = None;
         if let Some(worker) = self.worker.take() {
-            // Panics in tiles are caught and reported; nothing to add from here.
+            // Panics in tiles are caught and reported, so the result of `join` adds nothing.
             worker.join().ok();
         }
     }

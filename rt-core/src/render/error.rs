@@ -1,38 +1,38 @@
-//! Why a picture could not be drawn.
+//! Errors of rendering.
 
 use crate::camera::CameraError;
 use crate::scene::SceneError;
 
-/// Why a picture could not be drawn.
+/// Why an image could not be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RenderError {
-    /// Something is wrong with the scene.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Something is wrong with the camera.
+    /// The camera is invalid.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// An option is out of range.
     #[error("render option `{field}` is {value}; it must be {rule}")]
     Option {
-        /// Which option.
+        /// The option.
         field: &'static str,
         /// Its value.
         value: String,
         /// What is allowed.
         rule: &'static str,
     },
-    /// Effects that do not work together.
+    /// Effects that cannot be combined.
     #[error("{what} is not supported {with}; {cure}")]
     Unsupported {
-        /// What was asked for.
+        /// What was requested.
         what: &'static str,
-        /// Together with what.
+        /// What it cannot be combined with.
         with: &'static str,
         /// What to do.
         cure: &'static str,
     },
-    /// A bug: the renderer panicked. Nothing else of the process is affected.
+    /// A bug: the renderer panicked. The rest of the process is not affected.
     #[error(
         "internal error at pixel ({x}, {y}), sample {sample}: {message}; it repeats with crop: \
          Crop {{ x: {x}, y: {y}, width: 1, height: 1 }}, please report it"
@@ -47,7 +47,7 @@ pub enum RenderError {
         /// The panic's message.
         message: String,
     },
-    /// The thread of an asynchronous renderer is gone.
+    /// The thread of an asynchronous renderer has ended.
     #[error(
         "the rendering thread could not be started or has ended: {reason}; make a new AsyncRenderer"
     )]

@@ -1,8 +1,8 @@
-//! Scene and camera in, picture and report out.
+//! Renders a scene as seen by a camera and returns an image and a report.
 //!
-//! [`render`] draws one frame, a [`Renderer`] many in the same memory. [`ProgressiveRenderer`]
-//! gives a picture after every sample per pixel. [`AsyncRenderer`] draws frame N while the program
-//! prepares frame N+1 (thesis section 4.1.2).
+//! [`render`] draws one frame. A [`Renderer`] draws many frames and reuses its memory.
+//! [`ProgressiveRenderer`] gives an image after every sample per pixel. [`AsyncRenderer`] draws
+//! frame N while the program prepares frame N+1 (thesis section 4.1.2).
 
 mod assemble;
 mod asynchronous;
@@ -23,18 +23,18 @@ use crate::camera::Camera;
 use crate::frame::Frame;
 use crate::scene::Scene;
 
-/// A picture with the account of how it came about.
+/// An image with a report on its rendering.
 #[derive(Debug, Clone)]
 pub struct RenderOutput {
-    /// The picture.
+    /// The image.
     pub frame: Frame,
     /// Rays by kind, effects that ran, warnings, time.
     pub report: RenderReport,
 }
 
-/// Draws `scene` as seen by `camera`, on rayon's current thread pool, until the options' samples,
-/// time or error are reached. The same arguments and seed give the same picture bit for bit on any
-/// number of threads (unless time or cancelling cuts it short).
+/// Renders `scene` as seen by `camera`, on rayon's current thread pool, until the options' samples,
+/// time or error are reached. The same arguments and seed give the same image bit for bit on any
+/// number of threads (unless a time limit or cancellation ends it early).
 pub fn render(
     scene: &Scene,
     camera: &Camera,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// A part of the picture, in pixels from the top left.
+/// A part of the image, in pixels from the top left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crop {
     /// First column.
@@ -25,63 +25,62 @@ pub struct Crop {
 /// Options of a frame. `RenderOptions { samples: 16, ..RenderOptions::new(640, 480) }`.
 #[derive(Debug, Clone)]
 pub struct RenderOptions {
-    /// Pixels per row of the whole picture.
+    /// Pixels per row of the whole image.
     pub width: u32,
-    /// Rows of the whole picture.
+    /// Rows of the whole image.
     pub height: u32,
-    /// Draw only this part (its pixels are those of the whole picture, bit for bit). The frame has
-    /// the part's size.
+    /// Renders only this part (its pixels equal those of the whole image, bit for bit). The frame
+    /// has the size of the part.
     pub crop: Option<Crop>,
     /// What to compute.
     pub layers: Layers,
-    /// Effects that may run. `None`: those that scene and camera need. An effect named here that
-    /// changes no pixel is reported.
+    /// Effects that may run. `None`: those that scene and camera need. The report has a warning for
+    /// a named effect that changes no pixel.
     pub effects: Option<Effects>,
-    /// Light over many bounces in place of ambient light and ambient occlusion.
+    /// Path tracing: light over many bounces, instead of ambient light and ambient occlusion.
     pub path_tracing: bool,
     /// Samples per pixel, at most. One sample goes through the pixel's centre, several are spread
     /// over its square (box filter).
     pub samples: u32,
     /// Shadow rays per sample to each light that has a size.
     pub light_rays: u32,
-    /// How samples are spread.
+    /// How samples are distributed.
     pub sampling: Sampling,
     /// Another seed gives other noise.
     pub seed: u64,
-    /// Most reflections, refractions and diffuse bounces in a row; transparent layers do not count.
-    /// What lies beyond is missing from the picture:
-    /// [`RayStats::cut_at_max_bounces`](crate::ray_stats::RayStats::cut_at_max_bounces) counts it,
-    /// and a warning says so. `None`: 8 for mirrors and glass; no limit for path tracing, where
-    /// chance ends paths (Russian roulette) and the mean is right.
+    /// Limit on consecutive reflections, refractions and diffuse bounces; transparent layers do not
+    /// count. Light from longer paths is missing from the image:
+    /// [`RayStats::cut_at_max_bounces`](crate::ray_stats::RayStats::cut_at_max_bounces) counts
+    /// these paths, and a warning reports them. `None`: 8 for mirrors and glass; no limit for path
+    /// tracing, where Russian roulette ends paths and keeps the mean correct.
     pub max_bounces: Option<u32>,
-    /// Mirror, glass and transparency rays of which less than this share reaches the pixel are not
-    /// sent: at most this times the radiance they would have met is missing for each (linear, 1 =
-    /// white), and
+    /// Mirror, glass and transparency rays are not sent when less than this share of them reaches
+    /// the pixel. For each, at most this times the incoming radiance is missing (linear, 1 =
+    /// white);
     /// [`RayStats::cut_at_min_contribution`](crate::ray_stats::RayStats::cut_at_min_contribution)
     /// counts them. Of the light that comes through translucent layers, less than this share is
-    /// missing, and less than this radiance of each ray. 0 for everything. Path tracing leaves
+    /// missing, and less than this radiance of each ray. 0 sends every ray. Path tracing leaves
     /// nothing out.
     pub min_contribution: f32,
     /// Depth, distance, normal and ids belong to the first surface of at least this opacity: 0 for
-    /// any surface that is not invisible, 1 for opaque surfaces only, as OpenGL's depth buffer has
-    /// it.
+    /// any surface that is not invisible, 1 for opaque surfaces only, as in OpenGL's depth buffer.
     pub depth_min_opacity: f32,
     /// Accuracy of direct volume rendering.
     pub volume_quality: VolumeQuality,
     /// Stop when this much time has passed. The first sample of every pixel is always finished.
     pub time_limit: Option<Duration>,
-    /// Stop when the standard error of a pixel (root mean square over the picture, luminance) is
-    /// estimated below this, in 8-bit grey levels of linear light (1 = 1/255 of white).
-    /// Low-discrepancy samples do better than the estimate, which assumes independent ones. Looked
-    /// at from 4 samples on.
+    /// Stop when the standard error of a pixel (root mean square over the image, luminance) is
+    /// estimated below this, in 8-bit grey levels of linear light (1 = 1/255 of white). The
+    /// estimate assumes independent samples, so low-discrepancy samples have a smaller error than
+    /// it says. It is checked from 4 samples on.
     pub max_error_levels: Option<f32>,
-    /// Set to true to stop as soon as the tiles in work are done.
+    /// Set to true to stop as soon as the current tiles are finished.
     pub cancel: Option<Arc<AtomicBool>>,
 }
 
 impl RenderOptions {
-    /// Colour of a picture of `width` x `height`, one sample per pixel, with the effects that the
-    /// scene needs.
+    /// The colour layer of an image of `width` x `height`, one sample per pixel, with the effects
+    /// that the scene needs.
     pub fn new(width: u32, height: u32) -> RenderOptions {
         RenderOptions {
             width,
@@ -104,12 +103,12 @@ impl RenderOptions {
         }
     }
 
-    /// The part to draw: the crop, or everything.
+    /// The part to render: the crop, or the whole image.
     pub fn area(&self) -> Crop {
         self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })
     }
 
-    /// Limits and thresholds that cannot do anything, in words.
+    /// Warnings about limits and thresholds that have no effect.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         if self.depth_min_opacity != 0.0 && !self.layers.intersects(Layers::GEOMETRY) {

@@ -1,5 +1,5 @@
-//! From what is asked for and what the scene needs to what runs, with a word about every
-//! difference.
+//! Decides which effects run, from the request and from what the scene needs, and writes a warning
+//! for every difference.
 
 use super::{RenderError, RenderOptions};
 use crate::camera::Camera;
@@ -7,10 +7,10 @@ use crate::effects::Effects;
 use crate::ray_stats::RayStats;
 use crate::scene::Scene;
 
-/// What will run.
+/// The effects that will run.
 pub(crate) struct Plan {
     pub(crate) effects: Effects,
-    /// Needed by the scene but not asked for.
+    /// Needed by the scene but not requested.
     pub(crate) left_out: Effects,
     pub(crate) warnings: Vec<String>,
 }
@@ -23,7 +23,7 @@ pub(super) fn plan(
     plan_for(scene, Effects::required_by(scene), camera, options)
 }
 
-/// As [`plan`] for a part of a scene: the whole scene needs `by_scene`.
+/// As [`plan`], for a part of a scene; the whole scene needs `by_scene`.
 pub(crate) fn plan_for(
     scene: &Scene,
     by_scene: Effects,
@@ -79,8 +79,8 @@ pub(crate) fn plan_for(
     Ok(Plan { effects, left_out, warnings })
 }
 
-/// Whether `effects` lead to a point that a light casting shadows may miss: not where all such
-/// light goes along the camera rays and nothing but their first hits is lit.
+/// Whether `effects` can make a shadow visible. They cannot where all light that casts shadows
+/// follows the camera rays and only the first hits of these are lit.
 fn shadows_show(scene: &Scene, camera: &Camera, effects: Effects) -> bool {
     let beyond_first_hits = Effects::REFLECTION
         | Effects::GLOSSY_REFLECTION
@@ -111,7 +111,7 @@ fn why_not_needed(effect: Effects, path: bool) -> &'static str {
     }
 }
 
-/// Effects that ran without doing anything, in words, once the frame is done.
+/// Warnings about effects that ran without changing anything, after the frame is finished.
 pub(super) fn warn_without_effect(
     asked: Option<Effects>,
     ran: Effects,
@@ -122,7 +122,7 @@ pub(super) fn warn_without_effect(
     let asked = asked.unwrap_or(Effects::NONE);
     let path = ran.contains(Effects::PATH_TRACING);
     for (effect, name) in Effects::ALL {
-        // A path tracer's bounces are not told apart by kind.
+        // A path tracer's bounces are not counted by kind.
         let told_apart = !path
             || matches!(effect, Effects::SHADOWS | Effects::SOFT_SHADOWS | Effects::PATH_TRACING);
         if asked.contains(effect)

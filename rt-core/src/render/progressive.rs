@@ -1,4 +1,4 @@
-//! Sample after sample, with a picture after each.
+//! Renders one sample per pixel at a time, with an image after each.
 
 use super::assemble::{FrameSlices, Tile, assemble, bands, blank_frame, tiles};
 use super::plan::{plan, warn_without_effect};
@@ -30,20 +30,21 @@ pub enum StopReason {
     Cancelled,
 }
 
-/// The account of a frame.
+/// A report on a frame.
 #[derive(Debug, Clone)]
 pub struct RenderReport {
     /// Rays by kind.
     pub rays: RayStats,
     /// Effects that ran.
     pub effects: Effects,
-    /// Effects that scene or camera have, but the options did not ask for.
+    /// Effects that scene or camera need, but the options do not include.
     pub left_out: Effects,
-    /// Requests that changed nothing, or were only partly met; empty when all is well.
+    /// Requests that changed nothing or were only partly fulfilled; empty when there are none.
     pub warnings: Vec<String>,
-    /// Samples of every pixel; tiles may have one more when time or cancelling cut a pass short.
+    /// Samples of every pixel; tiles may have one more when a time limit or cancellation ended a
+    /// pass early.
     pub samples: u32,
-    /// Why it ended.
+    /// Why rendering ended.
     pub stopped: StopReason,
     /// Estimated standard error of a pixel (root mean square over the picture, luminance), in 8-bit
     /// grey levels of linear light. `None` below two samples.
@@ -52,33 +53,33 @@ pub struct RenderReport {
     pub elapsed: Duration,
 }
 
-/// Memory that frames hand on to each other.
+/// Memory that one frame leaves for the next.
 #[derive(Default)]
 pub(super) struct Buffers {
     tiles: Vec<Tile>,
     spare: Vec<ThreadScratch>,
-    /// A picture nobody needs any more.
+    /// An image that is no longer needed.
     pub(super) frame: Frame,
 }
 
-/// What a thread works with.
+/// Scratch memory of a thread.
 #[derive(Default)]
 struct ThreadScratch {
     work: Workspace,
-    /// The tile in work, in pictures of one sample; else tiles have their own.
+    /// The current tile of one-sample images; otherwise each tile has its own layers.
     layers: Option<TileLayers>,
 }
 
-/// A picture in the making.
+/// An image in progress.
 pub struct ProgressiveRenderer<'a> {
     context: FrameContext<'a>,
-    /// Tiles that collect samples. Pictures of one sample have none: each tile goes to its place
+    /// Tiles that accumulate samples. One-sample images have none: each tile is copied to the image
     /// while it is still in the cache, which saves writing and reading 32 bytes per pixel of main
     /// memory (measured: 5 of 50 ms at 1024 x 1024).
     tiles: Vec<Tile>,
-    /// Buffers of threads that are not rendering now.
+    /// Buffers that no thread is using.
     spare: Mutex<Vec<ThreadScratch>>,
-    /// Memory for the picture; in pictures of one sample, after the first step, the picture.
+    /// Memory for the image. After the first step of a one-sample image, it holds the image.
     old_frame: Frame,
     rays: RayStats,
     left_out: Effects,
@@ -86,12 +87,12 @@ pub struct ProgressiveRenderer<'a> {
     samples: u32,
     stopped: StopReason,
     started: Instant,
-    /// A second cancel flag, for the asynchronous renderer's own use.
+    /// A second cancel flag, for the asynchronous renderer.
     pub(super) also_cancel: Option<&'a AtomicBool>,
 }
 
 impl<'a> ProgressiveRenderer<'a> {
-    /// Checks everything and sets up the frame; traces nothing yet.
+    /// Checks all arguments and sets up the frame; traces nothing yet.
     pub fn new(
         scene: &'a Scene,
         camera: &Camera,
@@ -100,7 +101,7 @@ impl<'a> ProgressiveRenderer<'a> {
         ProgressiveRenderer::with_buffers(scene, camera, options, Buffers::default())
     }
 
-    /// As [`ProgressiveRenderer::new`], in memory of an earlier frame.
+    /// As [`ProgressiveRenderer::new`], with the memory of an earlier frame.
     pub(super) fn with_buffers(
         scene: &'a Scene,
         camera: &Camera,
@@ -128,8 +129,8 @@ impl<'a> ProgressiveRenderer<'a> {
         })
     }
 
-    /// Adds one sample to every pixel. Returns whether there is more to do; does nothing once there
-    /// is not.
+    /// Adds one sample to every pixel. Returns whether more samples are due; does nothing when none
+    /// are.
     pub fn step(&mut self) -> Result<bool, RenderError> {
         if self.stopped != StopReason::Running {
             return Ok(false);
@@ -138,8 +139,8 @@ impl<'a> ProgressiveRenderer<'a> {
         let (context, spare, started) = (&self.context, &self.spare, self.started);
         let also_cancel = self.also_cancel;
         let options = context.options;
-        // A pass may be cut short between tiles: at once when cancelled, for lack of time only
-        // after the first pass.
+        // A pass may end early between tiles: at once when cancelled, at the time limit only after
+        // the first pass.
         let cut = || {
             let is_set = |f: &AtomicBool| f.load(Ordering::Relaxed);
             if options.cancel.as_deref().is_some_and(is_set) || also_cancel.is_some_and(is_set) {
@@ -151,7 +152,7 @@ impl<'a> ProgressiveRenderer<'a> {
             }
         };
         let one_pass = one_pass(options);
-        // Rays of the tiles that were drawn, and how many were not.
+        // Rays of the tiles that were drawn, and the number of tiles that were not.
         let draw = |area: &TileArea, layers: &mut TileLayers, work: &mut Workspace| {
             catch_unwind(AssertUnwindSafe(|| render_tile(context, area, layers, work, sample)))
                 .map_err(|panic| locate_panic(context, *area, sample, message_of(&*panic)))
@@ -233,13 +234,13 @@ impl<'a> ProgressiveRenderer<'a> {
         })
     }
 
-    /// The picture so far.
+    /// The image so far.
     pub fn frame(&self) -> Frame {
         let options = self.context.options;
         if !one_pass(options) {
             return assemble(options, &self.tiles, Frame::default());
         }
-        // Before the first step, `old_frame` is some other picture.
+        // Before the first step, `old_frame` holds an unrelated image.
         if self.stopped == StopReason::Running {
             blank_frame(options, &self.context.camera, Frame::default())
         } else {
@@ -247,7 +248,7 @@ impl<'a> ProgressiveRenderer<'a> {
         }
     }
 
-    /// The finished picture, its account, and the memory for the next.
+    /// The finished image, its report, and the memory for the next frame.
     pub(super) fn finish(mut self) -> (RenderOutput, Buffers) {
         let mut frame = std::mem::take(&mut self.old_frame);
         if !one_pass(self.context.options) {
@@ -261,7 +262,7 @@ impl<'a> ProgressiveRenderer<'a> {
         )
     }
 
-    /// The account so far.
+    /// The report so far.
     pub fn report(&self) -> RenderReport {
         let mut warnings = self.warnings.clone();
         let options = self.context.options;
@@ -287,12 +288,12 @@ impl<'a> ProgressiveRenderer<'a> {
     }
 }
 
-/// True when tiles need not remember anything: one sample, or layers without samples.
+/// True when tiles keep no state between samples: one sample, or layers without samples.
 fn one_pass(options: &RenderOptions) -> bool {
     options.samples == 1 || !options.layers.contains(Layers::COLOR)
 }
 
-/// Layers of a tile without anything in them, in the memory of `old` ones where they fit.
+/// Empty layers of a tile. Reuses the memory of `old` layers where they fit.
 fn ready_layers(context: &FrameContext<'_>, old: Option<TileLayers>) -> TileLayers {
     let background_depth = context.camera.background_depth() as f32;
     let layers = context.options.layers;
@@ -310,7 +311,7 @@ fn return_scratch(spare: &Mutex<Vec<ThreadScratch>>, scratch: ThreadScratch) {
     }
 }
 
-/// Renders the tile's pixels one by one until one panics again.
+/// Renders the tile's pixels one by one until one panics, to find its position.
 fn locate_panic(
     context: &FrameContext<'_>,
     tile: TileArea,

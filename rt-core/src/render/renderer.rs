@@ -1,4 +1,4 @@
-//! Frame after frame in the same memory.
+//! Renders many frames in the same memory.
 
 use super::progressive::Buffers;
 use super::{ProgressiveRenderer, RenderError, RenderOptions, RenderOutput};
@@ -7,7 +7,7 @@ use crate::frame::Frame;
 use crate::scene::Scene;
 use std::sync::atomic::AtomicBool;
 
-/// Draws frames as [`super::render`] does and keeps the buffers for the next one: at interactive
+/// Renders frames as [`super::render`] does and keeps the buffers for the next one. At interactive
 /// rates, getting fresh pages from the operating system for every frame costs about as much as a
 /// sixth of the rays.
 #[derive(Default)]
@@ -16,7 +16,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Without any memory yet.
+    /// A renderer without buffers yet.
     pub fn new() -> Renderer {
         Renderer::default()
     }
@@ -31,7 +31,7 @@ impl Renderer {
         self.render_unless(scene, camera, options, None)
     }
 
-    /// Takes back a picture that is no longer needed: the next one of the same size and layers is
+    /// Takes back an image that is no longer needed. The next one of the same size and layers is
     /// written into its memory.
     pub fn recycle(&mut self, frame: Frame) {
         self.buffers.frame = frame;
