@@ -1,4 +1,4 @@
-//! What a holder of geometry answers.
+//! What a data server answers: hits of rays with the geometry that it holds.
 
 use super::super::ambient_occlusion::{Hemisphere, HemisphereSamples, OcclusionPoint, directions};
 use super::super::direct::{LightSampling, incident_from, light_point, shadow_ray};
@@ -14,7 +14,7 @@ use crate::shade::TileLayers;
 use fearless_simd::dispatch;
 use glam::Vec3;
 
-/// Camera rays of one tile and what they meet in this world.
+/// Camera rays of one tile and their hits in this world.
 #[derive(Default)]
 pub struct CameraHits {
     work: Workspace,
@@ -33,14 +33,14 @@ impl CameraHits {
         self.work.hits.get(slot / LANES)?.get(slot % LANES)
     }
 
-    /// Sixteen bits for every sixteen slots: set where something was hit.
+    /// Sixteen bits for every sixteen slots: set where there is a hit.
     pub fn mask(&self) -> impl Iterator<Item = u16> + '_ {
         let bits =
             |h: &HitBlock| (0..LANES).fold(0u16, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
         self.work.hits.iter().map(bits)
     }
 
-    /// Colours of all slots where something was hit, in frames where
+    /// Colours of all slots with a hit, in frames where
     /// [`DistributedFrame::needs_only_local_light`].
     pub fn colors(&mut self, frame: &DistributedFrame<'_>) -> &[[f32; 4]] {
         let Some(area) = self.area else { return &[] };
@@ -62,7 +62,7 @@ impl CameraHits {
         &self.work.pixels
     }
 
-    /// Everything about the hit in slot `slot`.
+    /// The complete hit in slot `slot`.
     pub fn shading_hit(&self, frame: &DistributedFrame<'_>, slot: usize) -> Option<ShadingHit> {
         let (area, hit) = (self.area?, self.get(slot)?);
         let ray = self.work.current.blocks[slot / LANES].get(slot % LANES);
@@ -76,7 +76,7 @@ impl CameraHits {
     }
 }
 
-/// Memory of [`DistributedFrame::occlusion_bits`].
+/// Scratch memory of [`DistributedFrame::occlusion_bits`].
 #[derive(Default)]
 pub struct OcclusionScratch {
     rays: LightRays,
@@ -90,7 +90,7 @@ pub struct OcclusionScratch {
 const BATCH_RAYS: usize = 4096;
 
 impl DistributedFrame<'_> {
-    /// What the camera rays of tile `tile` meet here.
+    /// Hits of the camera rays of tile `tile` in this world.
     pub fn camera_hits(&self, tile: usize, pass: Pass, out: &mut CameraHits) {
         let mut area = self.tiles[tile];
         area.sample = if let Pass::Color(sample) = pass { sample } else { 0 };
@@ -127,9 +127,9 @@ impl DistributedFrame<'_> {
         self.context.depth_and_distance(self.context.ndc(x, y, [0.5; 2]), ray, hit)
     }
 
-    /// What rays of any kind meet here, one answer each. Neighbouring rays should be similar. With
-    /// `pixels` (tile and slot of each, for camera rays of a pass that fills geometry layers) the
-    /// answers have depth and distance.
+    /// Hits of rays of any kind in this world, one answer each. Neighbouring rays should be
+    /// similar. With `pixels` (tile and slot of each, for camera rays of a pass that fills geometry
+    /// layers) the answers have depth and distance.
     pub fn closest(
         &self,
         rays: &[Ray],
@@ -156,8 +156,8 @@ impl DistributedFrame<'_> {
         }
     }
 
-    /// What light rays meet here that may let light through, one answer each; or
-    /// [`ShadingHit::blocked`] where something opaque is in the way, wherever that is.
+    /// Hits of light rays in this world with surfaces that may transmit light, one answer each; or
+    /// [`ShadingHit::blocked`] where an opaque surface blocks the ray anywhere.
     pub fn light_hits(&self, rays: &[Ray], out: &mut Vec<Option<ShadingHit>>) {
         let mut blocks = RayBlock::from_rays(rays);
         let (world, marks) = (&self.context.scene.world, self.context.transmissive.as_slice());
@@ -192,8 +192,8 @@ impl DistributedFrame<'_> {
         out.extend(rays.iter().enumerate().map(answer));
     }
 
-    /// Of every light ray of every point, whether something here is in its way:
-    /// [`DistributedFrame::light_rays_per_point`] bits a point, in whole words of 64, the lowest
+    /// For every light ray of every point, whether this world blocks it:
+    /// [`DistributedFrame::light_rays_per_point`] bits per point, in whole 64-bit words, the lowest
     /// bit first. Rays that no material could need may be left out; their bits are 0.
     pub fn occlusion_bits(
         &self,
@@ -206,7 +206,7 @@ impl DistributedFrame<'_> {
         out.clear();
         out.resize(words * points.len(), 0);
         let sample = if let Pass::Color(sample) = pass { sample } else { 0 };
-        // Numbers of rays are kept for everything but the world's own light.
+        // Ray numbers are kept for all sources but the world itself.
         work.rays.source = OcclusionSource::Recording(Vec::new());
         let most = self.light_rays_per_point().max(1) as usize;
         let per_batch = (BATCH_RAYS / most).max(1);
@@ -240,7 +240,7 @@ impl DistributedFrame<'_> {
             for k in 0..s.count {
                 let at = s.spread.then(|| light_point(&sampler, p.stream, number, k, s.count));
                 let incident = incident_from(light, p.point, at);
-                // No material answers light from behind its shading normal.
+                // No material reflects light that comes from behind its shading normal.
                 if incident.strength <= 0.0 || p.normal.dot(incident.dir) <= 0.0 {
                     continue;
                 }

@@ -1,18 +1,19 @@
-//! What travels between those who hold a scene and those who own the picture, as 32-bit words.
+//! Messages between data servers and tile owners, as 32-bit words.
 
 use crate::surface::SurfacePoint;
 use glam::Vec3;
 
-/// A hit with everything that shading needs of the surface there.
+/// A hit with all surface data that shading needs.
 #[derive(Debug, Clone, Copy)]
 pub struct ShadingHit {
     /// Ray parameter.
     pub t: f32,
     /// Instance, the same in every part of a scene.
     pub instance: u32,
-    /// Primitive: as the holder numbers them; who merges parts puts the number in the whole here.
+    /// Primitive, as numbered by the data server. Code that merges parts replaces it by the number
+    /// in the whole scene.
     pub primitive: u32,
-    /// Window depth, where that layer is wanted of a camera ray; else 0.
+    /// Window depth, where that layer is requested of a camera ray; else 0.
     pub(crate) depth: f32,
     /// Distance from the eye, likewise.
     pub(crate) distance: f32,
@@ -23,8 +24,8 @@ impl ShadingHit {
     /// Words of [`ShadingHit::to_words`].
     pub const WORDS: usize = 20;
 
-    /// For a light ray: something opaque of this scene is in its way, so that nothing else matters.
-    /// It comes before every hit. `instance` is one through which no light passes.
+    /// For a light ray: an opaque surface of this scene blocks it, so no other hit matters. It is
+    /// ordered before every hit. `instance` is one that transmits no light.
     pub fn blocked(instance: u32) -> ShadingHit {
         let surface = SurfacePoint {
             point: Vec3::ZERO,
@@ -44,14 +45,14 @@ impl ShadingHit {
         self.t == f32::NEG_INFINITY
     }
 
-    /// Whether this hit comes before another one of the same ray: nearer, or as near and of a lower
-    /// instance and primitive.
+    /// Whether this hit is ordered before another one of the same ray: nearer, or at the same
+    /// distance with a lower instance and primitive.
     pub fn is_before(&self, other: &ShadingHit) -> bool {
         let key = |m: &ShadingHit| (m.instance, m.primitive);
         self.t < other.t || (self.t == other.t && key(self) < key(other))
     }
 
-    /// For sending.
+    /// Encodes the hit for sending.
     pub fn to_words(&self) -> [u32; ShadingHit::WORDS] {
         let s = &self.surface;
         let mut out = [0; ShadingHit::WORDS];
@@ -70,8 +71,8 @@ impl ShadingHit {
         out
     }
 
-    /// What [`ShadingHit::to_words`] was made of. [`super::TileState::process_hits`] refuses what
-    /// no scene can have answered.
+    /// Decodes the words of [`ShadingHit::to_words`]. [`super::TileState::process_hits`] refuses
+    /// hits that no scene can have produced.
     pub fn from_words(words: &[u32; ShadingHit::WORDS]) -> ShadingHit {
         let f = |i: usize| f32::from_bits(words[i]);
         ShadingHit {
@@ -93,16 +94,17 @@ impl ShadingHit {
     }
 }
 
-/// A point that light is asked for. From it and the pixel's seed everybody makes the same rays.
+/// A point whose incoming light is requested. All processes generate the same rays from it and the
+/// pixel's seed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightPoint {
-    /// Column and row in the whole picture.
+    /// Column and row in the whole image.
     pub pixel: [u32; 2],
-    /// Whether it sends rays to lamps.
+    /// Whether it sends rays to light sources.
     pub lamps: bool,
     /// Whether it sends ambient occlusion rays.
     pub sky: bool,
-    /// Sampler stream of the ray that met it.
+    /// Sampler stream of the ray that hit it.
     pub(crate) stream: u32,
     pub(crate) point: Vec3,
     pub(crate) point_error: f32,
@@ -114,17 +116,17 @@ const LAMPS: u32 = 1;
 const SKY: u32 = 2;
 /// The shading normal is the face normal.
 const FLAT: u32 = 4;
-/// The stream is 0: it was met by a camera ray.
+/// The stream is 0: a camera ray hit it.
 const FROM_CAMERA: u32 = 8;
 
 impl LightPoint {
-    /// Where it is, in render space.
+    /// Position in render space.
     pub fn position(&self) -> Vec3 {
         self.point
     }
 
-    /// For sending: nine words for a point of a flat surface that the camera sees, at most
-    /// thirteen.
+    /// Encodes the point for sending: nine words for a point of a flat surface that the camera
+    /// sees, at most thirteen.
     pub fn write(&self, out: &mut Vec<u32>) {
         let flat = self.normal.to_array().map(f32::to_bits)
             == self.face_normal.to_array().map(f32::to_bits);
@@ -133,7 +135,7 @@ impl LightPoint {
             | flag(self.sky, SKY)
             | flag(flat, FLAT)
             | flag(self.stream == 0, FROM_CAMERA);
-        // Pixels are below 65536 each.
+        // Pixel coordinates are below 65536.
         out.extend([flags, self.pixel[0] | self.pixel[1] << 16, self.point_error.to_bits()]);
         out.extend(self.point.to_array().map(f32::to_bits));
         out.extend(self.face_normal.to_array().map(f32::to_bits));
@@ -145,8 +147,8 @@ impl LightPoint {
         }
     }
 
-    /// What [`LightPoint::write`] wrote, and the rest; `None` when there is less, or something
-    /// else.
+    /// Decodes one point of [`LightPoint::write`] and returns it with the remaining words; `None`
+    /// when the words are too few or invalid.
     pub fn read(words: &[u32]) -> Option<(LightPoint, &[u32])> {
         let (&[flags, pixel, error], mut rest) = words.split_first_chunk::<3>()?;
         let vector = |rest: &mut &[u32]| {
@@ -178,7 +180,7 @@ impl LightPoint {
 }
 
 impl LightPoint {
-    /// As much of the surface as making rays reads.
+    /// The part of the surface that ray generation reads.
     pub(crate) fn surface(&self) -> SurfacePoint {
         let LightPoint { point, point_error, face_normal, normal, .. } = *self;
         SurfacePoint {

@@ -1,21 +1,21 @@
-//! Frames whose rays are answered by whoever calls.
+//! Renders frames whose rays the caller traces, for scenes distributed over several processes.
 //!
-//! [`crate::render::render`] asks one world for every hit. Here the caller stands in between, so
-//! that a scene may be larger than what one process holds: those who hold parts of it (see
-//! [`crate::bvh::World::build_part`]) say what rays meet, and those who own a part of the picture
-//! do everything else. Rays go in waves: all that a tile can send before it needs an answer. The
-//! same functions do the same arithmetic in the same order as in a frame of one piece, so the
-//! picture has the same bits.
+//! [`crate::render::render`] traces every ray in one world. Here the caller answers the rays, so a
+//! scene may be larger than the memory of one process. *Data servers* hold parts of the scene (see
+//! [`crate::bvh::World::build_part`]) and answer what rays hit. *Tile owners* own a part of the
+//! image and do everything else. Rays are traced in wavefronts: all rays that a tile can send
+//! before it needs an answer. The same functions do the same arithmetic in the same order as in a
+//! frame of one process, so the image has the same bits.
 //!
-//! Of a tile, its owner asks in turn:
-//! 1. [`TileState::begin`], then for [`TileState::rays`] what each meets first; the answers go to
-//!    [`TileState::process_hits`].
-//! 2. If there is light to be asked for: either [`TileState::light_points`], answered with one bit
-//!    per ray ([`TileState::apply_occlusion`]), or, where light passes through surfaces,
-//!    [`TileState::light_rays`] layer by layer ([`TileState::process_light_hits`]).
-//! 3. [`TileState::advance`] shades and says whether there is another wave.
+//! For each tile, its owner does the following:
+//! 1. It calls [`TileState::begin`], requests the first hit of each of [`TileState::rays`], and
+//!    passes the answers to [`TileState::process_hits`].
+//! 2. If light is to be requested, it requests either one bit per ray of
+//!    [`TileState::light_points`] ([`TileState::apply_occlusion`]) or, where light passes through
+//!    surfaces, [`TileState::light_rays`] layer by layer ([`TileState::process_light_hits`]).
+//! 3. It calls [`TileState::advance`], which shades and returns whether there is another wavefront.
 //!
-//! Holders answer with [`DistributedFrame::camera_hits`], [`DistributedFrame::closest`],
+//! Data servers answer with [`DistributedFrame::camera_hits`], [`DistributedFrame::closest`],
 //! [`DistributedFrame::occlusion_bits`] and [`DistributedFrame::light_hits`].
 
 mod data_server;
@@ -42,7 +42,7 @@ use glam::{DAffine3, DVec3};
 /// Pixels along the side of a tile.
 pub const TILE_SIDE: u32 = TILE;
 
-/// One walk of rays over the whole picture.
+/// One pass of rays over the whole image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pass {
     /// Rays through the pixels' centres, for depth, normals and ids.
@@ -51,7 +51,7 @@ pub enum Pass {
     Color(u32),
 }
 
-/// A scene, or a part of one, made ready for one frame.
+/// A scene, or a part of one, prepared for one frame.
 pub struct DistributedFrame<'a> {
     context: FrameContext<'a>,
     tiles: Vec<TileArea>,
@@ -59,12 +59,12 @@ pub struct DistributedFrame<'a> {
 }
 
 impl<'a> DistributedFrame<'a> {
-    /// Checks everything. `needed` are the effects that the whole scene needs
-    /// ([`Effects::required_by`]): a part may seem to need less.
+    /// Checks all arguments. `needed` are the effects that the whole scene needs
+    /// ([`Effects::required_by`]): a part may seem to need fewer.
     ///
     /// # Errors
-    /// As [`crate::render::render`]; and [`RenderError::Unsupported`] for options that stop a frame
-    /// early, which nobody alone can decide here.
+    /// As [`crate::render::render`]; and [`RenderError::Unsupported`] for options that end a frame
+    /// early, which no single process can decide.
     pub fn new(
         scene: &'a Scene,
         needed: Effects,
@@ -119,19 +119,19 @@ impl<'a> DistributedFrame<'a> {
         self.context.effects
     }
 
-    /// Requests that change nothing, in words.
+    /// Warnings about requests that change nothing.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Of each volume of the frame whether it is a medium. Those may be held in bricks; projections
-    /// see whole volumes.
+    /// For each volume of the frame, whether it is a medium. Media may be held in bricks;
+    /// projections need whole volumes.
     pub fn media(&self) -> Vec<bool> {
         self.context.volumes.iter().map(|(volume, _)| volume.is_medium()).collect()
     }
 
-    /// The way of a ray, in render space, through the volumes up to `t_end`. `held` may give a part
-    /// in place of what the scene has as a volume.
+    /// The segments of a ray, in render space, through the volumes up to `t_end`. `held` may give a
+    /// brick that replaces the scene's volume.
     pub fn ray_segments<'v>(
         &'v self,
         ray: &Ray,
@@ -148,8 +148,8 @@ impl<'a> DistributedFrame<'a> {
         )
     }
 
-    /// What a ray shows that collects `mixed` in the media: the same where the scene has no
-    /// projections, which must be here whole.
+    /// The result of a ray that collects `mixed` in the media, after projections are composited;
+    /// projections need their whole volumes here. Without projections, the result is `mixed`.
     pub fn composite_projections(
         &self,
         ray: &Ray,
@@ -169,7 +169,7 @@ impl<'a> DistributedFrame<'a> {
         }
     }
 
-    /// What accuracy volumes are integrated to.
+    /// Accuracy of volume integration.
     pub fn volume_quality(&self) -> &VolumeQuality {
         &self.context.options.volume_quality
     }
@@ -179,7 +179,7 @@ impl<'a> DistributedFrame<'a> {
         self.context.instances.len()
     }
 
-    /// Number of tiles, which go row by row from the top left.
+    /// Number of tiles. They are numbered row by row from the top left.
     pub fn num_tiles(&self) -> usize {
         self.tiles.len()
     }
@@ -198,15 +198,15 @@ impl<'a> DistributedFrame<'a> {
         geometry.then_some(Pass::Geometry).into_iter().chain((0..colors).map(Pass::Color)).collect()
     }
 
-    /// True when colours need nothing but camera rays: holders then know the colours of their own
-    /// hits ([`CameraHits::colors`]), and owners only choose among them
+    /// True when colours need nothing but camera rays. Data servers then compute the colours of
+    /// their own hits ([`CameraHits::colors`]), and tile owners only select among them
     /// ([`TileState::select_colors`]).
     pub fn needs_only_local_light(&self) -> bool {
         local::is_sufficient(&self.context)
     }
 
-    /// True when [`Pass::Color`] also fills the geometry layers, from what
-    /// [`TileState::record_geometry`] is given or `process_hits` meets.
+    /// True when [`Pass::Color`] also fills the geometry layers, from the hits passed to
+    /// [`TileState::record_geometry`] or to `process_hits`.
     pub fn records_geometry(&self, pass: Pass) -> bool {
         match pass {
             Pass::Geometry => true,
@@ -216,18 +216,18 @@ impl<'a> DistributedFrame<'a> {
         }
     }
 
-    /// True when light rays pass through surfaces, so that they are followed layer by layer.
+    /// True when light rays pass through surfaces and are therefore traced layer by layer.
     pub fn light_passes_surfaces(&self) -> bool {
         self.context.light_passes_surfaces()
     }
 
-    /// Rays that a point may send towards light: bits that [`DistributedFrame::occlusion_bits`]
-    /// gives for each point.
+    /// Number of light rays that a point may send, which is the number of bits per point in
+    /// [`DistributedFrame::occlusion_bits`].
     pub fn light_rays_per_point(&self) -> u32 {
         self.context.sky_number + self.sky_rays()
     }
 
-    /// How far ambient occlusion looks, when it is the only reason for rays that leave a camera
+    /// The distance limit of ambient occlusion, when its rays are the only ones that leave a camera
     /// ray's hit.
     pub fn ambient_occlusion_only_distance(&self) -> Option<f64> {
         let alone =
@@ -253,7 +253,7 @@ impl<'a> DistributedFrame<'a> {
         self.centered() && self.context.options.layers.contains(Layers::COLOR)
     }
 
-    /// Of the sample that a pass aims at, its number; `None` for the pixels' centres.
+    /// The sample number that a pass aims at; `None` for the pixel centres.
     fn sample_of(&self, pass: Pass) -> Option<u32> {
         match pass {
             Pass::Color(sample) if !self.centered() => Some(sample),
@@ -261,12 +261,12 @@ impl<'a> DistributedFrame<'a> {
         }
     }
 
-    /// Bounds of this scene's or part's own geometry, render space.
+    /// Bounds of the geometry of this scene or part, render space.
     pub fn own_bounds(&self) -> Aabb {
         self.context.scene.world.own_bounds()
     }
 
-    /// Of each tile, whether a camera ray of it can meet `bounds` (render space).
+    /// For each tile, whether one of its camera rays can hit `bounds` (render space).
     pub fn tiles_overlapping(&self, bounds: Aabb) -> Vec<bool> {
         if bounds.is_empty() {
             return vec![false; self.tiles.len()];
@@ -281,7 +281,7 @@ impl<'a> DistributedFrame<'a> {
             let world = self.context.origin + corner.as_dvec3();
             let row = |r: usize| matrix.row(r).truncate().dot(world) + matrix.row(r).w;
             let (x, y, w) = (row(0), row(1), row(3));
-            // A corner beside or behind the eye has no place in the picture.
+            // A corner to the side of or behind the eye has no position in the image.
             let reach = (world - self.eye()).length();
             let in_front =
                 w.is_finite() && (w > 1e-6 * reach || self.context.camera.eye().is_none());
@@ -294,7 +294,7 @@ impl<'a> DistributedFrame<'a> {
                 (lo[a], hi[a]) = (lo[a].min(pixel[a]), hi[a].max(pixel[a]));
             }
         }
-        // Rays are anywhere in their pixels, and f32.
+        // Rays may pass anywhere through their pixels, and are rounded to f32.
         let margin =
             1.0 + 1e-4 * f64::from(self.context.options.width.max(self.context.options.height));
         let meets = |t: &TileArea| {
@@ -311,7 +311,7 @@ impl<'a> DistributedFrame<'a> {
     }
 
     // ---- The finished picture -------------------------------------------------------------------
-    /// A picture without any tile.
+    /// An image without any tile.
     pub fn blank_frame(&self) -> Frame {
         let area = self.context.options.area();
         let n = area.width as usize * area.height as usize;
@@ -329,7 +329,7 @@ impl<'a> DistributedFrame<'a> {
         }
     }
 
-    /// Words that a pixel has in [`TileState::encode`].
+    /// Words per pixel in [`TileState::encode`].
     pub fn words_per_pixel(&self) -> usize {
         let sizes = [
             (Layers::COLOR, 4),
@@ -342,8 +342,8 @@ impl<'a> DistributedFrame<'a> {
         sizes.iter().filter(|(l, _)| self.context.options.layers.contains(*l)).map(|(_, n)| n).sum()
     }
 
-    /// Puts what [`TileState::encode`] gave for tile `tile` into the picture. False when it is no
-    /// tile of this frame or of another length.
+    /// Writes the words of [`TileState::encode`] for tile `tile` into the image. Returns false when
+    /// the frame has no such tile or the length is wrong.
     #[must_use]
     pub fn decode_tile(&self, frame: &mut Frame, tile: usize, words: &[u32]) -> bool {
         let Some(t) = self.tiles.get(tile) else { return false };

@@ -1,4 +1,4 @@
-//! What the owner of a tile does with the answers.
+//! What a tile owner does with the answers of the data servers.
 
 use super::super::shadow::LightRayState;
 use super::super::tile::{PIXELS, TileArea, TileLayers};
@@ -16,7 +16,7 @@ use crate::surface::SurfacePoint;
 use crate::volume::VolumeSample;
 use glam::Vec3;
 
-/// A tile on its way to be finished. Its pixels have slots (0..1024) along a Morton curve.
+/// A tile in progress. Its pixels have slots (0..1024) along a Morton curve.
 pub struct TileState {
     tile: usize,
     area: TileArea,
@@ -24,34 +24,34 @@ pub struct TileState {
     work: Workspace,
     stats: RayStats,
     pass: Pass,
-    /// Light rays of the current wave.
+    /// Light rays of the current wavefront.
     waiting: Vec<RecordedRay>,
     points: Vec<LightPoint>,
-    /// Of each point of the wave its place in `points`; `u32::MAX` for none.
+    /// For each point of the wavefront, its index in `points`; `u32::MAX` for none.
     place: Vec<u32>,
     light_ray_states: Vec<LightRayState>,
-    /// Whether the wave's points have their light.
+    /// Whether the wavefront's points have received their light.
     lit: bool,
 }
 
-/// A ray on its way through volumes.
+/// A ray through volumes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VolumeRay {
-    /// Its place among the answers of its wave.
+    /// Its index among the answers of its wavefront.
     pub place: usize,
     /// In render space.
     pub ray: Ray,
-    /// Where it meets a surface, or its own end.
+    /// Parameter of its surface hit, or of its own end.
     pub t_end: f32,
 }
 
-/// An answer that no holder of this scene can have given.
+/// An answer that no data server of this scene can have given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("an answer of tile {tile} does not fit its question: {what} {found}, expected {expected}")]
 pub struct ProtocolError {
     /// The tile.
     pub tile: usize,
-    /// What does not fit.
+    /// What is wrong.
     pub what: &'static str,
     /// The number found.
     pub found: u64,
@@ -60,7 +60,7 @@ pub struct ProtocolError {
 }
 
 impl DistributedFrame<'_> {
-    /// Tile `tile`, with nothing in it.
+    /// An empty tile with the number `tile`.
     pub fn tile(&self, tile: usize) -> TileState {
         let background_depth = self.context.camera.background_depth() as f32;
         TileState {
@@ -90,7 +90,7 @@ impl TileState {
         self.stats
     }
 
-    /// Sends camera rays.
+    /// Generates camera rays.
     pub fn begin(&mut self, frame: &DistributedFrame<'_>, pass: Pass) {
         self.pass = pass;
         let first = matches!(pass, Pass::Color(0));
@@ -113,14 +113,15 @@ impl TileState {
         work.scattered.clear();
     }
 
-    /// Number of answers that [`TileState::process_hits`] wants: one per ray of the wave, waiting
-    /// or not.
+    /// Number of answers that [`TileState::process_hits`] expects: one per ray of the wavefront,
+    /// whether it waits for an answer or not.
     pub fn num_rays(&self) -> usize {
         self.work.current.states.len()
     }
 
-    /// Rays that wait for an answer, with their place in it and the slot of their pixel. The first
-    /// wave of a pass has the rays of [`DistributedFrame::camera_hits`], ray k in slot k.
+    /// Rays that wait for an answer, with the index of that answer and the slot of their pixel. The
+    /// first wavefront of a pass has the rays of [`DistributedFrame::camera_hits`], ray k in slot
+    /// k.
     pub fn rays(&self) -> impl Iterator<Item = (usize, u16, Ray)> + '_ {
         let wave = &self.work.current;
         wave.states.iter().enumerate().filter_map(|(i, state)| {
@@ -129,11 +130,11 @@ impl TileState {
         })
     }
 
-    /// In frames where [`DistributedFrame::needs_only_local_light`]: the colours of the nearest
-    /// hits, slot by slot; `None` for the background. Ends the pass.
+    /// In frames where [`DistributedFrame::needs_only_local_light`], takes the colours of the
+    /// nearest hits, slot by slot; `None` for the background. Ends the pass.
     ///
     /// # Errors
-    /// When there are not as many colours as slots.
+    /// When the number of colours is not the number of slots.
     pub fn select_colors(
         &mut self,
         frame: &DistributedFrame<'_>,
@@ -162,8 +163,8 @@ impl TileState {
         Ok(())
     }
 
-    /// Fills the geometry layers from what the pixels' camera rays met, slot by slot: for frames of
-    /// [`TileState::select_colors`].
+    /// Fills the geometry layers from the hits of the pixels' camera rays, slot by slot, in frames
+    /// that use [`TileState::select_colors`].
     pub fn record_geometry(&mut self, hits: &[Option<ShadingHit>]) {
         for (slot, hits) in hits.iter().enumerate().take(PIXELS) {
             if let Some(m) = hits {
@@ -177,8 +178,8 @@ impl TileState {
         }
     }
 
-    /// Where volumes are held in bricks: the rays that wait, which end where `hits` has something.
-    /// What they collect on their way goes to [`TileState::set_volume_samples`].
+    /// Where volumes are held in bricks: the waiting rays, which end at their hits in `hits`. Pass
+    /// what they collect to [`TileState::set_volume_samples`].
     pub fn volume_rays(&self, hits: &[Option<ShadingHit>]) -> Vec<VolumeRay> {
         let end =
             |i: usize, ray: &Ray| hits.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
@@ -187,10 +188,11 @@ impl TileState {
         if self.pass == Pass::Geometry { Vec::new() } else { self.rays().map(way).collect() }
     }
 
-    /// Takes what each ray of the wave collects in the volumes, before [`TileState::process_hits`].
+    /// Sets what each ray of the wavefront collects in the volumes, before
+    /// [`TileState::process_hits`].
     ///
     /// # Errors
-    /// When there are not as many answers as rays.
+    /// When the number of answers is not the number of rays.
     pub fn set_volume_samples(
         &mut self,
         collected: Vec<VolumeSample>,
@@ -200,10 +202,10 @@ impl TileState {
         Ok(())
     }
 
-    /// Takes what each ray of the wave met first.
+    /// Takes the first hit of each ray of the wavefront.
     ///
     /// # Errors
-    /// When the answers do not fit the wave.
+    /// When the answers do not fit the wavefront.
     pub fn process_hits(
         &mut self,
         frame: &DistributedFrame<'_>,
@@ -239,8 +241,8 @@ impl TileState {
         Ok(())
     }
 
-    /// Geometry layers of first surfaces; in a pass of its own, rays go on behind surfaces that are
-    /// too transparent.
+    /// Records the geometry layers of first surfaces. In a separate geometry pass, rays continue
+    /// behind surfaces that are too transparent.
     fn record_wave(&mut self, frame: &DistributedFrame<'_>, hits: &[Option<ShadingHit>]) {
         let transparent = frame.context.effects.contains(Effects::TRANSPARENCY);
         for (i, m) in hits.iter().enumerate() {
@@ -269,7 +271,7 @@ impl TileState {
     }
 
     // ---- Light ----------------------------------------------------------------------------------
-    /// Runs the lights once to see which rays they would send.
+    /// Runs the lights once to find the rays that they would send.
     fn find_light_rays(&mut self, frame: &DistributedFrame<'_>) {
         let before: Vec<Vec3> = self.work.points.iter().map(|p| p.radiance).collect();
         self.work.light_rays.source = OcclusionSource::Recording(std::mem::take(&mut self.waiting));
@@ -315,12 +317,12 @@ impl TileState {
         }
     }
 
-    /// Points that light is asked for, where light does not pass through surfaces.
+    /// Points whose light is requested, where light does not pass through surfaces.
     pub fn light_points(&self) -> &[LightPoint] {
         &self.points
     }
 
-    /// Of each of [`TileState::light_points`] the slot of its pixel.
+    /// For each of [`TileState::light_points`], the slot of its pixel.
     pub fn slots_of_points(&self) -> impl Iterator<Item = u16> + '_ {
         let slot = |p: &LightPoint| {
             TileArea::slot(p.pixel[0] - self.area.x, p.pixel[1] - self.area.y) as u16
@@ -328,17 +330,17 @@ impl TileState {
         self.points.iter().map(slot)
     }
 
-    /// Of each light ray that matters, its point among [`TileState::light_points`] and the ray: to
-    /// find out whom to ask.
+    /// For each light ray that matters, its point among [`TileState::light_points`] and the ray.
+    /// Use them to decide which data servers to ask.
     pub fn light_rays_of_points(&self) -> impl Iterator<Item = (usize, Ray)> + '_ {
         self.waiting.iter().map(|r| (self.place[r.point as usize] as usize, r.ray))
     }
 
-    /// Takes the bits of [`DistributedFrame::occlusion_bits`] for all [`TileState::light_points`];
-    /// those of several holders are joined by *or*.
+    /// Takes the bits of [`DistributedFrame::occlusion_bits`] for all [`TileState::light_points`].
+    /// Combine the bits of several data servers by *or*.
     ///
     /// # Errors
-    /// When there is another number of words.
+    /// When the number of words is wrong.
     pub fn apply_occlusion(
         &mut self,
         frame: &DistributedFrame<'_>,
@@ -360,13 +362,13 @@ impl TileState {
         Ok(())
     }
 
-    /// Light rays that wait for the next surface in their way, where light passes through surfaces.
+    /// Light rays that wait for the next surface along them, where light passes through surfaces.
     pub fn light_rays(&self) -> impl Iterator<Item = Ray> + '_ {
         self.waiting.iter().map(|r| r.ray).filter(|r| r.t_max >= r.t_min)
     }
 
-    /// Takes what [`DistributedFrame::light_hits`] says of each of [`TileState::light_rays`]: of
-    /// several holders, the answer that [`ShadingHit::is_before`] the others.
+    /// Takes the answer of [`DistributedFrame::light_hits`] to each of [`TileState::light_rays`];
+    /// of several data servers, the answer that [`ShadingHit::is_before`] the others.
     ///
     /// # Errors
     /// When the answers do not fit the rays.
@@ -426,7 +428,8 @@ impl TileState {
         self.lit = true;
     }
 
-    /// Shades the wave. True when there is another one; else the pass is done.
+    /// Shades the wavefront. Returns true when there is another one; otherwise the pass is
+    /// finished.
     pub fn advance(&mut self, frame: &DistributedFrame<'_>) -> bool {
         if self.pass == Pass::Geometry {
             self.work.surfaces.clear();
@@ -462,8 +465,8 @@ impl TileState {
     }
 
     // ---- The result -----------------------------------------------------------------------------
-    /// The finished tile, pixel by pixel and row by row: colour, depth, distance, normal, ids,
-    /// cost, as far as wanted. See [`DistributedFrame::decode_tile`].
+    /// The finished tile, pixel by pixel and row by row: the requested layers of colour, depth,
+    /// distance, normal, ids and cost. See [`DistributedFrame::decode_tile`].
     pub fn encode(&self, frame: &DistributedFrame<'_>) -> Vec<u32> {
         let options = frame.context.options;
         let has = |l| options.layers.contains(l);
@@ -514,7 +517,7 @@ impl TileState {
     }
 }
 
-/// In the place of a surface where nothing was met.
+/// Stands for the surface of a ray that hit nothing.
 const NO_SURFACE: SurfacePoint = SurfacePoint {
     point: Vec3::ZERO,
     point_error: 0.0,
