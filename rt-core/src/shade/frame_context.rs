@@ -1,5 +1,5 @@
-//! A scene made ready for the tiles of one frame: instances resolved, lights in render space, rays
-//! set up.
+//! A scene prepared for the tiles of one frame: instances resolved, lights in render space, ray
+//! generation set up.
 
 use super::camera_rays::CameraRays;
 use super::direct::LightSampling;
@@ -26,7 +26,7 @@ pub(crate) struct FrameContext<'a> {
     pub(crate) effects: Effects,
     pub(crate) instances: Vec<ResolvedInstance<'a>>,
     pub(crate) lights: Vec<ResolvedLight>,
-    /// What points send to each of them.
+    /// How points sample each of the lights.
     pub(crate) light_sampling: Vec<LightSampling>,
     /// Number of the first ambient occlusion ray among all light rays of a point.
     pub(crate) sky_number: u32,
@@ -37,15 +37,15 @@ pub(crate) struct FrameContext<'a> {
     pub(crate) camera_rays: CameraRays,
     /// Instruction set of ray generation and shading; every one gives the same bits.
     pub(crate) level: Level,
-    /// Whether a material has detail.
+    /// Whether a material has maps.
     pub(crate) has_maps: bool,
-    /// Of each instance whether light may pass through it; empty where it passes through none.
+    /// For each instance, whether it may transmit light; empty when none does.
     pub(crate) transmissive: Vec<bool>,
-    /// Volumes with the way into their object space.
+    /// Volumes with the transform into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
     /// World position of render space's origin.
     pub(crate) origin: DVec3,
-    /// Render-space up of the picture, for gradient backgrounds seen in mirrors.
+    /// Render-space up of the image, for gradient backgrounds seen in mirrors.
     up: Vec3,
 }
 
@@ -123,7 +123,7 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// True when opacity and dielectrics are to be seen by shadow and ambient occlusion rays.
+    /// True when shadow and ambient occlusion rays take opacity and dielectrics into account.
     pub(crate) fn light_passes_surfaces(&self) -> bool {
         passes_surfaces(self.effects)
     }
@@ -133,7 +133,7 @@ impl<'a> FrameContext<'a> {
         &self.instances[hit.instance as usize]
     }
 
-    /// The surface at a hit, with the normal that it is lit with.
+    /// The surface at a hit, with the normal used for lighting.
     #[inline]
     pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let resolved = self.instance_at(hit);
@@ -142,7 +142,7 @@ impl<'a> FrameContext<'a> {
         surface
     }
 
-    /// Sample points of pixel (`x`, `y`) of the whole picture.
+    /// Sample points of pixel (`x`, `y`) of the whole image.
     #[inline]
     pub(crate) fn sampler(&self, x: u32, y: u32, sample: u32) -> Sampler {
         Sampler::new(self.options.sampling, self.options.seed, x, y, sample)
@@ -171,7 +171,7 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// What a mirrored or refracted ray sees that leaves the scene: the environment, else the
+    /// Radiance of a mirrored or refracted ray that leaves the scene: the environment, else the
     /// background.
     pub(crate) fn surroundings(&self, dir: Vec3) -> Vec3 {
         let dir = dir.normalize_or_zero();
@@ -187,8 +187,8 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// Window depth of the surface met by the ray through NDC `ndc`, and its distance from where
-    /// the ray begins: see [`point_on_ray`].
+    /// Window depth of the surface hit by the ray through NDC `ndc`, and its distance from the
+    /// ray's origin: see [`point_on_ray`].
     pub(crate) fn depth_and_distance(&self, ndc: [f64; 2], ray: &Ray, hit: &Hit) -> (f32, f32) {
         let (on_surface, n) = self.instance_at(hit).plane(ray, hit, self.origin);
         let ray = self.camera.world_ray(ndc);
@@ -207,17 +207,17 @@ fn passes_surfaces(effects: Effects) -> bool {
     effects.intersects(Effects::TRANSPARENCY.union(Effects::REFRACTION))
 }
 
-/// World point where a pixel's f64 ray (origin, direction) meets the plane through `on_surface`
-/// with normal `n` (any length), so that neither the f32 ray nor its hit parameter limits the
-/// accuracy.
+/// World point where a pixel's f64 ray (origin, direction) intersects the plane through
+/// `on_surface` with normal `n` (any length), so that neither the f32 ray nor its hit parameter
+/// limits the accuracy.
 #[inline(always)]
 pub(crate) fn point_on_ray((origin, dir): (DVec3, DVec3), on_surface: DVec3, n: DVec3) -> DVec3 {
     let along = n.dot(dir);
     let t = n.dot(on_surface - origin) / along;
     let on_ray = origin + dir * t;
-    // Edge-on planes meet the exact ray anywhere: keep the hit itself then. A pixel's f32 ray and
-    // exact ray differ by some 1e-7 of the distance; a far larger step along the plane is not an
-    // improvement but a division by almost 0.
+    // The exact ray's intersection with an edge-on plane is ill-conditioned, so the hit itself is
+    // kept. A pixel's f32 ray and exact ray differ by some 1e-7 of the distance; a far larger step
+    // along the plane is not an improvement but a division by almost 0.
     let step = (on_ray - on_surface).length_squared();
     let limit = 1e-8 * (on_surface - origin).length_squared();
     if step <= limit { on_ray } else { on_surface }

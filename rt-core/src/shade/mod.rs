@@ -1,11 +1,11 @@
-//! The life of a tile of rays: trace a wave, light what it met, send the next waves, until none is
-//! left.
+//! Renders a tile: traces a wavefront of rays, lights its hits and spawns the next wavefronts,
+//! until no rays are left.
 //!
-//! Each effect is a pass over the whole wave, entered once per wave and only if the frame's
-//! [`Effects`] has it: [`direct`] light with its shadow rays, [`ambient_occlusion`], then
-//! [`specular`] (mirror, gloss, glass) or [`path`] and transparency, which send rays into the next
-//! waves. Rays behind transparent surfaces stay coherent and form a wave of their own. Frames
-//! without any of these take a loop of their own, [`local`].
+//! Each effect is a pass over the whole wavefront. A pass is entered once per wavefront and only if
+//! the frame's [`Effects`] include it: [`direct`] light with its shadow rays,
+//! [`ambient_occlusion`], then [`specular`] (mirror, gloss, glass) or [`path`] and transparency,
+//! which spawn rays for the next wavefronts. Rays behind transparent surfaces stay coherent and
+//! form a separate wavefront. Frames without any of these effects use a separate loop, [`local`].
 
 mod ambient_occlusion;
 mod camera_rays;
@@ -44,11 +44,11 @@ use point::NO_PARAMETERS;
 use tile::{PIXELS, block_place, lane_pixel};
 use wavefront::{LightRays, RayKind, RayState, Wavefront};
 
-/// Opacity from which on a surface is opaque: corners of alpha 1 come out some roundings below 1
-/// between them.
+/// Smallest opacity of an opaque surface: interpolation between corners of alpha 1 gives values
+/// some roundings below 1.
 const OPAQUE: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Sampler dimensions, counted from a ray's own stream.
+/// Sampler dimensions, counted from the start of a ray's stream.
 pub(crate) struct SampleDimension;
 
 impl SampleDimension {
@@ -57,7 +57,7 @@ impl SampleDimension {
     const CHOICE: u32 = 2;
     const SCATTER: u32 = 3;
     const AMBIENT_OCCLUSION: u32 = 4;
-    /// One per light from here on.
+    /// One per light from this number on.
     const LIGHTS: u32 = 8;
 }
 
@@ -68,16 +68,16 @@ pub(crate) struct Workspace {
     behind: Wavefront,
     scattered: Wavefront,
     hits: Vec<HitBlock>,
-    /// Of each ray the surface at its hit, where somebody else has looked at it; empty where this
-    /// scene's world is asked.
+    /// For each ray, the surface at its hit, in distributed frames; empty where this scene's world
+    /// is traced.
     surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
-    /// Finishes of points whose material has detail.
+    /// Parameters of points whose material has maps.
     parameters: Vec<SurfaceParameters>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
-    /// Of each ray what it collects in the volume up to its hit, where others hold the volume's
-    /// bricks; empty where it is whole here.
+    /// For each ray, what it collects in the volume up to its hit, where other processes hold the
+    /// volume's bricks; empty where the whole volume is here.
     volume_samples: Vec<crate::volume::VolumeSample>,
     /// One ray in the object spaces of all volumes.
     object_rays: Vec<Ray>,
@@ -99,8 +99,8 @@ pub(crate) fn render_tile(
         context.options.samples <= 1 && !context.effects.contains(Effects::DEPTH_OF_FIELD);
     let wants_geometry = layers.intersects(Layers::GEOMETRY) && sample == 0;
 
-    // Depth, normals and ids belong to the pixel centre: rays of their own unless the colour's rays
-    // go there anyway.
+    // Depth, normals and ids belong to the pixel centre. They need separate rays unless the
+    // colour's rays go through the centre.
     if wants_geometry && !(centered && layers.contains(Layers::COLOR)) {
         trace_geometry_layers(context, area, out, work, &mut stats);
     }
@@ -180,8 +180,8 @@ fn generate_camera_wavefront(
     generate_camera_rays(context, area, &mut wave.blocks, sample, stats, cost);
 }
 
-/// Rays of every pixel of the tile, in Morton order; lanes outside the picture are inactive.
-/// `sample` of `None` aims at pixel centres through the middle of the lens.
+/// Rays of every pixel of the tile, in Morton order; lanes outside the image are inactive. `sample`
+/// of `None` aims at pixel centres through the middle of the lens.
 fn generate_camera_rays(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -204,7 +204,7 @@ fn generate_camera_rays(
     {
         generate_single_rays(context, area, blocks, sample, through_lens);
     }
-    // The picture's edge cuts tiles.
+    // Tiles may extend beyond the image's edge.
     if area.width < TILE || area.height < TILE {
         for slot in (0..PIXELS as u16).filter(|s| area.pixel(*s).is_none()) {
             blocks[slot as usize / LANES]
@@ -213,7 +213,8 @@ fn generate_camera_rays(
     }
 }
 
-/// Camera rays sixteen at a time; false where they need the arithmetic of [`generate_single_rays`].
+/// Camera rays, sixteen at a time; false where they need the arithmetic of
+/// [`generate_single_rays`].
 fn generate_pinhole_rays<S: Simd>(
     simd: S,
     context: &FrameContext<'_>,
@@ -221,7 +222,7 @@ fn generate_pinhole_rays<S: Simd>(
     blocks: &mut [RayBlock],
     sample: Option<u32>,
 ) -> bool {
-    // NDC of the pixels' centres: of each column and each row of blocks what its lanes have.
+    // NDC of the pixels' centres: the lanes' values for each column and each row of blocks.
     let mut centres = [[[0.0; LANES]; TILE as usize / 4]; 2];
     for k in 0..TILE as usize / 4 {
         for lane in 0..LANES {
@@ -267,7 +268,7 @@ fn generate_pinhole_rays<S: Simd>(
     true
 }
 
-/// Camera rays one by one, for lenses and near planes that cut every ray elsewhere.
+/// Camera rays one by one, for lenses and for near planes that clip each ray at another parameter.
 fn generate_single_rays(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -294,7 +295,7 @@ fn generate_single_rays(
 }
 
 fn trace(context: &FrameContext<'_>, work: &mut Workspace, coherent: bool) {
-    // What is in it does not matter: tracing starts with misses everywhere.
+    // The old contents do not matter: tracing starts with misses everywhere.
     work.hits.resize(work.current.blocks.len(), HitBlock::MISS);
     let coherence = if coherent { Coherence::Coherent } else { Coherence::Incoherent };
     let world = &context.scene.world;
@@ -302,9 +303,9 @@ fn trace(context: &FrameContext<'_>, work: &mut Workspace, coherent: bool) {
     prefetch_surfaces(context, &work.hits);
 }
 
-/// Asks for everything that looking at the hits will read, first the triangles and then what they
-/// name: one after the other, these waits were half of the time of shading (measured on a million
-/// triangles).
+/// Prefetches everything that looking up the hits will read, first the triangles and then the
+/// vertices they name. Without it, these waits were half of the time of shading (measured on a
+/// million triangles).
 fn prefetch_surfaces(context: &FrameContext<'_>, hits: &[HitBlock]) {
     fn each(context: &FrameContext<'_>, hits: &[HitBlock], f: impl Fn(&ResolvedInstance<'_>, u32)) {
         for h in hits {
@@ -376,7 +377,7 @@ fn record_camera_hits(
     }
 }
 
-/// Hits become points to shade; misses add the background or the surroundings.
+/// Hits become points to shade; misses add the background or the environment.
 fn process_hits(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -385,7 +386,7 @@ fn process_hits(
     record: bool,
     stats: &mut RayStats,
 ) {
-    // Where somebody else has looked at the hits, their finishes did not travel.
+    // In distributed frames, the messages do not carry the parameters of mapped surfaces.
     if context.has_maps && work.surfaces.is_empty() {
         process_hits_with::<true>(context, area, out, work, record, stats);
     } else {
@@ -393,7 +394,7 @@ fn process_hits(
     }
 }
 
-/// As [`process_hits`]. `MAPS`: some material has detail.
+/// As [`process_hits`]. `MAPS`: whether some material has maps.
 fn process_hits_with<const MAPS: bool>(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -444,7 +445,7 @@ fn process_hits_with<const MAPS: bool>(
         let length = crate::surface::length(ray.dir);
         let state = &mut work.current.states[i];
         if state.absorption != Vec3::ZERO {
-            // `t_min` is where the ray entered or was last continued.
+            // `t_min` is the parameter where the ray entered the medium or was last continued.
             state.throughput *= (-state.absorption * ((hit.t - ray.t_min) * length)).exp();
         }
         if record && transparent && state.kind == RayKind::Camera {
@@ -515,7 +516,7 @@ fn shade_points(
     accumulate_radiance(context, area, work);
 }
 
-/// Light that falls onto the wave's points.
+/// Light that arrives at the wavefront's points.
 fn add_light(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -552,10 +553,11 @@ fn add_light(
     }
 }
 
-/// What the wave's points send to the eye, into the pixels.
+/// Adds the radiance of the wavefront's points to the pixels.
 fn accumulate_radiance(context: &FrameContext<'_>, area: &TileArea, work: &mut Workspace) {
     let Workspace { current, points, pixels, .. } = work;
-    // The path tracer chooses between surface and what is behind by chance, with the same mean.
+    // The path tracer chooses at random between the surface and what is behind it, with the same
+    // mean.
     let split = !context.effects.contains(Effects::PATH_TRACING);
     for p in points.iter() {
         let state = &current.states[p.lane as usize];
@@ -577,7 +579,7 @@ fn accumulate_radiance(context: &FrameContext<'_>, area: &TileArea, work: &mut W
     }
 }
 
-/// Rays that go on from the wave's points.
+/// Rays that continue from the wavefront's points.
 fn spawn_rays(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -608,7 +610,7 @@ fn spawn_rays(
 }
 
 /// Continues rays behind transparent surfaces: the same ray with a later start, so that packets
-/// stay packets.
+/// stay coherent.
 fn spawn_transparent_rays(context: &FrameContext<'_>, work: &mut Workspace, stats: &mut RayStats) {
     for p in work.points.iter().filter(|p| p.surface.opacity < 1.0) {
         let state = work.current.states[p.lane as usize];

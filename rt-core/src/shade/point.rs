@@ -1,4 +1,4 @@
-//! Points of surfaces that wait for light, and what differs from their material there.
+//! Surface points that wait for light, and their parameters where these differ from the material.
 
 use super::frame_context::FrameContext;
 use crate::material::SurfaceModel;
@@ -6,15 +6,15 @@ use crate::material_maps::SurfaceParameters;
 use crate::surface::SurfacePoint;
 use glam::Vec3;
 
-/// A surface met by a ray of the current wave.
+/// A surface point hit by a ray of the current wavefront.
 pub(crate) struct Point {
     pub(crate) surface: SurfacePoint,
-    /// Unit, towards where the ray came from.
+    /// Unit, towards the origin of the ray.
     pub(crate) view: Vec3,
-    /// Collected towards `view`.
+    /// Radiance collected towards `view`.
     pub(crate) radiance: Vec3,
     pub(crate) t: f32,
-    /// Ray of the wave.
+    /// Ray of the wavefront.
     pub(crate) lane: u32,
     pub(crate) instance: u32,
     /// False where lights change nothing.
@@ -23,12 +23,13 @@ pub(crate) struct Point {
     pub(super) parameters: u32,
 }
 
-/// In the place of an index: the point's finish is its material's.
+/// Instead of an index: the point has its material's own parameters.
 pub(super) const NO_PARAMETERS: u32 = u32::MAX;
 
 impl Point {
-    /// What differs from the material here. `MAPS`: whether anything in the wave does; code for
-    /// waves in which nothing does is made without the question.
+    /// The surface parameters of this point, where they differ from the material. `MAPS`: whether
+    /// some material has maps. Frames without maps use separately compiled code in which the check
+    /// costs nothing.
     #[inline(always)]
     pub(super) fn parameters<'v, const MAPS: bool>(
         &self,
@@ -41,7 +42,7 @@ impl Point {
         }
     }
 
-    /// How it answers light.
+    /// The reflection model of this point.
     #[inline(always)]
     pub(super) fn model<'v, const MAPS: bool>(
         &self,

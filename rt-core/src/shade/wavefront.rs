@@ -1,4 +1,4 @@
-//! Rays that are traced together, and what each is worth.
+//! Rays that are traced together, and their contributions to pixels.
 
 use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use glam::Vec3;
@@ -16,23 +16,23 @@ pub(crate) enum RayKind {
     Diffuse,
 }
 
-/// A ray's part in its pixel.
+/// State of a ray: its contribution to its pixel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RayState {
-    /// What radiance met by this ray is multiplied by.
+    /// Factor on the radiance that this ray finds.
     pub(crate) throughput: Vec3,
     /// Absorption per world unit of the medium it travels in.
     pub(crate) absorption: Vec3,
-    /// Share of the pixel's alpha it decides; 0 for rays that left the line of sight.
+    /// Share of the pixel's alpha that it determines; 0 for rays that left the line of sight.
     pub(crate) coverage: f32,
     /// First sampler dimension of this ray: different for all rays of a pixel.
     pub(crate) stream: u32,
     /// Pixel within the tile.
     pub(crate) slot: u16,
-    /// Surfaces scattered at so far.
+    /// Number of scattering surfaces so far.
     pub(crate) bounce: u16,
     pub(crate) kind: RayKind,
-    /// A camera ray that has met nothing yet.
+    /// A camera ray that has hit nothing yet.
     pub(crate) first: bool,
 }
 
@@ -40,7 +40,8 @@ pub(crate) struct RayState {
 #[derive(Default)]
 pub(crate) struct Wavefront {
     pub(crate) blocks: Vec<RayBlock>,
-    /// One per ray, in lane order; blocks are filled without gaps except in the camera's wave.
+    /// One per ray, in lane order; blocks are filled without gaps except in the camera rays'
+    /// wavefront.
     pub(crate) states: Vec<RayState>,
 }
 
@@ -72,8 +73,7 @@ impl Wavefront {
     }
 }
 
-/// Rays towards light, each with the point and the radiance it brings there if nothing is in the
-/// way.
+/// Rays towards light, each with its point and the radiance that it contributes if unblocked.
 #[derive(Default)]
 pub(crate) struct LightRays {
     pub(crate) blocks: Vec<RayBlock>,
@@ -82,23 +82,23 @@ pub(crate) struct LightRays {
     pub(crate) blocked: Vec<u16>,
     /// For rays that pass through surfaces.
     pub(crate) hits: Vec<HitBlock>,
-    /// Who says what is in their way.
+    /// Where the occlusion of these rays comes from.
     pub(crate) source: OcclusionSource,
-    /// Point of the wave that the batch's points are counted from.
+    /// First point of the wavefront in this batch; the batch's points are counted from it.
     pub(crate) first_point: u32,
-    /// While recording: of each ray, its number among the light rays that its point could send.
+    /// While recording: the number of each ray among the light rays that its point could send.
     numbers: Vec<u32>,
 }
 
-/// Who says what is in the way of light rays.
+/// Where the occlusion of light rays comes from.
 #[derive(Default)]
 pub(crate) enum OcclusionSource {
     /// The scene's own world.
     #[default]
     World,
-    /// Nobody yet: the rays are written down, and no light arrives.
+    /// Not known yet: the rays are recorded, and no light arrives.
     Recording(Vec<RecordedRay>),
-    /// Somebody has said it for every recorded ray, in the order they were recorded.
+    /// Given by the caller for every recorded ray, in recording order.
     Given(std::vec::IntoIter<LightRayResult>),
 }
 
@@ -106,20 +106,20 @@ pub(crate) enum OcclusionSource {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RecordedRay {
     pub(crate) ray: Ray,
-    /// Point of the wave.
+    /// Point of the wavefront.
     pub(crate) point: u32,
     /// Its number among the light rays that a point could send.
     pub(crate) number: u32,
-    /// What it brings if nothing is in the way.
+    /// Radiance that it contributes if unblocked.
     pub(crate) radiance: Vec3,
 }
 
-/// What a light ray met.
+/// The result of a light ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LightRayResult {
-    /// Share of the light that is left.
+    /// Share of the light that is transmitted.
     pub(crate) transmittance: Vec3,
-    /// Whether anything was in the way.
+    /// Whether the ray hit anything.
     pub(crate) hit: bool,
     /// How often it was continued behind a surface.
     pub(crate) continued: u32,
@@ -148,12 +148,12 @@ impl LightRays {
         self.targets.push((point, radiance));
     }
 
-    /// Point and number of each ray, unless the world answers.
+    /// Point and number of each ray, unless the world is the source.
     pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         self.targets.iter().map(|(point, _)| *point).zip(self.numbers.iter().copied())
     }
 
-    /// Writes the batch down for somebody else to trace.
+    /// Records the batch so that the caller can trace it.
     pub(crate) fn record(&mut self) {
         let OcclusionSource::Recording(list) = &mut self.source else { return };
         for (i, (&(point, radiance), &number)) in self.targets.iter().zip(&self.numbers).enumerate()
