@@ -1,8 +1,8 @@
-//! The structure of one geometry, in coordinates chosen for precision.
+//! The acceleration structure of one geometry, in coordinates chosen for precision.
 //!
-//! Local space is object space moved to the geometry's centre when it lies far from zero, and
-//! scaled by a power of two when it is tiny or huge. Both are exact for the data: f32 positions
-//! near one another differ exactly, and a power of two changes only exponents. What is gained: rays
+//! Local space is object space translated to the geometry's centre when it lies far from zero, and
+//! scaled by a power of two when it is tiny or huge. Both are exact for the data: differences of
+//! nearby f32 positions are exact, and a power of two changes only exponents. The benefit: rays
 //! that start near the geometry have small coordinates, and products of three lengths in the
 //! triangle test neither overflow nor underflow.
 
@@ -22,14 +22,14 @@ use fearless_simd::Simd;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// What the leaves hold.
+/// Contents of the leaves.
 #[derive(Clone)]
 pub(crate) enum Content {
     Triangles(TriBvh),
     Shape { bvh: WideBvh, shape: Arc<dyn Shape> },
 }
 
-/// One geometry's structure.
+/// The structure of one geometry.
 #[derive(Clone)]
 pub(crate) struct Blas {
     pub(crate) frame: LocalFrame,
@@ -38,7 +38,7 @@ pub(crate) struct Blas {
     pub(crate) content: Content,
     pub(crate) primitives: usize,
     pub(crate) skipped: usize,
-    /// Expected work per ray relative to the tree as built: refits make it grow.
+    /// Expected work per ray relative to the tree as built; refits increase it.
     pub(crate) cost_growth: f64,
     /// For [`super::BuildReport::notes`].
     pub(crate) notes: Vec<String>,
@@ -60,7 +60,7 @@ pub(crate) fn leaf_primitive_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
 }
 
 impl Blas {
-    /// `given`: local space and bounds there of the geometry that this is a part of.
+    /// `given`: local space and local bounds of the geometry that this is a part of.
     pub(crate) fn for_mesh(
         mesh: &TriMesh,
         options: &BuildOptions,
@@ -132,7 +132,7 @@ impl Blas {
         }
     }
 
-    /// Bounds that decide how rays come into local space: those of the whole geometry.
+    /// Bounds that decide how rays are transformed to local space: those of the whole geometry.
     pub(crate) fn reach(&self) -> Aabb {
         self.whole.unwrap_or(self.bvh().bounds)
     }

@@ -1,4 +1,4 @@
-//! The slow reference: every triangle against the ray, in f64. Tests compare the real traversal
+//! The slow reference: tests every triangle against the ray, in f64. Tests compare the traversal
 //! with it.
 
 use crate::mesh::TriMesh;

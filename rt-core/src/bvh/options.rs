@@ -1,15 +1,15 @@
-//! How to build an acceleration structure, and what came of it.
+//! Options of a build, and the report on it.
 
 use super::build::{BuilderConfig, Method, SahConfig};
 use std::time::Duration;
 
-/// What the build spends to make rays faster (thesis section 4.1.2: approximate builds for changing
-/// geometry, full builds for exploring). The measured trade-off is bench's experiment
-/// `accuracy-build`.
+/// Build effort, which trades build time for ray time (thesis section 4.1.2: approximate builds for
+/// changing geometry, full builds for exploration). The experiment `accuracy-build` of bench
+/// measures the trade-off.
 ///
-/// For nested isosurfaces of 1 M and 4 M triangles, as guidance: CPU time of the build relative to
-/// `Balanced`, time of single primary rays likewise, bytes a triangle. Coherent packets differ by 0
-/// to 8 %.
+/// As guidance, for nested isosurfaces of 1 M and 4 M triangles: CPU time of the build and time of
+/// single primary rays, both relative to `Balanced`, and bytes per triangle. Coherent packets
+/// differ by 0 to 8 %.
 ///
 /// | | build | single rays | bytes |
 /// |---|---|---|---|
@@ -18,22 +18,22 @@ use std::time::Duration;
 /// | `Best` | 1.9–2.2 | 0.96–1.00 | 56 |
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum BuildQuality {
-    /// SAH with 8 bins along the longest axis: for geometry that changes every frame.
+    /// SAH with 8 bins along the longest axis, for geometry that changes every frame.
     Fast,
     /// SAH with up to 16 bins along all three axes.
     #[default]
     Balanced,
-    /// Balanced, then obvhs' reinsertion optimiser: for geometry that is explored for long, and
-    /// single rays.
+    /// Balanced, then the reinsertion optimiser of obvhs, for long exploration of one geometry and
+    /// for single rays.
     Best,
 }
 
 impl BuildQuality {
-    /// Every preset, from fast to good: tests and benchmarks loop over it.
+    /// All presets, from fast to best; tests and benchmarks iterate over them.
     pub const ALL: [BuildQuality; 3] =
         [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best];
 
-    /// What the builders do for this preset.
+    /// Builder settings of this preset.
     pub(crate) fn config(self) -> BuilderConfig {
         let quick = SahConfig { bins: 8, longest_axis_only: true };
         let thorough = SahConfig { bins: 16, longest_axis_only: false };
@@ -57,17 +57,17 @@ impl BuildQuality {
 impl std::str::FromStr for BuildQuality {
     type Err = UnknownQuality;
 
-    /// By [`BuildQuality::name`], in letters of either case.
+    /// Parses [`BuildQuality::name`], ignoring case.
     fn from_str(text: &str) -> Result<BuildQuality, UnknownQuality> {
         let found = BuildQuality::ALL.into_iter().find(|q| q.name().eq_ignore_ascii_case(text));
         found.ok_or_else(|| UnknownQuality { found: text.into() })
     }
 }
 
-/// A name that no preset has.
+/// A name of no preset.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct UnknownQuality {
-    /// The name given.
+    /// The given name.
     pub found: String,
 }
 
@@ -82,13 +82,13 @@ impl std::fmt::Display for UnknownQuality {
     }
 }
 
-/// What happens to rays through shared edges and vertices.
+/// How rays through shared edges and vertices are treated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Robustness {
-    /// Edge functions in f32 alone, zeros count as inside. Of 2.5·10⁷ rays aimed at vertices and
-    /// edges of closed meshes none slipped through, but nothing rules it out: a triangle whose edge
-    /// functions all round to zero is missed. The other way round, a triangle 10⁷ times smaller
-    /// than its distance from the ray may be hit falsely when a large one shares its leaf.
+    /// Edge functions in f32 only; zeros count as inside. Of 2.5·10⁷ rays aimed at vertices and
+    /// edges of closed meshes none leaked, but leaks are not excluded: a triangle whose edge
+    /// functions all round to zero is missed. Conversely, a triangle 10⁷ times smaller than its
+    /// distance from the ray may be hit falsely when a large one shares its leaf.
     Fast,
     /// No ray passes between two triangles that share an edge or a vertex (Woop, Benthin and Wald
     /// 2013, with conservative boxes after Ize 2013).
@@ -112,15 +112,15 @@ impl Robustness {
 /// Options of [`crate::bvh::World::build`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct BuildOptions {
-    /// Build time against ray time.
+    /// Trade-off between build time and ray time.
     pub quality: BuildQuality,
     /// Edge and vertex behaviour.
     pub robustness: Robustness,
-    /// Instruction set of the traversal kernels; `None` for the best this machine has.
+    /// Instruction set of the traversal kernels; `None` for the best that this machine has.
     pub simd: Option<crate::simd::SimdLevel>,
 }
 
-/// What a build did: phases, sizes, and what it had to leave out.
+/// Report on a build: phases, sizes, and primitives left out.
 #[derive(Debug, Clone, Default)]
 pub struct BuildReport {
     /// Time from input to traversable structure.
@@ -133,8 +133,8 @@ pub struct BuildReport {
     pub skipped: usize,
     /// Bytes of nodes and leaves.
     pub bytes: usize,
-    /// Most nodes on the way from a geometry's root to a leaf.
+    /// Largest number of nodes on a path from a geometry's root to a leaf.
     pub depth: usize,
-    /// What was done in another way than asked for, and why; empty as a rule.
+    /// Deviations from the request, with their reasons; usually empty.
     pub notes: Vec<String>,
 }

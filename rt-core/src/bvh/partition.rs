@@ -1,11 +1,11 @@
-//! Worlds that hold a part of a larger world's primitives and answer for them as the larger world
-//! would.
+//! Worlds that hold a part of a larger world's primitives and return the same hits for them as the
+//! larger world.
 //!
-//! What a ray's hit is, to the last bit, depends on more than the primitive: rays are moved to the
-//! geometry's local space, those from far away are first moved along themselves, and render space
-//! has an origin. All of that is chosen from bounds. A part therefore takes over the choices of the
-//! whole ([`GlobalLayout`]), and the nearest of the hits of all parts, ties to the lowest id, is
-//! the whole's hit.
+//! The bits of a hit depend on more than the primitive: rays are transformed to the geometry's
+//! local space, origins of rays from far away are first moved along the ray, and render space has
+//! an origin. All of these are chosen from bounds. A part therefore uses the choices of the whole
+//! world ([`GlobalLayout`]). Then the nearest of the hits of all parts, ties to the lowest id, is
+//! the hit of the whole world.
 
 use super::blas::Blas;
 use super::layout::local_frame::LocalFrame;
@@ -17,7 +17,7 @@ use crate::shapes::{Shape, ShapeHit, ShapeSurface};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// What a world has chosen from the bounds of everything in it; see [`World::build_part`].
+/// What a world has chosen from the bounds of all its geometry; see [`World::build_part`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct GlobalLayout {
     pub(super) origin: DVec3,
@@ -27,7 +27,7 @@ pub struct GlobalLayout {
 }
 
 impl World {
-    /// What parts of this world need to know about it.
+    /// The choices of this world that its parts need.
     pub fn global_layout(&self) -> GlobalLayout {
         GlobalLayout {
             origin: self.origin(),
@@ -36,17 +36,17 @@ impl World {
         }
     }
 
-    /// Bounds in render space of what this world holds itself: less than [`World::bounds`] for a
-    /// part.
+    /// Bounds in render space of the primitives that this world holds: smaller than
+    /// [`World::bounds`] for a part.
     pub fn own_bounds(&self) -> Aabb {
         self.tlas.bounds
     }
 
-    /// A world of some of another world's primitives. `geometries` and `instances` are in number
-    /// and order those of the whole (a geometry may have no primitive left), meshes have the origin
-    /// they have there, and primitives keep their order. Then for every ray [`World::closest`] of
-    /// the whole is the nearest of those of any parts that together have all primitives, ties to
-    /// the lowest instance and then the lowest primitive of the whole, in the same bits.
+    /// A world of some of another world's primitives. `geometries` and `instances` have the number
+    /// and order of the whole world (a geometry may have no primitive left), meshes keep their
+    /// origin, and primitives keep their order. Then for every ray [`World::closest`] of the whole
+    /// world equals, bit for bit, the nearest of the hits of any parts that together have all
+    /// primitives, ties to the lowest instance and then the lowest primitive of the whole world.
     ///
     /// ```
     /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::{DAffine3, Vec3}};
@@ -84,7 +84,7 @@ impl World {
 }
 
 /// The structure of geometry `index`, which was checked, in its own local space or in that of the
-/// whole.
+/// whole world.
 pub(super) fn blas_of(
     index: usize,
     geometry: &Geometry,
@@ -98,8 +98,7 @@ pub(super) fn blas_of(
     }
 }
 
-/// Some primitives of a shape, in the order of their numbers there. The shape's data stay where
-/// they are and are shared.
+/// Some primitives of a shape, in ascending order. The data are shared with the shape.
 #[derive(Clone)]
 pub struct ShapePart {
     shape: Arc<dyn Shape>,
@@ -107,8 +106,8 @@ pub struct ShapePart {
 }
 
 impl ShapePart {
-    /// The primitives of `shape` whose numbers are in `primitives`; numbers that it does not have
-    /// are left out.
+    /// The primitives of `shape` whose numbers are in `primitives`; numbers out of range are
+    /// ignored.
     pub fn new(shape: Arc<dyn Shape>, mut primitives: Vec<u32>) -> ShapePart {
         let count = shape.num_primitives();
         primitives.retain(|&p| (p as usize) < count);

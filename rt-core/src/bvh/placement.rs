@@ -1,4 +1,4 @@
-//! Where an instance stands: from render space to a geometry's local space and back.
+//! Transforms rays from render space to a geometry's local space, and hits back.
 
 use super::layout::local_frame::LocalFrame;
 use super::world::ORDINARY_LENGTHS;
@@ -8,11 +8,12 @@ use crate::ray::{Ray, RayBlock};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-/// Beyond this many radii from the geometry a ray's origin is first moved along the ray in f64:
-/// there, f32 coordinates relative to the geometry would be coarser than 4·10⁻⁶ of its size.
+/// The origin of a ray more than this many radii from the geometry is first moved along the ray in
+/// f64: at that distance, f32 coordinates relative to the geometry would be coarser than 4·10⁻⁶ of
+/// its size.
 const FAR_RADII: f64 = 64.0;
 
-/// The way into one instance's local space.
+/// The transform into one instance's local space.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placement {
     /// Index of the geometry.
@@ -23,8 +24,8 @@ pub(crate) struct Placement {
     /// Sphere around the local bounds.
     center: DVec3,
     radius: f64,
-    /// The centre, and the distance up to which an origin is near, in f32 with a margin that covers
-    /// its rounding.
+    /// The centre, and the distance within which an origin is near, in f32 with a margin that
+    /// covers its rounding.
     center_f32: Vec3,
     near_f32: f32,
     /// Bounds in render space.
@@ -33,8 +34,8 @@ pub(crate) struct Placement {
 
 impl Placement {
     /// `world_origin` is the world position of render space's origin. `reach` are the local bounds
-    /// of the whole geometry, `local_bounds` those of what is here of it. `None` when the transform
-    /// cannot be inverted.
+    /// of the whole geometry, `local_bounds` those of the primitives held here. `None` when the
+    /// transform cannot be inverted.
     pub(crate) fn new(
         geometry: usize,
         world_from_object: &DAffine3,
@@ -68,8 +69,8 @@ impl Placement {
                 let object = p.as_dvec3() / frame.scale + frame.center;
                 world_from_object.transform_point3(object) - world_origin
             };
-            // Rays are rounded to f32 in local space, from up to 64 radii away in each axis, and so
-            // is their direction: off by at most 2⁻¹⁵ radii.
+            // Rays and their directions are rounded to f32 in local space, from up to 64 radii away
+            // in each axis: the error is at most 2⁻¹⁵ radii.
             let rows = world_from_object.matrix3.transpose();
             let stretch =
                 DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
@@ -151,8 +152,8 @@ impl Placement {
         let (t_min, t_max) = if moved == 0.0 {
             (ray.t_min, ray.t_max)
         } else {
-            // A moved ray starts before the geometry, so that nothing of it is lost when t_min lies
-            // behind.
+            // A moved ray starts before the geometry, so that no part of it is lost when t_min is
+            // negative after the move.
             (moved_limit(ray.t_min, moved).max(0.0), moved_limit(ray.t_max, moved))
         };
         let local = Ray { origin: (o + d * moved).as_vec3(), dir: d.as_vec3(), t_min, t_max };
@@ -160,13 +161,13 @@ impl Placement {
     }
 }
 
-/// A limit on a moved ray: x below it are those with `(x as f64 + moved) as f32 < t`, so that the
-/// range is half-open in the numbers that callers see.
+/// A limit on a moved ray: the x below it are those with `(x as f64 + moved) as f32 < t`, so that
+/// the range is half-open in the numbers that callers see.
 fn moved_limit(t: f32, moved: f64) -> f32 {
     if t == f32::INFINITY {
         return t;
     }
-    // Sums below the middle between t and its predecessor round to less than t; 2⁻⁵¹ for the
+    // Sums below the midpoint between t and its predecessor round to less than t; 2⁻⁵¹ covers the
     // rounding of the sum in f64.
     let middle = 0.5 * (t as f64 + t.next_down() as f64);
     let x = middle - moved - middle.abs() * 2.0 * f64::EPSILON;
@@ -174,8 +175,8 @@ fn moved_limit(t: f32, moved: f64) -> f32 {
     if (f as f64) < x { f.next_up() } else { f }
 }
 
-/// The parameter just before the line meets the sphere, or of its closest approach when it does
-/// not; at least 0.
+/// The parameter just before the line enters the sphere, or of its closest approach when it misses;
+/// at least 0.
 pub(crate) fn distance_to_sphere(o: DVec3, d: DVec3, center: DVec3, radius: f64) -> f64 {
     let dd = d.length_squared();
     if dd == 0.0 {

@@ -1,9 +1,9 @@
-//! Moving the vertices of a mesh without building its tree anew.
+//! Moves the vertices of a mesh without rebuilding its tree.
 //!
-//! Leaves get the new vertices and boxes are recomputed from the bottom up; which triangles share a
-//! leaf stays. A time step of a deforming mesh then costs a seventh of a build (42 ms of CPU
-//! against 290 for 1 M triangles), and rays become slower the further the vertices move from where
-//! the tree was built: the report says how much to expect.
+//! Leaves get the new vertices and boxes are recomputed from the bottom up; triangles stay in their
+//! leaves. A time step of a deforming mesh then costs a seventh of a build (42 ms of CPU against
+//! 290 for 1 M triangles). Rays become slower the further the vertices move from where the tree was
+//! built: the report estimates by how much.
 
 use super::blas::{Blas, Content};
 use super::layout::local_frame::LocalFrame;
@@ -18,80 +18,80 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What [`World::refit`] did.
+/// Report of [`World::refit`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RefitReport {
     /// Time from the new vertices to a traversable structure.
     pub elapsed: Duration,
     /// Triangles that cannot be hit because a vertex is NaN or infinite now. They return when their
-    /// vertices become finite again.
+    /// vertices become finite.
     pub unusable: usize,
     /// Triangles that could be hit, but were left out when the tree was built. Only a new build
-    /// brings them in.
+    /// includes them.
     pub absent: usize,
-    /// Expected box and leaf tests of a ray that meets the mesh (the surface area heuristic's
-    /// cost), relative to when the tree was built. Predicts single rays well: 1 M triangles twisted
-    /// until this was 1.14, 1.32, 1.57, 1.89 took 1.15, 1.33, 1.47, 1.69 times as long as in a new
-    /// tree, coherent packets 1.04, 1.16, 1.26, 1.37 times.
+    /// Expected box and leaf tests of a ray that hits the mesh (the cost of the surface area
+    /// heuristic), relative to when the tree was built. It predicts single rays well: 1 M triangles
+    /// twisted until this was 1.14, 1.32, 1.57, 1.89 took 1.15, 1.33, 1.47, 1.69 times as long as
+    /// in a new tree, coherent packets 1.04, 1.16, 1.26, 1.37 times.
     pub cost_growth: f64,
 }
 
-/// Why [`World::refit`] refused. The world is as it was before.
+/// Why [`World::refit`] failed. The world is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RefitError {
-    /// There is no such geometry.
+    /// The geometry index is out of range.
     #[error("there is no geometry {geometry}: the world has {count}")]
     NoSuchGeometry {
-        /// The index given.
+        /// The index.
         geometry: usize,
-        /// How many there are.
+        /// Number of geometries.
         count: usize,
     },
     /// Only meshes can be refitted.
     #[error("geometry {geometry} is not a triangle mesh; build a new world instead")]
     NotAMesh {
-        /// The index given.
+        /// The index.
         geometry: usize,
     },
-    /// The world is a part of another one, whose bounds would have to be chosen anew as well.
+    /// The world is a part of another one, whose bounds would also have to be chosen again.
     #[error(
         "geometry {geometry} is a part of a larger one; move the vertices of the whole, and build \
          its parts again"
     )]
     OfAPart {
-        /// The index given.
+        /// The index.
         geometry: usize,
     },
     /// The new mesh is unusable.
     #[error("geometry {geometry}: {source}")]
     Mesh {
-        /// The index given.
+        /// The index.
         geometry: usize,
         /// What is wrong with it.
         source: MeshError,
     },
-    /// The new mesh has other triangles.
+    /// The number of vertices or triangles differs.
     #[error(
         "geometry {geometry}: the new mesh has {found} {what}, the tree was built for {expected}; \
          refit only moves vertices, build a new world"
     )]
     Topology {
-        /// The index given.
+        /// The index.
         geometry: usize,
         /// "vertices" or "triangles".
         what: &'static str,
-        /// How many the tree was built for.
+        /// The number in the tree.
         expected: usize,
-        /// How many there are.
+        /// The number in the new mesh.
         found: usize,
     },
-    /// The new mesh joins its vertices differently.
+    /// The new mesh has different vertex indices.
     #[error(
         "geometry {geometry}: triangle {triangle} has other vertex indices than when the tree was \
          built; refit only moves vertices, build a new world"
     )]
     Indices {
-        /// The index given.
+        /// The index.
         geometry: usize,
         /// The first triangle that differs.
         triangle: usize,
@@ -99,9 +99,9 @@ pub enum RefitError {
 }
 
 impl World {
-    /// Replaces the vertices (and attributes) of a mesh that has the same triangles as before. All
-    /// instances of it follow. Hits are those of a new build; the origin of render space is chosen
-    /// anew as there, so convert points again afterwards.
+    /// Replaces the vertices (and attributes) of a mesh; the triangles stay. All of its instances
+    /// change. Hits equal those of a new build. As in a build, the origin of render space is chosen
+    /// again, so convert points again afterwards.
     ///
     /// ```
     /// # use rt_core::{bvh::*, mesh::TriMesh, ray::Ray, glam::Vec3};
@@ -144,7 +144,7 @@ impl World {
             return Err(RefitError::Indices { geometry, triangle: differs.unwrap_or(0) });
         }
 
-        // A tree that another world uses too is copied first.
+        // Copies a tree that another world also uses.
         let blas = Arc::make_mut(&mut self.blas[geometry]);
         let absent = refit_blas(blas, &mesh);
         let (unusable, cost_growth) = (blas.skipped - absent, blas.cost_growth);
@@ -164,7 +164,8 @@ fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
     tris.bvh.bounds = root.bounds;
     let after = root.bounds.half_area() as f64;
 
-    // Both sums per area of the whole: the ratio of expected tests per ray.
+    // Both sums are relative to the area of the whole: their quotient is the ratio of expected
+    // tests per ray.
     let growth = (root.new_area / after) / (root.old_area / before);
     blas.cost_growth *= if growth.is_finite() && growth > 0.0 { growth } else { 1.0 };
     let usable = (0..mesh.indices.len())
@@ -178,7 +179,7 @@ fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
     absent
 }
 
-/// What became of a subtree.
+/// Result of refitting a subtree.
 #[derive(Clone, Copy)]
 struct RefitTotals {
     bounds: Aabb,
@@ -194,19 +195,19 @@ impl RefitTotals {
         RefitTotals { bounds: Aabb::EMPTY, old_area: 0.0, new_area: 0.0, usable: 0 };
 }
 
-/// Subtrees of at least this many units are tasks of their own.
+/// Subtrees of at least this many units are separate tasks.
 const PARALLEL_UNITS: usize = 1 << 14;
 
-/// Refits the subtree that `units` is, whose first unit has the number `base` in the arena. A
-/// subtree is one piece of the arena: its node, then its children's pieces one after the other.
+/// Refits the subtree in `units`, whose first unit has the index `base` in the arena. A subtree is
+/// contiguous in the arena: its node, followed by the children's subtrees in order.
 fn refit_node(units: &mut [Unit], base: usize, writer: &TriWriter<'_>) -> RefitTotals {
     let children = *units[CHILD_ROW].bits();
     let (node, mut rest) = units.split_at_mut(NODE_UNITS);
 
-    // ---- The children's pieces, in the arena's order.
+    // ---- The children's subtrees, in arena order.
     let mut slots: [usize; WIDTH] = std::array::from_fn(|i| i);
     let used = children.iter().filter(|&&c| ChildRef(c) != ChildRef::NONE).count();
-    // Unused slots have the largest number.
+    // Unused slots sort last.
     slots.sort_unstable_by_key(|&s| {
         if ChildRef(children[s]) == ChildRef::NONE {
             usize::MAX

@@ -1,5 +1,5 @@
-//! Many rays in one call: packets for rays that go the same way, shared beginnings for rays that do
-//! not.
+//! Traces many rays in one call: in packets for coherent rays, and with a shared start of the
+//! traversal for incoherent ones.
 
 use super::blas::{Blas, Content, leaf_primitive_ids};
 use super::layout::wide::ChildRef;
@@ -15,12 +15,12 @@ use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
 
-/// With more instances than this in a packet's way its rays go one by one: most of them meet only a
-/// few each. Measured on glyphs, 512² primary rays, packets against one by one: 41 and 47 ms with
-/// 216 instances, 88 and 60 with 1,000, 4104 and 112 with 125,000.
+/// When a packet may hit more instances than this, its rays are traced one by one: most of them hit
+/// only a few each. Measured on glyphs, 512² primary rays, packets against one by one: 41 and 47 ms
+/// with 216 instances, 88 and 60 with 1,000, 4104 and 112 with 125,000.
 const MOST_CANDIDATES: usize = 16;
 
-/// Per-thread buffers: a packet is 24 KiB, too much to clear for every call.
+/// Per-thread buffers: a packet is 24 KiB, too large to clear for every call.
 struct TraversalScratch {
     /// Packets against instances' boxes and against triangles.
     outer: Box<Packet>,
@@ -53,7 +53,7 @@ thread_local! {
 pub struct StreamError {
     /// Blocks of rays.
     pub rays: usize,
-    /// Blocks, or masks, for their answers.
+    /// Blocks, or masks, of the answers.
     pub answers: usize,
 }
 
@@ -61,19 +61,19 @@ fn same_length(rays: usize, answers: usize) -> Result<(), StreamError> {
     if rays == answers { Ok(()) } else { Err(StreamError { rays, answers }) }
 }
 
-/// How alike neighbouring rays are.
+/// Coherence of neighbouring rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Coherence {
-    /// They go the same way: to one light, through neighbouring pixels.
+    /// Similar directions: to one light, or through neighbouring pixels.
     Coherent,
-    /// They go in any direction.
+    /// Any directions.
     Incoherent,
 }
 
 impl World {
     /// The closest hits of many rays, in order. Neighbouring rays should be similar (a tile of
-    /// pixels, rays to one light): they are traced as packets of up to 256, cut where rays differ
-    /// too much. Lanes with `t_max <= t_min` are left alone as misses.
+    /// pixels, rays to one light): they are traced as packets of up to 256, split where rays differ
+    /// too much. Lanes with `t_max <= t_min` are misses.
     ///
     /// The answers are those of [`World::closest`], bit for bit.
     ///
@@ -100,8 +100,8 @@ impl World {
     }
 
     /// As [`World::closest_coherent`] for rays in any direction (ambient occlusion, glossy and path
-    /// tracing). Rays of one block should start close to one another: they share the way through
-    /// the tree as long as it is the same.
+    /// tracing). Rays of one block should start close to one another: they share the traversal
+    /// while their paths through the tree agree.
     ///
     /// # Errors
     /// When the slices differ in length; then no ray is traced.
@@ -129,7 +129,7 @@ impl World {
         Ok(())
     }
 
-    /// Whether an instance of `filter` is in the way of each ray. Slices of one length.
+    /// Whether an instance of `filter` blocks each ray. All slices have the same length.
     pub(crate) fn occluded_stream(
         &self,
         rays: &[RayBlock],
@@ -153,7 +153,7 @@ impl World {
         })
     }
 
-    /// Whether there is only one instance, and `filter` lacks it.
+    /// Whether there is only one instance, and `filter` excludes it.
     fn excludes_all(&self, filter: InstanceFilter<'_>) -> bool {
         self.placements.len() == 1 && !filter.has(0)
     }
@@ -187,8 +187,8 @@ impl World {
         });
     }
 
-    /// The only geometry, when it is a mesh that stands where the rays are: packets then go
-    /// straight to it.
+    /// The only geometry, when it is a mesh whose local space is render space: packets then skip
+    /// the upper level.
     fn single_mesh(&self) -> Option<(&TriBvh, PacketLimits)> {
         let [only] = self.placements.as_slice() else { return None };
         match &self.blas[only.geometry].content {
@@ -197,7 +197,7 @@ impl World {
         }
     }
 
-    /// The closest hit of each ray with an instance of `filter`. Slices of one length.
+    /// The closest hit of each ray with an instance of `filter`. All slices have the same length.
     pub(crate) fn closest_stream(
         &self,
         rays: &[RayBlock],
@@ -306,7 +306,7 @@ impl World {
                 return;
             }
         }
-        // ---- Several instances: those whose boxes the packet meets, nearest first.
+        // ---- Several instances: those whose boxes the packet intersects, nearest first.
         scratch.candidates.clear();
         if self.placements.len() > 1 && scratch.outer.load(simd, rays, &PacketLimits::NONE) {
             scratch.outer.collect(simd, &self.tlas, &mut scratch.candidates);
@@ -409,7 +409,7 @@ impl World {
     }
 }
 
-/// Whether nothing at `distance` or beyond can change an answer.
+/// Whether nothing at `distance` or farther can change an answer.
 fn all_resolved<const ANY: bool>(rays: &[RayBlock], hits: &[HitBlock], distance: f32) -> bool {
     rays.iter().zip(hits).all(|(r, h)| {
         (0..LANES).all(|lane| {
@@ -420,8 +420,8 @@ fn all_resolved<const ANY: bool>(rays: &[RayBlock], hits: &[HitBlock], distance:
     })
 }
 
-/// Whether an active ray's direction is so short or long that single rays rescale it; NaN is not,
-/// it is left to the packet.
+/// Whether an active ray's direction is so short or long that the single-ray code rescales it. A
+/// NaN direction is left to the packet.
 #[inline(never)]
 fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
     simd.vectorize(
@@ -455,7 +455,7 @@ fn to_local_space(
             let mut ray = r.get(lane);
             let found = h.prim[lane] != NO_HIT;
             if found {
-                // One step beyond the best: a tie may go to this instance. Blocked shadow rays are
+                // One ulp past the best: a tie may go to this instance. Blocked shadow rays are
                 // finished.
                 ray.t_max = if any { -1.0 } else { h.t[lane].next_up().min(ray.t_max) };
             }
@@ -485,7 +485,7 @@ fn trace_blas<S: Simd, const EXACT: bool, const ANY: bool>(
         trace_blas_single_rays::<S, EXACT, ANY>(simd, blas, rays, hits, instance);
         return;
     };
-    // Packets of 16 blocks, then of 4; blocks whose rays part share the beginning of their way.
+    // Packets of 16 blocks, then of 4; blocks whose rays diverge share the start of the traversal.
     for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         if packet.load(simd, r, &PacketLimits::NONE) {
             packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);

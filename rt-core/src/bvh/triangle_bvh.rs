@@ -24,7 +24,7 @@ impl TriBvh {
     pub(crate) fn build(mesh: &TriMesh, frame: &LocalFrame, quality: BuildQuality) -> TriBvh {
         debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
         let writer = TriWriter::new(mesh, frame);
-        // Nearly always every triangle can be built: collect in place and throw out the few others
+        // Nearly always every triangle is usable: collect in place and remove the few others
         // afterwards.
         let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
             .into_par_iter()
@@ -37,8 +37,8 @@ impl TriBvh {
         TriBvh { bvh: build_wide(refs, &writer, quality.config(), &mut notes), skipped, notes }
     }
 
-    /// The closest hit of a local-space ray. Set-up and traversal in one body: called once per ray,
-    /// the call chain around a traversal used to take two fifths of the time.
+    /// The closest hit of a local-space ray. Set-up and traversal are one function body: called
+    /// once per ray, the call chain around a traversal used to take two fifths of the time.
     #[inline(never)]
     pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> ClosestTri {
         simd.vectorize(

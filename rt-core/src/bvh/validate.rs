@@ -1,5 +1,4 @@
-//! Checks of finished trees, for tests and for hunting faults: slow, and not needed by correct
-//! programs.
+//! Checks finished trees, for tests and debugging: slow, and not needed by correct programs.
 
 use super::blas::{Blas, Content, leaf_primitive_ids};
 use super::layout::triangles::{TriWriter, leaf_floats, leaf_triangle_ids};
@@ -9,12 +8,12 @@ use super::layout::wide::{
 use super::world::{Geometry, World};
 use crate::math::Aabb;
 
-/// What [`World::validate`] counted over all geometries' trees.
+/// Counts of [`World::validate`] over all geometries' trees.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TreeStats {
     /// 8-wide nodes.
     pub nodes: usize,
-    /// Children of these.
+    /// Children of these nodes.
     pub children: usize,
     /// Leaves.
     pub leaves: usize,
@@ -24,7 +23,7 @@ pub struct TreeStats {
     pub depth: usize,
 }
 
-/// A broken tree: a defect of this crate, please report it.
+/// An invalid tree: a defect of this crate, please report it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{tree}: {fault}")]
 pub struct InvalidTree {
@@ -82,8 +81,7 @@ fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> 
                         Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
                     })?;
             let lost = (0..seen.len()).find(|&i| !seen[i] && mesh.is_renderable(i));
-            // A refit can make a triangle usable that the build had to leave out; it counts as
-            // skipped.
+            // A refit can make a triangle usable that the build left out; it counts as skipped.
             if let Some(i) = lost
                 && blas.skipped == 0
             {

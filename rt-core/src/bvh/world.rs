@@ -1,4 +1,4 @@
-//! The two-level structure that rays are traced against: instances of geometries.
+//! The two-level acceleration structure for tracing rays: instances of geometries.
 
 use super::blas::{Blas, IdWriter, leaf_primitive_ids};
 use super::build::{MAX_PRIMS, PrimRef, build_wide};
@@ -19,18 +19,18 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Something rays can hit, shared between instances.
+/// Geometry that rays can hit, shared between instances.
 #[derive(Clone)]
 pub enum Geometry {
     /// Triangles.
     Mesh(Arc<TriMesh>),
-    /// Spheres, tubes, isosurfaces, user geometry.
+    /// Spheres, tubes, isosurfaces, user-defined geometry.
     Shape(Arc<dyn Shape>),
 }
 
 impl Geometry {
-    /// Where the shared data lie: the same for two clones of one geometry and for two looks of one
-    /// shape, and never for two others that are both alive.
+    /// Address of the shared data. It is the same for two clones of one geometry and for two
+    /// appearances of one shape, and different for any two others that are both alive.
     fn address(&self) -> usize {
         let of_shape = |s: &Arc<dyn Shape>| Arc::as_ptr(s) as *const () as usize;
         match self {
@@ -39,7 +39,7 @@ impl Geometry {
         }
     }
 
-    /// Triangles of a mesh, primitives of a shape.
+    /// Number of triangles of a mesh, or of primitives of a shape.
     pub fn num_primitives(&self) -> usize {
         match self {
             Geometry::Mesh(m) => m.indices.len(),
@@ -84,28 +84,28 @@ pub enum BuildError {
         /// What is wrong with it.
         source: MeshError,
     },
-    /// An instance names a geometry that does not exist.
+    /// The index of an instance's geometry is out of range.
     #[error("instance {instance} uses geometry {geometry}, but there are only {count}")]
     NoSuchGeometry {
         /// Index of the instance.
         instance: usize,
-        /// The geometry it names.
+        /// Index of the geometry.
         geometry: usize,
-        /// How many there are.
+        /// Number of geometries.
         count: usize,
     },
-    /// A part does not match its whole.
+    /// A part does not match the whole scene.
     #[error(
         "a part has {found} geometries, the whole {expected}: give the part one for each, with no \
          primitives where it has none"
     )]
     NotAPart {
-        /// Geometries of the whole.
+        /// Geometries of the whole scene.
         expected: usize,
         /// Geometries given.
         found: usize,
     },
-    /// The machine lacks the instruction set asked for.
+    /// The machine lacks the requested instruction set.
     #[error(transparent)]
     Level(#[from] UnavailableLevel),
     /// An instance's transform cannot be inverted.
@@ -116,19 +116,19 @@ pub enum BuildError {
     SingularTransform {
         /// Index of the instance.
         instance: usize,
-        /// The determinant found.
+        /// The determinant.
         determinant: f64,
     },
 }
 
-/// Which instances rays can meet.
+/// Which instances rays can hit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum InstanceFilter<'a> {
-    /// Every one.
+    /// All instances.
     All,
-    /// Those with a mark. Marks that are missing are not set.
+    /// Marked instances. A missing mark counts as not set.
     Marked(&'a [bool]),
-    /// Those without.
+    /// Unmarked instances.
     Unmarked(&'a [bool]),
 }
 
@@ -143,7 +143,7 @@ impl InstanceFilter<'_> {
     }
 }
 
-/// Instances of geometries, ready for rays.
+/// Instances of geometries with their acceleration structures.
 pub struct World {
     pub(super) geometries: Vec<Geometry>,
     instances: Vec<Instance>,
@@ -169,11 +169,11 @@ impl World {
         World::build_sharing(geometries, instances, options, None)
     }
 
-    /// As [`World::build`], but a geometry that `previous` has as well (the same [`Arc`], whatever
-    /// its index) keeps its acceleration structure: when one of five hundred meshes changes, or
-    /// only transforms do, the others cost nothing. The options must be those of `previous`, or
-    /// everything is built anew. The hits are those of a world built from nothing (after a
-    /// [`World::refit`] of `previous`: those of the refitted one).
+    /// As [`World::build`], but reuses the acceleration structure of every geometry that `previous`
+    /// also has (the same [`Arc`], at any index). When one of five hundred meshes changes, or only
+    /// transforms do, the others cost nothing. If the options differ from those of `previous`,
+    /// everything is rebuilt. The hits equal those of a world built from scratch (after a
+    /// [`World::refit`] of `previous`: those of the refitted world).
     pub fn build_sharing(
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
@@ -183,8 +183,8 @@ impl World {
         World::build_in_layout(geometries, instances, options, None, previous)
     }
 
-    /// Builds a world, or a part of one, with the structures of `previous` where it has the same
-    /// geometries.
+    /// Builds a world, or a part of one. Reuses the structures of `previous` for geometries that
+    /// both have.
     pub(super) fn build_in_layout(
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
@@ -253,7 +253,7 @@ impl World {
         })
     }
 
-    /// A world of one mesh at its place.
+    /// A world of one mesh, without a transform.
     pub fn from_mesh(
         mesh: impl Into<Arc<TriMesh>>,
         options: &BuildOptions,
@@ -266,7 +266,7 @@ impl World {
         self.geometries.iter().map(Geometry::address).zip(&self.blas).collect()
     }
 
-    /// Makes the upper level anew after a geometry has changed.
+    /// Rebuilds the upper level after a geometry has changed.
     pub(super) fn rebuild_top_level(&mut self) {
         let placed = build_top_level(&self.instances, &self.blas, None, &mut self.report.notes);
         let TopLevel { origin, placements, tlas } =
@@ -297,12 +297,12 @@ impl World {
         &self.instances
     }
 
-    /// What the build did.
+    /// Report on the build.
     pub fn report(&self) -> &BuildReport {
         &self.report
     }
 
-    /// Edge behaviour of this world.
+    /// Robustness mode of this world.
     pub fn robustness(&self) -> Robustness {
         self.robustness
     }
@@ -312,10 +312,10 @@ impl World {
         (p - self.origin).as_vec3()
     }
 
-    /// A render-space ray from f64 world coordinates. When the origin is far outside the bounds it
-    /// is first moved along the ray, in f64, to where the ray can first meet them, so that a camera
-    /// 10⁹ away loses nothing. Returns the ray and how far its origin was moved (add it to a hit's
-    /// `t`). `dir` need not be of unit length.
+    /// A render-space ray from f64 world coordinates. An origin far outside the bounds is first
+    /// moved along the ray, in f64, to the first point where the ray can reach them, so that a
+    /// camera 10⁹ away loses no accuracy. Returns the ray and how far its origin was moved (add it
+    /// to a hit's `t`). `dir` need not be of unit length.
     pub fn ray_from_world(&self, origin: DVec3, dir: DVec3) -> (Ray, f64) {
         let o = origin - self.origin;
         let moved = if self.bounds.is_empty() {
@@ -374,7 +374,7 @@ impl World {
         }
     }
 
-    /// The closest hit with an instance of `filter`; where there is only one instance, it is.
+    /// The closest hit with an instance of `filter`. With only one instance, the filter is ignored.
     pub(crate) fn closest_in<S: Simd, const EXACT: bool>(
         &self,
         simd: S,
@@ -402,7 +402,8 @@ impl World {
         leaves.best
     }
 
-    /// Whether an instance of `filter` is in the way; where there is only one instance, it is.
+    /// Whether an instance of `filter` blocks the ray. With only one instance, the filter is
+    /// ignored.
     pub(crate) fn occluded_in<S: Simd, const EXACT: bool>(
         &self,
         simd: S,
@@ -438,11 +439,11 @@ impl World {
     }
 }
 
-/// Largest components of directions that are traced as they are.
+/// Largest components of directions that are traced without scaling.
 pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
 
-/// Rays whose direction is neither tiny nor huge pass unchanged; others are scaled by a power of
-/// two. The second value turns the scaled ray's `t` back.
+/// Returns rays whose direction is neither tiny nor huge unchanged; scales others by a power of
+/// two. The second value converts the scaled ray's `t` back.
 pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     let m = max_abs(ray.dir);
     if ORDINARY_LENGTHS.contains(&m) {
@@ -455,7 +456,7 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
         let x = t / k;
         if x * k < t { x.next_up() } else { x }
     };
-    // Hits whose t is beyond f32 are none.
+    // Hits whose t overflows f32 are ignored.
     (
         Ray {
             dir: ray.dir * k,
@@ -467,19 +468,20 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     )
 }
 
-/// Geometries of more primitives are built one after the other, each by all threads. Their cuts are
-/// tasks enough, and the builder's boxes (64 bytes a primitive) are in memory for one at a time.
+/// Geometries with more primitives are built one after the other, each by all threads. Their cuts
+/// give enough tasks, and the builder's boxes (64 bytes a primitive) are in memory for one geometry
+/// at a time.
 const LARGE_GEOMETRY: usize = 1 << 17;
 
-/// `build(i)` for every geometry, in order. What is built does not depend on who builds it when.
+/// `build(i)` for every geometry, in order. The results do not depend on the scheduling.
 fn build_in_parallel<T: Send>(
     geometries: &[Geometry],
     build: impl Fn(usize) -> T + Sync,
 ) -> Vec<T> {
     let (large, small): (Vec<usize>, Vec<usize>) =
         (0..geometries.len()).partition(|&i| geometries[i].num_primitives() > LARGE_GEOMETRY);
-    // The small ones fill the gaps that the first, serial cut of a large one leaves. Each is a task
-    // of its own, so that threads share them whatever their sizes.
+    // Small geometries fill the gaps that the first, serial cut of a large one leaves. Each is a
+    // separate task, so that threads share them evenly.
     let (of_large, of_small): (Vec<T>, Vec<T>) = rayon::join(
         || large.iter().map(|&i| build(i)).collect(),
         || small.par_iter().with_max_len(1).map(|&i| build(i)).collect(),
@@ -497,7 +499,7 @@ struct TopLevel {
     tlas: WideBvh,
 }
 
-/// Chooses render space (world space, moved when everything is far from zero) and places the
+/// Chooses render space (world space, translated when everything is far from zero) and places the
 /// instances in it.
 fn build_top_level(
     instances: &[Instance],
@@ -516,7 +518,7 @@ fn build_top_level(
             },
         )
     };
-    // Of several errors the first is told, whoever finds one first.
+    // Of several errors, the first in order is returned, whichever thread finds its error first.
     let placed: Vec<_> =
         instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
     let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -532,9 +534,9 @@ fn build_top_level(
     Ok(TopLevel { origin, placements, tlas })
 }
 
-/// Zero, or the middle of the world's bounds when they lie more than four sizes away from it. A
-/// single geometry without rotation gets its own centre, so that its local space and render space
-/// coincide.
+/// Zero, or the centre of the world's bounds when they are more than four times their size away
+/// from zero. A single geometry without rotation gets its own centre, so that its local space and
+/// render space coincide.
 fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     if let [only] = instances
         && only.world_from_object.matrix3 == DMat3::IDENTITY
@@ -557,7 +559,7 @@ fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
         };
         bounds.corners().map(of_corner).into_iter().fold(nothing(), join)
     };
-    // Pieces of a fixed size, joined in order: the sign of a zero does not depend on the threads.
+    // Chunks of a fixed size, merged in order: the sign of a zero does not depend on the threads.
     let pieces: Vec<_> = instances
         .par_chunks(1024)
         .map(|piece| piece.iter().map(of_instance).fold(nothing(), join))
@@ -578,7 +580,7 @@ struct InstanceClosest<'w, const EXACT: bool> {
 impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
     fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, skip_t: &mut f32) {
         let p = &self.world.placements[instance as usize];
-        // One step beyond the best so far: a tie may go to this instance.
+        // One ulp past the best so far: a tie may go to this instance.
         let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
         let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
         if local.t_max <= local.t_min {
