@@ -1,4 +1,4 @@
-//! How surfaces look.
+//! How surfaces look: colour, reflection model, opacity and sides.
 
 use crate::colormap::ColorMap;
 use crate::environment::texels;
@@ -9,16 +9,16 @@ use std::sync::Arc;
 /// Where a surface's colour comes from.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum ColorSource {
-    /// The geometry's own colours where it has any (per vertex, per triangle, per primitive), else
+    /// The geometry's own colours if it has any (per vertex, per triangle, per primitive), else
     /// [`Material::color`].
     #[default]
     Attribute,
     /// [`Material::color`] even on geometry with colours.
     Constant,
-    /// The geometry's scalars, interpolated first and mapped then (thesis section 3.2.5), so that
-    /// the map stays sharp inside large triangles.
+    /// The geometry's scalars, interpolated first and colour-mapped afterwards (thesis section
+    /// 3.2.5), so that the map stays sharp inside large triangles.
     Scalars(Arc<ColorMap>),
-    /// A texture by the mesh's texture coordinates, times [`Material::color`].
+    /// A texture at the mesh's texture coordinates, times [`Material::color`].
     Texture(Arc<Texture>),
 }
 
@@ -30,26 +30,27 @@ pub enum PhongForm {
     HalfVector,
     /// (R·V)^s with the mirrored light direction R: VTK (Phong 1975).
     Mirrored,
-    /// (N·L)^s, whatever the viewing direction: VTK's shader where a headlight is the only light.
+    /// (N·L)^s, for any viewing direction: VTK's shader where a headlight is the only light.
     TowardsLight,
 }
 
 /// Formula of [`SurfaceModel::Pbr`] for lights.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum PbrForm {
-    /// glTF 2.0, appendix B: the matte layer gets what the coat lets through at the viewing angle.
+    /// glTF 2.0, appendix B: the matte layer receives the light that the coat transmits at the
+    /// viewing angle.
     #[default]
     Gltf,
-    /// VTK 9's shader: the matte layer gets 1 - F at the half vector, F with the metal's colour in
-    /// it; shadowing and masking take α = roughness where the distribution takes α = roughness²;
+    /// VTK 9's shader: the matte layer gets 1 - F at the half vector, and F includes the metal's
+    /// colour; shadowing and masking use α = roughness, but the distribution uses α = roughness²;
     /// reflectance at grazing angles is min(1, 49.5·F₀).
     Vtk,
 }
 
-/// How a surface answers light.
+/// The reflection model of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SurfaceModel {
-    /// The colour as it is, without lights: pre-lit vertex colours, annotations.
+    /// The colour without lighting: pre-lit vertex colours, annotations.
     Unlit,
     /// Ideal diffuse.
     Matte,
@@ -71,7 +72,7 @@ pub enum SurfaceModel {
     },
     /// A metal: the colour is its reflectance at normal incidence (Schlick 1994 towards grazing).
     Metal {
-        /// 0 for a mirror, 1 for very dull (GGX α = roughness²).
+        /// 0 for a mirror, 1 for very rough (GGX α = roughness²).
         roughness: f32,
     },
     /// Glass, water: Fresnel reflection and refraction at a smooth interface.
@@ -86,12 +87,12 @@ pub enum SurfaceModel {
     Pbr {
         /// 0 dielectric to 1 metal.
         metallic: f32,
-        /// 0 mirror to 1 dull (GGX α = roughness²).
+        /// 0 mirror to 1 rough (GGX α = roughness²).
         roughness: f32,
         /// Reflectance at normal incidence of the dielectric part; 0.04 for common plastics, 0 for
         /// none (sends no rays).
         specular: f32,
-        /// Formula for lights; rays to other surfaces follow glTF's.
+        /// Formula for lights; rays to other surfaces use glTF's.
         form: PbrForm,
     },
 }
@@ -99,13 +100,14 @@ pub enum SurfaceModel {
 /// Which sides of a surface are drawn and lit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// Both; the normal is turned to the viewer by the geometry's orientation
+    /// Both; the geometric orientation turns the normal towards the viewer
     /// (GL_LIGHT_MODEL_TWO_SIDE).
     #[default]
     Both,
-    /// Both; the shading normal is turned to the viewer by its own direction (VTK).
+    /// Both; the shading normal is turned towards the viewer by its own direction (VTK).
     BothByNormal,
-    /// Both are drawn, lit with the outward normal (OpenGL's one-sided lighting: backs are dark).
+    /// Both are drawn and lit with the outward normal (OpenGL's one-sided lighting: backs are
+    /// dark).
     LitOutside,
     /// Only the outside; rays pass through backs (GL_CULL_FACE, GL_BACK).
     FrontOnly,
@@ -116,7 +118,7 @@ pub enum Sides {
 /// A material.
 #[derive(Debug, Clone)]
 pub struct Material {
-    /// Reaction to light.
+    /// Reflection model.
     pub model: SurfaceModel,
     /// Linear RGB.
     pub color: [f32; 3],
@@ -124,17 +126,17 @@ pub struct Material {
     pub color_source: ColorSource,
     /// 1 opaque to 0 invisible; times the alpha of the colour source.
     pub opacity: f32,
-    /// Radiance given off, linear RGB.
+    /// Emitted radiance, linear RGB.
     pub emission: [f32; 3],
     /// Sides drawn.
     pub sides: Sides,
     /// Use the geometric normal even where shading normals exist (GL_FLAT).
     pub flat: bool,
-    /// What varies besides the colour; `None` for nothing.
+    /// Parameters that vary over the surface, besides the colour; `None` for none.
     pub maps: Option<Arc<dyn MaterialMaps>>,
 }
 
-/// Details are equal when they are the same one.
+/// Maps are equal when they are the same object.
 impl PartialEq for Material {
     fn eq(&self, o: &Material) -> bool {
         let same = match (&self.maps, &o.maps) {
@@ -219,19 +221,19 @@ impl Material {
         Material { color_source: ColorSource::Texture(texture.into()), ..self }
     }
 
-    /// The same material giving off light.
+    /// The same material with emission.
     #[must_use]
     pub fn with_emission(self, emission: [f32; 3]) -> Material {
         Material { emission, ..self }
     }
 
-    /// The same material drawn on other sides.
+    /// The same material with other sides drawn.
     #[must_use]
     pub fn with_sides(self, sides: Sides) -> Material {
         Material { sides, ..self }
     }
 
-    /// The same material with detail.
+    /// The same material with maps.
     #[must_use]
     pub fn with_maps(self, maps: impl Into<Arc<dyn MaterialMaps>>) -> Material {
         Material { maps: Some(maps.into()), ..self }
@@ -242,7 +244,7 @@ impl Material {
         matches!(self.sides, Sides::FrontOnly | Sides::BackOnly)
     }
 
-    /// Reflectance and roughness of the reflection rays it sends: `None` for none.
+    /// Roughness of the reflection rays that it sends: `None` for no such rays.
     pub(crate) fn reflection_roughness(&self) -> Option<f32> {
         match self.model {
             SurfaceModel::Phong { mirror, .. } if mirror > 0.0 => Some(0.0),
@@ -256,7 +258,7 @@ impl Material {
         }
     }
 
-    /// Checks the numbers; the error names the field.
+    /// Checks the parameters; the error names the field.
     pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
         let unit = |field, v: f32| {
             if (0.0..=1.0).contains(&v) {

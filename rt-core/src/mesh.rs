@@ -1,4 +1,4 @@
-//! Indexed triangle meshes with attributes, and what is wrong with them.
+//! Indexed triangle meshes with attributes, and their validation.
 
 use crate::math::Aabb;
 use crate::scene::attribute_part;
@@ -52,40 +52,40 @@ pub struct TriMesh {
     pub scalars: Option<Attribute<f32>>,
     /// Texture coordinates, one per vertex.
     pub texcoords: Option<Vec<Vec2>>,
-    /// Tangents, one per vertex: the direction in which the first texture coordinate grows, and 1
-    /// or -1 for a second one that makes a right-handed or left-handed frame with it and the
-    /// normal. For normal maps; without them they come from the texture coordinates.
+    /// Tangents, one per vertex, for normal maps: the direction in which the first texture
+    /// coordinate grows, and 1 or -1 for a bitangent that makes a right-handed or left-handed
+    /// frame. Without them, tangents are computed from the texture coordinates.
     pub tangents: Option<Vec<Vec4>>,
 }
 
-/// Why a mesh cannot be used at all. Repairable faults are counted in [`MeshReport`] instead.
+/// Why a mesh cannot be used at all. Tolerable faults are counted in [`MeshReport`] instead.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MeshError {
     /// An attribute has the wrong number of values.
     #[error("mesh attribute `{field}` has {found} values; give one per {per}, {expected} in all")]
     AttributeLength {
-        /// Which attribute.
+        /// The attribute.
         field: &'static str,
         /// "vertex" or "triangle".
         per: &'static str,
-        /// How many are needed.
+        /// Number of values needed.
         expected: usize,
-        /// How many there are.
+        /// Number of values found.
         found: usize,
     },
-    /// More triangles or vertices than 32-bit ids can name.
+    /// More triangles or vertices than 32-bit ids can address.
     #[error("mesh has {found} {what}; at most {limit} fit in one mesh: split it into several")]
     TooLarge {
         /// "triangles" or "vertices".
         what: &'static str,
-        /// How many there are.
+        /// Number found.
         found: usize,
-        /// The most that fit.
+        /// The largest number allowed.
         limit: usize,
     },
 }
 
-/// What [`TriMesh::validate`] found. Triangles named here are left out when building; the rest is
+/// Faults found by [`TriMesh::validate`]. The build leaves unusable triangles out; the rest is
 /// rendered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct MeshReport {
@@ -112,9 +112,9 @@ impl TriMesh {
         TriMesh { positions, indices, ..Default::default() }
     }
 
-    /// A mesh from f64 positions: `origin` becomes the centre of their bounds, rounded so that it
-    /// is exact in f32 steps, and positions are stored relative to it. Keeps sub-millimetre detail
-    /// in planet-sized coordinates.
+    /// A mesh from f64 positions. `origin` becomes the centre of their bounds, rounded to exact f32
+    /// steps, and positions are stored relative to it. This keeps sub-millimetre detail in
+    /// planet-sized coordinates.
     pub fn from_f64_positions(positions: &[DVec3], indices: Vec<[u32; 3]>) -> Self {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in positions.iter().filter(|p| p.is_finite()) {
@@ -122,8 +122,8 @@ impl TriMesh {
             hi = hi.max(*p);
         }
         let center = 0.5 * lo + 0.5 * hi;
-        // Coordinates that straddle zero lose nothing in f32: keep the origin at 0 so that they are
-        // not changed.
+        // Coordinates that straddle zero lose nothing in f32: keep the origin at 0 so that they do
+        // not change.
         let far = center.abs().max_element() > (hi - lo).max_element();
         let origin =
             if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
@@ -148,9 +148,9 @@ impl TriMesh {
         self.indices[i].map(|k| self.positions[k as usize])
     }
 
-    /// The triangles `kept` with their vertices and attributes, relative to the same origin; and of
-    /// each vertex its number here, in ascending order. Triangles that name vertices past the end
-    /// stay unusable. Panics when this mesh has no such triangle.
+    /// The triangles `kept` with their vertices and attributes, relative to the same origin; and
+    /// for each vertex its index in this mesh, in ascending order. Triangles with vertex indices
+    /// out of range stay unusable. Panics when this mesh has no such triangle.
     pub fn part(&self, kept: &[u32]) -> (TriMesh, Vec<u32>) {
         let mut vertices: Vec<u32> = kept.iter().flat_map(|&t| self.indices[t as usize]).collect();
         vertices.sort_unstable();

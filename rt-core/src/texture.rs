@@ -1,22 +1,22 @@
-//! Pictures on surfaces.
+//! Images on surfaces.
 
 use crate::colormap::srgb_to_linear;
 use glam::Vec2;
 
-/// What lies outside 0..=1.
+/// How texture coordinates outside 0..=1 are handled.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The picture again (GL_REPEAT).
+    /// Repeats the image (GL_REPEAT).
     #[default]
     Repeat,
-    /// The edge texel (GL_CLAMP_TO_EDGE).
+    /// Uses the edge texel (GL_CLAMP_TO_EDGE).
     Clamp,
-    /// The picture mirrored (GL_MIRRORED_REPEAT).
+    /// Repeats the image mirrored (GL_MIRRORED_REPEAT).
     Mirror,
 }
 
-/// How texels are combined. There are no reduced levels: take several samples per pixel where a
-/// texture is seen from afar.
+/// How texels are combined. There are no mipmaps: use several samples per pixel where a texture is
+/// seen from afar.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Filter {
     /// The texel the point lies in.
@@ -26,32 +26,33 @@ pub enum Filter {
     Bilinear,
 }
 
-/// A picture of linear RGBA texels.
+/// An image of linear RGBA texels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     width: usize,
     height: usize,
     texels: Vec<[f32; 4]>,
     summary: TexelSummary,
-    /// Horizontal and vertical behaviour outside 0..=1.
+    /// Wrap mode outside 0..=1, horizontal and vertical.
     pub wrap: [Wrap; 2],
     /// How texels are combined.
     pub filter: Filter,
 }
 
-/// What is asked of all texels in every frame; they never change, so it is found out once.
+/// Properties of the texels that every frame needs. Texels never change, so these are determined
+/// once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TexelSummary {
     transparent: bool,
     black: bool,
-    /// The first texel that no picture can have, and the first that no light can have.
+    /// The first texel that is invalid in any texture, and the first that is invalid as light.
     unusable: Option<usize>,
     negative: Option<usize>,
 }
 
 #[cfg(test)]
 thread_local! {
-    /// Textures of this thread whose texels were all looked at.
+    /// Number of textures whose texels were all scanned on this thread.
     static SCANS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
@@ -78,7 +79,7 @@ impl TexelSummary {
 /// Why a texture cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TextureError {
-    /// Number of texels and size do not fit.
+    /// The number of texels does not match the size.
     #[error(
         "texture of {width} x {height} texels needs {expected} values, found {found}; give 4 per \
          texel (RGBA), at least one texel"
@@ -96,7 +97,7 @@ pub enum TextureError {
 }
 
 impl Texture {
-    /// From linear RGBA texels, row 0 at texture coordinate v = 0 (OpenGL's order).
+    /// A texture from linear RGBA texels, row 0 at texture coordinate v = 0 (OpenGL's order).
     pub fn from_linear(
         width: usize,
         height: usize,
@@ -118,7 +119,7 @@ impl Texture {
         })
     }
 
-    /// From sRGB-encoded 8-bit RGBA, row 0 at v = 0; alpha is linear.
+    /// A texture from sRGB-encoded 8-bit RGBA, row 0 at v = 0; alpha is linear.
     pub fn from_srgb8(width: usize, height: usize, rgba: &[u8]) -> Result<Texture, TextureError> {
         let expected = width.saturating_mul(height).saturating_mul(4);
         if expected == 0 || expected != rgba.len() {
@@ -149,7 +150,7 @@ impl Texture {
         &self.texels
     }
 
-    /// True when a texel lets light through.
+    /// True when a texel is transparent.
     pub fn has_transparency(&self) -> bool {
         self.summary.transparent
     }
@@ -169,7 +170,7 @@ impl Texture {
         self.summary.negative.map(|i| [i % self.width, i / self.width])
     }
 
-    /// How often texels of a texture were all looked at on this thread.
+    /// How often all texels of a texture were scanned on this thread.
     #[cfg(test)]
     pub(crate) fn scans() -> usize {
         SCANS.get()
@@ -243,8 +244,8 @@ mod tests {
         assert!(!opaque.has_transparency() && !opaque.is_black());
         let mut looked_through = Texture::from_srgb8(1, 2, &[0, 0, 0, 255, 0, 0, 0, 254]).unwrap();
         assert!(looked_through.has_transparency() && looked_through.is_black());
-        // What can change does not touch the texels; what replaces the texture brings its own
-        // answers.
+        // The mutable fields do not affect the texels; a replaced texture brings its own scan
+        // results.
         (looked_through.wrap, looked_through.filter) = ([Wrap::Clamp; 2], Filter::Nearest);
         assert!(looked_through.clone().has_transparency() && looked_through.is_black());
         looked_through = opaque;

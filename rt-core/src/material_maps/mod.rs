@@ -1,9 +1,9 @@
-//! What varies over a surface besides its colour: the shading normal, metalness, roughness,
-//! emission, how much light gets into its pores.
+//! Surface parameters that vary over a surface, besides its colour: the shading normal, metalness,
+//! roughness, emission, and occlusion.
 //!
-//! A material with a [`MaterialMaps`] is asked once for each point that is shaded; materials
-//! without one cost nothing more than before. [`TextureMaps`] reads textures; programs with other
-//! ideas (attributes, procedures) write their own.
+//! The renderer evaluates a material's [`MaterialMaps`] once for each shaded point; materials
+//! without maps cost nothing extra. [`TextureMaps`] reads textures; programs implement the trait
+//! for other sources (attributes, procedures).
 
 mod texture_maps;
 
@@ -13,45 +13,45 @@ use crate::material::{Material, SurfaceModel};
 use crate::mesh::TriMesh;
 use glam::{DMat3, DVec3, Vec2, Vec3};
 
-/// A surface's finish at one point.
+/// Surface parameters at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BsdfParameters {
-    /// Unit shading normal in world axes, on the side that is lit.
+    /// Unit shading normal in world axes, on the lit side.
     pub normal: Vec3,
-    /// 0 dielectric to 1 metal, where the model has it.
+    /// 0 dielectric to 1 metal, if the model uses it.
     pub metallic: f32,
-    /// 0 mirror to 1 dull, where the model has it.
+    /// 0 mirror to 1 rough, if the model uses it.
     pub roughness: f32,
-    /// Reflectance at normal incidence of the dielectric part, where the model has it.
+    /// Reflectance at normal incidence of the dielectric part, if the model uses it.
     pub specular: f32,
-    /// Radiance given off, linear RGB.
+    /// Emitted radiance, linear RGB.
     pub emission: Vec3,
-    /// Share of ambient and reflected light that gets here (glTF's occlusion). Path tracing finds
-    /// out for itself.
+    /// Share of ambient and reflected light that arrives here (glTF's occlusion). Path tracing
+    /// ignores it and computes the occlusion.
     pub ambient: f32,
-    /// Share of the lamps' light that gets here.
+    /// Share of the lights' direct light that arrives here.
     pub direct: f32,
 }
 
-/// Where a [`MaterialMaps`] is asked.
+/// The point at which a [`MaterialMaps`] is evaluated.
 pub struct MaterialEvalContext<'a> {
     /// Primitive of the geometry.
     pub primitive: u32,
-    /// The hit's own numbers: on triangles the weights of the second and third corner.
+    /// Surface coordinates of the hit: on triangles the weights of the second and third corner.
     pub uv: [f32; 2],
     /// The point in the geometry's coordinates, before the instance's transform.
     pub point: DVec3,
-    /// Unit shading normal in the geometry's coordinates, as the geometry has it: not turned to
-    /// anybody.
+    /// Unit shading normal in the geometry's coordinates, as the geometry defines it: not turned
+    /// towards the viewer.
     pub object_normal: Vec3,
-    /// Whether the material's sides turn it over.
+    /// Whether the material's sides flip it.
     pub flipped: bool,
-    /// The mesh, where the geometry is one.
+    /// The mesh, if the geometry is one.
     pub mesh: Option<&'a TriMesh>,
     pub(crate) linear: DMat3,
-    /// Unit shading normal in world axes, not turned.
+    /// Unit shading normal in world axes, not flipped.
     pub(crate) outward: Vec3,
-    /// Unit, in world axes: towards where the ray came from, and the face's normal on that side.
+    /// Unit, in world axes: the direction to the ray's origin, and the face normal on that side.
     pub(crate) view: Vec3,
     pub(crate) face_normal: Vec3,
 }
@@ -62,8 +62,8 @@ impl MaterialEvalContext<'_> {
         [1.0 - self.uv[0] - self.uv[1], self.uv[0], self.uv[1]]
     }
 
-    /// The same place, seen as one of `mesh`: for shapes that stand for a mesh's triangles, with
-    /// the same primitives and hits.
+    /// The same point as a point of `mesh`, for shapes that represent a mesh's triangles with the
+    /// same primitives and hits.
     pub fn with_mesh<'m>(&self, mesh: &'m TriMesh) -> MaterialEvalContext<'m> {
         let MaterialEvalContext {
             primitive,
@@ -91,7 +91,7 @@ impl MaterialEvalContext<'_> {
         }
     }
 
-    /// A direction along the surface, in the geometry's coordinates, as one in world axes (of any
+    /// Transforms a direction along the surface from the geometry's coordinates to world axes (any
     /// length).
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         (self.linear * v.as_dvec3()).normalize_or_zero().as_vec3()
@@ -103,7 +103,7 @@ impl MaterialEvalContext<'_> {
         Some((mesh, mesh.indices.get(self.primitive as usize)?.map(|k| k as usize)))
     }
 
-    /// Texture coordinates of the mesh here.
+    /// Texture coordinates of the mesh at this point.
     pub fn texcoord(&self) -> Option<Vec2> {
         let (mesh, corners) = self.corners()?;
         let uv = mesh.texcoords.as_ref()?;
@@ -112,9 +112,9 @@ impl MaterialEvalContext<'_> {
         Some(x * w + y * u + z * v)
     }
 
-    /// The direction in which the first texture coordinate grows and the sense of the second one (1
-    /// when normal, tangent and it are right-handed, else -1): the mesh's own tangents, else from
-    /// the triangle's texture coordinates.
+    /// The direction in which the first texture coordinate grows, and the sign of the bitangent (1
+    /// when normal, tangent and bitangent are right-handed, else -1): the mesh's own tangents, else
+    /// from the triangle's texture coordinates.
     pub fn tangent(&self) -> Option<(Vec3, f32)> {
         let (mesh, corners) = self.corners()?;
         if let Some(tangents) = &mesh.tangents {
@@ -145,24 +145,25 @@ impl MaterialEvalContext<'_> {
         Some((du.as_vec3(), if sense < 0.0 { -1.0 } else { 1.0 }))
     }
 
-    /// The world normal for `bend`, a normal in the space of (tangent, its partner, shading
-    /// normal), as glTF defines it: the whole frame belongs to the geometry's outside and is turned
-    /// over with it. `None` where there is no such frame. Normals in which the viewer would see a
-    /// mirror reflect what is below the face are bent less: such points would be black (Keller et
-    /// al., "The Iray Light Transport Simulation and Rendering System", 2017, appendix A.3).
+    /// The world normal for `bend`, a normal in the space of (tangent, bitangent, shading normal),
+    /// as glTF defines it: the frame belongs to the geometry's outside and is flipped with it.
+    /// `None` where there is no such frame. A normal is bent less when the mirrored view would
+    /// point below the face: such points would be black (Keller et al., "The Iray Light Transport
+    /// Simulation and Rendering System", 2017, appendix A.3).
     pub fn perturbed_normal(&self, (tangent, sense): (Vec3, f32), bend: Vec3) -> Option<Vec3> {
         let normal = self.frame(self.outward, tangent, sense, bend)?;
         Some(self.limited_to_visible(if self.flipped { -normal } else { normal }))
     }
 
-    /// As [`MaterialEvalContext::perturbed_normal`], as VTK's shader does it: the normal is turned
-    /// to the viewer first, the tangent stays, and its partner is their cross product.
+    /// As [`MaterialEvalContext::perturbed_normal`], with the convention of VTK's shader: the
+    /// normal is first turned towards the viewer, the tangent stays, and the bitangent is their
+    /// cross product.
     pub fn perturbed_normal_after_flip(&self, tangent: Vec3, bend: Vec3) -> Option<Vec3> {
         self.frame(if self.flipped { -self.outward } else { self.outward }, tangent, 1.0, bend)
     }
 
-    /// `n`, or the nearest normal in the plane of it and the view in which the mirrored view just
-    /// leaves the face.
+    /// `n`, or the nearest normal in the plane of `n` and the view for which the mirrored view just
+    /// grazes the face.
     fn limited_to_visible(&self, n: Vec3) -> Vec3 {
         let mirrored = n * (2.0 * n.dot(self.view)) - self.view;
         let below = mirrored.dot(self.face_normal);
@@ -181,18 +182,18 @@ impl MaterialEvalContext<'_> {
     }
 }
 
-/// What varies over a surface.
+/// Surface parameters that vary over a surface.
 pub trait MaterialMaps: Send + Sync + std::fmt::Debug {
-    /// The finish at a place of a surface that has the finish `base` without it.
+    /// The parameters at a point of a surface whose material has the parameters `base`.
     fn evaluate(&self, base: BsdfParameters, place: &MaterialEvalContext<'_>) -> BsdfParameters;
 
-    /// What the mesh lacks that this needs, in words; `None` when it has all.
+    /// Names the attribute that the mesh lacks for these maps; `None` when it has all.
     fn missing_attribute(&self, _mesh: &TriMesh) -> Option<&'static str> {
         None
     }
 }
 
-/// A point whose finish is not its material's.
+/// A point whose surface parameters differ from its material's.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SurfaceParameters {
     pub(crate) model: SurfaceModel,
@@ -202,7 +203,7 @@ pub(crate) struct SurfaceParameters {
 }
 
 impl BsdfParameters {
-    /// The material's own, with a normal.
+    /// The material's own parameters, with a normal.
     pub(crate) fn of(material: &Material, normal: Vec3) -> BsdfParameters {
         let (metallic, roughness, specular) = match material.model {
             SurfaceModel::Pbr { metallic, roughness, specular, .. } => {
@@ -223,8 +224,8 @@ impl BsdfParameters {
         }
     }
 
-    /// `model` with these numbers. What is no number, or outside of its range, becomes the nearest
-    /// that is inside, so that data cannot put NaN into a picture.
+    /// `model` with these parameters. NaN and values outside their range become the nearest valid
+    /// value, so that data cannot put NaN into an image.
     pub(crate) fn apply(&self, mut model: SurfaceModel) -> SurfaceParameters {
         let unit = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
         match &mut model {

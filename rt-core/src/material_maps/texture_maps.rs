@@ -1,4 +1,4 @@
-//! Detail from textures by the mesh's texture coordinates: glTF 2.0's, which are also
+//! Material maps from textures at the mesh's texture coordinates: those of glTF 2.0, which are also
 //! `vtkProperty`'s.
 
 use super::{BsdfParameters, MaterialEvalContext, MaterialMaps};
@@ -7,38 +7,39 @@ use crate::texture::Texture;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Whose reading of the same textures.
+/// Which convention interprets the textures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum MapConvention {
-    /// glTF 2.0: occlusion dims ambient light only; the tangent frame belongs to the outside;
+    /// glTF 2.0: occlusion attenuates ambient light only; the tangent frame belongs to the outside;
     /// tangents come from the texture coordinates where the mesh has none.
     #[default]
     Gltf,
-    /// VTK 9's shader: occlusion dims lamps too, but not emission; the frame stands on the normal
-    /// that is turned to the viewer; without tangents in the mesh the normal map is left out.
+    /// VTK 9's shader: occlusion attenuates lights too, but not emission; the frame is built on the
+    /// normal that is turned towards the viewer; without tangents in the mesh the normal map is
+    /// ignored.
     Vtk,
 }
 
-/// Textures; what is `None` stays as the material says.
+/// Textures; the material's own value applies where one is `None`.
 #[derive(Debug, Clone, Default)]
 pub struct TextureMaps {
-    /// Normals: 2 rgb - 1 in the frame of tangent, its partner and shading normal.
+    /// Normals: 2 rgb - 1 in the frame of tangent, bitangent and shading normal.
     pub normal: Option<Arc<Texture>>,
     /// Factor on the first two components of the normal.
     pub normal_scale: f32,
     /// Green times the material's roughness, blue times its metalness.
     pub metallic_roughness: Option<Arc<Texture>>,
-    /// Red: share of light that gets in.
+    /// Red: share of light that arrives.
     pub occlusion: Option<Arc<Texture>>,
-    /// 0 for no occlusion, 1 for all of it.
+    /// Strength of the occlusion: 0 for none, 1 for full.
     pub occlusion_strength: f32,
     /// Times the material's emission.
     pub emission: Option<Arc<Texture>>,
-    /// How they are read.
+    /// How the textures are interpreted.
     pub convention: MapConvention,
-    /// The second texture coordinate grows from the picture's upper edge downwards, as in glTF's
-    /// files. Green points up in the picture, so the partner of a tangent that is made from such
-    /// coordinates points against them. Tangents of the mesh say that themselves.
+    /// The second texture coordinate grows from the image's upper edge downwards, as in glTF's
+    /// files. Green points up in the image, so a bitangent that is computed from such coordinates
+    /// points against them. Tangents of the mesh already include the sign.
     pub rows_from_top: bool,
 }
 

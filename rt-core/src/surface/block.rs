@@ -1,10 +1,10 @@
-//! What local lighting needs of sixteen hits at once.
+//! Surface data of sixteen hits at once, for local lighting.
 //!
-//! Memory is the larger part of it: a hit names a triangle, the triangle three vertices, each of
-//! them a position and its attributes. The values of sixteen hits are read into rows first, so that
-//! sixteen waits overlap, and then the arithmetic of [`ResolvedInstance::shading_point`] runs on
-//! all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that cannot
-//! be normalised) are left to `shading_point` itself.
+//! Most of the time goes to memory access: a hit names a triangle, the triangle three vertices,
+//! each of them a position and its attributes. The values of sixteen hits are read into rows first,
+//! so that sixteen waits overlap. Then the arithmetic of [`ResolvedInstance::shading_point`] runs
+//! on all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that
+//! cannot be normalised) are left to `shading_point` itself.
 
 use super::{ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
 use crate::material::{ColorSource, Sides};
@@ -15,7 +15,7 @@ use crate::simd::vectors::{Row, Rows3, Vec3x16};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 use glam::{DVec3, Vec3};
 
-/// Sixteen [`ShadingPoint`]s, a row per number.
+/// Sixteen [`ShadingPoint`]s, one row per component.
 #[repr(C, align(64))]
 pub(crate) struct ShadingPointBlock {
     pub(crate) point: Rows3,
@@ -64,11 +64,11 @@ impl Planes {
     }
 }
 
-/// Vertex numbers of sixteen triangles, a row per corner.
+/// Vertex indices of sixteen triangles, one row per corner.
 type Corners = [[u32; LANES]; 3];
 
 impl ResolvedInstance<'_> {
-    /// Starts loading the triangle `prim`'s vertex numbers.
+    /// Prefetches the vertex indices of triangle `prim`.
     #[inline]
     pub(crate) fn prefetch_triangle(&self, prim: u32) {
         if let Source::Mesh(mesh) = self.source {
@@ -76,8 +76,8 @@ impl ResolvedInstance<'_> {
         }
     }
 
-    /// Starts loading what [`ResolvedInstance::shading_point_block`] will read of the triangle
-    /// `prim`'s vertices.
+    /// Prefetches the vertex data of triangle `prim` that [`ResolvedInstance::shading_point_block`]
+    /// will read.
     #[inline]
     pub(crate) fn prefetch_vertices(&self, prim: u32) {
         if let Source::Mesh(mesh) = self.source {
@@ -96,7 +96,7 @@ impl ResolvedInstance<'_> {
     }
 
     /// [`ResolvedInstance::shading_point`] for the hits whose bits are set in `lanes`, all of them
-    /// on this instance; other lanes of `out` hold anything.
+    /// on this instance; other lanes of `out` are undefined.
     pub(crate) fn shading_point_block<S: Simd, const POINT: bool>(
         &self,
         simd: S,
@@ -185,7 +185,7 @@ impl ResolvedInstance<'_> {
         );
     }
 
-    /// Returns the lanes that it could do.
+    /// Returns the lanes that it completed.
     #[inline(never)]
     fn mesh_block<S: Simd, const POINT: bool>(
         &self,
@@ -213,7 +213,7 @@ impl ResolvedInstance<'_> {
         out: &mut ShadingPointBlock,
     ) -> u16 {
         let v = |x: f32| f32x16::splat(simd, x);
-        // Lanes without a hit repeat one that has: nothing below needs to ask again.
+        // Lanes without a hit repeat one that has a hit, so the code below needs no checks.
         let first = lanes.trailing_zeros() as usize & 15;
         let mut prims = hits.prim;
         for lane in 0..LANES {
@@ -266,7 +266,7 @@ impl ResolvedInstance<'_> {
             }
         };
 
-        // ---- Which side is seen, and which is lit.
+        // ---- Orientation: seen side and lit side.
         let zero = v(0.0);
         let outside = outward.dot(dir).simd_le(zero);
         let back = shading.neg();

@@ -1,10 +1,11 @@
-//! From a hit to a point that can be shaded and that rays can start from.
+//! Turns a hit into a point that can be shaded and from which rays can start.
 //!
-//! The point comes from the primitive (barycentric coordinates in f64), not from the ray, so its
-//! error does not grow with the ray's length. It carries a bound of 4 ulp of the largest vertex
-//! coordinate; a secondary ray starts that far off the surface along the face normal. Measured over
-//! 16 million rays on spheres of radius 1e-4 to 1e4 up to 1800 radii from the origin: 1 ulp leaves
-//! 0.1-0.4 % of false self-shadows, 2 ulp 1e-6, 4 ulp none. There is no global epsilon.
+//! The point is computed from the primitive (barycentric coordinates in f64), not from the ray, so
+//! its error does not grow with the ray's length. It has an error bound of 4 ulp of the largest
+//! vertex coordinate; a secondary ray starts that far off the surface along the face normal.
+//! Measured over 16 million rays on spheres of radius 1e-4 to 1e4 up to 1800 radii from the origin:
+//! 1 ulp leaves 0.1-0.4 % of false self-shadows, 2 ulp 1e-6, 4 ulp none. There is no global
+//! epsilon.
 
 mod block;
 mod parameters;
@@ -20,13 +21,13 @@ use crate::scene::Scene;
 use crate::shapes::{Shape, ShapeHit};
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
 
-/// Length of a vector of any size: f32 would overflow or vanish beyond 10^±19.
+/// Length of a vector of any size: a plain f32 norm would overflow or underflow beyond 10^±19.
 #[inline]
 pub(crate) fn length(v: Vec3) -> f32 {
     v.as_dvec3().length() as f32
 }
 
-/// One instance with everything shading needs, resolved once per frame.
+/// One instance with all data for shading, resolved once per frame.
 pub(crate) struct ResolvedInstance<'a> {
     source: Source<'a>,
     pub(crate) material: &'a Material,
@@ -40,7 +41,7 @@ pub(crate) struct ResolvedInstance<'a> {
     winding: f64,
     /// Length in render space of the longest image of an object-space unit vector.
     stretch: f32,
-    /// True when rays are moved to object space before they meet the primitive.
+    /// True when rays are transformed to object space before they are intersected.
     moved: bool,
 }
 
@@ -53,13 +54,13 @@ enum Source<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SurfacePoint {
     pub(crate) point: Vec3,
-    /// Bound on the distance between `point` and the surface that rays meet.
+    /// Bound on the distance between `point` and the surface that rays hit.
     pub(crate) point_error: f32,
     /// Unit face normal, turned against the ray.
     pub(crate) face_normal: Vec3,
-    /// Unit shading normal, turned as the material's sides say.
+    /// Unit shading normal, oriented by the material's sides.
     pub(crate) normal: Vec3,
-    /// True when the ray met the outside.
+    /// True when the ray hit the outside.
     pub(crate) outside: bool,
     /// Linear RGB.
     pub(crate) color: Vec3,
@@ -67,12 +68,12 @@ pub(crate) struct SurfacePoint {
     pub(crate) opacity: f32,
 }
 
-/// As much of a surface as lights without shadows need, in render space.
+/// The part of a surface point that lights without shadows need, in render space.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShadingPoint {
-    /// Zero when it was not asked for.
+    /// Zero when it was not requested.
     pub(crate) point: Vec3,
-    /// Unit shading normal, turned as the material's sides say.
+    /// Unit shading normal, oriented by the material's sides.
     pub(crate) normal: Vec3,
     /// Linear RGB.
     pub(crate) color: Vec3,
@@ -80,12 +81,12 @@ pub(crate) struct ShadingPoint {
     pub(crate) opacity: f32,
 }
 
-/// Squared lengths of face normals that f32 can work with: beyond, products of lengths may vanish
-/// or overflow.
+/// Squared lengths of face normals for which f32 suffices: outside this range, products of lengths
+/// may underflow or overflow.
 const ORDINARY_NORMAL_SQUARED: std::ops::Range<f32> = 1e-30..1e30;
 
 impl SurfacePoint {
-    /// Start of a ray that leaves in direction `dir`, on the right side of the surface.
+    /// Origin of a ray that leaves in direction `dir`, on the matching side of the surface.
     #[inline]
     pub(crate) fn ray_origin(&self, dir: Vec3) -> Vec3 {
         let side =
@@ -93,17 +94,17 @@ impl SurfacePoint {
         self.point + self.face_normal * side
     }
 
-    /// Smallest parameter for continuing `ray`, which met this point at `t`, behind it. Surfaces
-    /// nearer to each other than their error bounds are one surface (that of the lowest id), so an
-    /// edge shared by two triangles is met once.
+    /// Smallest parameter at which `ray`, which hit this point at `t`, continues behind it.
+    /// Surfaces closer together than their error bounds count as one surface (that of the lowest
+    /// id), so an edge shared by two triangles is hit once.
     #[inline]
     pub(crate) fn t_behind(&self, ray: &Ray, t: f32) -> f32 {
         let length = length(ray.dir);
-        // Error of the point, of the ray's own arithmetic, and of a t this large, across the
-        // surface ...
+        // Error across the surface: of the point, of the ray's own arithmetic, and of a t this
+        // large.
         let across =
             4.0 * self.point_error + 4.0 * f32::EPSILON * (max_abs(ray.origin) + t.abs() * length);
-        // ... is longer along a grazing ray; 2^-10 keeps an exactly edge-on ray from skipping
+        // Along a grazing ray the error is longer. 2^-10 keeps an exactly edge-on ray from skipping
         // everything behind.
         let cos = (self.face_normal.dot(ray.dir).abs() / length).max(1.0 / 1024.0);
         (t + across / (length * cos)).max(t.next_up())
@@ -152,7 +153,7 @@ impl<'a> ResolvedInstance<'a> {
         }
     }
 
-    /// The point that `ray` met.
+    /// The surface point that `ray` hit.
     #[inline]
     pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         match self.source {
@@ -161,9 +162,9 @@ impl<'a> ResolvedInstance<'a> {
         }
     }
 
-    /// What local lighting needs of the point that `ray` met, where no other ray will start: on
-    /// meshes in f32 wherever the triangle's size allows it, and without `POINT` the point is left
-    /// out. [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
+    /// Local-lighting data of the point that `ray` hit, where no other ray will start: on meshes in
+    /// f32 wherever the triangle's size allows it, and without the point itself unless `POINT`.
+    /// [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
     #[inline]
     pub(crate) fn shading_point<const POINT: bool>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         match self.source {
@@ -199,7 +200,7 @@ impl<'a> ResolvedInstance<'a> {
         let outward = if !ORDINARY_NORMAL_SQUARED.contains(&squared) {
             self.exact_normal([a, b, c], hit, ray)
         } else if smooth.is_some() {
-            // Any length will do to turn the shading normal.
+            // Any length is sufficient to orient the shading normal.
             n
         } else {
             n * (1.0 / squared.sqrt())
@@ -213,21 +214,21 @@ impl<'a> ResolvedInstance<'a> {
         ShadingPoint { point, normal, color: Vec3::new(r, g, b), opacity }
     }
 
-    /// Out of the way of the usual case.
+    /// Kept out of the common path.
     #[cold]
     #[inline(never)]
     fn exact_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> Vec3 {
         self.point_and_normal(corners, hit, ray).1
     }
 
-    /// Normals to interpolate, if the material wants them.
+    /// Normals to interpolate, if the material uses them.
     #[inline(always)]
     fn shading_normals<'m>(&self, mesh: &'m TriMesh) -> Option<&'m Attribute<Vec3>> {
         mesh.normals.as_ref().filter(|_| !self.material.flat)
     }
 
-    /// The render-space point `inside` away from the corner `a` of a triangle, in f32: the small
-    /// numbers are added first.
+    /// The render-space point `inside` away from the corner `a` of a triangle, in f32; adds the
+    /// small numbers first.
     #[inline(always)]
     fn moved_point(&self, a: Vec3, inside: Vec3) -> Vec3 {
         let shift = self.render_from_object.translation.as_vec3();
@@ -400,7 +401,7 @@ impl<'a> ResolvedInstance<'a> {
         [r, g, b, 1.0]
     }
 
-    /// Whether the ray met the outside, the shading normal turned as the material's sides say, and
+    /// Whether the ray hit the outside, the shading normal oriented by the material's sides, and
     /// whether this side is drawn.
     #[inline(always)]
     fn turned(&self, outward: Vec3, shading: Vec3, dir: Vec3) -> (bool, Vec3, bool) {
@@ -436,8 +437,8 @@ impl<'a> ResolvedInstance<'a> {
         let ulps = 4.0 * f32::EPSILON;
         let mut point_error = (ulps * coordinates + own_error) * self.stretch;
         if self.moved {
-            // The ray was moved to object space in f32: its error there is some ulp of where it
-            // was.
+            // The ray was transformed to object space in f32: its error there is some ulp of its
+            // coordinates.
             point_error += ulps * max_abs(point);
         }
         let (outside, normal, drawn) = self.turned(outward, shading, ray.dir);
@@ -463,8 +464,8 @@ fn interpolate4(
     }
 }
 
-/// A point of a triangle and its normal, of any length, in world space; `moved` when its instance
-/// does more than shift it.
+/// A point of a triangle and its normal, of any length, in world space; `moved` when the instance's
+/// transform is more than a translation.
 #[inline(always)]
 fn plane_of(
     corners: [Vec3; 3],

@@ -8,8 +8,8 @@ use crate::shapes::ShapeHit;
 use glam::Vec3;
 
 impl ResolvedInstance<'_> {
-    /// What differs from the material at the point that `ray` met, where it has detail; `normal` is
-    /// the shading normal, which may be bent.
+    /// The surface parameters at the point that `ray` hit, where they differ from the material;
+    /// `normal` is the shading normal, which may be perturbed.
     #[inline]
     pub(crate) fn parameters(
         &self,
