@@ -1,15 +1,15 @@
-//! What rays see that leave the scene: light from all directions, and the picture's background.
+//! What rays see when they leave the scene: light from all directions, and the image's background.
 
 use crate::texture::Texture;
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// Radiance from infinitely far away, by direction. It lights surfaces (dimmed by ambient
-/// occlusion), and is what reflected, refracted and path-traced rays see when they leave the scene.
+/// Radiance from infinitely far away, by direction. It lights surfaces (attenuated by ambient
+/// occlusion). Reflected, refracted and path-traced rays see it when they leave the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Environment {
-    /// The same from everywhere, linear RGB.
+    /// The same from all directions, linear RGB.
     Constant([f32; 3]),
     /// Linear in the height of the direction: `bottom` straight down, `top` straight up.
     Gradient {
@@ -17,16 +17,16 @@ pub enum Environment {
         bottom: [f32; 3],
         /// Radiance from above.
         top: [f32; 3],
-        /// Which way is up, unit length.
+        /// Up direction, unit length.
         up: Vec3,
     },
-    /// A latitude-longitude picture: texture v = 1 is `up`, u runs around it.
+    /// A latitude-longitude image: texture v = 1 is `up`, u runs around it.
     Image {
-        /// The picture, linear.
+        /// The image, linear.
         image: Arc<Texture>,
-        /// Which way is up, unit length.
+        /// Up direction, unit length.
         up: Vec3,
-        /// Factor on the picture.
+        /// Factor on the image.
         scale: f32,
     },
 }
@@ -43,8 +43,8 @@ impl Environment {
             }
             Environment::Image { image, up, scale } => {
                 let (e, n) = crate::math::orthonormal_basis(*up);
-                // Half a texel from the poles, so that a repeating texture does not mix top and
-                // bottom there.
+                // Stay half a texel away from the poles, so that a repeating texture does not mix
+                // top and bottom there.
                 let margin = 0.5 / image.size()[1] as f32;
                 let height = 0.5 + d.dot(*up).clamp(-1.0, 1.0).asin() / PI;
                 let around = 0.5 + d.dot(n).atan2(d.dot(e)) / (2.0 * PI);
@@ -55,7 +55,7 @@ impl Environment {
         }
     }
 
-    /// True when no light comes from it.
+    /// True when it emits no light.
     pub fn is_black(&self) -> bool {
         match self {
             Environment::Constant(c) => *c == [0.0; 3],
@@ -66,18 +66,17 @@ impl Environment {
 }
 
 /// Lengths of `up` that count as 1: an f32 vector that was normalised is within 1e-7, and one
-/// written with four digits within 1e-4. The radiance is off by no more.
+/// written with four digits within 1e-4. The relative error of the radiance is no larger.
 const UNIT: std::ops::RangeInclusive<f32> = 0.999..=1.001;
 
 impl Environment {
-    /// Checks the numbers; the error names the field, its value and what it must be.
+    /// Checks the parameters; the error names the field, its value and the allowed values.
     pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
         let light = |field, c: [f32; 3]| {
             let ok = c.iter().all(|v| v.is_finite() && *v >= 0.0);
             if ok { Ok(()) } else { Err((field, format!("{c:?}"), FINITE_LIGHT)) }
         };
-        // Every other direction is measured from `up` alone: what stands across it is chosen, so no
-        // unit vector is parallel to anything.
+        // All other directions are derived from `up` alone, so no unit vector is degenerate.
         let upright = |up: Vec3| {
             let ok = up.is_finite() && UNIT.contains(&crate::surface::length(up));
             if ok { Ok(()) } else { Err(("up", up.to_string(), "of unit length: normalise it")) }
@@ -106,7 +105,7 @@ impl Environment {
 
 const FINITE_LIGHT: &str = "finite and not negative in every channel";
 
-/// Checks the texels of a picture.
+/// Checks the texels of an image.
 pub(crate) fn texels(
     field: &'static str,
     image: &Texture,
@@ -125,7 +124,7 @@ fn texel_in_words(image: &Texture, x: usize, y: usize) -> String {
 }
 
 impl Background {
-    /// Checks the numbers, as [`Environment::check`].
+    /// Checks the parameters, as [`Environment::check`].
     pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
         let finite = |field, c: &[f32]| {
             let ok = c.iter().all(|v| v.is_finite() && *v >= 0.0);
@@ -154,7 +153,7 @@ pub enum Background {
     Transparent,
     /// Linear RGBA, not premultiplied.
     Constant([f32; 4]),
-    /// From the bottom row to the top row of the picture, opaque.
+    /// From the bottom row to the top row of the image, opaque.
     Gradient {
         /// Linear RGB of the bottom edge.
         bottom: [f32; 3],
@@ -168,7 +167,7 @@ pub enum Background {
 /// Cosine-weighted mean of an environment over the hemisphere around a normal, as nine spherical
 /// harmonics (Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment
 /// Maps", 2001): exact for constant and gradient environments, within a few per cent of the mean
-/// for pictures.
+/// for images.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct IrradianceCoefficients {
     pub(crate) coefficients: [Vec3; 9],

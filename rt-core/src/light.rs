@@ -1,14 +1,14 @@
-//! Lights.
+//! Light sources.
 //!
-//! **Unit.** As in OpenGL and VTK, a light of colour 1 that falls straight onto a matte white
-//! surface makes it 1: its irradiance is π times its colour. The path tracer uses the same unit, so
-//! both integrators agree on direct light. An ambient light or an environment of radiance 1 makes
-//! an unoccluded white surface 1.
+//! **Unit.** As in OpenGL and VTK, a light of colour 1 at normal incidence on a matte white surface
+//! gives it radiance 1: its irradiance is π times its colour. The path tracer uses the same unit,
+//! so both integrators agree on direct light. An ambient light or an environment of radiance 1
+//! gives an unoccluded white surface radiance 1.
 
 use crate::camera::Camera;
 use glam::{DMat3, DVec3, Vec3};
 
-/// The space a light's position and direction are given in.
+/// The space in which a light's position and direction are given.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum LightFrame {
     /// World space.
@@ -22,16 +22,17 @@ pub enum LightFrame {
 /// Shape of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
-    /// The same from everywhere; dimmed by ambient occlusion.
+    /// The same from all directions; attenuated by ambient occlusion.
     Ambient,
     /// Parallel light.
     Directional {
         /// Direction from the scene to the light, any length.
         to_light: DVec3,
-        /// Half the angle the light's disk covers, radians; 0 for sharp shadows (the sun: 0.00465).
+        /// Half the angle that the light's disk subtends, radians; 0 for sharp shadows (the sun:
+        /// 0.00465).
         angular_radius_rad: f64,
     },
-    /// From a point or a sphere, to all sides.
+    /// Light from a point or a sphere, in all directions.
     Point {
         /// Centre.
         position: DVec3,
@@ -46,14 +47,14 @@ pub enum LightKind {
         direction: DVec3,
         /// Half angle of the cone, radians; dark outside.
         cutoff_rad: f64,
-        /// Light falls off inside the cone as the cosine to the axis to this power
+        /// Inside the cone, light falls off as the cosine of the angle to the axis to this power
         /// (GL_SPOT_EXPONENT).
         exponent: f64,
-        /// Radius of the disk the light comes from, world units; 0 for sharp shadows.
+        /// Radius of the emitting disk, world units; 0 for sharp shadows.
         radius: f64,
     },
-    /// A cone of light with a soft rim: full inside of the inner angle, none outside of the outer,
-    /// and between them linear in the cosine to the axis (OSPRay's and ANARI's spot light).
+    /// A cone of light with a soft edge: full inside the inner angle, none outside the outer angle,
+    /// and linear in the cosine to the axis between them (OSPRay's and ANARI's spot light).
     Cone {
         /// Tip of the cone.
         position: DVec3,
@@ -61,24 +62,24 @@ pub enum LightKind {
         direction: DVec3,
         /// Half angle of full light, radians.
         inner_rad: f64,
-        /// Half angle of any light, radians; not less than the inner one.
+        /// Half angle of any light, radians; at least the inner one.
         outer_rad: f64,
     },
-    /// A flat disk that shines to one side, with the cosine to its normal.
+    /// A flat disk that emits on one side, with the cosine to its normal.
     Disk {
         /// Centre.
         position: DVec3,
-        /// Normal of the shining side.
+        /// Normal of the emitting side.
         direction: DVec3,
         /// Radius, world units.
         radius: f64,
     },
-    /// A flat ring or disk that shines to one side with the cosine to its normal, within a cone
-    /// with a soft rim (ANARI's ring light).
+    /// A flat ring or disk that emits on one side with the cosine to its normal, within a cone with
+    /// a soft edge (ANARI's ring light).
     Ring {
         /// Centre.
         position: DVec3,
-        /// Normal of the shining side.
+        /// Normal of the emitting side.
         direction: DVec3,
         /// Radius of the hole, world units; 0 for a disk.
         inner_radius: f64,
@@ -86,17 +87,17 @@ pub enum LightKind {
         radius: f64,
         /// Half angle of full light, radians.
         inner_rad: f64,
-        /// Half angle of any light, radians; not less than the inner one, at most π/2.
+        /// Half angle of any light, radians; at least the inner one, at most π/2.
         outer_rad: f64,
     },
-    /// A flat parallelogram that shines with the cosine to its normal.
+    /// A flat parallelogram that emits with the cosine to its normal.
     Quad {
         /// A corner.
         corner: DVec3,
-        /// From there to the neighbouring corners, world units. It shines to the side of edge 1 ×
+        /// From there to the neighbouring corners, world units. It emits to the side of edge 1 ×
         /// edge 2.
         edges: [DVec3; 2],
-        /// It shines to the other side as well.
+        /// Whether it emits to the other side as well.
         both_sides: bool,
     },
 }
@@ -104,39 +105,39 @@ pub enum LightKind {
 /// A light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
-    /// Shape and place.
+    /// Shape and position.
     pub kind: LightKind,
-    /// Space of the place.
+    /// Space of the position.
     pub frame: LightFrame,
-    /// Linear RGB; see the module's text for the unit.
+    /// Linear RGB; the module documentation defines the unit.
     pub color: [f32; 3],
     /// Colour of Phong highlights where it differs from `color` (GL_SPECULAR, vtkLight's specular
     /// colour).
     pub highlight_color: Option<[f32; 3]>,
-    /// Divisor c + l·d + q·d² over distance d (GL's attenuation); `[1, 0, 0]` for none, `[0, 0, 1]`
-    /// for physical lights, whose colour is then that at distance 1. Ignored by directional and
-    /// ambient light.
+    /// Attenuation: divisor c + l·d + q·d² over distance d (as in GL). `[1, 0, 0]` for none; `[0,
+    /// 0, 1]` for physical lights, whose colour then holds at distance 1. Ignored by directional
+    /// and ambient light.
     pub attenuation: [f32; 3],
-    /// Whether surfaces block it. Light that goes along the camera rays (from a point at the eye of
-    /// a perspective, or parallel to a parallel projection's rays) gets no shadow rays from what
-    /// those rays meet first: the eye could not see them.
+    /// Whether surfaces block it. For light that follows the camera rays (from a point at the eye
+    /// of a perspective, or parallel to a parallel projection's rays), no shadow rays are sent from
+    /// the first hits of those rays: the eye could not see the shadows.
     pub shadows: bool,
 }
 
 /// Why a light cannot be given a size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LightSizeError {
-    /// It comes from everywhere.
+    /// Ambient light comes from all directions.
     #[error("ambient light has no size: it comes from everywhere; leave the size out")]
     Ambient,
-    /// It comes from the tip.
+    /// The light comes from the tip.
     #[error(
         "a cone light has no size: its light comes from its tip; take LightKind::Ring for a disk \
          that shines within a cone, \
          or LightKind::Spot, which has a radius"
     )]
     Cone,
-    /// Its edges have no length that could be changed.
+    /// The edges have zero length, so they cannot be scaled.
     #[error(
         "a quadrangle light whose edges are zero, NaN or infinite cannot be given a size; give it \
          edges"
@@ -181,15 +182,15 @@ impl Light {
         Light::new(LightKind::Disk { position, direction, radius })
     }
 
-    /// White light along the viewing direction (VTK's headlight, GL_LIGHT0's default): moves with
-    /// the camera, casts no shadows.
+    /// White light along the viewing direction (VTK's headlight, GL_LIGHT0's default). It moves
+    /// with the camera and casts no shadows.
     pub fn headlight() -> Light {
         let kind = LightKind::Directional { to_light: DVec3::Z, angular_radius_rad: 0.0 };
         Light { frame: LightFrame::Camera, shadows: false, ..Light::new(kind) }
     }
 
     /// White light from the parallelogram at `corner` with these edges, to the side of edge 1 ×
-    /// edge 2; colour as at distance 1 straight ahead.
+    /// edge 2. The colour holds at distance 1 straight ahead.
     pub fn quad(corner: DVec3, edges: [DVec3; 2]) -> Light {
         let kind = LightKind::Quad { corner, edges, both_sides: false };
         Light { attenuation: [0.0, 0.0, 1.0], ..Light::new(kind) }
@@ -201,13 +202,13 @@ impl Light {
         Light { color, ..self }
     }
 
-    /// The same light with a size, [`Light::size`]: the radius in world units, for directional
-    /// light the angular radius in radians, and for a quadrangle half of its longer edge. The holes
-    /// of rings and the shorter edges of quadrangles grow with it; a quadrangle's middle stays.
+    /// The same light with a size as in [`Light::size`]: the radius in world units, for directional
+    /// light the angular radius in radians, and for a quadrilateral half of its longer edge. The
+    /// holes of rings and the shorter edges of quadrilaterals scale with it; a quadrilateral's
+    /// centre stays.
     ///
     /// # Errors
-    /// Ambient light and cones have no size, and a quadrangle without edges has none that could
-    /// grow.
+    /// Ambient light and cones have no size, and a quadrilateral without edges cannot be scaled.
     pub fn with_size(mut self, size: f64) -> Result<Light, LightSizeError> {
         match &mut self.kind {
             LightKind::Directional { angular_radius_rad: r, .. }
@@ -233,7 +234,7 @@ impl Light {
         Ok(self)
     }
 
-    /// The same light, whose shadows are left out.
+    /// The same light without shadows.
     #[must_use]
     pub fn without_shadows(self) -> Light {
         Light { shadows: false, ..self }
@@ -245,7 +246,8 @@ impl Light {
         Light { frame: LightFrame::Camera, ..self }
     }
 
-    /// Radius or angular radius, half the longer edge of a quadrangle; 0 for a light without size.
+    /// Radius or angular radius, half the longer edge of a quadrilateral; 0 for a light without
+    /// size.
     pub fn size(&self) -> f64 {
         match self.kind {
             LightKind::Ambient | LightKind::Cone { .. } => 0.0,
@@ -258,8 +260,9 @@ impl Light {
         }
     }
 
-    /// True when it is a point at the eye: what it misses, camera rays from that point cannot see.
-    /// Mirrors, lenses and what lies behind translucent surfaces show its shadows.
+    /// True for a point light at the eye: points that it does not reach are invisible to camera
+    /// rays from the eye. Mirrors, lenses and surfaces behind translucent ones can show its
+    /// shadows.
     pub fn is_at_eye(&self) -> bool {
         if self.frame == LightFrame::World || self.size() > 0.0 {
             return false;
@@ -268,7 +271,7 @@ impl Light {
             LightKind::Point { position, .. }
             | LightKind::Spot { position, .. }
             | LightKind::Cone { position, .. } => position == DVec3::ZERO,
-            // An area is no point, and parallel light has no place.
+            // An area is not a point, and parallel light has no position.
             LightKind::Ambient
             | LightKind::Directional { .. }
             | LightKind::Ring { .. }
@@ -277,10 +280,10 @@ impl Light {
         }
     }
 
-    /// True when its light goes along the camera rays of `camera` that leave a pinhole: from the
-    /// eye of a perspective, or parallel to the rays of a parallel projection. What such a ray
-    /// meets first is lit. Parallel light along the view is no such light in perspective: there its
-    /// shadows show beside what casts them.
+    /// True when its light follows the camera rays of `camera` that leave a pinhole: from the eye
+    /// of a perspective, or parallel to the rays of a parallel projection. The first hit of such a
+    /// ray is lit. Parallel light along the view does not qualify in perspective, where its shadows
+    /// are visible next to their casters.
     pub(crate) fn follows_rays_of(&self, camera: &Camera) -> bool {
         if camera.eye().is_some() {
             return self.is_at_eye();
@@ -295,7 +298,7 @@ impl Light {
         to_light.x == 0.0 && to_light.y == 0.0 && to_light.z > 0.0
     }
 
-    /// True when its shadow rays can change a picture.
+    /// True when its shadow rays can change an image.
     pub fn casts_shadows(&self) -> bool {
         self.shadows
             && !matches!(self.kind, LightKind::Ambient)
@@ -315,7 +318,7 @@ pub(crate) fn cone_share(cos: f32, cos_inner: f32, cos_outer: f32) -> f32 {
     }
 }
 
-/// A light in render space, ready for shading.
+/// A light in render space, prepared for shading.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ResolvedLight {
     pub(crate) kind: ResolvedLightKind,
@@ -324,7 +327,7 @@ pub(crate) struct ResolvedLight {
     pub(crate) attenuation: Option<[f32; 3]>,
     pub(crate) size: f32,
     pub(crate) shadows: bool,
-    /// Whether all that camera rays meet first is lit, see [`Light::follows_rays_of`].
+    /// Whether all first hits of camera rays are lit, see [`Light::follows_rays_of`].
     pub(crate) follows_camera_rays: bool,
 }
 
@@ -360,7 +363,7 @@ pub(crate) enum ResolvedLightKind {
         cos_inner: f32,
         cos_outer: f32,
     },
-    /// The middle, half edges and the unit normal.
+    /// The centre, half edges and the unit normal.
     Quad {
         position: Vec3,
         edges: [Vec3; 2],
@@ -371,7 +374,7 @@ pub(crate) enum ResolvedLightKind {
 
 impl ResolvedLight {
     /// `light` for `camera`, whose rays go through a lens or a pinhole, in a render space with
-    /// origin `origin`. `None` for ambient light, which has no place.
+    /// origin `origin`. `None` for ambient light, which has no position.
     pub(crate) fn new(
         light: &Light,
         camera: &Camera,
@@ -431,7 +434,7 @@ impl ResolvedLight {
                 ResolvedLightKind::Quad {
                     position: point(corner + 0.5 * (a + b)),
                     edges: [a, b].map(|e| (0.5 * turned(e)).as_vec3()),
-                    // Scaled first: the product of two short edges may vanish.
+                    // Scaled first: the product of two short edges may underflow.
                     direction: vector(a.normalize_or_zero().cross(b.normalize_or_zero())),
                     both_sides,
                 }

@@ -1,18 +1,18 @@
-//! Rays counted by what they are for. Always kept: one addition per block of rays.
+//! Counts rays by kind. Counting is always on: it costs one addition per block of rays.
 
 use crate::effects::Effects;
 use std::ops::AddAssign;
 
-/// How many rays were traced, by kind, and how often each effect did something. All zero for a kind
-/// the frame did not need.
+/// How many rays were traced, by kind, and how often each effect changed something. Kinds that the
+/// frame did not need are zero.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RayStats {
-    /// Rays from the camera that can hit something (lanes outside the picture are not counted).
+    /// Rays from the camera that can hit something (lanes outside the image are not counted).
     pub primary: u64,
-    /// Rays between surfaces and lights; each further layer of a transparent blocker counts again,
-    /// unless something opaque is in the way.
+    /// Rays between surfaces and lights. Each further layer of a transparent blocker counts as
+    /// another ray, unless an opaque surface blocks the ray.
     pub shadow: u64,
-    /// Rays of ambient occlusion.
+    /// Ambient occlusion rays.
     pub ambient_occlusion: u64,
     /// Mirror and glossy reflection.
     pub reflection: u64,
@@ -24,28 +24,28 @@ pub struct RayStats {
     pub path: u64,
     /// Ray segments integrated through volumes.
     pub volume: u64,
-    /// Shadow rays that found something.
+    /// Shadow rays that hit something.
     pub shadow_blocked: u64,
-    /// Ambient occlusion rays that found something.
+    /// Ambient occlusion rays that hit something.
     pub ambient_occlusion_blocked: u64,
-    /// Shadow and ambient occlusion rays that nothing opaque ended, as often as it was asked which
-    /// surface that lets light through comes next. All others only needed to know whether anything
-    /// is in their way.
+    /// Closest-hit queries for the next transmissive surface, of shadow and ambient occlusion rays
+    /// that no opaque surface blocks. All other rays need only an any-hit query.
     pub light_closest: u64,
-    /// Surfaces that were looked up because light may pass through them.
+    /// Surfaces that were looked up because they may transmit light.
     pub light_lookups: u64,
-    /// Paths cut because they reached `max_bounces`; their rest is missing from the picture.
+    /// Paths ended because they reached `max_bounces`; their remaining light is missing from the
+    /// image.
     pub cut_at_max_bounces: u64,
-    /// Rays left out because less than `min_contribution` of what they would have met reaches the
-    /// pixel; paths never are.
+    /// Rays that were not sent because less than `min_contribution` of their radiance reaches the
+    /// pixel; path tracing sends all of them.
     pub cut_at_min_contribution: u64,
-    /// Hits on surfaces with opacity below 1 that were drawn opaque because transparency was left
-    /// out.
+    /// Hits on surfaces with opacity below 1 that were rendered opaque because transparency was
+    /// left out.
     pub opacity_ignored: u64,
 }
 
 impl RayStats {
-    /// Every ray, primary and secondary.
+    /// Number of rays of all kinds.
     pub fn total(&self) -> u64 {
         self.primary
             + self.shadow
@@ -56,8 +56,8 @@ impl RayStats {
             + self.path
     }
 
-    /// How often `effect` (one of [`Effects::ALL`]) changed what a ray sees. 0 means that no pixel
-    /// differs because of it. `None` where that is not counted (the lens moves every ray).
+    /// How often `effect` (one of [`Effects::ALL`]) changed what a ray sees. 0 means that it
+    /// changes no pixel. `None` for effects that are not counted (the lens moves every ray).
     pub fn times_effective(&self, effect: Effects) -> Option<u64> {
         if effect == Effects::SHADOWS || effect == Effects::SOFT_SHADOWS {
             Some(self.shadow_blocked)

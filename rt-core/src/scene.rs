@@ -1,4 +1,5 @@
-//! What is drawn: geometry in a [`World`], how each instance looks, lights and surroundings.
+//! Describes a scene: geometry in a [`World`], the appearance of each instance, lights and
+//! environment.
 //!
 //! ```
 //! use rt_core::glam::{DVec3, Vec3};
@@ -36,7 +37,7 @@ use glam::DAffine3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// How one instance looks.
+/// The appearance of one instance.
 #[derive(Debug, Clone, Default)]
 pub struct Appearance {
     /// Index into [`Scene::materials`].
@@ -47,12 +48,12 @@ pub struct Appearance {
 }
 
 impl Appearance {
-    /// A material and the geometry's own attributes.
+    /// An appearance with a material and the geometry's own attributes.
     pub fn new(material: usize) -> Appearance {
         Appearance { material, ..Appearance::default() }
     }
 
-    /// Colours in place of the mesh's own (linear RGBA): recolouring needs no new acceleration
+    /// Colours that replace the mesh's own (linear RGBA). Recolouring needs no new acceleration
     /// structure.
     #[must_use]
     pub fn with_colors(mut self, colors: impl Into<Arc<Attribute<[f32; 4]>>>) -> Appearance {
@@ -62,49 +63,49 @@ impl Appearance {
         self
     }
 
-    /// Scalars in place of the mesh's own.
+    /// Scalars that replace the mesh's own.
     #[must_use]
     pub fn with_scalars(mut self, scalars: impl Into<Arc<Attribute<f32>>>) -> Appearance {
         self.scalars = Some(scalars.into());
         self
     }
 
-    /// Colours in place of the mesh's own.
+    /// Colours that replace the mesh's own.
     pub fn colors(&self) -> Option<&Attribute<[f32; 4]>> {
         self.colors.as_deref()
     }
 
-    /// Scalars in place of the mesh's own.
+    /// Scalars that replace the mesh's own.
     pub fn scalars(&self) -> Option<&Attribute<f32>> {
         self.scalars.as_deref()
     }
 }
 
-/// Dimming of ambient and environment light by near surfaces.
+/// Attenuation of ambient and environment light by near surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmbientOcclusion {
-    /// How far a surface can be and still dim, world units; infinity for no limit.
+    /// Largest distance of an occluder, world units; infinity for no limit.
     pub distance: f64,
     /// Rays per shaded point and sample.
     pub rays: u32,
 }
 
-/// A volume placed in the world. Where volumes overlap, their media mix.
+/// A volume placed in the world. Where volumes overlap, their media are mixed.
 #[derive(Clone)]
 pub struct VolumeInstance {
     /// The medium.
     pub volume: Arc<Volume>,
-    /// Object to world. Extinction is per object-space length: a volume scaled up is thicker, not
-    /// denser.
+    /// Object to world. Extinction is per object-space length: scaling a volume up makes it
+    /// thicker, not denser.
     pub world_from_object: DAffine3,
 }
 
-/// What is asked of all colours of an attribute in every frame.
+/// Properties of an attribute's colours that every frame needs.
 #[derive(Debug, Clone, Copy, Default)]
 struct ColorSummary {
-    /// One lets light through.
+    /// Whether a colour is transparent.
     transparent: bool,
-    /// The first that is NaN or infinite in a channel.
+    /// The first colour with a NaN or infinite channel.
     unusable: Option<usize>,
 }
 
@@ -125,8 +126,8 @@ impl ColorSummary {
     }
 }
 
-/// Everything that is drawn. Materials, lights and appearances may change between frames; the world
-/// is built once.
+/// A scene to render. Materials, lights and appearances may change between frames; the world is
+/// built once.
 #[derive(Clone)]
 pub struct Scene {
     /// Geometry.
@@ -141,21 +142,21 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// What fills uncovered pixels.
     pub background: Background,
-    /// Ambient occlusion; `None` for none.
+    /// Ambient occlusion; `None` disables it.
     pub ambient_occlusion: Option<AmbientOcclusion>,
-    /// Direct volume rendering, in front of, between and behind surfaces. Volumes cast no shadows
-    /// and have no depth.
+    /// Volumes to render, in front of, between and behind surfaces. Volumes cast no shadows and
+    /// have no depth.
     pub volumes: Vec<VolumeInstance>,
     geometry_colors: Vec<ColorSummary>,
 }
 
-/// Why a scene cannot be drawn.
+/// Why a scene cannot be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// The world could not be built.
     #[error(transparent)]
     Build(#[from] BuildError),
-    /// Appearances and instances do not match.
+    /// The numbers of appearances and instances differ.
     #[error("scene has {appearances} appearances for {instances} instances; give one per instance")]
     Appearances {
         /// How many there are.
@@ -163,14 +164,14 @@ pub enum SceneError {
         /// How many are needed.
         instances: usize,
     },
-    /// An appearance names a material that does not exist.
+    /// The index of an appearance's material is out of range.
     #[error("appearance {appearance} uses material {material}, but there are only {count}")]
     NoSuchMaterial {
         /// Index of the appearance.
         appearance: usize,
-        /// The material it names.
+        /// Index of the material.
         material: usize,
-        /// How many there are.
+        /// Number of materials.
         count: usize,
     },
     /// [`Scene::world`] was replaced by one with other geometries.
@@ -185,14 +186,14 @@ pub enum SceneError {
         /// Geometries of the world it has.
         found: usize,
     },
-    /// A number of a material, a light, the environment, ... is out of range.
+    /// A parameter of a material, a light, the environment, ... is out of range.
     #[error("{what} {index}: {field} is {value}; it must be {rule}")]
     OutOfRange {
         /// "material", "light", "environment", ...
         what: &'static str,
         /// Its index.
         index: usize,
-        /// Which number.
+        /// The parameter.
         field: &'static str,
         /// Its value.
         value: String,
@@ -242,10 +243,10 @@ impl Scene {
         }
     }
 
-    /// Requests in the scene that cannot change a pixel, in words: ambient occlusion without
+    /// Warnings about settings of the scene that cannot change a pixel: ambient occlusion without
     /// ambient light, colour maps without scalars, textures without coordinates, colours that a
-    /// material does not look at, attenuation of light from infinitely far. They are part of every
-    /// render report.
+    /// material does not use, attenuation of light from infinitely far. Every render report
+    /// contains them.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         if self.ambient_occlusion.is_some() && !self.has_ambient() {
@@ -267,7 +268,7 @@ impl Scene {
                 ));
             }
         }
-        // Of each material, what was said already.
+        // For each material, the warnings already given.
         let mut told = vec![[false; 5]; self.materials.len()];
         for (i, (a, instance)) in self.appearances.iter().zip(self.world.instances()).enumerate() {
             let Some(material) = self.materials.get(a.material) else { continue };
@@ -293,7 +294,8 @@ impl Scene {
     }
 }
 
-/// What a material has that this instance has no use for, or the other way round: in words of each.
+/// Warnings about settings of a material that this instance cannot use, and about attributes that
+/// its material does not use.
 fn unused(
     material: &Material,
     look: &Appearance,
@@ -306,7 +308,7 @@ fn unused(
     };
     let by_scalars = matches!(material.color_source, ColorSource::Scalars(_));
     let by_texture = matches!(material.color_source, ColorSource::Texture(_));
-    // Whether a shape has scalars shows only at its hits.
+    // Whether a shape has scalars is known only at its hits.
     let no_scalars = mesh.is_some_and(|m| m.scalars.is_none() && look.scalars.is_none());
     let no_coordinates = mesh.is_none_or(|m| m.texcoords.is_none());
     let no_maps = material.maps.as_ref().and_then(|d| match mesh {
@@ -326,7 +328,7 @@ fn unused(
     ]
 }
 
-/// Collects a scene piece by piece.
+/// Builds a scene from its elements.
 #[derive(Default)]
 pub struct SceneBuilder {
     geometries: Vec<Geometry>,
@@ -351,19 +353,19 @@ impl SceneBuilder {
         SceneBuilder::default()
     }
 
-    /// Adds a material; the result names it for [`SceneBuilder::instance`].
+    /// Adds a material. Pass the returned index to [`SceneBuilder::instance`].
     pub fn material(&mut self, material: Material) -> usize {
         self.materials.push(material);
         self.materials.len() - 1
     }
 
-    /// Adds a geometry without placing it; the result names it for [`SceneBuilder::instance`].
+    /// Adds a geometry without an instance. Pass the returned index to [`SceneBuilder::instance`].
     pub fn geometry(&mut self, geometry: Geometry) -> usize {
         self.geometries.push(geometry);
         self.geometries.len() - 1
     }
 
-    /// Places a geometry. Returns the index of the instance.
+    /// Adds an instance of a geometry. Returns the index of the instance.
     pub fn instance(
         &mut self,
         geometry: usize,
@@ -375,14 +377,14 @@ impl SceneBuilder {
         self.instances.len() - 1
     }
 
-    /// Adds a mesh at its place. Returns the index of the instance.
+    /// Adds a mesh and an instance of it, without a transform. Returns the index of the instance.
     pub fn mesh(&mut self, mesh: impl Into<Arc<TriMesh>>, material: Material) -> usize {
         let (g, m) = (self.geometry(Geometry::Mesh(mesh.into())), self.material(material));
         self.instance(g, DAffine3::IDENTITY, Appearance::new(m))
     }
 
-    /// Adds a shape (spheres, tubes, isosurface, own geometry) at its place. Returns the index of
-    /// the instance.
+    /// Adds a shape (spheres, tubes, isosurface, user-defined geometry) and an instance of it,
+    /// without a transform. Returns the index of the instance.
     pub fn shape(&mut self, shape: Arc<dyn Shape>, material: Material) -> usize {
         let (g, m) = (self.geometry(Geometry::Shape(shape)), self.material(material));
         self.instance(g, DAffine3::IDENTITY, Appearance::new(m))
@@ -393,13 +395,13 @@ impl SceneBuilder {
         self.lights.push(light);
     }
 
-    /// Adds a volume at its place.
+    /// Adds a volume without a transform.
     pub fn volume(&mut self, volume: impl Into<Arc<Volume>>) {
         self.volumes
             .push(VolumeInstance { volume: volume.into(), world_from_object: DAffine3::IDENTITY });
     }
 
-    /// Builds the world and checks everything.
+    /// Builds the world and checks the scene.
     pub fn build(self) -> Result<Scene, SceneError> {
         let world = World::build(self.geometries, self.instances, &self.build_options)?;
         let mut scene = Scene::new(world);

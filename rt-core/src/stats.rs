@@ -1,7 +1,6 @@
-//! Work counters inside the traversal loops, compiled out unless the feature `stats` is on. Counted
-//! per thread.
+//! Work counters inside the traversal loops, per thread. Compiled only with the feature `stats`.
 
-/// What is counted.
+/// The counted events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counter {
     /// Nodes whose eight boxes were tested.

@@ -1,4 +1,4 @@
-//! Instruction sets, and the few places where speed needs `unsafe`.
+//! Instruction sets, and the few operations whose speed needs `unsafe`.
 #![allow(
     unsafe_code,
     reason = "one of the workspace's rooms for unsafe code: each block says why it is sound"
@@ -13,8 +13,8 @@ use fearless_simd::Level;
 pub(crate) use prefetch::{prefetch, prefetch_item};
 pub(crate) use stack::{Stack, StackMemory};
 
-/// An instruction set the kernels can be limited to, for tests and for measurements against peers
-/// at the same level.
+/// An instruction set to which the kernels can be limited, for tests and for comparisons with other
+/// ray tracers at the same level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
     /// 128-bit, the x86-64 baseline.
@@ -30,7 +30,7 @@ pub enum SimdLevel {
 }
 
 impl SimdLevel {
-    /// The levels this machine can run, lowest first. Empty on a machine without any.
+    /// The levels that this machine supports, lowest first. Empty if it supports none.
     pub fn available() -> Vec<SimdLevel> {
         let _level = Level::new();
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -66,7 +66,7 @@ impl SimdLevel {
         }
     }
 
-    /// The level as fearless_simd knows it; the machine's best where none is asked for.
+    /// The level as fearless_simd represents it; `None` gives the machine's best.
     pub(crate) fn resolve(wanted: Option<SimdLevel>) -> Result<Level, UnavailableLevel> {
         let best = Level::new();
         let Some(wanted) = wanted else { return Ok(best) };
@@ -91,7 +91,7 @@ impl SimdLevel {
     wanted.name(), available_names()
 )]
 pub struct UnavailableLevel {
-    /// The level asked for.
+    /// The requested level.
     pub wanted: SimdLevel,
 }
 
