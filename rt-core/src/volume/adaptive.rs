@@ -1,15 +1,15 @@
 //! Integration of one cell to a tolerance.
 //!
-//! The scalar along the ray is a cubic. A stretch of it becomes one homogeneous layer with the
-//! exact mean of the transfer function over its chord. That is wrong in four ways, and a stretch is
-//! cut further until each is small enough:
+//! The scalar along the ray is a cubic. An interval of it becomes one homogeneous layer with the
+//! exact mean of the transfer function over its chord. This has four errors, and an interval is
+//! split until each is small enough:
 //!
 //! 1. the curve is not its chord: the layer differs from the layers of the two parts;
-//! 2. the curve leaves the range of its ends and meets, there, a bend of the transfer function that
-//!    no sample has seen;
-//! 3. the curve reaches a step of the transfer function elsewhere than its chord does;
-//! 4. colours are mixed, not put one behind the other: seen as a difference too, but only when both
-//!    parts have some thickness.
+//! 2. the curve leaves the range of its ends and reaches, there, a bend of the transfer function
+//!    that no sample has seen;
+//! 3. the curve reaches a step of the transfer function at another parameter than its chord does;
+//! 4. colours are mixed instead of composited in order: also visible as a difference, but only when
+//!    both parts have some thickness.
 
 use super::Volume;
 use super::layer::{Layer, MarchState};
@@ -17,21 +17,21 @@ use super::shading::ShadingCurve;
 use crate::grid_walk::Crossing;
 use crate::ray_cubic;
 
-/// Where a stretch is cut. Not in the middle: an antisymmetric cubic passes through the middle of
-/// its chord, and would seem straight.
+/// Where an interval is split. Not in the middle: an antisymmetric cubic passes through the middle
+/// of its chord, and would seem straight.
 const SPLIT: f64 = 0.375;
-/// A layer is off by the cube of its length (curvature, order of colours): two parts have a quarter
-/// of the error of one, a third of the difference between them.
+/// The error of a layer is proportional to the cube of its length (curvature, order of colours):
+/// two parts have a quarter of the error of one, a third of the difference between them.
 const REFINEMENT_GAIN: f64 = 3.0;
-/// Cuts of a cell's stretch at most: to less than 2⁻⁸ of a cell.
+/// Largest number of splits of a cell's interval: to less than 2⁻⁸ of a cell.
 const MAX_SPLITS: usize = 12;
-/// Cuts for the sake of something that no sample shows.
+/// Largest number of splits for features that no sample shows.
 const MAX_BLIND_SPLITS: u32 = 6;
-/// A part with less of the optical thickness than this, relative to the other, shows nothing about
-/// the order of colours.
+/// A part with less than this share of the other's optical thickness gives no information on the
+/// order of colours.
 const MIN_ORDER_THICKNESS: f64 = 0.1;
 
-/// A stretch of a cell that waits to be agreed on.
+/// An interval of a cell that still has to be integrated.
 #[derive(Clone, Copy)]
 struct CubicSegment {
     ta: f64,
@@ -57,8 +57,8 @@ impl Volume {
         let ends = [self.transfer.integral(b[0]), self.transfer.integral(b[3])];
         let layer = self.layer(lit, per_t, c.t0, c.t1, b, &ends);
         m.samples += 1;
-        // What is wrong in one place of a cell, not all along it, may use half of the cell's share
-        // of the tolerance.
+        // An error at one point of a cell, not all along it, may use half of the cell's share of
+        // the tolerance.
         let local_share = 0.5 * m.error_per_length * (c.t1 - c.t0) * per_t;
         // Depth first with the near part on top: the stack holds one far part per level.
         let mut stack =
@@ -95,7 +95,7 @@ impl Volume {
         }
     }
 
-    /// The stretch as one layer, its scalar taken as linear; `ends` are the transfer function's
+    /// The interval as one layer, with a linear scalar; `ends` are the transfer function's
     /// integrals at its ends.
     #[inline]
     fn layer(
@@ -120,8 +120,8 @@ impl Volume {
         Layer { tau: sigma.max(0.0) * (tb - ta) * per_t, color }
     }
 
-    /// Error 2: whether the scalar may leave the range between its ends and get, there, to where
-    /// the transfer function bends.
+    /// Error 2: whether the scalar may leave the range between its ends and reach, there, a bend of
+    /// the transfer function.
     #[inline]
     fn may_hide_something(&self, b: &[f64; 4]) -> bool {
         let (s0, s1) = (b[0].min(b[3]), b[0].max(b[3]));
@@ -130,7 +130,7 @@ impl Volume {
             || (hi > s1 && self.transfer.has_knot_between(s1, hi))
     }
 
-    /// Error 3: optical thickness that steps of the transfer function can be wrong by.
+    /// Error 3: the error of optical thickness that steps of the transfer function can cause.
     #[inline]
     fn step_error(&self, b: &[f64; 4], length: f64) -> f64 {
         let (lo, hi) = ray_cubic::hull(b);
@@ -145,8 +145,8 @@ impl Volume {
     }
 
     /// Error 4, where the parts' difference does not show it: colours that differ by δ within a
-    /// layer of opacity a, mixed instead of ordered, are off by at most a²·δ/4 (half of the layer
-    /// in front of the other half).
+    /// layer of opacity a, mixed instead of ordered, have an error of at most a²·δ/4 (half of the
+    /// layer in front of the other half).
     #[inline]
     fn order_error(&self, first: &Layer, near: &[f64; 4], second: &Layer, far: &[f64; 4]) -> f64 {
         let (small, big, b) =

@@ -1,10 +1,10 @@
-//! Volumes in bricks: what several holders of one volume need so that together they see what one
-//! would.
+//! Volumes in bricks, so that several data servers of one volume together compute the result of the
+//! whole volume.
 //!
-//! A ray meets the blocks of a grid in an order that depends on the ray alone, and what a block
-//! adds depends only on what was collected in front of it. So a ray may be carried from brick to
-//! brick together with what it has collected ([`PartialIntegral`]): the result has the bits of one
-//! march through the whole.
+//! The order in which a ray visits the blocks of a grid depends on the ray alone, and the
+//! contribution of a block depends only on what was collected in front of it. So a ray may be
+//! passed from brick to brick together with what it has collected ([`PartialIntegral`]): the result
+//! has the bits of one march through the whole volume.
 
 use super::layer::MarchState;
 use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
@@ -12,8 +12,8 @@ use crate::grid::Grid;
 use glam::UVec3;
 use std::sync::Arc;
 
-/// Layers of points around a brick: a gradient takes the points on both sides of a cell's corners,
-/// and the end of a ray's way through a cell may be rounded into the next one.
+/// Ghost layers of points around a brick: a gradient uses the points on both sides of a cell's
+/// corners, and the end of a ray's segment in a cell may be rounded into the next one.
 const GHOSTS: u32 = 2;
 
 /// A box of blocks of [`MACROCELL`]³ cells: from `first` to before `end`.
@@ -21,23 +21,23 @@ const GHOSTS: u32 = 2;
 pub struct Brick {
     /// Lowest block.
     pub first: UVec3,
-    /// Beyond the highest block, on each axis.
+    /// One past the highest block, on each axis.
     pub end: UVec3,
 }
 
 impl Brick {
-    /// Whether there is no block in it.
+    /// Whether it contains no block.
     pub fn is_empty(&self) -> bool {
         self.first.cmpge(self.end).any()
     }
 
-    /// Whether a block is in it.
+    /// Whether it contains a block.
     pub fn contains(&self, block: UVec3) -> bool {
         block.cmpge(self.first).all() && block.cmplt(self.end).all()
     }
 }
 
-/// What a ray has collected so far, on its way from brick to brick.
+/// What a ray has collected so far, passed from brick to brick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartialIntegral {
     color: [f64; 3],
@@ -57,7 +57,7 @@ impl PartialIntegral {
     /// Words of [`PartialIntegral::to_words`].
     pub const WORDS: usize = 11;
 
-    /// For a message.
+    /// Encodes the integral for a message.
     pub fn to_words(&self) -> [u32; PartialIntegral::WORDS] {
         let [r, g, b] = self.color;
         let mut words = [0; PartialIntegral::WORDS];
@@ -71,7 +71,7 @@ impl PartialIntegral {
         words
     }
 
-    /// What [`PartialIntegral::to_words`] has made.
+    /// Decodes the words of [`PartialIntegral::to_words`].
     pub fn from_words(words: &[u32; PartialIntegral::WORDS]) -> PartialIntegral {
         let number =
             |i: usize| f64::from_bits(u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32);
@@ -83,7 +83,7 @@ impl PartialIntegral {
         }
     }
 
-    /// At the end of the way.
+    /// The result at the end of the ray.
     pub fn sample(&self) -> VolumeSample {
         let [r, g, b] = self.color.map(|c| c as f32);
         VolumeSample {
@@ -93,7 +93,7 @@ impl PartialIntegral {
         }
     }
 
-    /// Whether so little light passes that nothing behind counts.
+    /// Whether so little light passes that nothing behind matters.
     pub fn is_opaque(&self, quality: &VolumeQuality) -> bool {
         self.samples > 0 && self.march(*quality, 1.0).is_opaque()
     }
@@ -118,12 +118,13 @@ impl From<MarchState> for PartialIntegral {
 }
 
 impl Volume {
-    /// Blocks per axis, of the whole.
+    /// Blocks per axis of the whole volume.
     pub fn blocks(&self) -> UVec3 {
         self.blocks
     }
 
-    /// Whether a block here has any extinction. False for blocks that a brick does not hold.
+    /// Whether a block that is held here has any extinction. False for blocks that a brick does not
+    /// hold.
     pub fn is_occupied(&self, block: UVec3) -> bool {
         block.cmplt(self.blocks).all() && self.occupied[self.block_index(block)]
     }
@@ -133,8 +134,8 @@ impl Volume {
         (z * self.blocks.y as usize + y) * self.blocks.x as usize + x
     }
 
-    /// What a holder of `brick` needs: the values of its cells with two layers of points around
-    /// them, for gradients. The rest of the whole is clear here. See
+    /// The data that a data server of `brick` needs: the values of its cells with two ghost layers
+    /// of points, for gradients. The rest of the volume is clear here. See
     /// [`RaySegments`](super::RaySegments) for an example.
     pub fn part(&self, brick: Brick) -> Volume {
         let cells = self.cells();

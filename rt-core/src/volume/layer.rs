@@ -1,4 +1,4 @@
-//! Homogeneous slabs, and what a ray has collected from those it has passed.
+//! Homogeneous slabs, and the sum that a ray has collected from those it has passed.
 
 use super::VolumeQuality;
 
@@ -39,7 +39,7 @@ impl Layer {
     }
 }
 
-/// A ray on its way.
+/// State of a ray during the march.
 pub(super) struct MarchState {
     pub(super) color: [f64; 3],
     pub(super) transmittance: f64,

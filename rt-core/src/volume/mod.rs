@@ -1,11 +1,11 @@
 //! Direct volume rendering: emission and absorption along a ray through a uniform grid (Max 1995,
 //! "Optical Models for Direct Volume Rendering", eq. 7), front to back.
 //!
-//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut until it is straight
-//! enough, and over straight stretches the transfer function is integrated exactly
-//! ([`TransferFunction`]), so thin shells are not stepped over. "Straight enough" means: one
-//! stretch and its two parts differ by less than the stretch's share of the tolerance, and steps of
-//! the transfer function are met where they are.
+//! Along a ray the trilinear interpolant of a cell is a cubic. It is split until each interval is
+//! nearly straight, and over such intervals the transfer function is integrated exactly
+//! ([`TransferFunction`]), so thin shells are not skipped. An interval is nearly straight when it
+//! and its two parts differ by less than its share of the tolerance; steps of the transfer function
+//! are taken into account where they are.
 //!
 //! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no
 //! extinction, then by cells.
@@ -39,21 +39,21 @@ use layer::{Layer, MarchState};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Cells along an edge of the blocks by which empty space is skipped.
+/// Cells along an edge of the blocks used to skip empty space.
 pub const MACROCELL: u32 = 8;
 
-/// What accuracy to spend time on.
+/// Accuracy of the integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum VolumeQuality {
     /// Adaptive: estimated error of the colour and opacity of a ray, in levels of 1/255 (linear)
-    /// for colours up to 1. Half of it is spent on integration, half on ending the ray when hardly
-    /// any light passes.
+    /// for colours up to 1. Half of it is for the integration, half for ending the ray when almost
+    /// no light passes.
     Tolerance {
         /// Levels, at least 10⁻⁶.
         levels: f32,
     },
-    /// Classical: one sample in the middle of each step, opacity corrected for the step. Can step
-    /// over thin shells; for comparison.
+    /// Classical: one sample in the middle of each step, opacity corrected for the step. It can
+    /// miss thin shells; for comparison.
     Step {
         /// Step in units of the smallest grid spacing.
         voxels: f32,
@@ -61,7 +61,7 @@ pub enum VolumeQuality {
 }
 
 impl Default for VolumeQuality {
-    /// Half a level: below what an 8-bit image can show.
+    /// Half a level: less than an 8-bit image can show.
     fn default() -> Self {
         VolumeQuality::Tolerance { levels: 0.5 }
     }
@@ -70,22 +70,23 @@ impl Default for VolumeQuality {
 /// What a ray collected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VolumeSample {
-    /// Linear colour, premultiplied by its opacity, and opacity: put it over what is behind `t1`.
+    /// Linear colour, premultiplied by its opacity, and opacity: composite it over what is behind
+    /// `t1`.
     pub rgba: [f32; 4],
     /// Ray parameter at which the opacity reaches 50 %; infinite when it does not.
     pub depth: f32,
-    /// Stretches of the ray whose transfer function was integrated (or samples taken, with fixed
+    /// Intervals of the ray whose transfer function was integrated (or samples taken, with fixed
     /// steps).
     pub samples: u32,
 }
 
 impl VolumeSample {
-    /// Nothing in the way.
+    /// Fully transparent.
     pub const CLEAR: VolumeSample =
         VolumeSample { rgba: [0.0; 4], depth: f32::INFINITY, samples: 0 };
 }
 
-/// Sizes of a volume, and what is left out of it.
+/// Sizes of a volume, and the cells left out of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct VolumeReport {
     /// Cells of the grid.
@@ -94,7 +95,7 @@ pub struct VolumeReport {
     pub cells_non_finite: u64,
     /// Blocks of [`MACROCELL`]³ cells.
     pub macrocells: u64,
-    /// Blocks without extinction, which are skipped whole.
+    /// Blocks without extinction, which are skipped entirely.
     pub macrocells_clear: u64,
 }
 
@@ -120,11 +121,11 @@ pub struct Volume {
     grid: Arc<Grid>,
     transfer: TransferFunction,
     options: VolumeOptions,
-    /// Points per axis of the whole; those of `grid` unless this is a part.
+    /// Points per axis of the whole volume; those of `grid` unless this is a part.
     dims: UVec3,
-    /// The origin of the whole.
+    /// The origin of the whole volume.
     origin: DVec3,
-    /// Point of the whole where `grid` begins.
+    /// Point of the whole volume where `grid` begins.
     first_point: UVec3,
     /// Smallest and largest finite value of each block, x fastest.
     ranges: Vec<[f32; 2]>,
@@ -135,7 +136,7 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// A volume of `grid` seen through `transfer`.
+    /// A volume of `grid` with the transfer function `transfer`.
     pub fn new(
         grid: Arc<Grid>,
         transfer: TransferFunction,
@@ -181,7 +182,7 @@ impl Volume {
         Ok(v)
     }
 
-    /// Looks through another transfer function; only the list of empty blocks is made anew.
+    /// Sets another transfer function; only the list of empty blocks is recomputed.
     pub fn set_transfer_function(&mut self, transfer: TransferFunction) {
         self.transfer = transfer;
         self.find_occupied();
@@ -193,18 +194,19 @@ impl Volume {
         self.report.macrocells_clear = self.occupied.iter().filter(|o| !**o).count() as u64;
     }
 
-    /// World position of object space's origin: that of the grid, of the whole one for a part.
+    /// World position of object space's origin: that of the grid; for a part, that of the whole
+    /// grid.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// Bounds relative to [`Volume::origin`], of the whole.
+    /// Bounds of the whole volume relative to [`Volume::origin`].
     pub fn bounds(&self) -> Aabb {
         let max_corner = self.origin + self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
         outward_box(DVec3::ZERO, max_corner - self.origin)
     }
 
-    /// The grid; of a part, what it holds.
+    /// The grid; for a part, the points that it holds.
     pub fn grid(&self) -> &Arc<Grid> {
         &self.grid
     }
@@ -214,14 +216,14 @@ impl Volume {
         &self.transfer
     }
 
-    /// Sizes, and cells that are left out.
+    /// Sizes, and cells left out.
     pub fn report(&self) -> VolumeReport {
         self.report
     }
 
     /// Colour and opacity between `t0` and `t1` of a ray in object space (and within the ray's own
-    /// range). To place surfaces inside, integrate up to the surface, then on behind it; the pieces
-    /// compose to the whole within the tolerance.
+    /// range). To place surfaces inside, integrate up to the surface, then from the surface on; the
+    /// results composite to the whole within the tolerance.
     pub fn integrate(&self, ray: &Ray, t0: f32, t1: f32, quality: &VolumeQuality) -> VolumeSample {
         let (t0, t1) = (f64::from(t0.max(ray.t_min)), f64::from(t1.min(ray.t_max)));
         if !(ray.is_valid() && t0 < t1) {
@@ -234,7 +236,7 @@ impl Volume {
             .sample()
     }
 
-    /// Whether cells are boxes around the points of the grid, and not between them.
+    /// Whether cells are boxes around the points of the grid instead of between them.
     pub fn has_cells_around_points(&self) -> bool {
         self.is_nearest()
     }
@@ -243,20 +245,19 @@ impl Volume {
         self.options.interpolation == Interpolation::Nearest
     }
 
-    /// Cells per axis of the whole: between points, or boxes around them.
+    /// Cells per axis of the whole volume: between points, or boxes around them.
     fn cells(&self) -> UVec3 {
         if self.is_nearest() { self.dims } else { self.dims - UVec3::ONE }
     }
 
-    /// The ray in indices of cells, their number, and the part of `t0..t1` that is inside the
-    /// bounds.
+    /// The ray in cell indices, the number of cells, and the part of `t0..t1` inside the bounds.
     fn index_ray(&self, ray: &Ray, t0: f64, t1: f64) -> (IndexRay, UVec3, f64, f64) {
         let (o, d, spacing) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), self.grid.spacing);
         if !self.is_nearest() {
             return (IndexRay::new(o, d, spacing), self.cells(), t0, t1);
         }
-        // Cells are the boxes around points: half a spacing further out than the bounds, where they
-        // are cut.
+        // Cells are boxes around points: they extend half a spacing past the bounds, where they are
+        // clipped.
         let max_corner = self.origin + spacing * (self.dims - UVec3::ONE).as_dvec3();
         let (near, far) = within(o, d, max_corner - self.origin);
         (IndexRay::new(o + 0.5 * spacing, d, spacing), self.cells(), t0.max(near), t1.min(far))
@@ -277,7 +278,7 @@ impl Volume {
         if t0 >= t1 {
             return before.march(*quality, 0.0);
         }
-        // The error budget is handed out by length of path through the grid.
+        // The error budget is distributed by length of path through the grid.
         let mut inside = (0.0, 0.0);
         let whole = cells.iter().max().copied().unwrap_or(1);
         index_ray.walk([0; 3], cells, cells, whole, t0, t1, |c| {
@@ -296,7 +297,7 @@ impl Volume {
         m
     }
 
-    /// Goes on from `ta` to `tb`, within one block. The ray comes into the grid at `anchor`.
+    /// Continues from `ta` to `tb`, within one block. The ray enters the grid at `anchor`.
     fn march_block(
         &self,
         ray: &IndexRay,
@@ -360,8 +361,8 @@ impl Volume {
         match m.quality {
             VolumeQuality::Tolerance { .. } => self.march_adaptive(light.as_ref(), per_t, c, &b, m),
             VolumeQuality::Step { voxels } => {
-                // Steps lie at multiples of the step from where the ray enters the grid, cut at
-                // cell faces.
+                // Samples lie at multiples of the step from where the ray enters the grid, clipped
+                // at cell faces.
                 let step = f64::from(voxels).max(1e-3) * self.grid.spacing.min_element() / per_t;
                 let mut t = c.t0;
                 let mut k = ((t - anchor) / step).floor();
@@ -385,7 +386,7 @@ impl Volume {
         }
     }
 
-    /// Whether no scalar the cubic can take has any extinction.
+    /// Whether no scalar in the cubic's range has any extinction.
     #[inline]
     fn is_clear(&self, b: &[f64; 4]) -> bool {
         let (lo, hi) = ray_cubic::hull(b);
@@ -393,7 +394,7 @@ impl Volume {
     }
 }
 
-/// Where a ray is inside the box from zero to `size`.
+/// The interval in which a ray is inside the box from zero to `size`.
 fn within(o: DVec3, d: DVec3, size: DVec3) -> (f64, f64) {
     let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
     for a in 0..3 {

@@ -1,4 +1,4 @@
-//! How a volume looks: shading, blending, and the checks of both.
+//! Appearance of a volume: shading, blending, and the checks of both.
 
 use glam::{UVec3, Vec3};
 use std::sync::Arc;
@@ -14,12 +14,12 @@ pub enum VolumeError {
         /// Points per axis.
         dims: UVec3,
     },
-    /// A bad parameter of the shading, the lights or the gradient opacity.
+    /// An invalid parameter of the shading, the lights or the gradient opacity.
     #[error("volume shading: {field} is {value}; it must be {rule}")]
     Shading {
-        /// Which one.
+        /// The parameter.
         field: &'static str,
-        /// What was given.
+        /// Its value.
         value: f32,
         /// What is allowed.
         rule: &'static str,
@@ -39,7 +39,7 @@ pub enum VolumeHighlight {
 
 /// Lambert shading by the gradient, two-sided, with a light at the viewer or in a fixed direction.
 /// It multiplies the colour by `ambient + diffuse·|n·l|` where the gradient is steep, and by 1
-/// where there is none; a highlight is added.
+/// where there is none, and adds a highlight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VolumeShading {
     /// Part of the colour that needs no light, 0..=1.
@@ -56,7 +56,7 @@ pub struct VolumeShading {
     /// Its form.
     pub highlight: VolumeHighlight,
     /// Gradient, in value per world unit, at which the shading has half its effect. With 0 it has
-    /// all of it everywhere, and only `ambient` where there is no gradient (VTK).
+    /// its full effect everywhere, and only `ambient` where there is no gradient (VTK).
     pub half_gradient: f32,
 }
 
@@ -84,12 +84,12 @@ pub struct VolumeLight {
     pub color: [f32; 3],
 }
 
-/// Extinction that depends on the gradient too (Levoy 1988, "Display of Surfaces from Volume
-/// Data"): that of the transfer function times this.
+/// Extinction that also depends on the gradient (Levoy 1988, "Display of Surfaces from Volume
+/// Data"): the transfer function's extinction times this factor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GradientOpacity {
-    /// Factors for gradients from zero to `steepest`, evenly spaced, linear between; the last holds
-    /// for steeper ones too.
+    /// Factors for gradients from zero to `steepest`, evenly spaced, linear between; the last also
+    /// applies to steeper gradients.
     pub factors: Arc<[f32]>,
     /// Gradient of the last factor, in value per world unit.
     pub steepest: f32,
@@ -101,15 +101,16 @@ impl GradientOpacity {
     pub fn at(&self, steepness: f64) -> f64 {
         let last = self.factors.len() - 1;
         let x = (steepness / f64::from(self.steepest)).clamp(0.0, 1.0) * last as f64;
-        // `clamp` leaves what is not a number, which `as` sends to the first entry.
+        // `clamp` keeps NaN, which `as` maps to the first entry.
         let i = (x as usize).min(last.saturating_sub(1));
         let [a, b] = [i, (i + 1).min(last)].map(|i| f64::from(self.factors[i]));
         a + (b - a) * (x - i as f64)
     }
 }
 
-/// What a ray makes of the scalars it meets. All but [`Blend::Composite`] take the transfer
-/// function's extinction for an opacity (of at most 1), or a weight: they know no thickness.
+/// How the scalars along a ray are combined. All modes but [`Blend::Composite`] interpret the
+/// transfer function's extinction as an opacity (of at most 1), or a weight: they do not depend on
+/// thickness.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Blend {
     /// Emission and absorption.
@@ -128,17 +129,18 @@ pub enum Blend {
     Isosurfaces(Arc<[f32]>),
 }
 
-/// What the scalar is between the points of the grid.
+/// Interpolation between the points of the grid.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Interpolation {
     /// Trilinear.
     #[default]
     Linear,
-    /// That of the nearest point: boxes of one value around each point, cut at the grid's bounds.
+    /// The value of the nearest point: boxes of one value around each point, clipped at the grid's
+    /// bounds.
     Nearest,
 }
 
-/// How to make a [`super::Volume`].
+/// Options of a [`super::Volume`].
 #[derive(Debug, Clone, Default)]
 pub struct VolumeOptions {
     /// Shading by the gradient; `None` for pure emission and absorption. Not for the projections
@@ -146,20 +148,20 @@ pub struct VolumeOptions {
     pub shading: Option<VolumeShading>,
     /// The scalar between points.
     pub interpolation: Interpolation,
-    /// What a ray makes of it.
+    /// How the scalars along a ray are combined.
     pub blend: Blend,
-    /// Lights that take the place of the shading's own, and cast no highlight; none for that one,
+    /// Lights that replace the shading's own light and cast no highlight; empty for that light, in
     /// white.
     pub lights: Vec<VolumeLight>,
     /// With [`Blend::Composite`] only.
     pub gradient_opacity: Option<GradientOpacity>,
-    /// Beyond the bounds the scalar goes on as it is there, so that gradients across them are half
-    /// of what they are inside, as with OpenGL's clamped textures. Else they are one-sided.
+    /// Extends the scalar past the bounds by its value there, so that gradients across them are
+    /// half of those inside, as with OpenGL's clamped textures. Otherwise they are one-sided.
     pub clamped_gradients: bool,
 }
 
 impl VolumeOptions {
-    /// The first thing that is wrong.
+    /// Returns the first error.
     pub(super) fn check(&self) -> Result<(), VolumeError> {
         let fault = |field, value, rule| Err(VolumeError::Shading { field, value, rule });
         const DIRECTION: &str = "a direction: finite and not zero";

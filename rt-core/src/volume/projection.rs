@@ -1,5 +1,5 @@
-//! Volumes that are no medium: the largest or smallest scalar along a ray, means and sums, surfaces
-//! of given values.
+//! Volumes that are not media: the largest or smallest scalar along a ray, means and sums,
+//! isosurfaces.
 
 use super::layer::{Layer, MarchState};
 use super::{Blend, MACROCELL, Volume, VolumeQuality, VolumeSample};
@@ -22,7 +22,7 @@ impl Volume {
         self.options.blend == Blend::Composite
     }
 
-    /// What a ray through a volume that is no medium shows between `t0` and `t1`.
+    /// The result of a ray between `t0` and `t1` through a volume that is not a medium.
     pub(super) fn project(
         &self,
         ray: &Ray,
@@ -40,8 +40,8 @@ impl Volume {
         }
     }
 
-    /// Visits what the ray crosses, in order. `wanted` says by the range of its values whether a
-    /// block or a cell counts. Cells with a value that is not a number are left out.
+    /// Visits the blocks and cells that the ray crosses, in order. `wanted` tells from the range of
+    /// its values whether a block or a cell counts. Cells with a NaN value are left out.
     fn visit_cells(
         &self,
         ray: &Ray,
@@ -115,7 +115,7 @@ impl Volume {
         VolumeSample { rgba: [r, g, b, a as f32], depth, samples }
     }
 
-    /// Colour times weight, integrated; divided by the length of the way where a mean is asked for.
+    /// Colour times weight, integrated; divided by the length of the path for a mean.
     fn sum(
         &self,
         ray: &Ray,
@@ -126,7 +126,7 @@ impl Volume {
     ) -> VolumeSample {
         let per_t = f64::from(ray.dir.length());
         let (mut length, mut samples, mut total) = (0.0, 0, [0.0; 3]);
-        // A sum may be off by as much in all, a mean by as much everywhere.
+        // The tolerance applies to the total of a sum, and to every point of a mean.
         let levels = match *quality {
             VolumeQuality::Tolerance { levels } => f64::from(levels.max(1e-6)),
             VolumeQuality::Step { .. } => 0.1,
@@ -155,8 +155,8 @@ impl Volume {
         VolumeSample { rgba: [r, g, b, 1.0], depth: t0 as f32, samples }
     }
 
-    /// ∫ colour times weight over a stretch of this length: exact along its chord, and cut until
-    /// that is the curve's.
+    /// ∫ colour times weight over an interval of this length: exact along its chord, and split
+    /// until the chord represents the curve.
     fn weighted(
         &self,
         b: &[f64; 4],
@@ -208,7 +208,7 @@ impl Volume {
                 let (p, q) = index_ray.fractions(s.crossing, 1);
                 let at = std::array::from_fn(|a| p[a] + (q[a] - p[a]) * u);
                 let color = self.shaded_at(index_ray, s.stored, at, color);
-                // A layer without thickness: this opacity, whatever the way through it.
+                // A layer without thickness: this opacity, for any path through it.
                 let tau = -(-opacity.clamp(0.0, 0.999_999)).ln_1p();
                 let t = s.crossing.t0 + (s.crossing.t1 - s.crossing.t0) * u;
                 m.add(t, t, &Layer { tau, color: color.map(|c| c.min(1.0)) });
@@ -221,9 +221,9 @@ impl Volume {
     }
 }
 
-/// Where a cubic turns between 0 and 1, in order, and how often.
+/// The turning points of a cubic between 0 and 1, in order, and their number.
 fn turns(b: &[f64; 4]) -> ([f64; 2], usize) {
-    // Its slope in Bernstein form, as a + 2 h u + c u².
+    // Its derivative in Bernstein form, as a + 2 h u + c u².
     let [d0, d1, d2] = [b[1] - b[0], b[2] - b[1], b[3] - b[2]];
     let (a, h, c) = (d0, d1 - d0, d0 - 2.0 * d1 + d2);
     let mut places = ([0.0; 2], 0);
@@ -235,7 +235,7 @@ fn turns(b: &[f64; 4]) -> ([f64; 2], usize) {
     };
     let discriminant = h * h - a * c;
     if discriminant >= 0.0 {
-        // The form that does not cancel.
+        // The form without cancellation.
         let q = -(h + h.signum() * discriminant.sqrt());
         let (x, y) = (q / c, a / q);
         add(x.min(y));
@@ -246,7 +246,7 @@ fn turns(b: &[f64; 4]) -> ([f64; 2], usize) {
     places
 }
 
-/// Calls `found` with every place between 0 and 1, in order, where the cubic passes `value`.
+/// Calls `found` with every parameter between 0 and 1, in order, where the cubic passes `value`.
 fn crossings(b: &[f64; 4], value: f64, mut found: impl FnMut(f64)) {
     let (places, count) = turns(b);
     let (mut low, mut below) = (0.0, b[0] < value);
@@ -255,7 +255,7 @@ fn crossings(b: &[f64; 4], value: f64, mut found: impl FnMut(f64)) {
         let at_end = if end == 1.0 { b[3] } else { ray_cubic::evaluate(b, end) };
         if (at_end < value) != below {
             let (mut near, mut far) = (low, end);
-            // To the last bit that counts for a picture.
+            // To the last bit that matters for an image.
             for _ in 0..40 {
                 let mid = 0.5 * (near + far);
                 if (ray_cubic::evaluate(b, mid) < value) == below { near = mid } else { far = mid }

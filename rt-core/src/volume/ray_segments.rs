@@ -2,11 +2,11 @@
 //! contributes its colour in proportion to its extinction. Compositing one whole volume over the
 //! other would be wrong there.
 //!
-//! Mixing is local: a ray is cut where it comes into another block of any of its volumes
-//! ([`RaySegments`]), and what such a span adds depends on nothing but the blocks around it and
-//! what was collected in front. (Halving the whole common stretch until halves agreed, as this did
-//! first, marched everything again on every level, and needed every value along a ray in one
-//! place.)
+//! Mixing is local: a ray is split where it enters another block of any of its volumes
+//! ([`RaySegments`]), and the contribution of such a span depends only on the blocks around it and
+//! on what was collected in front. (The first version halved the whole common interval until halves
+//! agreed: it marched everything again on every level, and needed every value along a ray in one
+//! process.)
 
 use super::layer::{Layer, MarchState};
 use super::{MACROCELL, PartialIntegral, Volume, VolumeQuality, VolumeSample};
@@ -15,10 +15,10 @@ use crate::ray::Ray;
 use glam::UVec3;
 use std::ops::Range;
 
-/// Halvings of a span at most.
+/// Largest number of halvings of a span.
 const MAX_HALVINGS: u32 = 14;
-/// Halvings of a span before it is believed that mixing its volumes as a whole agrees with mixing
-/// them in its halves: it can do so by accident.
+/// Halvings of a span before agreement between mixing its volumes as a whole and in its halves is
+/// accepted: it can occur by accident.
 const BLIND_HALVINGS: u32 = 2;
 
 /// Colour and opacity of several volumes between `t0` and `t1`. Each comes with the ray in its own
@@ -46,9 +46,9 @@ pub fn integrate_overlapping(
     composite_projections(volumes, t0, t1, quality, mixed)
 }
 
-/// What several volumes show whose media are `mixed` already. Projections have no place along the
-/// ray: they are put in the order of the middles of their boxes, and the media in that of the first
-/// of them.
+/// The result of several volumes whose media are `mixed` already. Projections have no position
+/// along the ray: they are sorted by the centres of their boxes, and the media take the position of
+/// the first of them.
 pub fn composite_projections(
     volumes: &[(&Volume, Ray)],
     t0: f32,
@@ -75,7 +75,7 @@ pub fn composite_projections(
     all
 }
 
-/// A stretch of a ray in one block of a volume.
+/// An interval of a ray in one block of a volume.
 #[derive(Debug, Clone, Copy)]
 struct BlockSegment {
     block: UVec3,
@@ -89,14 +89,14 @@ struct VolumeSegments<'a> {
     ray: IndexRay,
     /// World length of one unit of the parameter.
     per_t: f64,
-    /// Where the ray comes into the grid.
+    /// Parameter at which the ray enters the grid.
     anchor: f64,
     blocks: Vec<BlockSegment>,
 }
 
-/// The way of a ray through several media, cut into spans along which every medium stays within one
-/// block. Spans depend on the ray and on the volumes' sizes and places alone, not on what of their
-/// values is here: holders of parts ([`Volume::part`]) agree on them.
+/// The segments of a ray through several media, split into spans along which every medium stays
+/// within one block. Spans depend on the ray and on the volumes' sizes and positions alone, not on
+/// the values held here: data servers of parts ([`Volume::part`]) agree on them.
 ///
 /// ```
 /// use rt_core::glam::{DVec3, UVec3, Vec3};
@@ -126,14 +126,13 @@ struct VolumeSegments<'a> {
 /// ```
 pub struct RaySegments<'a> {
     per_volume: Vec<VolumeSegments<'a>>,
-    /// From where the ray comes into the first volume to where it leaves the last, in its
-    /// parameter.
+    /// From where the ray enters the first volume to where it leaves the last, in its parameter.
     path: f64,
 }
 
 impl<'a> RaySegments<'a> {
-    /// The way between `t0` and `t1` through `volumes`, each with the ray in its object space, as
-    /// for [`integrate_overlapping`]. Volumes that are no medium are passed over.
+    /// The segments between `t0` and `t1` through `volumes`, each with the ray in its object space,
+    /// as for [`integrate_overlapping`]. Volumes that are not media are skipped.
     pub fn new(volumes: Vec<(&'a Volume, Ray)>, t0: f32, t1: f32) -> RaySegments<'a> {
         let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut per_volume = Vec::with_capacity(volumes.len());
@@ -158,14 +157,14 @@ impl<'a> RaySegments<'a> {
         RaySegments { per_volume, path: last - first }
     }
 
-    /// Calls `visit` with the number of each span that is longer than nothing, its limits and the
-    /// block of each volume that is there, until it returns false.
+    /// Calls `visit` with the number of each span of positive length, its limits and the block of
+    /// each volume in it, until `visit` returns false.
     fn walk(&self, mut visit: impl FnMut(usize, f64, f64, &[(usize, UVec3)]) -> bool) {
         let mut next = vec![0; self.per_volume.len()];
         let mut here = Vec::with_capacity(self.per_volume.len());
         let (mut at, mut number) = (f64::NEG_INFINITY, 0);
         loop {
-            // ---- To the next place where a block begins or ends.
+            // ---- To the next point where a block begins or ends.
             let mut end = f64::INFINITY;
             here.clear();
             for (v, (segments, next)) in self.per_volume.iter().zip(&mut next).enumerate() {
@@ -181,7 +180,7 @@ impl<'a> RaySegments<'a> {
                 }
             }
             if end == f64::INFINITY {
-                // Nothing comes, or something without an end, which no grid is.
+                // Nothing follows, or an interval without an end, which no grid has.
                 return;
             }
             if !here.is_empty() {
@@ -194,8 +193,8 @@ impl<'a> RaySegments<'a> {
         }
     }
 
-    /// Calls `visit` with the number of each span, in order, and the volumes that are there with
-    /// their blocks, one or more.
+    /// Calls `visit` with the number of each span, in order, and the volumes in it with their
+    /// blocks, one or more.
     pub fn spans(&self, mut visit: impl FnMut(usize, &[(usize, UVec3)])) {
         self.walk(|number, _, _, here| {
             visit(number, here);
@@ -203,7 +202,7 @@ impl<'a> RaySegments<'a> {
         });
     }
 
-    /// Whether every block of every volume in these spans is within what `held` says.
+    /// Whether `held` is true for every block of every volume in these spans.
     pub fn is_within(&self, spans: Range<usize>, held: impl Fn(usize, UVec3) -> bool) -> bool {
         let mut all = true;
         self.walk(|number, _, _, here| {
@@ -215,8 +214,8 @@ impl<'a> RaySegments<'a> {
         all
     }
 
-    /// Goes on where `collected` was left through the spans numbered `spans`. Spans must be gone
-    /// through in order, by whom ever.
+    /// Continues from `collected` through the spans with the numbers `spans`. Spans must be
+    /// integrated in order, by any process.
     pub fn integrate_spans(
         &self,
         spans: Range<usize>,
@@ -227,7 +226,7 @@ impl<'a> RaySegments<'a> {
         if collected.is_opaque(quality) || self.path.is_nan() || self.path <= 0.0 {
             return collected;
         }
-        // The error budget of everything is handed out by length along the ray.
+        // The error budget of all volumes is distributed by length along the ray.
         let per_t = m.error_per_length;
         let mut there: Vec<(usize, UVec3)> = Vec::with_capacity(self.per_volume.len());
         self.walk(|number, ta, tb, here| {
@@ -266,7 +265,7 @@ impl<'a> RaySegments<'a> {
     }
 }
 
-/// A span in which there are several media.
+/// A span with several media.
 struct MediaMixer<'a> {
     segments: &'a RaySegments<'a>,
     there: &'a [(usize, UVec3)],
@@ -280,7 +279,7 @@ impl MediaMixer<'_> {
         }
         let share = m.error_per_length * (tb - ta);
         // Colours that differ by at most 1 within a layer of opacity a, mixed instead of ordered,
-        // are off by at most a²/4.
+        // have an error of at most a²/4.
         let opacity = one.opacity();
         if m.transmittance * 0.25 * opacity * opacity <= share {
             m.add(ta, tb, &one);
@@ -338,7 +337,7 @@ impl MediaMixer<'_> {
     }
 }
 
-/// Where the ray is inside the volume's bounds.
+/// The interval in which the ray is inside the volume's bounds.
 fn slab(volume: &Volume, ray: &Ray) -> Option<(f64, f64)> {
     let b = volume.bounds();
     let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));

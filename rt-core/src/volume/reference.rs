@@ -1,12 +1,12 @@
-//! The slow reference: many small steps in f64, the transfer function read off its definition,
-//! nothing skipped. Tests and accuracy curves compare the integrator with it.
+//! The slow reference: many small steps in f64, with the transfer function evaluated from its
+//! definition and no skipping. Tests and accuracy curves compare the integrator with it.
 
 use super::Volume;
 use crate::ray::Ray;
 use glam::{DVec3, UVec3};
 
 /// Premultiplied linear colour and opacity between `t0` and `t1`, by the midpoint rule with steps
-/// of `step_voxels` of the smallest grid spacing. The error falls with the square of the step.
+/// of `step_voxels` of the smallest grid spacing. The error decreases with the square of the step.
 /// Shading is not included.
 pub fn integrate_reference(
     volume: &Volume,

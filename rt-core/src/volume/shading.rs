@@ -1,11 +1,11 @@
-//! Gradients of a cell, and what lights make of them.
+//! Gradients of a cell, and shading by lights.
 
 use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading};
 use crate::grid::Grid;
 use crate::grid_walk::IndexRay;
 use glam::{DVec3, UVec3, Vec3};
 
-/// What light makes of a colour, and how steep the scalar is there.
+/// The effect of light on a colour, and the steepness of the scalar there.
 #[derive(Debug, Clone, Copy)]
 struct ShadingSample {
     factor: [f64; 3],
@@ -13,9 +13,9 @@ struct ShadingSample {
     steepness: f64,
 }
 
-/// Light along a ray's way through a cell: the parabola through its values at both ends and in the
-/// middle. Gradients cost as much as everything else of a sample, and between grid points they bend
-/// no more than that.
+/// Light along a ray's segment in a cell: the parabola through its values at both ends and in the
+/// middle. Gradients cost as much as the rest of a sample, and between grid points they vary no
+/// more than that.
 pub(super) struct ShadingCurve<'a> {
     t0: f64,
     per_t: f64,
@@ -24,7 +24,7 @@ pub(super) struct ShadingCurve<'a> {
 }
 
 impl ShadingCurve<'_> {
-    /// Extinction and colour at `t`, of those that the transfer function says.
+    /// Extinction and colour at `t`, given those of the transfer function.
     #[inline]
     pub(super) fn on(&self, t: f64, sigma: f64, color: [f64; 3]) -> (f64, [f64; 3]) {
         let x = (t - self.t0) * self.per_t;
@@ -48,8 +48,8 @@ impl Volume {
         self.options.shading.is_some() || self.options.gradient_opacity.is_some()
     }
 
-    /// Light along the way of `ray` through a cell (of the grid that is stored here) from `t0` at
-    /// the place `p` in it to `t1` at `q`; `None` without shading and gradient opacity.
+    /// Light along the segment of `ray` in a cell (of the grid that is stored here) from `t0` at
+    /// position `p` in it to `t1` at `q`; `None` without shading and gradient opacity.
     pub(super) fn light_along(
         &self,
         ray: &IndexRay,
@@ -78,7 +78,7 @@ impl Volume {
         Some(ShadingCurve { t0, per_t: 1.0 / (t1 - t0), ends, opacity })
     }
 
-    /// A colour under the lights at one place of a stored cell.
+    /// A colour under the lights at one position in a stored cell.
     pub(super) fn shaded_at(
         &self,
         ray: &IndexRay,
@@ -92,7 +92,7 @@ impl Volume {
         }
     }
 
-    /// What lights make of the gradient `g` for a ray along `dir`.
+    /// Shading by the gradient `g` for a ray along `dir`.
     fn lit(&self, g: DVec3, dir: DVec3) -> ShadingSample {
         let steepness = g.length();
         let flat = !(steepness > 0.0 && steepness.is_finite());
@@ -134,7 +134,7 @@ fn highlight(s: &VolumeShading, normal: DVec3, light: DVec3, dir: DVec3) -> f64 
     if s.specular <= 0.0 {
         return 0.0;
     }
-    // A light at the viewer comes as the ray's direction; the sides of the gradient are alike.
+    // A light at the viewer shines along the ray; both signs of the gradient are equivalent.
     let viewer = if s.light.is_some() { -dir } else { dir }.normalize_or_zero();
     let light = light.normalize_or_zero();
     let base = match s.highlight {
@@ -178,7 +178,7 @@ fn corner_gradients(grid: &Grid, cell: UVec3, clamped: bool) -> [Vec3; 8] {
     if cell.cmpeq(UVec3::ZERO).any() || (cell + 2).cmpge(grid.dims).any() {
         return std::array::from_fn(|i| corner_gradient(grid, corner(i), clamped));
     }
-    // Inside nothing needs to be checked one by one.
+    // Inside the grid, no index needs a check.
     let (row, slab) = (grid.dims.x as usize, grid.dims.x as usize * grid.dims.y as usize);
     let first = grid.index(cell.x - 1, cell.y - 1, cell.z - 1);
     let Some(v) = grid.values.get(first..first + 3 * slab + 3 * row + 4) else {
