@@ -1,5 +1,5 @@
-//! Ambient and environment light, dimmed by what is near: cosine-weighted rays over the hemisphere,
-//! limited in length.
+//! Ambient and environment light, attenuated by near surfaces: cosine-weighted rays over the
+//! hemisphere, limited in length.
 
 use super::frame_context::FrameContext;
 use super::lobes::ambient_albedo;
@@ -19,7 +19,7 @@ use crate::surface::SurfacePoint;
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
-/// Rays per batch: enough for the tracer to sort by direction, few enough to stay in the
+/// Rays per batch: enough for the tracer to sort them by direction, few enough to stay in the
 /// second-level cache.
 const BATCH_RAYS: usize = 4096;
 
@@ -104,7 +104,7 @@ pub(crate) fn add_ambient_light(
     }
 }
 
-/// Ambient light that a point sends to the eye. `MAPS`: some point has a finish of its own.
+/// Ambient light that a point reflects to the eye. `MAPS`: whether some material has maps.
 fn ambient_at<const MAPS: bool>(
     context: &FrameContext<'_>,
     mean: &IrradianceCoefficients,
@@ -117,7 +117,7 @@ fn ambient_at<const MAPS: bool>(
     p.parameters::<MAPS>(parameters).map_or(light, |v| light * v.ambient)
 }
 
-/// Where the rays of a point go.
+/// The hemisphere of a point's rays.
 pub(super) struct Hemisphere {
     axes: [Vec3; 3],
     origin: Vec3,
@@ -127,7 +127,7 @@ pub(super) struct Hemisphere {
 impl Hemisphere {
     #[inline]
     pub(super) fn new(s: &SurfacePoint) -> Hemisphere {
-        // The lobe stands on the side that is seen, whatever side the shading normal is lit from.
+        // The lobe is on the visible side, whichever side the shading normal is lit from.
         let normal = if s.normal.dot(s.face_normal) < 0.0 { -s.normal } else { s.normal };
         let (x, y) = orthonormal_basis(normal);
         // A direction that leaves through the back of the face is never sent, so there is one
@@ -148,13 +148,13 @@ impl Hemisphere {
         let lane = sample % LANES;
         let [x, y, normal] = self.axes;
         let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
-        // A smooth normal's hemisphere dips below the face: no sky there to be hidden.
+        // The hemisphere of a smooth normal extends below the face, where no sky can be occluded.
         (dir.dot(self.face_normal) > 0.0)
             .then(|| Ray::new(self.origin, dir).with_t_max(distance as f32))
     }
 }
 
-/// Sixteen directions, a row per component.
+/// Sixteen directions, one row per component.
 pub(super) type HemisphereSamples = [Row; 3];
 
 /// Buffers of one thread.

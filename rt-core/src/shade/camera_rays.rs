@@ -7,12 +7,12 @@ use crate::ray::{LANES, Ray, RayBlock};
 use fearless_simd::Simd;
 use glam::DVec3;
 
-/// How far the eye may be from the scene's centre, in radii of the scene, before rays start at the
-/// scene instead of at the eye. Up to here the eye's f32 rounding is no worse than that of the
-/// vertices; rays with one origin are traced faster.
+/// The largest distance of the eye from the scene's centre, in radii of the scene, at which rays
+/// start at the eye; beyond it they start at the scene. Up to this distance the eye's f32 rounding
+/// is no worse than that of the vertices; rays with one origin are traced faster.
 const EYE_WITHIN_RADII: f64 = 8.0;
 
-/// Makes the rays of one frame.
+/// Generates the rays of one frame.
 pub(crate) struct CameraRays {
     parallel: bool,
     /// Eye, or origin at NDC (0,0); render space.
@@ -31,12 +31,12 @@ pub(crate) struct CameraRays {
     lens: Option<(DVec3, DVec3, f64)>,
 }
 
-/// Where the near and the far plane cut the rays.
+/// Where the near and the far plane clip the rays.
 enum ClipRange {
-    /// At the same parameter everywhere: every usual matrix.
+    /// At the same parameter for all rays: every usual matrix.
     Same([f64; 2]),
-    /// Somewhere else for each ray (oblique near planes); panoramas, whose rays have nothing in
-    /// common.
+    /// At another parameter for each ray (oblique near planes); also for panoramas, whose rays
+    /// share nothing.
     PerRay(Box<(Camera, DVec3)>),
 }
 
@@ -148,7 +148,7 @@ impl CameraRays {
     }
 
     /// The rays through sixteen NDC points, see [`CameraRays::ray`]; through the middle of a lens.
-    /// False, without rays, where each has its own near and far plane.
+    /// Returns false, without rays, where each ray has its own near and far plane.
     #[inline(never)]
     pub(crate) fn fill_block<S: Simd>(
         &self,
@@ -168,7 +168,7 @@ impl CameraRays {
                     (1, &mut out.oy, &mut out.dy),
                     (2, &mut out.oz, &mut out.dz),
                 ] {
-                    // Plain loops over plain numbers become vector code.
+                    // Simple loops over scalars are vectorized by the compiler.
                     let (d0, dx, dy) = (self.dir[c], self.dir_x[c], self.dir_y[c]);
                     let (o0, ox, oy, start) = (self.origin[c], move_x[c], move_y[c], self.start);
                     if self.parallel || start != 0.0 {

@@ -1,4 +1,4 @@
-//! Light straight from the scene's lights, with or without shadow rays.
+//! Direct light from the scene's lights, with or without shadow rays.
 
 use super::frame_context::FrameContext;
 use super::lobes::response;
@@ -16,17 +16,17 @@ use crate::sampler::{Sampler, unit_disk};
 use crate::surface::{SurfacePoint, length};
 use glam::Vec3;
 
-/// Light falling onto a point from one direction.
+/// Light that arrives at a point from one direction.
 pub(super) struct Incident {
     /// Unit, towards the light.
     pub(super) dir: Vec3,
-    /// Where the light is; `None` for directional light.
+    /// Position of the light; `None` for directional light.
     from: Option<Vec3>,
-    /// From there to where shadow rays go: off the plane of a flat light by the error of its place,
-    /// towards the point, so that what is drawn in that plane does not hide the light however flat
-    /// it falls.
+    /// Offset from the light's position to the end of shadow rays: off the plane of a flat light by
+    /// the error of its position, towards the point, so that geometry in that plane does not hide
+    /// the light even at grazing angles.
     lift: Vec3,
-    /// Share of the light's colour that falls here.
+    /// Share of the light's colour that arrives here.
     pub(super) strength: f32,
 }
 
@@ -35,11 +35,11 @@ pub(super) struct Incident {
 pub(crate) struct LightSampling {
     /// Whether there are shadow rays at all.
     pub(crate) traced: bool,
-    /// Whether they go to different points of the light.
+    /// Whether they aim at different points of the light.
     pub(crate) spread: bool,
     /// How many.
     pub(crate) count: u32,
-    /// Number of the first among all light rays of a point.
+    /// Number of the first one among all light rays of a point.
     pub(crate) first_number: u32,
 }
 
@@ -65,8 +65,8 @@ impl LightSampling {
     }
 }
 
-/// Point of the unit square that ray `k` of `count` to light `number` belongs to; round lights
-/// spread it over their disk.
+/// Point of the unit square for ray `k` of `count` to light `number`; round lights map it to their
+/// disk.
 #[inline]
 pub(super) fn light_point(
     sampler: &Sampler,
@@ -78,7 +78,7 @@ pub(super) fn light_point(
     sampler.square_of(stream.wrapping_add(SampleDimension::LIGHTS + number as u32), k, count)
 }
 
-/// Adds the light of every lamp to `points`.
+/// Adds the direct light of every light source to `points`.
 pub(crate) fn add_direct_light(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -96,7 +96,7 @@ pub(crate) fn add_direct_light(
     }
 }
 
-/// As [`add_direct_light`]. `MAPS`: some point has a finish of its own.
+/// As [`add_direct_light`]. `MAPS`: whether some material has maps.
 fn direct_lighting<const MAPS: bool>(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -115,7 +115,8 @@ fn direct_lighting<const MAPS: bool>(
                 continue;
             }
             let state = &states[p.lane as usize];
-            // What lies along the light's own way to this point would have hidden it from the eye.
+            // An occluder between this point and the light would have hidden the point from the
+            // eye.
             let traced = traced && !(light.follows_camera_rays && state.first);
             let model = p.model::<MAPS>(context, parameters);
             let arriving = p.parameters::<MAPS>(parameters).map_or(1.0, |v| v.direct);
@@ -171,7 +172,7 @@ fn direct_lighting<const MAPS: bool>(
 /// Direction and strength of `light` at `p`; `at` is a point of the unit square for lights with a
 /// size.
 ///
-/// Parallel light without size, which nearly every scene has, is decided in the caller; the rest is
+/// Parallel light without size, which nearly every scene has, is handled in the caller; the rest is
 /// a call. As one function it is too long to be inlined, and untextured frames with shadows took
 /// 1.8 % more instructions.
 #[inline(always)]
@@ -190,7 +191,7 @@ fn incident_from_place(light: &ResolvedLight, p: Vec3, at: Option<[f32; 2]>) -> 
         ResolvedLightKind::Directional { to_light } => {
             let dir = if let Some(at) = at {
                 let [x, y] = unit_disk(at);
-                // Uniform over the disk that the light covers in the sky.
+                // Uniform over the disk that the light subtends.
                 let (s, t) = orthonormal_basis(to_light);
                 (to_light + (s * x + t * y) * light.size.tan()).normalize()
             } else {
@@ -265,15 +266,15 @@ fn incident_from_place(light: &ResolvedLight, p: Vec3, at: Option<[f32; 2]>) -> 
     Incident { dir, from: Some(from), lift, strength }
 }
 
-/// See [`Incident::lift`]: for a light in the plane with this normal, of coordinates up to `reach`.
+/// See [`Incident::lift`]: for a light in the plane with this normal, with coordinates up to
+/// `reach`.
 #[inline]
 fn off_plane(normal: Vec3, to_light: Vec3, reach: f32) -> Vec3 {
     let towards_point = if to_light.dot(normal) > 0.0 { -normal } else { normal };
     towards_point * (PLACE_ULPS * f32::EPSILON * reach)
 }
 
-/// A point of the unit disk spread over the ring that is left around a light's hole, with the same
-/// density everywhere.
+/// Maps a point of the unit disk to the ring around a light's hole, with uniform density.
 #[inline]
 fn in_ring(at: [f32; 2], kind: ResolvedLightKind) -> [f32; 2] {
     let ResolvedLightKind::Ring { hole, .. } = kind else { return at };
@@ -285,22 +286,22 @@ fn in_ring(at: [f32; 2], kind: ResolvedLightKind) -> [f32; 2] {
     at.map(|v| v * factor)
 }
 
-/// Ulps of its coordinates within which a light's place is known: as those of surfaces (see
+/// Error of a light's position, in ulps of its coordinates: as for surfaces (see
 /// [`crate::surface`]).
 const PLACE_ULPS: f32 = 4.0;
 
-/// A ray may come from the light when it then ends at most this many error bounds of the surface
-/// before it.
+/// A ray may start at the light if it ends at most this many error bounds of the surface before the
+/// surface.
 const MOST_ERRORS: f32 = 32.0;
 
-/// The ray between a point and a light. `from_light` asks for the light as its origin: all rays of
-/// a light then share it and are traced as one packet.
+/// The ray between a point and a light. `from_light` requests the light as its origin: all rays of
+/// a light then share the origin and are traced as one packet.
 ///
-/// A ray is exact where it starts; where it ends, the arithmetic has an error of some ulp of its
-/// length. So rays start at the surface, and that error is at the light, where it is no more than
-/// what f32 coordinates tell apart anyway: what touches the surface casts its shadow however far
-/// the light is. Only from a light so near that the error is of the size of the surface's own they
-/// may come the other way.
+/// A ray is exact at its origin; at its end, the arithmetic has an error of some ulp of its length.
+/// So rays start at the surface, and the error is at the light, where it is no larger than the
+/// resolution of f32 coordinates: an object that touches the surface casts its shadow at any
+/// distance of the light. Rays may start at the light only if it is so near that the error is of
+/// the order of the surface's own.
 #[inline]
 pub(super) fn shadow_ray(p: &SurfacePoint, incident: &Incident, from_light: bool) -> Ray {
     let origin = p.ray_origin(incident.dir);
@@ -310,17 +311,17 @@ pub(super) fn shadow_ray(p: &SurfacePoint, incident: &Incident, from_light: bool
     let light = light + incident.lift;
     let to_light = light - origin;
     if from_light {
-        // The surface's end is off it by its error bound; the arithmetic of a ray from this far
-        // adds some ulp of the coordinates, taken off the range, and as much at the light, which
-        // may stand on a surface. A hundredth: a lamp next to the wall.
+        // The end at the surface is off it by its error bound. The arithmetic of a ray from this
+        // distance adds some ulp of the coordinates, which is taken off the range, and as much at
+        // the light, which may lie on a surface. At most a hundredth, for a light next to a wall.
         let slack = 8.0 * f32::EPSILON * (max_abs(light) + max_abs(origin));
         let share = slack / max_abs(to_light);
         if slack <= MOST_ERRORS * p.point_error && share < 0.01 {
             return Ray { t_min: share, ..Ray::new(light, -to_light).with_t_max(1.0 - share) };
         }
     }
-    // Unit length: in units of the way to a far light, what is near the surface would be lost among
-    // the smallest numbers of f32.
+    // Unit length: in units of the distance to a far light, geometry near the surface would
+    // underflow in f32.
     let distance = length(to_light);
     let error = PLACE_ULPS * f32::EPSILON * (max_abs(light) + distance);
     Ray::new(origin, to_light / distance).with_t_max(distance - error.min(0.5 * distance))

@@ -1,5 +1,5 @@
 //! Depth, distance and ids of sixteen hits at once: [`TileLayers::record`] in loops over plain f64
-//! arrays, which become vector code. Same functions, same bits.
+//! arrays, which the compiler vectorizes. Same functions, same bits.
 
 use super::frame_context::{FrameContext, point_on_ray};
 use super::tile::{TileArea, TileLayers, block_place, lane_pixel};
@@ -8,8 +8,8 @@ use crate::surface::Planes;
 use fearless_simd::Simd;
 use glam::DVec3;
 
-/// Fills depth, distance and ids of block `b` where it was hit. The rays go through the pixels'
-/// centres; normals are left to the caller.
+/// Fills depth, distance and ids of block `b` at its hits. The rays go through the pixels' centres;
+/// the caller fills the normals.
 pub(super) fn record_block<S: Simd>(
     simd: S,
     context: &FrameContext<'_>,
@@ -27,7 +27,7 @@ pub(super) fn record_block<S: Simd>(
     if let (Some(instance), Some(primitive)) =
         (out.instance.get_mut(slots.clone()), out.primitive.get_mut(slots.clone()))
     {
-        // A miss has the numbers of a blank pixel.
+        // A miss has the ids of a blank pixel.
         instance.copy_from_slice(&hits.instance);
         primitive.copy_from_slice(&hits.prim);
     }
@@ -101,13 +101,13 @@ fn depth_and_distance<S: Simd>(
         [x[lane], y[lane]] =
             context.ndc(area.x + (column + i) as u32, area.y + (row + j) as u32, [0.5; 2]);
     }
-    // A copy whose fields no store can change.
+    // A local copy, whose fields no store can change.
     let camera = context.camera;
     simd.vectorize(
         #[inline(always)]
         || {
-            // ---- The rays, as Camera::world_ray has them; perspective ones spelled out, because a
-            // loop with a choice in it does not become vector code.
+            // ---- The rays, as Camera::world_ray computes them; perspective ones are written out,
+            // because a loop with a branch is not vectorized.
             let (mut origins, mut dirs) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             if let Some(eye) = camera.eye() {
                 let m = camera.inverse;
@@ -125,7 +125,7 @@ fn depth_and_distance<S: Simd>(
                     }
                 }
             }
-            // ---- Where they meet the planes.
+            // ---- Their intersections with the planes.
             let at = |v: &[[f64; LANES]; 3], l: usize| DVec3::new(v[0][l], v[1][l], v[2][l]);
             let (mut depth, mut distance) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {

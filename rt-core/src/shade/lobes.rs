@@ -1,4 +1,4 @@
-//! How a material answers light from one direction, and ambient light.
+//! The reflection of light from one direction, and of ambient light, by a material.
 
 use super::microfacet::{ggx, schlick};
 use super::specular::reflection_of;
@@ -7,14 +7,14 @@ use crate::material::{PbrForm, PhongForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
 
-/// Smallest GGX α that a light without size is shaded with: below, its highlight is a point that no
-/// pixel would find.
+/// Smallest GGX α for shading with a light without size: a smaller highlight is a point that no
+/// pixel would hit.
 const MIN_HIGHLIGHT_ALPHA: f32 = 1e-3;
 
-/// Light sent to `view` per unit of light colour from direction `l` (unit): BRDF · π · cosine, as
-/// the unit of lights wants it. `highlight` is the light's own colour for Phong highlights. Matte
-/// and Phong are decided in the caller; microfacets, which cost more than a call, are not, so that
-/// loops over lights stay short.
+/// Light reflected to `view` per unit of light colour from direction `l` (unit): BRDF · π · cosine,
+/// as the unit of lights requires. `highlight` is the light's own colour for Phong highlights.
+/// Matte and Phong are handled in the caller; microfacets, which cost more than a call, are not, so
+/// that loops over lights stay short.
 #[inline(always)]
 pub(crate) fn response(
     model: &SurfaceModel,
@@ -31,7 +31,7 @@ pub(crate) fn response(
     }
     match *model {
         SurfaceModel::Unlit => Vec3::ZERO,
-        // A dielectric gets here only where refraction is switched off.
+        // A dielectric gets here only when refraction is disabled.
         SurfaceModel::Matte | SurfaceModel::Dielectric { .. } => surface_color * color * cos,
         SurfaceModel::Phong { diffuse, specular, shininess, highlight: form, .. } => {
             let matte = surface_color * color * (diffuse * cos);
@@ -51,7 +51,7 @@ pub(crate) fn response(
     }
 }
 
-/// [`response`] of the models of microfacets, without the cosine.
+/// [`response`] of the microfacet models, without the cosine.
 #[inline(never)]
 fn microfacet_response(
     model: &SurfaceModel,
@@ -94,8 +94,8 @@ pub(crate) fn pbr_transmitted(specular: f32, cos_view: f32) -> f32 {
     if specular > 0.0 { 1.0 - schlick(Vec3::splat(specular), cos_view).x } else { 1.0 }
 }
 
-/// x^n for x in 0..=1. Whole exponents, which nearly all materials have, by squaring: a few
-/// multiplications, and the same bits on every platform.
+/// x^n for x in 0..=1. Integer exponents, which nearly all materials have, are computed by
+/// squaring: a few multiplications, and the same bits on every platform.
 #[inline]
 pub(crate) fn power(x: f32, n: f32) -> f32 {
     if n.fract() != 0.0 || n > 1024.0 {
@@ -127,7 +127,7 @@ fn vtk_pbr(
     v: Vec3,
     l: Vec3,
 ) -> [Vec3; 2] {
-    // As the shader has them: never 0.
+    // As in the shader: never 0.
     let cosine = |a: Vec3, b: Vec3| a.dot(b).clamp(1e-5, 1.0);
     let h = (v + l).normalize_or_zero();
     let (nv, nl, nh, hl) = (cosine(n, v), cosine(n, l), cosine(n, h), cosine(h, l));
@@ -140,7 +140,7 @@ fn vtk_pbr(
     let a = roughness * roughness;
     let a2 = a * a;
     let d = (nh * a2 - nh) * nh + 1.0;
-    // A mirror is a point that no pixel would find; the shader divides 0 by 0 there.
+    // A mirror's highlight is a point that no pixel would hit; the shader divides 0 by 0 there.
     let distribution = a2 / (PI * d * d).max(f32::MIN_POSITIVE);
     let visibility = 0.5
         / (nl * (a + nv * (nv - a * nv)).max(0.0).sqrt()
@@ -148,8 +148,8 @@ fn vtk_pbr(
     [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (distribution * visibility * PI)]
 }
 
-/// Light sent to the viewer per unit of ambient radiance. Where the reflection rays of its own
-/// roughness are left out, a reflector takes its share of ambient light instead of turning black.
+/// Light reflected to the viewer per unit of ambient radiance. Where a reflector's own reflection
+/// rays are left out, it uses its share of ambient light instead of turning black.
 #[inline]
 pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects) -> Vec3 {
     let reflects = |roughness| effects.contains(reflection_of(roughness));
@@ -164,8 +164,8 @@ pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects
                 color
             }
         }
-        // VTK's physically based shader knows no ambient light; where occlusion is asked for, there
-        // must be something to occlude.
+        // VTK's physically based shader has no ambient light; where ambient occlusion is requested,
+        // there must be light to occlude.
         SurfaceModel::Pbr { form: PbrForm::Vtk, .. }
             if !effects.contains(Effects::AMBIENT_OCCLUSION) =>
         {

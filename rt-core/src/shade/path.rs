@@ -1,6 +1,7 @@
 //! Path tracing (Kajiya 1986): one continued ray per point, chosen with the probabilities of the
-//! material's lobes; lamps by shadow rays at every point, environment and emission by hitting them.
-//! No light is counted twice: lamps have no surface to be hit.
+//! material's lobes. Lights are sampled by shadow rays at every point; environment and emission
+//! contribute when rays hit them. No light is counted twice: lights have no surface that a ray
+//! could hit.
 
 use super::frame_context::FrameContext;
 use super::lobes::pbr_transmitted;
@@ -15,16 +16,16 @@ use crate::ray_stats::RayStats;
 use crate::sampler::cosine_hemisphere;
 use glam::Vec3;
 
-/// Bounce from which paths are ended by chance (Russian roulette; Arvo and Kirk 1990).
+/// First bounce at which paths may be ended at random (Russian roulette; Arvo and Kirk 1990).
 const ROULETTE_FROM: u16 = 4;
 
-/// Largest probability with which a path goes on. Below 1, so that paths end where nothing absorbs.
-/// With survival probability q at albedo ρ the variance is finite only for ρ² < q: pbrt's 0.95
-/// would not do above ρ = 0.975, this one does up to 0.9995.
+/// Largest probability with which a path continues. It is below 1, so that paths end where nothing
+/// absorbs. With survival probability q at albedo ρ the variance is finite only for ρ² < q: pbrt's
+/// 0.95 fails above ρ = 0.975, this value holds up to 0.9995.
 const MOST_SURVIVAL: f32 = 1.0 - 1.0 / 1024.0;
 
-/// Whether the path scatters at `p` rather than passing through it: by chance, with the surface's
-/// opacity.
+/// Whether the path scatters at `p` rather than passing through it: at random, with the surface's
+/// opacity as probability.
 #[inline]
 pub(super) fn scatters(
     context: &FrameContext<'_>,
@@ -73,8 +74,8 @@ pub(super) fn continue_paths(
             throughput /= survive;
         }
         next.throughput = throughput;
-        // Roulette alone ends paths, unless the options limit them: dropping faint ones would make
-        // the picture too dark.
+        // Only roulette ends paths, unless the options limit them: dropping faint paths would make
+        // the image too dark.
         if let Some(most) = context.options.max_bounces
             && u32::from(state.bounce) >= most
         {
@@ -96,8 +97,7 @@ fn scatter(
 ) -> Option<(Vec3, Vec3, RayState)> {
     let sampler = area.sampler(context, state.slot);
     let u = sampler.square(state.stream.wrapping_add(SampleDimension::SCATTER));
-    // The first number of this pair decided about opacity; stretch what is left of it to a fresh
-    // one.
+    // The first number of this pair decided about opacity; rescale its remainder to a fresh one.
     let [_, lobe] = choice(context, area, state);
     let material = context.instances[p.instance as usize].material;
     let color = p.surface.color;
@@ -112,7 +112,7 @@ fn scatter(
         let (s, t) = orthonormal_basis(n);
         let d = cosine_hemisphere(u);
         let dir = s * d.x + t * d.y + n * d.z;
-        // Directions below the face are inside the body: black.
+        // Directions below the face point into the body: black.
         (dir.dot(p.surface.face_normal) > 0.0).then(|| (dir, weight, kind(RayKind::Diffuse)))
     };
     let gloss = |f0: Vec3, roughness: f32, probability: f32| {
@@ -127,8 +127,8 @@ fn scatter(
         SurfaceModel::Unlit => None,
         SurfaceModel::Matte => diffuse(color),
         SurfaceModel::Phong { diffuse: kd, mirror, .. } => {
-            // The highlight is for lamps only: it is no physical lobe, and has no share of indirect
-            // light.
+            // The highlight applies to lights only: it is not a physical lobe, and has no share of
+            // indirect light.
             let matte = color * kd;
             let total = mirror + matte.max_element();
             if total <= 0.0 {

@@ -1,6 +1,6 @@
-//! Which light rays arrive. Opaque instances end a ray: the any-hit kernels say whether one is in
-//! the way. Only what is left of the rays is taken through the instances that may let light
-//! through, layer by layer.
+//! Decides which light rays arrive. Opaque instances end a ray: the any-hit kernels test whether
+//! one blocks it. Only the remaining rays are traced through the transmissive instances, layer by
+//! layer.
 
 use super::frame_context::FrameContext;
 use super::microfacet::fresnel_dielectric;
@@ -13,7 +13,7 @@ use crate::ray_stats::RayStats;
 use crate::surface::{SurfacePoint, length};
 use glam::Vec3;
 
-/// Rays traced and rays that met something.
+/// Number of rays traced and of rays that hit something.
 #[derive(Default, Clone, Copy)]
 pub(crate) struct LightRayCounts {
     pub(crate) rays: u64,
@@ -25,14 +25,15 @@ pub(crate) struct LightRayCounts {
 }
 
 impl LightRayCounts {
-    /// Adds what is counted for rays of all kinds together.
+    /// Adds the counters that all kinds of rays share.
     pub(crate) fn add_to(&self, stats: &mut RayStats) {
         stats.light_closest += self.closest;
         stats.light_lookups += self.lookups;
     }
 }
 
-/// Calls `arrived(point, radiance)` for what reaches its point of each light ray, in order.
+/// Calls `arrived(point, radiance)` for the light that reaches the point of each light ray, in
+/// order.
 pub(crate) fn trace_light_rays(
     context: &FrameContext<'_>,
     rays: &mut LightRays,
@@ -76,7 +77,7 @@ pub(crate) fn trace_light_rays(
         return counts;
     }
 
-    // ---- Anything opaque ends a ray, wherever it is.
+    // ---- Any opaque surface along a ray ends it.
     let marks = context.transmissive.as_slice();
     let mut states: Vec<_> =
         rays.targets.iter().map(|(_, light)| LightRayState::new(context, *light)).collect();
@@ -143,8 +144,7 @@ pub(crate) fn trace_light_rays(
     counts
 }
 
-/// A light ray on its way through layers; transmittance is a product, so only the set of layers
-/// matters.
+/// A light ray through layers; transmittance is a product, so only the set of layers matters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LightRayState {
     transmittance: Vec3,
@@ -152,14 +152,14 @@ pub(crate) struct LightRayState {
     optical_depth: Vec3,
     hit: bool,
     continued: u32,
-    /// What is not more than this is no longer followed.
+    /// A transmittance up to this is no longer followed.
     cutoff: f32,
 }
 
 impl LightRayState {
-    /// A ray that brings `radiance` if nothing is in its way. Missing may be less than the options'
-    /// smallest contribution, both as a share of it and as radiance; paths, whose mean must be
-    /// right, are followed until nothing is left.
+    /// A ray that contributes `radiance` if unblocked. The light left out may be less than the
+    /// options' smallest contribution, both as a share of it and as radiance. Paths, whose mean
+    /// must be correct, are followed until nothing is left.
     pub(crate) fn new(context: &FrameContext<'_>, radiance: Vec3) -> LightRayState {
         let exact = context.effects.contains(Effects::PATH_TRACING);
         let cutoff = if exact {
@@ -176,7 +176,7 @@ impl LightRayState {
         }
     }
 
-    /// Something opaque is in its way.
+    /// An opaque surface blocks the ray.
     pub(crate) const BLOCKED: LightRayState = LightRayState {
         transmittance: Vec3::ZERO,
         optical_depth: Vec3::ZERO,
@@ -185,7 +185,7 @@ impl LightRayState {
         cutoff: 0.0,
     };
 
-    /// Meets a surface at `t`; returns from where `ray` goes on, if it does.
+    /// Passes through a surface at `t`; returns the parameter at which `ray` continues, if it does.
     pub(crate) fn pass(
         &mut self,
         context: &FrameContext<'_>,
@@ -209,7 +209,7 @@ impl LightRayState {
         goes_on.then_some(behind)
     }
 
-    /// What has become of it.
+    /// The result of the ray.
     pub(crate) fn result(&self) -> LightRayResult {
         let LightRayState { transmittance, optical_depth, hit, continued, cutoff } = *self;
         let followed = transmittance.max_element() > cutoff;
@@ -222,9 +222,9 @@ impl LightRayState {
     }
 }
 
-/// Light through `surface`, met at `t`: multiplies `transmittance`, adds to the optical
-/// `optical_depth`, and returns where the ray goes on. Light is taken straight through dielectrics
-/// (no caustics): Fresnel loss at each interface and absorption in between.
+/// Light through `surface`, hit at `t`: multiplies `transmittance`, adds to the `optical_depth`,
+/// and returns the parameter at which the ray continues. Light passes straight through dielectrics
+/// (no caustics), with Fresnel loss at each interface and absorption in between.
 fn pass(
     context: &FrameContext<'_>,
     material: &Material,
@@ -247,7 +247,7 @@ fn pass(
                 0.0
             };
             *transmittance *= surface.color * (1.0 - reflected);
-            // The way inside is where it leaves minus where it enters.
+            // The length inside is the exit parameter minus the entry parameter.
             let sign = if surface.outside { -1.0 } else { 1.0 };
             *optical_depth += Vec3::from(absorption) * (sign * t * length);
         }

@@ -15,7 +15,7 @@ use crate::ray_stats::RayStats;
 use crate::sampler::hash;
 use glam::Vec3;
 
-/// Up to this roughness a lobe is narrower than a pixel and treated as a mirror.
+/// Up to this roughness, a lobe is narrower than a pixel and is treated as a mirror.
 pub(crate) const MIRROR_ROUGHNESS: f32 = 1e-3;
 
 /// The effect whose rays a lobe of this roughness sends.
@@ -24,10 +24,10 @@ pub(crate) fn reflection_of(roughness: f32) -> Effects {
     if roughness <= MIRROR_ROUGHNESS { Effects::REFLECTION } else { Effects::GLOSSY_REFLECTION }
 }
 
-/// Most reflections and refractions in a row where the options do not say it.
+/// Default limit on consecutive reflections and refractions.
 const MIRROR_BOUNCES: u32 = 8;
 
-/// Stream of a ray that leaves a point in branch `branch`.
+/// Sampler stream of a ray that leaves a point in branch `branch`.
 #[inline]
 pub(super) fn child_stream(state: &RayState, branch: u32) -> u32 {
     hash(state.stream.wrapping_mul(4).wrapping_add(branch).wrapping_add(0x9e37_79b9))
@@ -224,8 +224,9 @@ pub(super) fn sample_lobe(
     (share != Vec3::ZERO && dir.dot(p.surface.face_normal) > 0.0).then_some((dir, share))
 }
 
-/// Sends a ray of Whitted's tree unless it is worth too little or has bounced too often: two
-/// deterministic approximations, bounded by the options and counted. Returns how many were sent.
+/// Sends a ray of Whitted's tree unless its contribution is too small or it has bounced too often:
+/// two deterministic approximations, bounded by the options and counted. Returns how many were
+/// sent.
 pub(super) fn spawn_ray(
     context: &FrameContext<'_>,
     p: &Point,
@@ -248,7 +249,7 @@ pub(super) fn spawn_ray(
     1
 }
 
-/// Appends the ray that leaves `p` in branch `branch` of the one with `state`.
+/// Appends the ray that leaves `p` in branch `branch` of the ray with `state`.
 pub(super) fn push_scattered(
     p: &Point,
     dir: Vec3,
@@ -258,8 +259,8 @@ pub(super) fn push_scattered(
     wave: &mut Wavefront,
 ) {
     let ray = Ray::new(p.surface.ray_origin(dir), dir);
-    // Paths without a limit may be longer than the counter reaches; it is only compared with limits
-    // below that.
+    // Unlimited paths may be longer than the counter's range; it is only compared with smaller
+    // limits.
     let (stream, bounce) = (child_stream(&state, branch), state.bounce.saturating_add(1));
     wave.push(&ray, RayState { throughput, coverage: 0.0, stream, bounce, first: false, ..state });
 }

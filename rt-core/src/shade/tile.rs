@@ -1,4 +1,4 @@
-//! A square of pixels: the unit of work, with the layers it fills.
+//! A square of pixels: the unit of work, with its layers.
 
 use super::frame_context::FrameContext;
 use crate::frame::Layers;
@@ -11,7 +11,7 @@ pub(crate) const TILE: u32 = 32;
 /// Pixels of a tile.
 pub(crate) const PIXELS: usize = (TILE * TILE) as usize;
 
-/// Where a tile lies: `x..x+width`, `y..y+height` of the whole picture.
+/// Position of a tile: `x..x+width`, `y..y+height` of the whole image.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileArea {
     pub(crate) x: u32,
@@ -24,7 +24,7 @@ pub(crate) struct TileArea {
 
 impl TileArea {
     /// Pixel of a slot. Slots follow a Morton curve: 16 of them are 4 x 4 pixels, so a block of
-    /// rays is as square as can be.
+    /// rays is square.
     #[inline]
     pub(crate) fn pixel(&self, slot: u16) -> Option<[u32; 2]> {
         let (x, y) = (even_bits(slot), even_bits(slot >> 1));
@@ -67,7 +67,7 @@ pub(crate) const fn block_place(block: usize) -> [usize; 2] {
     lane_pixel(block)
 }
 
-/// Bits 0, 2, 4, 6, 8 packed together.
+/// Extracts bits 0, 2, 4, 6 and 8 into adjacent bits.
 #[inline]
 const fn even_bits(v: u16) -> u32 {
     let mut x = v as u32 & 0x155;
@@ -76,7 +76,7 @@ const fn even_bits(v: u16) -> u32 {
     (x | x >> 4) & 0x1f
 }
 
-/// What a tile has computed so far, in slot order. Layers that were not asked for are empty.
+/// The results of a tile so far, in slot order. Layers that were not requested are empty.
 pub(crate) struct TileLayers {
     /// Sum over the samples.
     pub(crate) color: Vec<[f32; 4]>,
@@ -112,13 +112,13 @@ impl TileLayers {
         }
     }
 
-    /// No colour, as before any sample.
+    /// Clears the colour, as before the first sample.
     pub(crate) fn clear_color(&mut self) {
         self.color.fill([0.0; 4]);
     }
 
-    /// As new, in the same memory; false when other layers are wanted. Sums are not cleared: the
-    /// first sample replaces them.
+    /// Resets the layers in the same memory; false when other layers are requested. Sums are not
+    /// cleared: the first sample replaces them.
     pub(crate) fn reset(
         &mut self,
         layers: Layers,
@@ -147,7 +147,7 @@ impl TileLayers {
         self.recorded[slot as usize]
     }
 
-    /// Fills the geometry layers of a pixel. `normal` is looked at only when that layer is wanted.
+    /// Fills the geometry layers of a pixel. `normal` is called only when that layer is requested.
     pub(crate) fn record(
         &mut self,
         context: &FrameContext<'_>,
@@ -178,8 +178,8 @@ impl TileLayers {
         }
     }
 
-    /// Fills the geometry layers of a pixel with what somebody else has found there: depth and
-    /// distance, normal, instance and primitive.
+    /// Fills the geometry layers of a pixel with given values: depth and distance, normal, instance
+    /// and primitive.
     pub(crate) fn record_given(
         &mut self,
         slot: u16,
@@ -188,7 +188,7 @@ impl TileLayers {
         ids: [u32; 2],
     ) {
         let i = slot as usize;
-        // There are no marks when no geometry layer is wanted.
+        // There are no marks when no geometry layer is requested.
         if let Some(r) = self.recorded.get_mut(i) {
             *r = true;
         }
@@ -205,7 +205,7 @@ impl TileLayers {
         }
     }
 
-    /// Fills the normals of the lanes `lanes` of block `b`, if that layer is wanted.
+    /// Fills the normals of the lanes `lanes` of block `b`, if that layer is requested.
     pub(crate) fn record_normals(&mut self, b: usize, lanes: u16, normal: impl Fn(usize) -> Vec3) {
         if let Some(normals) = self.normal.get_mut(b * LANES..(b + 1) * LANES) {
             for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
@@ -214,7 +214,7 @@ impl TileLayers {
         }
     }
 
-    /// The first sample is the sum so far.
+    /// Sets the sums to the first sample.
     pub(crate) fn start_samples(&mut self, pixels: Vec<[f32; 4]>) {
         self.color = pixels;
         for (sum, p) in self.luminance_sq.iter_mut().zip(&self.color) {

@@ -1,4 +1,4 @@
-//! Media between a ray's start and the surface it meets.
+//! Media between a ray's origin and the surface that it hits.
 
 use super::frame_context::FrameContext;
 use super::wavefront::RayState;
@@ -7,7 +7,7 @@ use crate::ray_stats::RayStats;
 use crate::volume::{VolumeSample, integrate_overlapping};
 use glam::DAffine3;
 
-/// The ray in a volume's space. Not normalised: the parameter is the same in every space.
+/// The ray in a volume's object space. Not normalised: the parameter is the same in every space.
 pub(super) fn in_object_space(ray: &Ray, object_from_render: &DAffine3) -> Ray {
     let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     Ray {
@@ -17,7 +17,8 @@ pub(super) fn in_object_space(ray: &Ray, object_from_render: &DAffine3) -> Ray {
     }
 }
 
-/// What `ray` collects in the stage's volumes up to `t_end`. `object_rays` is a buffer.
+/// The radiance that `ray` collects in the frame's volumes up to `t_end`. `object_rays` is a
+/// buffer.
 pub(super) fn integrate_volumes(
     context: &FrameContext<'_>,
     ray: &Ray,
@@ -41,7 +42,7 @@ pub(super) fn integrate_volumes(
     }
 }
 
-/// Adds what a ray has collected, and dims what comes behind.
+/// Adds the radiance that a ray has collected, and attenuates everything behind it.
 pub(super) fn composite_volume(
     sample: &VolumeSample,
     state: &mut RayState,

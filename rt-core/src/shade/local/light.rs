@@ -1,5 +1,5 @@
-//! Light on sixteen surfaces of one material: the lobes and lights of [`super::radiance`], lane by
-//! lane the same bits.
+//! Lighting of sixteen surfaces of one material: the lobes and lights of [`super::radiance`], with
+//! the same bits in each lane.
 
 use super::FrameContext;
 use crate::effects::Effects;
@@ -13,15 +13,15 @@ use crate::surface::ShadingPointBlock;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdNarrow, SimdWiden, f32x16, mask32x16};
 use glam::Vec3;
 
-/// What the vector code knows: ideal diffuse, or that and a highlight.
+/// Models with vector code: ideal diffuse, or ideal diffuse with a highlight.
 #[derive(Clone, Copy)]
 enum Lobe {
     Matte,
     Phong { diffuse: f32, specular: Vec3, shininess: f32, highlight: PhongForm },
 }
 
-/// Microfacets are left to the scalar code: their many special cases are worth it only where a
-/// scene is made of them.
+/// Microfacets are left to the scalar code: vector code for their many special cases would pay only
+/// in scenes made of them.
 pub(super) fn supports(model: &SurfaceModel) -> bool {
     !matches!(model, SurfaceModel::Metal { .. } | SurfaceModel::Pbr { .. })
 }
@@ -236,7 +236,7 @@ fn irradiance<S: Simd>(simd: S, mean: &IrradianceCoefficients, n: Vec3x16<S>) ->
     Vec3x16 { x: sum.x.max(v(0.0)), y: sum.y.max(v(0.0)), z: sum.z.max(v(0.0)) }
 }
 
-/// Sixteen pixels from their channels' rows.
+/// Assembles sixteen pixels from their channels' rows.
 #[inline(never)]
 pub(super) fn store_pixels<S: Simd>(simd: S, rows: &[Row; 4], out: &mut [[f32; 4]]) {
     simd.vectorize(
@@ -257,7 +257,7 @@ pub(super) fn store_pixels<S: Simd>(simd: S, rows: &[Row; 4], out: &mut [[f32; 4
     );
 }
 
-/// Puts the lanes of `lanes` of `new` into the colour rows, opaque.
+/// Writes the lanes `lanes` of `new` to the colour rows, opaque.
 #[inline(never)]
 pub(super) fn merge<S: Simd>(simd: S, lanes: u16, new: &Rows3, rows: &mut [Row; 4]) {
     simd.vectorize(

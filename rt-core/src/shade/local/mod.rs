@@ -1,10 +1,10 @@
-//! Frames that need nothing but camera rays: trace, look up, light, done. No waves, no ray states,
-//! no points kept.
+//! Renders frames that need nothing but camera rays: trace, look up, light. It keeps no wavefronts,
+//! ray states or points.
 //!
-//! The same lights and lobes as the general loop, sixteen pixels at a time. Half of the time beyond
-//! tracing was waiting for vertices (measured on a million triangles, one after the other: 30 of 60
-//! ns per pixel), so a tile first asks for its triangles, then for their vertices, and only then
-//! looks at them.
+//! The lights and lobes are those of the general loop, computed for sixteen pixels at a time. Half
+//! of the time besides tracing was waiting for vertices (measured on a million triangles, one after
+//! the other: 30 of 60 ns per pixel). So a tile first prefetches its triangles, then their
+//! vertices, and only then reads them.
 
 mod light;
 
@@ -27,7 +27,7 @@ use crate::surface::{ShadingPoint, ShadingPointBlock};
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
-/// True when the frame has no effect beyond the lens.
+/// True when the frame has no effect other than the lens.
 pub(super) fn is_sufficient(context: &FrameContext<'_>) -> bool {
     context.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
 }
@@ -63,7 +63,7 @@ pub(super) fn render_tile(
     }
 }
 
-/// Colours of the tile whose camera rays and hits `work` has.
+/// Colours of the tile whose camera rays and hits are in `work`.
 pub(super) fn light(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -85,7 +85,7 @@ pub(super) fn light(
     });
 }
 
-/// As [`light`]. `POINT`: some light needs to know where the surface is.
+/// As [`light`]. `POINT`: some light needs the position of the surface.
 fn light_hits<S: Simd, const POINT: bool>(
     simd: S,
     context: &FrameContext<'_>,
@@ -164,7 +164,7 @@ fn light_hits<S: Simd, const POINT: bool>(
     }
 }
 
-/// Background under every pixel of block `b`; hits are put on top.
+/// Background under every pixel of block `b`; hits are drawn over it.
 fn fill_background(
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -180,8 +180,8 @@ fn fill_background(
     }
 }
 
-/// Radiance of one surface towards the origin of a ray with direction `dir`: what
-/// [`light::radiance_block`] does for sixteen.
+/// Radiance of one surface towards the origin of a ray with direction `dir`: the scalar form of
+/// [`light::radiance_block`].
 fn radiance(
     context: &FrameContext<'_>,
     material: &Material,
