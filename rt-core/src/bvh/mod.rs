@@ -1,4 +1,4 @@
-//! Acceleration structures: how rays find primitives.
+//! Acceleration structures for finding the primitives that rays hit.
 
 mod blas;
 #[cfg(test)]

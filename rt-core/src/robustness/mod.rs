@@ -1,8 +1,8 @@
-//! Measurements of robustness, shared by the tests, which ask for perfection, and by the program
-//! `bench`, which runs more rays and compares.
+//! Measures robustness. The tests require perfect results; the program `bench` traces more rays and
+//! compares ray tracers.
 //!
-//! [`LeakTest`]: how many rays aimed at vertices, edges and points of a closed mesh get through.
-//! [`SelfShadowTest`]: how many secondary rays meet the surface that they start from.
+//! [`LeakTest`] counts rays that get through when aimed at vertices, edges and points of a closed
+//! mesh. [`SelfShadowTest`] counts secondary rays that hit the surface from which they start.
 
 mod leaks;
 mod self_shadow;

@@ -1,4 +1,4 @@
-//! Geometry that is not a triangle mesh: anything that can bound its primitives and intersect a ray
+//! Geometry other than triangle meshes: any type that can bound its primitives and intersect a ray
 //! with one of them.
 
 mod cylinder;
@@ -20,18 +20,19 @@ use crate::ray::Ray;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// What [`Shape::closest`] found on one primitive.
+/// A hit that [`Shape::closest`] found on one primitive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeHit {
     /// Ray parameter, `t_min <= t < t_max`.
     pub t: f32,
-    /// First surface coordinate (its meaning is the shape's).
+    /// First surface coordinate (each shape defines its meaning).
     pub u: f32,
     /// Second surface coordinate.
     pub v: f32,
 }
 
-/// A point on a shape, for shading and for starting secondary rays; in the shape's object space.
+/// A point on a shape, for shading and for the origins of secondary rays, in the shape's object
+/// space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeSurface {
     /// The point, projected back onto the surface so that its error does not grow with the ray's
@@ -41,18 +42,19 @@ pub struct ShapeSurface {
     pub point_error: f32,
     /// Unit normal, outward where the shape has an outside.
     pub normal: Vec3,
-    /// Scalar for the material's colour map, when the shape carries one.
+    /// Scalar for the material's colour map, if the shape has scalars.
     pub scalar: Option<f32>,
-    /// Linear RGBA, when the shape carries colours.
+    /// Linear RGBA, if the shape has colours.
     pub color: Option<[f32; 4]>,
 }
 
-/// Geometry made of primitives numbered `0..num_primitives()`: the door for user-defined geometry.
+/// Geometry made of primitives numbered `0..num_primitives()`. Implement it for user-defined
+/// geometry.
 ///
 /// Object space is f32 relative to [`Shape::origin`]. Implementations must be deterministic: the
 /// same ray and primitive give the same bits every time.
 pub trait Shape: Send + Sync {
-    /// How many primitives.
+    /// Number of primitives.
     fn num_primitives(&self) -> usize;
 
     /// World position (before the instance's transform) of object space's origin.
@@ -60,44 +62,45 @@ pub trait Shape: Send + Sync {
         DVec3::ZERO
     }
 
-    /// A box that contains primitive `prim`. An empty or non-finite box leaves the primitive out
-    /// (it is counted).
+    /// A box that contains primitive `prim`. A primitive with an empty or non-finite box is left
+    /// out (and counted).
     fn bounds(&self, prim: u32) -> Aabb;
 
     /// The first intersection of `ray` with primitive `prim` within `[t_min, t_max)`.
     fn closest(&self, prim: u32, ray: &Ray) -> Option<ShapeHit>;
 
-    /// Whether anything of primitive `prim` lies within `[t_min, t_max)`.
+    /// Whether primitive `prim` is hit within `[t_min, t_max)`.
     fn occluded(&self, prim: u32, ray: &Ray) -> bool {
         self.closest(prim, ray).is_some()
     }
 
-    /// The surface at a hit this shape reported for `ray`.
+    /// The surface at a hit that this shape reported for `ray`.
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface;
 
-    /// Whether [`Shape::surface`] may return a colour with alpha below 1. Asked once, when a scene
-    /// is made: shapes that say no are not looked through, and a hit on one whose colour does have
-    /// alpha is drawn opaque and counted in [`crate::ray_stats::RayStats::opacity_ignored`].
+    /// Whether [`Shape::surface`] may return a colour with alpha below 1. Called once, when a scene
+    /// is built. If it returns false, the shape is treated as opaque: a hit whose colour
+    /// nevertheless has alpha is drawn opaque and counted in
+    /// [`crate::ray_stats::RayStats::opacity_ignored`].
     fn has_transparency(&self) -> bool {
         false
     }
 
-    /// A shape of these primitives alone (ascending numbers of this one's, in that order) that
-    /// holds no others' data, with the same bits in all its answers. `None` when the data cannot be
-    /// cut: who holds some primitives then holds the whole.
+    /// A shape of only these primitives (ascending numbers of this shape's, in that order), without
+    /// the data of others and with the same bits in all results. `None` when the data cannot be
+    /// split: a holder of some primitives then keeps all data.
     fn part(&self, _primitives: &[u32]) -> Option<Arc<dyn Shape>> {
         None
     }
 
-    /// For a shape that only gives another one's hits a new look: that other shape. Its primitives,
-    /// bounds and hits must be the same; then a world made from one that has it
-    /// ([`crate::bvh::World::build_sharing`]) takes over its tree.
+    /// For a shape that only changes the appearance of another one: that other shape. Its
+    /// primitives, bounds and hits must be the same. A world built from one with that shape
+    /// ([`crate::bvh::World::build_sharing`]) then reuses its tree.
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {
         None
     }
 }
 
-/// Whether any colour lets light through.
+/// Whether any colour is transparent.
 fn any_alpha(colors: &Option<Vec<[f32; 4]>>) -> bool {
     colors.iter().flatten().any(|c| c[3] < 1.0)
 }
@@ -147,8 +150,8 @@ impl Radii {
 }
 
 /// Splits f64 positions into an origin and f32 offsets from it, so that small detail far from zero
-/// survives. The origin is the middle of the finite positions, or zero when they straddle it (then
-/// nothing is lost by f32 offsets from zero).
+/// is kept. The origin is the centre of the finite positions, or zero when they straddle it (f32
+/// offsets from zero then lose nothing).
 pub fn relative_positions(points: &[DVec3]) -> (DVec3, Vec<Vec3>) {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for p in points.iter().filter(|p| p.is_finite()) {
@@ -168,8 +171,8 @@ pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
     if !(min.is_finite() && max.is_finite()) {
         return Aabb::EMPTY;
     }
-    // One step beyond the rounded value: a box that merely touches its surface invites rays through
-    // the gap of one ulp that a traversal's own rounding leaves (notes of the watertight triangle
+    // One ulp past the rounded value: rays could leak through a box that only touches its surface,
+    // because of the one-ulp gap of the traversal's own rounding (see the watertight triangle
     // tests).
     Aabb::new(
         Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down()),
@@ -177,8 +180,8 @@ pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
     )
 }
 
-/// `p` rounded to f32 and a bound on its distance from the true surface, when `p` itself is off by
-/// at most `error`.
+/// `p` rounded to f32 and a bound on its distance from the true surface, when `p` itself has an
+/// error of at most `error`.
 pub(crate) fn rounded_point(p: DVec3, error: f64) -> (Vec3, f32) {
     let point = p.as_vec3();
     // Each component moved by at most half an ulp (2⁻²⁴ relative); √3 of them together, and

@@ -1,4 +1,4 @@
-//! How the tree lies in memory.
+//! Memory layout of the tree.
 
 pub(crate) mod local_frame;
 pub(crate) mod triangles;

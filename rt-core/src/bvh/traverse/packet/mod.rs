@@ -1,5 +1,5 @@
-//! Up to 256 rays at a time, for rays that go the same way: tiles of primary rays, shadow rays to
-//! one light, sorted ambient occlusion rays.
+//! Traces up to 256 coherent rays at a time: tiles of primary rays, shadow rays to one light,
+//! sorted ambient occlusion rays.
 //!
 //! Two levels of bounds do most of the work. All rays of a packet share one octant, so intervals of
 //! their reciprocal directions (and origins) bound every ray's distance to a plane. A node's eight
@@ -64,45 +64,45 @@ pub(crate) struct Packet {
     shear_bounds: [[Row; 2]; 2],
     /// Largest difference from `shear_mid` of all groups.
     shear_span: [f32; 2],
-    /// Whether testing groups' rays one by one against boxes pays with a common origin, learned
-    /// from the packets before: closest hits, occlusion.
+    /// Whether testing the rays of groups one by one against boxes pays off with a common origin,
+    /// learned from earlier packets: closest hits, occlusion.
     slabs: [SlabHeuristic; 2],
 }
 
-/// Whether rays' own box tests throw out enough of the groups whose intervals meet a box. They do
+/// Whether per-ray box tests reject enough of the groups whose intervals intersect a box. They do
 /// for shadow rays of points at many depths and not for tiles of pixels; no measure of the
-/// intervals told these apart as well as trying. Answers do not depend on it.
+/// intervals predicted this as well as trying. Results do not depend on it.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlabHeuristic {
-    /// Groups tested and kept lately.
+    /// Groups tested and groups kept recently.
     tested: f32,
     kept: f32,
-    /// Rays in the kept groups that meet the boxes.
+    /// Rays in the kept groups that intersect the boxes.
     rays: f32,
     /// Packets since the last trial.
     since: u8,
 }
 
-/// Rays' own box tests in one walk.
+/// Per-ray box tests in one traversal.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlabCounts {
-    /// Groups tested, groups kept, and rays in these that meet the boxes.
+    /// Groups tested, groups kept, and their rays that intersect the boxes.
     tested: u32,
     kept: u32,
     rays: u32,
 }
 
 impl SlabHeuristic {
-    /// Every so many packets the tests are tried again.
+    /// The tests are tried again after this many packets.
     const TRIAL: u8 = 16;
-    /// Beyond this share of kept groups the tests cost more than they save. Measured shares on one
+    /// Above this share of kept groups the tests cost more than they save. Measured shares on one
     /// million triangles: 0.83 and 0.94 for pixels (orbit, close by), where the tests cost a tenth
     /// of the time; 0.66 and 0.93 for rays from a light, where they save a third and cost a
     /// quarter.
     const KEPT: f32 = 0.75;
-    /// With fewer rays than this in a group that is tested, the packet falls apart, and the tests
-    /// find the few rays that had better go on alone. One value tried: rays from a light among
-    /// pipes took 94 instead of 133 ms, among isosurfaces nothing changed.
+    /// When a tested group has fewer rays than this, the packet loses coherence, and the tests find
+    /// the few rays that are traced faster alone. One value tried: rays from a light among pipes
+    /// took 94 instead of 133 ms, among isosurfaces nothing changed.
     const RAYS: f32 = 5.0;
 
     fn next(&mut self) -> bool {
@@ -162,7 +162,7 @@ impl Packet {
                     h.prim[lane] = if on { 0 } else { h.prim[lane] };
                     continue;
                 }
-                // Selects instead of branches: this loop becomes vector code.
+                // Selects instead of branches, so that this loop is vectorized.
                 h.t[lane] = if on { self.t[g][lane] } else { h.t[lane] };
                 h.u[lane] = if on { self.u[g][lane] } else { h.u[lane] };
                 h.v[lane] = if on { self.v[g][lane] } else { h.v[lane] };
@@ -201,8 +201,8 @@ impl Packet {
         bvh: &WideBvh,
     ) {
         if !self.common_origin {
-            // Intervals of origins and directions together say little: measured seven times slower
-            // without the rays' own tests.
+            // Combined intervals of origins and directions are weak bounds: measured seven times
+            // slower without per-ray tests.
             self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, false>);
         } else if self.slabs[ANY as usize].next() {
             let slabs = self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
@@ -224,7 +224,7 @@ impl Packet {
     }
 }
 
-/// What happens at a leaf.
+/// Callback for the leaves that a packet reaches.
 trait PacketLeaf<S: Simd> {
     /// All rays start at one point.
     const COMMON: bool;
