@@ -1,4 +1,23 @@
 //! Ray tracing for scientific visualization on the CPU.
+//!
+//! ```
+//! use rt_core::{camera::Camera, glam::{DVec3, Vec3}, light::Light, material::Material, mesh::TriMesh};
+//! use rt_core::{render::{RenderOptions, render}, scene::SceneBuilder};
+//!
+//! let floor = TriMesh::new(vec![Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::new(0.0, 9.0, 0.0)], vec![[0, 1, 2]]);
+//! let mut builder = SceneBuilder::new();
+//! builder.mesh(floor, Material::matte([0.5, 0.25, 1.0]));
+//! builder.light(Light::directional(DVec3::Z));
+//! let scene = builder.build().unwrap();
+//! let camera = Camera::perspective(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 100.0]).unwrap();
+//! let output = render(&scene, &camera, &RenderOptions::new(32, 32)).unwrap();
+//! assert_eq!(output.frame.color_at(16, 16), [0.5, 0.25, 1.0, 1.0]);
+//! assert_eq!(output.report.rays.reflection, 0);
+//! ```
+//!
+//! A [`scene::Scene`] has geometry in a [`bvh::World`], materials, lights and volumes. A
+//! [`camera::Camera`] and [`render::RenderOptions`] define the image. [`render::render`] returns it
+//! with a report. [`distributed`] renders scenes whose parts are held by several processes.
 #![deny(unsafe_code)]
 
 pub mod bvh;

@@ -1,4 +1,4 @@
-//! Sample points in the unit square: the same for the same seed, pixel, sample and dimension on any
+//! Sample points in the unit square. They depend only on seed, pixel, sample and dimension, for any
 //! number of threads.
 //!
 //! [`Sampling::Sobol`] is the (0,2)-sequence made of Sobol's first two dimensions, shuffled and
@@ -11,13 +11,14 @@ use crate::ray::LANES;
 use crate::simd::vectors::Row;
 use fearless_simd::Simd;
 
-/// How sample points are spread.
+/// How sample points are distributed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Sampling {
-    /// Owen-scrambled (0,2)-sequence: error falls nearly as 1/n where the integrand is smooth.
+    /// Owen-scrambled (0,2)-sequence: the error decreases nearly as 1/n where the integrand is
+    /// smooth.
     #[default]
     Sobol,
-    /// Independent uniform points: error falls as 1/√n.
+    /// Independent uniform points: the error decreases as 1/√n.
     Random,
 }
 
@@ -43,13 +44,13 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Points for sample `index` of the pixel at (`x`, `y`) of the whole picture.
+    /// Points for sample `index` of the pixel at (`x`, `y`) of the whole image.
     #[inline]
     pub fn new(kind: Sampling, seed: u64, x: u32, y: u32, index: u32) -> Sampler {
         Sampler { kind, pixel: pixel_key(seed, x, y), index }
     }
 
-    /// The point of dimension `dimension` (a pair of axes; give each use its own number).
+    /// The point of dimension `dimension` (a pair of axes; each use needs its own number).
     #[inline]
     pub fn square(&self, dimension: u32) -> [f32; 2] {
         self.point(self.index, dimension)
@@ -71,7 +72,8 @@ impl Sampler {
     }
 }
 
-/// Points for sixteen uses at once: the functions of [`Sampler`] in loops that become vector code.
+/// Points for sixteen uses at once: the functions of [`Sampler`] in loops that the compiler
+/// vectorizes.
 pub(crate) struct SamplerBlock {
     kind: Sampling,
     pixel: [u32; LANES],
@@ -84,7 +86,7 @@ impl SamplerBlock {
         SamplerBlock { kind, pixel: [0; LANES], index: [0; LANES], dimension: [0; LANES] }
     }
 
-    /// Lane `lane` is to have [`Sampler::square_of`]`(dimension, k, count)`.
+    /// Requests [`Sampler::square_of`]`(dimension, k, count)` for lane `lane`.
     #[inline]
     pub(crate) fn set(
         &mut self,
@@ -99,7 +101,7 @@ impl SamplerBlock {
         self.dimension[lane] = dimension;
     }
 
-    /// All lanes are to have [`Sampler::square`]`(dimension)` of sample `index`, each of its own
+    /// Requests [`Sampler::square`]`(dimension)` of sample `index` for all lanes, each of its own
     /// pixel.
     #[inline(never)]
     pub(crate) fn set_pixels<S: Simd>(
@@ -173,7 +175,7 @@ impl SamplerBlock {
     }
 }
 
-/// What tells pixels (and pictures) apart.
+/// Hash that distinguishes pixels (and images).
 #[inline(always)]
 fn pixel_key(seed: u64, x: u32, y: u32) -> u32 {
     hash(hash(x ^ seed as u32).wrapping_add(y)) ^ hash((seed >> 32) as u32 ^ 0x5bd1_e995)
@@ -251,8 +253,8 @@ pub fn cosine_hemisphere([a, b]: [f32; 2]) -> glam::Vec3 {
 #[inline]
 pub fn unit_disk([a, b]: [f32; 2]) -> [f32; 2] {
     let (x, y) = (2.0 * a - 1.0, 2.0 * b - 1.0);
-    // Angles are counted from the nearer axis, x or y. No branches, so that loops over this become
-    // vector code.
+    // Angles are counted from the nearer axis, x or y. No branches, so that the compiler vectorizes
+    // loops over this.
     let near_x = x.abs() > y.abs();
     let (r, across) = if near_x { (x, y) } else { (y, x) };
     let ratio = across / if r == 0.0 { 1.0 } else { r };

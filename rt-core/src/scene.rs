@@ -1,23 +1,5 @@
 //! Describes a scene: geometry in a [`World`], the appearance of each instance, lights and
 //! environment.
-//!
-//! ```
-//! use rt_core::glam::{DVec3, Vec3};
-//! use rt_core::{camera::Camera, light::Light, material::Material, mesh::TriMesh};
-//! use rt_core::{render::{RenderOptions, render}, scene::SceneBuilder};
-//!
-//! let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]].map(Vec3::from);
-//! let floor = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]);
-//! let mut builder = SceneBuilder::new();
-//! builder.mesh(floor, Material::matte([0.5, 0.25, 1.0]));
-//! builder.light(Light::directional(DVec3::Z));
-//! let scene = builder.build().unwrap();
-//! let eye = DVec3::new(0.0, 0.0, 4.0);
-//! let camera = Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 100.0]).unwrap();
-//! let output = render(&scene, &camera, &RenderOptions::new(32, 32)).unwrap();
-//! assert_eq!(output.frame.color_at(16, 16), [0.5, 0.25, 1.0, 1.0]);
-//! assert_eq!(output.report.rays.reflection, 0);
-//! ```
 
 mod check;
 mod part;

@@ -1,11 +1,11 @@
-//! What a scalar looks like inside a volume: colour and extinction, and their exact integrals over
-//! a linear stretch of scalars.
+//! Appearance of a scalar inside a volume: colour and extinction, and their exact integrals over a
+//! linear interval of scalars.
 //!
-//! Extinction σ is piecewise linear in the scalar, colour follows a [`ColorMap`]; so ∫σ ds and
-//! ∫σ·colour ds are piecewise polynomials, which are kept as running sums at the knots. The mean
-//! over a stretch s₀..s₁ is then a difference of two look-ups (Engel, Kraus and Ertl 2001,
+//! Extinction σ is piecewise linear in the scalar, and colour follows a [`ColorMap`]. So ∫σ ds and
+//! ∫σ·colour ds are piecewise polynomials, which are stored as running sums at the knots. The mean
+//! over an interval s₀..s₁ is then a difference of two look-ups (Engel, Kraus and Ertl 2001,
 //! "High-quality pre-integrated volume rendering", section 4.2, whose approximation also leaves out
-//! attenuation within the stretch, but without their table: a peak of any narrowness counts with
+//! attenuation within the interval, but without their table: a peak of any narrowness counts with
 //! its full area).
 
 use crate::colormap::ColorMap;
@@ -16,8 +16,8 @@ pub struct TransferFunction {
     colors: ColorMap,
     extinction: Vec<[f32; 2]>,
     intervals: Vec<Interval>,
-    /// For evenly spaced scalars from `buckets.lo`: the piece to begin looking at, and how many
-    /// buckets before this one have any extinction.
+    /// For evenly spaced scalars from `buckets.lo`: the interval where the search starts, and how
+    /// many buckets before this one have any extinction.
     buckets: Buckets,
 }
 
@@ -27,35 +27,36 @@ pub enum TransferFunctionError {
     /// No control point.
     #[error("transfer function has no extinction points; give at least one [scalar, extinction]")]
     Empty,
-    /// A bad control point.
+    /// An invalid control point.
     #[error("transfer function point {index} is {point:?}; {rule}")]
     Point {
-        /// Which one.
+        /// Index of the point.
         index: usize,
         /// Scalar and extinction (or opacity) given.
         point: [f32; 2],
         /// What is allowed.
         rule: &'static str,
     },
-    /// A bad unit distance.
+    /// An invalid unit distance.
     #[error("opacity unit distance is {0}; it must be finite and positive, in world units")]
     UnitDistance(f32),
-    /// A bad colour.
+    /// An invalid colour.
     #[error("transfer function: {field} is {value}; it must be {rule}")]
     Colors {
-        /// Which number.
+        /// The parameter.
         field: &'static str,
         /// Its value.
         value: String,
         /// What is allowed.
         rule: &'static str,
     },
-    /// A bad colour range.
+    /// An invalid colour range.
     #[error("colour map range is {0:?}; it must be finite and, for a logarithmic map, positive")]
     ColorRange([f32; 2]),
 }
 
-/// A stretch of scalars from `s` on where extinction and extinction times colour are polynomials.
+/// An interval of scalars, starting at `s`, in which extinction and extinction times colour are
+/// polynomials.
 #[derive(Debug, Clone, Copy)]
 struct Interval {
     s: f64,
@@ -65,7 +66,7 @@ struct Interval {
     color: [[f64; 2]; 3],
     /// ∫σ, ∫σr, ∫σg, ∫σb up to `s`.
     sums: [f64; 4],
-    /// Heights of the steps of σ up to and at `s`, added up.
+    /// Sum of the heights of the steps of σ up to and at `s`.
     steps: f64,
 }
 
@@ -136,19 +137,19 @@ impl TransferFunction {
         TransferFunction::new(colors, extinction)
     }
 
-    /// The colours.
+    /// The colour map.
     pub fn colors(&self) -> &ColorMap {
         &self.colors
     }
 
-    /// Extinction per world unit at `scalar`, straight from the control points. The value after a
-    /// step counts.
+    /// Extinction per world unit at `scalar`, computed from the control points. At a step, the
+    /// value after it.
     pub fn extinction(&self, scalar: f64) -> f64 {
         extinction_at(&self.extinction, scalar)
     }
 
-    /// Whether there is any extinction for scalars in `lo..=hi`; may say so when there is none
-    /// within a thousandth of the range.
+    /// Whether there is any extinction for scalars in `lo..=hi`. May return true when extinction
+    /// lies only within a thousandth of the range.
     #[inline]
     pub(crate) fn is_clear(&self, lo: f64, hi: f64) -> bool {
         let b = &self.buckets;
@@ -193,7 +194,7 @@ impl TransferFunction {
         self.interval(lo).s != self.interval(hi).s
     }
 
-    /// Heights of the steps of extinction between two scalars, added up.
+    /// Sum of the heights of the steps of extinction between two scalars.
     #[inline]
     pub(crate) fn steps_between(&self, lo: f64, hi: f64) -> f64 {
         self.interval(hi).steps - self.interval(lo).steps
@@ -212,7 +213,7 @@ impl TransferFunction {
 impl Buckets {
     #[inline]
     fn index(&self, s: f64) -> usize {
-        // `as` saturates: below the first bucket is 0. Bucket 0 and the last one stand for
+        // `as` saturates: below the first bucket is 0. Bucket 0 and the last one represent
         // everything outside.
         (((s - self.lo) * self.per_scalar) as usize).min(BUCKETS - 1)
     }
@@ -260,7 +261,7 @@ fn extinction_at(points: &[[f32; 2]], s: f64) -> f64 {
     }
 }
 
-/// Cuts the scalars at every knot of extinction and colour.
+/// Splits the scalars at every knot of extinction and colour.
 fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
     // Where the colour bends.
     let [lo, hi] = colors.range.map(f64::from);
@@ -275,12 +276,12 @@ fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
     let largest = knots[0].abs().max(knots[knots.len() - 1].abs());
     let span =
         (knots[knots.len() - 1] - knots[0]).max(1e-5 * largest).max(f64::from(f32::MIN_POSITIVE));
-    // Constant pieces on either side, wide enough for f32 scalars to be far inside.
+    // Constant intervals on either side, wide enough for f32 scalars to be far inside.
     let mut all = vec![knots[0] - span];
     all.extend(&knots);
 
-    // Limits from inside each piece, so that steps are steps: a colour map of zero width is one,
-    // too.
+    // Limits from inside each interval, so that steps stay steps; a colour map of zero width is
+    // also a step.
     let color_at = |s: f32| -> [f64; 3] {
         let c = colors.lookup(s);
         [c[0], c[1], c[2]].map(f64::from)
@@ -344,7 +345,8 @@ fn buckets(intervals: &[Interval]) -> Buckets {
     let mut interval = 0;
     for i in 0..BUCKETS {
         let (from, to) = (lo + i as f64 / per_scalar, lo + (i + 1) as f64 / per_scalar);
-        // One piece early: rounding in `index` may put a scalar of the bucket before into this one.
+        // Start one interval early: rounding in `index` may put a scalar of the previous bucket
+        // into this one.
         while interval + 1 < intervals.len() && intervals[interval + 1].s < from - 0.5 / per_scalar
         {
             interval += 1;

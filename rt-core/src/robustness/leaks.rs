@@ -1,8 +1,9 @@
-//! Rays that slip between the triangles of a closed mesh.
+//! Counts rays that leak between the triangles of a closed mesh.
 //!
-//! A ray that starts inside a closed surface must hit it. Random rays almost never find the places
-//! where a tracer fails, so these are aimed there: exactly at vertices and edges, beside edges by a
-//! few roundings, and from close to the surface, where a triangle is large against its distance.
+//! A ray that starts inside a closed surface must hit it. Random rays almost never find the points
+//! where a tracer fails, so these rays are aimed there: exactly at vertices and edges, next to
+//! edges by a few roundings, and from close to the surface, where a triangle is large compared with
+//! its distance.
 
 use super::batch_numbers;
 use crate::bvh::{Coherence, InstanceFilter, World};
@@ -19,7 +20,7 @@ pub enum RayTarget {
     Vertex,
     /// A point on an edge, rounded to f32.
     Edge,
-    /// A point beside an edge, off by up to 10⁻⁶ of its length: there the edge test and the box
+    /// A point next to an edge, off by up to 10⁻⁶ of its length: there the edge test and the box
     /// test may disagree.
     NearEdge,
     /// Any point of a triangle.
@@ -27,7 +28,7 @@ pub enum RayTarget {
 }
 
 impl RayTarget {
-    /// Every aim.
+    /// All targets.
     pub const ALL: [RayTarget; 4] =
         [RayTarget::Vertex, RayTarget::Edge, RayTarget::NearEdge, RayTarget::Anywhere];
 
@@ -62,7 +63,7 @@ pub enum RayOrigins {
     },
 }
 
-/// Which of the world's queries answer.
+/// The queries of the world that trace the rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum QueryKind {
     /// [`World::closest`] and [`World::occluded`].
@@ -74,11 +75,11 @@ pub enum QueryKind {
 }
 
 impl QueryKind {
-    /// Every query.
+    /// All kinds of queries.
     pub const ALL: [QueryKind; 3] = [QueryKind::Single, QueryKind::Coherent, QueryKind::Incoherent];
 }
 
-/// What became of the rays.
+/// Counts of a leak test.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct LeakCount {
     /// Rays traced.
@@ -114,7 +115,7 @@ pub struct LeakCount {
 pub struct LeakTest<'a> {
     /// The world.
     pub world: &'a World,
-    /// The mesh that its first instance shows.
+    /// The mesh of its first instance.
     pub mesh: &'a TriMesh,
     /// Where rays start.
     pub start: RayOrigins,
@@ -124,7 +125,7 @@ pub struct LeakTest<'a> {
     pub seed: u64,
 }
 
-/// Rays made and traced by one task.
+/// Rays generated and traced by one task.
 const BATCH: usize = 4096;
 /// Rays that share an origin and go to neighbouring triangles; every other such group has unrelated
 /// rays.

@@ -1,5 +1,5 @@
-//! Isosurfaces of a uniform grid without any geometry: rays meet the trilinear interpolant itself
-//! (thesis chapter 6; Parker et al. 1998).
+//! Isosurfaces of a uniform grid without extracted geometry: rays intersect the trilinear
+//! interpolant itself (thesis chapter 6; Parker et al. 1998).
 //!
 //! Primitives are the blocks of cells (bricks) that contain part of a surface. Inside a brick a ray
 //! walks from cell to cell ([`crate::grid_walk`]) and finds the first root of the cubic along it
@@ -32,7 +32,7 @@ pub enum IsosurfaceNormals {
     Smooth,
 }
 
-/// How to make an [`Isosurface`].
+/// Options of an [`Isosurface`].
 #[derive(Debug, Clone, Copy)]
 pub struct IsosurfaceOptions {
     /// Cells per edge of a brick, 1 to 255: smaller ones fit the surface closer and take more
@@ -48,18 +48,18 @@ impl Default for IsosurfaceOptions {
     }
 }
 
-/// What an isosurface is made of, and what was left out.
+/// Sizes of an isosurface, and the cells left out of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct IsosurfaceReport {
     /// Cells of the grid.
     pub cells: u64,
     /// Cells with a NaN or infinite corner. They are empty: the surface ends at them.
     pub cells_non_finite: u64,
-    /// Cells that some surface passes.
+    /// Cells that some surface crosses.
     pub cells_active: u64,
     /// Bricks of the grid.
     pub blocks: u64,
-    /// Bricks that some surface passes: the primitives.
+    /// Bricks that some surface crosses: the primitives.
     pub bricks_active: u64,
     /// Isovalues outside the range of the data: their surfaces are empty.
     pub isovalues_out_of_range: usize,
@@ -94,7 +94,7 @@ struct CellBlock {
     size: [u8; 3],
 }
 
-/// What one brick found while looking at its cells.
+/// Result of scanning one brick's cells.
 #[derive(Default)]
 struct BlockScan {
     block: Option<CellBlock>,
@@ -189,7 +189,7 @@ impl Isosurface {
         Isosurface { color_by: Some(grid), ..self }
     }
 
-    /// Sizes, and cells that had to be left out.
+    /// Sizes, and cells left out.
     pub fn report(&self) -> IsosurfaceReport {
         self.report
     }
@@ -235,7 +235,7 @@ impl Isosurface {
             // sign at grid points is right.
             let iso = f64::from(iso);
             let b = ray_cubic::along(&corners.map(|v| f64::from(v) - iso), p, q);
-            // A ray that starts exactly on the surface touches it there, whichever way it goes.
+            // A ray that starts exactly on the surface touches it there, in any direction.
             let touches = crossing.entry.is_none() && b[0] == 0.0;
             if let Some(u) = if touches { Some(0.0) } else { ray_cubic::first_change(&b) }
                 && best.is_none_or(|(least, _)| u < least)
@@ -256,7 +256,7 @@ fn min_max(v: &[f32; 8]) -> (f32, f32) {
     v.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)))
 }
 
-/// Looks at the cells `lo..hi`.
+/// Scans the cells `lo..hi`.
 fn scan(grid: &Grid, isovalues: &[f32], lo: UVec3, hi: UVec3) -> BlockScan {
     let mut s = BlockScan::default();
     let (mut first, mut last) = (hi, lo);

@@ -2,8 +2,8 @@
 //! (streamlines, field lines, fibres).
 //!
 //! Each segment is one primitive, a [rounded cone](super::rounded_cone). Neighbours share the
-//! sphere at their joint, so the union has no gaps. What of a segment's surface lies inside its
-//! neighbours is not reported, so a polyline is one solid: a ray through a bend has one entry and
+//! sphere at their joint, so the union has no gaps. The parts of a segment's surface inside its
+//! neighbours are not reported, so a polyline is one solid: a ray through a bend has one entry and
 //! one exit, also for transparent tubes and rays that start inside. Different polylines, and a
 //! polyline that crosses itself, interpenetrate.
 //!
@@ -45,8 +45,8 @@ pub struct Tubes {
     single_points: usize,
 }
 
-/// How many neighbours on each side are looked at for a hit's being inside them: enough for
-/// segments down to 1/32 of the radius; beyond that, a transparent bend may show an inner surface.
+/// Number of neighbours on each side that are tested for containing a hit: enough for segments down
+/// to 1/32 of the radius. For shorter ones, a transparent bend may show an inner surface.
 const NEIGHBOURS: usize = 32;
 
 impl Tubes {
@@ -84,7 +84,7 @@ impl Tubes {
         })
     }
 
-    /// Tubes around f64 world positions, stored relative to their middle: see
+    /// Tubes around f64 world positions, stored relative to their centre: see
     /// [`super::relative_positions`].
     pub fn from_f64_points(
         points: &[DVec3],
@@ -249,8 +249,7 @@ impl Shape for Tubes {
         any_alpha(&self.colors)
     }
 
-    /// Holds, beside the segments asked for, those of the same line that may hide something of
-    /// them.
+    /// Also holds those segments of the same line that may hide parts of the requested ones.
     fn part(&self, primitives: &[u32]) -> Option<Arc<dyn Shape>> {
         let (mut points, mut segments, mut local) = (Vec::new(), Vec::new(), Vec::new());
         let asked = primitives.iter().map(|&p| p as usize).filter(|&p| p < self.segments.len());
