@@ -1,5 +1,5 @@
-//! Binary trees over one fragment of the primitives: what every builder makes and the collapse
-//! reads.
+//! Binary trees over one fragment of the primitives: the output of every builder and the input of
+//! the collapse.
 
 use crate::bvh::layout::wide::LEAF_SIZE;
 use crate::math::Aabb;
@@ -8,8 +8,8 @@ use crate::math::Aabb;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BinaryNode {
     pub(crate) bounds: Aabb,
-    /// A leaf's first place in [`BinaryTree::ids`]; an inner node's left child, with the right one
-    /// behind it.
+    /// A leaf's first index in [`BinaryTree::ids`]; an inner node's left child, which the right one
+    /// follows.
     pub(crate) first: u32,
     /// Primitives of a leaf; 0 for inner nodes.
     pub(crate) count: u32,
@@ -35,19 +35,18 @@ pub(crate) struct BinaryTree {
 }
 
 impl BinaryTree {
-    /// Room for a tree over `prims` primitives. Leaves hold more than three on average.
+    /// A tree with capacity for `prims` primitives. Leaves hold more than three on average.
     pub(crate) fn with_room_for(prims: usize) -> BinaryTree {
         BinaryTree { nodes: Vec::with_capacity(prims * 5 / 8 + 8), ids: vec![0; prims], depth: 0 }
     }
 
-    /// Makes room for the root.
+    /// Adds the root.
     pub(crate) fn add_root(&mut self) {
         self.nodes.push(NEW);
     }
 
-    /// Makes `node` a leaf of up to four primitives, which take the places from `first` on.
-    /// Ascending numbers: with ties in t the first of a leaf wins, whatever the order of
-    /// partitioning.
+    /// Makes `node` a leaf of up to four primitives, with ids from index `first` on. Ids ascend:
+    /// with ties in t the first of a leaf wins, for any order of partitioning.
     #[inline]
     pub(crate) fn make_leaf(
         &mut self,
@@ -65,7 +64,7 @@ impl BinaryTree {
         sort4(ids);
     }
 
-    /// Makes room for the two children of `node` and returns the left one's number.
+    /// Adds the two children of `node` and returns the left one's index.
     #[inline]
     pub(crate) fn open(&mut self, node: usize) -> usize {
         let left = self.nodes.len();
@@ -74,8 +73,8 @@ impl BinaryTree {
         left
     }
 
-    /// The surface area heuristic's cost relative to the root's area: expected nodes and leaves a
-    /// ray through the root's box meets.
+    /// The surface area heuristic's cost relative to the root's area: expected nodes and leaves
+    /// that a ray through the root's box visits.
     #[cfg(test)]
     pub(crate) fn cost(&self) -> f64 {
         let sum: f64 = self.nodes.iter().map(|n| n.bounds.half_area() as f64).sum();

@@ -1,4 +1,4 @@
-//! Where to cut a set of primitives: the surface area heuristic over bins (Wald, "On fast
+//! Chooses where to cut a set of primitives: the surface area heuristic over bins (Wald, "On fast
 //! Construction of SAH-based Bounding Volume Hierarchies", 2007), with a leaf of up to four
 //! primitives costing one test.
 
@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Most bins per axis.
 const MAX_BINS: usize = 16;
-/// Sets at least this large are binned in parallel, in pieces of this size (fixed, so that the tree
+/// Sets at least this large are binned in parallel, in chunks of this size (fixed, so that the tree
 /// does not depend on the threads).
 const PARALLEL_CHUNK: usize = 1 << 16;
 
@@ -25,7 +25,7 @@ pub(crate) fn leaf_tests(n: usize) -> f32 {
     n.div_ceil(LEAF_SIZE) as f32
 }
 
-/// A way to cut a set in two.
+/// A cut of a set in two.
 #[derive(Debug, Clone, Copy)]
 struct Cut {
     axis: usize,
@@ -201,8 +201,8 @@ impl SplitPlane {
     }
 }
 
-/// Room for a search, and the instructions to use. Every level gives the same cuts: there are only
-/// minima, and arithmetic without fused operations.
+/// Buffers of a search, and the instruction set to use. Every level gives the same cuts: there are
+/// only minima, and arithmetic without fused operations.
 pub(crate) struct SearchSpace {
     level: Level,
     even: Bins,
@@ -244,7 +244,7 @@ impl SearchSpace {
     }
 }
 
-/// The best place to cut `refs`; `None` for primitives that no cut separates (duplicates).
+/// The best cut of `refs`; `None` for primitives that no cut separates (duplicates).
 fn find_plane(
     refs: &[PrimRef],
     bounds: &SetBounds,
@@ -258,7 +258,7 @@ fn find_plane(
     dispatch!(space.level, simd => find_plane_of_few(simd, refs, bounds, sah, space))
 }
 
-/// Bins and axes to look at.
+/// Bins and axes to search.
 #[inline(always)]
 fn search(n: usize, bounds: &SetBounds, sah: SahConfig) -> (BinMap, usize, Range<usize>) {
     let bins = (4 + n / 16).min(sah.bins).min(MAX_BINS);

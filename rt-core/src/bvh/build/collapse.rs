@@ -1,4 +1,4 @@
-//! From a binary tree to 8-wide nodes.
+//! Converts a binary tree to 8-wide nodes.
 //!
 //! Which binary nodes become wide nodes decides how many nodes a ray meets and how full they are.
 //! Opening always the child with the largest surface leaves many nodes half empty; choosing by
@@ -13,7 +13,7 @@
 use super::binary_tree::BinaryTree;
 use crate::bvh::layout::wide::WIDTH;
 
-/// Marks an unused place in a [`WidePlan`] node.
+/// Marks an unused slot in a [`WidePlan`] node.
 pub(crate) const NO_CHILD: u32 = u32::MAX;
 
 /// The wide nodes of a fragment, parents before children in depth-first order.
@@ -40,8 +40,8 @@ pub(crate) fn plan(tree: &BinaryTree) -> WidePlan {
     planner.plan
 }
 
-/// `[i − 1]`: cost of a subtree with at most i roots, i = 1..=8. The last place holds the cost of
-/// being spread over exactly the eight places of a node of its own.
+/// `[i − 1]`: cost of a subtree with at most i roots, i = 1..=8. The last entry is the cost of
+/// filling exactly the eight slots of a separate node.
 type Costs = [f32; WIDTH];
 
 struct Planner<'t> {
@@ -50,7 +50,8 @@ struct Planner<'t> {
     plan: WidePlan,
 }
 
-/// The cheapest way to divide `i` places between two children: cost and places for the left one.
+/// The cheapest division of `i` slots between two children: cost, and number of slots for the left
+/// one.
 #[inline(always)]
 fn share(left: &Costs, right: &Costs, i: usize) -> (f32, usize) {
     let mut best = (f32::INFINITY, 1);
@@ -90,8 +91,8 @@ impl Planner<'_> {
         let mut children = [NO_CHILD; WIDTH];
         let mut count = 0;
         self.spread(node, WIDTH, &mut children, &mut count);
-        // Leaves first: they stand right behind their node. Stable, so that the order is the binary
-        // tree's.
+        // Leaves first: they are stored directly after their node. Stable, so that the order is the
+        // binary tree's.
         let mut ordered = [NO_CHILD; WIDTH];
         let is_leaf = |c: &&u32| self.tree.nodes[**c as usize].is_leaf();
         let leaves = children[..count].iter().filter(is_leaf);
@@ -107,13 +108,13 @@ impl Planner<'_> {
         }
     }
 
-    /// Divides `places` between the two children of `node`.
+    /// Divides `places` slots between the two children of `node`.
     fn spread(&self, node: usize, places: usize, out: &mut [u32; WIDTH], count: &mut usize) {
         let left = self.tree.nodes[node].first as usize;
         let (_, k) = share(&self.costs[left], &self.costs[left + 1], places);
         for (child, places) in [(left, k), (left + 1, places - k)] {
             let c = &self.costs[child];
-            // One root of its own when that is as cheap as any division.
+            // A single root when it is as cheap as any division.
             if places == 1 || self.tree.nodes[child].is_leaf() || c[places - 1] >= c[0] {
                 out[*count] = child as u32;
                 *count += 1;

@@ -1,12 +1,12 @@
 //! Binary trees improved by the reinsertion optimiser of the crate obvhs (Meister and Bittner,
 //! "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", 2018).
 //!
-//! It runs within a fragment of the primitives, which bounds its memory and its time. What obvhs
-//! 0.4 cannot take is kept from it:
+//! It runs within a fragment of the primitives, which bounds its memory and its time. Inputs that
+//! obvhs 0.4 cannot handle are excluded:
 //! - Boxes whose surface overflows f32 lead to comparisons of NaN, which panic: `None` here.
 //! - Trees may become as deep as there are primitives: `None` beyond [`MAX_BINARY_DEPTH`].
-//! - The optimiser's stack has a fixed size, twice the depth that the tree claims: it is told the
-//!   true depth before every pass.
+//! - The optimiser's stack has a fixed size, twice the depth that the tree stores: the true depth
+//!   is set before every pass.
 //!
 //! obvhs' builder (PLOC, Meister and Bittner 2018) was a preset once. It took longer than
 //! [`super::sah_tree`] with few bins, and rays through its trees took longer, too.
@@ -28,8 +28,8 @@ fn is_ordinary(b: Aabb) -> bool {
     b.half_area() <= LARGEST_HALF_AREA
 }
 
-/// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot take it. Each pass
-/// tries that part of the nodes which has the largest surface.
+/// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot handle it. Each
+/// pass tries the given share of the nodes, those with the largest surface.
 pub(crate) fn reinsert(tree: &BinaryTree, passes: &[f32]) -> Option<BinaryTree> {
     if !is_ordinary(tree.nodes[0].bounds) {
         return None;

@@ -1,7 +1,7 @@
-//! A subtree that only a few rays of a packet meet: each of them walks it for itself, two at a
-//! time.
+//! Traverses a subtree that only a few rays of a packet reach: the rays are traced individually,
+//! two at a time.
 //!
-//! Rays that leave each other spread over the groups, a lane here and one there, and every box and
+//! Rays that diverge are spread over the groups, a lane here and one there, and every box and
 //! triangle would still be tested against sixteen.
 
 use super::Packet;
@@ -20,8 +20,8 @@ use fearless_simd::Simd;
 pub(super) const MAX_SINGLE_RAYS: usize = 4;
 
 impl Packet {
-    /// What a ray needs to go on alone: the packet's own numbers, so that its answers stay the same
-    /// bits.
+    /// The data that a ray needs to continue alone: the packet's own numbers, so that its results
+    /// keep the same bits.
     #[inline(always)]
     fn setup(&self, g: usize, lane: usize) -> RaySetup {
         let [kx, ky, kz] = self.axes;

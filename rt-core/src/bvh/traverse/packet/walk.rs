@@ -1,4 +1,4 @@
-//! A packet's way through the hierarchy.
+//! Traversal of the hierarchy by a packet.
 
 use super::switch_to_single::MAX_SINGLE_RAYS;
 use super::{Packet, PacketLeaf, SlabCounts, load_row};
@@ -11,12 +11,12 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, f32x16};
 
-/// A child to visit, by the place where its box stands: the node's unit times eight plus the slot.
+/// A child to visit, by the index of its box: the node's unit times eight plus the slot.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Entry {
     /// Distance in the high half.
     key: u64,
-    /// Groups whose bounds meet the box.
+    /// Groups whose bounds intersect the box.
     groups: u16,
 }
 
@@ -43,7 +43,7 @@ fn planes(node: &[Unit; NODE_UNITS], near: [usize; 3], slot: usize) -> [f32; 6] 
 }
 
 impl Packet {
-    /// Groups that may meet the box with these planes before `group_t`, by their intervals.
+    /// Groups that may intersect the box with these planes before `group_t`, by their intervals.
     #[inline(always)]
     fn groups_in_box<S: Simd>(
         &self,
