@@ -1,4 +1,5 @@
-//! The surfaces of a frame as rt-core's lists of geometries, instances, appearances and materials.
+//! Converts the surfaces of a frame to rt-core's lists of geometries, instances, appearances and
+//! materials.
 
 use crate::bridge::FrameSurface;
 use crate::colors::MeshColors;

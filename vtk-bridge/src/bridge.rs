@@ -1,9 +1,9 @@
-//! One renderer of the program: what it draws this frame, what is kept from the frames before, and
-//! the picture.
+//! One renderer of the program: what it draws in this frame, what is cached from earlier frames,
+//! and the image.
 //!
-//! A frame is [`Bridge::begin`], then everything that is drawn, then [`Bridge::render`] (thesis
-//! section 3.2.2: one frame per render event). What it keeps: acceleration structures by the key of
-//! their arrays, colours by the key of theirs, and the whole picture while nothing changes at all.
+//! A frame consists of [`Bridge::begin`], one call for each object to draw, and [`Bridge::render`]
+//! (thesis section 3.2.2: one frame per render event). The bridge caches acceleration structures by
+//! the key of their arrays, colours by their own key, and the whole image while nothing changes.
 
 use crate::assemble::{Assembled, assemble};
 use crate::colors::{self, MeshColors};

@@ -1,4 +1,5 @@
-//! Colours of points and cells as rt-core wants them, kept as long as their key stays the same.
+//! Converts colours of points and cells to rt-core's format and caches them until their key
+//! changes.
 
 use crate::geometry::PolygonMesh;
 use crate::input::{Color, Image, PerItem};

@@ -1,6 +1,6 @@
-//! Edges of polygons on a surface, as VTK 9's shaders draw them: by the distance of a pixel from
-//! the projected edges of its polygon, and a little beyond the outline, because the geometry shader
-//! moves the corners of each triangle outwards.
+//! Draws the edges of polygons on a surface as VTK 9's shaders do. A pixel's colour depends on its
+//! distance from the projected edges of its polygon. Edges also extend slightly past the outline,
+//! because the geometry shader moves the corners of each triangle outwards.
 
 use crate::geometry::PolygonMesh;
 use crate::input::{Property, View};

@@ -1,9 +1,9 @@
-//! What a visualization program has, borrowed as it lies in memory: points, cells, attributes,
-//! properties, lights, a camera.
+//! The data of a visualization program, borrowed without a copy: points, cells, attributes,
+//! properties, lights and a camera.
 //!
-//! The types mirror VTK's arrays (`vtkPoints`, `vtkCellArray`, `vtkUnsignedCharArray`), but know
-//! nothing of VTK: any program with such arrays can fill them in. Nothing is read before
-//! [`crate::bridge::Bridge::add_surface`] needs it.
+//! The types mirror VTK's arrays (`vtkPoints`, `vtkCellArray`, `vtkUnsignedCharArray`) but do not
+//! depend on VTK. Any program with such arrays can fill them in. The arrays are read only when
+//! [`crate::bridge::Bridge::add_surface`] needs them.
 
 use rt_core::glam::{DMat4, DVec3};
 

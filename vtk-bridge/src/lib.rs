@@ -34,15 +34,15 @@
 //!     samples: 0,
 //!     lens: None,
 //! };
-//! let picture = bridge.render(&view)?;
-//! assert_eq!(picture.opaque[5 * 8 + 4], [255; 4]);
-//! assert_eq!(picture.depth[5 * 8 + 4], 0.5);
+//! let image = bridge.render(&view)?;
+//! assert_eq!(image.opaque[5 * 8 + 4], [255; 4]);
+//! assert_eq!(image.depth[5 * 8 + 4], 0.5);
 //! # Ok::<(), vtk_bridge::bridge::BridgeError>(())
 //! ```
 //!
-//! VTK and ParaView come in through [`loader`] (found by `VTK_AUTOLOAD_PATH`), which loads the C++
-//! shim built for the VTK in the process; the shim calls [`capi`]. [`setup`] builds and lays out
-//! these pieces; the program `vtk-bridge` is its command line.
+//! VTK and ParaView use the bridge through [`loader`] (found by `VTK_AUTOLOAD_PATH`), which loads
+//! the C++ shim built for the VTK in the process. The shim calls [`capi`]. [`setup`] builds and
+//! installs these parts; the program `vtk-bridge` is its command line.
 #![deny(unsafe_code)]
 
 pub mod anari;

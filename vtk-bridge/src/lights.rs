@@ -1,4 +1,4 @@
-//! VTK's lights as rt-core's.
+//! Converts VTK's lights to rt-core's lights.
 
 use crate::input::{LightKind, SceneLight};
 use crate::options::Options;

@@ -1,10 +1,10 @@
-//! VTK's properties as rt-core's materials, so that without any effect the picture is VTK's.
+//! Converts VTK's properties to rt-core's materials. Without any effect, the image equals VTK's.
 //!
-//! VTK 9's shader (measured: 0 to 0.1 levels of 255 apart): ambient coefficient times ambient
-//! colour, always; diffuse coefficient times colour times cosine; highlight (R·V)^p, and (N·L)^p
-//! where one headlight is the only light. Numbers are neither decoded nor encoded, except by the
-//! physically based shader, which ends with `pow(c, 1/2.2)` and divides diffuse light by π:
-//! [`Encoding::Pbr`] says so for the picture.
+//! VTK 9's shader (measured difference: 0 to 0.1 levels of 255) adds three terms: ambient
+//! coefficient times ambient colour, always; diffuse coefficient times colour times cosine; and a
+//! highlight (R·V)^p, or (N·L)^p where one headlight is the only light. Numbers are neither decoded
+//! nor encoded, except by the physically based shader, which ends with `pow(c, 1/2.2)` and divides
+//! diffuse light by π. [`Encoding::Pbr`] marks this case for the image.
 
 use crate::input::{Image, Maps, Property};
 use crate::options::{MaterialChoice, Options};

@@ -1,7 +1,7 @@
-//! The options of the bridge: from environment variables `RTV_*`, or set by a program (ParaView's
-//! panel).
+//! The options of the bridge. They come from environment variables `RTV_*` or from a program
+//! (ParaView's panel).
 //!
-//! What is not understood is not silently dropped: [`Options::parse`] names the variable, the value
+//! An invalid option is never dropped silently: [`Options::parse`] names the variable, the value
 //! and the rule.
 
 use rt_core::bvh::{BuildQuality, Robustness};

@@ -1,4 +1,4 @@
-//! The account of a frame, and the file `RTV_REPORT` names.
+//! The report of a frame, and the file that `RTV_REPORT` names.
 
 use rt_core::ray_stats::RayStats;
 use serde::Serialize;

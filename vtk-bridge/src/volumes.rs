@@ -1,5 +1,5 @@
-//! Grids of scalars as rt-core's volumes, kept while their scalars stay the same; and where a
-//! volume lies in the window's depth.
+//! Converts grids of scalars to rt-core's volumes and caches them until their scalars change. Also
+//! computes the depth of a volume in the window.
 
 use crate::input::{Scalars, View, Volume as Input, VolumeBlend};
 use rayon::prelude::*;

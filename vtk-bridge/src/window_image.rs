@@ -1,5 +1,5 @@
-//! rt-core's frame as the window wants it: 8-bit colour where everything is opaque, premultiplied
-//! floating point elsewhere, and OpenGL's depth.
+//! Converts rt-core's frame to the format of the window: 8-bit colour if every pixel is opaque,
+//! premultiplied floating-point colour otherwise, and OpenGL's depth.
 
 use crate::bridge::{BridgeError, RenderInputs, ms};
 use crate::input::View;

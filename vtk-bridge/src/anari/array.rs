@@ -1,8 +1,9 @@
-//! Arrays: whose memory they use, and their elements as values.
+//! Arrays: who owns their memory, and access to their elements as values.
 //!
-//! Three owners (ANARI 1.0, section "Array objects"): the program's memory, shared until the
-//! program releases the array (then it is copied, because the program may free it); the program's
-//! memory handed over with a deleter; memory of the device, which the program fills by mapping it.
+//! ANARI 1.0, section "Array objects", has three kinds of ownership. Shared memory belongs to the
+//! program until it releases the array; the device then copies it, because the program may free it.
+//! Captured memory comes with a deleter. Managed memory belongs to the device, and the program
+//! fills it by mapping it.
 
 use super::abi::memory::{AppMemory, OwnMemory};
 use super::data_type::DataType;

@@ -1,5 +1,5 @@
 //! ANARI's data types: their numbers (fixed by the specification, version 1.0, section "Data
-//! types"), sizes, names, and how elements become numbers.
+//! types"), sizes and names, and the conversion of elements to numbers.
 
 use rt_core::colormap::srgb_to_linear;
 

@@ -1,5 +1,5 @@
-//! The device: makes objects, keeps count of who uses them, and answers questions. Every fault of
-//! the program is a message and nothing else happens.
+//! The device: makes objects, counts references to them and answers queries. A mistake of the
+//! program causes a message and has no other effect.
 
 mod frames;
 

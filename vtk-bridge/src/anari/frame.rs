@@ -1,4 +1,4 @@
-//! Frames: drawing beside the program, and channels in the form it asked for.
+//! Frames: renders on a separate thread and returns channels in the requested format.
 
 mod channels;
 mod job;

@@ -2,16 +2,16 @@
 //! [ANARI](https://www.khronos.org/anari) (ParaView 6.1 and later, VTK with RenderingAnari, pynari,
 //! Blender).
 //!
-//! ANARI's loader opens `libanari_library_rtv.so` and calls C++ virtual functions of what it gets.
-//! [`abi`] lays these tables out, and is the only place with unsafe code; behind it a
-//! [`device::Device`] is ordinary Rust. The way of a frame:
+//! ANARI's loader opens `libanari_library_rtv.so` and calls C++ virtual functions of the objects it
+//! returns. [`abi`] defines these function tables and is the only module with unsafe code; behind
+//! it, a [`device::Device`] is ordinary Rust. A frame passes through these modules:
 //!
-//! 1. [`device`]: the program makes [`object`]s and sets parameters, which [`schema`] checks;
-//!    commits make them effective.
-//! 2. [`scene`]: rendering a frame turns the committed objects into a scene of rt-core, with what
-//!    is expensive kept from frame to frame.
-//! 3. [`frame`]: a thread builds what is new of the acceleration structures, draws, and puts the
-//!    channels into the form that was asked for.
+//! 1. [`device`]: the program makes [`object`]s and sets parameters, which [`schema`] checks.
+//!    Commits make them effective.
+//! 2. [`scene`]: when a frame is rendered, the committed objects are converted to a scene of
+//!    rt-core. Expensive results are cached between frames.
+//! 3. [`frame`]: a thread builds the acceleration structures that are new, renders, and converts
+//!    the channels to the requested format.
 
 pub mod abi;
 pub mod array;

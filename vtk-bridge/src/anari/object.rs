@@ -1,9 +1,9 @@
-//! Objects: parameters that take effect when they are committed, and who keeps an object alive.
+//! Objects: parameters that take effect when they are committed, and reference counts.
 //!
-//! A program knows an object by its [`Handle`], a number that is never a memory address and never
-//! used again: a handle that was released once too often, or that belongs to another device, is
-//! found out and reported. Objects that other objects refer to live on after the program has
-//! released them: parameters hold [`Arc`]s.
+//! A program knows an object by its [`Handle`], a number that is never a memory address and is
+//! never reused. The device therefore detects and reports a handle that was released too often or
+//! that belongs to another device. Parameters hold [`Arc`]s, so an object stays alive after its
+//! release while other objects refer to it.
 
 use super::array::Array;
 use super::data_type::DataType;

@@ -1,4 +1,4 @@
-//! Messages to the program: what went wrong or was ignored, and what to do about it.
+//! Messages to the program: what failed or was ignored, and how to fix it.
 
 use super::data_type::DataType;
 use super::object::Handle;

@@ -1,5 +1,5 @@
-//! `vtk-bridge`: installs the bridge for the VTKs of this machine, says what is wrong, and prints
-//! the variables to set.
+//! `vtk-bridge`: installs the bridge for the VTK installations of this machine, reports problems,
+//! and prints the variables to set.
 #![forbid(unsafe_code)]
 
 use anyhow::Context;

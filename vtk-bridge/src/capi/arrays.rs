@@ -1,4 +1,4 @@
-//! Foreign arrays as slices, after their kinds and lengths were checked.
+//! Converts foreign arrays to slices after checking their kinds and lengths.
 
 use super::types::*;
 use crate::input::{

@@ -1,10 +1,10 @@
 //! The C ABI behind the C++ shim, the plugin and the Python package: `include/rtv.h`.
 //!
-//! A frame is `rtv_begin`, `rtv_surface` and `rtv_light` for everything there is, `rtv_render`.
-//! Arrays belong to the caller and are read before the call returns. Pictures and texts belong to
-//! the bridge. A panic never crosses the border: it becomes a warning, and the call fails. A bridge
-//! is used by one thread at a time; different bridges may be used at once, each with options of its
-//! own.
+//! A frame is `rtv_begin`, then `rtv_surface` and `rtv_light` for each surface and light, then
+//! `rtv_render`. Arrays belong to the caller and are read before the call returns. Images and
+//! strings belong to the bridge. A panic never crosses the interface: it becomes a warning, and the
+//! call fails. One thread at a time uses a bridge. Different bridges may be used concurrently, each
+//! with its own options.
 #![allow(unsafe_code, reason = "this is where foreign code calls us")]
 
 mod arrays;

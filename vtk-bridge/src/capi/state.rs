@@ -1,4 +1,4 @@
-//! What is behind a handle: a bridge with its options; and the guard against panics.
+//! The state behind a handle, which is a bridge with its options, and the guard against panics.
 
 use super::{RtvBridge, RtvPicture};
 use crate::bridge::Bridge;

@@ -1,4 +1,4 @@
-//! The calls as C makes them, with what foreign code gets wrong.
+//! Tests the calls as C makes them, including mistakes of foreign code.
 
 use super::*;
 use std::ffi::OsStr;

@@ -1,4 +1,4 @@
-//! The structures that cross the border, as C lays them out.
+//! The structures of the C interface, with C's layout.
 
 use std::os::raw::{c_char, c_void};
 

@@ -1,8 +1,9 @@
-//! Backs of triangles that look different from their fronts (`vtkActor::SetBackfaceProperty`).
+//! Back faces of triangles that look different from their front faces
+//! (`vtkActor::SetBackfaceProperty`).
 //!
-//! OpenGL asks each fragment which side it is of. rt-core's materials belong to instances, so the
-//! backs are a second shape: its triangles are met only from behind, and a hair before the surface
-//! itself.
+//! OpenGL tests each fragment for its side. In rt-core, materials belong to instances, so the back
+//! faces are a second shape. Rays hit its triangles only from behind, slightly in front of the
+//! surface itself.
 
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::math::Aabb;

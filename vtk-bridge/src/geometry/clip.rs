@@ -1,9 +1,9 @@
-//! Clipping planes of a mapper: triangles are cut (Sutherland and Hodgman 1974), because rays know
-//! no planes.
+//! Clipping planes of a mapper. Triangles are clipped (Sutherland and Hodgman 1974), because the
+//! ray tracer has no clipping planes.
 //!
 //! OpenGL interpolates the distance to the plane over the triangle and drops fragments where it is
-//! negative; a cut along the plane is the same, up to rounding. New vertices remember the edge they
-//! were made on, so that colours can be carried over later without a new mesh.
+//! negative. A cut along the plane gives the same result, up to rounding. New vertices record the
+//! edge that they were made on, so colours can be interpolated later without a new mesh.
 
 use rt_core::glam::{DVec3, Vec2, Vec3, Vec4};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};

@@ -1,4 +1,5 @@
-//! From points and cells to what rays can meet, and what is needed to put colours on it later.
+//! Converts points and cells to geometry that rays can hit, and keeps the data needed to colour it
+//! later.
 
 mod back_faces;
 mod clip;

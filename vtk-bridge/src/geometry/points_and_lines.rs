@@ -1,4 +1,4 @@
-//! Vertices as spheres, lines and edges as tubes.
+//! Converts vertices to spheres, and lines and edges to tubes.
 
 use super::GeometrySet;
 use crate::input::{Cells, Shape};

@@ -1,5 +1,5 @@
-//! Polygons and strips to triangles, in VTK's order: polygons are fanned from their first point,
-//! every other triangle of a strip is turned.
+//! Triangulates polygons and strips in VTK's order. Polygons become fans around their first point,
+//! and every other triangle of a strip has its winding reversed.
 
 use super::CellOfTriangle;
 use crate::input::{Cells, Ids, Shape};

@@ -1,4 +1,4 @@
-//! Coordinates to `f32` relative to an origin, in parallel.
+//! Converts coordinates to `f32` relative to an origin, in parallel.
 
 use crate::input::Points;
 use rayon::prelude::*;

@@ -1,11 +1,11 @@
-//! What VTK finds through `VTK_AUTOLOAD_PATH`: three functions, behind which the C++ shim is loaded
-//! that was built for the VTK in the process.
+//! The library that VTK finds through `VTK_AUTOLOAD_PATH`. It has three functions, and it loads the
+//! C++ shim that was built for the VTK in the process.
 //!
 //! VTK opens every shared library in that folder and asks for its version before it calls
-//! `vtkLoad`. A shim linked to one VTK would drag that VTK's libraries into a process that runs
-//! another one before the question is even asked (seen: ParaView 5.11 crashes when Debian's VTK 9.1
-//! is installed). So the folder has only this library, which needs no VTK, looks which one is
-//! there, and opens the shim that fits.
+//! `vtkLoad`. A shim linked to one VTK would load that VTK's libraries into a process that runs
+//! another VTK, even before VTK asks for the version (observed: ParaView 5.11 crashes when Debian's
+//! VTK 9.1 is installed). The folder therefore contains only this library. It needs no VTK, detects
+//! which one is loaded, and opens the matching shim.
 #![allow(unsafe_code, reason = "symbols that VTK calls, and dlopen")]
 
 mod process;

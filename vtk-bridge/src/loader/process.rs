@@ -1,4 +1,4 @@
-//! What is in the process: its shared libraries, and how to add one.
+//! Lists the shared libraries in the process and opens another one.
 
 use super::Shim;
 use crate::capi::{RTV_ABI, RtvApi, rtv_api};

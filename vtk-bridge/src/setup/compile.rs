@@ -1,4 +1,5 @@
-//! The C++ shim: its sources are in this library, and the machine's compiler makes it for each VTK.
+//! Compiles the C++ shim. This library contains its sources, and the machine's compiler builds it
+//! for each VTK.
 
 use super::headers::Flavour;
 use super::{SetupError, io};

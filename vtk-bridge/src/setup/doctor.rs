@@ -1,4 +1,4 @@
-//! What is there, what is missing, and what to do about it.
+//! Reports what is installed, what is missing, and how to fix it.
 
 use super::headers::{Flavour, find, places};
 use super::layout::{Layout, library};

@@ -1,4 +1,4 @@
-//! The variables after which any script is ray traced.
+//! The environment variables that make any script render with ray tracing.
 
 use super::layout::Layout;
 

@@ -1,4 +1,4 @@
-//! Which VTKs with headers are on this machine.
+//! Finds the VTK installations with headers on this machine.
 
 use crate::loader::flavour_of;
 use serde::Serialize;

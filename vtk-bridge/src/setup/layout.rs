@@ -1,4 +1,4 @@
-//! Where the pieces lie, and installing them.
+//! The paths of the installed files, and their installation.
 
 use super::headers::Flavour;
 use super::{SetupError, compile, io};

@@ -1,5 +1,5 @@
-//! Building and laying out the pieces for the VTKs of this machine: what the program `vtk-bridge`
-//! does.
+//! Builds and installs the bridge for the VTK installations of this machine, as the program
+//! `vtk-bridge` does.
 //!
 //! ```text
 //! PREFIX/autoload/librtv_loader.so        the only library in the folder that VTK_AUTOLOAD_PATH names

@@ -1,5 +1,5 @@
-//! ParaView's plugin: a panel for the options, and the override without `VTK_AUTOLOAD_PATH`.
-//! Compiled like the shim.
+//! ParaView's plugin: a panel for the options, and the override without `VTK_AUTOLOAD_PATH`. It is
+//! compiled like the shim.
 
 use super::headers::Flavour;
 use super::layout::Layout;

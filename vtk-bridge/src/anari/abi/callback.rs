@@ -1,4 +1,4 @@
-//! Functions of the program that the device calls.
+//! Calls the program's callback functions.
 
 use crate::anari::device::Hooks;
 use crate::anari::object::Handle;

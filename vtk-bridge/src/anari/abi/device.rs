@@ -1,4 +1,5 @@
-//! The device object: one function per entry of `anari::DeviceImpl`'s table, which only translates.
+//! The device object: one function per entry of `anari::DeviceImpl`'s table. Each function only
+//! translates its arguments and results.
 
 mod answers;
 

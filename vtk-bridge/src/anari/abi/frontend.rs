@@ -1,9 +1,9 @@
-//! Which of the two forms of `anari::LibraryImpl` the loader in this process has.
+//! Detects which of the two layouts of `anari::LibraryImpl` the loader in this process uses.
 //!
-//! Between two releases of the SDK a virtual function was put into the middle of the class. Both
-//! forms are in use (pynari 1.2.6 brings the older), nothing that is passed tells them apart, and
-//! the loader that has the new function also exports `anariNewInitializedDevice`: that is looked
-//! for.
+//! A virtual function was inserted into the middle of the class between two releases of the SDK.
+//! Both layouts are in use (pynari 1.2.6 ships the older one), and no argument tells them apart. A
+//! loader with the new function also exports `anariNewInitializedDevice`, so this module looks for
+//! that symbol.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 

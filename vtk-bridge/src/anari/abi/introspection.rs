@@ -1,5 +1,5 @@
-//! Answers to `anariGetObjectSubtypes`, `anariGetObjectInfo` and `anariGetParameterInfo`, made once
-//! from the schema and never freed.
+//! Answers to `anariGetObjectSubtypes`, `anariGetObjectInfo` and `anariGetParameterInfo`. They are
+//! made once from the schema and never freed.
 
 use super::text::{StaticList, forever};
 use crate::anari::data_type::DataType;

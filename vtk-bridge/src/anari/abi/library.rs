@@ -1,4 +1,4 @@
-//! The library object: makes devices.
+//! The library object, which makes devices.
 
 use super::callback::{Callback, Own, StatusCallback};
 use super::device::DeviceObject;

@@ -1,4 +1,4 @@
-//! Memory that both the program and the device touch.
+//! Memory that both the program and the device access.
 
 use std::cell::UnsafeCell;
 use std::ffi::c_void;

@@ -1,4 +1,4 @@
-//! Strings of the program, and lists for it.
+//! Reads strings from the program and makes lists of strings for it.
 
 use std::ffi::{CStr, c_char};
 

@@ -1,5 +1,5 @@
-//! Drawing: from a frame's committed parameters to an order for the renderer, and its pixels to the
-//! program.
+//! Rendering: converts a frame's committed parameters to a render job, and returns its pixels to
+//! the program.
 
 use super::Device;
 use crate::anari::data_type::DataType;

@@ -1,4 +1,5 @@
-//! From the renderer's layers to channels: rows from the bottom, packed as the program asked.
+//! Converts the renderer's layers to channels: rows start at the bottom, and pixels are packed as
+//! the program requested.
 
 use crate::anari::data_type::DataType;
 use crate::anari::scene::FrameBackground;

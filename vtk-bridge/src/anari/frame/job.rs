@@ -1,4 +1,4 @@
-//! One drawing of a frame, on a thread of its own.
+//! Renders one frame on its own thread.
 
 use super::channels::{albedo, blank, color, depth, normal, numbers, over};
 use super::{Accumulated, FrameImage};

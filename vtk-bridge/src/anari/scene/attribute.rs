@@ -1,8 +1,8 @@
-//! Attributes: named values on geometries that materials and samplers ask for.
+//! Attributes: named values on geometries, read by materials and samplers.
 //!
-//! An attribute comes from the instance, else from the geometry: per corner of a face, per vertex,
-//! per primitive or for the whole (ANARI 1.0, section "Geometry"). What nobody gives is (0, 0, 0,
-//! 1).
+//! An attribute comes from the instance, or else from the geometry: per corner of a face, per
+//! vertex, per primitive or one value for the whole geometry (ANARI 1.0, section "Geometry"). An
+//! attribute that is not set is (0, 0, 0, 1).
 
 use crate::anari::object::{Object, Value};
 use rt_core::glam::{DAffine3, DMat3, DVec3};

@@ -1,5 +1,5 @@
-//! Geometries: from arrays to the renderer's meshes and shapes, with how their primitives belong to
-//! vertices.
+//! Geometries: converts arrays to the renderer's meshes and shapes, and records which vertices
+//! belong to each primitive.
 
 use super::Diagnostics;
 use super::attribute::{Numbers, Topology};

@@ -1,5 +1,5 @@
-//! Lights. ANARI gives radiometric quantities, the renderer what a white surface becomes:
-//! irradiance over π.
+//! Lights. ANARI specifies radiometric quantities. The renderer takes the radiance of a lit white
+//! surface, which is irradiance over π.
 
 use super::Diagnostics;
 use crate::anari::object::Object;

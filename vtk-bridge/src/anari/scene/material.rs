@@ -1,4 +1,5 @@
-//! Materials: from ANARI's to the renderer's model, and where colour and opacity come from.
+//! Materials: converts ANARI's model to the renderer's, and finds the sources of colour and
+//! opacity.
 
 use super::Diagnostics;
 use super::attribute::{NAMES, Source};

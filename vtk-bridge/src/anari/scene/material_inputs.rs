@@ -1,5 +1,5 @@
-//! What varies over a surface besides colour and opacity, looked up at the hits: numbers, emission,
-//! bent normals.
+//! Material inputs that vary over a surface, other than colour and opacity: numbers, emission and
+//! perturbed normals. They are looked up at the hits.
 
 use super::attribute::{HitPoint, Topology};
 use super::sampler::Sampler;

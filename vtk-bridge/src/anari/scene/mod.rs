@@ -1,5 +1,4 @@
-//! From committed objects to a scene of rt-core: each file turns one kind of object into what the
-//! renderer takes.
+//! Converts committed objects to a scene of rt-core. Each file converts one kind of object.
 
 pub mod attribute;
 mod camera;

@@ -1,4 +1,4 @@
-//! Renderers: options of a frame, and what is behind the scene.
+//! Renderers: the options of a frame and its background.
 
 use super::Diagnostics;
 use crate::anari::object::{Object, Value};

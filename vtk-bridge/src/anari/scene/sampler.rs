@@ -1,4 +1,4 @@
-//! Samplers: from an attribute to a value, by a picture, a list or a matrix.
+//! Samplers: convert an attribute to a value through an image, a list or a matrix.
 
 use super::Diagnostics;
 use super::attribute::{Domain, HitPoint, Source};

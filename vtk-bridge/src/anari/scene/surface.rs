@@ -1,9 +1,10 @@
-//! A geometry with its look: the cheapest way of the renderer that shows the material's colour
-//! exactly.
+//! Combines a geometry with its appearance. It chooses the cheapest representation in the renderer
+//! that shows the material's colour exactly.
 //!
-//! Constant colours go into the material, values per face and per vertex into the appearance,
-//! pictures become textures (all three need no new acceleration structure on meshes, pictures one
-//! when they come and go). Everything else is computed at the hits: see [`super::surface_color`].
+//! Constant colours go into the material. Values per face and per vertex go into the appearance.
+//! Images become textures. On meshes none of the three needs a new acceleration structure, except
+//! that images need one when they are added or removed. Everything else is computed at the hits:
+//! see [`super::surface_color`].
 
 use super::attribute::{Domain, HitPoint, Topology};
 use super::geometry::{Body, Part};

@@ -1,5 +1,5 @@
-//! The colour of a surface at a hit, where it is more than the renderer's meshes can hold: on
-//! shapes, and for blocks of texels, thresholds and products.
+//! The colour of a surface at a hit, for cases that the renderer's meshes cannot represent: shapes,
+//! blocks of texels, thresholds and products.
 
 use super::attribute::{HitPoint, Source, Topology};
 use super::sampler::Sampler;

@@ -1,8 +1,9 @@
-//! Worlds: everything placed, with what is expensive kept from frame to frame.
+//! Worlds: converts all instances to a scene and caches expensive results between frames.
 //!
-//! What is kept has a fingerprint of the values it was made from, with a count of changes for
-//! arrays: a new colour makes new colours, a new matrix moves an instance, and only new arrays of a
-//! geometry's shape make a new acceleration structure.
+//! Each cached result has a fingerprint of the values it was made from; for arrays, the fingerprint
+//! holds a change count. A new colour therefore rebuilds only colours, and a new matrix only moves
+//! an instance. The acceleration structure is rebuilt only when the arrays of a geometry's shape
+//! change.
 
 use super::Diagnostics;
 use super::attribute::{SLOTS, Topology};

@@ -1,5 +1,5 @@
-//! What objects and parameters the device knows: one table for checking what programs set, and for
-//! telling them what they may set (ANARI 1.0, section "Object and parameter info").
+//! The objects and parameters that the device supports. One table serves both to check what
+//! programs set and to answer their queries (ANARI 1.0, section "Object and parameter info").
 //!
 //! A parameter is in the table only if it changes what the device does.
 

@@ -1,4 +1,4 @@
-//! The second half of the table: questions, frames and extensions.
+//! The second half of the function table: queries, frames and extensions.
 
 use super::{DeviceObject, Name, Object, This, guard, handle};
 use crate::anari::abi::introspection::Introspection;
