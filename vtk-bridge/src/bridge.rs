@@ -25,13 +25,13 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What is kept between frames, with the frame it was last used in.
+/// A cache entry with the frame that last used it.
 struct CacheEntry<T> {
     value: T,
     frame: u64,
 }
 
-/// A surface of this frame, with everything resolved.
+/// A surface of this frame with all references resolved.
 pub(crate) struct FrameSurface {
     pub(crate) built: Arc<GeometrySet>,
     pub(crate) color: Option<MeshColors>,
@@ -40,49 +40,49 @@ pub(crate) struct FrameSurface {
     pub(crate) property: crate::input::Property,
     pub(crate) back: Option<crate::input::Property>,
     pub(crate) world_from_data: DAffine3,
-    /// Place and colour of each copy; `None` without copies.
+    /// Matrix and colour of each copy; `None` without copies.
     pub(crate) glyphs: Option<Vec<(DAffine3, Option<[u8; 4]>)>>,
 }
 
-/// Why nothing could be traced.
+/// Why nothing could be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BridgeError {
-    /// rt-core's reason.
+    /// rt-core failed for this reason.
     #[error(transparent)]
     Render(#[from] rt_core::render::RenderError),
-    /// The camera's matrix is unusable.
+    /// The camera's matrix is not usable.
     #[error(transparent)]
     Camera(#[from] rt_core::camera::CameraError),
     /// The acceleration structure could not be built.
     #[error(transparent)]
     Build(#[from] rt_core::bvh::BuildError),
-    /// The pool of threads could not be made.
+    /// The thread pool could not be made.
     #[error("RTV_THREADS={threads}: the threads could not be started: {reason}; ask for fewer")]
     Threads {
-        /// How many.
+        /// Number of threads.
         threads: usize,
-        /// Why not.
+        /// The system's reason.
         reason: String,
     },
 }
 
-/// What [`Bridge::add_surface`] did.
+/// Result of [`Bridge::add_surface`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum AddOutcome {
-    /// It will be traced.
+    /// It will be ray traced.
     Traced,
-    /// It has nothing that can be traced, for this reason.
+    /// It has nothing that can be ray traced, for this reason.
     Nothing(&'static str),
 }
 
-/// See the module's text.
+/// Renders the surfaces, volumes and lights of one renderer; see the module's page.
 #[derive(Default)]
 pub struct Bridge {
     options: Options,
     frame: u64,
     surfaces: Vec<FrameSurface>,
     lights: Vec<SceneLight>,
-    /// Of everything that was added this frame.
+    /// Hash of everything that was added this frame.
     content: DefaultHasher,
     geometries: HashMap<u64, CacheEntry<Arc<GeometrySet>>>,
     colors: HashMap<(u64, u64), CacheEntry<Option<MeshColors>>>,
@@ -92,23 +92,23 @@ pub struct Bridge {
     renderer: Renderer,
     pool: Option<(usize, rayon::ThreadPool)>,
     picture: WindowImage,
-    /// What the picture shows, and how many frames it is the mean of.
+    /// Hash of what the image shows, and the number of frames averaged in it.
     shown: Option<(u64, u32)>,
     warned: HashSet<String>,
-    /// Warnings that nobody has read yet.
+    /// Warnings that were not read yet.
     fresh_warnings: Vec<String>,
     report: FrameReport,
-    /// Milliseconds by effect, for the sets of effects they were measured with.
+    /// Milliseconds by effect, for each set of effects that was measured.
     costs: HashMap<Vec<&'static str>, Vec<(String, f64)>>,
 }
 
 impl Bridge {
-    /// An empty one.
+    /// A bridge with nothing in it.
     pub fn new() -> Bridge {
         Bridge::default()
     }
 
-    /// Begins a frame: nothing is drawn yet.
+    /// Begins a frame with nothing to draw.
     pub fn begin(&mut self, options: &Options) {
         if self.options != *options {
             (self.options, self.shown) = (options.clone(), None);
@@ -126,7 +126,7 @@ impl Bridge {
         &self.options
     }
 
-    /// Adds something to draw. What is not a number is repaired or left out, and told.
+    /// Adds a surface. Values that are not finite are repaired or left out, and reported.
     pub fn add_surface(&mut self, surface: &Surface<'_>) -> AddOutcome {
         let start = Instant::now();
         let Some(place) = affine(surface.world_from_data) else {
@@ -197,7 +197,7 @@ impl Bridge {
         AddOutcome::Traced
     }
 
-    /// Adds a volume. What rt-core cannot draw comes back with the reason.
+    /// Adds a volume. If rt-core cannot draw it, the reason is returned.
     pub fn add_volume(&mut self, volume: &crate::input::Volume<'_>) -> Result<(), String> {
         let start = Instant::now();
         if self.options.path_tracing {
@@ -226,12 +226,13 @@ impl Bridge {
         Ok(())
     }
 
-    /// Whether the scalars of this key are kept, so that they need not be given again.
+    /// Whether the scalars of this key are cached, so that the caller need not pass them again.
     pub fn has_volume(&self, key: u64) -> bool {
         self.volume_cache.has(key)
     }
 
-    /// Whether colours of these keys are kept, so that their arrays need not be given again.
+    /// Whether colours of these keys are cached, so that the caller need not pass their arrays
+    /// again.
     pub fn has_colors(&self, shape_key: u64, color_key: u64) -> bool {
         shape_key != 0 && color_key != 0 && self.colors.contains_key(&(shape_key, color_key))
     }
@@ -273,13 +274,13 @@ impl Bridge {
             Color::Material => 0,
             Color::Values { key, .. } | Color::Mapped { key, .. } => key,
         };
-        // A key of 0 says that nothing is known: such a frame is like no other.
+        // A key of 0 means that nothing is known: such a frame never equals another.
         let unknown = s.shape.key == 0 || (color_key == 0 && !matches!(s.color, Color::Material));
         if unknown {
             self.frame.hash(h);
         }
         (s.shape.key, color_key, s.texture.map(|t| t.key)).hash(h);
-        // The numbers' text is as unique as the numbers.
+        // The text of the numbers is as unique as the numbers.
         format!("{:?}{:?}{:?}", s.property, s.back, s.world_from_data).hash(h);
         if let Some(m) = &s.maps {
             [m.material, m.normal, m.emissive].map(|i| i.map(|i| i.key)).hash(h);
@@ -298,17 +299,17 @@ impl Bridge {
         self.lights.push(light);
     }
 
-    /// For the report: something that OpenGL draws, and why.
+    /// Records for the report something that OpenGL draws, and why.
     pub fn report_untraced(&mut self, name: &str, reason: &str) {
         self.report.passed.push(UntracedItem { name: name.to_owned(), reason: reason.to_owned() });
     }
 
-    /// How many surfaces were added this frame.
+    /// The number of surfaces added this frame.
     pub fn num_surfaces(&self) -> usize {
         self.surfaces.len()
     }
 
-    /// Something the user should know, once.
+    /// Adds a warning to the report. [`Bridge::take_warnings`] returns each text only once.
     pub fn warn(&mut self, text: String) {
         self.report.warnings.push(text.clone());
         if self.warned.insert(text.clone()) {
@@ -316,17 +317,17 @@ impl Bridge {
         }
     }
 
-    /// Warnings since the last call.
+    /// Returns the warnings since the last call.
     pub fn take_warnings(&mut self) -> Vec<String> {
         std::mem::take(&mut self.fresh_warnings)
     }
 
-    /// What happened this frame.
+    /// The report of this frame.
     pub fn report(&self) -> &FrameReport {
         &self.report
     }
 
-    /// Draws what was added. The picture stays valid until the next call.
+    /// Renders what was added. The image stays valid until the next call.
     pub fn render(&mut self, view: &View) -> Result<&WindowImage, BridgeError> {
         self.make_pool()?;
         let frame = self.frame;
@@ -335,7 +336,7 @@ impl Bridge {
         self.textures.retain(|_, k| k.frame == frame);
         self.volume_cache.forget_unused();
 
-        // ---- Nothing changed: the picture is there, or gets better.
+        // ---- Nothing changed: reuse the image or refine it.
         format!("{view:?}").hash(&mut self.content);
         let content = self.content.finish();
         let mut mean_of = 0;
@@ -393,7 +394,7 @@ impl Bridge {
         }
         let camera = self.camera(view, &options)?;
 
-        // ---- What it needs, of what is wanted.
+        // ---- Which of the requested effects the scene needs.
         let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
         let mirrors = Effects::REFLECTION | Effects::GLOSSY_REFLECTION;
         let effects = if crate::assemble::wants_reflections(&options) {
@@ -438,7 +439,7 @@ impl Bridge {
             edges: &edges,
         };
 
-        // ---- Rays, and the picture for the window.
+        // ---- Trace the rays and convert the image for the window.
         let (mut renderer, mut picture) =
             (std::mem::take(&mut self.renderer), std::mem::take(&mut self.picture));
         let outcome = self.in_pool(|| picture.draw(&mut renderer, &inputs, view, mean_of));
@@ -449,9 +450,9 @@ impl Bridge {
         self.report.effects = effects.names().map(str::to_owned).collect();
         self.report.rays = crate::report::rays(&outcome.rays);
         for w in outcome.warnings {
-            // Nobody asked for the effects one by one: reflections are left out on purpose, and
-            // others may happen not to be in view. Alpha of 1 at all corners comes out a rounding
-            // below 1 inside.
+            // The effects were not requested one by one, so missing reflections are deliberate, and
+            // other effects may not be in view. Interpolating an alpha of 1 at all corners gives
+            // slightly less than 1 inside.
             let of_no_use = ["left out", "drawn opaque", "changed no pixel of this picture"];
             if !of_no_use.iter().any(|t| w.contains(t)) {
                 self.warn(w);
@@ -464,7 +465,8 @@ impl Bridge {
         Ok(())
     }
 
-    /// What each effect costs: the same picture without it, once for each set of effects.
+    /// Measures the cost of each effect: renders the same image without it, once for each set of
+    /// effects.
     fn measure_effects(&mut self, inputs: &RenderInputs<'_>, effects: Effects) {
         let names: Vec<&'static str> = effects.names().collect();
         if !self.costs.contains_key(&names) {
@@ -480,7 +482,7 @@ impl Bridge {
             let costs = Effects::ALL.iter().filter(|(e, _)| effects.contains(*e)).filter_map(
                 |(e, name)| {
                     let without = effects.without(*e);
-                    // Soft shadows are shadows.
+                    // Soft shadows count as shadows.
                     let without = if *e == Effects::SHADOWS {
                         without.without(Effects::SOFT_SHADOWS)
                     } else {
@@ -509,7 +511,8 @@ impl Bridge {
         }
     }
 
-    /// The world of these instances: the one there is, or a new one that shares all trees it can.
+    /// The world of these instances: the existing one, or a new one that shares as many trees as
+    /// possible.
     fn world(
         &mut self,
         geometries: Vec<Geometry>,
@@ -531,7 +534,8 @@ impl Bridge {
         let shares =
             |w: &Arc<World>| geometries.iter().any(|g| w.geometries().iter().any(|h| same(g, h)));
         if !previous.as_ref().is_some_and(shares) {
-            // Nothing to share: the old trees must not be in memory beside the new ones.
+            // Nothing can be shared. Free the old trees first, so that both sets are never in
+            // memory.
             previous = None;
         }
         let list = instances.clone();
@@ -563,16 +567,16 @@ impl Bridge {
     }
 }
 
-/// Everything a picture is made from.
+/// All inputs of an image.
 pub(crate) struct RenderInputs<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) camera: &'a Camera,
     pub(crate) options: RenderOptions,
-    /// The picture will be averaged with later ones.
+    /// Later images will be averaged with this one.
     pub(crate) averaged: bool,
     /// One per instance.
     pub(crate) encodings: &'a [crate::materials::Encoding],
-    /// One per instance, or none at all.
+    /// One per instance, or empty.
     pub(crate) edges: &'a [Option<crate::edges::Edges>],
 }
 
@@ -590,7 +594,7 @@ fn same_geometries(a: &[Geometry], b: &[Geometry]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b))
 }
 
-/// `m` as an affine map that can be inverted.
+/// `m` as an invertible affine map.
 fn affine(m: DMat4) -> Option<DAffine3> {
     let row = m.row(3);
     let scaled = DAffine3::from_mat4(m * row.w.recip());

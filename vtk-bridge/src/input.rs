@@ -12,12 +12,12 @@ use rt_core::glam::{DMat4, DVec3};
 pub enum Points<'a> {
     /// Single precision.
     F32(&'a [[f32; 3]]),
-    /// Double precision; kept relative to the middle, so that detail far from zero survives.
+    /// Double precision. Stored relative to the centre, so that detail far from zero is not lost.
     F64(&'a [[f64; 3]]),
 }
 
 impl Points<'_> {
-    /// How many points.
+    /// The number of points.
     pub fn len(&self) -> usize {
         match self {
             Points::F32(p) => p.len(),
@@ -25,12 +25,12 @@ impl Points<'_> {
         }
     }
 
-    /// True without points.
+    /// True if there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Point `i`. Panics when there is none.
+    /// Point `i`. Panics if it does not exist.
     pub fn at(&self, i: usize) -> DVec3 {
         match self {
             Points::F32(p) => DVec3::from(p[i].map(f64::from)),
@@ -39,7 +39,7 @@ impl Points<'_> {
     }
 }
 
-/// Whole numbers of either width, as `vtkCellArray` stores them.
+/// Integers of either width, as `vtkCellArray` stores them.
 #[derive(Debug, Clone, Copy)]
 pub enum Ids<'a> {
     /// 32 bits.
@@ -49,7 +49,7 @@ pub enum Ids<'a> {
 }
 
 impl Ids<'_> {
-    /// How many.
+    /// The number of values.
     pub fn len(&self) -> usize {
         match self {
             Ids::I32(v) => v.len(),
@@ -57,12 +57,12 @@ impl Ids<'_> {
         }
     }
 
-    /// True when there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Number `i`; panics past the end.
+    /// Value `i`. Panics past the end.
     #[inline]
     pub fn at(&self, i: usize) -> i64 {
         match self {
@@ -71,18 +71,18 @@ impl Ids<'_> {
         }
     }
 
-    /// Number `i` as a vertex index. What no index can be (negative, or beyond 32 bits) becomes
-    /// `u32::MAX`, which no mesh has: such a triangle is left out and counted.
+    /// Value `i` as a vertex index. A value that cannot be an index (negative, or beyond 32 bits)
+    /// becomes `u32::MAX`, which no mesh has. Such a triangle is skipped and counted.
     #[inline]
     pub fn vertex(&self, i: usize) -> u32 {
         u32::try_from(self.at(i)).unwrap_or(u32::MAX)
     }
 }
 
-/// Cells as runs of point numbers: cell i is `connectivity[offsets[i]..offsets[i + 1]]`.
+/// Cells as ranges of point numbers: cell i is `connectivity[offsets[i]..offsets[i + 1]]`.
 #[derive(Debug, Clone, Copy)]
 pub struct Cells<'a> {
-    /// One more than there are cells; empty for no cells.
+    /// One more than the number of cells; empty if there are no cells.
     pub offsets: Ids<'a>,
     /// Point numbers.
     pub connectivity: Ids<'a>,
@@ -92,17 +92,17 @@ impl<'a> Cells<'a> {
     /// No cells.
     pub const NONE: Cells<'static> = Cells { offsets: Ids::I64(&[]), connectivity: Ids::I64(&[]) };
 
-    /// How many cells.
+    /// The number of cells.
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// True without cells.
+    /// True if there are no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The run of cell `i` in `connectivity`; empty where the offsets make no sense.
+    /// The range of cell `i` in `connectivity`; empty if the offsets are invalid.
     #[inline]
     pub fn run(&self, i: usize) -> std::ops::Range<usize> {
         let all = self.connectivity.len() as i64;
@@ -120,42 +120,43 @@ pub enum PerItem<'a, T> {
     Cell(&'a [T]),
 }
 
-/// Which points and cells, and everything else that decides where rays meet them. The acceleration
-/// structure is kept as long as `key` stays the same.
+/// The geometry of a surface: everything that decides where rays hit it. The acceleration structure
+/// is cached while `key` stays the same.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape<'a> {
-    /// Changes whenever one of the arrays or numbers below does; 0 is never kept.
+    /// Changes whenever one of the arrays or numbers below changes; 0 is never cached.
     pub key: u64,
     /// Coordinates.
     pub points: Points<'a>,
-    /// Vertices: drawn as spheres when `point_radius` is positive.
+    /// Vertices, drawn as spheres if `point_radius` is positive.
     pub verts: Cells<'a>,
-    /// Polylines: drawn as tubes when `line_radius` is positive.
+    /// Polylines, drawn as tubes if `line_radius` is positive.
     pub lines: Cells<'a>,
     /// Polygons, fanned into triangles from their first point as VTK does.
     pub polys: Cells<'a>,
     /// Triangle strips.
     pub strips: Cells<'a>,
-    /// Shading normals; of the cells only where there are none of the points.
+    /// Shading normals. Normals per cell are used only if there are none per point.
     pub normals: Option<PerItem<'a, [f32; 3]>>,
     /// Texture coordinates, one per point.
     pub texcoords: Option<&'a [[f32; 2]]>,
-    /// Directions in which the first texture coordinate grows, one per point, for normal maps.
+    /// Tangents for normal maps, one per point: the direction in which the first texture coordinate
+    /// grows.
     pub tangents: Option<&'a [[f32; 3]]>,
     /// Half-spaces `a x + b y + c z + d >= 0` (data coordinates) outside of which nothing is drawn.
     pub clip_planes: &'a [[f64; 4]],
-    /// Radius of spheres for `verts`, data units; 0 for none.
+    /// Radius of spheres for `verts`, data units; 0 draws none.
     pub point_radius: f64,
-    /// Radius of tubes for `lines`, data units; 0 for none.
+    /// Radius of tubes for `lines`, data units; 0 draws none.
     pub line_radius: f64,
-    /// Polygons are drawn as their edges, with tubes of `line_radius`.
+    /// Draws only the edges of polygons, as tubes of `line_radius`.
     pub edges_only: bool,
-    /// The backs of polygons look different ([`Surface::back`]).
+    /// The back faces of polygons look different ([`Surface::back`]).
     pub has_back_faces: bool,
 }
 
 impl<'a> Shape<'a> {
-    /// Points and polygons, nothing else.
+    /// A shape of points and polygons only.
     pub fn polygons(key: u64, points: Points<'a>, polys: Cells<'a>) -> Shape<'a> {
         Shape {
             key,
@@ -176,10 +177,10 @@ impl<'a> Shape<'a> {
     }
 }
 
-/// An RGBA picture.
+/// An RGBA image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Image<'a> {
-    /// Changes whenever the pixels do; 0 is never kept.
+    /// Changes whenever the pixels change; 0 is never cached.
     pub key: u64,
     /// Texels per row.
     pub width: usize,
@@ -187,101 +188,102 @@ pub struct Image<'a> {
     pub height: usize,
     /// Not premultiplied.
     pub rgba: &'a [[u8; 4]],
-    /// Linear between texels instead of the nearest.
+    /// Interpolates linearly between texels; false takes the nearest texel.
     pub interpolate: bool,
-    /// Repeated outside 0..1 instead of its edge.
+    /// Repeats the image outside 0..1; false extends its edge.
     pub repeat: bool,
-    /// Encoded as sRGB: decoded before it is interpolated.
+    /// Encoded as sRGB, and decoded before interpolation.
     pub srgb: bool,
 }
 
-/// Textures of a physically based property besides that of its colour, as VTK's shader reads them.
+/// Textures of a physically based property other than its colour, as VTK's shader reads them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Maps<'a> {
     /// Occlusion, roughness (times the property's) and metalness (times the property's) in red,
     /// green and blue.
     pub material: Option<Image<'a>>,
-    /// Normals, 2 rgb - 1; nothing without [`Shape::tangents`].
+    /// Normals, 2 rgb - 1; ignored without [`Shape::tangents`].
     pub normal: Option<Image<'a>>,
-    /// Radiance given off.
+    /// Emitted radiance.
     pub emissive: Option<Image<'a>>,
     /// Factor on the first two components of the normals.
     pub normal_scale: f32,
-    /// 0 for no occlusion, 1 for all of it.
+    /// Strength of occlusion: 0 for none, 1 for full.
     pub occlusion_strength: f32,
     /// Factor on the radiance.
     pub emissive_factor: [f32; 3],
 }
 
-/// Where the colour of a surface comes from.
+/// The source of a surface's colour.
 #[derive(Debug, Clone, Copy)]
 pub enum Color<'a> {
-    /// The material's own.
+    /// The material's own colour.
     Material,
     /// RGBA of points (interpolated) or cells.
     Values {
-        /// Changes whenever the values do; 0 is never kept.
+        /// Changes whenever the values change; 0 is never cached.
         key: u64,
         /// Not premultiplied.
         rgba: PerItem<'a, [u8; 4]>,
     },
-    /// Coordinates that are interpolated first and looked up in a row of colours then (VTK's
+    /// Coordinates that are interpolated first and then looked up in a row of colours (VTK's
     /// *interpolate scalars before mapping*).
     Mapped {
-        /// Changes whenever coordinates or row do; 0 is never kept.
+        /// Changes whenever the coordinates or the row change; 0 is never cached.
         key: u64,
         /// One pair per point: position in the row (0 to 1), and above 0.5 where the value is NaN.
         coordinates: &'a [[f32; 2]],
-        /// The colours; the nearest one is taken.
+        /// The colours. The nearest one is used.
         row: &'a [[u8; 4]],
         /// Colour of NaN.
         nan: [u8; 4],
     },
 }
 
-/// How surfaces answer light: `vtkProperty`.
+/// How surfaces reflect light: `vtkProperty`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Property {
-    /// Colour that ambient light sees.
+    /// Ambient colour.
     pub ambient_color: [f32; 3],
-    /// Colour that lights see.
+    /// Diffuse colour.
     pub diffuse_color: [f32; 3],
-    /// Colour of the highlight.
+    /// Colour of the specular highlight.
     pub specular_color: [f32; 3],
-    /// Share of the ambient colour that shows without any light.
+    /// Ambient coefficient: factor on the ambient colour, which needs no light.
     pub ambient: f32,
     /// Factor on diffuse light.
     pub diffuse: f32,
-    /// Factor on the highlight.
+    /// Factor on the specular highlight.
     pub specular: f32,
-    /// Exponent of the highlight.
+    /// Exponent of the specular highlight.
     pub specular_power: f32,
-    /// 1 opaque.
+    /// Opacity; 1 is opaque.
     pub opacity: f32,
-    /// One normal per triangle.
+    /// Flat shading: one normal per triangle.
     pub flat: bool,
-    /// False: colours are drawn as they are.
+    /// Lighting; false draws the colours unchanged.
     pub lighting: bool,
-    /// Physically based: metallic, roughness.
+    /// Physically based shading with metalness and roughness.
     pub pbr: bool,
-    /// Of the physically based model.
+    /// Metalness of the physically based model.
     pub metallic: f32,
-    /// Of the physically based model.
+    /// Roughness of the physically based model.
     pub roughness: f32,
     /// Index of refraction of the physically based model's dielectric layer.
     pub base_ior: f32,
-    /// Sides turned to the viewer are left out.
+    /// Front faces are culled.
     pub cull_front: bool,
-    /// Sides turned away from the viewer are left out.
+    /// Back faces are culled.
     pub cull_back: bool,
     /// Colour of the edges of polygons.
     pub edge_color: [f32; 3],
-    /// Their width, pixels; 0 for none. Only on opaque surfaces that are not clipped.
+    /// Width of the edges, pixels; 0 for none. Applies only to opaque surfaces that are not
+    /// clipped.
     pub edge_width: f32,
 }
 
 impl Default for Property {
-    /// A new `vtkProperty`'s.
+    /// The values of a new `vtkProperty`.
     fn default() -> Self {
         Property {
             ambient_color: [1.0; 3],
@@ -306,41 +308,41 @@ impl Default for Property {
     }
 }
 
-/// One drawn thing.
+/// One surface to draw.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface<'a> {
     /// Name for messages and the report.
     pub name: &'a str,
-    /// Where rays meet it.
+    /// Its geometry.
     pub shape: Shape<'a>,
     /// Data coordinates to world.
     pub world_from_data: DMat4,
-    /// Its colours.
+    /// Its colour.
     pub color: Color<'a>,
     /// Its texture.
     pub texture: Option<Image<'a>>,
     /// Further textures of its property.
     pub maps: Option<Maps<'a>>,
-    /// Its answer to light.
+    /// How it reflects light.
     pub property: Property,
-    /// Another answer on the backs of its polygons, opaque and of one colour (needs
+    /// A different property for the back faces of its polygons, opaque and of one colour (needs
     /// [`Shape::has_back_faces`]).
     pub back: Option<Property>,
-    /// Copies: each is drawn where its own matrix (data of the copy to `world_from_data`'s input)
-    /// puts it.
+    /// Copies. Each has its own matrix, from data coordinates of the copy to the input of
+    /// `world_from_data`.
     pub glyphs: Option<Glyphs<'a>>,
 }
 
 /// Copies of a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Glyphs<'a> {
-    /// A matrix per copy, row by row.
+    /// One matrix per copy, in row-major order.
     pub matrices: &'a [[f64; 16]],
-    /// A colour per copy; empty for the surface's own.
+    /// One colour per copy; empty to use the surface's own colour.
     pub rgba: &'a [[u8; 4]],
 }
 
-/// Values of any kind that a grid can have.
+/// Scalar types that a grid can have.
 #[derive(Debug, Clone, Copy)]
 pub enum Scalars<'a> {
     /// Unsigned bytes.
@@ -355,44 +357,44 @@ pub enum Scalars<'a> {
     F64(&'a [f64]),
 }
 
-/// A uniform grid of scalars as a glowing, absorbing medium: `vtkImageData` through a volume
+/// A uniform grid of scalars as an emitting and absorbing medium: `vtkImageData` through a volume
 /// mapper, blended front to back.
 #[derive(Debug, Clone, Copy)]
 pub struct Volume<'a> {
     /// Name for messages and the report.
     pub name: &'a str,
-    /// Changes whenever the scalars do; 0 is never kept.
+    /// Changes whenever the scalars change; 0 is never cached.
     pub key: u64,
-    /// One per point, x fastest. Not read when [`crate::bridge::Bridge::has_volume`] says so.
+    /// One per point, x fastest. Not read if [`crate::bridge::Bridge::has_volume`] returns true.
     pub scalars: Scalars<'a>,
     /// Points per axis.
     pub dims: [u32; 3],
-    /// Distance of neighbouring points, data units; positive.
+    /// Distance between neighbouring points, data units; positive.
     pub spacing: [f64; 3],
     /// Data coordinates (point (0,0,0) at zero) to world.
     pub world_from_data: DMat4,
-    /// The value of the nearest point instead of linear interpolation.
+    /// Uses the value of the nearest point; false interpolates linearly.
     pub nearest: bool,
     /// Scalars of the first and the last entry of the tables.
     pub range: [f64; 2],
-    /// Colours, evenly spaced, linear between.
+    /// Colours, evenly spaced and interpolated linearly.
     pub colors: &'a [[f32; 3]],
-    /// Opacities of a slab of `unit_distance`, evenly spaced, linear between.
+    /// Opacities of a slab of `unit_distance`, evenly spaced and interpolated linearly.
     pub opacities: &'a [f32],
-    /// Thickness that the opacities are for, data units.
+    /// Thickness to which the opacities refer, data units.
     pub unit_distance: f64,
-    /// Answer to light; `None` for none.
+    /// Shading; `None` for none.
     pub shading: Option<Shading>,
-    /// Lights: for each the direction towards it, in the world (zero for one at the viewer), and
-    /// its colour; none for a white one at the viewer.
+    /// For each light, its world direction (zero for a light at the viewer) and its colour. An
+    /// empty list means one white light at the viewer.
     pub lights: &'a [[f32; 6]],
-    /// Opacities by gradient, evenly spaced from 0 to `steepest`, that the others are multiplied
-    /// by; empty for 1.
+    /// Gradient opacities, evenly spaced from 0 to `steepest`, that multiply the scalar opacities;
+    /// empty for 1.
     pub gradient_opacities: &'a [f32],
-    /// Gradient of the last of them, scalar per data unit.
+    /// Gradient of the last entry, scalar per data unit.
     pub steepest: f64,
-    /// What a ray makes of the scalars. All but [`VolumeBlend::Composite`] take the opacities as
-    /// they are, whatever the thickness.
+    /// How a ray combines the scalars. All modes but [`VolumeBlend::Composite`] use the opacities
+    /// unchanged, independent of the thickness.
     pub blend: VolumeBlend<'a>,
 }
 
@@ -403,28 +405,29 @@ pub enum VolumeBlend<'a> {
     Composite,
     /// Colour and opacity of the largest scalar.
     Maximum,
-    /// Of the smallest.
+    /// Colour and opacity of the smallest scalar.
     Minimum,
     /// The mean of colour times opacity, opaque.
     Average,
     /// The integral of colour times opacity by `unit_distance`, opaque.
     Additive,
-    /// Surfaces of these scalars.
+    /// Isosurfaces at these scalars.
     Isosurfaces(&'a [f64]),
 }
 
-/// Answer of a volume to light, by its gradient (`vtkVolumeProperty`).
+/// Shading of a volume by its gradient (`vtkVolumeProperty`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shading {
-    /// Part of the colour that needs no light.
+    /// Ambient coefficient.
     pub ambient: f32,
-    /// Part that is lit.
+    /// Diffuse coefficient.
     pub diffuse: f32,
-    /// White highlight.
+    /// Coefficient of the white specular highlight.
     pub specular: f32,
-    /// Its exponent.
+    /// Exponent of the highlight.
     pub specular_power: f32,
-    /// It lies around the mirrored light (VTK 9.2 and later), not the half vector (9.1).
+    /// The highlight is centred on the mirrored light (VTK 9.2 and later), not on the half vector
+    /// (9.1).
     pub mirrored: bool,
 }
 
@@ -433,7 +436,7 @@ pub struct Shading {
 pub enum LightKind {
     /// Parallel light, from `position` to `focal_point`.
     Directional,
-    /// To all sides from `position`.
+    /// In all directions from `position`.
     Point,
     /// A cone from `position` to `focal_point`.
     Spot {
@@ -451,13 +454,13 @@ pub struct SceneLight {
     pub kind: LightKind,
     /// World position.
     pub position: DVec3,
-    /// World point it looks at.
+    /// World point that it is aimed at.
     pub focal_point: DVec3,
     /// Colour times intensity.
     pub color: [f32; 3],
     /// Constant, linear and quadratic attenuation.
     pub attenuation: [f32; 3],
-    /// True when it moves with the camera and looks where the camera looks.
+    /// True if the light moves with the camera and points where the camera looks.
     pub headlight: bool,
 }
 
@@ -470,22 +473,22 @@ pub struct Lens {
     pub focus_distance: f64,
 }
 
-/// What is asked for: a camera and a size.
+/// What to render: a camera and a size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// OpenGL's projection · view, depth -1..1.
     pub clip_from_world: DMat4,
     /// Pixels per row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Renderer's background at the bottom and the top: what mirrors see where they see nothing.
+    /// Renderer's background at the bottom and the top. Reflected rays that hit nothing see it.
     pub background: [[f32; 3]; 2],
-    /// The program wants a quick picture (it is being turned with the mouse): one sample.
+    /// The program wants a fast image because the user is moving the camera: one sample.
     pub interactive: bool,
-    /// The program itself asks for shadows (`vtkRenderer::SetUseShadows`).
+    /// The program itself requests shadows (`vtkRenderer::SetUseShadows`).
     pub shadows: bool,
-    /// Samples per pixel that the program itself asks for; 0 for no wish.
+    /// Samples per pixel that the program itself requests; 0 for no request.
     pub samples: u32,
     /// The program's own lens.
     pub lens: Option<Lens>,

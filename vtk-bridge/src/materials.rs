@@ -14,16 +14,16 @@ use rt_core::texture::Texture;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// How radiance becomes numbers in the picture.
+/// How radiance becomes numbers in the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// As it is.
+    /// Unchanged.
     Direct,
-    /// Over π, then to the power 1/2.2.
+    /// Divided by π, then raised to the power 1/2.2.
     Pbr,
 }
 
-/// What decides about all materials of a frame.
+/// Settings that affect all materials of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct MaterialContext<'a> {
     /// The options.
@@ -34,14 +34,14 @@ pub struct MaterialContext<'a> {
     pub dark: bool,
 }
 
-/// Ambient occlusion needs light to occlude: this share of the diffuse coefficient answers ambient
-/// light instead of lights.
+/// Ambient occlusion needs ambient light. This fraction of the diffuse coefficient reflects ambient
+/// light instead of direct light.
 fn ambient_share(options: &Options) -> f32 {
     if options.ao > 0 && !options.path_tracing { options.ao_strength } else { 0.0 }
 }
 
-/// The material of `p`. `from_values` is true where colours of points, cells or a map replace the
-/// property's.
+/// Converts the property `p` to a material. `from_values` is true if colours of points, cells or a
+/// map replace the property's.
 pub fn material(
     p: &Property,
     from_values: bool,
@@ -85,7 +85,7 @@ pub fn material(
         }
         MaterialChoice::Glass => {
             let model = SurfaceModel::Dielectric { ior: options.ior, absorption: [0.0; 3] };
-            // Half of the way to white: two walls of a saturated colour would swallow all light.
+            // Halfway to white, because two walls of a saturated colour would absorb all light.
             let color = base.color.map(|c| 0.5 + 0.5 * c);
             return (Material { model, color, opacity: 1.0, ..base }, Encoding::Direct);
         }
@@ -95,7 +95,7 @@ pub fn material(
         if options.material == MaterialChoice::Transparent { 0.5 * opacity } else { opacity };
     let base = Material { opacity, ..base };
     if !p.lighting || context.dark {
-        // Complexity 0 of VTK's shader: ambient and diffuse as they are.
+        // Complexity 0 of VTK's shader: ambient and diffuse are used unchanged.
         let color = if from_values {
             [p.ambient + p.diffuse; 3]
         } else {
@@ -139,7 +139,7 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
         specular: f0,
         form: PbrForm::Vtk,
     };
-    // VTK 9 takes the colour as linear here, although the result is encoded.
+    // VTK 9 treats the colour as linear here, although it encodes the result.
     (Material { model, ..base }, Encoding::Pbr)
 }
 
@@ -150,7 +150,7 @@ pub(crate) struct PbrTextures {
     emission: [f32; 3],
 }
 
-/// Those of `maps`, with what `texture` makes of pictures.
+/// Converts `maps`; `texture` converts each image.
 pub(crate) fn pbr_textures(
     maps: &Maps<'_>,
     mut texture: impl FnMut(Option<&Image<'_>>) -> Option<Arc<Texture>>,
@@ -165,23 +165,23 @@ pub(crate) fn pbr_textures(
         emission: texture(maps.emissive.as_ref()),
         ..TextureMaps::new(MapConvention::Vtk)
     };
-    // The shader adds emission where the picture is encoded, and there light is over π.
+    // The shader adds emission after it divides light by π and before it encodes the image.
     let factor = if detail.emission.is_some() { PI } else { 0.0 };
     let emission = maps.emissive_factor.map(|f| non_negative(f) * factor);
     PbrTextures { detail: Arc::new(detail), emission }
 }
 
 impl PbrTextures {
-    /// The material with them.
+    /// Returns the material with these textures.
     pub(crate) fn apply_to(&self, base: Material) -> Material {
         let emission = std::array::from_fn(|c| base.emission[c] + self.emission[c]);
         Material { emission, ..base.with_maps(self.detail.clone()) }
     }
 }
 
-/// The ambient part of a surface of one colour as light that it gives off. An ambient light in the
-/// scene would show on every surface, also on physically based ones, whose shader knows no ambient
-/// coefficient; so it is left to surfaces whose colour varies, and to ambient occlusion.
+/// Converts the ambient part of a surface of one colour to emission. An ambient light in the scene
+/// would affect every surface, even physically based ones, whose shader has no ambient coefficient.
+/// Surfaces of varying colour and ambient occlusion still use an ambient light.
 pub fn ambient_as_emission(mut m: Material) -> Material {
     if let (ColorSource::Constant, SurfaceModel::Phong { ambient, .. }) =
         (&m.color_source, &mut m.model)
@@ -192,7 +192,7 @@ pub fn ambient_as_emission(mut m: Material) -> Material {
     m
 }
 
-/// Finite and not negative.
+/// Clamps to finite, non-negative values.
 fn non_negative(v: f32) -> f32 {
     if v.is_finite() { v.max(0.0) } else { 0.0 }
 }

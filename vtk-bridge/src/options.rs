@@ -7,77 +7,79 @@
 use rt_core::bvh::{BuildQuality, Robustness};
 use std::ffi::OsString;
 
-/// What all surfaces are made of.
+/// The material of all surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MaterialChoice {
-    /// What the program's own properties say.
+    /// The materials that the program's own properties give.
     #[default]
     Scene,
-    /// Ideal diffuse, in the surfaces' colours.
+    /// Ideal diffuse, with the surfaces' colours.
     Matte,
     /// Metal, with the surfaces' colours as reflectance.
     Metal,
-    /// Glass, tinted in the surfaces' colours.
+    /// Glass, tinted with the surfaces' colours.
     Glass,
-    /// The scene's, half transparent.
+    /// The scene's materials, half transparent.
     Transparent,
 }
 
-/// All options. The default is what looks like OpenGL: no effect is on.
+/// All options. The default looks like OpenGL: all effects are off.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// Everything is left to OpenGL.
+    /// Leaves all drawing to OpenGL.
     pub off: bool,
     /// Threads; `None` for all.
     pub threads: Option<usize>,
     /// Samples per pixel.
     pub samples: u32,
-    /// Frames that are averaged while nothing changes.
+    /// Number of frames that are averaged while nothing changes.
     pub progressive: u32,
-    /// Shadows of all lights but headlights.
+    /// Shadows of all lights except headlights.
     pub shadows: bool,
-    /// Angle under which lights are seen, radians (half); 0 for sharp shadows.
+    /// Angular radius of the lights, radians; 0 for sharp shadows.
     pub light_size_rad: f64,
-    /// Rays of ambient occlusion per point and sample; 0 for none.
+    /// Ambient occlusion rays per point and sample; 0 for none.
     pub ao: u32,
-    /// How far ambient occlusion looks, world units; `None` for a fifth of the scene's diagonal.
+    /// Maximum distance of ambient occlusion, world units; `None` for a fifth of the scene's
+    /// diagonal.
     pub ao_radius: Option<f64>,
-    /// Share of light that is ambient while ambient occlusion is on.
+    /// Fraction of light that is ambient while ambient occlusion is on.
     pub ao_strength: f32,
-    /// Physically based and metallic surfaces reflect their surroundings.
+    /// Physically based and metallic surfaces reflect their environment.
     pub reflections: bool,
-    /// Share of mirror reflection added to every surface.
+    /// Fraction of mirror reflection added to every surface.
     pub mirror: f32,
-    /// What surfaces are made of.
+    /// The material of all surfaces.
     pub material: MaterialChoice,
-    /// Roughness of the choice `metal`.
+    /// Roughness of the material `metal`.
     pub roughness: f32,
-    /// Refractive index of the choice `glass`.
+    /// Refractive index of the material `glass`.
     pub ior: f32,
-    /// Light over many bounces.
+    /// Global illumination: light over many bounces.
     pub path_tracing: bool,
-    /// Most bounces; `None` for 8 of mirrors and glass, and paths that chance ends.
+    /// Maximum number of bounces; `None` for 8 at mirrors and glass, and Russian roulette for
+    /// paths.
     pub max_bounces: Option<u32>,
     /// Radius of the lens, world units; 0 for a pinhole.
     pub aperture: f64,
     /// Distance in focus, world units; `None` for the camera's focal point.
     pub focus: Option<f64>,
-    /// Edges and vertices.
+    /// Robustness of intersection tests at edges and vertices.
     pub robustness: Robustness,
-    /// Effort of building.
+    /// Build effort of the acceleration structure.
     pub build: BuildQuality,
-    /// Vertices become spheres of this radius, data units; 0: they stay OpenGL's points.
+    /// Radius of the spheres that replace vertices, data units; 0: they stay OpenGL's points.
     pub point_radius: f64,
-    /// Lines and edges become tubes of this radius, data units; 0: they stay OpenGL's lines.
+    /// Radius of the tubes that replace lines and edges, data units; 0: they stay OpenGL's lines.
     pub line_radius: f64,
     /// How far corners of triangles with edges move outwards, line widths: the geometry shader of
     /// VTK 9.0 to 9.2 moves them by a quarter. 0: edges end at the outline.
     pub edge_reach: f64,
-    /// Seed of the noise.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Where the report is written after each frame.
+    /// File to which the report is written after each frame.
     pub report: Option<String>,
-    /// No warnings on stderr.
+    /// Suppresses warnings on stderr.
     pub quiet: bool,
 }
 
@@ -114,8 +116,8 @@ impl Default for Options {
     }
 }
 
-/// Name, what it does and what it may be: for `vtk-bridge --help`, the book, and the check for
-/// misspelt names.
+/// Name, effect and allowed values of each option: for `vtk-bridge --help`, the book, and the check
+/// for misspelt names.
 pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_OFF", "leave everything to OpenGL", "0 or 1"),
     ("RTV_THREADS", "threads that trace", "1 to 1024; all by default"),
@@ -172,10 +174,10 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_LIBRARY", "the library that `vtk-bridge install` copies", "a file"),
 ];
 
-/// Variables that the library does not read, or reads as folders and files of any name.
+/// Variables that the library does not read, or reads as arbitrary paths.
 const PATHS: &[&str] = &["RTV_HOME", "RTV_VTK_INCLUDE", "RTV_LIBRARY"];
 
-/// Variables as texts. The second value names those that are none because they are not UTF-8.
+/// Variables as strings. The second value names those that are not UTF-8.
 pub fn readable(variables: &[(OsString, OsString)]) -> (Vec<(String, String)>, Vec<String>) {
     let (mut texts, mut faults) = (Vec::new(), Vec::new());
     for (name, value) in variables {
@@ -183,7 +185,7 @@ pub fn readable(variables: &[(OsString, OsString)]) -> (Vec<(String, String)>, V
             (Some(name), Some(value)) => texts.push((name.to_owned(), value.to_owned())),
             (Some(name), None) if PATHS.contains(&name) => {}
             _ => {
-                // As `Debug` writes them: with the bytes that are no text.
+                // In `Debug` format, which shows the invalid bytes.
                 let [name, value] =
                     [name, value].map(|t| format!("{t:?}").trim_matches('"').to_owned());
                 faults.push(format!(
@@ -196,7 +198,7 @@ pub fn readable(variables: &[(OsString, OsString)]) -> (Vec<(String, String)>, V
 }
 
 impl Options {
-    /// Options from pairs of name and value; the second value says what was not understood.
+    /// Options from pairs of name and value. The second value lists what is invalid.
     pub fn parse(pairs: impl IntoIterator<Item = (String, String)>) -> (Options, Vec<String>) {
         let (mut options, mut faults) = (Options::default(), Vec::new());
         for (name, value) in pairs {
@@ -294,7 +296,7 @@ fn automatic(value: &str) -> Option<Option<f64>> {
     }
 }
 
-/// Edit distance (Levenshtein 1966), to guess what a misspelt name means.
+/// Edit distance (Levenshtein 1966), to suggest the name that a misspelt one means.
 fn distance(a: &str, b: &str) -> usize {
     let b: Vec<u8> = b.bytes().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

@@ -6,20 +6,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-/// Something that was traced.
+/// An object that was ray traced.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TracedItem {
     /// Its name.
     pub name: String,
-    /// Triangles, all copies together.
+    /// Triangles in all copies together.
     pub triangles: usize,
     /// Cells of a volume.
     pub cells: u64,
-    /// How often it is drawn.
+    /// Number of copies.
     pub copies: usize,
 }
 
-/// Something that OpenGL draws.
+/// An object that OpenGL draws.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UntracedItem {
     /// Its name.
@@ -31,46 +31,46 @@ pub struct UntracedItem {
 /// Milliseconds by phase.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Milliseconds {
-    /// Arrays to geometry and colours.
+    /// Converting arrays to geometry and colours.
     pub extract: f64,
-    /// Acceleration structures.
+    /// Building acceleration structures.
     pub build: f64,
-    /// Rays and shading.
+    /// Tracing rays and shading.
     pub trace: f64,
-    /// Floating point to the window's format.
+    /// Converting floating point to the window's format.
     pub convert: f64,
-    /// All of it.
+    /// The whole frame.
     pub frame: f64,
 }
 
-/// The account of one frame of one renderer.
+/// The report of one frame of one renderer.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct FrameReport {
-    /// Frames so far.
+    /// Number of frames so far.
     pub frame: u64,
-    /// What was traced.
+    /// What was ray traced.
     pub traced: Vec<TracedItem>,
     /// What OpenGL draws, and why.
     pub passed: Vec<UntracedItem>,
     /// Effects that ran.
     pub effects: Vec<String>,
-    /// What each effect adds to the frame: time with it minus time without it.
+    /// Cost of each effect: time with it minus time without it.
     pub ms_by_effect: Vec<(String, f64)>,
     /// Rays by kind.
     pub rays: Vec<(String, u64)>,
     /// Time by phase.
     pub ms: Milliseconds,
-    /// Geometries that were built anew.
+    /// Number of geometries that were rebuilt.
     pub rebuilt: u32,
     /// Bytes of acceleration structures.
     pub bytes: usize,
-    /// True when nothing had changed and the last picture was shown again.
+    /// True if nothing changed and the last image was shown again.
     pub reused: bool,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Rays by kind, those that were sent.
+/// Rays traced, by kind.
 pub(crate) fn rays(r: &RayStats) -> Vec<(String, u64)> {
     let all = [
         ("primary", r.primary),
@@ -86,8 +86,8 @@ pub(crate) fn rays(r: &RayStats) -> Vec<(String, u64)> {
 /// Last reports of all renderers of the process, by number.
 static RENDERERS: Mutex<BTreeMap<u64, FrameReport>> = Mutex::new(BTreeMap::new());
 
-/// Writes the reports of all renderers that had something to draw. A rank of a parallel program
-/// writes its own file.
+/// Writes the reports of all renderers that drew something. Each rank of a parallel program writes
+/// its own file.
 pub fn write(renderer: u64, report: &FrameReport, path: &str) -> std::io::Result<()> {
     #[derive(Serialize)]
     struct ReportFile<'a> {
@@ -106,21 +106,21 @@ pub fn write(renderer: u64, report: &FrameReport, path: &str) -> std::io::Result
     std::fs::rename(&beside, &path)
 }
 
-/// Forgets a renderer that is gone.
+/// Removes a renderer that was destroyed.
 pub fn forget(renderer: u64) {
     if let Ok(mut all) = RENDERERS.lock() {
         all.remove(&renderer);
     }
 }
 
-/// Variables in which Open MPI and MPICH say how many ranks there are.
+/// Variables in which Open MPI and MPICH give the number of ranks.
 const RANKS: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 fn number(variable: impl Fn(&str) -> Option<String>, names: [&str; 2]) -> Option<u32> {
     names.iter().find_map(|n| variable(n)?.parse().ok())
 }
 
-/// Of how many ranks this process is one.
+/// The number of ranks of the program that this process belongs to.
 pub(crate) fn ranks() -> u32 {
     number(|name| std::env::var(name).ok(), RANKS).unwrap_or(1)
 }

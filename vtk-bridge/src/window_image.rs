@@ -13,16 +13,17 @@ use rt_core::render::{RenderOptions, Renderer};
 use std::f32::consts::PI;
 use std::time::Instant;
 
-/// A picture; rows from the top.
+/// An image; rows start at the top.
 #[derive(Debug, Clone, Default)]
 pub struct WindowImage {
     /// Pixels per row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// RGBA: alpha 255 where something is hit, else 0. Empty when [`WindowImage::blended`] is not.
+    /// RGBA with alpha 255 where a ray hit something, else 0. Empty if [`WindowImage::blended`] is
+    /// not.
     pub opaque: Vec<[u8; 4]>,
-    /// Premultiplied RGBA, when some of it lets the window's contents through; else empty.
+    /// Premultiplied RGBA if some pixels are translucent; else empty.
     pub blended: Vec<[f32; 4]>,
     /// Window depth of the first opaque surface, 1 where there is none.
     pub depth: Vec<f32>,
@@ -30,7 +31,7 @@ pub struct WindowImage {
     pub first_depth: Vec<f32>,
 }
 
-/// What drawing came to.
+/// Result of drawing.
 pub(crate) struct DrawResult {
     pub(crate) rays: RayStats,
     pub(crate) warnings: Vec<String>,
@@ -38,17 +39,17 @@ pub(crate) struct DrawResult {
     pub(crate) convert_ms: f64,
 }
 
-/// Pixels a task works on.
+/// Pixels per task.
 const CHUNK: usize = 1 << 14;
 
 impl WindowImage {
-    /// What mirrors and glass see where nothing is.
+    /// Background that reflected and refracted rays see.
     pub(crate) fn gradient_background(view: &View) -> Background {
         let [bottom, top] = view.background;
         Background::Gradient { bottom, top }
     }
 
-    /// Draws; `mean_of` earlier pictures of the same are averaged with this one.
+    /// Renders. The result is averaged with `mean_of` earlier images of the same scene.
     pub(crate) fn draw(
         &mut self,
         renderer: &mut Renderer,
@@ -65,8 +66,8 @@ impl WindowImage {
         let layers = Layers::COLOR | Layers::DEPTH;
         let options = RenderOptions {
             layers: if mixed || !inputs.edges.is_empty() { layers | Layers::IDS } else { layers },
-            // Interpolated colours of opacity 1 come a rounding below it; what is 255 of 255 is
-            // opaque.
+            // Interpolating an opacity of 1 gives slightly less than 1, so an alpha that rounds to
+            // 255 of 255 is opaque.
             depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) {
                 1.0 - 1.0 / 512.0
             } else {
@@ -132,8 +133,8 @@ impl WindowImage {
     }
 }
 
-/// Takes the background away again that mirrors and glass needed: pixels where nothing is are the
-/// window's.
+/// Removes the background that reflections and refractions needed: pixels without a hit belong to
+/// the window.
 fn clear_background(frame: &mut Frame, first_depth: &[f32]) {
     let clear = |(c, d): (&mut [f32; 4], &f32)| {
         if *d >= 1.0 {
