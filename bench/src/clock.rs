@@ -1,9 +1,9 @@
-//! Time as this thread, this process and the wall clock see it.
+//! Time of this thread, this process and the wall clock.
 //!
-//! On a machine that others use too, the wall clock measures the others. A thread's CPU time does
-//! not advance while the thread waits for a core, so single-threaded variants are compared by it;
-//! with several threads the wall clock is what a user waits for, and the process's CPU time shows
-//! how much of the machine was used meanwhile.
+//! On a shared machine, wall-clock time includes the load of other users. A thread's CPU time does
+//! not advance while the thread waits for a core, so it is used to compare single-threaded
+//! variants. With several threads, the wall clock measures how long a user waits, and the process's
+//! CPU time shows how much of the machine was used.
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};

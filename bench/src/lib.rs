@@ -1,16 +1,16 @@
-//! Measurements of the whole workspace: every table and figure of the dissertation, and error
-//! against time.
+//! Measures the whole workspace: reproduces every table and figure of the dissertation, and plots
+//! error against time.
 //!
-//! One measurement's life: an [`experiments::Experiment`] prepares its scenes, hands closures to
-//! [`runner::interleave`], which times them in turns on a shared machine, and turns the samples
-//! into rows and ratios of a [`record::Record`]. Records are written as JSON and CSV; [`report`]
-//! makes one HTML page of them, with the plots of [`plot`].
+//! An [`experiments::Experiment`] prepares its scenes and passes closures to
+//! [`runner::interleave`]. The runner times them in alternation, because the machine may be shared.
+//! The experiment then turns the samples into rows and ratios of a [`record::Record`]. Records are
+//! written as JSON and CSV. [`report`] makes one HTML page of them, with the plots of [`plot`].
 //!
-//! Other ray tracers ([`baselines`]) are loaded at run time when they are installed and run on the
-//! same mesh and the same [`rays`], in the same process, in turns with ours. What is missing is
-//! named in the record, never skipped silently.
+//! Other ray tracers ([`baselines`]) are loaded at run time if they are installed. They run on the
+//! same mesh and the same [`rays`], in the same process, alternating with ours. The record names
+//! everything that is missing; nothing is skipped silently.
 //!
-//! `unsafe` lives in `baselines/embree` alone: a C library cannot be called without it.
+//! Only `baselines/embree` contains `unsafe` code, because calling a C library requires it.
 #![deny(unsafe_code)]
 
 pub mod baselines;

@@ -1,4 +1,4 @@
-//! What a record has to say about the machine it was made on.
+//! Describes the machine on which a record was made.
 
 use serde::{Deserialize, Serialize};
 use std::path::Path;

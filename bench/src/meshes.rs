@@ -1,5 +1,5 @@
-//! The meshes that experiments share: the dissertation's nested wavelet surfaces, and two of other
-//! kinds.
+//! Meshes that several experiments use: the dissertation's nested wavelet surfaces, and two of
+//! other kinds.
 
 use anyhow::Context as _;
 use datasets::generate::nested_wavelet::Size;

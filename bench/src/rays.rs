@@ -1,10 +1,10 @@
-//! The ray sets that all tracers are timed on.
+//! The ray sets on which all tracers are timed.
 //!
-//! Rays are made once, by one exact rule from one set of hits, and stored; every tracer then gets
-//! the same bits in the same order. Blocks of 16 rays as structure of arrays: 16 primary rays are a
-//! 4 x 4 block of pixels and 256 are 16 x 16, because pixels go in Morton order. Hit points are
-//! computed in f64 from the triangle that was hit, so that secondary rays do not depend on the
-//! tracer that found it.
+//! The rays are generated once by one exact rule from one set of hits, and stored. Every tracer
+//! then gets the same bits in the same order. Rays are stored in blocks of 16 as a structure of
+//! arrays. Pixels are in Morton order, so 16 primary rays cover 4 x 4 pixels and 256 cover 16 x 16.
+//! Hit points are computed in f64 from the triangle that was hit, so secondary rays do not depend
+//! on the tracer that found it.
 
 use glam::{DVec3, Vec3};
 use rt_core::mesh::TriMesh;

@@ -1,8 +1,8 @@
-//! What a measurement leaves behind: one JSON object and one CSV table.
+//! The result of a measurement: one JSON object and one CSV table.
 //!
-//! A record explains itself: every column has a unit and a meaning, the machine and the program's
-//! version are in it, and what could not be measured is named in `missing` with the cure. Reports
-//! are made from records alone, so old ones can be shown again.
+//! A record is self-contained. Every column has a unit and a meaning, the machine and the program's
+//! version are included, and `missing` names what could not be measured, with the cure. Reports are
+//! made from records alone, so old records can be shown again.
 
 use crate::machine::Machine;
 use crate::plot::Plot;

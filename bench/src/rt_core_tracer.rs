@@ -1,4 +1,4 @@
-//! rt-core behind the interface of the peers.
+//! rt-core behind the interface of the baselines.
 
 use crate::baselines::{BuildCost, Tracer};
 use crate::{clock, memory, rays};

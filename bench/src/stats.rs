@@ -1,4 +1,4 @@
-//! Medians and spreads of few samples.
+//! Medians and spreads of small samples.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,5 @@
-//! Every triangle against every ray in f64: slow, short, and what fast tracers are checked against.
+//! Tests every triangle against every ray in f64. It is slow and short, and serves as the reference
+//! for fast tracers.
 
 use super::Tracer;
 use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};

@@ -1,8 +1,8 @@
-//! Other ray tracers behind one interface, to measure ours against.
+//! Other ray tracers behind one interface, as baselines for rt-core.
 //!
-//! [`embree`] is loaded at run time when it is installed; [`obvhs`] is a crate and always here;
-//! [`brute_force`] tests every triangle in f64 and is what the others are checked against.
-//! [`thesis_schlieren`] is the dissertation's way through a gas.
+//! [`embree`] is loaded at run time if it is installed. [`obvhs`] is a crate and always available.
+//! [`brute_force`] tests every triangle in f64 and is the reference for the others.
+//! [`thesis_schlieren`] is the dissertation's ray marcher for gas flows.
 
 pub mod brute_force;
 pub mod embree;
@@ -178,7 +178,7 @@ mod tests {
 
 #[cfg(test)]
 pub(crate) mod testing {
-    //! One test for every peer: the same answers as testing all triangles in f64.
+    //! One test for every baseline: the same answers as testing all triangles in f64.
 
     use super::*;
     use crate::rays::{self, View};

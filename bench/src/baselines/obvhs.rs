@@ -1,9 +1,9 @@
 //! obvhs' compressed wide BVH (Ylitie et al. 2017), one ray at a time.
 //!
-//! The triangles are stored in leaf order, as the crate's own benchmark does. obvhs gives distance
-//! and triangle and no barycentric coordinates, and none are computed here: that is in its favour.
-//! Its vector width is fixed when the program is compiled (SSE in a default build), unlike Embree's
-//! and ours, which are chosen at run time.
+//! The triangles are stored in leaf order, as in the crate's own benchmark. obvhs returns distance
+//! and triangle but no barycentric coordinates. None are computed here, which favours obvhs. Its
+//! vector width is fixed at compile time (SSE in a default build), whereas Embree and rt-core
+//! choose theirs at run time.
 
 use super::{BaselineError, BuildCost, Tracer, require_clean};
 use crate::clock;

@@ -1,12 +1,12 @@
-//! The dissertation's march (section 5.3, equations 5.7 and 5.8) as one would write it from the
-//! text: a texture of (gradient, n), trilinear; position and direction stepped by Euler's method in
-//! f32; a step length for all.
+//! The dissertation's ray marcher (section 5.3, equations 5.7 and 5.8), implemented directly from
+//! the text: a texture of (gradient, n) with trilinear interpolation, Euler steps for position and
+//! direction in f32, and one step length for all rays.
 //!
-//! Signs and lengths of gradients are right here, which they are not in the code its author
-//! published (TACC/SchlierenRay, 2015): central differences are divided by twice the spacing and
-//! point to higher index, rays start with |v| = n, and march until they leave the box. What remains
-//! is the method: 16 bytes a voxel, first order, and kicks that vanish when they are smaller than
-//! half a unit in the last place of the direction.
+//! The signs and lengths of the gradients are correct here. In the author's published code
+//! (TACC/SchlierenRay, 2015) they are not. Central differences are divided by twice the spacing and
+//! point to the higher index. Rays start with |v| = n and march until they leave the box. The
+//! limits of the method remain: 16 bytes per voxel, first order, and deflections that are lost when
+//! they are smaller than half a unit in the last place of the direction.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

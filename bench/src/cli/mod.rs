@@ -1,4 +1,4 @@
-//! The command line: what was typed becomes a call of the library.
+//! The command line: converts arguments to calls of the library.
 
 mod list;
 mod peers;

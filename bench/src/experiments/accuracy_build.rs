@@ -1,6 +1,6 @@
-//! What a better build costs and what rays gain by it: the dissertation's choice between
-//! approximate and full builds (section 4.1.2), with the number of frames after which the better
-//! build has paid for itself.
+//! Measures the cost of a better build and the gain for rays: the dissertation's choice between
+//! approximate and full builds (section 4.1.2). It also gives the number of frames after which the
+//! better build pays off.
 
 use super::Context;
 use super::compare::{self, Contender, Kind};

@@ -1,4 +1,4 @@
-//! Error against bytes and time of blending many faint layers, by pixel format.
+//! Error against bytes and time when many faint layers are blended, by pixel format.
 
 use super::Context;
 use super::many_ranks::{CAVEAT, NETWORK, simulated};

@@ -1,9 +1,8 @@
-//! Leaks: rays from inside closed surfaces, aimed exactly at vertices and edges, that come out; and
-//! what not leaking costs in time.
+//! Counts leaks of closed surfaces, and measures the time that leak-free traversal costs.
 //!
-//! From inside a closed surface every ray must hit. Rays are aimed at mesh vertices, at points on
-//! edges, and in random directions; a miss is a leak. Nothing else is judged here: which triangle
-//! answers is a matter for the comparison with brute force in the tests.
+//! Every ray that starts inside a closed surface must hit it; a miss is a leak. Rays are aimed
+//! exactly at mesh vertices, at points on edges, and in random directions. Which triangle is hit is
+//! not checked here; the tests compare that with brute force.
 
 use super::Context;
 use super::installed_tracers::InstalledBaselines;

@@ -1,5 +1,5 @@
-//! Error against time of light's way through a gas: integrator by interpolant by step by precision,
-//! on closed forms; and the tolerance asked for against the error got.
+//! Error against time of ray paths through a gas, by integrator, interpolant, step and precision,
+//! on closed-form solutions. Also the requested tolerance against the measured error.
 
 use super::Context;
 use super::test_section::{

@@ -1,7 +1,8 @@
-//! Ours against Embree 3, Embree 4 and obvhs: same mesh, same rays, one process, in turns.
+//! Compares rt-core with Embree 3, Embree 4 and obvhs on the same mesh and rays, in one process, in
+//! alternation.
 //!
-//! Our watertight mode is compared with everyone's modes, also with those that are not robust; each
-//! rival enters with the packet width that was fastest for it.
+//! rt-core's watertight mode is compared with every mode of the baselines, even those that are not
+//! robust. Each baseline uses the packet width that is fastest for it.
 
 use super::Context;
 use super::compare::{self, Kind};

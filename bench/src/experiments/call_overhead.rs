@@ -1,4 +1,4 @@
-//! What a call costs that is passed to the driver.
+//! Measures the cost of a call that is forwarded to the driver.
 
 use super::Context;
 use crate::opengl::{Display, Tools};

@@ -1,5 +1,5 @@
-//! What each effect costs: the same view drawn plainly and with one effect, in turns, with the rays
-//! that it sends.
+//! Measures the cost of each effect. The same view is rendered without effects and with one effect,
+//! in alternation, and the rays traced are counted.
 
 use super::Context;
 use crate::picture::framing::Framing;

@@ -1,5 +1,5 @@
-//! Figure 3.5: frames per second of compositing alone, 2 to 128 ranks: binary swap against direct
-//! send and IceT.
+//! Figure 3.5: frames per second of compositing alone, for 2 to 128 ranks: binary swap against
+//! direct send and IceT.
 
 use super::Context;
 use super::many_ranks::{CAVEAT, powers, simulated};

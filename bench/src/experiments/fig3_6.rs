@@ -1,4 +1,4 @@
-//! Figure 3.6: weak scaling of data-parallel rendering: the same number of triangles for every
+//! Figure 3.6: weak scaling of data-parallel rendering, with the same number of triangles on every
 //! rank.
 
 use super::Context;

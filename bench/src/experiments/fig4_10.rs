@@ -1,6 +1,6 @@
-//! Figure 4.10: replicated data, pieces of the picture to ranks (section 4.2.3), beside the same
-//! scene in parts, and beside processes that share the pictures of an unmodified program
-//! ([`super::program_ranks`]).
+//! Figure 4.10: replicated data with image tiles distributed over ranks (section 4.2.3). It is
+//! compared with the same scene partitioned, and with processes that share the images of an
+//! unmodified program ([`super::program_ranks`]).
 
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
 use super::{Context, program_ranks};

@@ -1,5 +1,6 @@
-//! Figure 4.7: build time against the number of triangles, for fast and for careful builds; with
-//! the peers' builds, and with a frame of Mesa's rasteriser, which needs no build.
+//! Figure 4.7: build time against the number of triangles, for fast and for high-quality builds.
+//! The baselines' builds are measured too, as is a frame of Mesa's rasteriser, which needs no
+//! build.
 
 use super::Context;
 use super::installed_tracers::InstalledBaselines;

@@ -1,4 +1,4 @@
-//! Figure 4.8: what happens when in frames of ParaView that are traced.
+//! Figure 4.8: a timeline of ray traced frames of ParaView.
 
 use super::Context;
 use crate::opengl::{Backend, Display, Program, Session, Tools, write};

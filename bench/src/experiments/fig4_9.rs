@@ -1,5 +1,5 @@
-//! Figure 4.9: frame time against the number of triangles, same view, primary rays with a
-//! headlight; with frames of Mesa's rasteriser.
+//! Figure 4.9: frame time against the number of triangles for the same view, with primary rays and
+//! a headlight, and with frames of Mesa's rasteriser.
 
 use super::Context;
 use super::fig4_7::fits_in_memory;

@@ -1,5 +1,5 @@
-//! Figure 5.11: photons per second by technique, on the combustion jet of 480x720x100, by line of
-//! sight and traced.
+//! Figure 5.11: photons per second by technique, on the combustion jet of 480x720x100, along
+//! straight lines of sight and with ray tracing.
 
 use super::Context;
 use super::test_section::{

@@ -1,6 +1,6 @@
-//! Figure 5.14: noise against samples: independent photons against low-discrepancy ones, filtered
-//! and not; and how far pictures of ever more samples are apart, which is what the dissertation
-//! gives numbers for.
+//! Figure 5.14: noise against the number of samples, for independent and for low-discrepancy
+//! photons, each with and without a filter. Also the difference between images with growing numbers
+//! of samples, for which the dissertation gives numbers.
 
 use super::Context;
 use super::test_section::{check_cancelled, flow, picture, render_picture, scene};

@@ -1,9 +1,10 @@
-//! One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView, ray traced by
-//! vtk-bridge.
+//! One node of figures 3.6 to 3.10: ParaView with llvmpipe against the same ParaView with ray
+//! tracing by vtk-bridge.
 //!
-//! Both are run as users run them: `pvbatch` with the same script, once with what `vtk-bridge env
-//! --paraview` prints and once without. Processes take turns, so that both see the same load of the
-//! machine; CPU seconds are those of the whole process, with all threads of Mesa's or ours.
+//! Both run as users run them: `pvbatch` with the same script, once with the variables that
+//! `vtk-bridge env --paraview` prints and once without. The processes alternate, so both see the
+//! same load of the machine. CPU seconds are those of the whole process, including all threads of
+//! Mesa or of rt-core.
 
 use super::Context;
 use crate::plot::{Axis, Plot, Series};

@@ -1,4 +1,4 @@
-//! Parts with the same number of triangles against parts with the same expected work for the view
+//! Compares partitions of equal triangle count with partitions of equal expected work for the view
 //! (sections 3.2.1 and 3.2.2).
 
 use super::Context;

@@ -1,5 +1,5 @@
-//! Shocks whose angle is known exactly, photographed and measured with a ruler: wedges and cones,
-//! and how fine a lattice that takes.
+//! Images shocks whose angle is known exactly (wedges and cones), measures the angle in the image,
+//! and finds how fine a lattice this needs.
 
 use super::Context;
 use super::test_section::{check_cancelled, picture, render_picture_with, scene};

@@ -1,5 +1,5 @@
-//! How fast light goes through a field: ray-steps and photons per second at 256³ and 256 steps, and
-//! a frame of the combustion jet.
+//! Speed of ray marching through a field: ray-steps and photons per second at 256³ and 256 steps,
+//! and a frame of the combustion jet.
 
 use super::Context;
 use super::test_section::{

@@ -1,5 +1,5 @@
-//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering: the same scene cut into ever
-//! more parts.
+//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering, with the same scene cut into
+//! more and more parts.
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};

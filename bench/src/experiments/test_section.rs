@@ -1,5 +1,5 @@
-//! What the experiments of chapter 5 share: flows of the catalogue between the lenses, rays through
-//! them, pictures as PNG.
+//! Code that the experiments of chapter 5 share: flows of the catalogue between the lenses, rays
+//! through them, and PNG images.
 
 use super::Context;
 use crate::record::Picture;

@@ -1,4 +1,4 @@
-//! A mesh as the files that programs read: binary STL, binary OFF with normals, VTP.
+//! Writes a mesh in the formats that the programs read: binary STL, binary OFF with normals, VTP.
 
 use anyhow::Context as _;
 use datasets::model::{Dataset, PolyData};

@@ -1,4 +1,4 @@
-//! An X server of our own, without a screen.
+//! Starts an X server without a screen.
 
 use anyhow::Context as _;
 use std::io::{BufRead as _, BufReader};

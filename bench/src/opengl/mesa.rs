@@ -1,5 +1,5 @@
-//! Frames of a mesh by Mesa's software rasteriser alone: what a build or a traced frame is set
-//! against (figures 4.7 and 4.9).
+//! Frames of a mesh by Mesa's software rasteriser alone: the baseline for a build or a ray traced
+//! frame (figures 4.7 and 4.9).
 
 use super::programs::find;
 use super::{Backend, Cost, Display, Program, Session, write};

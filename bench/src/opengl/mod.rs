@@ -1,5 +1,5 @@
-//! Unmodified OpenGL programs on an X server without a screen, drawn by Mesa's llvmpipe or through
-//! `gluray run`, one frame at a time.
+//! Runs unmodified OpenGL programs on an X server without a screen, one frame at a time. Mesa's
+//! llvmpipe or `gluray run` renders them.
 
 mod data;
 mod display;

@@ -1,5 +1,5 @@
-//! The programs of table 4.1 and how each is made to draw one frame at a time. The programs are the
-//! installed ones; only their own script languages are used.
+//! The programs of table 4.1, and how to make each draw one frame at a time. The installed programs
+//! are used unchanged, through their own script languages.
 
 use super::Format;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
-//! A program that runs and draws a frame whenever it is told to.
+//! A running program that draws a frame on request.
 //!
-//! Programs say `ready` when their first frame is drawn and `frame` after each that follows, so two
-//! of them (native, and through us) can take turns, and what each costs is read from the kernel's
-//! account of its process.
+//! Programs print `ready` after their first frame and `frame` after each later one, so two of them
+//! (native, and through gluray) can alternate. The cost of each is read from the kernel's
+//! accounting of its process.
 
 use super::programs::find;
 use super::{Display, Program};

@@ -1,7 +1,7 @@
-//! One HTML page that shows a set of records.
+//! Makes one HTML page from a set of records.
 //!
-//! The page refers to nothing outside itself (no scripts, fonts or style sheets from elsewhere;
-//! pictures are data URIs), so that it can be mailed, archived and opened without a network.
+//! The page has no external references: no scripts, fonts or style sheets from elsewhere, and
+//! images are data URIs. It can therefore be mailed, archived and opened without a network.
 
 mod table;
 

@@ -1,4 +1,4 @@
-//! The part of Embree's C interface that is used, after the headers of 3.13.5 and 4.4.0
+//! The subset of Embree's C interface that is used, from the headers of 3.13.5 and 4.4.0
 //! (`rtcore_ray.h`, `rtcore_common.h`, `rtcore_scene.h`, `rtcore_device.h`, `rtcore_geometry.h`).
 
 use core::ffi::{c_char, c_int, c_uint, c_void};

@@ -1,8 +1,8 @@
-//! Finding and loading Embree.
+//! Finds and loads Embree.
 //!
-//! Looked for, in this order: the file or folder that `RTSV_EMBREE3` or `RTSV_EMBREE4` names;
-//! `target/peers`, where the set-up program puts peers; the active Python environment's and
-//! `.venv`'s `embreex` package, which carries Embree 4; and whatever the system's loader finds.
+//! The search order is: the file or folder that `RTSV_EMBREE3` or `RTSV_EMBREE4` names;
+//! `target/peers`, where the set-up program installs baselines; the `embreex` package of the active
+//! Python environment and of `.venv`, which contains Embree 4; and finally the system's loader.
 
 #![expect(
     unsafe_code,

@@ -1,12 +1,12 @@
 //! Intel Embree 3 and 4, loaded at run time.
 //!
-//! One Rust type for both: Embree 4 changed the arguments of its query functions and nothing else
-//! that is used here. Everything `unsafe` of this workspace member is in this folder: [`library`]
+//! One Rust type serves both versions. Of what is used here, Embree 4 changed only the arguments of
+//! the query functions. All `unsafe` code of this workspace member is in this folder: [`library`]
 //! finds and loads the C library, `abi` repeats its C declarations, and this file calls it.
 //!
-//! What is measured is Embree at its best: packets of rays are copied from blocks that already have
-//! its layout, fields that a query leaves alone are set once per call and not once per packet, and
-//! only the hit fields that ours fills too are read back.
+//! Embree is measured at its best. Ray packets are copied from blocks that already have its layout.
+//! Fields that a query does not change are set once per call, not once per packet. Only the hit
+//! fields that rt-core also fills are read back.
 
 mod abi;
 pub mod library;

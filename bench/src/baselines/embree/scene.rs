@@ -1,4 +1,4 @@
-//! A mesh built by Embree, and rays through it.
+//! A mesh built by Embree, and ray queries on it.
 
 #![expect(unsafe_code, reason = "Embree is a C library")]
 
