@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all.
+//! Writes files atomically: a file appears complete or not at all.
 
 use std::io::{self, Write};
 use std::path::Path;

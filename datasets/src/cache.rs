@@ -1,9 +1,9 @@
-//! Generated meshes kept on disk, so that a benchmark of 300 million triangles generates them once.
+//! Caches generated meshes on disk, so that a benchmark generates its 300 million triangles once.
 //!
 //! The directory is `RTSV_CACHE`, else `rtsv` in the user's cache directory (`XDG_CACHE_HOME`, else
 //! `~/.cache`). Files may be deleted at any time. A file that is damaged, of another version or of
-//! another machine's byte order is regenerated, and the caller is told so; a full disk costs the
-//! cache, not the mesh.
+//! another machine's byte order is regenerated, and this is reported to the caller. A full disk
+//! prevents caching but does not lose the mesh.
 //!
 //! ```
 //! use datasets::cache::{MeshCache, Origin};

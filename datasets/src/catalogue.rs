@@ -1,5 +1,5 @@
-//! Data sets by name: what there is, in which sizes, from which views, and which figure of the
-//! thesis it stands for. Meshes and lines are here, flows in [`flows`].
+//! Data sets by name, with their sizes, their views and the figure of the thesis that each
+//! represents. Meshes and lines are here, flows in [`flows`].
 //!
 //! ```
 //! use datasets::catalogue::{Data, find};

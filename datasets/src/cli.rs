@@ -1,12 +1,12 @@
-//! The conventions that all command-line programs here share, written once.
+//! Implements the conventions that all command-line programs of the workspace share.
 //!
 //! * Results go to stdout (as text, or as JSON with `--json`); progress, notes and errors go to
 //!   stderr.
-//! * Progress bars appear only on a terminal, and never with `--quiet`; they make way for whatever
-//!   else is printed.
+//! * Progress bars appear only on a terminal, and never with `--quiet`. They are hidden while other
+//!   output is printed.
 //! * Exit codes are those of [`Status`]: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
-//! * Ctrl-C asks the program to stop at the next good place and keep what is finished; a second one
-//!   ends it at once.
+//! * Ctrl-C asks the program to stop at the next safe point and keep its finished results. A second
+//!   Ctrl-C ends it at once.
 //! * A closed pipe (`program | head`) is success.
 //! * Errors print the whole chain of causes and, where there is one, the cure ([`CureExt`]).
 //!

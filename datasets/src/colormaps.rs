@@ -1,4 +1,4 @@
-//! Colour maps that order scalars for the eye. All colours given back are linear RGB.
+//! Perceptually ordered colour maps for scalars. All returned colours are linear RGB.
 //!
 //! | name | for | source and licence |
 //! |---|---|---|
@@ -6,8 +6,8 @@
 //! | `cool-warm` | deviations from a middle | K. Moreland, "Diverging Color Maps for Scientific Visualization" (2009); computed from the paper's formula, tables CC0 |
 //! | `grey` | printing, schlieren | equal steps of sRGB |
 //!
-//! The rainbow is absent on purpose: its lightness goes up and down, which shows edges where the
-//! data have none.
+//! There is no rainbow map, because its lightness is not monotonic and shows edges that are not in
+//! the data.
 
 use rt_core::colormap::{ColorMap, Rgba, srgb_to_linear};
 

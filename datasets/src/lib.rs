@@ -2,15 +2,15 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`catalogue`] | data sets by name, with sizes and views; start here |
+//! | [`catalogue`] | data sets by name, with sizes and views (start here) |
 //! | [`generate`] | every data set of the thesis as a deterministic function of its size |
 //! | [`isosurface`] | surfaces of uniform fields, with VTK's triangle counts |
-//! | [`cache`] | generated meshes kept on disk |
-//! | [`image_io`] | pictures as PNG and multi-layer OpenEXR |
+//! | [`cache`] | disk cache of generated meshes |
+//! | [`image_io`] | images as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
 //! | [`resample`] | data of any mesh on a uniform lattice, with a mask and the error |
-//! | [`model`], [`read`], [`write`](mod@write) | files of others |
-//! | `cli` (feature) | what all command-line programs here share |
+//! | [`model`], [`read`], [`write`](mod@write) | data sets in files |
+//! | `cli` (feature) | conventions of all command-line programs of the workspace |
 #![forbid(unsafe_code)]
 
 mod atomic_file;

@@ -1,4 +1,4 @@
-//! The program `datasets`: names, generates, describes and converts data sets.
+//! The program `datasets`: lists, generates, describes and converts data sets.
 #![forbid(unsafe_code)]
 
 mod program;

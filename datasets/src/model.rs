@@ -1,10 +1,10 @@
-//! The data sets that files hold: VTK's five kinds and collections of them, with named arrays of
+//! The data sets that files contain: VTK's five kinds and collections of them, with named arrays of
 //! any scalar type.
 //!
-//! Readers return a [`Dataset`] with the types the file has; nothing is converted before it is
-//! asked for: [`Dataset::to_trimesh`] (outer surface), [`Dataset::to_lines`] (for tubes),
-//! [`Dataset::to_points`] (for spheres), [`Dataset::to_grid`] (for volumes). What a conversion has
-//! to leave out is counted in a [`SurfaceReport`].
+//! Readers return a [`Dataset`] with the types of the file. Data is converted only on request, by
+//! [`Dataset::to_trimesh`] (boundary surface), [`Dataset::to_lines`] (for tubes),
+//! [`Dataset::to_points`] (for spheres) and [`Dataset::to_grid`] (for volumes). A [`SurfaceReport`]
+//! counts what a conversion leaves out.
 
 pub mod array;
 mod boundary_faces;

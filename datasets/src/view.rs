@@ -1,4 +1,4 @@
-//! Cameras as plain data, so that data sets can come with the views they are known by.
+//! Cameras as plain data, so that data sets can include their well-known views.
 
 use glam::DVec3;
 

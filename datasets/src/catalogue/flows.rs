@@ -1,4 +1,4 @@
-//! Flows by name, for schlieren pictures.
+//! Flows by name, for schlieren images.
 //!
 //! ```
 //! use datasets::catalogue::flows::find;

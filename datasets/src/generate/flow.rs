@@ -1,5 +1,5 @@
-//! What the flow generators return: fields with units on a uniform lattice, and the body in the
-//! stream.
+//! The result of the flow generators: fields with units on a uniform lattice, and the body in the
+//! flow.
 
 use crate::model::{DataArray, Dataset, ImageData, Values};
 use glam::{DVec3, UVec3};

@@ -1,11 +1,11 @@
-//! A ball has hit a plate: crater with a torn rim, the flattened ball, and ejecta flying off in a
-//! cone. Stands for the fracture simulations among the data sets of chapter 4 of the thesis: many
-//! separate closed pieces of very different size, which is what acceleration structures find harder
-//! than one big surface.
+//! A ball that has hit a plate: a crater with a torn rim, the flattened ball, and ejecta flying off
+//! in a cone. It represents the fracture simulations among the data sets of chapter 4 of the
+//! thesis: many separate closed parts of very different size, which are harder for acceleration
+//! structures than one big surface.
 //!
-//! The field is a signed distance in world units, positive in matter: the maximum over plate, ball
-//! and fragments, with a rough surface by noise. The plate is 1.8 x 1.8 x 0.25, its undisturbed top
-//! at z = 0.
+//! The field is a signed distance in world units, positive in matter. It is the maximum over plate,
+//! ball and fragments, with noise that roughens the surface. The plate is 1.8 x 1.8 x 0.25, and its
+//! undisturbed top is at z = 0.
 
 use super::noise::{Noise, RowScratch};
 use crate::isosurface::{IsosurfaceError, Isosurfaces, Options, PlaneSource, extract_streamed};

@@ -1,16 +1,16 @@
-//! A Richtmyer-Meshkov-like mixing layer: two gases, a shaken interface between them, and
-//! turbulence that tears it.
+//! A Richtmyer-Meshkov-like mixing layer: two gases, a perturbed interface between them, and
+//! turbulence that breaks it up.
 //!
-//! Stands for the LLNL simulation (2048 x 2048 x 1920 points, 316 million triangles) that the
+//! It represents the LLNL simulation (2048 x 2048 x 1920 points, 316 million triangles) that the
 //! thesis renders in table 4.1 as "RMO" (the whole, from outside) and "RMI" (close, from inside the
 //! layer).
 //!
-//! The field is the share of the heavy gas, 0 above to 1 below. It falls linearly across a surface
-//! whose height is a sum of long waves (what the shock left behind) plus noise in octaves down to a
-//! few cells with Kolmogorov's amplitudes ∝ wavelength^(1/3). Where the noise's slope in z exceeds
-//! one the surface folds over, so its area grows faster than the square of the resolution, as in
-//! the simulation (measured: 0.18, 1.1, 6.8 and 42.5 million triangles at 128, 256, 512 and 1024
-//! points). Along x and y the field is periodic.
+//! The field is the fraction of the heavy gas, 0 above to 1 below. It falls linearly across a
+//! surface. The height of the surface is a sum of long waves (which the shock left behind) plus
+//! noise in octaves down to a few cells, with Kolmogorov's amplitudes ∝ wavelength^(1/3). Where the
+//! noise's slope in z exceeds one, the surface folds over, so its area grows faster than the square
+//! of the resolution, as in the simulation (measured: 0.18, 1.1, 6.8 and 42.5 million triangles at
+//! 128, 256, 512 and 1024 points). Along x and y the field is periodic.
 
 use super::noise::{Noise, RowScratch};
 use crate::isosurface::{IsosurfaceError, Isosurfaces, Options, PlaneSource, extract_streamed};

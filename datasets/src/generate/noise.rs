@@ -1,8 +1,8 @@
-//! Periodic gradient noise (Perlin 2002) evaluated a grid row at a time.
+//! Periodic gradient noise (Perlin 2002), evaluated one grid row at a time.
 //!
-//! Along a row of constant y and z the noise is, in each lattice cell, a blend of two linear
-//! functions of x whose coefficients are the same for the whole cell. Computing those once a cell
-//! leaves about a dozen operations a point, which is what makes fields of 8 billion points
+//! Along a row of constant y and z, the noise in each lattice cell is a blend of two linear
+//! functions of x. Their coefficients are the same for the whole cell and are computed once per
+//! cell. About a dozen operations per point remain, which makes fields of 8 billion points
 //! affordable.
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! Refractive indices through which rays are known in closed form, sampled at points: test objects
-//! for ray tracers.
+//! Refractive index fields with closed-form ray paths, sampled at points: test objects for ray
+//! tracers.
 
 use super::flow::{Flow, FlowError, names};
 use glam::{DVec3, UVec3};

@@ -1,8 +1,8 @@
-//! Streamlines by the classical Runge-Kutta method of fourth order.
+//! Streamlines by the classical fourth-order Runge-Kutta method.
 //!
-//! Lines are followed by arc length, not by time: the direction field `v/|v|` is integrated, so
-//! points are evenly spaced however the speed varies (field lines of a magnet vary over many orders
-//! of magnitude).
+//! Lines are parametrised by arc length, not by time. The direction field `v/|v|` is integrated, so
+//! points are evenly spaced even where the speed varies (field lines of a magnet vary over many
+//! orders of magnitude).
 
 use glam::DVec3;
 

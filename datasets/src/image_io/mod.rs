@@ -1,9 +1,9 @@
-//! Pictures in files: PNG for eyes, multi-layer OpenEXR for data.
+//! Reads and writes images: PNG for viewing, multi-layer OpenEXR for data.
 //!
 //! A [`Picture`] is a set of named f32 planes of equal size. Names follow the `layer.channel`
 //! convention by which tev, Nuke, Blender and OpenRV group channels: `R`, `G`, `B`, `A` for the
 //! colour, then `depth.Z`, `normal.X`, `deflection.X`… OpenEXR keeps every plane bit for bit with
-//! its unit and the picture's metadata; PNG keeps the colour only.
+//! its unit and the image's metadata; PNG keeps the colour only.
 //!
 //! ```
 //! use datasets::image_io::{Picture, read_exr, write_exr};

@@ -1,11 +1,11 @@
-//! OpenEXR through the `exr` crate: all planes of a picture as 32-bit channels of one part,
-//! ZIP-compressed without loss.
+//! OpenEXR through the `exr` crate: all planes of an image become 32-bit channels of one part, with
+//! lossless ZIP compression.
 //!
-//! Metadata entries are attributes of the same name; the unit of plane `depth.Z` is the text
-//! attribute `unit.depth.Z`. Texts are written as UTF-8. Names that the format itself defines as a
-//! text (`software`, `comments`, `owner`…) or as a number (`expTime`, `near`…) become those
-//! standard attributes, which other programs show under their own headings. Standard numbers have
-//! 32 bits, all others 64.
+//! Metadata entries are attributes of the same name. The unit of plane `depth.Z` is the text
+//! attribute `unit.depth.Z`. Texts are written as UTF-8. Names that the format defines as text
+//! (`software`, `comments`, `owner`…) or as numbers (`expTime`, `near`…) become those standard
+//! attributes, which other programs show under their own headings. Standard numbers have 32 bits,
+//! all others 64.
 
 use super::{ImageError, Metadata, MetadataValue, Picture, Plane, format_error, io_error};
 use crate::atomic_file::write_atomically;

@@ -1,4 +1,4 @@
-//! Gradients at grid points by central differences, as VTK's contour filters take them.
+//! Gradients at grid points by central differences, as in VTK's contour filters.
 
 use super::inside_bits::Block;
 use glam::{DVec3, Vec3};

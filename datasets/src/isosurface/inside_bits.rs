@@ -1,8 +1,8 @@
-//! One bit per grid point of a plane: inside (value at or above the isovalue) or not.
+//! One bit per grid point of a plane: inside (value at or above the isovalue) or outside.
 //!
-//! With 64 points a word, finding crossed edges is an exclusive-or, counting them a popcount, and
-//! finding the cells that the surface passes a handful of and/or: the cost of the cells that it
-//! misses, more than nine in ten, nearly vanishes.
+//! A word holds 64 points. An exclusive-or finds crossed edges, a popcount counts them, and a few
+//! and/or operations find the cells that the surface crosses. More than nine in ten cells are not
+//! crossed, and they cost almost nothing.
 
 /// The part of a field that is in memory: planes `first_plane..` of a grid of `dims` points.
 #[derive(Clone, Copy)]

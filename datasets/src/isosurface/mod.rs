@@ -14,8 +14,8 @@
 //! | `gradient.rs` | normals |
 //! | `stream.rs` | fields larger than memory, a batch of planes at a time |
 //!
-//! Values that are NaN or infinite make the eight cells around them empty; how many cells were left
-//! out is reported.
+//! A value that is NaN or infinite empties the eight cells around it. The number of skipped cells is
+//! reported.
 
 mod case_table;
 mod gradient;

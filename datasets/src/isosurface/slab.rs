@@ -1,11 +1,13 @@
-//! Counting and emitting, one slab of cells (between two neighbouring planes) at a time.
+//! Counts and emits vertices and triangles, one slab of cells (between two neighbouring planes) at
+//! a time.
 //!
-//! Ids are fixed by position, not by who computes them. Plane k owns, in this order: the vertices
-//! on its x and y edges (row by row, x before y), then those on the z edges up to plane k + 1; slab
-//! k owns its triangles. So two passes suffice: count every plane in parallel, take prefix sums,
-//! emit every plane in parallel into its own part of the result (the plan of flying edges,
-//! Schroeder, Maynard and Geveci 2015, with planes in place of rows). Because the in-plane vertices
-//! come first, slab k knows the ids on plane k + 1 from that plane alone, without plane k + 2.
+//! Ids depend on position, not on the thread that computes them. Plane k has, in this order, the
+//! vertices on its x and y edges (row by row, x before y), then those on the z edges up to plane k
+//! + 1. Slab k has its triangles. Two passes therefore suffice. They count every plane in parallel,
+//! take prefix sums, and emit every plane in parallel into its own part of the result. This is the
+//! method of flying edges (Schroeder, Maynard and Geveci 2015), with planes in place of rows. The
+//! in-plane vertices come first, so slab k knows the ids on plane k + 1 without reading plane k +
+//! 2.
 
 use super::case_table::{CASES, EDGES_AT_CORNERS};
 use super::gradient::normal_on_edge;

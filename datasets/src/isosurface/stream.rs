@@ -1,6 +1,6 @@
-//! Isosurfaces of fields that do not fit into memory: planes are asked for a batch at a time, and
-//! only the batch and the result are ever held. The result equals that of the whole field in
-//! memory, id for id.
+//! Isosurfaces of fields that do not fit into memory. Planes are requested in batches, and only one
+//! batch and the result are in memory. The result equals that of the whole field in memory, id for
+//! id.
 
 use super::inside_bits::Block;
 use super::{

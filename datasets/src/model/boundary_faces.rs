@@ -1,4 +1,5 @@
-//! Which faces of solid cells belong to one cell only: the outside of an unstructured grid.
+//! Finds the boundary faces of an unstructured grid: faces of solid cells that belong to one cell
+//! only.
 //!
 //! Faces are compared by sorting their point ids. A hash table took 3.4 times as long on a million
 //! tetrahedra.

@@ -1,4 +1,4 @@
-//! Lists of point ids, and what VTK's cell types look like.
+//! Lists of point ids, and the geometry of VTK's cell types.
 
 /// Point ids of many cells: cell `i` is `connectivity[offsets[i]..offsets[i + 1]]`.
 #[derive(Debug, Clone, PartialEq)]

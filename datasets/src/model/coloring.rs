@@ -1,4 +1,4 @@
-//! Choosing what a surface, line or point set is coloured by.
+//! Chooses the array that colours a surface, a line or a point set.
 
 use super::{Attributes, DataArray, Dataset, ModelError, Values};
 

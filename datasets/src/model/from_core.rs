@@ -1,4 +1,4 @@
-//! The renderer's meshes and grids as data sets, for writing.
+//! Converts the renderer's meshes and grids to data sets, for writing.
 
 use super::{Attributes, Cells, DataArray, ImageData, Points, PolyData, Values};
 use glam::DMat3;

@@ -1,4 +1,5 @@
-//! Lattices as [`rt_core::grid::Grid`], the renderer's and the schlieren tracer's scalar field.
+//! Converts lattices to [`rt_core::grid::Grid`], the scalar field of the renderer and of the
+//! schlieren tracer.
 
 use super::{ColorBy, DataArray, Dataset, ModelError, extent_dims};
 use glam::{DMat3, DVec3, UVec3};

@@ -1,4 +1,4 @@
-//! Polylines for tubes and points for spheres.
+//! Extracts polylines for tubes and points for spheres.
 
 use super::surface::GhostFlags;
 use super::{Attributes, CellType, ColorBy, Dataset, ModelError, Points};

@@ -1,4 +1,4 @@
-//! Pieces of one data set put together again.
+//! Merges the pieces of one data set.
 
 use super::{
     Attributes, DataArray, Dataset, ModelError, Points, PolyData, UnstructuredGrid, Values,

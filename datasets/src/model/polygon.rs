@@ -1,4 +1,4 @@
-//! Polygons to triangles: fans for convex ones, ear clipping for the others.
+//! Triangulates polygons: fans for convex ones, ear clipping for the others.
 //!
 //! Sources: Newell's normal (Sutherland, Sproull and Schumacker 1974, p. 15); ear clipping
 //! (Meisters 1975; O'Rourke, "Computational Geometry in C", 1998, section 1.4).

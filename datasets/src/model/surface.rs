@@ -1,4 +1,4 @@
-//! The outer surface of any data set as one triangle mesh.
+//! Extracts the boundary surface of any data set as one triangle mesh.
 
 use super::boundary_faces::{BoundaryFaces, Faces};
 use super::polygon::{Division, triangulate};

@@ -1,4 +1,4 @@
-//! The command line: arguments become calls of the library.
+//! The command line: converts arguments to calls of the library.
 
 mod convert;
 mod info;

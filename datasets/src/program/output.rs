@@ -1,4 +1,4 @@
-//! Writing a result: the ending of the file's name decides the format.
+//! Writes a result. The extension of the file name decides the format.
 
 use clap::Args;
 use datasets::cli::{CommonArgs, UsageError};

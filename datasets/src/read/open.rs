@@ -1,4 +1,4 @@
-//! Finding out what a file is: by its first bytes, else by the ending of its name.
+//! Detects the format of a file by its first bytes, or else by the extension of its name.
 
 use super::error::{io_error, read_bytes};
 use super::{

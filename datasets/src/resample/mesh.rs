@@ -1,5 +1,5 @@
-//! Any data set as points and solid cells, numbered through all blocks. Lattices keep their
-//! implicit cells.
+//! Represents any data set as points and solid cells, numbered consecutively over all blocks.
+//! Lattices keep their implicit cells.
 
 use super::ResampleError;
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};

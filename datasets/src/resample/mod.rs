@@ -1,13 +1,13 @@
-//! Data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra, hexahedra,
-//! wedges, pyramids, prisms, polyhedra, and collections of them.
+//! Resamples data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra,
+//! hexahedra, wedges, pyramids, prisms, polyhedra, and collections of them.
 //!
-//! Each cell finds the lattice nodes inside it (`rasterize`), so no search tree is needed and time
-//! goes with the number of nodes plus that of cells. Inside a cell values are those of the finite
-//! element (`shape`): Newton's method inverts the trilinear map of a hexahedron. Cells whose map
-//! cannot be inverted are divided into tetrahedra and counted.
+//! Each cell finds the lattice nodes inside it (`rasterize`). No search tree is needed, and the
+//! time is proportional to the number of nodes plus the number of cells. Inside a cell, values are
+//! those of the finite element (`shape`): Newton's method inverts the trilinear map of a
+//! hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
 //!
-//! What a node is, is told by its [`Mark`]; what the resampling cost in accuracy, by the
-//! [`Report`]: the lattice is sampled back at the points of the mesh.
+//! [`Mark`] classifies a node. [`Report`] gives the loss of accuracy: the lattice is sampled back
+//! at the points of the mesh.
 
 mod mesh;
 mod rasterize;

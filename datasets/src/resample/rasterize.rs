@@ -1,9 +1,9 @@
-//! Cells look for the nodes inside them, layer by layer of the lattice.
+//! Cells find the nodes inside them, one layer of the lattice at a time.
 //!
-//! A layer of nodes (one k) is one task. It goes through the cells that reach into it in the order
-//! of their numbers, so a node on a face that two cells share gets the same value whatever the
-//! number of threads. A node that lies in no cell, but within [`NEAR`] of one, takes the value of
-//! the nearest: curved faces of unlike cells do not match exactly.
+//! A layer of nodes (one k) is one task. The task visits the cells that overlap it in the order of
+//! their numbers, so a node on a face that two cells share gets the same value for any number of
+//! threads. A node outside all cells but within [`NEAR`] of one takes the value of the nearest,
+//! because curved faces of different cell types do not match exactly.
 
 use super::mesh::Mesh;
 use super::shape::Cell;

@@ -1,4 +1,4 @@
-//! What a resampling cost: the lattice sampled back where the mesh has its values.
+//! The error of a resampling: samples the lattice back at the points where the mesh has its values.
 
 use super::mesh::Mesh;
 use super::rasterize::Counts;

@@ -1,7 +1,7 @@
-//! Axisymmetric data: a plane of axial position (x) and radius (y), turned about the x axis.
+//! Axisymmetric data: revolves a plane of axial position (x) and radius (y) about the x axis.
 //!
-//! The plane is resampled to a fine image first, four times as fine as the lattice, and each node
-//! of the lattice reads it at its radius. Linear interpolation in the image then adds a sixteenth
+//! The plane is first resampled to an image four times as fine as the lattice. Each node of the
+//! lattice then reads the image at its radius. Linear interpolation in the image adds a sixteenth
 //! of the error that the lattice has anyway.
 
 use super::mesh::Mesh;

@@ -1,10 +1,10 @@
-//! Where a point lies in a cell, and the value there.
+//! Finds the parametric coordinates of a point in a cell, and the value there.
 //!
 //! Hexahedra, wedges and pyramids are isoparametric finite elements (orders of VTK; shape functions
 //! as in "The VTK User's Guide", and, for the pyramid, a hexahedron whose upper face is one point).
-//! Their maps are inverted by Newton's method. Where the map folds (corners with Jacobians of both
-//! signs, collapsed edges) or Newton fails, the cell is a fan of tetrahedra around its centre and
-//! those of its faces, which meets its neighbours at their corners and edges.
+//! Newton's method inverts their maps. If the map folds (corners with Jacobians of both signs,
+//! collapsed edges) or Newton fails, the cell becomes a fan of tetrahedra around its centre and the
+//! centres of its faces, which joins its neighbours at their corners and edges.
 
 use super::mesh::Shape;
 use glam::{DMat3, DVec3};

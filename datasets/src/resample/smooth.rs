@@ -1,8 +1,9 @@
 //! Binomial smoothing of a lattice, for shocks that its spacing cannot resolve.
 //!
-//! A shock one cell wide is a staircase to any ray that crosses it at an angle, and deflections
-//! come out wrong by up to their own size. Smoothed over a node or so they come out right to a few
-//! per cent, because the deflection by a plane step does not depend on its thickness.
+//! A shock one cell wide looks like a staircase to a ray that crosses it at an angle, and the
+//! errors of deflections are as large as the deflections. Smoothing over about one node reduces the
+//! errors to a few per cent, because the deflection by a plane step does not depend on its
+//! thickness.
 
 use super::ResampleError;
 use rayon::prelude::*;

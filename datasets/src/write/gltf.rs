@@ -1,5 +1,5 @@
-//! Meshes as GLB: glTF 2.0 (Khronos, 2021) in one binary file, which browsers, Blender, PowerPoint
-//! and CAD viewers show.
+//! Writes meshes as GLB: glTF 2.0 (Khronos, 2021) in one binary file, which browsers, Blender,
+//! PowerPoint and CAD viewers display.
 
 use super::{WriteError, write_file};
 use glam::{DVec3, Vec3};

@@ -1,4 +1,4 @@
-//! Meshes as Wavefront OBJ text.
+//! Writes meshes as Wavefront OBJ text.
 
 use super::{WriteError, write_file};
 use rt_core::mesh::{PerElement, TriMesh};

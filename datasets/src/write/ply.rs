@@ -1,4 +1,4 @@
-//! Meshes as binary PLY, which MeshLab, Blender and ParaView read.
+//! Writes meshes as binary PLY, which MeshLab, Blender and ParaView read.
 
 use super::{WriteError, write_file};
 use crate::model::from_core::srgb8_from_linear;

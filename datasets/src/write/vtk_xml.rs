@@ -1,7 +1,8 @@
-//! VTK's XML files: `.vtp .vti .vtu .vtr .vts`, collections as `.vtm`, time series as `.pvd`.
+//! Writes VTK's XML files: `.vtp .vti .vtu .vtr .vts`, collections as `.vtm`, time series as
+//! `.pvd`.
 //!
-//! Data is written as ascii or as appended base64, never as appended raw: raw bytes make the file
-//! no XML at all, which VTK 9.1 to 9.2.6 with newer versions of libexpat refuse (VTK commit
+//! Data is written as ASCII or as appended base64, never as appended raw. Raw bytes make the file
+//! invalid XML, which VTK 9.1 to 9.2.6 with newer versions of libexpat reject (VTK commit
 //! db8f9efc).
 
 use super::{WriteError, write_file};

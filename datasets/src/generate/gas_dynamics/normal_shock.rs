@@ -1,5 +1,4 @@
-//! The jump across a normal shock (Rankine-Hugoniot), and the pressure behind it where the gas
-//! comes to rest.
+//! The jump across a normal shock (Rankine-Hugoniot), and the stagnation pressure behind it.
 
 use super::{GasError, check_gamma, isentropic};
 

@@ -1,10 +1,10 @@
-//! One binary array of a VTK XML file: length header, base64 or raw bytes, compressed blocks.
+//! Reads one binary array of a VTK XML file: length header, base64 or raw bytes, compressed blocks.
 //!
 //! Layout (VTK file formats guide, "XML file formats"; vtkXMLDataParser.cxx): uncompressed = number
 //! of bytes, bytes. Compressed = number of blocks, size of a block, size of the last block if it is
-//! partial (else 0), compressed size of each block, then the blocks. In base64 the header of
-//! compressed data is a padded piece of its own, whereas the length of uncompressed data is in one
-//! piece with it.
+//! partial (else 0), compressed size of each block, then the blocks. In base64, the header of
+//! compressed data is padded and encoded separately, whereas the length of uncompressed data is
+//! encoded together with the data.
 
 use crate::model::Endian;
 use crate::read::base64::{BadByte, Decoder};

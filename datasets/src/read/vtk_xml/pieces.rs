@@ -1,4 +1,4 @@
-//! The `Piece` elements of a VTK XML file as data sets.
+//! Converts the `Piece` elements of a VTK XML file to data sets.
 
 use super::file::{XmlFile, attribute_numbers, bad_attribute};
 use crate::model::{
