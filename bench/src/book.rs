@@ -1,8 +1,8 @@
 //! Compiles and runs the Rust examples of the book (docs/src) and of READMEs as documentation
-//! tests, so that none can rot.
+//! tests, so that they stay correct.
 //!
-//! bench does this because it may use every member, as an example may. A chapter with examples that
-//! is missing here is found by the test `the_book_is_complete`.
+//! This is done in bench because it may use every member, as an example may. The test
+//! `the_book_is_complete` finds a chapter with examples that is missing here.
 
 macro_rules! chapters {
     ($($name:ident $path:literal)*) => {

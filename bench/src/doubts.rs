@@ -1,8 +1,8 @@
-//! What speaks against a measurement: a tree that no commit has, a machine that was busy, a build
-//! that is no release.
+//! Reasons to distrust a measurement: a working tree that no commit matches, a busy machine, or a
+//! build that is not a release build.
 //!
-//! Reports show it beside every record, old ones too, and `bench run --record` keeps nothing that
-//! has some of it.
+//! Reports show these reasons beside every record, even old ones. `bench run --record` keeps no
+//! record that has any.
 
 use crate::machine::Machine;
 use crate::record::Record;

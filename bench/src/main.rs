@@ -1,4 +1,5 @@
-//! `bench`: every table and figure of the dissertation, and error against time. See `bench --help`.
+//! `bench`: measures every table and figure of the dissertation, and error against time. See `bench
+//! --help`.
 #![forbid(unsafe_code)]
 
 fn main() -> std::process::ExitCode {

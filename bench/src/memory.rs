@@ -1,8 +1,8 @@
-//! Memory that work needs at its height, counted where Rust allocates it.
+//! Peak memory of a computation, counted where Rust allocates it.
 //!
-//! The whole of `bench` allocates through a counting allocator (crate peak_alloc: two atomic
-//! additions a call). The resident set, which the operating system tells, will not do: the
-//! allocator keeps freed memory back, and the second build of a run then seems to need none.
+//! All of `bench` allocates through a counting allocator (crate peak_alloc: two atomic additions
+//! per call). The resident set size from the operating system is not suitable: the allocator keeps
+//! freed memory, so the second build of a run would seem to need none.
 
 use peak_alloc::PeakAlloc;
 

@@ -1,6 +1,6 @@
-//! Tables and plots in documents that are quoted from the records in `bench/runs`.
+//! Quotes tables and plots from the records in `bench/runs` in documents.
 //!
-//! A document says what it quotes between two comments, and [`update`] writes what stands between
+//! A pair of comments in a document names the quotation, and [`update`] writes the text between
 //! them:
 //!
 //! ```text
@@ -10,9 +10,9 @@
 //! <!-- end record -->
 //! ```
 //!
-//! `table` names columns, and which rows (`where mode = fast | slow` takes either); `plot` names
-//! the beginning of a plot's title. The newest record of that name is taken, and what speaks
-//! against it stands below the quotation. The test `documents_quote_their_records` fails when a
+//! `table` names columns and selects rows (`where mode = fast | slow` takes either). `plot` names the
+//! beginning of a plot's title. The newest record of that name is used, and reasons to distrust it
+//! appear below the quotation. The test `documents_quote_their_records` fails when a
 //! document and its record differ.
 
 use crate::doubts::MOST_LOAD_PER_CORE;

@@ -1,9 +1,9 @@
-//! Timing variants against each other on a machine that others use too.
+//! Times variants against each other on a shared machine.
 //!
-//! Variants run in turns, one run each per round, in an order that changes from round to round, so
-//! that a slow minute of the machine falls on all of them. A ratio is taken inside each round and
-//! the median over the rounds is reported: what the neighbours do cancels (two runs of one round
-//! see nearly the same machine), which it would not in a ratio of two medians.
+//! Variants alternate, one run each per round. Their order changes from round to round, so a slow
+//! minute of the machine affects all of them. The reported ratio is the median over the rounds of
+//! the ratio within each round. Load by other users cancels in it, because two runs of one round
+//! see nearly the same machine. It would not cancel in a ratio of two medians.
 
 use crate::clock::{self, Clock, Sample};
 use crate::stats::Summary;

@@ -1,10 +1,10 @@
-//! Time at equal error against the dissertation's method (Euler, trilinear gradients): in one
-//! process, in turns.
+//! Time at equal error against the dissertation's method (Euler, trilinear gradients), in one
+//! process, in alternation.
 //!
-//! The rival runs twice: as one would write it from the text (scalar, position and direction in
-//! f32), and as its scheme in our own kernel (deviations, sixteen rays at a time), which leaves
-//! only the difference of the method. For each of its steps, ours is the cheapest setting whose
-//! error is not larger.
+//! The baseline runs in two forms: implemented directly from the text (scalar, position and
+//! direction in f32), and as its scheme in our own kernel (deviations, sixteen rays at a time),
+//! which leaves only the difference of the method. For each step length of the baseline, our time
+//! is that of the cheapest setting whose error is not larger.
 
 use super::Context;
 use super::test_section::{

@@ -1,5 +1,5 @@
-//! Figure 5.12: the same flow by volume rendering, by line of sight and traced; and how far the
-//! latter two are apart, against n − 1.
+//! Figure 5.12: the same flow by volume rendering, along straight lines of sight and with ray
+//! tracing. Also the difference between the latter two, against n − 1.
 
 use super::Context;
 use super::test_section::{blob, check_cancelled, flow, picture, render_picture, scene};

@@ -1,4 +1,4 @@
-//! Figure 5.13: what the techniques show of one flow, and what the filters make of its noise.
+//! Figure 5.13: what the techniques show of one flow, and how the filters change its noise.
 
 use super::Context;
 use super::fig5_14::{FILTERS, NoiseCase, rms_difference};

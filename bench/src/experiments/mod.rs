@@ -1,4 +1,4 @@
-//! The experiments, one file each, named after the table or figure.
+//! The experiments, one file each, named after their table or figure.
 
 mod accuracy_build;
 mod accuracy_composite;

@@ -1,5 +1,5 @@
-//! Ranks of `gluray run --ranks N`: processes that make one picture of an unmodified OpenGL program
-//! together.
+//! Ranks of `gluray run --ranks N`: processes that together render one image of an unmodified
+//! OpenGL program.
 
 use super::Context;
 use crate::opengl::{Backend, Display, Program, Session, Tools, write};

@@ -1,4 +1,4 @@
-//! Table 4.1: frames of unmodified OpenGL programs, by a rasteriser in software and by rays.
+//! Table 4.1: frames of unmodified OpenGL programs, by a software rasteriser and by ray tracing.
 
 use super::Context;
 use super::fig4_7::fits_in_memory;

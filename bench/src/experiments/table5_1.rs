@@ -1,5 +1,5 @@
-//! Table 5.1: memory by data set; the dissertation's numbers by its layout, and what this program
-//! really holds.
+//! Table 5.1: memory by data set: the dissertation's numbers computed from its layout, and what
+//! this program uses.
 
 use super::Context;
 use super::test_section::check_cancelled;

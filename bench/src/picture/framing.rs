@@ -1,4 +1,4 @@
-//! Where a picture is taken from: a camera file, a data set's own view, or one that fits the
+//! Chooses the camera of an image: a camera file, a data set's own view, or a view that fits the
 //! subject.
 
 use anyhow::Context as _;

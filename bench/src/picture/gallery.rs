@@ -1,5 +1,5 @@
-//! The pictures of the report and of the README: the dissertation's data sets, each with the
-//! command that draws it.
+//! The images of the report and of the README: the dissertation's data sets, each with the command
+//! that renders it.
 
 use super::framing::Framing;
 use super::style::{BACKGROUNDS, RenderStyle};

@@ -1,4 +1,4 @@
-//! Materials of scene files (glTF, OBJ) as rt-core's.
+//! Converts materials of scene files (glTF, OBJ) to rt-core's.
 
 use datasets::read::{AlphaMode, SceneModel, SurfaceMaterial};
 use rt_core::material::{Material, Sides, SurfaceModel};

@@ -1,9 +1,9 @@
-//! Pictures of files and of the generated data sets.
+//! Renders images of files and of the generated data sets.
 //!
-//! A [`subject::Subject`] is what is drawn, without lights: out of any file that [`datasets::read`]
-//! knows, or out of the catalogue. [`style`] adds materials and lights for the wished effects,
-//! [`framing`] finds a camera, [`draw`] does the work and keeps the account, [`save`] writes PNG
-//! and OpenEXR. [`gallery`] holds the pictures of the report.
+//! A [`subject::Subject`] is the scene without lights, from any file that [`datasets::read`]
+//! supports or from the catalogue. [`style`] adds materials and lights for the requested effects,
+//! [`framing`] finds a camera, [`draw`] renders the image and records what it did, and [`save`]
+//! writes PNG and OpenEXR. [`gallery`] contains the images of the report.
 
 pub mod framing;
 pub mod gallery;

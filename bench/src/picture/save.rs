@@ -1,4 +1,5 @@
-//! Pictures into files: PNG for eyes, OpenEXR with every layer, its unit and how it was made.
+//! Saves images: PNG for viewing, and OpenEXR with every layer, its unit and how the image was
+//! made.
 
 use super::{RenderRequest, RenderedImage};
 use datasets::image_io::{self, Metadata, Picture, PngDepth, keys};

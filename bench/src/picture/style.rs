@@ -1,9 +1,9 @@
-//! Materials, lights and background: one studio for all pictures, so that pictures differ by their
-//! effects alone.
+//! Materials, lights and background. All images use the same lighting, so they differ only by their
+//! effects.
 //!
-//! The key light stands above the viewer's right shoulder, a weak headlight fills the shadows,
-//! ambient light is a quarter of white. All lights move with the camera: nothing that can be seen
-//! lies in the dark.
+//! The key light is above the viewer's right shoulder, a weak headlight fills the shadows, and
+//! ambient light is a quarter of white. All lights move with the camera, so every visible surface
+//! is lit.
 
 use super::subject::{PartColoring, Subject, VolumeField};
 use anyhow::Context as _;

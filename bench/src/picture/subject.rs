@@ -1,4 +1,4 @@
-//! What is drawn: geometry with its own colours, out of a file or out of the catalogue.
+//! The subject of an image: geometry with its own colours, from a file or from the catalogue.
 
 use super::framing::corners_of_box;
 use super::materials::SceneMaterials;

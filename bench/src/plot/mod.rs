@@ -1,8 +1,8 @@
 //! Plots as data, drawn as SVG.
 //!
-//! The data is part of the record; [`Plot::to_svg`] draws it. Drawn by hand rather than with a
-//! plotting library: a page needs lines, bars, logarithmic axes, spreads and a legend, text that
-//! follows the page's colours, and marks that tell series apart without colour.
+//! The data is part of the record; [`Plot::to_svg`] draws it. No plotting library is used, because
+//! a page needs only lines, bars, logarithmic axes, spreads and a legend, text that follows the
+//! page's colours, and markers that distinguish series without colour.
 
 mod scale;
 mod svg;

@@ -1,4 +1,4 @@
-//! From values to positions, and where the ticks go.
+//! Maps values to positions and places the ticks.
 
 use super::Scale;
 

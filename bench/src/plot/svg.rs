@@ -1,4 +1,4 @@
-//! Drawing a plot: frame, grid, data, legend.
+//! Draws a plot as SVG: frame, grid, data, legend.
 
 use super::scale::{Mapping, label};
 use super::{Kind, Plot, Series};
