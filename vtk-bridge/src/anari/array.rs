@@ -10,11 +10,11 @@ use super::data_type::DataType;
 use super::object::Object;
 use std::sync::Arc;
 
-/// Whose memory it is.
+/// Owner of an array's memory.
 pub(crate) enum Storage {
-    /// The program's: shared, or captured when it has a deleter.
+    /// The program's memory: shared, or captured if it has a deleter.
     App(AppMemory),
-    /// The device's.
+    /// The device's memory.
     Own(OwnMemory),
 }
 
@@ -27,16 +27,16 @@ pub struct Array {
     pub dims: [usize; 3],
     /// Strong references to objects named in the data.
     objects: Vec<Option<Arc<Object>>>,
-    /// Whether the program may be writing now.
+    /// Whether the program may be writing to the memory now.
     pub(crate) mapped: bool,
-    /// First and past-the-last element in use, of one-dimensional arrays.
+    /// For one-dimensional arrays, the first element in use and one past the last.
     pub(crate) region: Option<[usize; 2]>,
 }
 
 /// More bytes than any array can have.
 const MOST_BYTES: usize = isize::MAX as usize / 2;
 
-/// Bytes of `dims` elements; `None` when that is more than an address can count.
+/// Bytes of `dims` elements; `None` if the size does not fit into an address.
 pub(crate) fn byte_size(element: DataType, dims: [u64; 3]) -> Option<usize> {
     let mut bytes = element.size()?;
     for d in dims {
@@ -51,18 +51,19 @@ impl Array {
         Array { storage, element, dims, objects: Vec::new(), mapped: false, region: None }
     }
 
-    /// Number of elements in use.
+    /// The number of elements in use.
     pub fn len(&self) -> usize {
         let all = self.dims.iter().product();
         self.region.map_or(all, |[a, b]| b.min(all).saturating_sub(a))
     }
 
-    /// True without elements.
+    /// True if there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The elements' bytes, copied: the program may change its memory at any time after.
+    /// Copies the elements' bytes, because the program may change its memory at any time
+    /// afterwards.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         let all = match &self.storage {
             Storage::App(m) => m.copy(),
@@ -74,7 +75,7 @@ impl Array {
         }
     }
 
-    /// Address for the program to write to.
+    /// The address that the program writes to.
     pub(crate) fn address(&self) -> *mut std::ffi::c_void {
         match &self.storage {
             Storage::App(m) => m.address(),
@@ -82,7 +83,7 @@ impl Array {
         }
     }
 
-    /// Copies shared memory that the program may free from now on. True when a copy was made.
+    /// Copies shared memory that the program may free from now on. Returns true if it made a copy.
     pub(crate) fn privatize(&mut self) -> bool {
         let Storage::App(shared) = &self.storage else { return false };
         if shared.is_captured() {
@@ -92,7 +93,7 @@ impl Array {
         true
     }
 
-    /// Objects named by the elements, as far as they exist.
+    /// The existing objects that the elements name.
     pub fn objects(&self) -> &[Option<Arc<Object>>] {
         match self.region {
             Some([a, _]) => {
@@ -109,7 +110,7 @@ impl Array {
         std::mem::replace(&mut self.objects, objects)
     }
 
-    /// All handles in the memory, whatever the region.
+    /// All handles in the memory, whether or not they are in the region in use.
     pub(crate) fn handles(&self) -> Vec<u64> {
         let all = match &self.storage {
             Storage::App(m) => m.copy(),
@@ -152,8 +153,8 @@ impl Array {
         self.attributes().into_iter().map(|a| [a[0], a[1], a[2]]).collect()
     }
 
-    /// Indices, `N` an element; what does not fit into 32 bits becomes `u32::MAX`, which is past
-    /// every end.
+    /// Indices, `N` per element. An index that does not fit into 32 bits becomes `u32::MAX`, which
+    /// is always out of range.
     pub(crate) fn indices<const N: usize>(&self) -> Vec<[u32; N]> {
         let Some(size) = self.element.size() else { return Vec::new() };
         let wide = size / N == 8;
@@ -172,7 +173,7 @@ impl Array {
             .collect()
     }
 
-    /// 4 x 4 matrices, column by column.
+    /// 4 x 4 matrices in column-major order.
     pub(crate) fn matrices(&self) -> Vec<[f64; 16]> {
         self.bytes()
             .chunks_exact(64)

@@ -3,8 +3,8 @@
 
 use rt_core::colormap::srgb_to_linear;
 
-/// A number of the enumeration `ANARIDataType`. A program may pass any; unknown ones have size
-/// `None`.
+/// A number of the enumeration `ANARIDataType`. A program may pass any number; unknown ones have
+/// size `None`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DataType(pub u32);
 
@@ -47,8 +47,8 @@ data_types! {
     FLOAT64_BOX4 = 2211;
 }
 
-/// Families of vector types, each of one to four components: number of the first, bytes of a
-/// component, name.
+/// Families of vector types, each with one to four components: the number of the first type, bytes
+/// per component, name.
 const FAMILIES: &[(u32, usize, &str)] = &[
     (1000, 1, "INT8"),
     (1004, 1, "UINT8"),
@@ -71,7 +71,7 @@ const FAMILIES: &[(u32, usize, &str)] = &[
     (1072, 8, "FLOAT64"),
 ];
 
-/// What one component holds.
+/// Number format of one component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Component {
     Signed(usize),
@@ -91,7 +91,7 @@ impl DataType {
         Some((bytes, (self.0 - first) as usize + 1, name))
     }
 
-    /// Bytes of one element; `None` for types that are no values (strings, lists, unknown numbers).
+    /// Bytes of one element; `None` for types without values (strings, lists, unknown numbers).
     pub fn size(self) -> Option<usize> {
         if let Some((bytes, components, _)) = self.family() {
             return Some(bytes * components);
@@ -134,12 +134,12 @@ impl DataType {
         (502..=519).contains(&self.0)
     }
 
-    /// True for the three kinds of arrays and their common name.
+    /// True for the three kinds of arrays and for the type that covers all three.
     pub fn is_array(self) -> bool {
         (503..=506).contains(&self.0)
     }
 
-    /// Whether a parameter of type `self` takes an object of type `given`.
+    /// Whether a parameter of type `self` accepts an object of type `given`.
     pub fn accepts(self, given: DataType) -> bool {
         self == given
             || (self == DataType::OBJECT && given.is_object())
@@ -165,21 +165,21 @@ impl DataType {
         Some((kind, components))
     }
 
-    /// Number of components; 0 for types that are no vectors.
+    /// The number of components; 0 for types that are not vectors.
     pub fn components(self) -> usize {
         self.component().map_or(0, |(_, n)| n)
     }
 
-    /// True for types whose elements [`DataType::attribute`] can turn into colours: everything but
-    /// whole numbers.
+    /// True for types whose elements [`DataType::attribute`] can convert to colours: all except
+    /// integers.
     pub fn is_color(self) -> bool {
         self.component()
             .is_some_and(|(c, _)| !matches!(c, Component::Signed(_) | Component::Unsigned(_)))
     }
 
-    /// One element as an attribute value: what is missing of four components comes from (0, 0, 0,
-    /// 1); fixed point numbers are scaled to 0..=1 (signed: -1..=1), sRGB is decoded (its last of
-    /// two or four components, alpha, is linear).
+    /// One element as an attribute value. Missing components come from (0, 0, 0, 1). Fixed-point
+    /// numbers are scaled to 0..=1 (signed: -1..=1). sRGB is decoded, except for alpha, the last of
+    /// two or four components, which is linear.
     pub fn attribute(self, bytes: &[u8]) -> [f32; 4] {
         let mut out = [0.0, 0.0, 0.0, 1.0];
         let Some((kind, n)) = self.component() else { return out };
@@ -203,7 +203,7 @@ impl DataType {
         out
     }
 
-    /// The components of one element as f64, as many as there are.
+    /// The components of one element as f64, without padding.
     pub fn numbers(self, bytes: &[u8]) -> Vec<f64> {
         let scalars = |size: usize, f: fn(&[u8]) -> f64| bytes.chunks_exact(size).map(f).collect();
         match self.component() {
@@ -234,8 +234,8 @@ impl std::fmt::Display for DataType {
 fn unsigned(b: &[u8]) -> u64 {
     let mut wide = [0; 8];
     wide[..b.len()].copy_from_slice(b);
-    // The device runs where the program runs; the numbers are little-endian on every platform that
-    // ANARI exists for.
+    // The device runs where the program runs. Numbers are little-endian on every platform that
+    // ANARI supports.
     u64::from_le_bytes(wide)
 }
 
@@ -254,7 +254,7 @@ fn float64(b: &[u8]) -> f64 {
     f64::from_ne_bytes(wide)
 }
 
-/// IEEE 754 binary16.
+/// Converts IEEE 754 binary16.
 fn half(bits: u16) -> f32 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
     let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));

@@ -16,15 +16,15 @@ use std::collections::HashMap;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, Weak};
 
-/// A parameter's value as the program gave it.
+/// A parameter's value as the program passed it.
 pub enum Raw {
-    /// A value by its bytes.
+    /// A value, as bytes.
     Bytes(Vec<u8>),
     /// A string.
     Text(String),
     /// An object.
     Handle(Handle),
-    /// A pointer, not to be followed.
+    /// A pointer, which is never dereferenced.
     Pointer(usize),
 }
 
@@ -41,9 +41,9 @@ pub enum Property {
     Text(String),
 }
 
-/// What a device needs of the program besides messages.
+/// What a device needs from the program apart from messages.
 pub trait Hooks: Send + Sync {
-    /// Calls the program's function of type `ANARIFrameCompletionCallback` at `function`, for
+    /// Calls the program's function of type `ANARIFrameCompletionCallback` at `function` for
     /// `frame`.
     fn frame_completed(&self, function: usize, user: usize, frame: Handle);
 }
@@ -64,7 +64,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// A device that tells `listener` what goes wrong.
+    /// Makes a device that reports problems to `listener`.
     pub fn new(listener: Box<dyn Listener>, hooks: Arc<dyn Hooks>) -> Device {
         Device {
             objects: Mutex::default(),
@@ -75,7 +75,7 @@ impl Device {
         }
     }
 
-    /// Messages go to `listener` from now on.
+    /// Sends later messages to `listener`.
     pub fn set_listener(&self, listener: Box<dyn Listener>) {
         self.status.set_listener(listener);
     }
@@ -99,7 +99,7 @@ impl Device {
         self.status.tell_once(&Message { source, source_type, severity, code, text });
     }
 
-    /// A message about the device itself.
+    /// Reports a message about the device itself.
     pub fn report(&self, severity: Severity, text: &str) {
         self.tell(Handle::NULL, DataType::DEVICE, severity, text);
     }
@@ -128,8 +128,8 @@ impl Device {
         handle
     }
 
-    /// A new object. An unknown subtype gives an object that takes parameters and draws nothing,
-    /// with a message.
+    /// Makes an object. An unknown subtype causes a message and gives an object that accepts
+    /// parameters and draws nothing.
     pub fn new_object(&self, kind: DataType, subtype: &str) -> Handle {
         let known = schema::find(kind, subtype).is_some();
         if !known {
@@ -145,12 +145,12 @@ impl Device {
             DataType::WORLD => Extra::World(Box::<WorldCache>::default()),
             _ => Extra::None,
         };
-        // Some renderers are called differently by programs that know other devices: they all get
-        // the default one.
+        // Programs written for other devices use other names for renderers. All of them get the
+        // default renderer.
         self.keep(Object::new(kind, subtype, known, extra))
     }
 
-    /// Whether an array of these elements can be made; else a message is given.
+    /// Whether an array of these elements can be made. If not, the reason is reported.
     pub fn check_array(&self, kind: DataType, element: DataType, dims: [u64; 3]) -> Option<usize> {
         let text = match (element.size(), byte_size(element, dims)) {
             (None, _) => format!("elements of type {element} have no size"),
@@ -171,7 +171,8 @@ impl Device {
         None
     }
 
-    /// A new array over the program's memory, or over the device's own when there is none.
+    /// Makes an array in the program's memory, or in the device's own memory if the program passes
+    /// none.
     pub(crate) fn new_array(
         &self,
         kind: DataType,
@@ -219,11 +220,11 @@ impl Device {
             );
             self.about(array, Severity::Error, text);
         }
-        // The old objects are dropped after the lock is free.
+        // The old objects are dropped after the lock is released.
         let _old = array.with_array(|a| a.set_objects(objects));
     }
 
-    /// One more reference of the program.
+    /// Adds a reference of the program.
     pub fn retain(&self, handle: Handle) {
         if self.find(handle, "anariRetain").is_some()
             && let Some(entry) = lock(&self.objects).get_mut(&handle)
@@ -232,8 +233,9 @@ impl Device {
         }
     }
 
-    /// One reference less. Without references the program no longer knows the object; what other
-    /// objects refer to lives on, with a copy of memory that the program may now free.
+    /// Removes a reference of the program. Without references, the program can no longer use the
+    /// object. Objects that other objects refer to stay alive, with a copy of memory that the
+    /// program may now free.
     pub fn release(&self, handle: Handle) {
         let Some(object) = self.find(handle, "anariRelease") else { return };
         let gone = {
@@ -253,7 +255,7 @@ impl Device {
         drop(gone);
         lock(&self.sums).remove(&handle);
         if object.kind == DataType::FRAME {
-            // Nobody can ask for the picture any more.
+            // Nobody can request the image any more.
             if let Some(job) = frame::current_job(&object) {
                 job.cancel();
                 job.wait_until_over();
@@ -296,7 +298,7 @@ impl Device {
         object.set(name, value);
     }
 
-    /// Whether the object has a parameter of that name; else the program is told, once.
+    /// Whether the object has a parameter of that name. If not, this is reported once.
     fn knows(&self, object: &Object, name: &str) -> bool {
         let Some(schema) = schema::find(object.kind, &object.subtype) else { return object.known };
         if schema.parameter(name).is_some() {
@@ -312,7 +314,7 @@ impl Device {
         false
     }
 
-    /// Takes a parameter back.
+    /// Unsets a parameter.
     pub fn unset_parameter(&self, handle: Handle, name: Option<&str>) {
         let Some(object) = self.find(handle, "anariUnsetParameter") else { return };
         match name {
@@ -321,7 +323,7 @@ impl Device {
         }
     }
 
-    /// Makes what was set effective.
+    /// Commits the parameters that were set.
     pub fn commit(&self, handle: Handle) {
         let Some(object) = self.find(handle, "anariCommitParameters") else { return };
         let schema = schema::find(object.kind, &object.subtype);
@@ -358,7 +360,7 @@ impl Device {
     }
 
     // ---- Arrays ---------------------------------------------------------------------------------
-    /// Address for the program to write to.
+    /// The address that the program writes to.
     pub fn map_array(&self, handle: Handle) -> *mut c_void {
         let Some(array) = self.find(handle, "anariMapArray") else { return std::ptr::null_mut() };
         let mapped = array.with_array(|a| (std::mem::replace(&mut a.mapped, true), a.address()));
@@ -376,7 +378,7 @@ impl Device {
         }
     }
 
-    /// The program has written.
+    /// Called after the program has written.
     pub fn unmap_array(&self, handle: Handle) {
         let Some(array) = self.find(handle, "anariUnmapArray") else { return };
         self.written(&array);
@@ -394,8 +396,8 @@ impl Device {
         array.touch();
     }
 
-    /// Makes an array, sets it as a parameter, and gives the program its memory and the distance of
-    /// its elements in bytes.
+    /// Makes an array, sets it as a parameter, and returns its memory and the stride of its
+    /// elements in bytes.
     pub fn map_parameter_array(
         &self,
         handle: Handle,
@@ -418,7 +420,7 @@ impl Device {
         Some((address, element.size()? as u64))
     }
 
-    /// The program has written to the array of [`Device::map_parameter_array`].
+    /// Called after the program has written to the array of [`Device::map_parameter_array`].
     pub fn unmap_parameter_array(&self, handle: Handle, name: &str) {
         let Some(object) = self.find(handle, "anariUnmapParameterArray") else { return };
         match object.staged(name) {
@@ -446,13 +448,13 @@ impl Device {
             "version.name.size" => {
                 Property::U64(format!("rtv {}", env!("CARGO_PKG_VERSION")).len() as u64 + 1)
             }
-            // Of one geometry: 32-bit indices, of which the last means "none".
+            // The limit for one geometry: 32-bit indices, of which the last means "none".
             "geometryMaxIndex" => Property::U64(u64::from(u32::MAX - 2)),
             _ => return None,
         })
     }
 
-    /// A property of an object; with `wait`, after its frame is done.
+    /// A property of an object. With `wait`, waits until its frame is done.
     pub fn property(&self, handle: Handle, name: &str, wait: bool) -> Option<Property> {
         let object = self.find(handle, "anariGetProperty")?;
         match (object.kind, name) {
@@ -485,7 +487,7 @@ impl Device {
         diagnostics.0.iter().for_each(|m| self.status.tell_once(m));
     }
 
-    /// Number of objects that the program has not released.
+    /// The number of objects that the program has not released.
     pub fn num_objects(&self) -> usize {
         lock(&self.objects).len()
     }
@@ -493,7 +495,7 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // Messages and callbacks after this would reach a program that thinks the device is gone.
+        // Later messages and callbacks would reach a program that has already released the device.
         for job in lock(&self.jobs).iter().filter_map(Weak::upgrade) {
             job.cancel();
             job.wait_until_over();
@@ -508,7 +510,7 @@ impl Drop for Device {
     }
 }
 
-/// What is wrong with a value for a parameter.
+/// Explains why a value is not valid for a parameter.
 fn misfit(p: &schema::Parameter, value: &Value) -> Option<String> {
     let given = value.data_type();
     if !p.takes(given) {

@@ -14,17 +14,17 @@ use std::sync::Arc;
 /// A finished frame.
 #[derive(Default)]
 pub struct FrameImage {
-    /// Pixels per row, and rows.
+    /// Width and height, pixels.
     pub size: [u32; 2],
-    /// By name, `channel.color` and so on.
+    /// Channels by name, `channel.color` and so on.
     pub channels: BTreeMap<&'static str, Channel>,
-    /// Seconds it took.
+    /// Duration of the frame, seconds.
     pub duration_secs: f32,
-    /// Samples per pixel, with those of earlier frames that were added up.
+    /// Samples per pixel, including accumulated earlier frames.
     pub samples: u32,
 }
 
-/// Sums of earlier frames of the same scene.
+/// Accumulated earlier frames of the same scene.
 #[derive(Default)]
 pub(crate) struct Accumulated {
     pub(crate) key: Vec<u64>,
@@ -32,16 +32,16 @@ pub(crate) struct Accumulated {
     pub(crate) passes: u32,
 }
 
-/// What a frame object has besides its parameters.
+/// State of a frame object apart from its parameters.
 #[derive(Default)]
 pub struct FrameState {
     pub(crate) job: Option<Arc<Job>>,
     latest: Option<Arc<FrameImage>>,
-    /// Pictures of which the program holds addresses.
+    /// Images to which the program holds pointers.
     mapped: BTreeMap<String, Arc<FrameImage>>,
 }
 
-/// Gives the frame's state to `f`; `None` for objects that are no frames.
+/// Passes the frame's state to `f`; `None` for objects that are not frames.
 fn with_state<T>(frame: &Object, f: impl FnOnce(&mut FrameState) -> T) -> Option<T> {
     match &mut *lock(&frame.extra) {
         super::object::Extra::Frame(state) => Some(f(state)),
@@ -49,7 +49,7 @@ fn with_state<T>(frame: &Object, f: impl FnOnce(&mut FrameState) -> T) -> Option
     }
 }
 
-/// The job in work or done, if any.
+/// The running or finished job, if any.
 pub(crate) fn current_job(frame: &Object) -> Option<Arc<Job>> {
     with_state(frame, |s| s.job.clone()).flatten()
 }
@@ -58,9 +58,9 @@ pub(crate) fn set_job(frame: &Object, job: Arc<Job>) {
     with_state(frame, |s| s.job = Some(job));
 }
 
-/// Waits for the frame and gives its picture; `None` when it was never drawn.
+/// Waits for the frame and returns its image; `None` if it was never rendered.
 pub fn finish(frame: &Object) -> Option<Arc<FrameImage>> {
-    // Waiting with the lock held would stop `discard`.
+    // Waiting while holding the lock would block `discard`.
     let picture = current_job(frame).map(|job| job.wait());
     with_state(frame, |s| {
         if picture.is_some() {
@@ -71,12 +71,12 @@ pub fn finish(frame: &Object) -> Option<Arc<FrameImage>> {
     .flatten()
 }
 
-/// Keeps the picture alive until the channel is unmapped.
+/// Keeps the image alive until the channel is unmapped.
 pub(crate) fn hold(frame: &Object, channel: &str, picture: Arc<FrameImage>) {
     with_state(frame, |s| s.mapped.insert(channel.to_owned(), picture));
 }
 
-/// Forgets a mapping; false when there was none.
+/// Removes a mapping; false if there was none.
 pub(crate) fn unhold(frame: &Object, channel: &str) -> bool {
     with_state(frame, |s| s.mapped.remove(channel).is_some()).unwrap_or(false)
 }

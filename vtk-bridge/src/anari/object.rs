@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// The program's name for an object; 0 is none.
+/// The program's name for an object; 0 means no object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Handle(pub u64);
 
@@ -22,10 +22,10 @@ impl Handle {
     /// No object.
     pub const NULL: Handle = Handle(0);
 
-    /// A handle that no device of this process has given out before.
+    /// A handle that no device of this process has used before.
     pub(crate) fn fresh() -> Handle {
-        // Steps of 16 from a number that is no small integer: programs that look at handles as
-        // pointers see aligned ones.
+        // Steps of 16 from a number that is not a small integer, so that programs that treat
+        // handles as pointers see aligned ones.
         static NEXT: AtomicU64 = AtomicU64::new(0x1000);
         Handle(NEXT.fetch_add(16, Ordering::Relaxed))
     }
@@ -38,14 +38,14 @@ pub enum Value {
     Bytes(DataType, Vec<u8>),
     /// A string.
     Text(String),
-    /// Another object, with the type it was given as.
+    /// Another object, with the type under which it was passed.
     Object(Arc<Object>),
-    /// A pointer of the program, handed back to it and never followed.
+    /// A pointer of the program, returned to it and never dereferenced.
     Pointer(DataType, usize),
 }
 
 impl Value {
-    /// Its type; objects have that of the object.
+    /// The type of the value. An object has its own type.
     pub fn data_type(&self) -> DataType {
         match self {
             Value::Bytes(t, _) | Value::Pointer(t, _) => *t,
@@ -54,7 +54,8 @@ impl Value {
         }
     }
 
-    /// A number that changes when the value, or the data of an array that it names, changes.
+    /// A number that changes when the value changes, or when the data of an array that it names
+    /// changes.
     pub(crate) fn fingerprint(&self, out: &mut Vec<u64>) {
         out.push(u64::from(self.data_type().0));
         match self {
@@ -73,7 +74,7 @@ impl Value {
 /// Committed parameters by name.
 pub type Parameters = BTreeMap<String, Value>;
 
-/// What only some kinds of objects have.
+/// State that only some kinds of objects have.
 #[derive(Default)]
 pub enum Extra {
     /// Nothing.
@@ -81,22 +82,22 @@ pub enum Extra {
     None,
     /// An array's data.
     Array(Box<Array>),
-    /// A frame's pictures.
+    /// A frame's images.
     Frame(Box<FrameState>),
-    /// What a world has built.
+    /// Cached results of a world.
     World(Box<WorldCache>),
 }
 
 /// An object of a device.
 pub struct Object {
-    /// The program's name for it.
+    /// The program's handle for it.
     pub handle: Handle,
-    /// What it is.
+    /// Kind of the object.
     pub kind: DataType,
-    /// Which of its kind; empty for kinds without subtypes, and for unknown subtypes what the
-    /// program asked for.
+    /// Subtype. Empty for kinds without subtypes; for unknown subtypes, the name that the program
+    /// requested.
     pub subtype: String,
-    /// False when the device does not have this subtype: the object takes parameters and draws
+    /// False if the device does not have this subtype. The object then accepts parameters and draws
     /// nothing.
     pub known: bool,
     staged: Mutex<Parameters>,
@@ -121,8 +122,8 @@ impl Object {
 
     /// Sets a parameter; it takes effect with the next commit.
     pub(crate) fn set(&self, name: &str, value: Value) {
-        // The old value is dropped after the lock is free: it may be the last reference to an array
-        // whose deleter calls back.
+        // The old value is dropped after the lock is released, because it may be the last reference
+        // to an array whose deleter calls back.
         let _old = lock(&self.staged).insert(name.to_owned(), value);
     }
 
@@ -138,7 +139,7 @@ impl Object {
         lock(&self.staged).get(name).cloned()
     }
 
-    /// Makes what was set effective, but for what `usable` refuses.
+    /// Commits the parameters, except those that `usable` rejects.
     pub(crate) fn commit(&self, mut usable: impl FnMut(&str, &Value) -> bool) {
         let staged = lock(&self.staged).clone();
         let fresh: Parameters =
@@ -148,12 +149,12 @@ impl Object {
         drop(old);
     }
 
-    /// The parameters in effect.
+    /// The committed parameters.
     pub fn parameters(&self) -> Arc<Parameters> {
         lock(&self.committed).clone()
     }
 
-    /// Counts commits and changes of array data.
+    /// The number of commits and of changes to array data.
     pub fn version(&self) -> u64 {
         self.version.load(Ordering::Acquire)
     }
@@ -162,7 +163,7 @@ impl Object {
         self.version.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// What a status message calls it: "geometry `sphere`".
+    /// Name of the object in a status message: "geometry `sphere`".
     pub fn title(&self) -> String {
         let kind = self.kind.name().to_lowercase();
         let name = match self.parameters().get("name") {
@@ -218,7 +219,7 @@ impl Object {
         }
     }
 
-    /// The objects in an array parameter, in order; nulls are left out.
+    /// The objects in an array parameter, in order and without nulls.
     pub(crate) fn objects(&self, name: &str) -> Vec<Arc<Object>> {
         self.object(name)
             .map(|a| {
@@ -228,7 +229,7 @@ impl Object {
             .unwrap_or_default()
     }
 
-    /// Looks at the data of an array; `None` for other objects.
+    /// Reads the data of an array; `None` for other objects.
     pub(crate) fn with_array<T>(&self, f: impl FnOnce(&mut Array) -> T) -> Option<T> {
         match &mut *lock(&self.extra) {
             Extra::Array(a) => Some(f(a)),

@@ -25,8 +25,8 @@ struct Shim {
     load: unsafe extern "C" fn() -> *mut c_void,
 }
 
-/// The shim for this process, or what to tell the user, as a text that VTK prints for us as the
-/// "version" it rejects.
+/// The shim for this process, or a message for the user. VTK prints the message as the "version"
+/// that it rejects.
 fn shim() -> Result<&'static Shim, &'static CStr> {
     static SHIM_OR_REASON: OnceLock<Result<Shim, CString>> = OnceLock::new();
     let found = SHIM_OR_REASON.get_or_init(|| {
@@ -55,7 +55,7 @@ fn find_and_load() -> Result<Shim, String> {
     })
 }
 
-/// Which of the VTKs in the process to serve: the one we have a build for.
+/// Chooses, of the VTK versions in the process, the one for which a shim is installed.
 fn choose(
     flavours: &[String],
     home: &Path,
@@ -85,12 +85,11 @@ pub fn flavour_of(file: &str) -> Option<String> {
     if flavour.is_empty() {
         return Some("unnamed".to_owned());
     }
-    // Other libraries only begin with the same letters.
+    // Other libraries have names that start with the same letters.
     flavour.strip_prefix('-').map(str::to_owned)
 }
 
-/// The folder of `vtk-bridge install`: `RTV_HOME`, or the parent of the folder this library lies
-/// in.
+/// The folder of `vtk-bridge install`: `RTV_HOME`, or the parent of this library's folder.
 fn home() -> Option<PathBuf> {
     if let Some(set) = std::env::var_os("RTV_HOME").filter(|v| !v.is_empty()) {
         return Some(set.into());
@@ -98,8 +97,8 @@ fn home() -> Option<PathBuf> {
     Some(process::own_file()?.parent()?.parent()?.to_owned())
 }
 
-/// VTK's question which VTK this was built for: the shim's answer, or one that no VTK accepts, with
-/// the reason.
+/// Answers VTK's query for the VTK version of this build: the shim's answer, or one that no VTK
+/// accepts, with the reason.
 #[allow(non_snake_case, reason = "VTK's name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn vtkGetFactoryVersion() -> *const c_char {
@@ -110,17 +109,18 @@ pub extern "C" fn vtkGetFactoryVersion() -> *const c_char {
     }
 }
 
-/// The answer after a panic, which was told.
+/// The answer after a panic, which was reported.
 const INTERNAL: &CStr = c"none, because of an internal error of vtk-bridge";
 
-/// The question after the compiler, of VTK before 9.1; the shim is compiled where it runs.
+/// Answers the query for the compiler, of VTK before 9.1. The shim is compiled on the machine where
+/// it runs.
 #[allow(non_snake_case, reason = "VTK's name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn vtkGetFactoryCompilerUsed() -> *const c_char {
     c"c++".as_ptr()
 }
 
-/// The object factory; null without a shim, which VTK does not ask for then.
+/// The object factory, or null without a shim. VTK does not ask for it in that case.
 #[allow(non_snake_case, reason = "VTK's name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn vtkLoad() -> *mut c_void {

@@ -7,7 +7,7 @@ use std::os::raw::{c_char, c_int};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// Files of all shared libraries in the process.
+/// Paths of all shared libraries in the process.
 pub(super) fn loaded_files() -> Vec<String> {
     unsafe extern "C" fn collect(
         info: *mut libc::dl_phdr_info,
@@ -28,7 +28,7 @@ pub(super) fn loaded_files() -> Vec<String> {
     list
 }
 
-/// The file this code is in.
+/// The file that contains this code.
 pub(super) fn own_file() -> Option<PathBuf> {
     // SAFETY: a plain structure of pointers, for which zero is valid.
     let mut info: libc::Dl_info = unsafe { std::mem::zeroed() };
@@ -43,7 +43,7 @@ pub(super) fn own_file() -> Option<PathBuf> {
     path.canonicalize().ok()
 }
 
-/// Opens the shim and gives it our table.
+/// Opens the shim and passes it our function table.
 pub(super) fn open_shim(path: &Path) -> Result<Shim, String> {
     let file = CString::new(path.as_os_str().as_bytes()).map_err(|e| e.to_string())?;
     // SAFETY: a C string; what runs on loading is what `vtk-bridge install` compiled.

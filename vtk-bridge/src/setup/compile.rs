@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The sources by name.
+/// The sources with their names.
 pub const SOURCES: &[(&str, &str)] = &[
     ("rtv.h", include_str!("../../include/rtv.h")),
     ("rtv_shim.h", include_str!("../../cpp/rtv_shim.h")),
@@ -39,10 +39,10 @@ pub const MODULES: &[&str] = &[
     "CommonCore",
 ];
 
-/// Compositing over ranks in floating point: a library of its own, for ParaView only.
+/// The library that composites over ranks in floating point, for ParaView only.
 const ICET: (&str, &str) = ("rtv_icet.cxx", include_str!("../../cpp/rtv_icet.cxx"));
 
-/// Its file, beside the shim.
+/// Its file name, in the folder of the shim.
 const ICET_FILE: &str = "librtv_icet.so";
 
 /// The modules that it calls.
@@ -67,8 +67,8 @@ pub fn write_sources(folder: &Path) -> Result<(), SetupError> {
     Ok(())
 }
 
-/// Compiles the shim for `flavour` into `out`, and for ParaView what composites over ranks beside
-/// it.
+/// Compiles the shim for `flavour` into `out`. For ParaView, also compiles the compositing library
+/// in the same folder.
 pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupError> {
     let names = SOURCES.iter().map(|(name, _)| *name).filter(|n| n.ends_with(".cxx"));
     let files: Vec<PathBuf> = names.map(|n| sources.join(n)).collect();
@@ -84,8 +84,8 @@ pub fn shim(flavour: &Flavour, sources: &Path, out: &Path) -> Result<(), SetupEr
     library(flavour, &icet, &[file], ICET_MODULES, &out.with_file_name(ICET_FILE), what)
 }
 
-/// Compiles `files`, which call `modules`, into the shared library `out`. `headers` is a folder of
-/// more headers.
+/// Compiles `files`, which call `modules`, into the shared library `out`. `headers` is an
+/// additional include folder.
 fn library(
     flavour: &Flavour,
     headers: &Path,
@@ -96,7 +96,7 @@ fn library(
 ) -> Result<(), SetupError> {
     let folder = out.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
-    // Beside, then renamed: a program that is running keeps the old file.
+    // Build under another name, then rename: a running program keeps the old file.
     let beside = out.with_extension("so.new");
     let compiler = compiler();
     let objects: Vec<PathBuf> = files
@@ -111,12 +111,13 @@ fn library(
         run(&mut command, &compiler.to_string_lossy(), what.clone(), "apt-get install g++")
     };
     let made: Vec<_> = files.par_iter().zip(&objects).map(|(f, o)| compile(f, o)).collect();
-    // The first error in the order of the files.
+    // Report the first error in the order of the files.
     let made: Result<(), SetupError> = made.into_iter().collect();
     let mut command = Command::new(&compiler);
     command.args(["-shared", "-o"]).arg(&beside).args(&objects);
-    // Libraries of VTK need others of it, which the process has already. Never unloaded: VTK
-    // deletes our factory when the process ends, after ParaView has closed its plugins.
+    // VTK's libraries need other VTK libraries, which the process has already loaded. The shim is
+    // never unloaded: VTK deletes our factory when the process ends, after ParaView has closed its
+    // plugins.
     command.args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"]);
     command.args(modules.iter().filter_map(|m| flavour.library(m)));
     command.args(["-lGL", "-ldl"]);
@@ -130,12 +131,12 @@ fn library(
     fs::rename(&beside, out).map_err(io(out, "put in place"))
 }
 
-/// The C++ compiler: `CXX`, a path of any name, or g++.
+/// The C++ compiler: `CXX`, which may be any path, or g++.
 pub(crate) fn compiler() -> OsString {
     std::env::var_os("CXX").filter(|c| !c.is_empty()).unwrap_or_else(|| "g++".into())
 }
 
-/// Runs a build command; its last lines are part of the error.
+/// Runs a build command. Its last lines of output are part of the error.
 pub(crate) fn run(
     command: &mut Command,
     program: &str,

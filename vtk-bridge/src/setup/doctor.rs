@@ -5,14 +5,14 @@ use super::layout::{Layout, library};
 use serde::Serialize;
 use std::process::Command;
 
-/// One thing that was looked at.
+/// The result of one check.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What was looked at.
+    /// What was checked.
     pub what: String,
-    /// True when it is as it should be.
+    /// True if it is correct.
     pub ok: bool,
-    /// What was found, and the cure.
+    /// The finding and the cure.
     pub text: String,
 }
 
@@ -20,7 +20,7 @@ fn finding(what: &str, ok: bool, text: impl Into<String>) -> Finding {
     Finding { what: what.to_owned(), ok, text: text.into() }
 }
 
-/// Looks at everything.
+/// Runs all checks.
 pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Vec<Finding> {
     let mut out = Vec::new();
     let (flavours, faults) = find(&places(&variable));

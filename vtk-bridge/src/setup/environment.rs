@@ -2,7 +2,7 @@
 
 use super::layout::Layout;
 
-/// Which program's variables.
+/// The kind of program whose variables are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {
     /// Python scripts and programs with VTK itself.
@@ -22,7 +22,7 @@ impl Program {
         if self == Program::Vtk { "VTK" } else { "ParaView" }
     }
 
-    /// How to get its headers.
+    /// How to install its headers.
     pub fn cure(self) -> &'static str {
         match self {
             Program::Vtk => {
@@ -53,8 +53,8 @@ pub fn exports(layout: &Layout, autoload_before: Option<&str>) -> String {
     )
 }
 
-/// Lines for `eval` after which ANARI programs load us when they ask for the library of the
-/// environment.
+/// Lines for `eval` that make ANARI programs load this device when they request the library named
+/// by the environment.
 pub fn anari_exports(layout: &Layout, libraries_before: Option<&str>) -> String {
     let ours = layout.anari().parent().unwrap_or(layout.prefix()).display().to_string();
     let others = libraries_before
@@ -65,7 +65,7 @@ pub fn anari_exports(layout: &Layout, libraries_before: Option<&str>) -> String 
     format!("export LD_LIBRARY_PATH={}\nexport ANARI_LIBRARY=rtv\n", quoted(&path))
 }
 
-/// `text` as one word of a POSIX shell.
+/// Quotes `text` as one word of a POSIX shell.
 fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// A VTK that a shim can be compiled for.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Flavour {
-    /// As in the names of its libraries: `9.1`, `pv5.11`.
+    /// Version as in the names of its libraries: `9.1`, `pv5.11`.
     pub name: String,
     /// Folder of vtkObjectFactory.h.
     pub include: PathBuf,
@@ -22,7 +22,7 @@ impl Flavour {
         self.name.starts_with("pv")
     }
 
-    /// The file of VTK module `module`: the link without version, or the library itself.
+    /// The file of VTK module `module`: the link without a version, or the library itself.
     pub fn library(&self, module: &str) -> Option<PathBuf> {
         let stem = if self.name == "unnamed" {
             format!("libvtk{module}.so")
@@ -40,15 +40,15 @@ impl Flavour {
     }
 }
 
-/// Folders that are looked at: those of `RTV_VTK_INCLUDE` (separated by colons), those beside the
-/// libraries of `LD_LIBRARY_PATH`, the system's.
+/// Folders to search: those of `RTV_VTK_INCLUDE` (separated by colons), those next to the libraries
+/// of `LD_LIBRARY_PATH`, and the system's.
 pub fn places(variable: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let list = |name| {
         let value = variable(name).unwrap_or_default();
         value.split(':').filter(|p| !p.is_empty()).map(PathBuf::from).collect::<Vec<_>>()
     };
     let own = list("RTV_VTK_INCLUDE").into_iter();
-    // PREFIX/lib/MACHINE, PREFIX/lib: to PREFIX/include.
+    // From PREFIX/lib/MACHINE or PREFIX/lib to PREFIX/include.
     let beside = list("LD_LIBRARY_PATH");
     let beside =
         beside.iter().flat_map(|p| p.ancestors().skip(1).take(2).map(|a| a.join("include")));
@@ -69,8 +69,8 @@ pub fn places(variable: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     own.chain(inside).collect()
 }
 
-/// The VTKs whose headers and libraries are there; the second list says what is wrong with the
-/// other folders.
+/// The VTK installations whose headers and libraries both exist. The second list gives the problems
+/// of the other folders.
 pub fn find(places: &[PathBuf]) -> (Vec<Flavour>, Vec<String>) {
     let (mut found, mut faults) = (Vec::<Flavour>::new(), Vec::new());
     for place in places {

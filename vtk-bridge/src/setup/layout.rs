@@ -7,30 +7,30 @@ use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The folder of all pieces.
+/// The paths below the installation folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     prefix: PathBuf,
 }
 
-/// What [`Layout::install`] did.
+/// Result of [`Layout::install`].
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Installed {
-    /// The folder of all pieces.
+    /// The installation folder.
     pub prefix: PathBuf,
-    /// VTKs for which a shim was built.
+    /// VTK versions for which a shim was built.
     pub built: Vec<String>,
-    /// VTKs for which it could not be built, and why.
+    /// VTK versions whose shim could not be built, with the reason.
     pub failed: Vec<(String, String)>,
 }
 
 impl Layout {
-    /// Pieces below `prefix`.
+    /// An installation in `prefix`.
     pub fn at(prefix: PathBuf) -> Layout {
         Layout { prefix }
     }
 
-    /// `RTV_HOME`, or the user's folder for data.
+    /// `RTV_HOME`, or the installation folder in the user's data folder.
     pub fn default_prefix(variable: impl Fn(&str) -> Option<String>) -> PathBuf {
         let set = |name| variable(name).filter(|v: &String| !v.is_empty()).map(PathBuf::from);
         set("RTV_HOME")
@@ -39,7 +39,7 @@ impl Layout {
             .unwrap_or_else(|| PathBuf::from("/usr/local/lib/vtk-bridge"))
     }
 
-    /// The folder of all pieces.
+    /// The installation folder.
     pub fn prefix(&self) -> &Path {
         &self.prefix
     }
@@ -49,12 +49,13 @@ impl Layout {
         self.prefix.join("autoload")
     }
 
-    /// The library in it.
+    /// The loader library in that folder.
     pub fn loader(&self) -> PathBuf {
         self.autoload().join("librtv_loader.so")
     }
 
-    /// The library as ANARI's loader looks for it: `libanari_library_rtv.so`, of the device `rtv`.
+    /// The library under the name that ANARI's loader expects: `libanari_library_rtv.so`, of the
+    /// device `rtv`.
     pub fn anari(&self) -> PathBuf {
         self.prefix.join("anari").join("libanari_library_rtv.so")
     }
@@ -69,7 +70,7 @@ impl Layout {
         self.prefix.join("plugins").join(flavour)
     }
 
-    /// VTKs with a shim.
+    /// VTK versions with a shim.
     pub fn shims(&self) -> Vec<String> {
         let entries = fs::read_dir(self.prefix.join("lib")).into_iter().flatten();
         let mut names: Vec<String> = entries
@@ -81,8 +82,8 @@ impl Layout {
         names
     }
 
-    /// Installs the loader from `library`, and builds a shim for each of `flavours`. A shim that
-    /// cannot be built does not keep the others from being built.
+    /// Installs the loader from `library`, and builds a shim for each of `flavours`. If one shim
+    /// fails, the others are still built.
     pub fn install(&self, library: &Path, flavours: &[Flavour]) -> Result<Installed, SetupError> {
         let mut done = Installed { prefix: self.prefix.clone(), ..Installed::default() };
         let sources = self.prefix.join("src");
@@ -101,7 +102,7 @@ impl Layout {
         Ok(done)
     }
 
-    /// Copies the library to where VTK finds it, unless it is there already.
+    /// Copies the library to where VTK finds it, unless it is already there.
     pub fn install_loader(&self, library: &Path) -> Result<(), SetupError> {
         self.put(library, &self.loader())
     }
@@ -138,14 +139,14 @@ impl Layout {
     }
 }
 
-/// Whether two files are there and the same.
+/// Whether both files exist and are equal.
 fn same(a: &Path, b: &Path) -> bool {
     let read = |p: &Path| fs::read(p).ok();
     read(a).is_some_and(|a| read(b) == Some(a))
 }
 
-/// The library that VTK loads: `RTV_LIBRARY`, or beside the program, or in `deps` beside it, or in
-/// `lib` one folder up.
+/// Finds the library that VTK loads: `RTV_LIBRARY`, or next to the program, in `deps` next to it,
+/// or in `lib` one folder up.
 pub fn library() -> Result<PathBuf, SetupError> {
     if let Some(set) = std::env::var_os("RTV_LIBRARY").filter(|v| !v.is_empty()) {
         return Ok(set.into());
@@ -155,7 +156,7 @@ pub fn library() -> Result<PathBuf, SetupError> {
     let name = "libvtk_bridge.so";
     let places =
         [folder.join("deps").join(name), folder.join(name), folder.join("../lib").join(name)];
-    // A build of the program alone renews only one of them.
+    // Building only the program renews only one of them.
     let age = |p: &PathBuf| fs::metadata(p).and_then(|m| m.modified()).ok();
     places
         .into_iter()

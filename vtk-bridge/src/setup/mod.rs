@@ -17,15 +17,15 @@ pub mod plugin;
 
 use std::path::PathBuf;
 
-/// What can go wrong, each with its cure.
+/// Errors of the set-up, each with its cure.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// A file or folder.
+    /// A file or folder could not be accessed.
     #[error("{path}: cannot {what}: {source}")]
     Io {
-        /// Which.
+        /// The path.
         path: PathBuf,
-        /// What was tried.
+        /// The operation.
         what: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -33,30 +33,30 @@ pub enum SetupError {
     /// A program is missing.
     #[error("`{program}` does not start ({source}); install it: {cure}")]
     NoProgram {
-        /// Which.
+        /// Name of the program.
         program: String,
         /// The system's reason.
         source: std::io::Error,
-        /// How to get it.
+        /// How to install it.
         cure: &'static str,
     },
-    /// A compiler or cmake refused.
+    /// A compiler or cmake failed.
     #[error("building {what} failed:\n{output}\ncommand: {command}")]
     Build {
         /// What was built.
         what: String,
-        /// The last lines it printed.
+        /// The last lines of its output.
         output: String,
-        /// How to repeat it.
+        /// How to repeat the command.
         command: String,
     },
-    /// The library that VTK loads is not beside the program.
+    /// The library that VTK loads is not next to the program.
     #[error(
         "libvtk_bridge.so is neither beside {program} nor in its folder `deps`; build it with \
          `cargo build -p vtk-bridge`, or name it in RTV_LIBRARY"
     )]
     NoLibrary {
-        /// Where the program lies.
+        /// Folder of the program.
         program: PathBuf,
     },
     /// There is no VTK with headers.
@@ -66,20 +66,20 @@ pub enum SetupError {
          the folder with vtkObjectFactory.h in RTV_VTK_INCLUDE"
     )]
     NoHeaders {
-        /// Where.
+        /// Folders that were searched.
         looked: String,
     },
-    /// The VTK asked for has no headers here.
+    /// The requested VTK has no headers here.
     #[error("{asked} is not built, and its headers were not found; {cure}")]
     NotFound {
         /// VTK or ParaView.
         asked: &'static str,
-        /// How to get it.
+        /// How to install them.
         cure: &'static str,
     },
 }
 
-/// [`SetupError::Io`] as an adapter.
+/// Converts an I/O error to [`SetupError::Io`].
 pub(crate) fn io<'a>(
     path: &'a std::path::Path,
     what: &'static str,

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// The plugin's own sources, by name.
+/// The plugin's own sources with their names.
 const SOURCES: &[(&str, &str)] = &[
     ("rtv_plugin.cxx", include_str!("../../cpp/plugin/rtv_plugin.cxx")),
     ("rtv_view_options.cxx", include_str!("../../cpp/plugin/rtv_view_options.cxx")),
@@ -29,7 +29,7 @@ const MODULES: &[&str] = &[
 /// The plugin's file; ParaView calls the plugin by this name.
 const FILE: &str = "VtkBridge.so";
 
-/// Builds the plugin for `flavour` and puts it into its folder. Returns the file.
+/// Builds the plugin for `flavour` and installs it in its folder. Returns the file.
 pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError> {
     let sources = layout.prefix().join("src").join("plugin");
     fs::create_dir_all(&sources).map_err(io(&sources, "make the folder"))?;
@@ -40,7 +40,7 @@ pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError
     let folder = layout.plugin_folder(&flavour.name);
     fs::create_dir_all(&folder).map_err(io(&folder, "make the folder"))?;
     let out = folder.join(FILE);
-    // Beside the folder: ParaView tries to load whatever library lies in it.
+    // Build outside the folder, because ParaView tries to load every library in it.
     let beside = layout.prefix().join("VtkBridge.so.new");
     let compiler = compile::compiler();
     let mut command = Command::new(&compiler);
@@ -49,7 +49,7 @@ pub fn install(layout: &Layout, flavour: &Flavour) -> Result<PathBuf, SetupError
     command.arg("-I").arg(layout.prefix().join("include")).arg("-isystem").arg(&flavour.include);
     command.arg("-o").arg(&beside);
     command.args(SOURCES.iter().filter(|(n, _)| n.ends_with(".cxx")).map(|(n, _)| sources.join(n)));
-    // Never unloaded: VTK keeps functions of it when ParaView has closed its plugins.
+    // Never unloaded: VTK keeps pointers to its functions after ParaView has closed its plugins.
     command
         .args(["-Wl,--allow-shlib-undefined", "-Wl,-z,nodelete"])
         .args(MODULES.iter().filter_map(|m| flavour.library(m)))
