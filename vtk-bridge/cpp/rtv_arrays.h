@@ -1,4 +1,4 @@
-// VTK's arrays as the bridge reads them.
+// Converts VTK's arrays to the form that the bridge reads.
 #pragma once
 #include "rtv_shim.h"
 
@@ -17,7 +17,8 @@ class vtkProperty;
 class vtkTexture;
 class vtkVolume;
 
-// Copies that must live until the bridge has read them: arrays of types it does not read itself.
+// Copies of arrays whose types the bridge does not read. They must live until the bridge has read
+// them.
 class RtvKeep
 {
 public:
@@ -33,7 +34,7 @@ private:
   std::vector<std::unique_ptr<unsigned char[]>> ByteArrays;
 };
 
-// A surface that is ready for the bridge, with all that its pointers lead to.
+// A surface that is ready for the bridge, with all data that its pointers refer to.
 struct RtvPending
 {
   RtvSurface Surface = {};
@@ -44,11 +45,12 @@ struct RtvPending
   std::vector<unsigned char> Colors;
 };
 
-// All surfaces of a prop. They go to the bridge together when nothing in the prop is refused: what
-// is drawn by the bridge and by OpenGL would be blended twice where it is translucent.
+// All surfaces of a prop. They are passed to the bridge together, and only if it can trace all of
+// them: parts drawn by the bridge and parts drawn by OpenGL would be blended twice where they are
+// translucent.
 using RtvBatch = std::vector<std::unique_ptr<RtvPending>>;
 
-// Gives a prop's surfaces to the bridge: all, or none. Returns why not, or null.
+// Passes a prop's surfaces to the bridge: all, or none. Returns why not, or null.
 const char* rtvCommit(RtvBridge* bridge, const RtvBatch& batch);
 
 // A key of everything that was mixed in (FNV-1a).
@@ -64,17 +66,19 @@ uint64_t rtvMix(uint64_t key, const T& value)
   return key;
 }
 
-// Offsets or point numbers of cells, whatever array they are in: where that lies in memory as whole
-// numbers of 32 or 64 bits itself, else a copy. False when it has other than one component.
+// Offsets or point numbers of cells from any array. Refers to the array's memory if it holds
+// integers of 32 or 64 bits, else to a copy. False if it has other than one component.
 bool rtvIds(vtkDataArray* array, RtvArray& out, RtvKeep& keep);
 // Points, cells, normals, texture coordinates, and the key of all of them. `points`: every point is
 // a vertex. Returns why not, or null; `answer` keeps the text.
 const char* rtvAddShape(
   RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, std::string& answer);
-// Colours of points, cells or a map, as the mapper makes them; only when the bridge does not have them.
+// Colours of points, cells or a map, as the mapper makes them; only if the bridge has not cached
+// them.
 void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep);
 void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep);
-// The textures of a physically based property besides that of its colour; `maps` must live until the bridge has read it. Null without any.
+// The textures of a physically based property other than its colour; `maps` must live until the
+// bridge has read it. Null if there are none.
 const RtvMaps* rtvMapsOf(const RtvSurface& s, vtkProperty* property, RtvMaps& maps, RtvKeep& keep);
 // Why a texture cannot be traced, or null.
 const char* rtvTextureReason(vtkTexture* texture);

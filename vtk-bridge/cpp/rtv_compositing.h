@@ -1,15 +1,16 @@
-// Pictures of several ranks, composited in floating point.
+// Composites the images of several ranks in floating point.
 #pragma once
 #include <vtkSmartPointer.h>
 
 class vtkRenderPass;
 
-// ParaView composites bytes, and IceT cuts off what is behind the point at each blend: with three translucent layers that is up to two of 255. While
-// one of these lives, the renderer's IceT pass is replaced by one for floats, of librtv_icet.so.
+// ParaView composites bytes, and IceT truncates each blend to whole numbers: with three translucent
+// layers the error is up to two of 255. While one of these objects lives, a pass for floats, of
+// librtv_icet.so, replaces the renderer's IceT pass.
 class RtvFloatCompositing
 {
 public:
-  // `kept` holds that pass from frame to frame.
+  // `kept` stores that pass between frames.
   RtvFloatCompositing(vtkRenderPass* pass, vtkSmartPointer<vtkRenderPass>& kept);
   ~RtvFloatCompositing();
 

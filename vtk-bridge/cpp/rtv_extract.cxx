@@ -1,4 +1,4 @@
-// Props to surfaces: which are traced, and why the others are not.
+// Converts props to surfaces: decides which are traced, and why the others are not.
 #include "rtv_arrays.h"
 
 #include <algorithm>
@@ -30,7 +30,7 @@
 
 namespace
 {
-// What a block has of its parents in the tree.
+// Properties that a block inherits from its parents in the tree.
 struct BlockState
 {
   bool Visible = true;
@@ -48,7 +48,7 @@ struct Actor
   vtkCompositeDataDisplayAttributes* Attributes = nullptr;
   RtvBatch Batch;
   std::string Name;
-  // The text of a reason that is made on the way.
+  // Storage for a reason that is composed at run time.
   std::string Answer;
   double PointRadius, LineRadius;
   bool Edges = false, Points = false;
@@ -82,12 +82,13 @@ RtvProperty PropertyOf(vtkProperty* p)
   out.cull_front = p->GetFrontfaceCulling() ? 1 : 0;
   out.cull_back = p->GetBackfaceCulling() ? 1 : 0;
   CopyColor(p->GetEdgeColor(), out.edge_color);
-  // OpenGL's are never thinner than this.
+  // OpenGL's lines are never thinner than this.
   out.edge_width = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE ? std::max(1.1f, p->GetLineWidth()) : 0.0f;
   return out;
 }
 
-// Clipping planes are given in world coordinates; a plane with normal n through o keeps n (M x - o) >= 0.
+// Clipping planes are given in world coordinates; a plane with normal n through o keeps n (M x - o)
+// >= 0.
 void AddClipPlanes(Actor& a, RtvPending& pending)
 {
   vtkPlaneCollection* planes = a.Mapper->GetClippingPlanes();
@@ -120,7 +121,7 @@ void AddClipPlanes(Actor& a, RtvPending& pending)
   }
 }
 
-// Makes the surface of one data set ready for the bridge. Returns why not, or null.
+// Prepares the surface of one data set for the bridge. Returns why not, or null.
 const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, const std::string& blockName)
 {
   const bool surface = !a.Edges && !a.Points;
@@ -153,7 +154,7 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   std::copy(&a.Matrix->Element[0][0], &a.Matrix->Element[0][0] + 16, s.world_from_data);
   if (vtkProperty* back = a.Prop->GetBackfaceProperty())
   {
-    // The back has the shading model of the front.
+    // The back face has the shading model of the front face.
     s.has_back = 1;
     s.back = s.property;
     const RtvProperty own = PropertyOf(back);
@@ -181,7 +182,7 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   if (vtkTexture* own = a.Prop->GetProperty()->GetTexture("albedoTex"))
   {
     texture = own;
-    // Its alpha takes the place of the opacity.
+    // Its alpha replaces the opacity.
     s.property.opacity = 1.0f;
   }
   if (texture)
@@ -212,7 +213,7 @@ const char* AddTree(Actor& a, vtkDataObject* data, BlockState block, const std::
   }
   if (vtkCompositeDataDisplayAttributes* attributes = a.Attributes)
   {
-    // What a block says holds for all below it until one says otherwise.
+    // The properties of a block apply to all blocks below it until one overrides them.
     if (attributes->HasBlockVisibility(data))
     {
       block.Visible = attributes->GetBlockVisibility(data);
@@ -267,7 +268,8 @@ const char* AddTree(Actor& a, vtkDataObject* data, BlockState block, const std::
   return "its data are not polygons";
 }
 
-// Why OpenGL has to draw an actor, as far as the actor itself says; null when it can be traced.
+// Why OpenGL has to draw an actor, as far as the actor's own properties decide; null if it can be
+// traced.
 const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, double lineRadius)
 {
   static const char* const known[] = { "vtkActor", "vtkOpenGLActor", "vtkPVLODActor", "vtkLODActor", "vtkQuadricLODActor" };
@@ -389,7 +391,7 @@ vtkDataSet* RtvExtractor::SurfaceOf(vtkMapper* mapper, vtkDataSet* data)
     kept.Filter = vtkSmartPointer<vtkDataSetSurfaceFilter>::New();
   }
   kept.Used = true;
-  // The input of a pipeline would be updated twice; the data themselves know when they changed.
+  // The input of a pipeline would be updated twice; the data's own modification time suffices.
   kept.Filter->SetInputData(data);
   kept.Filter->Update();
   return kept.Filter->GetOutput();
@@ -463,7 +465,7 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
   }
   BlockState root;
   root.Opacity = a.Prop->GetProperty()->GetOpacity();
-  // All blocks are looked at before one is given away.
+  // Checks all blocks before any is passed on.
   const char* reason = AddTree(a, data, root, "");
   reason = reason ? reason : rtvCommit(bridge, a.Batch);
   return reason ? pass(reason) : true;

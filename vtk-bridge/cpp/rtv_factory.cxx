@@ -1,4 +1,5 @@
-// The object factory that replaces vtkRenderer (thesis section 3.2.1), and the door through which the bridge comes in.
+// The object factory that replaces vtkRenderer (thesis section 3.2.1), and the entry point for the
+// bridge's functions.
 #include "rtv_shim.h"
 
 #include <vtkObjectFactory.h>
@@ -6,7 +7,8 @@
 
 const RtvApi* rtvApi = nullptr;
 
-// Gives the shim the bridge's functions. Returns the number of the interface it was compiled for.
+// Passes the bridge's functions to the shim. Returns the version of the interface it was compiled
+// for.
 extern "C" VTK_ABI_EXPORT uint32_t rtv_shim_init(const RtvApi* api)
 {
   if (api && api->abi() == RTV_ABI)
@@ -42,7 +44,8 @@ protected:
 
 VTK_FACTORY_INTERFACE_IMPLEMENT(vtkRtvFactory);
 
-// For a plugin, which comes when VTK's own factories are registered already: theirs is switched off for this class.
+// For a plugin, which is loaded after VTK's own factories are registered: disables theirs for this
+// class.
 extern "C" VTK_ABI_EXPORT void rtv_shim_register()
 {
   vtkObjectFactory::SetAllEnableFlags(0, "vtkRenderer", "vtkOpenGLRenderer");

@@ -1,7 +1,9 @@
-// The renderer: splits the props into those that are traced and the rest, which OpenGL draws into the same picture with correct depth.
+// The renderer: traces some props and lets OpenGL draw the others into the same image with correct
+// depth.
 //
-// UpdateGeometry is where VTK's own DeviceRender, ParaView's passes and IceT's compositing pass all come by. The superclass draws the rest:
-// opaque, translucent, volumes, overlays. The picture goes in before its opaque props (opaque pixels) and after them (the others).
+// VTK's own DeviceRender, ParaView's passes and IceT's compositing pass all call UpdateGeometry.
+// The superclass draws the rest: opaque, translucent, volumes, overlays. Opaque pixels of the image
+// are drawn before its opaque props, the other pixels after them.
 #include "rtv_shim.h"
 
 #include <vtkFrameBufferObjectBase.h>
@@ -35,7 +37,8 @@ void vtkRtvRenderer::ReleaseGraphicsResources(vtkWindow* window)
   this->Superclass::ReleaseGraphicsResources(window);
 }
 
-// The bridge of a renderer, for the plugin, whose options belong to one; null for other renderers.
+// The bridge of a renderer, for the plugin, whose options belong to one bridge; null for other
+// renderers.
 extern "C" VTK_ABI_EXPORT RtvBridge* rtv_shim_bridge(vtkObjectBase* renderer)
 {
   vtkRtvRenderer* own = vtkRtvRenderer::SafeDownCast(renderer);
@@ -55,7 +58,7 @@ void vtkRtvRenderer::DeviceRender()
 
 int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
 {
-  // Selections are drawn by the hardware selector through the stock mappers: picks stay what they are.
+  // The hardware selector draws selections through the stock mappers, so picking is unchanged.
   if (!this->Bridge || this->Selector || this->UseHiddenLineRemoval || this->PropArrayCount == 0 ||
     !rtvApi->begin(this->Bridge))
   {

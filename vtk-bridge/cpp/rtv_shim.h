@@ -1,5 +1,6 @@
-// The C++ side of vtk-bridge: one subclass of vtkOpenGLRenderer. Everything that is not VTK's arrays or OpenGL is behind rtv.h.
-// Compiled by `vtk-bridge install` for each VTK on the machine, because the layout of VTK's classes differs from version to version.
+// The C++ side of vtk-bridge: one subclass of vtkOpenGLRenderer. Only code for VTK's arrays and
+// OpenGL is here; everything else is behind rtv.h. `vtk-bridge install` compiles it for each VTK on
+// the machine, because the layout of VTK's classes differs between versions.
 #pragma once
 #include "rtv.h"
 #include "rtv_compositing.h"
@@ -16,18 +17,19 @@ class vtkOpenGLQuadHelper;
 class vtkProp;
 class vtkTextureObject;
 
-// The bridge's functions; null until the loader or the plugin has set them.
+// The bridge's functions; null until the loader or the plugin sets them.
 extern const RtvApi* rtvApi;
 
-// Props of a renderer to surfaces of the bridge.
+// Converts the props of a renderer to surfaces of the bridge.
 class RtvExtractor
 {
 public:
-  // Adds `prop` to the frame. False when OpenGL has to draw it; the report knows why then.
+  // Adds `prop` to the frame. Returns false if OpenGL has to draw it; the report then gives the
+  // reason.
   bool Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, int number);
-  // The surface of a data set that is not polygons, made with the filter kept for `mapper`.
+  // The surface of a data set that is not polygonal, made with the filter cached for `mapper`.
   vtkDataSet* SurfaceOf(vtkMapper* mapper, vtkDataSet* data);
-  // Forgets the filters of mappers that were not seen this frame.
+  // Removes the filters of mappers that were not used this frame.
   void EndFrame();
 
 private:
@@ -43,13 +45,14 @@ private:
 void rtvAddLights(RtvBridge* bridge, vtkRenderer* renderer);
 RtvView rtvView(vtkRenderer* renderer, int width, int height);
 
-// Draws a picture with its depth into the bound framebuffer.
+// Draws an image with its depth into the bound framebuffer.
 class RtvBlit
 {
 public:
   ~RtvBlit();
   void Upload(vtkRenderer* renderer, const RtvPicture& picture);
-  // Stage 0: opaque pixels, with depth. Stage 1: pixels through which the window shows, tested against the depth that is there.
+  // Stage 0: opaque pixels, with depth. Stage 1: translucent pixels, tested against the existing
+  // depth.
   void Draw(vtkRenderer* renderer, int x, int y, int width, int height, int stage);
   void Release(vtkWindow* window);
 
@@ -82,7 +85,7 @@ private:
   RtvExtractor Extractor;
   RtvBlit Blit;
   vtkSmartPointer<vtkRenderPass> Compositing;
-  // Set while OpenGL draws the rest: where the picture goes.
+  // Set while OpenGL draws the rest: the destination of the image.
   bool HasPicture = false;
   bool PictureIsBlended = false;
   int Area[4] = { 0, 0, 0, 0 };

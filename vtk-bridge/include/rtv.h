@@ -9,7 +9,7 @@ extern "C" {
 
 /* A renderer's side of the bridge. */
 typedef struct RtvBridge RtvBridge;
-/* Kind of the numbers of an RtvArray: no array. */
+/* Element type of an RtvArray: no array. */
 #define RTV_NONE 0u
 /* Unsigned bytes. */
 #define RTV_U8 1u
@@ -27,7 +27,7 @@ typedef struct RtvBridge RtvBridge;
 #define RTV_COLOR_POINTS 1u
 /* Four bytes per cell. */
 #define RTV_COLOR_CELLS 2u
-/* Two floats per point: place in map, and above 0.5 for NaN. */
+/* Two floats per point: position in map, and above 0.5 for NaN. */
 #define RTV_COLOR_MAPPED 3u
 /* Parallel light. */
 #define RTV_LIGHT_DIRECTIONAL 0u
@@ -47,9 +47,9 @@ typedef struct RtvBridge RtvBridge;
 #define RTV_BLEND_ADDITIVE 4u
 /* Surfaces of given scalars. */
 #define RTV_BLEND_ISOSURFACES 5u
-/* tuples times components numbers, one after the other. */
+/* tuples times components numbers, contiguous in memory. */
 typedef struct RtvArray {
-  /* First number; may be null when there are none. */
+  /* First number; may be null if there are none. */
   void const* data;
   /* Tuples. */
   uint64_t tuples;
@@ -60,7 +60,7 @@ typedef struct RtvArray {
 } RtvArray;
 /* Cell i is connectivityoffsetsi .. offsetsi + 1. */
 typedef struct RtvCells {
-  /* One more than there are cells. */
+  /* One more than the number of cells. */
   RtvArray offsets;
   /* Point numbers. */
   RtvArray connectivity;
@@ -95,24 +95,24 @@ typedef struct RtvProperty {
   uint32_t lighting;
   /* 1 for the physically based model. */
   uint32_t pbr;
-  /* 1 to leave out sides turned to the viewer. */
+  /* 1 to cull front faces. */
   uint32_t cull_front;
-  /* 1 to leave out sides turned away. */
+  /* 1 to cull back faces. */
   uint32_t cull_back;
   /* Colour of the edges of polygons. */
   float edge_color[3];
   /* Their width in pixels; 0 for none. */
   float edge_width;
 } RtvProperty;
-/* A picture, and how it is read. */
+/* An image, and how it is sampled. */
 typedef struct RtvImage {
   /* Four RTV_U8 per texel, or none. */
   RtvArray texels;
-  /* Changes whenever the texels do. */
+  /* Changes whenever the texels change. */
   uint64_t key;
   /* Texels per row. */
   uint32_t width;
-  /* 1: linear between texels. */
+  /* 1: interpolated linearly between texels. */
   uint8_t interpolate;
   /* 1: repeated. */
   uint8_t repeat;
@@ -121,32 +121,32 @@ typedef struct RtvImage {
   /* Not used. */
   uint8_t reserved;
 } RtvImage;
-/* Textures of a physically based property besides that of its colour. */
+/* Textures of a physically based property other than its colour. */
 typedef struct RtvMaps {
   /* Occlusion, roughness and metalness in red, green and blue. */
   RtvImage material;
   /* Normals; they need tangents. */
   RtvImage normal;
-  /* Radiance given off. */
+  /* Emitted radiance. */
   RtvImage emissive;
   /* Factor on the first two components of the normals. */
   float normal_scale;
-  /* 0 for no occlusion, 1 for all of it. */
+  /* 0 for no occlusion, 1 for full occlusion. */
   float occlusion_strength;
   /* Factor on the radiance. */
   float emissive_factor[3];
   /* Not used. */
   uint32_t reserved;
 } RtvMaps;
-/* Something to draw. Arrays are read before rtv_surface returns and not kept. */
+/* A surface to draw. Arrays are read before rtv_surface returns and not kept. */
 typedef struct RtvSurface {
   /* Name for messages, UTF-8. */
   char const* name;
-  /* Changes whenever points, cells, normals, texture coordinates, clipping planes or radii do; 0: not known. */
+  /* Changes whenever points, cells, normals, texture coordinates, clipping planes or radii change; 0: not known. */
   uint64_t shape_key;
-  /* Changes whenever the colours do; 0: not known. */
+  /* Changes whenever the colours change; 0: not known. */
   uint64_t color_key;
-  /* Changes whenever the texture does. */
+  /* Changes whenever the texture changes. */
   uint64_t texture_key;
   /* Three RTV_F32 or RTV_F64. */
   RtvArray points;
@@ -176,7 +176,7 @@ typedef struct RtvSurface {
   RtvArray map;
   /* RTV_COLOR_MAPPED: colour of NaN. */
   uint8_t nan_color[4];
-  /* 1: linear between texels. */
+  /* 1: interpolated linearly between texels. */
   uint8_t texture_interpolate;
   /* 1: the texture is repeated. */
   uint8_t texture_repeat;
@@ -188,7 +188,7 @@ typedef struct RtvSurface {
   RtvArray texture;
   /* Texels per row. */
   uint32_t texture_width;
-  /* 1: backs of polygons answer light as back says. */
+  /* 1: back faces of polygons have the property back. */
   uint32_t has_back;
   /* Answer to light. */
   RtvProperty property;
@@ -213,15 +213,15 @@ typedef struct RtvSurface {
 typedef struct RtvVolume {
   /* Name for messages, UTF-8. */
   char const* name;
-  /* Changes whenever the scalars do; 0: not known. */
+  /* Changes whenever the scalars change; 0: not known. */
   uint64_t scalar_key;
   /* One number of any kind per point, x fastest; none when rtv_has_volume says that they are kept. */
   RtvArray scalars;
   /* Points per axis. */
   uint32_t dims[3];
-  /* 1: the value of the nearest point; 0: linear. */
+  /* 1: the value of the nearest point; 0: linear interpolation. */
   uint32_t nearest;
-  /* Distance of neighbouring points. */
+  /* Distance between neighbouring points. */
   double spacing[3];
   /* Row by row; the first point is at zero of the data. */
   double world_from_data[16];
@@ -262,7 +262,7 @@ typedef struct RtvVolume {
 typedef struct RtvLight {
   /* World position. */
   double position[3];
-  /* World point it looks at. */
+  /* World point that it is aimed at. */
   double focal_point[3];
   /* Half angle of a spot, degrees. */
   double cone_angle_deg;
@@ -277,7 +277,7 @@ typedef struct RtvLight {
   /* 1 for a headlight. */
   uint32_t headlight;
 } RtvLight;
-/* What is asked for. */
+/* What to render: a camera and a size. */
 typedef struct RtvView {
   /* Projection times view, row by row, depth -1 to 1. */
   double clip_from_world[16];
@@ -296,7 +296,7 @@ typedef struct RtvView {
   /* 1 when the program itself asks for shadows. */
   uint32_t shadows;
 } RtvView;
-/* A picture; rows from the top, memory of the bridge's until its next call. */
+/* An image; rows start at the top, and the memory belongs to the bridge until its next call. */
 typedef struct RtvPicture {
   /* Pixels per row. */
   uint32_t width;
@@ -311,7 +311,7 @@ typedef struct RtvPicture {
   /* Window depth of the first surface, or null without blended. */
   float const* first_depth;
 } RtvPicture;
-/* Number of this interface, made from its structures and calls (a test says which). A shim built for another one must not go on. */
+/* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
 #define RTV_ABI 4135612408u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
@@ -357,11 +357,11 @@ typedef struct RtvApi {
 
 /* RTV_ABI of the library. */
 uint32_t rtv_abi(void);
-/* A new bridge; free it with rtv_free. Null only when that is impossible. */
+/* Makes a bridge; free it with rtv_free. Null only if that is impossible. */
 RtvBridge* rtv_new(void);
 /* Frees a bridge; null is allowed. */
 void rtv_free(RtvBridge* bridge);
-/* Sets an option for all bridges of the process (RTV_AO, "16"); an empty value takes it back. 1 when it was understood. */
+/* Sets an option for all bridges of the process (RTV_AO, "16"). An empty value unsets it. Returns 1 if the option is valid. */
 int32_t rtv_set_option(char const* name, char const* value);
 /* Sets an option for one bridge, over those of the process; as rtv_set_option. Two bridges that draw in two threads do not see each other's. */
 int32_t rtv_set_bridge_option(RtvBridge* bridge, char const* name, char const* value);
@@ -371,27 +371,27 @@ double rtv_option(char const* name);
 double rtv_bridge_option(RtvBridge* bridge, char const* name);
 /* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES) take it from here, unless the environment or the program says otherwise. For all bridges of the process. */
 void rtv_host(uint32_t vtk_major, uint32_t vtk_minor);
-/* Begins a frame. 0 when everything is to be left to OpenGL (RTV_OFF). */
+/* Begins a frame. Returns 0 if OpenGL should draw everything (RTV_OFF). */
 int32_t rtv_begin(RtvBridge* bridge);
-/* Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1 when its arrays make no sense. */
+/* Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are invalid. */
 int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
-/* Adds all surfaces of something to draw, or none of them: how many will be traced, or -1 when the arrays of one make no sense (a warning names it), so that nothing is drawn twice. */
+/* Adds all surfaces of one prop, or none of them, so that nothing is drawn twice. Returns how many will be traced, or -1 if the arrays of one are invalid (a warning names it). */
 int32_t rtv_surfaces(RtvBridge* bridge, RtvSurface const* surfaces, uint64_t count);
-/* Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory until its next call. */
+/* Adds a volume: null if it will be traced, else the reason, in memory of the bridge that is valid until its next call. */
 char const* rtv_volume(RtvBridge* bridge, RtvVolume const* volume);
-/* 1 when the scalars of this key are kept: rtv_volume need not be given them. */
+/* Returns 1 if the scalars of this key are cached; rtv_volume then does not need them. */
 int32_t rtv_has_volume(RtvBridge* bridge, uint64_t scalar_key);
-/* 1 when colours of these keys are kept from the frame before: rtv_surface need not be given their arrays. */
+/* Returns 1 if colours of these keys are cached from the last frame; rtv_surface then does not need their arrays. */
 int32_t rtv_has_colors(RtvBridge* bridge, uint64_t shape_key, uint64_t color_key);
 /* Adds a light. */
 void rtv_light(RtvBridge* bridge, RtvLight const* light);
-/* Tells the report that OpenGL draws something, and why. */
+/* Records for the report that OpenGL draws something, and why. */
 void rtv_pass(RtvBridge* bridge, char const* name, char const* reason);
 /* Warns the user, once for each text. */
 void rtv_warn(RtvBridge* bridge, char const* message);
-/* Draws what was added: 1 with a picture, 0 when it could not be drawn (the user is told why; OpenGL should draw everything). */
+/* Renders what was added: 1 with an image, 0 if it could not be rendered. The user is told why, and OpenGL should draw everything. */
 int32_t rtv_render(RtvBridge* bridge, RtvView const* view, RtvPicture* picture);
-/* Ends the frame: warnings are printed and the report is written, also when nothing was drawn. */
+/* Ends the frame: prints warnings and writes the report, even if nothing was drawn. */
 void rtv_end(RtvBridge* bridge);
 /* The table; valid as long as the library is loaded. */
 RtvApi const* rtv_api(void);

@@ -5,20 +5,20 @@ use super::object::Handle;
 use std::collections::HashSet;
 use std::sync::Mutex;
 
-/// How bad it is, with ANARI's numbers.
+/// Severity, with ANARI's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The device cannot go on.
     Fatal = 1,
-    /// What was asked for was not done.
+    /// The request was not carried out.
     Error = 2,
-    /// It was done differently from what was asked, or left out.
+    /// The request was carried out differently or only in part.
     Warning = 3,
-    /// It works, but slower than it could.
+    /// The request works, but is slower than necessary.
     Performance = 4,
-    /// Worth knowing.
+    /// Information.
     Info = 5,
-    /// For people who look for faults.
+    /// Information for debugging.
     Debug = 6,
 }
 
@@ -31,18 +31,18 @@ pub enum Code {
     Unknown = 1,
     /// An argument is wrong.
     InvalidArgument = 2,
-    /// Not now, or not on this object.
+    /// The call is not valid now, or not on this object.
     InvalidOperation = 3,
 }
 
-/// Something to tell the program.
+/// A message for the program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Message {
-    /// Which object it is about; the null handle for none or the device.
+    /// The object concerned; the null handle for none or the device.
     pub source: Handle,
     /// Kind of the object.
     pub source_type: DataType,
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
     /// ANARI's code.
     pub code: Code,
@@ -50,35 +50,35 @@ pub struct Message {
     pub text: String,
 }
 
-/// Who gets the messages.
+/// Receives the messages.
 pub trait Listener: Send + Sync {
     /// Takes a message; may be called from any thread.
     fn message(&self, message: &Message);
 }
 
-/// Messages on their way; those that could come with every frame are given once.
+/// Sends messages. A message that could repeat with every frame is sent once.
 pub struct Status {
     listener: Mutex<Box<dyn Listener>>,
     told: Mutex<HashSet<String>>,
 }
 
 impl Status {
-    /// Messages go to `listener`.
+    /// Makes a sender to `listener`.
     pub fn new(listener: Box<dyn Listener>) -> Status {
         Status { listener: Mutex::new(listener), told: Mutex::default() }
     }
 
-    /// From now on messages go to `listener`.
+    /// Sends later messages to `listener`.
     pub fn set_listener(&self, listener: Box<dyn Listener>) {
         *lock(&self.listener) = listener;
     }
 
-    /// Tells.
+    /// Sends a message.
     pub fn tell(&self, message: &Message) {
         lock(&self.listener).message(message);
     }
 
-    /// Tells unless the same text about the same object has been told before.
+    /// Sends a message unless the same text about the same object was already sent.
     pub fn tell_once(&self, message: &Message) {
         let key = format!("{:?} {}", message.source, message.text);
         if lock(&self.told).insert(key) {
@@ -87,7 +87,7 @@ impl Status {
     }
 }
 
-/// A lock whatever other threads did while they held it: the data behind the device's locks is
+/// Takes a lock even if it is poisoned. This is safe because the data behind the device's locks is
 /// never left half changed.
 pub(crate) fn lock<T: ?Sized>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)

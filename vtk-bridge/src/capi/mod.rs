@@ -27,8 +27,8 @@ pub struct RtvBridge {
     _private: [u8; 0],
 }
 
-/// Number of this interface, made from its structures and calls (a test says which). A shim built
-/// for another one must not go on.
+/// Version of this interface, computed from its structures and calls (a test gives the value). A
+/// shim built for another version must not continue.
 pub const RTV_ABI: u32 = 4_135_612_408;
 
 /// [`RTV_ABI`] of the library.
@@ -37,7 +37,7 @@ pub extern "C" fn rtv_abi() -> u32 {
     RTV_ABI
 }
 
-/// A new bridge; free it with `rtv_free`. Null only when that is impossible.
+/// Makes a bridge; free it with `rtv_free`. Null only if that is impossible.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_new() -> *mut RtvBridge {
     guarded(std::ptr::null_mut(), || Box::into_raw(Box::new(BridgeState::new())).cast())
@@ -56,8 +56,8 @@ pub unsafe extern "C" fn rtv_free(bridge: *mut RtvBridge) {
     }
 }
 
-/// Sets an option for all bridges of the process (`RTV_AO`, "16"); an empty value takes it back. 1
-/// when it was understood.
+/// Sets an option for all bridges of the process (`RTV_AO`, "16"). An empty value unsets it.
+/// Returns 1 if the option is valid.
 ///
 /// # Safety
 /// Both are null or end with a zero byte.
@@ -111,7 +111,7 @@ pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {
     guarded((), || state::set_host(vtk_major, vtk_minor));
 }
 
-/// Begins a frame. 0 when everything is to be left to OpenGL (`RTV_OFF`).
+/// Begins a frame. Returns 0 if OpenGL should draw everything (`RTV_OFF`).
 ///
 /// # Safety
 /// `bridge` is null or came from `rtv_new`.
@@ -121,8 +121,8 @@ pub unsafe extern "C" fn rtv_begin(bridge: *mut RtvBridge) -> i32 {
     unsafe { with(bridge, 0, |h| h.begin()) }
 }
 
-/// Adds something to draw: 1 when it will be traced, 0 when there is nothing to trace in it, -1
-/// when its arrays make no sense.
+/// Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are
+/// invalid.
 ///
 /// # Safety
 /// As `rtv_begin`; every array of `surface` has the length it says and is not written to during the
@@ -133,8 +133,8 @@ pub unsafe extern "C" fn rtv_surface(bridge: *mut RtvBridge, surface: *const Rtv
     unsafe { rtv_surfaces(bridge, surface, 1) }
 }
 
-/// Adds all surfaces of something to draw, or none of them: how many will be traced, or -1 when the
-/// arrays of one make no sense (a warning names it), so that nothing is drawn twice.
+/// Adds all surfaces of one prop, or none of them, so that nothing is drawn twice. Returns how many
+/// will be traced, or -1 if the arrays of one are invalid (a warning names it).
 ///
 /// # Safety
 /// As `rtv_surface`, for `count` surfaces one after the other.
@@ -164,7 +164,7 @@ pub unsafe extern "C" fn rtv_surfaces(
     }
 }
 
-/// Adds a volume: null when it will be traced, else the reason why not, of the bridge's memory
+/// Adds a volume: null if it will be traced, else the reason, in memory of the bridge that is valid
 /// until its next call.
 ///
 /// # Safety
@@ -189,7 +189,7 @@ pub unsafe extern "C" fn rtv_volume(
     }
 }
 
-/// 1 when the scalars of this key are kept: `rtv_volume` need not be given them.
+/// Returns 1 if the scalars of this key are cached; `rtv_volume` then does not need them.
 ///
 /// # Safety
 /// As `rtv_begin`.
@@ -199,8 +199,8 @@ pub unsafe extern "C" fn rtv_has_volume(bridge: *mut RtvBridge, scalar_key: u64)
     unsafe { with(bridge, 0, |h| i32::from(h.bridge.has_volume(scalar_key))) }
 }
 
-/// 1 when colours of these keys are kept from the frame before: `rtv_surface` need not be given
-/// their arrays.
+/// Returns 1 if colours of these keys are cached from the last frame; `rtv_surface` then does not
+/// need their arrays.
 ///
 /// # Safety
 /// As `rtv_begin`.
@@ -226,7 +226,7 @@ pub unsafe extern "C" fn rtv_light(bridge: *mut RtvBridge, light: *const RtvLigh
     unsafe { with(bridge, (), |h| h.bridge.add_light(arrays::light(l))) }
 }
 
-/// Tells the report that OpenGL draws something, and why.
+/// Records for the report that OpenGL draws something, and why.
 ///
 /// # Safety
 /// As `rtv_begin`; texts are null or end with a zero byte.
@@ -250,8 +250,8 @@ pub unsafe extern "C" fn rtv_warn(bridge: *mut RtvBridge, message: *const c_char
     unsafe { with(bridge, (), |h| h.bridge.warn(text(message))) }
 }
 
-/// Draws what was added: 1 with a picture, 0 when it could not be drawn (the user is told why;
-/// OpenGL should draw everything).
+/// Renders what was added: 1 with an image, 0 if it could not be rendered. The user is told why,
+/// and OpenGL should draw everything.
 ///
 /// # Safety
 /// As `rtv_begin`; `view` and `picture` are null or valid.
@@ -285,7 +285,7 @@ pub unsafe extern "C" fn rtv_render(
     }
 }
 
-/// Ends the frame: warnings are printed and the report is written, also when nothing was drawn.
+/// Ends the frame: prints warnings and writes the report, even if nothing was drawn.
 ///
 /// # Safety
 /// As `rtv_begin`.
@@ -368,7 +368,7 @@ pub extern "C" fn rtv_api() -> *const RtvApi {
     &API
 }
 
-/// A C text; what is not UTF-8 is replaced.
+/// Converts a C string; bytes that are not UTF-8 are replaced.
 ///
 /// # Safety
 /// Null, or ends with a zero byte.
@@ -380,8 +380,7 @@ unsafe fn text(t: *const c_char) -> String {
     unsafe { CStr::from_ptr(t) }.to_string_lossy().into_owned()
 }
 
-/// The options in force, for programs that use the library from Rust and want what the environment
-/// says.
+/// The effective options, for Rust programs that want to follow the environment.
 pub fn options_of_process() -> Options {
     state::options()
 }

@@ -2,7 +2,7 @@
 
 use std::os::raw::{c_char, c_void};
 
-/// Kind of the numbers of an [`RtvArray`]: no array.
+/// Element type of an [`RtvArray`]: no array.
 pub const RTV_NONE: u32 = 0;
 /// Unsigned bytes.
 pub const RTV_U8: u32 = 1;
@@ -21,7 +21,7 @@ pub const RTV_COLOR_PROPERTY: u32 = 0;
 pub const RTV_COLOR_POINTS: u32 = 1;
 /// Four bytes per cell.
 pub const RTV_COLOR_CELLS: u32 = 2;
-/// Two floats per point: place in `map`, and above 0.5 for NaN.
+/// Two floats per point: position in `map`, and above 0.5 for NaN.
 pub const RTV_COLOR_MAPPED: u32 = 3;
 
 /// Parallel light.
@@ -44,11 +44,11 @@ pub const RTV_BLEND_ADDITIVE: u32 = 4;
 /// Surfaces of given scalars.
 pub const RTV_BLEND_ISOSURFACES: u32 = 5;
 
-/// `tuples` times `components` numbers, one after the other.
+/// `tuples` times `components` numbers, contiguous in memory.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvArray {
-    /// First number; may be null when there are none.
+    /// First number; may be null if there are none.
     pub data: *const c_void,
     /// Tuples.
     pub tuples: u64,
@@ -62,7 +62,7 @@ pub struct RtvArray {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvCells {
-    /// One more than there are cells.
+    /// One more than the number of cells.
     pub offsets: RtvArray,
     /// Point numbers.
     pub connectivity: RtvArray,
@@ -100,9 +100,9 @@ pub struct RtvProperty {
     pub lighting: u32,
     /// 1 for the physically based model.
     pub pbr: u32,
-    /// 1 to leave out sides turned to the viewer.
+    /// 1 to cull front faces.
     pub cull_front: u32,
-    /// 1 to leave out sides turned away.
+    /// 1 to cull back faces.
     pub cull_back: u32,
     /// Colour of the edges of polygons.
     pub edge_color: [f32; 3],
@@ -110,17 +110,17 @@ pub struct RtvProperty {
     pub edge_width: f32,
 }
 
-/// A picture, and how it is read.
+/// An image, and how it is sampled.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvImage {
     /// Four RTV_U8 per texel, or none.
     pub texels: RtvArray,
-    /// Changes whenever the texels do.
+    /// Changes whenever the texels change.
     pub key: u64,
     /// Texels per row.
     pub width: u32,
-    /// 1: linear between texels.
+    /// 1: interpolated linearly between texels.
     pub interpolate: u8,
     /// 1: repeated.
     pub repeat: u8,
@@ -130,7 +130,7 @@ pub struct RtvImage {
     pub reserved: u8,
 }
 
-/// Textures of a physically based property besides that of its colour.
+/// Textures of a physically based property other than its colour.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvMaps {
@@ -138,11 +138,11 @@ pub struct RtvMaps {
     pub material: RtvImage,
     /// Normals; they need tangents.
     pub normal: RtvImage,
-    /// Radiance given off.
+    /// Emitted radiance.
     pub emissive: RtvImage,
     /// Factor on the first two components of the normals.
     pub normal_scale: f32,
-    /// 0 for no occlusion, 1 for all of it.
+    /// 0 for no occlusion, 1 for full occlusion.
     pub occlusion_strength: f32,
     /// Factor on the radiance.
     pub emissive_factor: [f32; 3],
@@ -150,18 +150,18 @@ pub struct RtvMaps {
     pub reserved: u32,
 }
 
-/// Something to draw. Arrays are read before `rtv_surface` returns and not kept.
+/// A surface to draw. Arrays are read before `rtv_surface` returns and not kept.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvSurface {
     /// Name for messages, UTF-8.
     pub name: *const c_char,
-    /// Changes whenever points, cells, normals, texture coordinates, clipping planes or radii do;
-    /// 0: not known.
+    /// Changes whenever points, cells, normals, texture coordinates, clipping planes or radii
+    /// change; 0: not known.
     pub shape_key: u64,
-    /// Changes whenever the colours do; 0: not known.
+    /// Changes whenever the colours change; 0: not known.
     pub color_key: u64,
-    /// Changes whenever the texture does.
+    /// Changes whenever the texture changes.
     pub texture_key: u64,
     /// Three RTV_F32 or RTV_F64.
     pub points: RtvArray,
@@ -191,7 +191,7 @@ pub struct RtvSurface {
     pub map: RtvArray,
     /// RTV_COLOR_MAPPED: colour of NaN.
     pub nan_color: [u8; 4],
-    /// 1: linear between texels.
+    /// 1: interpolated linearly between texels.
     pub texture_interpolate: u8,
     /// 1: the texture is repeated.
     pub texture_repeat: u8,
@@ -203,7 +203,7 @@ pub struct RtvSurface {
     pub texture: RtvArray,
     /// Texels per row.
     pub texture_width: u32,
-    /// 1: backs of polygons answer light as back says.
+    /// 1: back faces of polygons have the property `back`.
     pub has_back: u32,
     /// Answer to light.
     pub property: RtvProperty,
@@ -231,16 +231,16 @@ pub struct RtvSurface {
 pub struct RtvVolume {
     /// Name for messages, UTF-8.
     pub name: *const c_char,
-    /// Changes whenever the scalars do; 0: not known.
+    /// Changes whenever the scalars change; 0: not known.
     pub scalar_key: u64,
     /// One number of any kind per point, x fastest; none when rtv_has_volume says that they are
     /// kept.
     pub scalars: RtvArray,
     /// Points per axis.
     pub dims: [u32; 3],
-    /// 1: the value of the nearest point; 0: linear.
+    /// 1: the value of the nearest point; 0: linear interpolation.
     pub nearest: u32,
-    /// Distance of neighbouring points.
+    /// Distance between neighbouring points.
     pub spacing: [f64; 3],
     /// Row by row; the first point is at zero of the data.
     pub world_from_data: [f64; 16],
@@ -286,7 +286,7 @@ pub struct RtvVolume {
 pub struct RtvLight {
     /// World position.
     pub position: [f64; 3],
-    /// World point it looks at.
+    /// World point that it is aimed at.
     pub focal_point: [f64; 3],
     /// Half angle of a spot, degrees.
     pub cone_angle_deg: f64,
@@ -302,7 +302,7 @@ pub struct RtvLight {
     pub headlight: u32,
 }
 
-/// What is asked for.
+/// What to render: a camera and a size.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvView {
@@ -324,7 +324,7 @@ pub struct RtvView {
     pub shadows: u32,
 }
 
-/// A picture; rows from the top, memory of the bridge's until its next call.
+/// An image; rows start at the top, and the memory belongs to the bridge until its next call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtvPicture {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 pub use clip::{ClipMap, ClipVertex};
 
-/// What became of one [`Shape`]; colours are put on it by [`crate::colors`].
+/// The geometry of one [`Shape`]. [`crate::colors`] adds colours to it.
 #[derive(Clone)]
 pub struct GeometrySet {
     /// Triangles of polygons and strips, if there are any.
@@ -25,13 +25,13 @@ pub struct GeometrySet {
     pub spheres: Option<Arc<rt_core::shapes::Spheres>>,
     /// Tubes of lines or edges.
     pub tubes: Option<Arc<rt_core::shapes::Tubes>>,
-    /// Backs of the triangles, where they look different.
+    /// Back faces of the triangles, if they look different.
     pub back_faces: Option<Arc<dyn rt_core::shapes::Shape>>,
     /// Triangles that cannot be drawn (a NaN point, a point number that does not exist).
     pub skipped: usize,
 }
 
-/// Triangles, and where each comes from.
+/// Triangles and their source cells.
 #[derive(Clone)]
 pub struct PolygonMesh {
     /// The mesh, without colours.
@@ -46,13 +46,13 @@ pub struct PolygonMesh {
 }
 
 impl PolygonMesh {
-    /// As rt-core wants it.
+    /// The mesh in rt-core's form.
     pub fn geometry(&self) -> Geometry {
         Geometry::Mesh(Arc::clone(&self.mesh))
     }
 }
 
-/// Which cell a triangle belongs to.
+/// The cell that each triangle belongs to.
 #[derive(Clone)]
 pub enum CellOfTriangle {
     /// Triangle i is cell `first + i`: all polygons are triangles, and a list is not needed.
@@ -75,7 +75,7 @@ impl CellOfTriangle {
     }
 }
 
-/// The numbers that `vtkPolyData` gives the cells of each kind.
+/// The range of cell numbers in `vtkPolyData` for each kind of cell.
 fn cell_numbers(shape: &Shape<'_>) -> [Range<usize>; 4] {
     let mut start = 0;
     [shape.verts, shape.lines, shape.polys, shape.strips].map(|cells| {
@@ -85,7 +85,7 @@ fn cell_numbers(shape: &Shape<'_>) -> [Range<usize>; 4] {
     })
 }
 
-/// Builds everything that `shape` asks for.
+/// Builds all geometry that `shape` requests.
 pub fn build(shape: &Shape<'_>) -> GeometrySet {
     let [_, _, polys, strips] = cell_numbers(shape);
     let mut built =

@@ -15,12 +15,12 @@ use rt_core::shapes::{
 };
 use std::sync::{Arc, OnceLock};
 
-/// A geometry without its look.
+/// A geometry without its appearance.
 pub(crate) struct Part {
     pub(crate) body: Body,
     pub(crate) topology: Arc<Topology>,
-    /// A mesh as a shape, made when a paint needs it; always the same one, so that looks share its
-    /// tree.
+    /// The mesh as a shape, made only when a surface colour needs it. It is always the same shape,
+    /// so that appearances share its tree.
     triangles: OnceLock<Arc<dyn Shape>>,
 }
 
@@ -29,7 +29,7 @@ pub(crate) enum Body {
     Shape(Arc<dyn Shape>, Weights),
 }
 
-/// What a geometry object consists of.
+/// The parts of a geometry object.
 #[derive(Default)]
 pub(crate) struct CompiledGeometry {
     /// Usually one; an isosurface has one per isovalue.
@@ -67,13 +67,14 @@ impl Part {
     }
 }
 
-/// Parameters that do not change the shape: what depends on them is made in [`super::surface`].
+/// Parameters that do not change the shape. [`super::surface`] handles what depends on them.
 pub(crate) fn is_appearance_parameter(name: &str) -> bool {
     let last = name.rsplit('.').next().unwrap_or(name);
     name == "name" || last == "color" || last.starts_with("attribute")
 }
 
-/// Makes what the renderer needs. Faults become notes, and what is unusable is left out.
+/// Converts the geometry for the renderer. Faults are recorded as diagnostics, and unusable parts
+/// are left out.
 pub(crate) fn compile_geometry(
     geometry: &Object,
     diagnostics: &mut Diagnostics,
@@ -164,8 +165,8 @@ fn elements<const N: usize>(
 /// Radii by `index`, from an array or the parameter `radius`.
 fn radii(geometry: &Object, array: &str, default: f32) -> impl Fn(u32) -> f32 + use<> {
     let listed = geometry.object(array).and_then(|a| a.with_array(|a| a.scalars()));
-    // A radius past the end of its array is none at all: the renderer counts and leaves out what
-    // has no radius.
+    // A radius past the end of its array counts as missing. The renderer counts and leaves out
+    // primitives without a radius.
     move |i| listed.as_ref().map_or(default, |r| r.get(i as usize).copied().unwrap_or(0.0))
 }
 
@@ -242,8 +243,8 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
     Some(Part::new(Body::Mesh(mesh.into()), topology))
 }
 
-/// Tangents of a mesh's vertices, per corner before per vertex; what is missing is 0, where normal
-/// maps then change nothing.
+/// Tangents of a mesh's vertices; per corner takes precedence over per vertex. Missing tangents are
+/// 0, and normal maps have no effect there.
 fn tangents(geometry: &Object, topology: &Topology, vertices: usize) -> Option<Vec<Vec4>> {
     let list = |name: &str| geometry.object(name).and_then(|a| a.with_array(|a| a.attributes()));
     let at =
@@ -330,7 +331,7 @@ fn cylinders(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
     shape_part(geometry, shape, Weights::Along, topology, diagnostics)
 }
 
-/// Cylinders of which some ends are open: hits on the missing caps are passed over.
+/// Cylinders with some open ends. Hits on the missing caps are skipped.
 struct HalfOpen {
     solid: Cylinders,
     closed: Vec<[bool; 2]>,
@@ -372,8 +373,7 @@ fn curve(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
         geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<1>()));
     let total = listed.as_ref().map_or(points.len().saturating_sub(1), Vec::len);
     let all = listed.unwrap_or_else(|| (0..total as u32).map(|i| [i]).collect());
-    // Segments in the order of their vertices, so that chains are found whatever order the program
-    // has them in.
+    // Sorts segments by their vertices, so that chains are found in any order.
     let mut segments: Vec<(u32, u32)> = (0..)
         .zip(&all)
         .map(|(number, [v])| (*v, number))
