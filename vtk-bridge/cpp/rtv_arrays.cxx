@@ -224,7 +224,8 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
   }
   if (cellFlag == 2 && mapper->GetFieldDataTupleId() < 0)
   {
-    // An array of the field data with a value for each cell; with a tuple's number it would be one colour for everything.
+    // An array of the field data with a value for each cell; with a tuple's number it would be one
+    // colour for everything.
     cellFlag = 1;
   }
   const bool byCell = cellFlag == 1;

@@ -1,4 +1,5 @@
-// Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does not give them away.
+// Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does
+// not give them away.
 #include "rtv_arrays.h"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
-// ParaView's pass that composites ranks with IceT, with other pixels. A library of its own, opened by the shim when there are several ranks: it needs
-// ParaView's libraries, and if the shim brought those along they would register their renderer before ours.
+// ParaView's pass that composites ranks with IceT, with other pixels. A library of its own, opened
+// by the shim when there are several ranks: it needs ParaView's libraries, and if the shim brought
+// those along they would register their renderer before ours.
 #include <algorithm>
 #include <vector>
 #include <vtkCamera.h>
@@ -20,7 +21,8 @@
 
 #include <IceT.h>
 
-// ParaView's pass with other pixels: ranks draw into a framebuffer of floats, IceT blends floats, and the result is rounded once.
+// ParaView's pass with other pixels: ranks draw into a framebuffer of floats, IceT blends floats,
+// and the result is rounded once.
 class vtkRtvIceTPass : public vtkIceTCompositePass
 {
 public:
@@ -201,7 +203,8 @@ vtkStandardNewMacro(vtkRtvIceTPass);
 
 #define RTV_EXPORT extern "C" __attribute__((visibility("default")))
 
-// Puts our pass into the place of ParaView's below `camera`, made with `kept` or anew. Null when that does not composite translucent pictures.
+// Puts our pass into the place of ParaView's below `camera`, made with `kept` or anew. Null when
+// that does not composite translucent pictures.
 RTV_EXPORT vtkRenderPass* rtv_icet_begin(vtkRenderPass* camera, vtkRenderPass* kept)
 {
   auto outer = vtkCameraPass::SafeDownCast(camera);

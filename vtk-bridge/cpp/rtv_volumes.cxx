@@ -1,4 +1,5 @@
-// Volumes of uniform grids to the bridge; which of them rt-core can draw as VTK does, and why the others stay OpenGL.
+// Volumes of uniform grids to the bridge; which of them rt-core can draw as VTK does, and why the
+// others stay OpenGL.
 #include "rtv_arrays.h"
 
 #include <algorithm>
@@ -287,7 +288,8 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     }
   }
 
-  // ---- Place: index times spacing, turned by the image's directions, moved to its first point, then the prop's matrix.
+  // ---- Place: index times spacing, turned by the image's directions, moved to its first point,
+  // then the prop's matrix.
   double first[3];
   image->TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first);
   vtkNew<vtkMatrix4x4> local;
@@ -352,7 +354,8 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   }
   if (HasGradientOpacity(property))
   {
-    // OpenGL takes differences over n / (n - 1) of the distance of points and back, and scales them by the mean of the spacings.
+    // OpenGL takes differences over n / (n - 1) of the distance of points and back, and scales them
+    // by the mean of the spacings.
     double spacing = 0.0, reach = 0.0;
     for (int axis = 0; axis < 3; ++axis)
     {
@@ -407,7 +410,8 @@ const char* rtvAddVolume(
     {
       return reason;
     }
-    // OpenGL's highlight under several lights is that of the last one in 9.1, seen from a mirrored place.
+    // OpenGL's highlight under several lights is that of the last one in 9.1, seen from a mirrored
+    // place.
     if (!lights.List.empty() && volume->GetProperty()->GetSpecular(0) > 0.0)
     {
       return "a shaded volume with a highlight under other lights than one white headlight";

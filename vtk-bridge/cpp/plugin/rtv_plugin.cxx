@@ -1,8 +1,10 @@
-// What happens when ParaView loads the plugin: the bridge and the shim for this ParaView are opened, the renderer's override is
-// registered, and ParaView learns of the views' options. Whatever is missing is said once, and ParaView goes on as before.
+// What happens when ParaView loads the plugin: the bridge and the shim for this ParaView are
+// opened, the renderer's override is registered, and ParaView learns of the views' options.
+// Whatever is missing is said once, and ParaView goes on as before.
 //
-// Compiled by `vtk-bridge install --plugin` like the shim, with ParaView's headers only. ParaView's CMake package would write the class
-// below for us, but wants the headers of a dozen libraries that Debian's paraview-dev does not depend on.
+// Compiled by `vtk-bridge install --plugin` like the shim, with ParaView's headers only. ParaView's
+// CMake package would write the class below for us, but wants the headers of a dozen libraries that
+// Debian's paraview-dev does not depend on.
 #define PARAVIEW_BUILDING_PLUGIN
 #define PARAVIEW_PLUGIN_BUILT_SHARED 1
 #include "rtv.h"

@@ -18,8 +18,9 @@ namespace
 const RtvApi* theApi = nullptr;
 RtvBridge* (*theBridgeOf)(vtkObjectBase* renderer) = nullptr;
 
-// A property's command, the option it sets, its default, and the names of an enumeration. A property with its default value leaves the
-// option what the environment says, so that RTV_* variables work with the plugin too.
+// A property's command, the option it sets, its default, and the names of an enumeration. A
+// property with its default value leaves the option what the environment says, so that RTV_*
+// variables work with the plugin too.
 struct Row
 {
   const char* Command;

@@ -1,5 +1,6 @@
-// What the plugin adds to ParaView, in the language of its server manager: a set of options, and a property of render views that holds one.
-// ParaView makes the panel from them. Names are those of ParaView's properties for OSPRay where there is such a one.
+// What the plugin adds to ParaView, in the language of its server manager: a set of options, and a
+// property of render views that holds one. ParaView makes the panel from them. Names are those of
+// ParaView's properties for OSPRay where there is such a one.
 #pragma once
 
 static const char* const rtvViewProperties = R"xml(

@@ -1,5 +1,6 @@
-// Points and cells in every array that VTK can keep them in, read as the bridge gets them: each must come out as the same
-// two triangles. Compiled with cpp/rtv_arrays.cxx for each VTK with headers; prints what it looked at.
+// Points and cells in every array that VTK can keep them in, read as the bridge gets them: each
+// must come out as the same two triangles. Compiled with cpp/rtv_arrays.cxx for each VTK with
+// headers; prints what it looked at.
 #include "rtv_arrays.h"
 
 #include <cstdio>
