@@ -1,9 +1,9 @@
-//! Brings the pieces of a finished image to one rank, as they are finished, or leaves them where
+//! Gathers the parts of a finished image on one rank as they are finished, or leaves them where
 //! they are.
 //!
-//! Pieces travel as sparse messages, so background costs a bit a pixel, and depth only where it is
-//! asked for. All ranks know from the beginning which pieces there will be, so their receives are
-//! posted before anything else is done.
+//! The parts are sent as sparse messages: background costs one bit per pixel, and depth is sent
+//! only on request. All ranks know from the beginning which parts there will be, so they post
+//! their receives before they do anything else.
 use crate::codec;
 use crate::error::CompositeError;
 use crate::frame::{Image, Piece};

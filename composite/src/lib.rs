@@ -1,10 +1,10 @@
-//! Sort-last compositing: every rank has rendered its part of the data, together they make one
-//! image.
+//! Sort-last compositing: every rank has rendered its part of the data, and the ranks combine
+//! their images into one.
 //!
-//! Slices of colour and depth, or of ordered premultiplied colour, go in; one image, or a piece of
-//! it on every rank, comes out, over any [`Communicator`]. All strategies give the same bits as
-//! [`composite_serial`]. Sections 3.2.1 and 3.3 of the thesis are about this step; IceT (Moreland,
-//! Kendall, Peterka, Huang, SC11) is the library it used.
+//! The input is slices of colour and depth, or of ordered premultiplied colour. The output is one
+//! image, or one part of it on every rank. Ranks communicate through any [`Communicator`]. All
+//! strategies give the same bits as [`composite_serial`]. Sections 3.2.1 and 3.3 of the thesis
+//! describe this step; the thesis used IceT (Moreland, Kendall, Peterka, Huang, SC11).
 //!
 //! ```
 //! use composite::{Communicator, Frame, Options, threads};

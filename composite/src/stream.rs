@@ -1,6 +1,5 @@
-//! Compositing while the frame is still being rendered: tiles are handed in as they are finished,
-//! travel and are joined, so that a frame costs the longer of rendering and compositing and not
-//! their sum.
+//! Compositing while the frame is still being rendered. Tiles are submitted, sent and merged as
+//! they are finished, so a frame costs the longer of rendering and compositing and not their sum.
 //!
 //! The thesis names this as not done (sections 3.3.2 and 6.1); the Distributed FrameBuffer of
 //! OSPRay (W. Usher, I. Wald, J. Amstutz, J. Günther, C. Brownlee, V. Pascucci, "Scalable Ray

@@ -1,4 +1,5 @@
-//! How ranks talk. Compositing needs no more than this trait, so any transport can be plugged in.
+//! Communication between ranks. Compositing needs only this trait, so any transport can
+//! implement it.
 pub mod collective;
 #[cfg(all(unix, target_pointer_width = "64", target_endian = "little"))]
 #[cfg_attr(
