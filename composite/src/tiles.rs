@@ -4,8 +4,8 @@
 //! The image is bisected recursively, and so are the ranks: those that drew further left (or up)
 //! get the left (or upper) part, which is as large as their share of the work. Compared with bands
 //! of rows this needs fewer messages: a small object overlaps a few tiles and not many bands (at
-//! 127 ranks in slabs it is a few instead of all). Part of the data to merge is
-//! also already on the rank that needs it.
+//! 127 ranks in slabs it is a few instead of all). Part of the data to merge is also
+//! already on the rank that needs it.
 use crate::rect::Rect;
 
 /// An active pixel costs a transfer and a join, a pixel of the result only its place: their ratio,
