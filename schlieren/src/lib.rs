@@ -1,8 +1,8 @@
 //! Physically based schlieren, shadowgraph and interferometry from flow data.
 //!
-//! Lengths are metres, angles radians, all in `f64` where the user meets them. What is stored of
-//! the gas is not its index of refraction n but the small number eps = n/n0 - 1 ([`field::Field`]),
-//! and what is computed of a ray is not where it goes but how far it strays from the straight ray
+//! Lengths are in metres and angles in radians, all in `f64` in the public interface. The gas is
+//! stored not as its index of refraction n but as the small number eps = n/n0 - 1
+//! ([`field::Field`]). A ray's result is not its position but its deviation from the straight ray
 //! through the reference medium ([`path::Exit`]). Both keep their relative accuracy in `f32`
 //! however weak the gas is.
 //!
