@@ -1,21 +1,22 @@
 //! Ray tracing inside unmodified OpenGL programs (chapter 4 of the dissertation).
 //!
-//! The shared library stands between a program and its OpenGL driver. The life of a frame:
+//! The shared library is loaded between a program and its OpenGL driver. It handles a frame in
+//! five steps:
 //!
-//! 1. A call comes to a trampoline (`interpose`); most go straight on to the driver, which keeps
-//!    all state.
-//! 2. A draw of filled primitives asks what the state is (`state`) and whether rays can stand for
-//!    it (`classify`).
-//! 3. If so it becomes a mesh (`capture`) whose hierarchy may be there already
+//! 1. The program's OpenGL call enters a trampoline (`interpose`). Most calls go straight on to
+//!    the driver, which keeps all state.
+//! 2. For a draw of filled primitives, the library reads the state (`state`) and decides whether
+//!    ray tracing can replace the draw (`classify`).
+//! 3. If it can, the draw becomes a mesh (`capture`). The mesh's hierarchy may already be cached
 //!    (`capture::geometry_cache`).
-//! 4. When the program is about to see the picture (`present::frame`) rays find the nearest
-//!    triangle of every pixel (`trace`), which is lit as OpenGL lights it (`trace::lighting`,
+//! 4. When the program is about to see the image (`present::frame`), rays find the nearest
+//!    triangle of every pixel (`trace`). Each hit is lit as OpenGL lights it (`trace::lighting`,
 //!    `trace::texturing`).
 //! 5. Colours and depths go into the program's framebuffer as one pass of fragments
 //!    (`present::framebuffer_pass`).
 //!
-//! Whatever is not understood the driver draws, and depth brings both together. A fault of ours
-//! ends the tracing, not the program (`interpose::panic_guard`).
+//! The driver draws whatever the library does not understand, and the depth buffer combines the
+//! two. A fault in the library ends the tracing, not the program (`interpose::panic_guard`).
 #![deny(unsafe_code)]
 
 mod capture;
@@ -34,11 +35,11 @@ pub use cluster::RankStats;
 pub use host::{config, export, folders, panel, report, timeline};
 pub use interpose::glvnd;
 
-/// Whether rays can stand for a program with these shaders; an empty text for a shader that it
-/// lacks.
+/// Checks whether ray tracing can replace a program with these shaders. Pass an empty text for a
+/// shader that the program lacks.
 ///
 /// # Errors
-/// Why it is the driver's, as the account of a run says it.
+/// Returns the reason why the driver must draw it, in the words of a run's report.
 pub fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<(), &'static str> {
     classify::vtk::recognise(vertex, geometry, fragment)
 }
