@@ -1,4 +1,4 @@
-//! The library's side of the control panel: once a frame, what the panel wants and what it is told.
+//! The library's side of the control panel. Once a frame it takes commands and sends telemetry.
 //!
 //! One link for the process, made when the first frame ends. Contexts take up new settings at the
 //! end of their own frame.

@@ -39,7 +39,7 @@ pub(crate) struct Frame {
     places: Vec<(u32, [i32; 4])>,
     /// The highest row that viewports of the window reached in the frame before, and in this one.
     tops: [i32; 2],
-    /// What the control panel and reports are told of it.
+    /// Telemetry of the frame for the control panel and reports.
     telemetry: crate::host::panel_client::FrameTelemetry,
 }
 

@@ -235,7 +235,7 @@ const UNPACK: [u32; 6] = [
     UNPACK_SWAP_BYTES,
     UNPACK_LSB_FIRST,
 ];
-/// What must be off for our two triangles whatever their fate.
+/// What must be off for our two triangles in every composite mode.
 const OFF: [u32; 4] = [CULL_FACE, POLYGON_OFFSET_FILL, POLYGON_SMOOTH, RASTERIZER_DISCARD];
 /// Per-fragment operations that only fragments in order meet.
 const OPERATIONS: [u32; 3] = [BLEND, STENCIL_TEST, COLOR_LOGIC_OP];

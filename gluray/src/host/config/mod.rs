@@ -1,4 +1,4 @@
-//! What gluray is told: modes, effects, materials, lights, quality.
+//! The settings of gluray: modes, effects, materials, lights, quality.
 //!
 //! ```text
 //!   defaults < file (all programs) < file ([program.NAME]) < environment = command line < control panel
