@@ -8,7 +8,7 @@
 #![allow(unsafe_code, reason = "the one function that SimGrid calls")]
 
 // A test harness has a `main` of its own; what the library exports is tested from outside
-// (tests/mpi.rs).
+// (tests/mpi).
 #[cfg(not(test))]
 mod exported {
     use std::ffi::{CStr, OsString, c_char, c_int};

@@ -5,6 +5,10 @@
 //! (thesis section 3.2.2: one frame per render event). The bridge caches acceleration structures by
 //! the key of their arrays, colours by their own key, and the whole image while nothing changes.
 
+mod error;
+
+pub use error::BridgeError;
+
 use crate::assemble::{Assembled, assemble};
 use crate::colors::{self, MeshColors};
 use crate::geometry::{self, GeometrySet};
@@ -42,28 +46,6 @@ pub(crate) struct FrameSurface {
     pub(crate) world_from_data: DAffine3,
     /// Matrix and colour of each copy; `None` without copies.
     pub(crate) glyphs: Option<Vec<(DAffine3, Option<[u8; 4]>)>>,
-}
-
-/// Why nothing could be rendered.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BridgeError {
-    /// rt-core failed for this reason.
-    #[error(transparent)]
-    Render(#[from] rt_core::render::RenderError),
-    /// The camera's matrix is not usable.
-    #[error(transparent)]
-    Camera(#[from] rt_core::camera::CameraError),
-    /// The acceleration structure could not be built.
-    #[error(transparent)]
-    Build(#[from] rt_core::bvh::BuildError),
-    /// The thread pool could not be made.
-    #[error("RTV_THREADS={threads}: the threads could not be started: {reason}; ask for fewer")]
-    Threads {
-        /// Number of threads.
-        threads: usize,
-        /// The system's reason.
-        reason: String,
-    },
 }
 
 /// Result of [`Bridge::add_surface`].

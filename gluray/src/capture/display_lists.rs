@@ -8,6 +8,9 @@
 //! when it is to draw it.
 
 pub(crate) mod names;
+mod recording;
+
+pub(crate) use recording::ListRecording;
 
 use crate::capture::evaluators::MapKind;
 use crate::interpose::context::{Context, ImmediateModeTarget};
@@ -72,60 +75,6 @@ pub(crate) struct DisplayLists {
 
 /// Names of our pieces begin here: no program counts its lists so far.
 const FIRST_SEGMENT: u32 = 0x4000_0000;
-
-/// A list while it is compiled.
-pub(crate) struct ListRecording {
-    name: u32,
-    execute: bool,
-    list: DisplayList,
-    segment: u32,
-    used: bool,
-    draws: bool,
-    /// Something besides maps is in the driver's piece.
-    more: bool,
-    /// A call that may change a texture is in it.
-    textures: bool,
-    /// Between a Begin and its End.
-    open: bool,
-    /// The mode of the latest Begin.
-    mode: u32,
-}
-
-impl ListRecording {
-    /// Between a Begin and its End.
-    pub(crate) fn is_open(&self) -> bool {
-        self.open
-    }
-
-    /// A call goes into the driver's piece.
-    pub(crate) fn note_driver_call(&mut self, class: u8, flushes: bool, draws: bool) {
-        (self.used, self.more) = (true, true);
-        self.draws |= flushes || draws;
-        self.textures |= class & class::TEXTURE != 0;
-    }
-
-    /// A fault of ours has ended the tracing: the rest of the list is the driver's, to its end.
-    pub(crate) fn stop_tracing(&mut self) {
-        self.note_driver_call(class::ALL, true, true);
-        self.open = false;
-    }
-
-    /// A call that sets a map of an evaluator goes into the driver's piece.
-    pub(crate) fn note_map(&mut self) {
-        self.used = true;
-    }
-
-    /// The driver's piece ends, and is a step of the list when anything is in it.
-    fn end_segment(&mut self) {
-        gl::end_list();
-        if self.used {
-            let (list, draws, only_maps, textures) =
-                (self.segment, self.draws, !self.more, self.textures);
-            self.list.ops.push(ListOp::Driver { list, draws, only_maps, textures });
-        }
-        (self.used, self.draws, self.more, self.textures) = (false, false, false, false);
-    }
-}
 
 const DEEPEST: u32 = 64;
 

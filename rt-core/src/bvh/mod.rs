@@ -4,6 +4,7 @@ mod blas;
 #[cfg(test)]
 mod brute_force;
 mod build;
+mod instance_leaf;
 pub(crate) mod intersect;
 pub(crate) mod layout;
 mod options;

@@ -6,12 +6,14 @@
 //! structure). The light is taken as deflected in the plane through the view's centre, and the tilt
 //! of an extended source's beams shifts nothing.
 
+mod spline_derivatives;
+
 use super::frame::{BlankCells, Frame, clip};
 use crate::at_level;
 use crate::field::{Field, Node};
 use crate::interpolate::{
-    BSpline, Interpolant, Interpolate, Interpolate16, LANES, Row, Trilinear, bspline_weights,
-    bspline_weights16, cell, prefilter_line, transpose,
+    BSpline, Interpolant, Interpolate, Interpolate16, LANES, Row, Trilinear, bspline_weights16,
+    cell, prefilter_line, transpose,
 };
 use crate::path::{Exit, Jacobian, LightPaths, PathQuantities, Start};
 use crate::view::View;
@@ -19,6 +21,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x4, f32x16, i32x16};
 use glam::DVec3;
 use rayon::prelude::*;
+use spline_derivatives::{derivatives, second_derivatives};
 
 /// Light paths by line of sight.
 pub struct LineOfSight {
@@ -562,52 +565,6 @@ impl LightPaths for LineOfSight {
                 hessian.map(|r| r.map(|v| (v * f64::from(e.exit_depth_m)) as f32));
         }
     }
-}
-
-/// First derivatives of a map's spline, per metre.
-fn derivatives(
-    c: &[f32],
-    row: usize,
-    [i, k]: [usize; 2],
-    [x, y]: [f64; 2],
-    per_m: [f64; 2],
-) -> [f64; 2] {
-    let ((wx, dx), (wy, dy)) = (bspline_weights(x), bspline_weights(y));
-    let c = |a: usize, b: usize| f64::from(c[i + a + (k + b) * row]);
-    let (mut along_x, mut along_y) = (0.0, 0.0);
-    for b in 0..4 {
-        for a in 0..3 {
-            along_x += wy[b] * dx[a] * (c(a + 1, b) - c(a, b));
-            along_y += wx[b] * dy[a] * (c(b, a + 1) - c(b, a));
-        }
-    }
-    [along_x * per_m[0], along_y * per_m[1]]
-}
-
-/// Second derivatives: linear weights of second differences.
-fn second_derivatives(
-    c: &[f32],
-    row: usize,
-    [i, k]: [usize; 2],
-    [x, y]: [f64; 2],
-    [p, q]: [f64; 2],
-) -> [[f64; 2]; 2] {
-    let ((wx, dx), (wy, dy)) = (bspline_weights(x), bspline_weights(y));
-    let (hx, hy) = ([1.0 - x, x], [1.0 - y, y]);
-    let c = |a: usize, b: usize| f64::from(c[i + a + (k + b) * row]);
-    let [mut xx, mut xy, mut yy] = [0.0f64; 3];
-    for b in 0..4 {
-        for a in 0..2 {
-            xx += wy[b] * hx[a] * (c(a, b) - 2.0 * c(a + 1, b) + c(a + 2, b));
-            yy += wx[b] * hy[a] * (c(b, a) - 2.0 * c(b, a + 1) + c(b, a + 2));
-        }
-    }
-    for b in 0..3 {
-        for a in 0..3 {
-            xy += dx[a] * dy[b] * ((c(a + 1, b + 1) - c(a, b + 1)) - (c(a + 1, b) - c(a, b)));
-        }
-    }
-    [[xx * p * p, xy * p * q], [xy * p * q, yy * q * q]]
 }
 
 /// Nodes are compared by how bad they are for light.

@@ -7,6 +7,7 @@
 use super::filter_plane::{as_painting, half_side_m, traced};
 use super::flow::ArrayInfo;
 use super::frame::{DeflectionMap, Frame};
+use super::merge_patch::merge;
 use crate::cutoff::Rgb;
 use crate::cutoff::painted::Stroke;
 use crate::input::Step;
@@ -577,27 +578,6 @@ fn check_limits(scene: &Scene) -> Result<(), RefusedChange> {
              and draw it with `schlieren render --scene`"
         ))),
         _ => Ok(()),
-    }
-}
-
-/// RFC 7396, but for objects that choose one of several kinds: merged, keys of the old kind would
-/// remain.
-fn merge(target: &mut Value, patch: Value) {
-    let Value::Object(patch) = patch else {
-        *target = patch;
-        return;
-    };
-    let chooses = patch.contains_key("kind") || patch.contains_key("method");
-    if chooses || !target.is_object() {
-        *target = Value::Object(serde_json::Map::new());
-    }
-    let Value::Object(target) = target else { return };
-    for (key, value) in patch {
-        if value.is_null() {
-            target.remove(&key);
-        } else {
-            merge(target.entry(key).or_insert(Value::Null), value);
-        }
     }
 }
 

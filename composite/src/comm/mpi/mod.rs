@@ -13,6 +13,7 @@
 mod abi;
 mod clock;
 mod error;
+mod finalize;
 mod heartbeat;
 pub mod launcher;
 mod library;
@@ -578,53 +579,5 @@ impl Communicator for MpiComm {
 
     fn recycle(&mut self, buffer: Vec<u8>) {
         self.transfers.pool.put(buffer);
-    }
-}
-
-impl Drop for MpiComm {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.abort("this rank panicked");
-        }
-        if self.mpi.abi == Abi::Smpi {
-            if self.finalize {
-                // SAFETY: called once, by the object that started MPI. SimGrid finds ranks that
-                // wait here for ever.
-                unsafe { (self.mpi.functions.finalize)() };
-            }
-            return;
-        }
-
-        // What was sent shall arrive before the news that this rank has left.
-        let begin = Instant::now();
-        self.transfers.reclaim_buffers(&self.mpi);
-        while self.transfers.outgoing() > 0
-            && begin.elapsed() < DRAIN_TIMEOUT
-            && self.aborted.is_none()
-        {
-            std::thread::yield_now();
-            self.transfers.reclaim_buffers(&self.mpi);
-        }
-        if self.aborted.is_none() {
-            let others = self.others();
-            self.notices.send_left(&self.mpi, others);
-        }
-        while !self.notices.delivered(&self.mpi) && begin.elapsed() < DRAIN_TIMEOUT {
-            std::thread::yield_now();
-        }
-
-        // MPI_Finalize waits for all ranks, as every MPI program does at its end; after a fault
-        // there is no such end, and whoever still works may yet report one.
-        if self.finalize && self.aborted.is_none() {
-            while self.others().any(|other| !self.left[other]) {
-                if self.process_notices().is_err() {
-                    return;
-                }
-                self.transfers.reclaim_buffers(&self.mpi);
-                std::thread::sleep(Duration::from_micros(100));
-            }
-            // SAFETY: called once, by the object that started MPI.
-            unsafe { (self.mpi.functions.finalize)() };
-        }
     }
 }

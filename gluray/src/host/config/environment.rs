@@ -206,7 +206,7 @@ mod tests {
         let all = [
             ("GLURAY_MODE".into(), no_text("rich")),
             ("GLURAY_SAMPLES".into(), "4".into()),
-            ("HOME".into(), no_text("/home/a")),
+            ("HOME".into(), no_text("/srv/a")),
             ("TITLE".into(), no_text("of somebody else's")),
             (no_text("GLURAY_"), "1".into()),
         ];
@@ -218,7 +218,7 @@ mod tests {
             [
                 "environment: `GLURAY_MODE` is not UTF-8: \"rich\u{fffd}\"; set it to text; it \
                  counts as not set",
-                "environment: `HOME` is not UTF-8: \"/home/a\u{fffd}\"; set it to text; it counts \
+                "environment: `HOME` is not UTF-8: \"/srv/a\u{fffd}\"; set it to text; it counts \
                  as not set",
                 "environment: `GLURAY_\u{fffd}` is not UTF-8: \"1\"; set it to text; it counts as \
                  not set",
