@@ -10,10 +10,10 @@
 //! <!-- end record -->
 //! ```
 //!
-//! `table` names columns and selects rows (`where mode = fast | slow` takes either). `plot` names the
-//! beginning of a plot's title. The newest record of that name is used, and reasons to distrust it
-//! appear below the quotation. The test `documents_quote_their_records` fails when a
-//! document and its record differ.
+//! `table` names columns and selects rows (`where mode = fast | slow` takes either). `plot` names
+//! the beginning of a plot's title. The newest record of that name is used, and reasons to distrust
+//! it appear below the quotation. The test `documents_quote_their_records` fails when a document
+//! and its record differ.
 
 use crate::doubts::MOST_LOAD_PER_CORE;
 use crate::plot::Plot;

@@ -1,15 +1,22 @@
 //! Ray tracing for scientific visualization on the CPU.
 //!
 //! ```
-//! use rt_core::{camera::Camera, glam::{DVec3, Vec3}, light::Light, material::Material, mesh::TriMesh};
-//! use rt_core::{render::{RenderOptions, render}, scene::SceneBuilder};
+//! use rt_core::camera::Camera;
+//! use rt_core::glam::{DVec3, Vec3};
+//! use rt_core::light::Light;
+//! use rt_core::material::Material;
+//! use rt_core::mesh::TriMesh;
+//! use rt_core::render::{RenderOptions, render};
+//! use rt_core::scene::SceneBuilder;
 //!
-//! let floor = TriMesh::new(vec![Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::new(0.0, 9.0, 0.0)], vec![[0, 1, 2]]);
+//! let corners = vec![Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::Y * 9.0];
+//! let floor = TriMesh::new(corners, vec![[0, 1, 2]]);
 //! let mut builder = SceneBuilder::new();
 //! builder.mesh(floor, Material::matte([0.5, 0.25, 1.0]));
 //! builder.light(Light::directional(DVec3::Z));
 //! let scene = builder.build().unwrap();
-//! let camera = Camera::perspective(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 100.0]).unwrap();
+//! let eye = DVec3::new(0.0, 0.0, 4.0);
+//! let camera = Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 100.0]).unwrap();
 //! let output = render(&scene, &camera, &RenderOptions::new(32, 32)).unwrap();
 //! assert_eq!(output.frame.color_at(16, 16), [0.5, 0.25, 1.0, 1.0]);
 //! assert_eq!(output.report.rays.reflection, 0);

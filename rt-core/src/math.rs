@@ -124,6 +124,13 @@ pub fn round_to_f32(p: DVec3) -> Vec3 {
 /// The middle one of `values`, of an even number the larger of the two: always a value that was
 /// there. `None` of nothing. The order is that of [`f64::total_cmp`], in which NaN is beyond
 /// infinity; the values are left in another order.
+///
+/// ```
+/// use rt_core::math::median_high;
+///
+/// assert_eq!(median_high(&mut [4.0, 1.0, 3.0, 2.0]), Some(3.0));
+/// assert_eq!(median_high(&mut []), None);
+/// ```
 pub fn median_high(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)

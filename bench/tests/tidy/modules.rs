@@ -23,7 +23,7 @@ const CIRCLES: &[(&str, usize)] = &[
     ("gluray/src/trace", 2),
     ("gluray/src/trace/texturing", 2),
     ("rt-core/src", 60),
-    ("rt-core/src/bvh", 4),
+    ("rt-core/src/bvh", 2),
     ("rt-core/src/shade", 7),
     ("schlieren/src", 4),
     ("vtk-bridge/src", 4),

@@ -14,8 +14,8 @@
 //! | `gradient.rs` | normals |
 //! | `stream.rs` | fields larger than memory, a batch of planes at a time |
 //!
-//! A value that is NaN or infinite empties the eight cells around it. The number of skipped cells is
-//! reported.
+//! A value that is NaN or infinite empties the eight cells around it. The number of skipped cells
+//! is reported.
 
 mod case_table;
 mod gradient;

@@ -4,7 +4,7 @@ mod blas;
 #[cfg(test)]
 mod brute_force;
 mod build;
-mod instance_leaf;
+mod error;
 pub(crate) mod intersect;
 pub(crate) mod layout;
 mod options;
@@ -17,6 +17,7 @@ mod triangle_bvh;
 mod validate;
 mod world;
 
+pub use error::BuildError;
 pub(crate) use layout::wide::{Unit, WideBvh};
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, UnknownQuality};
 pub use partition::{GlobalLayout, ShapePart};
@@ -25,7 +26,7 @@ pub(crate) use streams::Coherence;
 pub use streams::StreamError;
 pub use validate::{InvalidTree, TreeStats};
 pub(crate) use world::InstanceFilter;
-pub use world::{BuildError, Geometry, Instance, World};
+pub use world::{Geometry, Instance, World};
 
 #[cfg(test)]
 mod tests;

@@ -8,9 +8,10 @@
 //! the hit of the whole world.
 
 use super::blas::Blas;
+use super::error::BuildError;
 use super::layout::local_frame::LocalFrame;
 use super::options::BuildOptions;
-use super::world::{BuildError, Geometry, Instance, World};
+use super::world::{Geometry, Instance, World};
 use crate::math::Aabb;
 use crate::ray::Ray;
 use crate::shapes::{Shape, ShapeHit, ShapeSurface};

@@ -1,12 +1,14 @@
 //! Transforms rays from render space to a geometry's local space, and hits back.
 
 use super::layout::local_frame::LocalFrame;
-use super::world::ORDINARY_LENGTHS;
 use crate::bvh::traverse::packet::PacketLimits;
 use crate::math::{Aabb, max_abs};
 use crate::ray::{Ray, RayBlock};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+/// Largest components of directions that are traced without scaling.
+pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
 
 /// The origin of a ray more than this many radii from the geometry is first moved along the ray in
 /// f64: at that distance, f32 coordinates relative to the geometry would be coarser than 4·10⁻⁶ of

@@ -4,9 +4,10 @@
 use super::blas::{Blas, Content, leaf_primitive_ids};
 use super::layout::wide::ChildRef;
 use super::options::Robustness;
+use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
 use super::triangle_bvh::TriBvh;
-use super::world::{InstanceFilter, ORDINARY_LENGTHS, World, with_ordinary_length};
+use super::world::{InstanceFilter, World, with_ordinary_length};
 use crate::bvh::traverse::hybrid;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
 use crate::bvh::traverse::single::inflate_t;

@@ -1,18 +1,18 @@
 //! The two-level acceleration structure for tracing rays: instances of geometries.
 
-use super::blas::{Blas, IdWriter};
+use super::blas::{Blas, IdWriter, leaf_primitive_ids};
 use super::build::{MAX_PRIMS, PrimRef, build_wide};
-use super::instance_leaf::{InstanceAny, InstanceClosest};
-use super::layout::wide::{Unit, WideBvh};
+use super::error::BuildError;
+use super::layout::wide::{ChildRef, Unit, WideBvh};
 use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
 use super::partition::{GlobalLayout, blas_of};
-use super::placement::{Placement, distance_to_sphere};
-use crate::bvh::traverse::single::{RaySetup, traverse};
+use super::placement::{ORDINARY_LENGTHS, Placement, distance_to_sphere};
+use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::math::{Aabb, exp2i, max_abs};
 use crate::mesh::{MeshError, TriMesh};
 use crate::ray::{Hit, Ray};
 use crate::shapes::Shape;
-use crate::simd::{SimdLevel, UnavailableLevel};
+use crate::simd::SimdLevel;
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -72,54 +72,6 @@ pub struct Instance {
     pub geometry: usize,
     /// Object to world; may mirror and scale unevenly, must be invertible.
     pub world_from_object: DAffine3,
-}
-
-/// Why a world could not be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BuildError {
-    /// A mesh is unusable.
-    #[error("geometry {geometry}: {source}")]
-    Mesh {
-        /// Index of the geometry.
-        geometry: usize,
-        /// What is wrong with it.
-        source: MeshError,
-    },
-    /// The index of an instance's geometry is out of range.
-    #[error("instance {instance} uses geometry {geometry}, but there are only {count}")]
-    NoSuchGeometry {
-        /// Index of the instance.
-        instance: usize,
-        /// Index of the geometry.
-        geometry: usize,
-        /// Number of geometries.
-        count: usize,
-    },
-    /// A part does not match the whole scene.
-    #[error(
-        "a part has {found} geometries, the whole {expected}: give the part one for each, with no \
-         primitives where it has none"
-    )]
-    NotAPart {
-        /// Geometries of the whole scene.
-        expected: usize,
-        /// Geometries given.
-        found: usize,
-    },
-    /// The machine lacks the requested instruction set.
-    #[error(transparent)]
-    Level(#[from] UnavailableLevel),
-    /// An instance's transform cannot be inverted.
-    #[error(
-        "instance {instance}: its transform has determinant {determinant}; give one that is finite \
-         and not singular, or leave the instance out"
-    )]
-    SingularTransform {
-        /// Index of the instance.
-        instance: usize,
-        /// The determinant.
-        determinant: f64,
-    },
 }
 
 /// Which instances rays can hit.
@@ -428,7 +380,7 @@ impl World {
         leaves.found
     }
 
-    pub(super) fn instance_occluded<S: Simd, const EXACT: bool>(
+    fn instance_occluded<S: Simd, const EXACT: bool>(
         &self,
         simd: S,
         instance: usize,
@@ -439,9 +391,6 @@ impl World {
         local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, EXACT>(simd, &local)
     }
 }
-
-/// Largest components of directions that are traced without scaling.
-pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
 
 /// Returns rays whose direction is neither tiny nor huge unchanged; scales others by a power of
 /// two. The second value converts the scaled ray's `t` back.
@@ -569,4 +518,61 @@ fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     let center = 0.5 * lo + 0.5 * hi;
     let far = center.abs().max_element() > 4.0 * (hi - lo).max_element();
     if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO }
+}
+
+struct InstanceClosest<'w, const EXACT: bool> {
+    world: &'w World,
+    ray: Ray,
+    filter: InstanceFilter<'w>,
+    best: Option<Hit>,
+}
+
+impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
+    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, skip_t: &mut f32) {
+        let p = &self.world.placements[instance as usize];
+        // One ulp past the best so far: a tie may go to this instance.
+        let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
+        let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
+        if local.t_max <= local.t_min {
+            return;
+        }
+        let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local);
+        if !c.found {
+            return;
+        }
+        let t = if moved == 0.0 { c.t } else { (c.t as f64 + moved) as f32 };
+        let better = self.best.is_none_or(|b| t < b.t || (t == b.t && instance < b.instance));
+        if better {
+            self.best = Some(Hit { t, u: c.u, v: c.v, prim: c.prim, instance });
+            *skip_t = inflate_t(t);
+        }
+    }
+}
+
+impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
+        let filter = self.filter;
+        for &i in leaf_primitive_ids(units, leaf).iter().filter(|&&i| filter.has(i as usize)) {
+            self.try_instance(simd, i, skip_t);
+        }
+        false
+    }
+}
+
+struct InstanceAny<'w, const EXACT: bool> {
+    world: &'w World,
+    ray: Ray,
+    filter: InstanceFilter<'w>,
+    found: bool,
+}
+
+impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceAny<'_, EXACT> {
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
+        let (world, ray, filter) = (self.world, self.ray, self.filter);
+        self.found = leaf_primitive_ids(units, leaf)
+            .iter()
+            .filter(|&&i| filter.has(i as usize))
+            .any(|&i| world.instance_occluded::<S, EXACT>(simd, i as usize, &ray));
+        self.found
+    }
 }

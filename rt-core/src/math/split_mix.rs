@@ -7,6 +7,14 @@ use glam::DVec3;
 /// 2014): small, fast, and any seed is a good seed.
 ///
 /// Data sets, records and pictures depend on these numbers bit by bit.
+///
+/// ```
+/// use rt_core::math::{SplitMix64, mix64};
+///
+/// let mut random = SplitMix64::new(7);
+/// assert_eq!(random.bits(), mix64(7 + 0x9e37_79b9_7f4a_7c15));
+/// assert!((0.0..1.0).contains(&random.unit()));
+/// ```
 #[derive(Debug, Clone)]
 pub struct SplitMix64(u64);
 

@@ -199,9 +199,9 @@ fn many_instances_packets_equal_single_rays_and_the_oracle() {
 }
 
 /// The hit is where f64 says, and nothing is surely nearer. Both are held to what rounding may make
-/// of t ([`oracle::Meeting::t_error`]), the same as for one mesh: it grows with the coordinates, the
-/// slant and the slenderness of the triangle where it stands, and transforming rays adds no more.
-/// Returns the error of t as a share of that, or `None` for a miss. (The largest is 0.35.)
+/// of t ([`oracle::Meeting::t_error`]), the same as for one mesh: it grows with the coordinates,
+/// the slant and the slenderness of the triangle where it stands, and transforming rays adds no
+/// more. Returns the error of t as a share of that, or `None` for a miss. (The largest is 0.35.)
 fn check_instances(
     w: &World,
     geometries: &[TriMesh],

@@ -1,0 +1,52 @@
+//! Why a world cannot be built.
+
+use crate::mesh::MeshError;
+use crate::simd::UnavailableLevel;
+
+/// Why a world could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// A mesh is unusable.
+    #[error("geometry {geometry}: {source}")]
+    Mesh {
+        /// Index of the geometry.
+        geometry: usize,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+    /// The index of an instance's geometry is out of range.
+    #[error("instance {instance} uses geometry {geometry}, but there are only {count}")]
+    NoSuchGeometry {
+        /// Index of the instance.
+        instance: usize,
+        /// Index of the geometry.
+        geometry: usize,
+        /// Number of geometries.
+        count: usize,
+    },
+    /// A part does not match the whole scene.
+    #[error(
+        "a part has {found} geometries, the whole {expected}: give the part one for each, with no \
+         primitives where it has none"
+    )]
+    NotAPart {
+        /// Geometries of the whole scene.
+        expected: usize,
+        /// Geometries given.
+        found: usize,
+    },
+    /// The machine lacks the requested instruction set.
+    #[error(transparent)]
+    Level(#[from] UnavailableLevel),
+    /// An instance's transform cannot be inverted.
+    #[error(
+        "instance {instance}: its transform has determinant {determinant}; give one that is finite \
+         and not singular, or leave the instance out"
+    )]
+    SingularTransform {
+        /// Index of the instance.
+        instance: usize,
+        /// The determinant.
+        determinant: f64,
+    },
+}
