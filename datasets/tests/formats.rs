@@ -255,8 +255,8 @@ fn obj_concave_faces_materials_and_far_coordinates() {
     assert_eq!((m.base_color, m.ior), ([1.0, 0.0, 0.0, 0.5], 1.33));
     assert!((m.roughness - 0.02f32.powf(0.25)).abs() < 1e-6);
 
-    // The five corners make an arrow head, whose inner corner a fan would cover from outside: area
-    // 3.
+    // The five corners make an arrow head, whose inner corner a fan would cover from outside:
+    // area 3.
     let o = opened("b.obj", sample_files::OBJ.as_bytes());
     assert!(
         o.warnings.iter().any(|w| w.contains("none.mtl"))

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, UVec3, Vec3};
 
-/// A scalar on the points of a uniform grid, x fastest. World position of point (i,j,k) is `origin
-/// + spacing * (i,j,k)`.
+/// A scalar on the points of a uniform grid, x fastest. World position of point (i,j,k) is
+/// `origin + spacing * (i,j,k)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Points per axis, each at least 1.

@@ -14,8 +14,8 @@ use rt_core::scene::{Appearance, SceneBuilder};
 use rt_core::texture::{Filter, Texture};
 use scenes_common::*;
 
-/// Colour of the middle pixel of the floor z = 0 seen from straight above (parallel), where x = y =
-/// 0.
+/// Colour of the middle pixel of the floor z = 0 seen from straight above (parallel), where x = y
+/// = 0.
 fn middle(mesh: TriMesh, material: Material, lights: Vec<Light>) -> [f32; 4] {
     draw(&scene(vec![(mesh, material)], lights), &top_camera(5.0, 0.001), RenderOptions::new(1, 1))
         .frame

@@ -140,8 +140,8 @@ fn straight_lines_through_a_gaussian_are_the_closed_form() {
     );
 }
 
-/// The whole integral of motion, bent: a quarter turn of a Luneburg lens ends in one point; order
-/// 6.
+/// The whole integral of motion, bent: a quarter turn of a Luneburg lens ends in one point;
+/// order 6.
 #[test]
 fn bent_rays_are_the_closed_form_at_order_six() {
     let error = |n: usize| {

@@ -192,8 +192,8 @@ impl Icet {
         )
     }
 
-    /// IceT over any communicator between threads, set up for images of this size that go to rank
-    /// 0. The communicator is to be passed again with every frame.
+    /// IceT over any communicator between threads, set up for images of this size that go to
+    /// rank 0. The communicator is to be passed again with every frame.
     ///
     /// # Errors
     /// [`IcetError`].

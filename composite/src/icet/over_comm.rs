@@ -161,9 +161,12 @@ impl Transport for OverComm {
     }
 
     fn allgather(&mut self, send: *const u8, count: usize, recv: *mut u8) {
-        // SAFETY: in place, the rank's part is where it belongs.
-        let mine =
-            if send.is_null() { unsafe { recv.add(self.rank * count).cast_const() } } else { send };
+        let mine = if send.is_null() {
+            // SAFETY: in place, the rank's part is where it belongs.
+            unsafe { recv.add(self.rank * count).cast_const() }
+        } else {
+            send
+        };
         // SAFETY: IceT passes `count` bytes.
         let mine = unsafe { std::slice::from_raw_parts(mine, count) }.to_vec();
         let all = or_abort(self.comm().all_gather(&mine, count, TIMEOUT));

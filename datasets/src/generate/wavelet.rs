@@ -30,8 +30,8 @@ const MAX_POINTS_PER_AXIS: i64 = 1 << 20;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wavelet {
-    /// First point index per axis (`WholeExtent`); also its world position, because the spacing is
-    /// 1.
+    /// First point index per axis (`WholeExtent`); also its world position, because the spacing
+    /// is 1.
     pub first: IVec3,
     /// Last point index per axis, not smaller than `first`.
     pub last: IVec3,

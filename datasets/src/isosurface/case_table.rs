@@ -5,10 +5,10 @@
 //!    (two inside corners on a diagonal) this *separates the inside corners*. Both cells at a face
 //!    see the same corners, so they agree, and the surface has no holes (the flaw of the original
 //!    table: Dürst 1988; Nielson and Hamann 1991).
-//! 2. **Loops become triangles.** The segments join to closed loops; each loop of n edges becomes n
-//!    - 2 triangles. Among all ways to do that, the one is taken that puts no diagonal into a face
-//!    of the cell (there the neighbour might have the same diagonal, and four triangles would meet
-//!    at one edge) and that has the shortest diagonals.
+//! 2. **Loops become triangles.** The segments join to closed loops; each loop of n edges becomes
+//!    n - 2 triangles. Among all ways to do that, the one is taken that puts no diagonal into a
+//!    face of the cell (there the neighbour might have the same diagonal, and four triangles would
+//!    meet at one edge) and that has the shortest diagonals.
 //!
 //! The number of triangles per case is that of VTK's `vtkMarchingCubesTriangleCases`, so counts
 //! agree with `vtkFlyingEdges3D`; the diagonals are our own.

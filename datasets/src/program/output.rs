@@ -25,6 +25,7 @@ pub(super) struct EncodingArgs {
 }
 
 /// What is to be written.
+#[expect(clippy::large_enum_variant, reason = "one value a run")]
 pub(super) enum Content {
     /// Triangles.
     Mesh(TriMesh),

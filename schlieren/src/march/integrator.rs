@@ -1,7 +1,7 @@
 //! The reference in `f64`: one ray at a time, any integrator, any medium.
 //!
-//! As in the kernels, a ray is a deviation: position = start + direction tau + xi, rate = direction
-//! + u, both deviations zero at the start.
+//! As in the kernels, a ray is a deviation: position = start + direction tau + xi, rate =
+//! direction + u, both deviations zero at the start.
 
 use crate::field::Field;
 use crate::interpolate::Interpolate;

@@ -3,9 +3,9 @@
 //!
 //! Rays are sent from the camera (far away: a parallel beam) through the flow to the background,
 //! which stands at `Optics::focus_m` behind the flow as the camera sees it; the camera is focused
-//! on it. A ray that leaves with the deflection ε at the depth z hits it displaced by `ξ + ε (focus
-//! - z)`: the displacement that correlating the picture with the undisturbed one yields. The paths
-//! must be traced against the light ([`ReversedPaths`]).
+//! on it. A ray that leaves with the deflection ε at the depth z hits it displaced by `ξ + ε
+//! (focus - z)`: the displacement that correlating the picture with the undisturbed one yields. The
+//! paths must be traced against the light ([`ReversedPaths`]).
 //!
 //! The pattern is random dots: one dot per cell of a square lattice, jittered by a hash of the
 //! cell, the same at any resolution.

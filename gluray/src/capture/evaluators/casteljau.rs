@@ -6,8 +6,8 @@
 //! points, and go on as curves: of the points between the lines, and of their differences. The
 //! order of the operations is Mesa's, as in [`super::bernstein`].
 
-/// A point of the surface, and its derivatives but for a positive factor. Both orders are at least
-/// 2.
+/// A point of the surface, and its derivatives but for a positive factor. Both orders are at
+/// least 2.
 pub(super) fn point_and_tangents<const N: usize>(
     points: &[[f32; N]],
     orders: [usize; 2],
