@@ -1,5 +1,5 @@
-//! Messages: a rectangle of an image as a bit mask of active pixels, followed by these, row after
-//! row.
+//! Messages between ranks: a rectangle of an image, encoded as a bit mask of active pixels followed
+//! by these pixels, row after row.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -13,8 +13,8 @@
 //! | then | mask: for every row words of 64 pixels, lowest bit first; left out if all or no pixels are active |
 //! | then | for every row the colours of its active pixels, then (if the flag says so) their depths |
 //!
-//! All numbers are little-endian, and pixels have the bytes they have in memory; counts have 64
-//! bits, also in arithmetic. The decoder trusts nothing: whatever passes it can be read without a
+//! All numbers are little-endian, and pixels have the same bytes as in memory. Counts have 64 bits,
+//! also in arithmetic. The decoder trusts nothing: an accepted message can be read without a
 //! further check.
 mod error;
 
@@ -42,7 +42,7 @@ compile_error!(
 );
 
 const MAGIC: u64 = u64::from_le_bytes(*b"COMPOS03");
-/// Bytes in front of the mask.
+/// Bytes before the mask.
 pub(crate) const HEADER_BYTES: usize = 64;
 const HAS_MASK: u64 = 1;
 const HAS_DEPTHS: u64 = 2;
@@ -52,10 +52,10 @@ const ALL_FLAGS: u64 = 15;
 /// Bytes of a colour whose alpha is known to be full.
 const OPAQUE_BYTES: usize = 3;
 
-/// Sum of the bytes in eight independent chains, so that a processor works on all of them at once.
+/// Checksum of the bytes in eight independent chains, which a processor computes in parallel.
 ///
-/// Every step is a bijection of the state and of the word, so a change within a single word never
-/// goes unnoticed.
+/// Every step is a bijection of the state and of the word, so a change within a single word is
+/// always detected.
 pub(crate) fn checksum(bytes: &[u8]) -> u64 {
     let (blocks, rest) = bytes.as_chunks::<64>();
     let mut chains: [u64; 8] = std::array::from_fn(|i| i as u64);
@@ -77,7 +77,7 @@ pub(crate) fn mix(state: u64, value: u64) -> u64 {
     (state ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
 }
 
-/// How messages of one frame are written and read.
+/// How the messages of one frame are encoded and decoded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Codec {
     pub(crate) kernels: Kernels,
@@ -86,25 +86,25 @@ pub(crate) struct Codec {
     pub(crate) verify: bool,
 }
 
-/// Bytes of the longest message of `rect`, dense or not.
+/// Bytes of the longest message for `rect`, dense or sparse.
 pub(crate) fn longest<P: Composite>(rect: &Rect) -> usize {
     HEADER_BYTES + rect.height() * rect.width().div_ceil(64) * 8 + rect.pixels() * P::BYTES
 }
 
-/// Whether messages of colours without depths may leave out full alphas: opaque pictures nearly
-/// always are such.
+/// Whether messages of colours without depths may omit full alphas. Most messages of opaque images
+/// can.
 fn may_be_opaque<P: Composite>(depths: bool) -> bool {
     P::HAS_DEPTH && P::Color::BYTES == 4 && !depths
 }
 
-/// The rectangle a message says it holds, not yet checked.
+/// The rectangle in the header of a message, not yet checked.
 pub(crate) fn rect_of(bytes: &[u8]) -> Option<Rect> {
     let corner = |at: usize| bytes.get(at..at + 4).map(bytemuck::pod_read_unaligned::<u32>);
     Some(Rect { x0: corner(32)?, y0: corner(36)?, x1: corner(40)?, y1: corner(44)? })
 }
 
 impl Codec {
-    /// Appends the message of the pixels that `view` has in `rect` to the empty buffer `out`.
+    /// Writes the message for the pixels of `view` in `rect` into `out`, replacing its content.
     /// Without `depths` the receiver only gets colours.
     pub(crate) fn encode<P: Composite>(
         &self,
@@ -128,12 +128,12 @@ impl Codec {
                 counts = encoded;
                 break;
             }
-            // One of the alphas was not full after all.
+            // One of the alphas was not full after all: encode again with alphas.
             opaque = false;
             out.truncate(HEADER_BYTES);
         }
 
-        // Header. A rectangle with all pixels active has no mask.
+        // Write the header. A rectangle with all pixels active has no mask.
         let mut flags = if depths { HAS_DEPTHS } else { 0 };
         if counts.active == 0 {
             out.truncate(HEADER_BYTES);
@@ -189,13 +189,13 @@ impl Codec {
             return Err(MessageError::Fingerprint);
         }
 
-        // The rectangle is the expected one.
+        // The rectangle must be the expected one.
         let rect = rect_of(bytes).unwrap_or(Rect::EMPTY);
         if rect != expected {
             return Err(MessageError::Part { found: rect, expected });
         }
 
-        // Flags and count fit the rectangle, and the length fits them.
+        // Flags and count must fit the rectangle, and the length must fit them.
         let (pixels, active) = (rect.pixels() as u64, number(6));
         let sparse = active > 0 && active < pixels;
         if flags > ALL_FLAGS
@@ -229,7 +229,7 @@ impl Codec {
     }
 }
 
-/// What [`encode_rows`] does to a row, at one instruction set.
+/// Row operations of [`encode_rows`] at one instruction set.
 trait RowKernels: Copy {
     fn row_words<P: Composite>(
         self,
@@ -304,8 +304,8 @@ fn encode_rows<P: Composite>(
     let (width, words) = (rect.width(), rect.width().div_ceil(64));
     out.reserve(rect.pixels() * P::BYTES);
 
-    // As long as all is active: rows as they are. Most rectangles are either dense or not so in
-    // their first row.
+    // Copy whole rows as long as all pixels are active. Most rectangles are either dense or show
+    // that they are not in their first row.
     let mut y = rect.y0;
     while y < rect.y1 {
         let (colors, row_depths) = view.row(y, rect.x0, rect.x1);
@@ -323,12 +323,12 @@ fn encode_rows<P: Composite>(
         }
         y += 1;
     }
-    // Opaque colours come without depths, so they lie in one piece.
+    // Opaque colours have no depths between them, so they are contiguous.
     if y == rect.y1 {
         return (!opaque || kernels.drop_full_alpha(out, HEADER_BYTES)).then_some(counts);
     }
 
-    // With a mask, from the first row on.
+    // Otherwise start over with a mask.
     counts = Counts::default();
     out.truncate(HEADER_BYTES);
     out.resize(HEADER_BYTES + 8 * words * rect.height(), 0);
@@ -348,8 +348,8 @@ fn encode_rows<P: Composite>(
                 8 => kernels.append_active::<8>(out, mask_at, colors),
                 _ => kernels.append_active::<16>(out, mask_at, colors),
             }
-            // All alphas are looked at in the end; most pictures that are not opaque show it in
-            // their first row.
+            // `drop_full_alpha` checks all alphas at the end, but most images that are not opaque
+            // show it in their first row.
             if opaque && out.last() != Some(&255) {
                 return None;
             }
@@ -362,7 +362,7 @@ fn encode_rows<P: Composite>(
     (!opaque || kernels.drop_full_alpha(out, mask_at)).then_some(counts)
 }
 
-/// A message whose every number has been checked.
+/// A message that has been checked completely.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DecodedMessage<'a> {
     pub(crate) rect: Rect,
@@ -374,7 +374,7 @@ pub(crate) struct DecodedMessage<'a> {
 }
 
 impl<'a> DecodedMessage<'a> {
-    /// A message that [`Codec::decode`] has accepted, from its own number of active pixels.
+    /// Opens a message that [`Codec::decode`] has accepted, with its own number of active pixels.
     pub(crate) fn reopen<P: Composite>(bytes: &'a [u8], rect: Rect, depths: bool) -> Self {
         let active = bytes.get(48..56).map_or(0, bytemuck::pod_read_unaligned::<u64>);
         let flags: u64 = bytes.get(24..32).map_or(0, bytemuck::pod_read_unaligned);
@@ -395,7 +395,7 @@ impl<'a> DecodedMessage<'a> {
         Self { rect, active, has_depths, color_bytes, mask, pixels }
     }
 
-    /// The mask has as many ones as announced, and none behind the end of a row.
+    /// Checks that the mask has as many ones as announced, and none after the end of a row.
     fn check_mask(&self) -> Result<(), MessageError> {
         let width = self.rect.width();
         let outside = if width.is_multiple_of(64) { 0 } else { u64::MAX << (width % 64) };
@@ -414,7 +414,7 @@ impl<'a> DecodedMessage<'a> {
         if ones == self.active { Ok(()) } else { Err(MessageError::Mask) }
     }
 
-    /// Calls `visit` with every row, top to bottom, that may have active pixels.
+    /// Calls `visit` for every row, top to bottom; rows may be without active pixels.
     #[inline(always)]
     fn for_each_row(&self, mut visit: impl FnMut(u32, SparseRow<'a>)) {
         if self.active == 0 {
@@ -453,7 +453,7 @@ impl<'a> DecodedMessage<'a> {
         }
     }
 
-    /// Joins its pixels to `layer`, whose bounds must hold the rectangle.
+    /// Merges its pixels into `layer`, whose bounds must contain the rectangle.
     pub(crate) fn merge_into<P: Composite>(
         &self,
         kernels: Kernels,
@@ -476,8 +476,8 @@ impl<'a> DecodedMessage<'a> {
         );
     }
 
-    /// Writes its rectangle over `layer`, whose bounds must hold it. Not for messages without
-    /// depths where `layer` has some.
+    /// Overwrites its rectangle in `layer`, whose bounds must contain it. Not for messages without
+    /// depths where `layer` has depths.
     pub(crate) fn copy_to_layer<P: Composite>(&self, kernels: Kernels, layer: &mut Layer<P>) {
         let (x0, x1) = (self.rect.x0, self.rect.x1);
         at_level!(
@@ -496,8 +496,8 @@ impl<'a> DecodedMessage<'a> {
         );
     }
 
-    /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is room
-    /// to work in.
+    /// Writes its rectangle into planes of `width` columns; `depths` may be empty. `wide` is a
+    /// scratch buffer.
     pub(crate) fn copy_to_planes<P: Composite>(
         &self,
         kernels: Kernels,
@@ -521,7 +521,7 @@ impl<'a> DecodedMessage<'a> {
         }
         let mut part = *self;
         if self.color_bytes != P::Color::BYTES {
-            // All rows at once: those of slabs have a few pixels each.
+            // Expand all rows at once: slabs have only a few pixels per row.
             at_level!(
                 kernels,
                 simd => give_full_alpha(simd, self.pixels, wide),

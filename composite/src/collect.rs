@@ -1,9 +1,9 @@
-//! Gathers the parts of a finished image on one rank as they are finished, or leaves them where
+//! Gathers the pieces of the finished image on one rank as they are finished, or leaves them where
 //! they are.
 //!
-//! The parts are sent as sparse messages: background costs one bit per pixel, and depth is sent
-//! only on request. All ranks know from the beginning which parts there will be, so they post
-//! their receives before they do anything else.
+//! Pieces are sent as sparse messages: background costs one bit per pixel, and depth is sent only
+//! on request. All ranks know from the beginning which pieces there will be, so they post their
+//! receives first.
 use crate::codec;
 use crate::error::CompositeError;
 use crate::frame::{Image, Piece};
@@ -13,24 +13,24 @@ use crate::merge::Scratch;
 use crate::pixel::Composite;
 use crate::rect::Rect;
 
-/// The image at the root; elsewhere nothing, or this rank's piece where there is no root.
+/// The image at the root. Other ranks have nothing, or their own piece if there is no root.
 pub(crate) type Outcome<P> = (Option<Image<P>>, Option<Piece<P>>);
 
 pub(crate) struct Collector<P: Composite> {
     root: Option<usize>,
     depths: bool,
-    /// At the root: pieces of others that have not come.
+    /// At the root: pieces of other ranks that have not arrived.
     outstanding: Vec<(usize, Rect)>,
     image: Option<Image<P>>,
     /// Without a root: what this rank has finished.
     kept: Vec<Layer<P>>,
-    /// Room to work in.
+    /// Scratch buffer for colours with their alpha restored.
     wide: Vec<u8>,
 }
 
 impl<P: Composite> Collector<P> {
-    /// `pieces` are all that will be handed in, by place; `spare` is an image of this size that may
-    /// be written over.
+    /// `pieces` are all pieces that will be submitted, with the order index of their rank. `spare`
+    /// is an image of this size that may be overwritten.
     pub(crate) fn new(
         exchange: &mut FrameExchange<'_>,
         size_px: (u32, u32),
@@ -55,7 +55,8 @@ impl<P: Composite> Collector<P> {
             collector.outstanding.push((order_index, rect));
         }
         for &(order_index, _) in &collector.outstanding {
-            // Pieces of one place come in any order, so each receive has room for the largest.
+            // Pieces of one rank arrive in any order, so each receive has the capacity of the
+            // largest.
             let from_sender = collector.outstanding.iter().filter(|piece| piece.0 == order_index);
             let largest = from_sender.map(|piece| piece.1).max_by_key(codec::longest::<P>);
             exchange.post::<P>(order_index, Tag::Collect, &largest.unwrap_or(Rect::EMPTY))?;
@@ -97,7 +98,7 @@ impl<P: Composite> Collector<P> {
         Ok(())
     }
 
-    /// Puts the piece of another rank in its place.
+    /// Writes the piece of another rank into the image.
     pub(crate) fn take(
         &mut self,
         exchange: &mut FrameExchange<'_>,
@@ -105,8 +106,8 @@ impl<P: Composite> Collector<P> {
         bytes: Vec<u8>,
     ) -> Result<(), CompositeError> {
         let begin = exchange.comm.working_secs();
-        // A rank finishes its pieces in any order, so the message itself says which one it is, if
-        // it is one of those expected.
+        // A rank finishes its pieces in any order, so the header of the message says which of the
+        // expected pieces this is.
         let said = codec::rect_of(&bytes);
         let mut from_sender =
             self.outstanding.iter().enumerate().filter(|(_, piece)| piece.0 == order_index);
@@ -134,8 +135,8 @@ impl<P: Composite> Collector<P> {
         Ok(())
     }
 
-    /// Waits for what has not come; the image at the root, this rank's piece where there is no
-    /// root.
+    /// Waits for the outstanding pieces. Returns the image at the root, or this rank's piece if
+    /// there is no root.
     pub(crate) fn finish(
         mut self,
         exchange: &mut FrameExchange<'_>,
@@ -153,8 +154,8 @@ impl<P: Composite> Collector<P> {
     }
 }
 
-/// An image with background wherever no piece will come; elsewhere anything, because pieces bring
-/// their background with them.
+/// An image with background wherever no piece will arrive. Other pixels may hold anything, because
+/// pieces include their background.
 fn blank<P: Composite>(
     (width_px, height_px): (u32, u32),
     depths: bool,
@@ -175,8 +176,8 @@ fn blank<P: Composite>(
     let whole = pieces.iter().fold(Rect::EMPTY, |all, piece| all.around(&piece.1));
     let covered: usize = pieces.iter().map(|piece| piece.1.pixels()).sum();
     if covered < whole.pixels() {
-        // Pieces with gaps between them: the simple way, because no strategy makes them but for
-        // empty pictures.
+        // Pieces with gaps between them: fill everything, because strategies make such pieces only
+        // for empty images.
         image.colors.fill(P::EMPTY.color());
         image.depths.fill(1.0);
         return image;
@@ -199,7 +200,7 @@ fn blank<P: Composite>(
     image
 }
 
-/// Slices of one tile, one above the other, as a single piece.
+/// Joins slices of one tile, one above the other, into a single piece.
 fn stack_layers<P: Composite>(mut layers: Vec<Layer<P>>) -> Piece<P> {
     layers.retain(|layer| !layer.bounds.is_empty());
     layers.sort_by_key(|layer| layer.bounds.y0);

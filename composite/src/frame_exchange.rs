@@ -1,4 +1,5 @@
-//! One frame on one rank: the communicator in rank order, with costs counted and messages checked.
+//! One frame on one rank: sends and receives in compositing order, counts costs and checks
+//! messages.
 use crate::codec::{self, Codec, DecodedMessage, MessageError};
 use crate::comm::{Communicator, Receive};
 use crate::error::CompositeError;
@@ -8,7 +9,7 @@ use crate::rect::Rect;
 use crate::report::Report;
 use std::time::Duration;
 
-/// Which messages belong together; the order within a tag is kept by every communicator.
+/// Which messages belong together; every communicator keeps the order within a tag.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Tag {
     Fold = 2,
@@ -16,7 +17,7 @@ pub(crate) enum Tag {
     Collect = 4,
 }
 
-/// A message that has come and been checked.
+/// A message that has arrived and been checked.
 #[derive(Debug)]
 pub(crate) struct Message {
     pub(crate) bytes: Vec<u8>,
@@ -24,7 +25,7 @@ pub(crate) struct Message {
     depths: bool,
 }
 
-/// Longest string of [`FrameExchange::handshake`]: fingerprint, rectangle, interval of depths.
+/// Longest contribution to [`FrameExchange::handshake`]: fingerprint, rectangle, depth range.
 const HANDSHAKE_BYTES: usize = 8 + 16 + 8;
 
 /// See [`FrameExchange::begin_span`].
@@ -33,20 +34,21 @@ pub(crate) struct Span {
     counted: f64,
 }
 
-/// Ranks in here are *places* in the order of compositing, not ranks of the communicator.
+/// One frame on one rank. Methods take order indices (positions in the order of compositing), not
+/// ranks of the communicator.
 pub(crate) struct FrameExchange<'a> {
     pub(crate) comm: &'a mut dyn Communicator,
     order: Vec<usize>,
     pub(crate) order_index: usize,
     pub(crate) codec: Codec,
     timeout: Duration,
-    /// What every place drew.
+    /// The rectangle that each rank drew in, by order index.
     pub(crate) drawn: Vec<Rect>,
     pub(crate) report: Report,
-    /// Whether depths that are not numbers are counted on the way; else they have been when the
-    /// frame was looked over.
+    /// Whether NaN depths are counted while messages are encoded. Otherwise they were counted when
+    /// the frame was scanned for its bounds.
     pub(crate) counts_nan: bool,
-    /// Receives that have been posted, with what they are for.
+    /// Receives that have been posted and not completed.
     posted: Vec<Receive>,
 }
 
@@ -71,7 +73,7 @@ impl<'a> FrameExchange<'a> {
         }
     }
 
-    /// The communicator's time, in seconds.
+    /// Current time of the communicator, in seconds.
     pub(crate) fn now(&self) -> f64 {
         self.comm.now()
     }
@@ -89,9 +91,9 @@ impl<'a> FrameExchange<'a> {
         self.order.iter().position(|&other| other == rank).unwrap_or(rank)
     }
 
-    /// Tells all places what each drew of an image of this size, and how near and far, and finds
-    /// out whether all are doing the same thing. What is [`drawn`](Self::drawn) behind it lies
-    /// within the image.
+    /// Sends to all ranks the rectangle that this rank drew in and its depth range, and checks that
+    /// all ranks composite the same thing. Afterwards [`drawn`](Self::drawn) holds everybody's
+    /// rectangle, each within the image. Returns the depth ranges.
     pub(crate) fn handshake(
         &mut self,
         (width_px, height_px): (u32, u32),
@@ -131,7 +133,7 @@ impl<'a> FrameExchange<'a> {
         Ok(intervals)
     }
 
-    /// Sends what `view` has in `rect`, which must be within its bounds.
+    /// Sends the pixels of `view` in `rect`, which must be within its bounds.
     pub(crate) fn send<P: Composite>(
         &mut self,
         order_index: usize,
@@ -144,7 +146,7 @@ impl<'a> FrameExchange<'a> {
         let mut message = self.comm.buffer(codec::longest::<P>(&rect));
         let counts = self.codec.encode(view, rect, depths, &mut message);
         if self.counts_nan {
-            // Joined pixels hold no NaN, so only those of the frame are counted here.
+            // Merged pixels hold no NaN, so only those of the frame are counted here.
             self.report.nan_depths += counts.nan;
         }
         let encoded = self.comm.working_secs();
@@ -161,13 +163,13 @@ impl<'a> FrameExchange<'a> {
         Ok(())
     }
 
-    /// Lets messages of the exchange leave until at most `most` of them are on their way.
+    /// Waits until at most `most` messages of the exchange are in flight.
     pub(crate) fn throttle_sends(&mut self, most: usize) {
         self.comm.throttle_sends(Tag::Exchange as u32, most, self.timeout);
     }
 
-    /// Counts depths of the frame in `part` that are not numbers; those of parts sent to others are
-    /// counted when they are compressed.
+    /// Counts the NaN depths of the frame in `part`. Those of parts that are sent are counted when
+    /// they are encoded.
     pub(crate) fn count_nan<P: Composite>(&mut self, view: &View<'_, P>, part: Rect) {
         if P::HAS_DEPTH && self.counts_nan {
             for y in part.y0..part.y1 {
@@ -178,13 +180,13 @@ impl<'a> FrameExchange<'a> {
         }
     }
 
-    /// Waits until all have come here; longer than for a message: the rank that misses one shall be
-    /// the first to say so, because it knows which.
+    /// Waits for all ranks, for longer than for a message: the rank that misses a message should
+    /// time out first, because it knows whose it is.
     pub(crate) fn barrier(&mut self) -> Result<(), CompositeError> {
         Ok(self.comm.barrier(self.timeout.saturating_mul(2))?)
     }
 
-    /// One number of every place, at every place.
+    /// Gathers one number of every rank at every rank.
     pub(crate) fn all_gather_number(&mut self, number: u64) -> Result<Vec<u64>, CompositeError> {
         let answers = self.comm.all_gather(&number.to_le_bytes(), 8, self.timeout)?;
         let mut numbers = Vec::with_capacity(self.num_ranks());
@@ -199,7 +201,7 @@ impl<'a> FrameExchange<'a> {
         Ok(numbers)
     }
 
-    /// Sends a message that is not made of rows of pixels.
+    /// Sends a message that does not consist of rows of pixels.
     pub(crate) fn send_bytes(
         &mut self,
         order_index: usize,
@@ -214,7 +216,7 @@ impl<'a> FrameExchange<'a> {
         Ok(())
     }
 
-    /// Announces a message of at most `capacity` bytes.
+    /// Posts a receive for a message of at most `capacity` bytes.
     pub(crate) fn post_bytes(
         &mut self,
         order_index: usize,
@@ -226,31 +228,31 @@ impl<'a> FrameExchange<'a> {
         Ok(())
     }
 
-    /// Announces a message with the pixels of `rect`.
+    /// Posts a receive for a message with the pixels of `rect`.
     pub(crate) fn post<P: Composite>(
         &mut self,
         order_index: usize,
         tag: Tag,
         rect: &Rect,
     ) -> Result<(), CompositeError> {
-        // A little more than the longest honest message: one that is too long shall reach the
-        // decoder, which says what is wrong.
+        // A little more than the longest valid message: one that is too long should reach the
+        // decoder, which reports what is wrong.
         self.post_bytes(order_index, tag, codec::longest::<P>(rect) + 64)
     }
 
-    /// Whether messages that were announced have not yet come.
+    /// Whether any posted receive is incomplete.
     pub(crate) fn is_receiving(&self) -> bool {
         !self.posted.is_empty()
     }
 
-    /// Whether a message announced with `tag` has not yet come.
+    /// Whether any receive posted with `tag` is incomplete.
     pub(crate) fn is_receiving_for(&self, tag: Tag) -> bool {
         self.posted.iter().any(|receive| receive.tag == tag as u32)
     }
 
-    /// The next message that comes, of those announced: its place, whether it is one of
-    /// [`Tag::Collect`], its bytes. Without `patience`, only one that has already come. The time
-    /// goes to whoever measures the [span](Self::begin_span) around it.
+    /// The next message for a posted receive: the order index of its sender, whether its tag is
+    /// [`Tag::Collect`], and its bytes. Without `patience`, returns only a message that has already
+    /// arrived. The waiting time counts for the enclosing [span](Self::begin_span).
     pub(crate) fn next(
         &mut self,
         patience: bool,
@@ -268,9 +270,9 @@ impl<'a> FrameExchange<'a> {
         Ok(Some((self.order_index_of(arrival.source), is_collect, arrival.message)))
     }
 
-    /// Begins a span of which [`end_span`](Self::end_span) gives what is in no other column to
-    /// `column`: waits are measured together, because where time is simulated every look at the
-    /// clock costs some.
+    /// Begins a span. [`end_span`](Self::end_span) adds to `column` the time that no other column
+    /// has counted. Waits are measured together, because each reading of a simulated clock costs
+    /// time.
     pub(crate) fn begin_span(&self) -> Span {
         Span { begin: self.now(), counted: self.report.counted_secs() }
     }
@@ -308,7 +310,7 @@ impl Message {
         self.rect
     }
 
-    /// The message as its pixels; it has been checked when it came.
+    /// The pixels of the message, which was checked on arrival.
     pub(crate) fn part<P: Composite>(&self) -> DecodedMessage<'_> {
         DecodedMessage::reopen::<P>(&self.bytes, self.rect, self.depths)
     }

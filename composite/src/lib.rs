@@ -1,10 +1,11 @@
 //! Sort-last compositing: every rank has rendered its part of the data, and the ranks combine
 //! their images into one.
 //!
-//! The input is slices of colour and depth, or of ordered premultiplied colour. The output is one
-//! image, or one part of it on every rank. Ranks communicate through any [`Communicator`]. All
-//! strategies give the same bits as [`composite_serial`]. Sections 3.2.1 and 3.3 of the thesis
-//! describe this step; the thesis used IceT (Moreland, Kendall, Peterka, Huang, SC11).
+//! The input is borrowed slices: colour and depth, or premultiplied colour of ranks in a known
+//! front-to-back order. The output is one image, or one piece of it on every rank. Ranks
+//! communicate through any [`Communicator`]. All strategies give the same bits as
+//! [`composite_serial`]. Sections 3.2.1 and 3.3 of the thesis describe this step; the thesis used
+//! IceT (Moreland, Kendall, Peterka, Huang, SC11).
 //!
 //! ```
 //! use composite::{Communicator, Frame, Options, threads};
@@ -33,7 +34,7 @@
 //! | `icet` | module `icet`: IceT over the same ranks | nothing |
 //! | `cli` (the default) | module `cli`, the program `composite` | `render`, `icet`, clap |
 //!
-//! A program that embeds the compositor wants `composite = { version = "0.1", default-features =
+//! To use the compositor as a library, write `composite = { version = "0.1", default-features =
 //! false }`.
 #![deny(unsafe_code)]
 

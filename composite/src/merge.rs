@@ -1,9 +1,11 @@
-//! Joins what several places have in one rectangle, as it arrives, into the canonical grouping.
+//! Merges the contributions of several ranks to one rectangle as they arrive, in the canonical
+//! grouping.
 //!
-//! For formats with depth the grouping does not matter as long as ties go to the last place, so one
-//! layer takes everything: first the place that comes first in time, then its neighbours in either
-//! direction; what comes before its neighbour has waits. For blended formats two groups are joined
-//! as soon as both are there, and layers are only made where two messages meet.
+//! For formats with depth the grouping does not matter as long as ties go to the last rank in
+//! order, so one layer takes everything: first the contribution that arrives first, then its
+//! neighbours in either direction. A contribution that arrives before its neighbour waits. For
+//! blended formats two groups are merged as soon as both are complete, and a layer is only made
+//! where two messages are merged.
 use crate::frame_exchange::Message;
 use crate::layer::{Layer, View};
 use crate::pixel::Composite;
@@ -12,7 +14,7 @@ use crate::rect::Rect;
 use crate::simd::Kernels;
 use crate::simd::expand::Side;
 
-/// Pixels of one place, or of several already joined.
+/// Pixels of one rank, or of several that are merged already.
 pub(crate) enum MergeInput<'a, P: Composite> {
     View(View<'a, P>),
     Message(Message),
@@ -29,12 +31,12 @@ impl<P: Composite> MergeInput<'_, P> {
     }
 }
 
-/// Buffers to work in, kept from frame to frame.
+/// Scratch buffers that are kept from frame to frame.
 #[derive(Debug)]
 pub(crate) struct Scratch<P: Composite> {
     pub(crate) kernels: Kernels,
     pub(crate) layers: Vec<Layer<P>>,
-    /// Messages that have been read, for the communicator.
+    /// Messages that have been read, to be recycled by the communicator.
     pub(crate) read: Vec<Vec<u8>>,
 }
 
@@ -48,7 +50,7 @@ impl<P: Composite> Scratch<P> {
         Layer::empty(bounds, spare)
     }
 
-    /// `item` as a layer of at least `bounds`.
+    /// Converts `item` to a layer that covers at least `bounds`.
     fn layer(&mut self, item: MergeInput<'_, P>, bounds: Rect) -> Layer<P> {
         match item {
             MergeInput::Layer(layer) => {
@@ -83,7 +85,7 @@ impl<P: Composite> Scratch<P> {
     }
 }
 
-/// What has come for one rectangle and how far it is joined.
+/// The contributions to one rectangle that have arrived, and how far they are merged.
 pub(crate) struct Merge<'a, P: Composite> {
     bounds: Rect,
     missing: usize,
@@ -91,8 +93,8 @@ pub(crate) struct Merge<'a, P: Composite> {
 }
 
 enum MergeOrder<'a, P: Composite> {
-    /// Items that wait for their neighbours, by place among those expected; the layer has
-    /// `first..end` of them.
+    /// `waiting` holds the items that wait for their neighbours, by position among the expected
+    /// ranks. The layer holds `first..end` of them.
     Nearest {
         waiting: Vec<Option<MergeInput<'a, P>>>,
         order_indices: Vec<usize>,
@@ -100,19 +102,20 @@ enum MergeOrder<'a, P: Composite> {
         first: usize,
         end: usize,
     },
-    /// A heap: node 1 is the whole, nodes 2i and 2i + 1 are the halves of i, the last half of all
-    /// nodes are the places.
+    /// A heap: node 1 is the root, nodes 2i and 2i + 1 are the children of node i, and the last
+    /// half of the nodes are the ranks.
     Tree { nodes: Vec<TreeNode<'a, P>>, folding: Folding },
 }
 
 enum TreeNode<'a, P: Composite> {
     Missing,
-    /// Complete; `None` if nobody below drew anything.
+    /// Complete; `None` if no rank below this node drew anything.
     Done(Option<MergeInput<'a, P>>),
 }
 
 impl<'a, P: Composite> Merge<'a, P> {
-    /// Of `num_ranks` places those for which `contributes` says so will come.
+    /// Expects a contribution from each order index below `num_ranks` for which `contributes` is
+    /// true.
     pub(crate) fn new(bounds: Rect, num_ranks: usize, contributes: impl Fn(usize) -> bool) -> Self {
         let expected: Vec<usize> =
             (0..num_ranks).filter(|&order_index| contributes(order_index)).collect();
@@ -144,12 +147,12 @@ impl<'a, P: Composite> Merge<'a, P> {
         Self { bounds, missing, order: MergeOrder::Tree { nodes, folding } }
     }
 
-    /// Whether all have come.
+    /// Whether all contributions have arrived.
     pub(crate) fn is_complete(&self) -> bool {
         self.missing == 0
     }
 
-    /// Takes what `order_index` has.
+    /// Adds the contribution of `order_index`.
     pub(crate) fn put(
         &mut self,
         order_index: usize,
@@ -201,7 +204,7 @@ impl<'a, P: Composite> Merge<'a, P> {
         }
     }
 
-    /// The layer of all, `None` if nobody contributed. To be called when
+    /// The merged layer, `None` if no rank contributed. Call it when
     /// [`is_complete`](Self::is_complete).
     pub(crate) fn finish(self, scratch: &mut Scratch<P>) -> Option<Layer<P>> {
         match self.order {
@@ -216,14 +219,14 @@ impl<'a, P: Composite> Merge<'a, P> {
     }
 }
 
-/// The node of a place: two leaves for every slot, the second for the partner that is folded into
-/// it.
+/// The node of an order index. Every slot has two leaves; the second is for the partner that is
+/// folded into it.
 fn leaf(folding: &Folding, order_index: usize) -> usize {
     let slot = folding.slot(order_index);
     2 * folding.slots + 2 * slot + usize::from(folding.leader(slot) != order_index)
 }
 
-/// Two neighbours as one, in whichever of the two is a layer already.
+/// Merges two neighbours into one layer, and reuses the layer of either if there is one.
 fn merge_pair<'a, P: Composite>(
     lower: MergeInput<'a, P>,
     higher: MergeInput<'a, P>,

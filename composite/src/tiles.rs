@@ -1,36 +1,35 @@
-//! Assigns the tiles of direct send to ranks: rectangles of about equal work, near to what their
+//! Assigns the tiles of direct send to ranks: rectangles of about equal work, close to what their
 //! owners drew.
 //!
-//! The image is bisected recursively, and so are the ranks: those that drew further left (or up)
-//! get the left (or upper) part, which is as large as their share of the work. Compared with bands
-//! of rows this needs fewer messages: a small object overlaps a few tiles and not many bands (at
-//! 127 ranks in slabs it is a few instead of all). Part of the data to merge is also
-//! already on the rank that needs it.
+//! The image is bisected recursively, and so are the ranks. Ranks that drew further left (or up)
+//! get the left (or upper) part, and the cut divides the work in proportion to their shares.
+//! Compared with bands of rows this needs fewer messages, because a small object overlaps a few
+//! tiles but many bands: at 127 ranks in slabs, a few instead of all. A tile also overlaps what its
+//! owner drew, so part of the pixels to merge need not be sent.
 use crate::rect::Rect;
 
-/// An active pixel costs a transfer and a join, a pixel of the result only its place: their ratio,
-/// about.
+/// Cost of an active pixel (transfer and merge), relative to that of a pixel of the result, about.
 const DRAWN_WEIGHT: u64 = 2;
 
-/// Cells of a region at most in which its work is added up: cuts are as fine as this part of it.
+/// Most cells of a region in which its work is summed; cuts are no finer than a cell.
 const CELLS: usize = 128;
 
-/// One tile for every place; `drawn[order_index]` is the rectangle that it drew in. Tiles are
-/// disjoint and cover every `drawn`, and some may be empty.
+/// One tile per order index; `drawn[order_index]` is the rectangle that this rank drew in. Tiles
+/// are disjoint and cover every `drawn`, and some may be empty.
 pub(crate) fn balanced(drawn: &[Rect]) -> Vec<Rect> {
     let mut owners: Vec<Owner> =
         (0..drawn.len()).map(|order_index| Owner { order_index, share: 1 }).collect();
     balanced_among(drawn, &mut owners)
 }
 
-/// A place that gets a tile, as large as its share of all owners' shares.
+/// A rank that gets a tile in proportion to its share of all owners' shares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Owner {
     pub(crate) order_index: usize,
     pub(crate) share: u64,
 }
 
-/// As [`balanced`], among `owners` only; other places have empty tiles.
+/// As [`balanced`], but only `owners` get tiles; the other tiles are empty.
 pub(crate) fn balanced_among(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> {
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
     let mut tiles = vec![Rect::EMPTY; drawn.len()];
@@ -41,7 +40,7 @@ pub(crate) fn balanced_among(drawn: &[Rect], owners: &mut [Owner]) -> Vec<Rect> 
     tiles
 }
 
-/// Divides `region` among `owners`; `present` are the rectangles that meet it.
+/// Divides `region` among `owners`; `present` are the rectangles that overlap it.
 fn divide(
     region: Rect,
     owners: &mut [Owner],
@@ -58,8 +57,8 @@ fn divide(
     }
     let half = owners.len() / 2;
 
-    // Ranks by the centre of what they drew; those that drew nothing work in the middle, where they
-    // fill up.
+    // Sort ranks by the centre of what they drew. Ranks that drew nothing sort at the middle of the
+    // region.
     let sort = |across_columns: bool, owners: &mut [Owner]| {
         owners.sort_unstable_by_key(|owner| {
             let rect =
@@ -74,9 +73,9 @@ fn divide(
         cut(region, across_columns, present, of(&owners[..half]), of(owners))
     };
 
-    // A rectangle that a cut crosses is one message more. Rows lie in one piece in memory and
-    // columns do not, so the image is cut across its columns only where that saves many messages:
-    // below, between or beside small objects, and across slabs.
+    // Each rectangle that a cut crosses costs one more message. Rows are contiguous in memory and
+    // columns are not, so the region is cut across its columns only where that saves many messages:
+    // between small objects, and across slabs.
     let row = split(false, owners);
     let crossed_by_row = present.iter().filter(|rect| rect.y0 < row && row < rect.y1).count();
     let is_flat = region.height() < 2;
@@ -112,13 +111,13 @@ fn divide(
     }
 }
 
-/// Where to cut `region` so that the part before has `share` of `shares` of the work.
+/// Where to cut `region` so that the first part has `share` of `shares` of the work.
 fn cut(region: Rect, across_columns: bool, present: &[Rect], share: u64, shares: u64) -> u32 {
     let (start, end) = if across_columns { (region.x0, region.x1) } else { (region.y0, region.y1) };
     let own = if across_columns { region.height() } else { region.width() } as u64;
 
-    // The work of columns (or rows), in cells: what changes inside a cell counts as if at its
-    // nearer side.
+    // The work of columns (or rows), in cells: a change inside a cell counts as if it were at the
+    // nearer side of the cell.
     let length = (end - start) as usize;
     let cell = length.div_ceil(CELLS).max(1);
     let cells = length.div_ceil(cell);
@@ -148,7 +147,7 @@ fn cut(region: Rect, across_columns: bool, present: &[Rect], share: u64, shares:
     for (index, &work) in work[..cells].iter().enumerate() {
         let more = work * width_of(index);
         if done + more >= wanted {
-            // Rounded to the nearer side, so that cuts are not always late.
+            // Round to the nearer side, so that cuts are not biased towards the end.
             let along = (wanted - done + work / 2) / work.max(1);
             return (start + (index * cell) as u32 + along as u32).min(end);
         }
@@ -157,10 +156,10 @@ fn cut(region: Rect, across_columns: bool, present: &[Rect], share: u64, shares:
     end
 }
 
-/// Bytes of a slice between nodes.
+/// Bytes of a slice that is sent between nodes.
 pub(crate) const SLICE_BYTES: usize = 1 << 18;
 
-/// `tile` in slices of rows, of about `pixels` each.
+/// Cuts `tile` into slices of whole rows with about `pixels` pixels each.
 pub(crate) fn slices(tile: Rect, pixels: usize) -> Vec<Rect> {
     let count = tile.pixels().div_ceil(pixels.max(1)).clamp(1, tile.height().max(1));
     let row = |i: usize| tile.y0 + (tile.height() * i / count) as u32;

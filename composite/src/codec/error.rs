@@ -16,7 +16,7 @@ pub enum MessageError {
     /// Not a message of this library or of this version of it.
     #[error("it does not begin with COMPOS03")]
     Magic,
-    /// Bits changed on the way.
+    /// Bits changed in transit.
     #[error("its checksum is {found:#018x} instead of {expected:#018x}")]
     Checksum {
         /// As stored in the message.
