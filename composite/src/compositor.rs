@@ -21,47 +21,48 @@ use std::time::Duration;
 pub enum Destination {
     /// To one rank of the communicator, whole.
     Rank(usize),
-    /// Nowhere: every rank keeps its piece, to save it or to show its part of a wall.
+    /// To no single rank: every rank keeps its piece, to save it or to show its part of a display
+    /// wall.
     Distributed,
 }
 
-/// How to composite; the same on every rank (but for `simd` and `timeout`). Ranks that differ get
-/// [`MessageError::Fingerprint`](crate::MessageError::Fingerprint).
+/// How to composite. Options must be the same on every rank (except `simd` and `timeout`);
+/// otherwise ranks get [`MessageError::Fingerprint`](crate::MessageError::Fingerprint).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Which way the pixels take; changes the time, never the image.
+    /// How pixels are exchanged; changes the time, never the image.
     pub strategy: Strategy,
     /// Where the image goes.
     pub destination: Destination,
     /// Ranks from front to back, for premultiplied colours; each exactly once. `None` means rank 0
-    /// is in front. For images with depth it only says who wins a tie: the last one.
+    /// is in front. For images with depth it only decides ties: the last rank in the order wins.
     pub order: Option<Vec<usize>>,
-    /// Whether the collected image has its depths too; they cost 4 bytes a drawn pixel on the way
-    /// to the rank that collects.
+    /// Whether the collected image includes depths. They cost 4 bytes per drawn pixel in the
+    /// messages to the rank that collects.
     pub depth: bool,
-    /// Whether checksums cover the pixels of messages and not their headers only. For transports
+    /// Whether checksums cover the pixels of messages and not only their headers. For transports
     /// that may change bytes; it costs about a tenth of the time of a frame between threads.
     pub verify: bool,
-    /// Pixels of one message at most, about: direct send cuts its tiles in slices of so many, so
-    /// that one is compressed while another travels. `None` chooses.
+    /// Most pixels of one message, about. Direct send cuts its tiles into slices of this size, so
+    /// that one is encoded while another is in flight. `None` chooses.
     pub slice_px: Option<usize>,
-    /// Whether ranks that are processes of one machine merge the image in memory that they share,
-    /// where [`Strategy::DirectSend`] or [`Strategy::Automatic`] is asked for and the image goes to
-    /// one rank. Without it, and where there is no such memory, they send messages.
+    /// Whether ranks that are processes of one machine merge the image in shared memory, if the
+    /// strategy is [`Strategy::DirectSend`] or [`Strategy::Automatic`] and the image goes to one
+    /// rank. Without it, and where there is no such memory, they send messages.
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
     /// Longest wait for one message without a sign of life of those it depends on. A renderer that
     /// takes longer calls [`Communicator::alive`] now and then, as for each tile.
     pub timeout: Duration,
-    /// Whether all ranks meet at the end, so that success on one rank means success on all. Without
-    /// it a rank that has sent its part returns at once and hears of a fault of others only with
-    /// its next frame.
+    /// Whether all ranks wait for each other at the end, so that success on one rank means success
+    /// on all. Without it a rank that has sent its part returns at once and learns of a fault of
+    /// other ranks only with its next frame.
     pub final_barrier: bool,
 }
 
 impl Default for Options {
-    /// Direct send to rank 0 with depths, ranks in order, 60 seconds, confirmed.
+    /// Direct send to rank 0 with depths, ranks in order, 60 seconds, final barrier.
     fn default() -> Self {
         Self {
             strategy: Strategy::default(),
@@ -81,7 +82,7 @@ impl Default for Options {
 /// What one rank gets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompositeOutput<P: PixelFormat> {
-    /// The whole image, on the rank it was to go to.
+    /// The whole image, on the destination rank.
     pub image: Option<Image<P>>,
     /// The piece this rank holds, with [`Destination::Distributed`].
     pub piece: Option<Piece<P>>,
@@ -94,7 +95,7 @@ pub struct CompositeOutput<P: PixelFormat> {
 ///
 /// The result has the bits of [`composite_serial`](crate::composite_serial) over the frames in
 /// `options.order`, whatever the strategy, the transport and the order in which messages arrive.
-/// For frame after frame a [`Compositor`] is faster: it keeps its buffers.
+/// To composite many frames, use a [`Compositor`]: it keeps its buffers.
 ///
 /// # Errors
 /// [`CompositeError`]. A rank that fails aborts the communicator, so all other ranks get an error
@@ -108,14 +109,14 @@ pub fn composite<P: Composite>(
     Compositor::new(options.clone()).composite(comm, frame)
 }
 
-/// [`composite`] for frame after frame, with buffers that are kept.
+/// [`composite`] for many frames; keeps its buffers.
 #[derive(Debug)]
 pub struct Compositor<P: Composite> {
     pub(crate) options: Options,
     pub(crate) scratch: Scratch<P>,
     pub(crate) spare: Option<Image<P>>,
     network: Option<NetworkCosts>,
-    /// Where the frames of one node are merged.
+    /// The buffer into which the frames of one node are merged.
     pub(crate) node_image: Option<Image<P>>,
 }
 
@@ -126,23 +127,23 @@ impl<P: Composite> Compositor<P> {
         Self { options, scratch, spare: None, network: None, node_image: None }
     }
 
-    /// The same with a network that is known, so that [`Strategy::Automatic`] need not measure it;
-    /// the same on every rank.
+    /// Sets known network costs, so that [`Strategy::Automatic`] need not measure them; pass the
+    /// same on every rank.
     pub fn with_network(self, network: NetworkCosts) -> Self {
         Self { network: Some(network), ..self }
     }
 
-    /// How it composites.
+    /// Its options.
     pub fn options(&self) -> &Options {
         &self.options
     }
 
-    /// Another order from front to back ([`Options::order`]) for the frames to come.
+    /// Sets another order from front to back ([`Options::order`]) for the next frames.
     pub fn set_order(&mut self, order: Option<Vec<usize>>) {
         self.options.order = order;
     }
 
-    /// Takes back an image that is no longer needed, so that the next one is written over it.
+    /// Takes back an image that is no longer needed, so that its memory is used for the next one.
     pub fn recycle(&mut self, image: Image<P>) {
         self.spare = Some(image);
     }
@@ -171,7 +172,7 @@ impl<P: Composite> Compositor<P> {
         let begin = comm.now();
         let options = &self.options;
 
-        // Options that can be refused before any message.
+        // Check options before any message is sent.
         let order = CompositingOrder::new(comm, options)?;
         options.strategy.check()?;
         let size_px = (frame.width_px(), frame.height_px());
@@ -183,7 +184,7 @@ impl<P: Composite> Compositor<P> {
             self.network = Some(NetworkCosts::measure(comm, options.timeout)?);
         }
 
-        // Where this rank drew, unless the renderer has said so.
+        // Find where this rank drew, unless the renderer has said so.
         let kernels = self.scratch.kernels;
         let fingerprint = fingerprint::<P>(size_px, options, &order, self.network.as_ref());
         let codec = Codec { kernels, fingerprint, verify: options.verify };
@@ -204,7 +205,7 @@ impl<P: Composite> Compositor<P> {
             check_order(&exchange.drawn, &ranges, &order.ranks)?;
         }
 
-        // Ranks of one machine.
+        // Ranks of one machine merge in shared memory.
         if let Some(root) = order
             .root_index
             .filter(|_| shares && in_memory::is_possible::<P>(&mut exchange, size_px))
@@ -224,7 +225,7 @@ impl<P: Composite> Compositor<P> {
             }
         }
 
-        // The strategy, and what it hands in.
+        // Run the strategy and collect its pieces.
         let slice_px = options.slice_px.unwrap_or_else(|| slice_px::<P>(exchange.comm));
         let strategy = match (options.strategy, &self.network) {
             (Strategy::Automatic, Some(network)) => {
@@ -263,16 +264,16 @@ impl<P: Composite> Compositor<P> {
     }
 }
 
-/// Ends the group, unless somebody else has.
+/// Aborts the group, unless another rank has.
 pub(crate) fn abort_group(comm: &mut dyn Communicator, error: &CompositeError) {
     if !matches!(error, CompositeError::Comm(CommError::Aborted { .. })) {
         comm.abort(&error.to_string());
     }
 }
 
-/// Pixels of a slice that is joined and on its way to the collecting rank while the next one comes:
-/// a quarter of a megabyte. Where nothing travels by itself there are fewer and larger ones: half a
-/// megabyte costs a tenth more processor time at eight ranks than one.
+/// Pixels of a slice: a quarter of a megabyte, merged and sent to the collecting rank while the
+/// next one arrives. Where messages do not travel in the background, slices are fewer and larger:
+/// half a megabyte costs a tenth more processor time at eight ranks than one.
 pub(crate) fn slice_px<P: PixelFormat>(comm: &dyn Communicator) -> usize {
     (if comm.is_one_node() { 4 * SLICE_BYTES } else { SLICE_BYTES }) / P::BYTES
 }
@@ -320,12 +321,12 @@ pub(crate) fn front_to_back(
     )))
 }
 
-/// Ranks whose rectangles meet are one behind the other, in the order of compositing, where they
-/// say how far they reach.
+/// Checks that ranks with overlapping rectangles are one behind the other in the order of
+/// compositing, as far as they give a depth range.
 fn check_order(drawn: &[Rect], ranges: &[[f32; 2]], order: &[usize]) -> Result<(), CompositeError> {
     for behind in 0..drawn.len() {
         for front in 0..behind {
-            // NaN, the range of those who say nothing, is in conflict with nobody.
+            // NaN, the range of ranks that give none, never conflicts.
             if ranges[front][1] > ranges[behind][0]
                 && !drawn[front].intersection(&drawn[behind]).is_empty()
             {
@@ -341,8 +342,8 @@ fn check_order(drawn: &[Rect], ranges: &[[f32; 2]], order: &[usize]) -> Result<(
     Ok(())
 }
 
-/// Differs (but for one chance in 2^64) between ranks that do not composite the same thing in the
-/// same way.
+/// A number that differs (except with probability 2^-64) between ranks that do not composite the
+/// same thing with the same options.
 pub(crate) fn fingerprint<P: PixelFormat>(
     size_px: (u32, u32),
     options: &Options,

@@ -1,9 +1,9 @@
-//! What can go wrong, by name.
+//! Errors of compositing.
 use crate::codec::MessageError;
 use crate::comm::CommError;
 
-/// Why a composited image could not be made. After an error no rank gets an image: the communicator
-/// is aborted.
+/// Why an image could not be composited. After an error no rank gets an image: the communicator is
+/// aborted.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
 pub enum CompositeError {
     /// A slice of a frame has the wrong length.
@@ -42,7 +42,7 @@ pub enum CompositeError {
     /// The options cannot work for this communicator.
     #[error("{0}")]
     Options(String),
-    /// A message arrived that cannot be used.
+    /// A message arrived that cannot be decoded.
     #[error("rank {rank} got an unusable message from rank {from}: {reason}")]
     Message {
         /// The receiver.
@@ -52,7 +52,7 @@ pub enum CompositeError {
         /// What is wrong with it.
         reason: MessageError,
     },
-    /// Ranks of a blended image are not one behind the other.
+    /// Ranks of a blended image overlap in depth, against the order of compositing.
     #[error(
         "rank {front} is to be in front of rank {behind}, but reaches to depth {far_of_front}, \
          behind its nearest {near_of_behind}: \
@@ -60,16 +60,16 @@ pub enum CompositeError {
          use composite_deep"
     )]
     Order {
-        /// Comes first in the order of compositing.
+        /// The rank that comes first in the order of compositing.
         front: usize,
-        /// Comes later.
+        /// The rank that comes later.
         behind: usize,
         /// Farthest depth of the rank in front.
         far_of_front: String,
         /// Nearest depth of the rank behind.
         near_of_behind: String,
     },
-    /// A tile of a stream was handed in twice, or lies outside the bounds given at its beginning.
+    /// A tile of a stream was submitted twice, or lies outside the bounds given at its beginning.
     #[error("{0}")]
     Stream(String),
     /// The transport failed.

@@ -7,8 +7,8 @@ use crate::rect::Rect;
 use crate::simd::mask::{Counts, row_words, row_words_scalar};
 use crate::simd::{Kernels, at_level};
 
-/// One rank's rendered image: slices of the caller, row after row, any row order as long as all
-/// ranks use the same.
+/// One rank's rendered image: slices of the caller, row after row. The row order is free but must
+/// be the same on all ranks.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a, P: PixelFormat> {
     width_px: u32,
@@ -23,7 +23,7 @@ impl<'a, C: Color> Frame<'a, DepthPixel<C>>
 where
     DepthPixel<C>: PixelFormat<Color = C>,
 {
-    /// An opaque image with depth 0 (near) … 1 (background). Both slices hold `width_px *
+    /// An opaque image with depths from 0 (near) to 1 (background). Both slices hold `width_px *
     /// height_px` values.
     ///
     /// # Errors
@@ -73,7 +73,7 @@ fn check_length(
 }
 
 impl Rect {
-    /// An error that names both if `bounds` is not within this image.
+    /// Returns an error that names both rectangles if `bounds` is not within this one.
     pub(crate) fn must_contain(&self, bounds: &Self) -> Result<(), CompositeError> {
         if self.contains(bounds) {
             return Ok(());
@@ -87,21 +87,21 @@ impl Rect {
 }
 
 impl<'a, P: PixelFormat> Frame<'a, P> {
-    /// The same frame, of which only the pixels in `bounds` count: what the renderer knows of where
-    /// it drew, so that nobody has to look. What lies outside is background, whatever the slices
-    /// hold there.
+    /// The same frame, restricted to the pixels in `bounds`: a renderer that knows where it drew
+    /// saves the search for active pixels. Pixels outside are background, whatever the slices hold
+    /// there.
     ///
     /// # Errors
-    /// [`CompositeError::Options`] if `bounds` reaches beyond the image.
+    /// [`CompositeError::Options`] if `bounds` reaches outside the image.
     pub fn with_bounds(self, bounds: Rect) -> Result<Self, CompositeError> {
         Rect::of_size(self.width_px, self.height_px).must_contain(&bounds)?;
         Ok(Self { bounds: Some(if bounds.is_empty() { Rect::EMPTY } else { bounds }), ..self })
     }
 
-    /// The same frame, with the nearest and farthest depth of what this rank drew, in any unit that
-    /// all ranks share. Blended frames that say so are checked: a rank that reaches behind the
-    /// nearest of one that comes after it, where their rectangles meet, is
-    /// [`CompositeError::Order`] and not a wrong picture.
+    /// The same frame, with the nearest and farthest depth that this rank drew, in any unit that
+    /// all ranks share. This makes [`composite`](crate::composite) check the order of blended
+    /// frames: if a rank reaches behind the nearest depth of one that comes after it, and their
+    /// rectangles overlap, it returns [`CompositeError::Order`] instead of a wrong image.
     pub fn with_depth_range(self, near_to_far: [f32; 2]) -> Self {
         Self { depth_range: Some(near_to_far), ..self }
     }
@@ -130,7 +130,7 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
         self.color.is_empty()
     }
 
-    /// An image composited before, as a frame.
+    /// A composited image as a frame.
     pub(crate) fn of_image(image: &'a Image<P>) -> Self {
         Self {
             width_px: image.width_px,
@@ -142,7 +142,7 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
         }
     }
 
-    /// Whether the renderer has said where it drew.
+    /// Whether the renderer has set bounds.
     pub(crate) fn has_bounds(&self) -> bool {
         self.bounds.is_some()
     }
@@ -184,8 +184,7 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
 }
 
 impl<P: Composite> Frame<'_, P> {
-    /// Depths that are not a number: they count as background, and [`crate::Report`] says how many
-    /// there were.
+    /// Number of depths that are NaN. They count as background; [`crate::Report`] counts them too.
     pub fn nan_depths(&self) -> u64 {
         self.drawn(Kernels::new(None)).1.nan
     }
@@ -301,7 +300,7 @@ impl<P: Composite> Image<P> {
     }
 }
 
-/// The part of the finished image that one rank holds. What is in no rank's piece is background.
+/// The part of the finished image that one rank holds. Pixels in no rank's piece are background.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece<P: PixelFormat> {
     /// Which pixels; possibly none.

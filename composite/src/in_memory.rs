@@ -1,10 +1,10 @@
-//! Ranks that are processes of one machine: no message, but memory that all of them see.
+//! Merging for ranks that are processes of one machine: shared memory instead of messages.
 //!
-//! Each rank lays what it drew into a room of shared memory, all meet, and then take bands of rows
-//! of the image, as long as there are any, and merge them straight from the rooms. The bands of
-//! other ranks are read by the one that collects. A pixel is copied twice, where a message is read,
-//! packed, copied by the system, read again, joined, packed and sent once more; and whoever has a
-//! processor works, wherever pixels are.
+//! Each rank copies what it drew into its segment of shared memory. After a barrier, ranks take
+//! bands of rows of the image as long as there are any, and merge them straight from the segments.
+//! The collecting rank reads the bands of the others. A pixel is copied twice, whereas with
+//! messages it is read, encoded, copied by the system, read again, merged, encoded and sent once
+//! more. Any rank that has a processor works, wherever the pixels are.
 use crate::codec::MessageError;
 use crate::comm::SharedSegments;
 use crate::error::CompositeError;
@@ -17,13 +17,13 @@ use crate::shared::{BAND_ROWS, Rows, merge_band};
 use crate::simd::Kernels;
 use std::ops::Range;
 
-/// What rooms hold together at most: beyond it pictures travel, piece by piece.
+/// Most bytes of all segments together; larger images are sent in messages.
 const MOST_BYTES: usize = 4 << 30;
 
-/// Planes of other types than bytes begin at multiples of this.
+/// Planes of types other than bytes begin at multiples of this.
 const ALIGNMENT: usize = 64;
 
-/// Where the planes of a rectangle are in a room, colours first.
+/// Where the planes of a rectangle are in a segment, colours first.
 struct Planes {
     colors: usize,
     depths: Range<usize>,
@@ -38,7 +38,7 @@ impl Planes {
     }
 }
 
-/// Where the bands of the image are, in the room of the rank that collects.
+/// Where the bands of the image are, in the segment of the rank that collects.
 struct Bands {
     width: usize,
     height: usize,
@@ -56,7 +56,7 @@ impl Bands {
         self.height.div_ceil(BAND_ROWS)
     }
 
-    /// Begin, and bytes.
+    /// Offset and length in bytes.
     fn offset_and_len(&self, band: usize) -> (usize, usize) {
         let begin = self.first + band * (BAND_ROWS * self.row_bytes).next_multiple_of(ALIGNMENT);
         (begin, self.rows(band).len() * self.row_bytes)
@@ -78,7 +78,8 @@ impl Bands {
     }
 }
 
-/// Whether this frame can be merged in shared memory; the same on all ranks. They have met.
+/// Whether this frame can be merged in shared memory; the same on all ranks. The handshake must be
+/// complete.
 pub(crate) fn is_possible<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     (width_px, height_px): (u32, u32),
@@ -88,8 +89,8 @@ pub(crate) fn is_possible<P: Composite>(
     laid.saturating_add(image) <= MOST_BYTES && exchange.comm.shared_segments().is_some()
 }
 
-/// The image at the root, after which all have met; or nothing, if there was not enough memory,
-/// which all find alike.
+/// The image at the root; returns after a barrier. `None` on all ranks if there was not enough
+/// memory.
 pub(crate) fn run<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     view: &View<'_, P>,
@@ -105,7 +106,7 @@ pub(crate) fn run<P: Composite>(
     let of_root = Planes::of::<P>(&exchange.drawn[root]).depths.end.next_multiple_of(ALIGNMENT);
     let bands = Bands { width, height, first: of_root, depths, row_bytes };
 
-    // What this rank drew.
+    // Publish what this rank drew.
     let begin = exchange.comm.working_secs();
     exchange.count_nan(view, view.bounds);
     let own = Planes::of::<P>(&view.bounds);
@@ -118,7 +119,7 @@ pub(crate) fn run<P: Composite>(
     exchange.barrier()?;
     exchange.end_span(span, |report| &mut report.exchange_secs);
 
-    // Bands, as long as there are any.
+    // Merge bands, as long as there are any.
     let begin = exchange.comm.working_secs();
     let (drawn, ranks): (Vec<Rect>, Vec<usize>) = (0..exchange.num_ranks())
         .map(|order_index| (exchange.drawn[order_index], exchange.rank_of(order_index)))
@@ -169,7 +170,7 @@ pub(crate) fn run<P: Composite>(
     exchange.barrier()?;
     exchange.end_span(span, |report| &mut report.exchange_secs);
 
-    // The bands of the others.
+    // Copy the bands of the other ranks.
     let begin = exchange.comm.working_secs();
     if let (Some(image), Some(memory)) = (&mut image, exchange.comm.shared_segments()) {
         for band in (0..bands.count()).filter(|&band| !own_bands[band]) {

@@ -1,5 +1,5 @@
-//! Planes of pixels inside this crate: borrowed from a frame ([`View`]) or held while they are
-//! joined ([`Layer`]).
+//! Planes of pixels inside this crate: borrowed from a frame ([`View`]) or owned while they are
+//! merged ([`Layer`]).
 use crate::pixel::{Composite, PixelFormat};
 use crate::rect::Rect;
 use crate::simd::expand::{Side, clean_run, clean_run_scalar, merge_run, merge_run_scalar};
@@ -38,7 +38,7 @@ pub(crate) struct Layer<P: PixelFormat> {
 }
 
 impl<P: Composite> Layer<P> {
-    /// Nothing drawn in `bounds`, in the buffers of `spare`.
+    /// An empty layer of `bounds`, in the buffers of `spare`.
     pub(crate) fn empty(bounds: Rect, spare: Option<Self>) -> Self {
         let (mut colors, mut depths) =
             spare.map_or((Vec::new(), Vec::new()), |s| (s.colors, s.depths));
@@ -49,7 +49,8 @@ impl<P: Composite> Layer<P> {
         Self { bounds, colors, depths }
     }
 
-    /// What `view` has in `bounds`, copied: cheaper than joining it to nothing.
+    /// Copies the pixels of `view` in `bounds`, which is cheaper than merging them into an empty
+    /// layer.
     pub(crate) fn copied(
         bounds: Rect,
         view: &View<'_, P>,
@@ -108,7 +109,7 @@ impl<P: Composite> Layer<P> {
         (&mut self.colors[range], depths)
     }
 
-    /// Joins what `view` has within these bounds.
+    /// Merges the pixels of `view` within these bounds.
     pub(crate) fn merge_view(&mut self, kernels: Kernels, view: &View<'_, P>, side: Side) {
         let both = self.bounds.intersection(&view.bounds);
         at_level!(kernels, simd => merge_rows(simd, self, view, both, side), {
@@ -121,7 +122,7 @@ impl<P: Composite> Layer<P> {
         });
     }
 
-    /// The same pixels in bounds that hold at least these.
+    /// The same pixels in larger bounds that contain these and `bounds`.
     pub(crate) fn grown(self, bounds: Rect, spare: Option<Self>) -> Self {
         let bounds = self.bounds.around(&bounds);
         if bounds == self.bounds {

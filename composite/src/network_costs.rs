@@ -1,6 +1,6 @@
-//! What a message costs: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C. Scheiman
-//! (SPAA 1995), measured once over the communicator itself, and what follows from it for each
-//! strategy.
+//! Costs of messages and strategies: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C.
+//! Scheiman (SPAA 1995), measured once over the communicator itself, and the time of each strategy
+//! that follows from it.
 use crate::comm::{CommError, Communicator};
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
@@ -19,19 +19,19 @@ pub struct NetworkCosts {
     pub latency_secs: f64,
     /// Time a rank is busy with one message, on either side (LogGP: o, with the gap g).
     pub overhead_secs: f64,
-    /// Each byte of a long message (LogGP: G).
+    /// Time for each byte of a long message (LogGP: G).
     pub byte_secs: f64,
 }
 
 const PING_TAG: u32 = 11;
 const ROUNDS: usize = 8;
 const LONG_BYTES: usize = 1 << 18;
-/// Reading or writing a byte of a message on one core, about; measured on a server of 2023. Only
-/// its ratio to the network counts.
+/// Time to read or write a byte of a message on one core, about; measured on a server of 2023. Only
+/// its ratio to the network matters.
 const LOCAL_BYTE_SECS: f64 = 1.5e-10;
-/// What a rank does for each message besides its pixels (a buffer, a header, masks, asking whether
-/// it has left), about: from 16 to 128 simulated ranks dense frames by direct send take 15 µs more
-/// for each rank, which is one message more to send, to receive and to collect.
+/// Time that a rank spends on each message besides its pixels (a buffer, a header, masks, checking
+/// whether it has been sent), about. From 16 to 128 simulated ranks, dense frames by direct send
+/// take 15 µs more for each rank, which is one message more to send, to receive and to collect.
 const LOCAL_MESSAGE_SECS: f64 = 5e-6;
 
 impl NetworkCosts {
@@ -39,8 +39,8 @@ impl NetworkCosts {
     pub const QDR: Self =
         Self { latency_secs: 1.5e-6, overhead_secs: 0.5e-6, byte_secs: 1.0 / 3.2e9 };
 
-    /// Measures with messages between the first and the last rank; all ranks must call it, and all
-    /// get the numbers of rank 0.
+    /// Measures with messages between the first and the last rank. All ranks must call it, and all
+    /// get the values of rank 0.
     ///
     /// # Errors
     /// As the calls of the communicator.
@@ -73,7 +73,7 @@ impl NetworkCosts {
                 measured[slot] = best;
             }
         }
-        // Rank 0 decides, so that everybody will choose alike.
+        // Use the values of rank 0, so that all ranks choose the same strategy.
         let mine: &[u8] = bytemuck::cast_slice(&measured);
         let all = comm.all_gather(mine, size_of_val(&measured), timeout)?;
         let Some(of_first) = all.first().filter(|bytes| bytes.len() == mine.len()) else {
@@ -94,14 +94,15 @@ impl NetworkCosts {
         numbers.into_iter().map(f64::to_bits).fold(3, crate::codec::mix)
     }
 
-    /// Seconds that a frame will take about, from the rectangles that ranks drew in, as if these
-    /// were dense. `root` collects.
+    /// Estimated seconds of a frame, from the rectangles that ranks drew in, as if these were
+    /// dense. With `root`, the image is collected.
     ///
-    /// One exchange costs the latency, what a rank's messages cost it, and the bytes of the rank
-    /// that sends or receives most; compressing and joining is hidden behind the transfer, but for
-    /// the first message of each round, and in direct send altogether, which works slice by slice.
-    /// There collecting is hidden too, but for the last of a tile's slices: the collecting rank
-    /// joins nothing, so the first slices come to it while the next are exchanged.
+    /// One exchange costs the latency, the overhead of a rank's messages, and the bytes of the rank
+    /// that sends or receives most. Encoding and merging overlap with the transfer, except for the
+    /// first message of each round; in direct send, which works slice by slice, they overlap
+    /// completely. There collecting overlaps too, except for the last of a tile's slices: the
+    /// collecting rank merges nothing, so it receives the first slices while the next are
+    /// exchanged.
     pub fn estimate_secs<P: Composite>(
         &self,
         strategy: Strategy,
@@ -122,8 +123,7 @@ impl NetworkCosts {
         match strategy {
             Strategy::DirectSend | Strategy::Automatic => {
                 let plan = direct_send::Plan::new::<P>(drawn, usize::MAX, root.then_some(0));
-                // Of each place what it sends and receives, and in how many messages: each pair is
-                // looked at once.
+                // Bytes sent, bytes received and messages of each rank; each pair is visited once.
                 let mut traffic = vec![(0.0_f64, 0.0_f64, 0.0_f64); ranks];
                 for (owner, tiles) in plan.slices.iter().enumerate() {
                     for (giver, its_rect) in
@@ -171,7 +171,7 @@ impl NetworkCosts {
                 let (mut stride, mut parts) = (1, 1);
                 while stride < folding.slots {
                     let members = k.min(folding.slots / stride);
-                    // Shares of one round are about equal: the first and the middle one stand for
+                    // Shares of one round are about equal: the first and the middle one represent
                     // all.
                     let mut most = 0.0_f64;
                     for index in [0, parts * members / 2] {
@@ -199,7 +199,7 @@ impl NetworkCosts {
         }
     }
 
-    /// The strategy of the smallest estimate.
+    /// The strategy with the smallest estimate.
     pub(crate) fn choose<P: Composite>(&self, drawn: &[Rect], root: bool) -> Strategy {
         let mut best =
             (Strategy::DirectSend, self.estimate_secs::<P>(Strategy::DirectSend, drawn, root));
@@ -217,15 +217,16 @@ impl NetworkCosts {
         best.0
     }
 
-    /// A round of `messages` with `bytes`, of which those of the first message are compressed
-    /// before any other travels, and those of the last joined after it (together `first_bytes`).
+    /// Seconds of a round of `messages` with `bytes`. The bytes of the first message are encoded
+    /// before any other is sent, and those of the last are merged after it arrives (together
+    /// `first_bytes`).
     fn exchange_secs(&self, messages: f64, bytes: f64, first_bytes: f64) -> f64 {
         self.sliced_secs(messages, bytes - first_bytes)
             + first_bytes * (self.byte_secs + 2.0 * LOCAL_BYTE_SECS)
     }
 
-    /// The same where one slice is compressed and joined while another travels: the slower of both
-    /// counts.
+    /// The same where one slice is encoded and merged while another is in flight: the slower of
+    /// both counts.
     fn sliced_secs(&self, messages: f64, bytes: f64) -> f64 {
         self.latency_secs
             + messages * (self.overhead_secs + LOCAL_MESSAGE_SECS)

@@ -1,4 +1,4 @@
-//! Pixel formats and what it means to composite two pixels.
+//! Pixel formats and the operators that composite two pixels.
 //!
 //! A format is a colour ([`Color`]) with or without depth; [`PixelFormat`] is its storage and wire
 //! form, [`Composite`] its operator. An *inactive* pixel is the identity of every operator **by
@@ -13,11 +13,11 @@ pub trait PixelFormat: Copy + PartialEq + Debug + Send + Sync + 'static {
     type Color: Color;
     /// Name in error messages.
     const NAME: &'static str;
-    /// Number in message headers; differs between formats, so that ranks that disagree find out.
+    /// Number in message headers. It differs between formats, so that ranks that disagree notice.
     const CODE: u32;
     /// Bytes of one pixel in a message.
     const BYTES: usize = <Self::Color as Color>::BYTES + if Self::HAS_DEPTH { 4 } else { 0 };
-    /// Whether frames of this format bring a depth slice, and the nearest pixel wins.
+    /// Whether frames of this format have a depth slice, and the nearest pixel wins.
     const HAS_DEPTH: bool;
     /// The pixel where no rank drew anything.
     const EMPTY: Self;
@@ -29,12 +29,12 @@ pub trait PixelFormat: Copy + PartialEq + Debug + Send + Sync + 'static {
     fn depth(&self) -> f32;
 }
 
-/// The operator that joins the pixels of two groups of ranks.
+/// The operator that merges the pixels of two groups of ranks.
 pub trait Composite: PixelFormat {
     /// Whether something was drawn here.
     fn is_active(&self) -> bool;
-    /// Joins two *active* pixels; every rank behind `lower` comes before every rank behind
-    /// `higher`. Need not be associative: [`crate::rank_order`] fixes the grouping.
+    /// Merges two *active* pixels. Every rank of `lower` comes before every rank of `higher` in the
+    /// order of compositing. Need not be associative: [`crate::rank_order`] fixes the grouping.
     fn merge(lower: Self, higher: Self) -> Self;
 }
 

@@ -1,12 +1,12 @@
-//! The one grouping in which every strategy, and the serial reference, joins the ranks.
+//! The canonical grouping in which every strategy, and the serial reference, merges the ranks.
 //!
 //! `over` in floating point or in eight bits is not associative, so "in rank order" alone leaves
 //! the result open. Here the grouping is fixed for a given number of ranks p, and it is one that
 //! tree, binary swap and radix-k can follow without extra messages:
 //!
 //! 1. *Folding.* With 2^k the largest power of two ≤ p and e = p - 2^k, ranks (0,1), (2,3) … (2e-2,
-//!    2e-1) are joined in pairs; the others stay alone. That leaves 2^k *slots* in rank order.
-//! 2. *Balanced tree.* Neighbouring slots are joined, then neighbouring pairs, and so on.
+//!    2e-1) are merged in pairs; the others stay alone. That leaves 2^k *slots* in rank order.
+//! 2. *Balanced tree.* Neighbouring slots are merged, then neighbouring pairs, and so on.
 //!
 //! A balanced tree also loses less precision than a chain: its rounding errors grow with log p
 //! instead of p.
@@ -44,7 +44,7 @@ impl Folding {
     }
 }
 
-/// Joins one pixel of every rank, in rank order, in the canonical grouping. `pixels` is used as
+/// Merges one pixel of every rank, in rank order, in the canonical grouping. `pixels` is used as
 /// scratch space.
 pub fn reduce_ranks<P: Composite>(pixels: &mut [P]) -> P {
     let folding = Folding::new(pixels.len());
@@ -58,7 +58,7 @@ pub fn reduce_ranks<P: Composite>(pixels: &mut [P]) -> P {
     reduce_slots(&mut pixels[..folding.slots])
 }
 
-/// Joins neighbouring slots as a balanced tree; the length is a power of two, or 0, which gives
+/// Merges neighbouring slots as a balanced tree. The length is a power of two, or 0, which gives
 /// [`EMPTY`].
 ///
 /// [`EMPTY`]: crate::PixelFormat::EMPTY
@@ -70,7 +70,7 @@ pub(crate) fn reduce_slots<P: Composite>(pixels: &mut [P]) -> P {
             pixels[i] = combine(pixels[2 * i], pixels[2 * i + 1]);
         }
     }
-    // A pixel that nobody drew must not keep whatever an inactive pixel happened to hold.
+    // A pixel that nobody drew must be `EMPTY`, whatever bits an inactive pixel has.
     pixels.first().copied().filter(P::is_active).unwrap_or(P::EMPTY)
 }
 

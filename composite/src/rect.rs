@@ -1,16 +1,15 @@
-//! Rectangles of pixels, half open: what a rank drew, the tile it owns, the part a message speaks
-//! of.
+//! Half-open rectangles of pixels: what a rank drew, the tile it owns, the rectangle of a message.
 
-/// Pixels with `x0 <= x < x1` and `y0 <= y < y1`; empty where an end is not beyond its beginning.
+/// Pixels with `x0 <= x < x1` and `y0 <= y < y1`; empty where an end is not above its beginning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Rect {
     /// First column.
     pub x0: u32,
     /// First row.
     pub y0: u32,
-    /// Behind the last column.
+    /// One past the last column.
     pub x1: u32,
-    /// Behind the last row.
+    /// One past the last row.
     pub y1: u32,
 }
 
@@ -23,27 +22,27 @@ impl Rect {
         Self { x0: 0, y0: 0, x1: width_px, y1: height_px }
     }
 
-    /// Columns.
+    /// Number of columns.
     pub fn width(&self) -> usize {
         self.x1.saturating_sub(self.x0) as usize
     }
 
-    /// Rows.
+    /// Number of rows.
     pub fn height(&self) -> usize {
         self.y1.saturating_sub(self.y0) as usize
     }
 
-    /// Pixels; cannot overflow where `usize` has 64 bits.
+    /// Number of pixels; cannot overflow where `usize` has 64 bits.
     pub fn pixels(&self) -> usize {
         self.width() * self.height()
     }
 
-    /// Whether there is no pixel in it.
+    /// Whether it contains no pixel.
     pub fn is_empty(&self) -> bool {
         self.x1 <= self.x0 || self.y1 <= self.y0
     }
 
-    /// What both have; [`Rect::EMPTY`] if nothing.
+    /// The common pixels of both; [`Rect::EMPTY`] if there are none.
     pub fn intersection(&self, other: &Self) -> Self {
         let both = Self {
             x0: self.x0.max(other.x0),

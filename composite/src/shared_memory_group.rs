@@ -1,11 +1,11 @@
 //! Ranks that are threads of one process, each with its own call: frames are published to each
 //! other instead of sent.
 //!
-//! Every rank lays its image on the table (an `Arc`: nothing is copied), and all wait for each
-//! other. Whoever comes last merges all of them straight from their planes, on as many threads as
-//! there are processors and no more, while the others sleep: to wake eight ranks for bands of rows
-//! on two processors cost as much as merging. The communicator is only used to wait, so lost and
-//! stalled ranks are named as with messages.
+//! Every rank publishes its image (an `Arc`: nothing is copied), and all wait for each other. The
+//! rank that arrives last merges all images straight from their planes, on at most as many threads
+//! as there are processors, while the others sleep: waking eight ranks to merge bands of rows on
+//! two processors cost as much as merging. The communicator is only used to wait, so errors name
+//! lost and stalled ranks as they do with messages.
 use crate::codec::MessageError;
 use crate::comm::Communicator;
 use crate::compositor::{
@@ -21,25 +21,25 @@ use crate::simd::Kernels;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Frames that one thread reads in about a third of a millisecond.
+/// Bytes that one thread reads in about a third of a millisecond.
 const WORTH_A_THREAD_BYTES: usize = 8 << 20;
 
-/// What one rank has laid down: its image, where it drew, and a number of its options.
+/// What one rank has published: its image, where it drew, and the fingerprint of its options.
 type PublishedFrame<P> = (Arc<Image<P>>, Rect, u64);
 
 struct GroupState<P: Composite> {
     published_frames: Vec<Option<PublishedFrame<P>>>,
-    /// An image to write over, of the rank that collects.
+    /// An image of the collecting rank that may be overwritten.
     spare: Option<Image<P>>,
-    /// Frames that somebody has begun to merge.
+    /// Number of frames whose merge has begun.
     merges_begun: u64,
-    /// The last of them, until it is collected.
+    /// The last merged frame, until it is collected.
     image: Option<Image<P>>,
-    /// Its depths that are not a number, by rank.
+    /// Its number of NaN depths, by rank.
     nan_depths: Vec<u64>,
 }
 
-/// The place of one rank at a table that it shares with the other ranks of its process.
+/// One rank of a group of threads that merge their images in shared memory.
 pub struct SharedMemoryRank<P: Composite> {
     rank: usize,
     state: Arc<Mutex<GroupState<P>>>,
@@ -49,7 +49,7 @@ pub struct SharedMemoryRank<P: Composite> {
     processors: NonZeroUsize,
 }
 
-/// A table for `ranks` ranks; hand each seat to the thread of that rank.
+/// A group of `ranks` ranks; pass each element to the thread of that rank.
 pub fn shared_memory_group<P: Composite>(ranks: usize) -> Vec<SharedMemoryRank<P>> {
     let published_frames = (0..ranks).map(|_| None).collect();
     let state = GroupState {
@@ -60,7 +60,7 @@ pub fn shared_memory_group<P: Composite>(ranks: usize) -> Vec<SharedMemoryRank<P
         nan_depths: Vec::new(),
     };
     let state = Arc::new(Mutex::new(state));
-    // To ask costs reading files on some systems.
+    // Asked once, because the answer costs reading files on some systems.
     let processors = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let shared_rank = |rank| SharedMemoryRank {
         rank,
@@ -73,14 +73,14 @@ pub fn shared_memory_group<P: Composite>(ranks: usize) -> Vec<SharedMemoryRank<P
 }
 
 impl<P: Composite> SharedMemoryRank<P> {
-    /// Composites the images of all ranks of the table, of which this rank drew `bounds` of
-    /// `image`. Every rank calls this once a frame, with a communicator of the same ranks. The bits
-    /// are those of [`composite_serial`](crate::composite_serial) in the order of `options`.
+    /// Composites the images of all ranks of the group; this rank drew within `bounds` of `image`.
+    /// Every rank calls this once per frame, with a communicator of the same ranks. The result has
+    /// the bits of [`composite_serial`](crate::composite_serial) in the order of `options`.
     ///
     /// # Errors
     /// [`CompositeError::SizesDiffer`]; [`CompositeError::Options`] for an image that is to stay
-    /// distributed, which needs messages ([`composite`](crate::composite)), or an order that is
-    /// none; errors of the communicator.
+    /// distributed, which needs messages ([`composite`](crate::composite)), or an invalid order;
+    /// errors of the communicator.
     pub fn composite(
         &mut self,
         comm: &mut dyn Communicator,
@@ -95,7 +95,7 @@ impl<P: Composite> SharedMemoryRank<P> {
         result
     }
 
-    /// Takes back an image that is no longer needed, so that the next one is written over it.
+    /// Takes back an image that is no longer needed, so that its memory is used for the next one.
     pub fn recycle(&mut self, image: Image<P>) {
         self.spare = Some(image);
     }
@@ -124,12 +124,12 @@ impl<P: Composite> SharedMemoryRank<P> {
             }
         };
         let order = CompositingOrder::new(comm, options)?;
-        // Images of other sizes are named with both.
+        // Without the size: images of different sizes get an error that names both sizes.
         let own_fingerprint = fingerprint::<P>((0, 0), options, &order, None);
         let order = order.ranks;
         Rect::of_size(image.width_px, image.height_px).must_contain(&bounds)?;
 
-        // Lay it down and wait for the others.
+        // Publish the image and wait for the others.
         let spare = if self.rank == root { self.spare.take() } else { None };
         {
             let mut state = self.state();
@@ -141,7 +141,7 @@ impl<P: Composite> SharedMemoryRank<P> {
         comm.barrier(options.timeout)?;
         let published_secs = comm.now();
 
-        // The first to go on, who has come last, merges.
+        // The first rank to continue, which arrived last, merges.
         let frame = self.frames;
         self.frames += 1;
         let work = {
@@ -164,12 +164,12 @@ impl<P: Composite> SharedMemoryRank<P> {
                 .iter()
                 .map(|(image, bounds, _)| Frame::of_image(image).with_bounds(*bounds))
                 .collect::<Result<_, _>>()?;
-            // Where others work too, a new thread may begin later than one would have been done.
+            // Where other ranks work too, a new thread may start later than this one would finish.
             let bytes: usize = frames.iter().map(|frame| frame.bounds().pixels() * P::BYTES).sum();
             let threads =
                 self.processors.min(NonZeroUsize::MIN.saturating_add(bytes / WORTH_A_THREAD_BYTES));
             let merged = merge(&frames, threads, options.depth, spare, Kernels::new(options.simd))?;
-            // Images are let go before their ranks draw the next ones.
+            // Release the images before their ranks draw the next ones.
             drop(frames);
             drop(published_frames);
             let mut state = self.state();
@@ -181,7 +181,7 @@ impl<P: Composite> SharedMemoryRank<P> {
         }
         let merged_secs = comm.now();
 
-        // Nobody lays down the next frame before all have come here, and nobody merges it before
+        // No rank publishes the next frame before all have arrived here, and none merges it before
         // this one has been taken.
         comm.barrier(options.timeout)?;
         let mut state = self.state();

@@ -4,8 +4,8 @@
 //! The thesis names this as not done (sections 3.3.2 and 6.1); the Distributed FrameBuffer of
 //! OSPRay (W. Usher, I. Wald, J. Amstutz, J. Günther, C. Brownlee, V. Pascucci, "Scalable Ray
 //! Tracing Using the Distributed FrameBuffer", CGF 38(3), 2019) does it with tiles of fixed size.
-//! Here the slices of direct send's tiles are the unit, known from the rectangles in which ranks
-//! are going to draw, and the image has the same bits as without streaming.
+//! Here the unit is a slice of a direct-send tile, derived from the rectangles in which ranks are
+//! going to draw, and the image has the same bits as without streaming.
 use crate::codec::Codec;
 use crate::collect::Collector;
 use crate::comm::Communicator;
@@ -24,8 +24,8 @@ use crate::strategies::direct_send::{Plan, TileExchange};
 
 /// A frame that is being composited while it is rendered; made by [`Compositor::stream`].
 ///
-/// Dropping it before [`finish`](Self::finish) ends the group, because other ranks wait for what
-/// will not come.
+/// Dropping it before [`finish`](Self::finish) aborts the group, because other ranks wait for
+/// messages that will not arrive.
 pub struct Stream<'a, P: Composite> {
     state: Option<StreamState<'a, P>>,
 }
@@ -36,13 +36,13 @@ struct StreamState<'a, P: Composite> {
     collector: Collector<P>,
     tile_exchange: TileExchange<'static, P>,
     size_px: (u32, u32),
-    /// Parts of the own frame that have not been handed on.
+    /// Parts of the own frame that have not been submitted.
     pending: Vec<Pending>,
     final_barrier: bool,
     begin_secs: f64,
 }
 
-/// What this rank draws in one slice of somebody's tile.
+/// What this rank draws in one slice of a tile.
 struct Pending {
     owner: usize,
     index: usize,
@@ -53,12 +53,12 @@ struct Pending {
 
 impl<P: Composite> Compositor<P> {
     /// Begins a frame of `size_px` (width, height) in which this rank is going to draw within
-    /// `bounds`, before it is rendered. Every rank of `comm` calls this, then [`Stream::tile_done`]
-    /// as often as it likes, then [`Stream::finish`].
+    /// `bounds`. Call it before rendering: every rank of `comm` calls this, then
+    /// [`Stream::tile_done`] any number of times, then [`Stream::finish`].
     ///
     /// # Errors
     /// As [`Compositor::composite`]; [`CompositeError::Options`] for strategies other than direct
-    /// send, which work on whole images, and for bounds beyond the image.
+    /// send, which work on whole images, and for bounds outside the image.
     pub fn stream<'a>(
         &'a mut self,
         comm: &'a mut dyn Communicator,
@@ -67,7 +67,7 @@ impl<P: Composite> Compositor<P> {
     ) -> Result<Stream<'a, P>, CompositeError> {
         let begin_secs = comm.now();
         let begun = self.begin_stream(comm, size_px, bounds);
-        // What the session borrows comes back if it could not begin.
+        // If the stream could not begin, the compositor gets its buffers back.
         match begun {
             Ok((order, codec)) => {
                 let options = self.options.clone();
@@ -127,7 +127,7 @@ impl<P: Composite> Compositor<P> {
         }
     }
 
-    /// What can be refused before any message.
+    /// Checks what can be refused before any message is sent.
     fn begin_stream(
         &self,
         comm: &dyn Communicator,
@@ -144,8 +144,8 @@ impl<P: Composite> Compositor<P> {
             )));
         }
         Rect::of_size(size_px.0, size_px.1).must_contain(&bounds)?;
-        // Another number than without streaming: ranks that stream and ranks that do not would wait
-        // for each other.
+        // A fingerprint that differs from that without streaming: ranks that stream and ranks that
+        // do not would wait for each other.
         let fingerprint =
             fingerprint::<P>(size_px, options, &order, None) ^ u64::from_le_bytes(*b"STREAM__");
         let codec = Codec { kernels: self.scratch.kernels, fingerprint, verify: options.verify };
@@ -154,19 +154,19 @@ impl<P: Composite> Compositor<P> {
 }
 
 impl<P: Composite> Stream<'_, P> {
-    /// Hands in the pixels of `tile`, which are final in `frame`; the rest of the frame may still
-    /// change. Every pixel once; what is outside the bounds given at the beginning is background
-    /// and is ignored. Also joins whatever has come from other ranks.
+    /// Submits the pixels of `tile`, which are final in `frame`; the rest of the frame may still
+    /// change. Submit every pixel once. Pixels outside the bounds given at the beginning are
+    /// background and are ignored. Also merges messages that have arrived from other ranks.
     ///
     /// # Errors
-    /// As [`Compositor::composite`], and [`CompositeError::Stream`] for pixels handed in twice or a
+    /// As [`Compositor::composite`], and [`CompositeError::Stream`] for pixels submitted twice or a
     /// frame of another size.
     pub fn tile_done(&mut self, frame: &Frame<'_, P>, tile: Rect) -> Result<(), CompositeError> {
         self.state(|state| state.tile_done(frame, tile))
     }
 
-    /// Joins whatever has come from other ranks, without waiting; returns how many slices of this
-    /// rank's tile are complete.
+    /// Merges messages that have arrived from other ranks, without waiting. Returns how many slices
+    /// of this rank's tile are complete.
     ///
     /// # Errors
     /// As [`Compositor::composite`].
@@ -174,7 +174,7 @@ impl<P: Composite> Stream<'_, P> {
         self.state(|state| state.progress())
     }
 
-    /// Hands in all that has not been, and waits for the other ranks.
+    /// Submits all pixels that have not been submitted, and waits for the other ranks.
     ///
     /// # Errors
     /// As [`Compositor::composite`].
@@ -244,7 +244,7 @@ impl<P: Composite> StreamState<'_, P> {
             }
         }
         if outside > 0 {
-            // Of a part that has been handed on already.
+            // A part that has been submitted already.
             return Err(submitted_twice(&tile));
         }
         for position in finished.into_iter().rev() {
@@ -261,15 +261,15 @@ impl<P: Composite> StreamState<'_, P> {
 
     fn submit_rest(&mut self, frame: &Frame<'_, P>) -> Result<(), CompositeError> {
         self.check_size(frame)?;
-        // Others' parts first: they travel while the own ones are joined.
+        // Other ranks' parts first: they are in flight while the own ones are merged.
         let own = self.exchange.order_index;
         let mut rest = std::mem::take(&mut self.pending);
         rest.sort_by_key(|pending| pending.owner == own);
         rest.iter().try_for_each(|pending| self.submit_part(frame, pending))
     }
 
-    /// Sends a finished part, or joins it if it is of the own tile: copied, because the renderer
-    /// goes on drawing beside it.
+    /// Sends a finished part, or merges it if it is of the own tile. It is copied, because the
+    /// renderer continues to draw into the frame.
     fn submit_part(
         &mut self,
         frame: &Frame<'_, P>,

@@ -1,18 +1,17 @@
-//! Calls that all ranks take part in, made of messages: any [`Communicator`] has them without doing
-//! more, with the same timeouts.
+//! Collective calls made of messages. Any [`Communicator`] has them without further code, with the
+//! same timeouts.
 use super::{CommError, Communicator, FIRST_RESERVED_TAG};
 use std::time::Duration;
 
 const BARRIER_TAG: u32 = FIRST_RESERVED_TAG;
 pub(super) const GATHER_TAG: u32 = FIRST_RESERVED_TAG + 1;
-/// Added to the timeout of each later round. A rank that waits for the stalled one itself is then
-/// the first to give up, and the group's error names the stalled rank instead of one that waits as
-/// well.
+/// Added to the timeout of each later round. The rank that waits for the stalled one directly then
+/// gives up first, and the group's error names the stalled rank instead of one that waits too.
 const ROUND_GRACE: Duration = Duration::from_millis(50);
 
 /// A dissemination barrier (D. Hensgen, R. Finkel, U. Manber, "Two Algorithms for Barrier
-/// Synchronization", 1988): in round j every rank tells the one 2^j above it that it has come;
-/// after log2 p rounds everybody has heard of everybody.
+/// Synchronization", 1988): in round j every rank signals the one 2^j above it. After log2 p rounds
+/// every rank has heard, directly or not, from all others.
 ///
 /// # Errors
 /// As [`Communicator::barrier`].
@@ -36,7 +35,7 @@ pub fn barrier<C: Communicator + ?Sized>(comm: &mut C, timeout: Duration) -> Res
 }
 
 /// The all-gather of J. Bruck et al. ("Efficient Algorithms for All-to-All Communications in
-/// Multiport Message-Passing Systems", 1997): in round j every rank hands all it knows to the one
+/// Multiport Message-Passing Systems", 1997): in round j every rank sends all it knows to the one
 /// 2^j below, so log2 p rounds are enough for any p.
 ///
 /// # Errors
@@ -52,7 +51,8 @@ pub fn all_gather<C: Communicator + ?Sized>(
     if mine.len() > longest {
         return Err(too_long(rank));
     }
-    // Known strings, each behind its length; first that of this rank, then of the ranks above it.
+    // Known strings, each preceded by its length: first that of this rank, then those of the ranks
+    // above it.
     let block = 8 + longest;
     let mut known = comm.buffer(block.saturating_mul(size));
     known.extend_from_slice(&(mine.len() as u64).to_le_bytes());
@@ -63,7 +63,7 @@ pub fn all_gather<C: Communicator + ?Sized>(
         let more = count.min(size - count);
         let (below, above) = ((rank + size - count) % size, (rank + count) % size);
         let receive = comm.post_recv(above, GATHER_TAG, block.saturating_mul(more))?;
-        // The last round of a count that is no power of two needs a part only.
+        // If the count is no power of two, the last round sends only some of the strings.
         let end = end_of(&known, more, longest).ok_or_else(|| too_long(rank))?;
         let mut message = comm.buffer(end);
         message.extend_from_slice(&known[..end]);
@@ -78,7 +78,7 @@ pub fn all_gather<C: Communicator + ?Sized>(
         count += more;
     }
 
-    // From "this rank first" to rank order.
+    // Reorder from "this rank first" to rank order.
     let mut all = vec![Vec::new(); size];
     let mut at = 0;
     for step in 0..size {
@@ -90,7 +90,7 @@ pub fn all_gather<C: Communicator + ?Sized>(
     Ok(all)
 }
 
-/// Begin and end of the string whose length stands at `at`.
+/// Start and end of the string whose length is stored at `at`.
 pub(super) fn block_at(bytes: &[u8], at: usize) -> Option<(usize, usize)> {
     let length = bytes.get(at..at.checked_add(8)?)?;
     let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
@@ -98,8 +98,7 @@ pub(super) fn block_at(bytes: &[u8], at: usize) -> Option<(usize, usize)> {
     (end <= bytes.len()).then_some((at + 8, end))
 }
 
-/// Where the first `count` strings end; `None` if they are not all there or one is longer than
-/// `longest`.
+/// Where the first `count` strings end; `None` if some are missing or one is longer than `longest`.
 fn end_of(bytes: &[u8], count: usize, longest: usize) -> Option<usize> {
     (0..count).try_fold(0, |at, _| {
         let (start, end) = block_at(bytes, at)?;
@@ -120,7 +119,7 @@ mod tests {
             let expected: Vec<Vec<u8>> = (0..size).map(|rank| vec![rank as u8; rank % 4]).collect();
             let results = threads::run(size, |mut comm| {
                 let mine = vec![comm.rank() as u8; comm.rank() % 4];
-                // Twice, so that a message of one call taken for one of the next would show.
+                // Twice, so that a message of one call mistaken for one of the next would show.
                 let first = all_gather(&mut comm, &mine, 3, LONG).unwrap();
                 assert_eq!(first, all_gather(&mut comm, &mine, 3, LONG).unwrap());
                 first
@@ -162,7 +161,7 @@ mod tests {
         let results = threads::run(5, |mut comm| {
             use crate::Communicator;
             if comm.rank() == 3 {
-                // Alive, but elsewhere.
+                // Alive, but not at the barrier.
                 return comm.recv(0, 7, 1, LONG).map(|_| ()).unwrap_err().to_string();
             }
             let error = barrier(&mut comm, Duration::from_millis(100)).unwrap_err();

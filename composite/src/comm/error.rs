@@ -1,9 +1,9 @@
-//! Why ranks could not talk, by name.
+//! Errors of communicators.
 
-/// Why ranks could not talk.
+/// Why a call of a communicator failed.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
 pub enum CommError {
-    /// A message did not come in time.
+    /// A message did not arrive in time.
     #[error(
         "rank {rank} waited {waited_ms} ms for a message from rank {peer} (tag {tag}) in vain, \
          without a sign of life: \
@@ -11,26 +11,26 @@ pub enum CommError {
          Communicator::alive?"
     )]
     Timeout {
-        /// Who waited.
+        /// The waiting rank.
         rank: usize,
-        /// For whom; of several the first that was posted.
+        /// The rank waited for; of several, the first that was posted.
         peer: usize,
         /// Tag of the message.
         tag: u32,
-        /// How long, in milliseconds, since the last sign of life.
+        /// Milliseconds since the last sign of life.
         waited_ms: u64,
     },
-    /// Not all ranks came to a barrier in time.
+    /// Not all ranks reached a barrier in time.
     #[error("rank {rank} waited {waited_ms} ms at a barrier in vain: rank {missing} did not come")]
     BarrierTimeout {
-        /// Who waited.
+        /// The waiting rank.
         rank: usize,
-        /// The lowest rank that did not come.
+        /// The lowest rank that did not arrive.
         missing: usize,
-        /// How long, in milliseconds.
+        /// Milliseconds waited.
         waited_ms: u64,
     },
-    /// Ranks met though they make different calls.
+    /// Some ranks called an all-gather and others a barrier.
     #[error(
         "rank {rank}: {} came to an all-gather and {} to a barrier: all ranks must make the same \
          calls in the same order",
@@ -38,7 +38,7 @@ pub enum CommError {
         ranks(waiting)
     )]
     OutOfStep {
-        /// Who noticed; all ranks do.
+        /// The rank that noticed; all ranks do.
         rank: usize,
         /// Ranks that called [`all_gather`](super::Communicator::all_gather).
         gathering: Vec<usize>,
@@ -48,17 +48,17 @@ pub enum CommError {
     /// A rank has left the group (its program part ended or panicked).
     #[error("rank {rank} lost rank {peer}: it has left the group")]
     PeerLost {
-        /// Who noticed.
+        /// The rank that noticed.
         rank: usize,
-        /// Who is gone.
+        /// The rank that left.
         peer: usize,
     },
     /// Another rank, or this one, gave up.
     #[error("rank {by} ended the group: {reason}")]
     Aborted {
-        /// Who gave up.
+        /// The rank that gave up.
         by: usize,
-        /// Why.
+        /// Its reason.
         reason: String,
     },
     /// A rank number that the group does not have.
@@ -69,7 +69,8 @@ pub enum CommError {
         /// Size of the group.
         size: usize,
     },
-    /// A message is longer than the receiver allowed for: the two do not agree about what is sent.
+    /// A message is longer than the receiver allowed for: sender and receiver disagree about what
+    /// is sent.
     #[error(
         "rank {rank} got a message from rank {peer} (tag {tag}) that is longer than the {capacity} \
          bytes it allowed for: \
@@ -85,26 +86,26 @@ pub enum CommError {
         /// What the receiver allowed for, in bytes.
         capacity: usize,
     },
-    /// A wait for nothing, which would never end.
+    /// A wait without posted receives, which would never end.
     #[error("rank {rank} waits for a message but has posted no receive")]
     NothingPosted {
-        /// Who waits.
+        /// The waiting rank.
         rank: usize,
     },
     /// The library that carries the messages reported a failure.
     #[error("rank {rank}: {call} failed: {reason}")]
     Transport {
-        /// Where.
+        /// The rank on which it failed.
         rank: usize,
-        /// Which call.
+        /// The call that failed.
         call: String,
-        /// The library's words.
+        /// The error text of the library.
         reason: String,
     },
     /// A rank's thread panicked ([`threads::run`](super::threads::run) only).
     #[error("rank {rank} panicked: {message}")]
     Panicked {
-        /// Who.
+        /// The rank.
         rank: usize,
         /// The message of the panic.
         message: String,
@@ -112,9 +113,9 @@ pub enum CommError {
     /// The operating system gave no thread ([`threads::run`](super::threads::run) only).
     #[error("no thread for rank {rank}: {reason}: use fewer ranks")]
     NoThread {
-        /// Who.
+        /// The rank.
         rank: usize,
-        /// The system's words.
+        /// The error text of the system.
         reason: String,
     },
 }

@@ -18,16 +18,16 @@ pub use pool::BufferPool;
 
 use std::time::Duration;
 
-/// Tags from here on are for [`collective`] and for the back ends themselves.
+/// Tags from here on are reserved for [`collective`] and for the transports themselves.
 pub const FIRST_RESERVED_TAG: u32 = 16_384;
 
-/// A receive that has been posted and not yet waited for. Made by [`Communicator::post_recv`], used
-/// up by [`Communicator::wait_any`]; dropping it leaves the message, when it comes, unread.
+/// A receive that has been posted and not yet waited for. [`Communicator::post_recv`] makes it and
+/// [`Communicator::wait_any`] consumes it. If it is dropped, its message stays unread.
 #[derive(Debug)]
 pub struct Receive {
-    /// Which of the communicator's receives; for back ends.
+    /// Which of the communicator's receives this is; for implementations of the trait.
     pub id: u64,
-    /// From whom.
+    /// Rank of the sender.
     pub source: usize,
     /// Tag of the message.
     pub tag: u32,
@@ -35,59 +35,60 @@ pub struct Receive {
     pub capacity: usize,
 }
 
-/// A message that has come.
+/// A message that has arrived.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Arrival {
-    /// From whom.
+    /// Rank of the sender.
     pub source: usize,
     /// Its tag.
     pub tag: u32,
-    /// Its bytes. Give the buffer back with [`Communicator::recycle`] when it is read.
+    /// Its bytes. Give the buffer back with [`Communicator::recycle`] after reading it.
     pub message: Vec<u8>,
 }
 
-/// Memory of one machine that the ranks of a group share: a room for each of them. See
+/// Memory that the ranks of a group on one machine share, with one segment for each rank. See
 /// [`Communicator::shared_segments`].
 ///
-/// A frame: all meet ([`all_gather`](Communicator::all_gather)), each [`publish`](Self::publish)s
-/// its pixels down, all meet at a [barrier](Communicator::barrier) and [`attach`](Self::attach) the
-/// rooms of the others, take bands until there are none left, and meet at a barrier again. In any
-/// other order what is read may be half written.
+/// For each frame all ranks call [`all_gather`](Communicator::all_gather), then each
+/// [`publish`](Self::publish)es its pixels. After a [barrier](Communicator::barrier) each
+/// [`attach`](Self::attach)es the segments of the others and takes bands until none are left, and a
+/// second barrier ends the frame. In any other order a rank may read half-written data.
 pub trait SharedSegments {
-    /// Makes this rank's room `bytes` long and has the first `used` of them written. If there is
-    /// not enough memory, [`attach`](Self::attach) says so to all.
+    /// Makes this rank's segment `bytes` long and calls `fill` to write the first `used` of them.
+    /// If there is not enough memory, [`attach`](Self::attach) tells all ranks.
     fn publish(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8]));
 
-    /// Opens the rooms of all; false, on all ranks, if there is one that could not be made.
+    /// Opens the segments of all ranks. Returns false on all ranks if any segment could not be
+    /// made.
     ///
     /// # Errors
-    /// [`CommError::Transport`] if a room that was made cannot be opened here, or a rank has laid
-    /// down nothing for this frame; [`CommError::PeerLost`] if its process has ended.
+    /// [`CommError::Transport`] if an existing segment cannot be opened here, or a rank has
+    /// published nothing for this frame; [`CommError::PeerLost`] if its process has ended.
     fn attach(&mut self) -> Result<bool, CommError>;
 
-    /// The first `bytes` of the room of `rank`, as it has laid them down; fewer if it is smaller.
+    /// The first `bytes` of the published segment of `rank`; fewer if it is smaller.
     fn segment(&self, rank: usize, bytes: usize) -> &[u8];
 
-    /// The next band that nobody has taken, from 0 on.
+    /// The next band that no rank has taken, counted from 0.
     fn next_band(&self) -> usize;
 
-    /// Has a band written, into `bytes` from `from` on of the room of `rank`, by the one who has
-    /// taken it.
+    /// Calls `write` for a band at offset `from`, `bytes` long, in the segment of `rank`. Only the
+    /// rank that has taken the band may call this.
     fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8]));
 
-    /// A band that was written, behind the barrier.
+    /// A band that has been written; call it after the barrier.
     fn band(&self, rank: usize, from: usize, bytes: usize) -> &[u8];
 }
 
 /// A group of ranks, seen from one of them.
 ///
 /// Messages from one rank to another with one tag arrive in the order they were sent, and receives
-/// of one source and tag are served in the order they were posted. Tags are below
-/// [`FIRST_RESERVED_TAG`]. Buffers are owned: what is sent is handed over, what comes is the
-/// receiver's.
+/// of one source and tag complete in the order they were posted. Tags are below
+/// [`FIRST_RESERVED_TAG`]. Buffers are owned: sending moves the buffer, and the receiver owns the
+/// message.
 ///
-/// No call waits for longer than its timeout, and a rank that gives up tells the others by
-/// [`abort`](Self::abort), so that a fault ends in an error on every rank and never in a hang.
+/// No call waits for longer than its timeout, and a rank that gives up tells the others with
+/// [`abort`](Self::abort), so a fault becomes an error on every rank and never a hang.
 pub trait Communicator {
     /// This rank, below [`size`](Self::size).
     fn rank(&self) -> usize;
@@ -95,54 +96,54 @@ pub trait Communicator {
     /// Number of ranks.
     fn size(&self) -> usize;
 
-    /// Seconds since some moment in the past, the time in which costs are counted: wall-clock time,
-    /// or the virtual time of a simulated network.
+    /// Seconds since some moment in the past, on the clock that costs are measured with: wall-clock
+    /// time, or the virtual time of a simulated network.
     fn now(&self) -> f64;
 
-    /// As [`now`](Self::now), for the lengths of spans in which this rank waits for nothing. Where
-    /// time is simulated, looking at the simulated clock may cost more than what is measured.
+    /// Like [`now`](Self::now), to measure spans in which this rank waits for nothing. With
+    /// simulated time, reading the simulated clock may cost more than the span itself.
     fn working_secs(&self) -> f64 {
         self.now()
     }
 
     /// Whether all ranks share one memory and its processors, so that no message travels while its
-    /// ranks do something else: then it is not worth cutting pictures in slices for that. The same
-    /// on all ranks.
+    /// ranks do something else. Cutting images into slices has no benefit then. The same on all
+    /// ranks.
     fn is_one_node(&self) -> bool {
         false
     }
 
-    /// Memory that all ranks share though they are processes, if there is such and all of them have
-    /// it: then pictures need not travel.
+    /// Memory that all ranks share although they are processes, if there is any and all of them can
+    /// open it. Images need not be sent then.
     fn shared_segments(&mut self) -> Option<&mut dyn SharedSegments> {
         None
     }
 
-    /// What ended the group, if another rank has given up and this one hears of it only now; else
-    /// `error`, which this rank came upon by itself and which may be no more than what the other's
-    /// end has left.
+    /// The reason why the group ended, if another rank has given up and this rank learns of it only
+    /// now. Otherwise `error`, which this rank found itself and which may be a consequence of the
+    /// other rank's end.
     fn root_cause(&mut self, error: CommError) -> CommError {
         error
     }
 
-    /// Hands `message` over to `destination`; does not wait for it to be received.
+    /// Sends `message` to `destination`; does not wait for it to be received.
     ///
     /// # Errors
     /// [`CommError::NoSuchRank`], [`CommError::PeerLost`], [`CommError::Aborted`] or
     /// [`CommError::Transport`].
     fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError>;
 
-    /// Announces that a message of at most `capacity` bytes from `source` with this `tag` will be
-    /// waited for. Posted before it comes, a message goes straight into its place while this rank
-    /// works on something else.
+    /// Posts a receive for a message of at most `capacity` bytes from `source` with this `tag`. If
+    /// it is posted before the message arrives, the message is received directly into its buffer
+    /// while this rank works on something else.
     ///
     /// # Errors
     /// [`CommError::NoSuchRank`], [`CommError::Aborted`] or [`CommError::Transport`].
     fn post_recv(&mut self, source: usize, tag: u32, capacity: usize)
     -> Result<Receive, CommError>;
 
-    /// Waits until the message of one of `posted` is there, and takes that one out of the list (the
-    /// others keep their order). A `timeout` of zero looks once.
+    /// Waits until the message of one of `posted` has arrived, and removes that receive from the
+    /// list (the others keep their order). A `timeout` of zero checks once.
     ///
     /// # Errors
     /// [`CommError::Timeout`] when `timeout` has passed since the last [sign of life](Self::alive)
@@ -155,30 +156,31 @@ pub trait Communicator {
         timeout: Duration,
     ) -> Result<Arrival, CommError>;
 
-    /// Says that this rank is at work. Whoever works for long between two messages calls it now and
-    /// then, as for each tile it has rendered; it costs about as much as looking at a clock.
+    /// Signals that this rank is at work. A rank that works for long between two messages calls it
+    /// regularly, for example for each tile it has rendered; it costs about as much as reading a
+    /// clock.
     ///
-    /// A timeout counts from the last sign of life of those that are waited for, or of those that
-    /// these wait for themselves: from this call, and from any message sent. So a slow rank is
-    /// waited for as long as it says so, and one that is dead or stalled is missed when the timeout
-    /// has passed since its last sign.
+    /// A timeout counts from the last sign of life of the ranks that are waited for, or of those
+    /// that these wait for in turn. Signs of life are this call and any message sent. So the others
+    /// wait for a slow rank as long as it calls this, and a dead or stalled one is reported when
+    /// the timeout has passed since its last sign.
     ///
     /// # Errors
-    /// [`CommError::Aborted`] if the group has ended: further work is in vain.
+    /// [`CommError::Aborted`] if the group has ended: stop working.
     fn alive(&mut self) -> Result<(), CommError> {
         Ok(())
     }
 
-    /// Lets messages with this `tag` leave until at most `most` of them are on their way: where all
-    /// share a wire, the first ones arrive no sooner than the last. A hint, with which a transport
-    /// whose messages leave at once need do nothing; after `patience` it has an end anyway.
+    /// Waits until at most `most` messages with this `tag` are in flight, or `patience` has passed.
+    /// Where all messages share a wire, sending all at once delays the first ones. This is a hint;
+    /// transports that send messages at once need not implement it.
     fn throttle_sends(&mut self, _tag: u32, _most: usize, _patience: Duration) {}
 
-    /// Ends the group: all waiting and later calls on every rank give [`CommError::Aborted`] with
+    /// Ends the group: all current and later waits on every rank return [`CommError::Aborted`] with
     /// this rank and `reason`. Only the first call counts.
     fn abort(&mut self, reason: &str);
 
-    /// The message of one of `posted` if one is already there.
+    /// The message of one of `posted` if one has already arrived.
     ///
     /// # Errors
     /// As [`wait_any`](Self::wait_any), without its timeout.
@@ -214,7 +216,7 @@ pub trait Communicator {
         collective::barrier(self, timeout)
     }
 
-    /// Gives the bytes `mine` of every rank to every rank, in rank order. `longest` (bytes, the
+    /// Gathers the bytes `mine` of every rank at every rank, in rank order. `longest` (bytes, the
     /// same on all ranks) bounds their lengths, which may differ.
     ///
     /// # Errors
@@ -229,8 +231,8 @@ pub trait Communicator {
         collective::all_gather(self, mine, longest, timeout)
     }
 
-    /// An empty buffer with room for `capacity` bytes, from those given back if there is one: fresh
-    /// memory costs a page fault every 4 KiB, more than many a network takes to fill it.
+    /// An empty buffer with the given `capacity`, a recycled one if possible. Fresh memory costs a
+    /// page fault every 4 KiB, which is more than many networks take to fill it.
     fn buffer(&mut self, capacity: usize) -> Vec<u8> {
         Vec::with_capacity(capacity)
     }

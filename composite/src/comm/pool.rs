@@ -1,4 +1,4 @@
-//! Buffers that are used again, frame after frame.
+//! Buffers that are reused, frame after frame.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ const MOST: usize = 512;
 /// How much larger than what is asked for a buffer may be.
 const MOST_WASTE: usize = 4;
 
-/// Capacities come in eight steps from one power of two to the next: frames are alike but not
-/// equal, and a buffer of the last one shall fit the next.
+/// Rounds to eight capacities per power of two. Frames are similar but not equal, and a buffer of
+/// the last one should fit the next.
 fn rounded(capacity: usize) -> usize {
     let step = (capacity.max(64).next_power_of_two() / 16).max(1);
     capacity.max(64).checked_next_multiple_of(step).unwrap_or(capacity)
@@ -28,8 +28,7 @@ impl BufferPool {
         self.fitting(capacity).unwrap_or_else(|| Vec::with_capacity(rounded(capacity)))
     }
 
-    /// The smallest free buffer that holds `capacity` bytes and is not so large that it will be
-    /// missed.
+    /// The smallest free buffer that holds `capacity` bytes and is not much larger.
     pub fn fitting(&mut self, capacity: usize) -> Option<Vec<u8>> {
         let capacity = rounded(capacity);
         let (&size, buffers) =
@@ -42,7 +41,8 @@ impl BufferPool {
         Some(buffer)
     }
 
-    /// Keeps a buffer, emptied. Of too many the smallest goes: it is the cheapest to make again.
+    /// Keeps a buffer, emptied. If there are too many, drops the smallest, which is the cheapest to
+    /// allocate again.
     pub fn put(&mut self, mut buffer: Vec<u8>) {
         if buffer.capacity() == 0 {
             return;

@@ -1,7 +1,7 @@
 //! Volumes in bricks: rays are carried through them, from near to far, with what they have
 //! collected.
 //!
-//! The owner of a pixel knows which bricks a ray meets in which order ([`super::bricks`]). It asks
+//! The owner of a pixel knows which bricks a ray meets in which order ([`super::volume_bricks`]). It asks
 //! a holder of the first one, takes back what the ray has collected there, and asks the next: one
 //! round of questions per brick along a ray. Sums are made in the order in which one node makes
 //! them, so they have the same bits.

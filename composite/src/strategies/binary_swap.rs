@@ -1,10 +1,9 @@
 //! Binary swap (K.-L. Ma, J. S. Painter, C. D. Hansen, M. F. Krogh, "Parallel Volume Rendering
 //! Using Binary-Swap Compositing", IEEE CG&A 14(4), 1994).
 //!
-//! In round l a slot and the slot that differs in bit l hold the same part of the image; the lower
-//! one keeps the first half, the other the second half. Nearest slots come first, which is the
-//! balanced tree of [`crate::rank_order`]. Seen from radix-k, which came later, these are groups of
-//! two.
+//! In round l a slot exchanges with the slot that differs in bit l, which holds the same part of
+//! the image. The lower slot keeps the first half, the other the second half. Nearest slots come
+//! first, which is the balanced tree of [`crate::rank_order`]. This is radix-k with groups of two.
 use super::radix_k;
 use crate::collect::Collector;
 use crate::error::CompositeError;

@@ -1,12 +1,12 @@
-//! Direct send: every rank owns a tile of the image and gets it from all ranks that drew something
-//! there.
+//! Direct send: every rank owns a tile of the image and receives it from all ranks that drew
+//! something there.
 //!
-//! One exchange instead of log p rounds. All ranks know from the rectangles they drew in which
-//! tiles there are and which messages will come, so nobody waits for a rank that has nothing to
-//! give, and every receive is posted before the first message is made. Tiles are cut in slices:
-//! while one slice travels the next is compressed, and a slice that is complete goes to the
-//! collecting rank while others are still being joined. [`crate::stream`] hands slices in while the
-//! frame is still being rendered.
+//! This takes one exchange instead of log p rounds. All ranks derive the tiles and the messages
+//! from the rectangles that ranks drew in, so no rank waits for one that has nothing to send, and
+//! every receive is posted before the first message is encoded. Tiles are cut into slices: one
+//! slice is encoded while another is in flight, and a complete slice goes to the collecting rank
+//! while others are still being merged. [`crate::stream`] submits slices while the frame is still
+//! being rendered.
 use crate::codec;
 use crate::collect::Collector;
 use crate::error::CompositeError;
@@ -17,14 +17,14 @@ use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::tiles::{Owner, balanced_among, slices};
 
-/// Slices of every place's tile, in the order in which they are sent.
+/// Slices of every rank's tile by order index, in the order in which they are sent.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub(crate) slices: Vec<Vec<Rect>>,
 }
 
 impl Plan {
-    /// `root` is the place that collects the image over a wire of its own.
+    /// `root` is the order index of the rank that collects the image over a wire of its own.
     pub(crate) fn new<P: Composite>(
         drawn: &[Rect],
         slice_pixels: usize,
@@ -36,7 +36,7 @@ impl Plan {
         Self { slices: balanced_among(drawn, &mut owners).into_iter().map(cut).collect() }
     }
 
-    /// What each place holds in the end. Where nobody drew anything nothing is held.
+    /// What each rank holds in the end. Pixels that nobody drew are in no piece.
     pub(crate) fn pieces(&self, drawn: &[Rect]) -> Vec<(usize, Rect)> {
         let mut pieces = Vec::new();
         for (order_index, slices) in self.slices.iter().enumerate() {
@@ -50,25 +50,25 @@ impl Plan {
     }
 }
 
-/// Pixels of a tile at least: smaller ones make messages that cost more than what they carry.
+/// Least pixels of a tile: the messages of smaller tiles cost more than they carry.
 const OWNER_PX: usize = 32_768;
-/// The share of a place that does not collect.
+/// The share of a rank that does not collect.
 const FULL_SHARE: u64 = 256;
 
-/// Which places own tiles, and how large ones.
+/// Which ranks own tiles, and of what size.
 ///
-/// The collecting place gets the finished image besides, over the same wire. With a share `x` of
-/// the exchange `e` and of the image `g` (bytes that come in), it receives `x e + (1 - x) g` while
-/// each other one receives `(1 - x) e / (p - 1)`. They are equal for `x = (e / (p - 1) - g) / (e p
-/// / (p - 1) - g)`, which is nothing from a handful of ranks on. Two ranks share alike: there what
-/// one does not join the other must, and both work all the time. So do ranks of one memory, where
-/// every byte costs the same processors.
+/// The collecting rank also receives the finished image, over the same wire. With a share `x` of
+/// the exchange `e` and of the image `g` (bytes received), it receives `x e + (1 - x) g` while each
+/// other rank receives `(1 - x) e / (p - 1)`. They are equal for `x = (e / (p - 1) - g) / (e p / (p
+/// - 1) - g)`, which is zero for more than a handful of ranks. Two ranks get equal shares: what one
+/// does not merge the other must, and both work all the time. So do ranks that share one memory,
+/// where every byte costs time of the same processors.
 fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
     let num_ranks = drawn.len();
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).pixels();
     let layers: usize = drawn.iter().map(Rect::pixels).sum();
-    // As many as there are tiles worth a message, and enough that what comes to each is no more
-    // than what comes to the root.
+    // As many owners as there are tiles worth a message, and enough that each receives no more than
+    // the root does.
     let (drawn_bytes, image_bytes) = (layers * P::BYTES, whole * size_of::<P::Color>());
     let wanted =
         (whole / OWNER_PX).max(drawn_bytes.div_ceil(image_bytes.max(1))).clamp(1, num_ranks);
@@ -80,13 +80,13 @@ fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
             let image = image_bytes as f64;
             let x = (exchange_bytes / others - image)
                 / (exchange_bytes * num_ranks as f64 / others - image).max(1.0);
-            // Of shares that are FULL_SHARE for each of the others.
+            // Convert to a share where each other rank has FULL_SHARE.
             let x = x.clamp(0.0, 1.0 / num_ranks as f64);
             (x / (1.0 - x) * others * FULL_SHARE as f64) as u64
         }
         _ => FULL_SHARE,
     };
-    // Evenly among all, so that owners are near to what they drew.
+    // Spread owners evenly among all ranks, so that they are close to what they drew.
     let candidates: Vec<Owner> = (0..num_ranks)
         .map(|order_index| Owner {
             order_index,
@@ -108,10 +108,10 @@ pub(crate) fn run<P: Composite>(
     let (order_index, num_ranks) = (exchange.order_index, exchange.num_ranks());
     let mut tile_exchange = TileExchange::new(plan, exchange)?;
 
-    // Everybody's first slices, then everybody's second …; the next place first, so that no rank
-    // gets all first messages. No more than two rounds are on their way: messages share the wire,
-    // and with all of them under way at once the first slices would be complete, and begin to be
-    // collected, no sooner than the last. With a few slices only there is nothing to gain.
+    // Send everybody's first slices, then everybody's second …, beginning with the next rank in
+    // order so that no rank gets all first messages. At most two rounds are in flight. Messages
+    // share the wire, so with all of them in flight the first slices would be complete, and begin
+    // to be collected, no sooner than the last. With only a few slices there is nothing to gain.
     let most = plan.slices.iter().map(Vec::len).max().unwrap_or(0);
     let mut last_round = 0;
     for index in 0..most {
@@ -129,7 +129,7 @@ pub(crate) fn run<P: Composite>(
                 }
             }
         }
-        // Own pixels, and what has come meanwhile.
+        // Merge own pixels, and what has arrived meanwhile.
         if let Some(slice) = plan.slices[order_index].get(index) {
             let part = view.bounds.intersection(slice);
             if !part.is_empty() {
@@ -143,16 +143,16 @@ pub(crate) fn run<P: Composite>(
     tile_exchange.finish(exchange, collector, scratch)
 }
 
-/// The slices of this place and how far they are.
+/// The slices of this rank's tile and their progress.
 pub(crate) struct TileExchange<'a, P: Composite> {
     own: Vec<Rect>,
     merges: Vec<Option<Merge<'a, P>>>,
-    /// For every place the parts of own slices that have not come from it.
+    /// By order index, the parts of own slices that have not arrived from that rank.
     outstanding: Vec<Vec<(usize, Rect)>>,
 }
 
 impl<'a, P: Composite> TileExchange<'a, P> {
-    /// Posts the receives of this place.
+    /// Posts the receives of this rank.
     pub(crate) fn new(
         plan: &Plan,
         exchange: &mut FrameExchange<'_>,
@@ -170,7 +170,8 @@ impl<'a, P: Composite> TileExchange<'a, P> {
                     parts.push((index, part));
                 }
             }
-            // A renderer hands slices in in any order, so each receive has room for the largest.
+            // A renderer submits slices in any order, so each receive has the capacity of the
+            // largest.
             let largest = parts.iter().map(|part| part.1).max_by_key(codec::longest::<P>);
             for _ in 0..parts.len() {
                 exchange.post::<P>(from, Tag::Exchange, &largest.unwrap_or(Rect::EMPTY))?;
@@ -183,7 +184,7 @@ impl<'a, P: Composite> TileExchange<'a, P> {
         Ok(Self { own, merges, outstanding })
     }
 
-    /// Takes what `from` has in the own slice `index`, and hands the slice in if it is complete.
+    /// Merges what `from` drew in the own slice `index`, and submits the slice if it is complete.
     pub(crate) fn put(
         &mut self,
         index: usize,
@@ -208,7 +209,7 @@ impl<'a, P: Composite> TileExchange<'a, P> {
         }
     }
 
-    /// Slices that are complete.
+    /// Number of slices that are complete.
     pub(crate) fn complete(&self) -> usize {
         self.merges.iter().filter(|merge| merge.is_none()).count()
     }
@@ -225,7 +226,7 @@ impl<'a, P: Composite> TileExchange<'a, P> {
         Ok(())
     }
 
-    /// Waits for all messages of other places.
+    /// Waits for all messages of other ranks.
     pub(crate) fn finish(
         &mut self,
         exchange: &mut FrameExchange<'_>,
@@ -250,7 +251,7 @@ impl<'a, P: Composite> TileExchange<'a, P> {
         if is_collect {
             return collector.take(exchange, from, bytes);
         }
-        // The message itself says which slice it is for, if it is one of those expected.
+        // The header of the message says which of the expected slices it is for.
         let said = codec::rect_of(&bytes);
         let parts = &mut self.outstanding[from];
         let position = parts.iter().position(|part| Some(part.1) == said).unwrap_or(0);
@@ -287,7 +288,7 @@ mod tests {
         let apart: Vec<Rect> = (0..8).map(corner).collect();
         assert!(Plan::new::<P>(&apart, usize::MAX, Some(3)).slices[3].is_empty());
         assert_eq!((owning(&apart, Some(3)), owning(&apart, None)), (7, 8));
-        // Two ranks share alike.
+        // Two ranks get equal shares.
         let halves = Plan::new::<P>(&dense[..2], usize::MAX, Some(0)).slices;
         assert_eq!(halves[0][0].pixels(), halves[1][0].pixels());
     }

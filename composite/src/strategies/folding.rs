@@ -1,7 +1,8 @@
-//! What tree, binary swap and radix-k share: slots instead of places, and what a block of slots can
-//! have drawn.
+//! Code shared by tree, binary swap and radix-k: slots instead of ranks, and bounds of what a block
+//! of slots drew.
 //!
-//! Ranks beyond a power of two hand their image to a neighbour first; each pair is one slot.
+//! If the number of ranks is not a power of two, some ranks first send their image to a neighbour;
+//! each such pair is one slot.
 use crate::collect::Collector;
 use crate::error::CompositeError;
 use crate::frame_exchange::{FrameExchange, Tag};
@@ -13,7 +14,7 @@ use crate::rect::Rect;
 
 /// What a slot holds between rounds.
 pub(crate) enum SlotImage<'a, P: Composite> {
-    /// The rendered frame, as long as nothing has been joined to it.
+    /// The rendered frame, as long as nothing has been merged into it.
     Frame(View<'a, P>),
     Merged(Layer<P>),
 }
@@ -32,7 +33,7 @@ impl<P: Composite> SlotImage<'_, P> {
         }
     }
 
-    /// As a layer of exactly `bounds`, to be handed in.
+    /// Converts it to a layer of exactly `bounds`, to be submitted.
     pub(crate) fn into_layer(self, bounds: Rect, scratch: &mut Scratch<P>) -> Layer<P> {
         match self {
             Self::Merged(layer) if layer.bounds == bounds => layer,
@@ -46,21 +47,20 @@ impl<P: Composite> SlotImage<'_, P> {
     }
 }
 
-/// The rectangle around all that the slots `first..first + count` have drawn.
+/// The rectangle around everything that the slots `first..first + count` have drawn.
 pub(crate) fn bounds_of_slots(
     drawn: &[Rect],
     folding: &Folding,
     first: usize,
     count: usize,
 ) -> Rect {
-    // Slots keep the order of places, so a block of slots is a block of places.
+    // Slots are in order of order indices, so a block of slots is a block of order indices.
     let last = folding.leader(first + count - 1);
     let end = folding.partner(last).unwrap_or(last) + 1;
     drawn[folding.leader(first)..end].iter().fold(Rect::EMPTY, |all, rect| all.around(rect))
 }
 
-/// Pairs are joined; returns the slot and what it holds on leaders, `None` on ranks that have
-/// handed theirs over.
+/// Merges pairs. Leaders get their slot and its image; ranks that have sent theirs away get `None`.
 pub(crate) fn fold<'a, P: Composite>(
     exchange: &mut FrameExchange<'_>,
     frame: &View<'a, P>,
@@ -91,8 +91,9 @@ pub(crate) fn fold<'a, P: Composite>(
     Ok(Some((slot, SlotImage::Merged(layer))))
 }
 
-/// Joins what `members` (places) have in `bounds`, as it comes; their receives are posted. `own` is
-/// the number of this rank, and `rect_of` says what each member brings.
+/// Merges what `members` (order indices) have in `bounds` as it arrives; their receives are posted.
+/// `own` is this rank's number among them, and `rect_of` gives the rectangle that each member
+/// sends.
 pub(crate) fn merge_members<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     held: &SlotImage<'_, P>,

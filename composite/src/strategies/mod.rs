@@ -1,11 +1,11 @@
-//! Ways to bring the pixels of all ranks together, one a file, all with the signature `fn
-//! run<P>(&mut FrameExchange, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send takes its
-//! plan, radix-k its k as well) and all with the same bits as
+//! Strategies that combine the pixels of all ranks, one per file. All have the signature `fn
+//! run<P>(&mut FrameExchange, &View<P>, &mut Collector<P>, &mut Scratch<P>)` (direct send also
+//! takes its plan, radix-k its k), and all give the same bits as
 //! [`composite_serial`](crate::composite_serial).
 //!
-//! Each hands the pieces of the finished image that the rank holds to the
-//! [collector](crate::collect), as soon as they are finished; its function `pieces` says
-//! beforehand, and on all ranks alike, which these will be.
+//! Each submits the pieces of the finished image that the rank holds to the
+//! [collector](crate::collect) as soon as they are finished. Its function `pieces` tells in
+//! advance, identically on all ranks, which pieces these will be.
 pub(crate) mod binary_swap;
 pub(crate) mod direct_send;
 pub(crate) mod folding;
@@ -20,28 +20,28 @@ use crate::merge::Scratch;
 use crate::pixel::Composite;
 use crate::rect::Rect;
 
-/// Which way the pixels take.
+/// How ranks exchange their pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Strategy {
-    /// Every rank owns a tile of the image and gets that tile from all others at once. Tiles are
+    /// Every rank owns a tile of the image and receives it from all others at once. Tiles are
     /// balanced by what all ranks have drawn, and ranks that drew nothing in a tile send nothing to
     /// its owner.
     #[default]
     DirectSend,
-    /// Half of the ranks hand their whole image to the other half, again and again; ends whole on
-    /// one rank.
+    /// In each round half of the remaining ranks send their whole image to the other half, until
+    /// one rank has all.
     Tree,
     /// Ma et al. 1994: partners exchange halves of what they hold, log2 p times. Other rank counts
     /// are folded first.
     BinarySwap,
-    /// Peterka et al. 2009: as binary swap, in groups of up to `k` ranks. `k` is a power of two, at
-    /// least 2 (IceT uses 8).
+    /// Peterka et al. 2009: like binary swap, in groups of up to `k` ranks. `k` is a power of two,
+    /// at least 2 (IceT uses 8).
     RadixK {
         /// Largest group of a round.
         k: usize,
     },
-    /// The one that should be fastest for the rectangles of this frame, by a
-    /// [model](crate::Network) of the network that is measured before the first frame.
+    /// The strategy with the smallest estimated time for the rectangles of this frame, by a
+    /// [model](crate::NetworkCosts) of the network that is measured before the first frame.
     Automatic,
 }
 
@@ -69,8 +69,8 @@ impl Strategy {
         }
     }
 
-    /// What this rank, and every other, is going to do with what all have drawn.
-    /// `root` is the place that collects the image.
+    /// The plan for the rectangles that all ranks drew in, the same on every rank. `root` is the
+    /// order index of the rank that collects the image.
     pub(crate) fn plan<P: Composite>(
         self,
         drawn: &[Rect],
@@ -78,7 +78,7 @@ impl Strategy {
         root: Option<usize>,
     ) -> Plan {
         match self {
-            // Automatic has been replaced by what was chosen.
+            // The caller has replaced Automatic by a strategy.
             Self::DirectSend | Self::Automatic => {
                 Plan::DirectSend(direct_send::Plan::new::<P>(drawn, slice_pixels, root))
             }
@@ -98,7 +98,7 @@ pub(crate) enum Plan {
 }
 
 impl Plan {
-    /// Which pieces of the image are held in the end, and where.
+    /// Which pieces of the image are held in the end, and by which order index.
     pub(crate) fn pieces(&self, drawn: &[Rect]) -> Vec<(usize, Rect)> {
         match self {
             Self::DirectSend(plan) => plan.pieces(drawn),

@@ -1,11 +1,11 @@
 //! Radix-k (T. Peterka, D. Goodell, R. Ross, H.-W. Shen, R. Thakur, "A Configurable Algorithm for
-//! Parallel Image-Compositing Applications", SC09): the number of slots is a product of group
-//! sizes; in each round the members of a group divide the part they all hold, and each gets its
+//! Parallel Image-Compositing Applications", SC09). The number of slots is a product of group
+//! sizes. In each round the members of a group divide the part they all hold, and each receives its
 //! share from all others at once.
 //!
-//! Fewer rounds than binary swap, more messages in each. Here group sizes are powers of two and the
-//! members of a group are joined as a balanced tree, so that the grouping is that of
-//! [`crate::rank_order`] for every k.
+//! There are fewer rounds than with binary swap and more messages in each. Here group sizes are
+//! powers of two and the members of a group are merged as a balanced tree, so that the grouping is
+//! that of [`crate::rank_order`] for every k.
 use super::folding::{SlotImage, bounds_of_slots, fold, merge_members};
 use crate::collect::Collector;
 use crate::error::CompositeError;
@@ -56,7 +56,7 @@ pub(crate) fn run<P: Composite>(
         let first = slot - digit * stride;
         let order_indices: Vec<usize> =
             (0..members).map(|member| folding.leader(first + member * stride)).collect();
-        // What the slots that a member has joined so far can have drawn.
+        // Bounds of what the slots that each member has merged so far drew.
         let base = slot / (stride * members) * (stride * members);
         let reaches: Vec<Rect> = (0..members)
             .map(|member| bounds_of_slots(&drawn, &folding, base + member * stride, stride))
@@ -70,7 +70,7 @@ pub(crate) fn run<P: Composite>(
             }
         }
 
-        // Give each member its share, beginning with the next one, so that nobody gets all first
+        // Send each member its share, beginning with the next one, so that no rank gets all first
         // messages.
         for step in 1..members {
             let member = (digit + step) % members;
@@ -80,7 +80,7 @@ pub(crate) fn run<P: Composite>(
             }
         }
 
-        // Join the own share of all members.
+        // Merge the own share of all members.
         let bounds =
             reaches.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).intersection(&keep);
         let brings = |member: usize| reaches[member].intersection(&keep);

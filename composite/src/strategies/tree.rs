@@ -1,8 +1,8 @@
-//! Binary tree: in round l, slots with bit l set hand their whole image to the slot 2^l below and
+//! Binary tree: in round l, slots with bit l set send their whole image to the slot 2^l below and
 //! are done.
 //!
-//! Half of the ranks fall idle in every round and the last one moves a whole image, so it pays only
-//! for two ranks or for very sparse images; there is nothing left to collect.
+//! Half of the ranks become idle in every round and the last round moves a whole image, so it pays
+//! only for two ranks or for very sparse images. There is nothing left to collect.
 use super::folding::{SlotImage, bounds_of_slots, fold, merge_members};
 use crate::collect::Collector;
 use crate::error::CompositeError;
@@ -13,7 +13,7 @@ use crate::pixel::Composite;
 use crate::rank_order::Folding;
 use crate::rect::Rect;
 
-/// Everything at the first place.
+/// Everything at the first rank in order.
 pub(crate) fn pieces(drawn: &[Rect]) -> Vec<(usize, Rect)> {
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect));
     if whole.is_empty() { Vec::new() } else { vec![(0, whole)] }
