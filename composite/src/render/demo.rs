@@ -14,7 +14,7 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 
-/// What is shown.
+/// What to render.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Demo {
     /// Name in [`datasets::catalogue`], or a file that [`datasets::read::open`] reads and that has
@@ -24,16 +24,16 @@ pub struct Demo {
     pub size: Option<String>,
     /// One of its views; `None` for the first.
     pub view: Option<String>,
-    /// Width and height of the picture, pixels.
+    /// Width and height of the image, pixels.
     pub size_px: [u32; 2],
     /// Samples per pixel.
     pub samples: u32,
-    /// Shadows of a lamp and ambient occlusion; without it there is a headlight, and no ray leaves
-    /// a hit.
+    /// Shadows of a lamp and ambient occlusion. Without it there is a headlight and no secondary
+    /// ray.
     pub global_light: bool,
     /// A colour for each rank's part; without it everything is grey.
     pub color_by_rank: bool,
-    /// Cut for this view, in place of equal numbers of triangles.
+    /// Partition for this view, instead of equal numbers of triangles.
     pub cut_by_view: bool,
 }
 
@@ -54,7 +54,7 @@ impl Default for Demo {
     }
 }
 
-/// Everything but the ranks. Every rank of a group makes the same one.
+/// A demo without its ranks. Every rank of a group makes the same one.
 pub struct PreparedDemo {
     /// The whole scene.
     pub scene: Scene,
@@ -62,13 +62,13 @@ pub struct PreparedDemo {
     pub camera: Camera,
     /// The frame.
     pub options: RenderOptions,
-    /// Who holds what.
+    /// Which rank holds which primitives.
     pub partition: Partition,
 }
 
 impl Demo {
-    /// Generates the data, builds the scene and cuts it into `ranks` parts. `progress` hears how
-    /// many steps of how many are done, and may stop it by returning false.
+    /// Generates the data, builds the scene and cuts it into `ranks` parts. `progress` is called
+    /// with the steps done and their total, and may stop the preparation by returning false.
     ///
     /// # Errors
     /// Names that do not exist, with those that do.

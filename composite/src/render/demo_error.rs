@@ -1,4 +1,4 @@
-//! Why a demo has nothing to show.
+//! Errors of a demo.
 use super::FrameError;
 use datasets::catalogue::CatalogueError;
 use datasets::model::ModelError;
@@ -7,7 +7,7 @@ use rt_core::camera::CameraError;
 use rt_core::scene::SceneError;
 use rt_core::shapes::ShapeError;
 
-/// Why there is nothing to show.
+/// Why a demo could not be prepared or rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
     /// No such data set or size, or it cannot be made.
@@ -35,12 +35,12 @@ pub enum DemoError {
         /// The file.
         file: String,
     },
-    /// What looks like a file's name, and is none.
+    /// A name that looks like a file, but there is no such file.
     #[error("there is no file {file}, and {unknown}")]
     NoFile {
         /// The name.
         file: String,
-        /// What the catalogue says of it.
+        /// The catalogue's error for the name.
         unknown: CatalogueError,
     },
     /// A file has one size.

@@ -13,13 +13,13 @@ use rt_core::shapes::{Shape, Tubes};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Things to show, with their views.
+/// Shapes to show, with their views.
 pub(super) struct DemoModel {
     pub(super) bodies: Vec<DemoShape>,
     pub(super) views: Vec<View>,
 }
 
-/// One of them.
+/// One shape.
 pub(super) enum DemoShape {
     Mesh(Arc<TriMesh>),
     Tubes(Arc<Tubes>),
@@ -89,7 +89,7 @@ fn model_is_empty(bodies: &[DemoShape]) -> bool {
     !bodies.iter().any(|b| matches!(b, DemoShape::Mesh(m) if m.num_triangles() > 0))
 }
 
-/// Middle of all bodies' box, and the radius of the ball about it.
+/// Centre of the bounding box of all bodies, and the radius of the ball around it.
 pub(super) fn middle_and_radius(bodies: &[DemoShape]) -> (DVec3, f64) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for [lo, hi] in bodies.iter().map(DemoShape::bounds) {
@@ -97,14 +97,14 @@ pub(super) fn middle_and_radius(bodies: &[DemoShape]) -> (DVec3, f64) {
     }
     if low.is_finite() && high.is_finite() {
         let radius = 0.5 * (high - low).length();
-        // A view of a single point is one of a ball about it.
+        // The view of a single point is that of a ball around it.
         (0.5 * (low + high), if radius > 0.0 { radius } else { 1.0 })
     } else {
         (DVec3::ZERO, 1.0)
     }
 }
 
-/// Everything, from a little above.
+/// A view of everything, from a little above.
 fn whole((middle, radius): (DVec3, f64)) -> View {
     let from = DVec3::new(0.5, -1.0, 0.5).normalize();
     View::new("whole", middle + from * radius.max(f64::MIN_POSITIVE) * 4.0, middle)

@@ -1,10 +1,10 @@
-//! What can go wrong in a frame of many ranks.
+//! Errors of a frame of many ranks.
 use crate::comm::CommError;
 use rt_core::distributed::ProtocolError;
 use rt_core::render::RenderError;
 use rt_core::scene::SceneError;
 
-/// Why a frame could not be made. After an error no rank gets a picture: the communicator is
+/// Why a frame could not be rendered. After an error no rank gets an image: the communicator is
 /// aborted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrameError {
@@ -17,7 +17,7 @@ pub enum FrameError {
     /// The transport.
     #[error(transparent)]
     Comm(#[from] CommError),
-    /// A message does not say what it should.
+    /// A message has not the expected content.
     #[error(
         "rank {rank} got an unusable message from rank {from} ({what}, {words} words): all ranks \
          must render the same scene, camera and options"
@@ -27,12 +27,12 @@ pub enum FrameError {
         rank: usize,
         /// The sender.
         from: usize,
-        /// What it was about.
+        /// The content that was expected.
         what: &'static str,
         /// Its length in 32-bit words.
         words: usize,
     },
-    /// What a rank announced cannot be, or is not what it sent.
+    /// The numbers that a rank announced are invalid, or are not what it sent.
     #[error(
         "rank {rank} got numbers from rank {from} that cannot be ({reason}): all ranks must render \
          the same scene, camera and options"
@@ -45,7 +45,7 @@ pub enum FrameError {
         /// Which numbers, and what they break.
         reason: String,
     },
-    /// An answer that no part of this scene can have given.
+    /// A reply that no part of this scene can have given.
     #[error("rank {rank}: {source}: all ranks must render parts of the same scene")]
     Answer {
         /// The receiver.
@@ -63,7 +63,7 @@ pub enum FrameError {
         /// Ranks of the communicator.
         ranks: usize,
     },
-    /// A volume cannot be dealt like that.
+    /// A volume cannot be distributed like that.
     #[error("volume {volume} cannot be dealt so: {reason}")]
     Holders {
         /// Its number in the scene.

@@ -1,7 +1,7 @@
-//! Ghost zones: every rank also holds what lies within the distance of ambient occlusion around its
-//! part, and then answers for its own hits alone. Exact, because no such ray leaves the zone. They
-//! cost memory and a build once, and nothing per frame; asking costs messages and repeated rays
-//! every frame. `choose` estimates both.
+//! Ghost zones: every rank also holds the geometry within the distance of ambient occlusion around
+//! its part, and then computes the light of its own hits alone. This is exact, because no such ray
+//! leaves the zone. Ghost zones cost memory and a build once, and nothing per frame. Sending
+//! requests costs messages and repeated rays every frame. `choose` estimates both.
 use super::options::{FrameOptions, SecondaryRayPolicy};
 use super::rank_bounds::RankBounds;
 use super::request_reply::{RankChannel, Tag};
@@ -14,7 +14,7 @@ use rt_core::render::{RenderError, RenderOptions};
 use rt_core::scene::{Appearance, Scene, SceneError};
 use std::sync::Arc;
 
-/// What was decided.
+/// The chosen policy.
 #[derive(Debug, Clone)]
 pub(super) struct Decision {
     pub(super) distance: f64,
@@ -23,9 +23,9 @@ pub(super) struct Decision {
 }
 
 /// Prices of the estimate, for one thread of a 2020s server core and a network of 3 GB/s. Only
-/// their order of size matters: near the point where both cost the same, either will do.
+/// their order of magnitude matters: near the point where both cost the same, either will do.
 pub mod cost_model {
-    /// Seconds for a secondary ray, with the work of making it.
+    /// Seconds for a secondary ray, including its generation.
     pub const RAY_SECS: f64 = 150e-9;
     /// Seconds for a byte on the network.
     pub const BYTE_SECS: f64 = 1.0 / 3e9;
@@ -33,16 +33,16 @@ pub mod cost_model {
     pub const ROUND_SECS: f64 = 20e-6;
     /// Seconds to build the structure over a triangle.
     pub const BUILD_SECS: f64 = 400e-9;
-    /// Bytes of a triangle in a message: half a vertex of 12 bytes, with neighbours on the rim, and
-    /// three indices.
+    /// Bytes of a triangle in a message: half a vertex of 12 bytes, with neighbours in the ghost
+    /// layer, and three indices.
     pub const TRIANGLE_BYTES: f64 = 24.0;
-    /// Bytes of a point and its answer.
+    /// Bytes of a point and its reply.
     pub const POINT_BYTES: f64 = 52.0;
-    /// Share of a picture that is covered, as long as nobody has seen it.
+    /// Share of an image that is covered, before any frame has been rendered.
     pub const COVERED: f64 = 0.5;
 }
 
-/// Of a triangle, its boxes in render space, one for each instance.
+/// The boxes of each triangle in render space, one for each instance.
 fn placed_boxes(scene: &Scene, geometry: usize, mesh: &TriMesh) -> Vec<Aabb> {
     let origin = scene.world.origin();
     let mut triangle_boxes = vec![Aabb::EMPTY; mesh.indices.len()];
@@ -62,7 +62,7 @@ fn are_disjoint(a: &Aabb, b: &Aabb) -> bool {
     (0..3).any(|axis| a.min[axis] > b.max[axis] || b.min[axis] > a.max[axis])
 }
 
-/// `bounds` with everything that a ray of length `distance` from inside may meet.
+/// `bounds`, enlarged by everything that a ray of length `distance` from inside may hit.
 fn zone(bounds: &Aabb, distance: f64, whole: Aabb) -> Aabb {
     let size = whole.min.abs().max(whole.max.abs()).max_element();
     let ghost_layer = Vec3::splat((distance * 1.0001) as f32 + 1e-4 * size);
@@ -73,8 +73,8 @@ fn zone(bounds: &Aabb, distance: f64, whole: Aabb) -> Aabb {
     }
 }
 
-/// Decides between asking and ghost zones, the same on all ranks, and builds the zones where they
-/// win.
+/// Chooses between requests and ghost zones, identically on all ranks, and builds the zones if they
+/// are cheaper.
 pub(super) fn choose(
     channel: &mut RankChannel<'_>,
     part: &mut Part,
@@ -107,8 +107,8 @@ pub(super) fn choose(
     let placed: Vec<Vec<Aabb>> =
         meshes.iter().enumerate().map(|(g, mesh)| placed_boxes(&part.scene, g, mesh)).collect();
 
-    // ---- Triangles for each other rank's zone, and how many other parts are near a triangle of
-    // this one.
+    // ---- Triangles for each other rank's zone, and the number of other parts near each triangle
+    // of this one.
     let others =
         || (0..size).filter(|&r| r != rank && !are_disjoint(&zones[r], &rank_bounds.bounds[rank]));
     let mut wanted: Vec<Vec<Vec<u32>>> = vec![vec![Vec::new(); meshes.len()]; size];
@@ -133,7 +133,7 @@ pub(super) fn choose(
         check_announced(from, numbers).map_err(|reason| channel.announced_error(from, reason))?;
     }
 
-    // ---- Both costs, for the rank that has most to do.
+    // ---- Both costs, for the rank with the most work.
     let sum = |f: &dyn Fn(&[u32]) -> f64| all.iter().map(|n| f(n)).sum::<f64>();
     let total = sum(&|n| f64::from(n[size])).max(1.0);
     let near = sum(&|n| f64::from(n[size + 1])) / total;
@@ -178,8 +178,9 @@ pub(super) fn choose(
     })
 }
 
-/// Of one rank: triangles that it gives to each rank, those it has, and other parts near them. Room
-/// is made by these numbers: a rank cannot give more triangles than it has, and none to itself.
+/// Checks the numbers of one rank: triangles that it gives to each rank, those it has, and other
+/// parts near them. Buffers are sized by these numbers: a rank cannot give more triangles than it
+/// has, and none to itself.
 fn check_announced(from: usize, numbers: &[u32]) -> Result<(), String> {
     let [give @ .., triangles, _near] = numbers else {
         return Err(format!("{} numbers about ghost triangles", numbers.len()));
@@ -197,7 +198,7 @@ fn check_announced(from: usize, numbers: &[u32]) -> Result<(), String> {
     Ok(())
 }
 
-/// Exchanges the triangles and builds this rank's part with its rim.
+/// Exchanges the triangles and builds this rank's part with its ghost layer.
 fn fetch(
     channel: &mut RankChannel<'_>,
     part: &Part,
@@ -221,7 +222,7 @@ fn fetch(
         }
         channel.send(to, Tag::Hits, &words)?;
     }
-    // Light needs no attributes.
+    // Light rays need no attributes.
     let mut merged: Vec<TriMesh> = meshes
         .iter()
         .map(|m| TriMesh {
@@ -259,8 +260,8 @@ fn fetch(
     Ok(scene)
 }
 
-/// Adds triangles that came, and says how many. `None` when the words do not say what they should,
-/// or a mesh would have more vertices than can be numbered.
+/// Adds received triangles and returns their number. `None` when the words are invalid, or a mesh
+/// would have more vertices than can be numbered.
 fn add_triangles(meshes: &mut [TriMesh], mut words: &[u32]) -> Option<usize> {
     let mut came = 0;
     for mesh in meshes {
@@ -269,12 +270,12 @@ fn add_triangles(meshes: &mut [TriMesh], mut words: &[u32]) -> Option<usize> {
         let (indices, rest) = rest.split_at_checked((triangles as usize).checked_mul(3)?)?;
         words = rest;
         came += triangles as usize;
-        // Below the last number, which says that there is no such vertex.
+        // Below `u32::MAX`, which stands for an invalid vertex.
         let first = u32::try_from(mesh.positions.len()).ok()?;
         first.checked_add(vertices).filter(|&end| end < u32::MAX)?;
         let corner = |p: &[u32; 3]| Vec3::from_array(p.map(f32::from_bits));
         mesh.positions.extend(positions.as_chunks::<3>().0.iter().map(corner));
-        // Numbers past the end stay so: such triangles are left out of the structure.
+        // Indices past the end stay invalid: such triangles are left out of the structure.
         let moved = |t: &[u32; 3]| t.map(|k| if k < vertices { k + first } else { u32::MAX });
         mesh.indices.extend(indices.as_chunks::<3>().0.iter().map(moved));
     }

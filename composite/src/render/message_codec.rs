@@ -1,4 +1,4 @@
-//! Messages of 32-bit words, little-endian, with a length and a checksum in front.
+//! Messages of 32-bit words, little-endian, preceded by a checksum that also covers the length.
 use crate::codec::checksum;
 
 /// The message for `words`.

@@ -1,18 +1,19 @@
-//! Data-parallel rendering: every rank holds a part of a scene, and all together make the picture
-//! that one node would make of the whole.
+//! Data-parallel rendering: every rank holds a part of a scene, and together they render the image
+//! that one node would render of the whole.
 //!
-//! A [`Partition`] says which primitive goes to which rank, a [`Part`] is what one rank then holds.
-//! [`DataParallel::frame`] renders sort-last (thesis section 3.2.1): every rank traces camera rays
-//! against its part, owners of tiles keep the nearest hits, and what leaves those hits (shadow,
-//! ambient occlusion, mirror and glass rays) is asked of the ranks in whose bounds the rays come,
-//! until no ray is left: the open problem of section 6.2. Where local geometry with a rim around it
-//! does as well for less, [`ghost`] zones take the place of asking. [`ray_parallel()`] is the other
-//! way (sections 3.2.2 and 4.2.3): every rank holds everything and renders some tiles.
+//! A [`Partition`] says which primitive goes to which rank, and a [`Part`] is what one rank then
+//! holds. [`DataParallel::frame`] renders sort-last (thesis section 3.2.1). Every rank traces
+//! camera rays against its part, and owners of tiles keep the nearest hits. The secondary rays of
+//! those hits (shadow, ambient occlusion, mirror and glass rays) are sent to the ranks whose bounds
+//! they enter, until no ray is left; section 6.2 names this as an open problem. Where a part with a
+//! ghost layer around it gives the same result for less, [`ghost`] zones replace these requests.
+//! [`ray_parallel()`] is the alternative (sections 3.2.2 and 4.2.3): every rank holds everything
+//! and renders some pieces of the image.
 //!
-//! The picture has the bits of [`rt_core::render::render`] of the whole scene, for any number of
-//! ranks and any partition: parts take over the whole's local spaces
-//! ([`rt_core::bvh::World::build_part`]), hits are joined by parameter and then by number, light
-//! bits by *or*, and everything else is done by the functions that one node would use
+//! The image has the bits of [`rt_core::render::render`] of the whole scene, for any number of
+//! ranks and any partition: parts use the local spaces of the whole
+//! ([`rt_core::bvh::World::build_part`]), hits are merged by parameter and then by number,
+//! occlusion bits by *or*, and the functions of one node do everything else
 //! ([`rt_core::distributed`]).
 //!
 //! ```

@@ -1,5 +1,5 @@
-//! Data to ranks: bricks of space by k-d splits, with about the same number of primitives, or the
-//! same work for a view.
+//! Distribution of data to ranks: bricks of space by k-d splits, with about the same number of
+//! primitives, or with the same work for a view.
 use super::FrameError;
 use super::volume_bricks::{self, BrickData, VolumeBricks};
 use rt_core::bvh::{BuildOptions, Geometry};
@@ -12,24 +12,24 @@ use rt_core::scene::Scene;
 use rt_core::volume::Brick;
 use std::sync::Arc;
 
-/// How primitives are dealt to ranks.
+/// How primitives are distributed to ranks.
 #[derive(Debug, Clone)]
 pub enum Split {
     /// Bricks with the same number of primitives: the data-parallel partition of section 3.2.1.
     /// Does not depend on the view.
     Triangles,
-    /// Bricks with the same expected work for one view: a primitive counts a little for being
-    /// there, and more the larger it is in the picture. The view-dependent partition of section
-    /// 3.2.2; another view needs another one.
+    /// Bricks with the same expected work for one view. A primitive has a small base cost, and
+    /// costs more the larger it is in the image. This is the view-dependent partition of section
+    /// 3.2.2; another view needs another partition.
     View {
         /// The view.
         camera: Box<Camera>,
-        /// Width and height of the picture, pixels.
+        /// Width and height of the image, pixels.
         size_px: [u32; 2],
     },
-    /// Every primitive anywhere: nothing is left of locality. For tests.
+    /// Every primitive to any rank: no locality is left. For tests.
     Random {
-        /// Another seed deals otherwise.
+        /// Seed of the random numbers.
         seed: u64,
     },
 }
@@ -52,25 +52,25 @@ pub struct Part {
     pub rank: usize,
     /// Number of parts.
     pub parts: usize,
-    /// Of each geometry, the numbers in the whole of the primitives here.
+    /// By geometry, the numbers of this part's primitives in the whole scene.
     pub(super) primitive_ids: Vec<Vec<u32>>,
-    /// What the whole scene needs.
+    /// The effects that the whole scene needs.
     pub(super) needed: Effects,
     /// Who holds which bricks of volumes.
     pub(super) volume_bricks: Arc<VolumeBricks>,
-    /// What of them is here, by their numbers.
+    /// The data of those bricks that this rank holds, by brick number.
     pub(super) brick_data: Vec<Option<BrickData>>,
-    /// This part with a rim, see [`super::ghost`].
+    /// This part with a ghost layer, see [`super::ghost`].
     pub(super) ghost_layer: Option<(f64, Scene)>,
 }
 
 impl Part {
-    /// Primitives here.
+    /// Number of primitives in this part.
     pub fn primitives(&self) -> usize {
         self.primitive_ids.iter().map(Vec::len).sum()
     }
 
-    /// Values of volumes' grids here, with the layers around bricks.
+    /// Number of grid values of volumes in this part, including the layers around bricks.
     pub fn volume_values(&self) -> usize {
         let whole = self.scene.volumes.iter().filter(|v| !v.volume.is_medium());
         let whole: usize = whole.map(|v| v.volume.grid().values.len()).sum();
@@ -78,7 +78,7 @@ impl Part {
     }
 }
 
-/// A primitive on its way to a rank.
+/// A primitive to be assigned to a rank.
 struct Item {
     geometry: u32,
     primitive: u32,
@@ -88,7 +88,7 @@ struct Item {
 
 impl Partition {
     /// Cuts `scene` into `parts` parts. Geometries with several instances are cut where their first
-    /// one stands.
+    /// instance is.
     pub fn new(scene: &Scene, parts: usize, split: &Split) -> Partition {
         let parts = parts.max(1);
         let geometries = scene.world.geometries().len();
@@ -117,13 +117,13 @@ impl Partition {
         Partition { primitive_ids, volume_bricks }
     }
 
-    /// Deals a volume of `scene` otherwise: it is cut into as many bricks as `holders` has lists,
-    /// and all ranks of a list hold its brick. One list with all ranks is a volume that everybody
-    /// has whole; without this call every rank has a brick.
+    /// Distributes a volume of `scene` differently: cuts it into as many bricks as `holders` has
+    /// lists, and all ranks of a list hold its brick. With one list of all ranks, every rank holds
+    /// the whole volume. Without this call every rank has one brick.
     ///
     /// # Errors
     /// [`FrameError::Holders`] for volumes and ranks that do not exist, bricks without a holder,
-    /// and projections, which see whole volumes.
+    /// and projections, which need whole volumes.
     pub fn distribute_volume(
         mut self,
         scene: &Scene,
@@ -168,7 +168,7 @@ impl Partition {
             .ok_or(FrameError::Ranks { parts, ranks: rank + 1 })?
             .clone();
         let mut part = scene.part(&primitive_ids, options)?;
-        // Of media the sizes and places remain here, and the bricks apart.
+        // Of media only sizes and positions remain here; bricks are stored separately.
         for placed in part.volumes.iter_mut().filter(|placed| placed.volume.is_medium()) {
             let nothing = Brick { first: UVec3::ZERO, end: UVec3::ZERO };
             placed.volume = Arc::new(placed.volume.part(nothing));
@@ -202,7 +202,7 @@ fn items(scene: &Scene, split: &Split) -> Vec<Item> {
         let place = first.map_or(DAffine3::IDENTITY, |i| i.world_from_object);
         for p in 0..count(geometry) {
             let [lo, hi] = box_of(geometry, p);
-            // What cannot be hit may be anywhere.
+            // A primitive that cannot be hit may be anywhere.
             let (lo, hi) = if lo.is_finite() && hi.is_finite() {
                 (lo, hi)
             } else {
@@ -222,14 +222,14 @@ fn items(scene: &Scene, split: &Split) -> Vec<Item> {
     out
 }
 
-/// Corners of a primitive's box, object space in f64.
+/// Corners of a primitive's bounding box, object space in f64.
 fn box_of(geometry: &Geometry, primitive: usize) -> [DVec3; 2] {
     match geometry {
         Geometry::Mesh(mesh) => {
             let corners = mesh.indices[primitive].map(|k| {
                 mesh.positions.get(k as usize).map_or(DVec3::NAN, |p| mesh.origin + p.as_dvec3())
             });
-            // Minima of f64 would pass over NaN.
+            // The minimum of f64 would ignore NaN.
             if corners.iter().any(|c| !c.is_finite()) {
                 return [DVec3::NAN; 2];
             }
@@ -243,13 +243,12 @@ fn box_of(geometry: &Geometry, primitive: usize) -> [DVec3; 2] {
     }
 }
 
-/// Pixels that a ball about covers in the picture; 0 outside of it. What hides it is not known
-/// here.
+/// Pixels that a ball covers in the image, about; 0 if it is outside. Occlusion is not considered.
 fn pixels_of(camera: &Camera, size_px: [u32; 2], center: DVec3, radius: f64) -> f64 {
     let matrix = camera.clip_from_world();
     let clip = matrix * center.extend(1.0);
     let size = size_px.map(f64::from);
-    // Scale of the picture at the ball's depth.
+    // Scale of the image at the ball's depth.
     let across = matrix.row(0).xyz().length() * 0.5 * size[0];
     let w = clip.w.abs().max(1e-9 * radius.max(f64::MIN_POSITIVE));
     let reach = radius * across / w;
@@ -260,8 +259,8 @@ fn pixels_of(camera: &Camera, size_px: [u32; 2], center: DVec3, radius: f64) -> 
     if inside { (reach * reach).min(size[0] * size[1]) } else { 0.0 }
 }
 
-/// Gives `items` to `ranks` ranks from `first_rank` on: halves along the longest axis of their
-/// centres, again and again.
+/// Assigns `items` to `ranks` ranks from `first_rank` on, by recursive bisection along the longest
+/// axis of their centres.
 fn split_items(
     items: &mut [Item],
     first_rank: usize,
@@ -278,7 +277,7 @@ fn split_items(
         (lo, hi) = (lo.min(i.center), hi.max(i.center));
     }
     let axis = (0..3).max_by(|&a, &b| (hi[a] - lo[a]).total_cmp(&(hi[b] - lo[b]))).unwrap_or(0);
-    // By number where centres agree: every rank must cut in the same way.
+    // Ties are sorted by number: every rank must cut identically.
     items.sort_unstable_by(|a, b| {
         let key = |i: &Item| (i.geometry, i.primitive);
         a.center[axis].total_cmp(&b.center[axis]).then(key(a).cmp(&key(b)))

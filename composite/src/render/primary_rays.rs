@@ -1,10 +1,11 @@
-//! Camera rays: every rank traces them against its part, and owners of tiles keep the nearest hit
-//! of each pixel.
+//! Primary rays: every rank traces camera rays against its part, and owners of tiles keep the
+//! nearest hit of each pixel.
 //!
-//! Streamed, hits leave for the owner of their tiles as soon as a few tiles are traced, and what
-//! has come meanwhile is joined: messages travel while rays are traced. Where local light suffices,
-//! finished tiles go on to the collecting rank at once. So a frame costs the longer of rendering
-//! and compositing and not their sum: what sections 3.3.2 and 6.1 of the thesis wish for.
+//! When streaming, a rank sends hits to the owners of their tiles as soon as a few tiles are
+//! traced, and merges the hits that have arrived meanwhile, so messages are in flight while rays
+//! are traced. Where local light suffices, finished tiles go on to the collecting rank at once. So
+//! a frame costs the longer of rendering and compositing and not their sum, as sections 3.3.2 and
+//! 6.1 of the thesis suggest.
 use super::rank_frame::RankFrame;
 use super::request_reply::{Inbox, Incoming, RankChannel, Tag};
 use super::tile_collector::TileCollector;
@@ -15,35 +16,35 @@ use rayon::prelude::*;
 use rt_core::distributed::{CameraHits, DistributedFrame, Pass, ShadingHit};
 use std::sync::atomic::Ordering;
 
-/// Chunks of an owner's tiles at most, one after the other by all ranks. With more, less is left to
-/// send at the end, in more messages.
+/// Most chunks of an owner's tiles; all ranks process them one after the other. With more chunks,
+/// less is left to send at the end, but in more messages.
 const CHUNKS: usize = 4;
 /// Tiles of a chunk at least: with fewer, messages and looking for them cost more than travelling
 /// while others trace gains (measured with 100 tiles and 128 ranks).
 const CHUNK_TILES: usize = 8;
-/// Tiles traced between two looks for messages.
+/// Tiles traced between two polls for messages.
 const TILES_PER_LOOK: usize = 4;
 
 /// Words of a mask with a bit for each slot.
 const MASK_WORDS: usize = SLOTS / 32;
 
-/// Own hits, by tile; tiles without any are left out.
+/// Own hits, by tile; `None` for tiles without hits.
 type OwnHits = Vec<Option<CameraHits>>;
 
-/// What a pass of camera rays is for.
+/// The kind of a pass of camera rays.
 #[derive(Clone, Copy)]
 pub(super) struct PrimaryPass {
     pub(super) pass: Pass,
-    /// Hits come with their colours.
+    /// Hits include their colours.
     pub(super) colors: bool,
-    /// Owners get everything about the nearest hits.
+    /// Owners get all details of the nearest hits.
     pub(super) hit_details: bool,
-    /// Messages travel while rays are traced.
+    /// Messages are in flight while rays are traced.
     pub(super) stream: bool,
 }
 
-/// One pass of camera rays. With `collect`, colours of hits make finished tiles, which go to the
-/// collecting rank.
+/// Runs one pass of camera rays. With `collect`, tiles are finished from the colours of hits and
+/// sent to the collecting rank.
 pub(super) fn run(
     channel: &mut RankChannel<'_>,
     side: &RankFrame<'_>,
@@ -70,8 +71,8 @@ pub(super) fn run(
     };
     wave.own.resize_with(side.frame.num_tiles(), || None);
     wave.post_receives(channel)?;
-    // ---- Rays, and hits to the owners of their tiles: to the next rank first, so that nobody gets
-    // all at once, and one's own last.
+    // ---- Trace rays, and send hits to the owners of their tiles: to the next rank first, so that
+    // no rank gets all messages at once, and own hits last.
     let to = |step: usize| (rank + 1 + step) % size;
     let mut traced = 0;
     for chunk in 0..chunks {
@@ -122,13 +123,13 @@ struct PrimaryRays<'a, 'c> {
     chunks: usize,
     own: OwnHits,
     answers: Vec<TileHits>,
-    /// Of each rank, its tiles in which it has hits.
+    /// By rank, the tiles of this rank in which it has hits.
     seen_by: Vec<Vec<usize>>,
-    /// Of each rank, how many chunks of its hits have been joined (or passed, having nothing).
+    /// By rank, how many chunks of its hits have been merged (or skipped, having no hits).
     merged: Vec<usize>,
-    /// Of each of the own chunks, how many ranks have not yet said what they see there.
+    /// By own chunk, how many ranks have not yet sent their hits.
     missing: Vec<usize>,
-    /// Own chunks that have gone on to the root.
+    /// Own chunks that have been sent on to the root.
     finished: usize,
     inbox: Inbox,
     collect: Option<&'a mut TileCollector<'c>>,
@@ -159,7 +160,7 @@ impl PrimaryRays<'_, '_> {
         }
     }
 
-    /// Traces some of the tiles in which this rank's part may be seen.
+    /// Traces some of the tiles in which this rank's part may be visible.
     fn trace(&mut self, channel: &mut RankChannel<'_>, tiles: Vec<usize>) {
         let side = self.side;
         let one = |&tile: &usize| {
@@ -193,7 +194,7 @@ impl PrimaryRays<'_, '_> {
         channel.record_span(Activity::Render);
     }
 
-    /// The own hits in a chunk to the owner of its tiles.
+    /// Sends own hits in a chunk to the owner of its tiles.
     fn send_hits(
         &mut self,
         channel: &mut RankChannel<'_>,
@@ -227,7 +228,7 @@ impl PrimaryRays<'_, '_> {
                 None => Err(channel.message_error(from, "tiles", words.len())),
             };
         }
-        // Messages of one rank come in order; chunks of which it sees nothing are not sent.
+        // Messages of one rank arrive in order; chunks in which it sees nothing are not sent.
         let (rank, chunks) = (channel.rank(), self.chunks);
         let next = (self.merged[from]..chunks)
             .find(|&c| self.owners.has_messages(from, rank, (c, chunks)));
@@ -236,7 +237,7 @@ impl PrimaryRays<'_, '_> {
         self.merge_hits(channel, from, chunk, &words)
     }
 
-    /// What rank `from` sees in an own chunk.
+    /// Merges the hits of rank `from` in an own chunk.
     fn merge_hits(
         &mut self,
         channel: &mut RankChannel<'_>,
@@ -252,7 +253,7 @@ impl PrimaryRays<'_, '_> {
             .ok_or_else(|| channel.message_error(from, "hits", words.len()))?;
         channel.record_span(Activity::Composite);
         self.missing[chunk] -= 1;
-        // In the order of chunks, which the root relies on: a chunk that few ranks see may be
+        // Finish chunks in order, which the root relies on: a chunk that few ranks see may be
         // complete before the one in front of it.
         let Some(collect) = &mut self.collect else { return Ok(()) };
         while self.missing.get(self.finished) == Some(&0) {
@@ -268,7 +269,8 @@ fn words_per_hit(frame: &DistributedFrame<'_>, colors: bool) -> usize {
     2 + (frame.num_instances() > 1) as usize + if colors { 4 } else { 0 }
 }
 
-/// Hits in `tiles`: of each tile whether there are any, then a mask of slots and the hits in order.
+/// Encodes hits in `tiles`: for each tile whether there are any, then a mask of slots and the hits
+/// in order.
 fn encode_hits(
     side: &RankFrame<'_>,
     tiles: impl Iterator<Item = usize>,
@@ -302,8 +304,8 @@ fn encode_hits(
     out
 }
 
-/// Joins what [`encode_hits`] of rank `from` made to the nearest hits of this rank's tiles, which
-/// begin at `first`.
+/// Merges the output of [`encode_hits`] of rank `from` into the nearest hits of this rank's tiles,
+/// which begin at `first`.
 fn decode_hits(
     side: &RankFrame<'_>,
     tiles: impl Iterator<Item = usize>,
@@ -360,7 +362,7 @@ fn slots(mask: &[u32]) -> impl Iterator<Item = usize> + '_ {
     })
 }
 
-/// Asks the ranks whose hits are the nearest for everything about them.
+/// Requests the details of the nearest hits from the ranks that have them.
 fn fetch_hit_details(
     channel: &mut RankChannel<'_>,
     side: &RankFrame<'_>,
@@ -374,7 +376,7 @@ fn fetch_hit_details(
     for a in answers.iter_mut() {
         a.hits = vec![None; SLOTS];
     }
-    // ---- To everyone who has sent hits: a mask of those that won.
+    // ---- Send everyone who has sent hits a mask of those that are nearest.
     let won: Vec<Vec<u32>> =
         (0..size).map(|from| winner_masks(from, &seen_by[from], first, answers)).collect();
     for step in 1..size {
@@ -384,7 +386,7 @@ fn fetch_hit_details(
         }
     }
     channel.record_span(Activity::Exchange);
-    // ---- Everything about this rank's hits that won.
+    // ---- Send the details of this rank's nearest hits.
     let with_hits = |owner: usize| {
         owners.shared(rank, owner, WHOLE).filter(|&t| own[t].is_some()).collect::<Vec<_>>()
     };
@@ -441,7 +443,7 @@ fn fetch_hit_details(
     })
 }
 
-/// Of each of `tiles`, a mask of the slots where the hit of rank `from` is the nearest.
+/// For each of `tiles`, a mask of the slots where the hit of rank `from` is the nearest.
 fn winner_masks(from: usize, tiles: &[usize], first: usize, answers: &[TileHits]) -> Vec<u32> {
     let mut out = Vec::with_capacity(tiles.len() * MASK_WORDS);
     for &tile in tiles {

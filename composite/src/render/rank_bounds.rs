@@ -1,19 +1,19 @@
-//! Bounds of all ranks' parts, and which of them a ray comes into.
+//! Bounds of all ranks' parts, and which of them a ray enters.
 use rt_core::math::Aabb;
 use rt_core::ray::Ray;
 
-/// Boxes that are tested together.
+/// Number of boxes that are tested together.
 const LANES: usize = 16;
 
-/// Sixteen boxes, an array per side.
+/// Sixteen boxes as a structure of arrays.
 #[derive(Clone, Copy)]
 struct Block {
     low: [[f32; LANES]; 3],
     high: [[f32; LANES]; 3],
 }
 
-/// Boxes of all ranks, a little too large: a ray that meets anything in a box is never said to miss
-/// it.
+/// Boxes of all ranks, slightly enlarged: a ray that hits anything in a box is never reported to
+/// miss the box.
 pub(super) struct RankBounds {
     blocks: Vec<Block>,
     pub(super) bounds: Vec<Aabb>,
@@ -39,9 +39,9 @@ impl RankBounds {
         RankBounds { blocks, bounds }
     }
 
-    /// Sets the bits of the ranks into whose boxes the ray comes between its limits.
+    /// Sets the bits of the ranks whose boxes the ray enters between its limits.
     pub(super) fn add_hit_ranks(&self, ray: &Ray, bits: &mut [u16]) {
-        // Directions of 0 become tiny: a distance is then huge, but never NaN.
+        // Zero directions become tiny: a distance is then huge, but never NaN.
         let inverse = ray.dir.to_array().map(|d| 1.0 / d.abs().max(1e-30).copysign(d));
         let origin = ray.origin.to_array();
         for (block, bits) in self.blocks.iter().zip(bits) {
@@ -56,7 +56,7 @@ impl RankBounds {
                 }
             }
             for lane in 0..LANES {
-                // Empty boxes have low above high: turned, they would reach everywhere.
+                // Empty boxes have low above high: with swapped sides they would be infinite.
                 let there = block.low[0][lane] <= block.high[0][lane];
                 let meets = there & (near[lane] <= far[lane] * (1.0 + 1e-5));
                 *bits |= (meets as u16) << lane;

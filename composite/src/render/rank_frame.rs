@@ -1,11 +1,11 @@
-//! One rank's view of a frame, and work on several of its items at once.
+//! One rank's view of a frame, and a parallel loop over its items.
 use super::Part;
 use super::request_reply::RankChannel;
 use rayon::prelude::*;
 use rt_core::distributed::DistributedFrame;
 use std::sync::atomic::Ordering;
 
-/// One rank's view of the frame in work.
+/// One rank's view of the current frame.
 pub(super) struct RankFrame<'a> {
     pub(super) frame: &'a DistributedFrame<'a>,
     pub(super) part: &'a Part,
@@ -13,15 +13,15 @@ pub(super) struct RankFrame<'a> {
 }
 
 impl RankFrame<'_> {
-    /// Number in the whole of this part's primitive.
+    /// The number of this part's primitive in the whole scene.
     pub(super) fn global_primitive(&self, instance: u32, primitive: u32) -> u32 {
         let geometry = self.part.scene.world.instances()[instance as usize].geometry;
         self.part.primitive_ids[geometry][primitive as usize]
     }
 }
 
-/// Calls `f` with every item and its place, on several threads if wanted; each item done is a sign
-/// of life.
+/// Calls `f` with every item and its index, on several threads if `parallel`. Each finished item is
+/// a sign of life.
 pub(super) fn each<T: Send>(
     channel: &mut RankChannel<'_>,
     parallel: bool,

@@ -1,4 +1,4 @@
-//! Rays in messages.
+//! Encoding of rays in messages.
 use rt_core::glam::Vec3;
 use rt_core::ray::Ray;
 

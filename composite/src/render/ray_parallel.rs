@@ -1,9 +1,9 @@
-//! Replicated data: every rank holds the whole scene and renders some pieces of the picture (thesis
+//! Replicated data: every rank holds the whole scene and renders some pieces of the image (thesis
 //! sections 3.2.2 and 4.2.3).
 //!
-//! Pieces are small and dealt along a lattice, so that every rank gets a little of everything: what
-//! is costly in a picture lies together. Bands of whole rows, tried first, stop scaling when there
-//! are as many ranks as bands (32 for 1024 rows).
+//! Pieces are small and distributed along a lattice, because the costly pixels of an image are
+//! close together and every rank should get some of them. Bands of whole rows, tried first, stop
+//! scaling when there are as many ranks as bands (32 for 1024 rows).
 use super::request_reply::{RankChannel, Tag};
 use super::{Activity, FrameError, FrameOptions, FrameOutput};
 use crate::comm::Communicator;
@@ -12,19 +12,19 @@ use rt_core::frame::{Frame, Layers};
 use rt_core::render::{Crop, RenderOptions, Renderer};
 use rt_core::scene::Scene;
 
-/// Pixels along the sides of a piece, and how many of them every rank has at least where they are
-/// used. Small pieces are even, but rays that go together make tracing cheap: on one thread the
-/// wavelet with shadows and ambient occlusion takes 1.57 s in pieces of 64 pixels, 1.68 s in those
-/// of 32, 1.90 s in those of 16, 2.3 s in those of 8 (1024 x 1024). The slowest rank's share of
-/// those costs, added up over each rank's pieces, is least with these bounds for 1 to 128 ranks:
-/// pieces of 8 pixels for 128 ranks are uneven by 4 % in place of 15 %, but cost 21 % more.
+/// Side of a piece in pixels, and the least number of pieces per rank for which it is used. Small
+/// pieces balance the load, but coherent rays are cheaper: on one thread the wavelet with shadows
+/// and ambient occlusion takes 1.57 s in pieces of 64 pixels, 1.68 s in those of 32, 1.90 s in
+/// those of 16, 2.3 s in those of 8 (1024 x 1024). The slowest rank's share of those costs, added
+/// up over each rank's pieces, is least with these bounds for 1 to 128 ranks: pieces of 8 pixels
+/// for 128 ranks have an imbalance of 4 % instead of 15 %, but cost 21 % more.
 const PIECES: [(u32, usize); 3] = [(64, 32), (32, 11), (16, 6)];
-/// Where there are fewer of all those.
+/// Side if there are too few of all those.
 const SMALLEST: u32 = 8;
 
-/// Renders a picture of a scene that every rank has, each rank some square pieces spread over the
-/// picture, of 64 pixels a side for few ranks to 8 for many. Every rank must call it with the same
-/// arguments. Time limits and error limits end a frame in each piece on its own.
+/// Renders an image of a scene that every rank holds. Each rank renders some square pieces spread
+/// over the image, with sides from 64 pixels for few ranks to 8 for many. Every rank must call it
+/// with the same arguments. Time limits and error limits apply to each piece on its own.
 ///
 /// # Errors
 /// Any fault on any rank ends the frame for all.
@@ -59,7 +59,7 @@ fn render(
         let crop = Crop { x: area.x + piece.x, y: area.y + piece.y, ..piece };
         let cropped = RenderOptions { crop: Some(crop), ..options.clone() };
         let mut draw = || renderer.render(scene, camera, &cropped);
-        // One thread a rank where ranks share a machine.
+        // One thread per rank where ranks share a machine.
         let output = if frame_options.parallel { draw()? } else { alone(&mut draw)? };
         channel.report.rays += output.report.rays;
         channel.report.effects = output.report.effects;
@@ -101,8 +101,8 @@ fn render(
 }
 
 thread_local! {
-    /// This thread as a pool of its own: what runs in it uses no other thread, and nobody else's
-    /// work is stolen meanwhile.
+    /// A pool of this thread only: work in it uses no other thread and steals no other work
+    /// meanwhile.
     static ALONE: Option<rayon::ThreadPool> =
         rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().ok();
 }
@@ -117,8 +117,8 @@ fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 }
 
 /// The pieces of `rank`, relative to the area, row by row. Piece (i, j) goes to rank i + s j modulo
-/// the number of ranks: a lattice of rank 1, with s near the golden section of the number of ranks,
-/// so that a rank's pieces are about as far apart as they can be.
+/// the number of ranks: a rank-1 lattice, with s near the golden section of the number of ranks, so
+/// that a rank's pieces are about as far apart as possible.
 fn pieces(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Crop> {
     let side = piece_side(area, size);
     let (columns, rows) = (area.width.div_ceil(side) as usize, area.height.div_ceil(side) as usize);
@@ -132,7 +132,7 @@ fn pieces(area: Crop, rank: usize, size: usize) -> impl Iterator<Item = Crop> {
     })
 }
 
-/// Pixels along the sides of the pieces of an area for so many ranks.
+/// Side of the pieces of an area for a number of ranks, in pixels.
 fn piece_side(area: Crop, ranks: usize) -> u32 {
     let pieces =
         |side: u32| area.width.div_ceil(side) as usize * area.height.div_ceil(side) as usize;
@@ -142,7 +142,7 @@ fn piece_side(area: Crop, ranks: usize) -> u32 {
         .map_or(SMALLEST, |(side, _)| *side)
 }
 
-/// The number nearest to the golden section of `size` that has no divisor in common with it.
+/// The number nearest to the golden section of `size` that is coprime to it.
 fn lattice_step(size: usize) -> usize {
     let golden = (size as f64 * 0.618_034).round() as usize;
     let coprime = |n: &usize| (1..size).contains(n) && gcd(*n, size) == 1;
@@ -181,7 +181,7 @@ fn blank(area: Crop, layers: Layers, camera: &Camera) -> Frame {
     }
 }
 
-/// All layers of a piece, one after the other.
+/// Encodes all layers of a piece, one after the other.
 fn to_words(frame: &Frame, out: &mut Vec<u32>) {
     let float = |v: &f32| v.to_bits();
     out.extend(frame.color.as_flattened().iter().map(float));
@@ -193,7 +193,7 @@ fn to_words(frame: &Frame, out: &mut Vec<u32>) {
     out.extend(frame.cost.iter().map(float));
 }
 
-/// Puts what [`to_words`] made of each of `pieces` into the picture.
+/// Writes the output of [`to_words`] for each of `pieces` into the image.
 fn put(picture: &mut Frame, pieces: impl Iterator<Item = Crop>, words: &[u32]) -> Option<()> {
     let stride = picture.width as usize;
     let mut rest = words;
@@ -211,10 +211,10 @@ fn put(picture: &mut Frame, pieces: impl Iterator<Item = Crop>, words: &[u32]) -
     rest.is_empty().then_some(())
 }
 
-/// A piece on its way into the picture.
+/// A piece that is being written into the image.
 struct Put<'a> {
     piece: Crop,
-    /// Pixels of a row of the picture.
+    /// Pixels of a row of the image.
     stride: usize,
     rest: &'a [u32],
 }
@@ -224,8 +224,8 @@ impl Put<'_> {
         self.layer(layer, channels, f32::from_bits)
     }
 
-    /// The next words into a layer of `channels` words per pixel; a layer that the picture does not
-    /// have takes none.
+    /// Writes the next words into a layer of `channels` words per pixel; a layer that the image
+    /// does not have takes none.
     fn layer<T>(
         &mut self,
         layer: &mut [T],

@@ -1,11 +1,12 @@
-//! Questions to other ranks and their answers, all at once: the shape of every exchange of a frame.
+//! Requests to other ranks and their replies, all at once: the pattern of every exchange of a
+//! frame.
 use super::message_codec::{decode_message, encode_message, message_bytes};
 use super::{Activity, FrameError, RankReport};
 use crate::comm::{Communicator, Receive};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// How often a rank that works on other threads looks whether they get on.
+/// How often a rank that works on other threads checks their progress.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Calls a function when it is dropped.
@@ -27,20 +28,20 @@ pub(super) enum Tag {
     Tiles = 104,
 }
 
-/// Messages that will come while this rank works on something else.
+/// Receives for messages that arrive while this rank works on something else.
 #[derive(Default)]
 pub(super) struct Inbox {
     posted: Vec<Receive>,
 }
 
-/// What came: from whom, whether under the tag asked for, and its words.
+/// A received message: its sender, its tag, and its words.
 pub(super) struct Incoming {
     pub(super) from: usize,
     pub(super) tag: u32,
     pub(super) words: Vec<u32>,
 }
 
-/// One frame's conversation of one rank, with its costs counted.
+/// One rank's messages of one frame, with their costs counted.
 pub(super) struct RankChannel<'a> {
     comm: &'a mut dyn Communicator,
     timeout: Duration,
@@ -61,19 +62,19 @@ impl<'a> RankChannel<'a> {
         self.comm.size()
     }
 
-    /// Says that this rank is at work. That others have given up is heard with the next message.
+    /// Signals that this rank is at work. If others have given up, the next message reports it.
     pub(super) fn alive(&mut self) {
         let _ = self.comm.alive();
     }
 
-    /// Does `work` on other threads and says meanwhile that this rank is at work, as far as the
+    /// Does `work` on other threads and meanwhile signals that this rank is at work, as long as the
     /// number of steps grows.
     pub(super) fn in_background<T: Send>(
         &mut self,
         work: impl FnOnce(&AtomicUsize) -> T + Send,
     ) -> T {
         let steps = AtomicUsize::new(0);
-        // A thread of the pool works itself: if it waited, there might be no other.
+        // A thread of the pool does the work itself: if it waited, there might be no other thread.
         if rayon::current_thread_index().is_some() {
             let out = work(&steps);
             self.alive();
@@ -83,7 +84,7 @@ impl<'a> RankChannel<'a> {
         let mut out = None;
         rayon::in_place_scope(|scope| {
             scope.spawn(|_| {
-                // The scope ends with its work, whether that ends or panics.
+                // End the scope when its work returns or panics.
                 let _end = CallOnDrop(|| {
                     done.store(true, Ordering::Release);
                     waiting.unpark();
@@ -102,12 +103,12 @@ impl<'a> RankChannel<'a> {
         });
         match out {
             Some(out) => out,
-            // A panic in the scope is this thread's.
+            // A panic in the scope is propagated to this thread.
             None => unreachable!("work that did not panic has ended"),
         }
     }
 
-    /// Books the time since the last booking.
+    /// Records the time since the last span.
     pub(super) fn record_span(&mut self, activity: Activity) {
         self.report.record_span(activity, self.comm.now());
     }
@@ -134,7 +135,7 @@ impl<'a> RankChannel<'a> {
         Ok(())
     }
 
-    /// Receives one message from each of `sources` (rank and most words), in any order, and hands
+    /// Receives one message from each of `sources` (rank and most words), in any order, and passes
     /// them to `take`.
     pub(super) fn receive(
         &mut self,
@@ -161,8 +162,8 @@ impl<'a> RankChannel<'a> {
         Ok(())
     }
 
-    /// Announces a message of at most `words` words. Those of one rank and tag come in the order of
-    /// their announcements.
+    /// Posts a receive for a message of at most `words` words. Those of one rank and tag arrive in
+    /// the order in which they were posted.
     pub(super) fn expect(
         &mut self,
         inbox: &mut Inbox,
@@ -174,7 +175,7 @@ impl<'a> RankChannel<'a> {
         Ok(())
     }
 
-    /// The next of the announced messages; with `wait`, when it comes, else only if it is there.
+    /// The next message; with `wait`, waits for it, otherwise returns it only if it has arrived.
     pub(super) fn next(
         &mut self,
         inbox: &mut Inbox,
@@ -199,7 +200,7 @@ impl<'a> RankChannel<'a> {
         Ok(Some(Incoming { from: arrival.source, tag: arrival.tag, words }))
     }
 
-    /// Gives numbers of every rank to every rank.
+    /// Gathers the numbers of every rank at every rank.
     pub(super) fn all_gather(&mut self, mine: &[u32]) -> Result<Vec<Vec<u32>>, FrameError> {
         let message = encode_message(mine, Vec::new());
         self.report.bytes_sent += (message.len() * self.size().saturating_sub(1)) as u64;
@@ -216,9 +217,9 @@ impl<'a> RankChannel<'a> {
         Ok(out)
     }
 
-    /// Asks `requests[r]` of each rank r (nothing where it is empty) and answers what others ask.
-    /// `answer` turns a question into an answer; `longest` bounds the words of the answer to a
-    /// question; `take` gets the answers in any order. False when no rank had a question.
+    /// Sends `requests[r]` to each rank r (nothing where it is empty) and answers the requests of
+    /// others. `answer` computes the reply to a request, `longest` bounds its number of words, and
+    /// `take` gets the replies in any order. Returns false when no rank had a request.
     pub(super) fn request_reply(
         &mut self,
         what: &'static str,
@@ -228,7 +229,7 @@ impl<'a> RankChannel<'a> {
         mut take: impl FnMut(usize, Vec<u32>) -> Result<(), FrameError>,
     ) -> Result<bool, FrameError> {
         let (rank, size) = (self.rank(), self.size());
-        // ---- Who asks whom, and how much.
+        // ---- Lengths of all requests.
         let lengths: Vec<u32> = requests.iter().map(|q| q.len() as u32).collect();
         let lengths = if size > 1 { self.all_gather(&lengths)? } else { vec![lengths] };
         self.record_span(Activity::Exchange);
@@ -236,7 +237,7 @@ impl<'a> RankChannel<'a> {
             return Ok(false);
         }
         self.report.rounds += 1;
-        // ---- Questions, to the next rank first, so that nobody gets all at once.
+        // ---- Requests, to the next rank first, so that no rank gets all at once.
         for step in 1..size {
             let to = (rank + step) % size;
             if !requests[to].is_empty() {
@@ -244,7 +245,7 @@ impl<'a> RankChannel<'a> {
             }
         }
         self.record_span(Activity::Exchange);
-        // ---- One's own question first: others' are on their way meanwhile.
+        // ---- The own request first, while those of others are in flight.
         if !requests[rank].is_empty() {
             let own = answer(&mut self.report, &requests[rank]);
             self.record_span(Activity::Answer);
@@ -281,7 +282,7 @@ impl<'a> RankChannel<'a> {
         Ok(true)
     }
 
-    /// Ends the group for all.
+    /// Aborts the group.
     pub(super) fn abort(&mut self, reason: &str) {
         self.comm.abort(reason);
     }

@@ -1,4 +1,5 @@
-//! What leaves the hits of camera rays: light asked for by points, and rays of later waves.
+//! Secondary rays of the hits of camera rays: occlusion requests for points, and rays of later
+//! bounces.
 use super::options::SecondaryRayPolicy;
 use super::rank_bounds::{RankBounds, ranks_in};
 use super::rank_frame::{RankFrame, each};
@@ -14,20 +15,20 @@ use rt_core::ray::Ray;
 /// By tile and ray.
 type ClosestHits = Vec<Vec<Option<ShadingHit>>>;
 
-/// One pass beyond its camera rays.
+/// The secondary rays of one pass.
 pub(super) struct SecondaryRays<'a> {
     pub(super) side: &'a RankFrame<'a>,
     pub(super) rank_bounds: &'a RankBounds,
     pub(super) policy: SecondaryRayPolicy,
-    /// This rank's part with a rim, for ghost zones.
+    /// This rank's part with a ghost layer, for ghost zones.
     pub(super) ghost_layer: Option<&'a DistributedFrame<'a>>,
-    /// Whether there are media, which are held in bricks.
+    /// Whether there are media, which are distributed in bricks.
     pub(super) media: bool,
     pub(super) pass: Pass,
 }
 
 impl SecondaryRays<'_> {
-    /// Until no ray is left in any tile of any rank.
+    /// Runs until no ray is left in any tile of any rank.
     pub(super) fn run(
         &mut self,
         channel: &mut RankChannel<'_>,
@@ -36,7 +37,7 @@ impl SecondaryRays<'_> {
     ) -> Result<(), FrameError> {
         let (rank, frame) = (channel.rank(), self.side.frame);
         let fits = |source| FrameError::Answer { rank, source };
-        // Ranks that were hit by camera rays, for light that stays there.
+        // Ranks that camera rays hit, for the policy `LocalOnly`.
         let mut hit_ranks: Vec<Option<Vec<u32>>> = Vec::new();
         if self.media {
             let met: Vec<_> = camera.iter().map(|answer| answer.hits.clone()).collect();
@@ -68,7 +69,7 @@ impl SecondaryRays<'_> {
         }
     }
 
-    // ---- Light that nothing passes through: points out, bits back -------------------------------
+    // ---- Occlusion by opaque surfaces: points out, bits back -----------------------------------
     fn exchange_occlusion(
         &self,
         channel: &mut RankChannel<'_>,
@@ -78,9 +79,9 @@ impl SecondaryRays<'_> {
     ) -> Result<(), FrameError> {
         let (frame, pass, size) = (self.side.frame, self.pass, channel.size());
         let words = (frame.light_rays_per_point() as usize).div_ceil(64);
-        // ---- Whom to ask.
+        // ---- Which ranks to ask.
         let mut requests: Vec<Vec<u32>> = vec![Vec::new(); size];
-        // Of each rank, the tiles and points asked of it.
+        // By rank, the tiles and points requested from it.
         let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); size];
         let mut bits: Vec<Vec<u64>> = Vec::with_capacity(tiles.len());
         for (t, tile) in tiles.iter().enumerate() {
@@ -110,7 +111,7 @@ impl SecondaryRays<'_> {
         channel.report.points_sent +=
             (0..size).filter(|&r| r != rank).map(|r| asked[r].len() as u64).sum::<u64>();
         channel.record_span(Activity::Shade);
-        // ---- Answers, joined by or: exact, and in any order.
+        // ---- Replies are merged by or: exact, and in any order.
         let tracer = self.ghost_layer.unwrap_or(frame);
         let mut work = OcclusionScratch::default();
         let mut answer = |report: &mut RankReport, request: &[u32]| {
@@ -132,7 +133,7 @@ impl SecondaryRays<'_> {
             report.answered_rays += work.traced - before;
             Some(out.iter().flat_map(|b| [*b as u32, (*b >> 32) as u32]).collect())
         };
-        // At least nine words a point.
+        // At least nine words per point.
         let longest = |request: &[u32]| request.len() / 9 * words * 2;
         let message_error = |from: usize, n: usize| FrameError::Message {
             rank,
@@ -169,8 +170,9 @@ impl SecondaryRays<'_> {
         failed.map_or(Ok(()), |source| Err(FrameError::Answer { rank, source }))
     }
 
-    // ---- Rays that want what they meet first ----------------------------------------------------
-    /// One layer of surfaces in the way of light. False when no light ray is under way anywhere.
+    // ---- Rays that need their closest hit -------------------------------------------------------
+    /// Traces one layer of transparent surfaces along light rays. Returns false when no rank has a
+    /// light ray.
     fn transmitted_light(
         &self,
         channel: &mut RankChannel<'_>,
@@ -192,7 +194,7 @@ impl SecondaryRays<'_> {
         Ok(any)
     }
 
-    /// The next wave. False when there is none anywhere.
+    /// Traces the next bounce. Returns false when no rank has one.
     fn next_bounce(
         &self,
         channel: &mut RankChannel<'_>,
@@ -230,13 +232,13 @@ impl SecondaryRays<'_> {
                 .map_err(|source| FrameError::Answer { rank, source })?;
         }
         channel.record_span(Activity::Shade);
-        // A wave of which every ray waits for nothing is still a wave of its tile; tiles agree with
-        // the others only on questions.
+        // A bounce whose rays all need no reply is still a bounce of its tile; tiles have to agree
+        // with the others only about requests.
         Ok(any)
     }
 
-    /// Of each ray of each tile the nearest of what all ranks in whose bounds it comes say it
-    /// meets, ties to the lowest number. False when no rank had a ray.
+    /// For each ray of each tile, the nearest of the hits that the ranks whose bounds it enters
+    /// report, ties to the lowest number. Returns false when no rank had a ray.
     fn closest_hits(
         &self,
         channel: &mut RankChannel<'_>,
@@ -256,7 +258,7 @@ impl SecondaryRays<'_> {
             for (i, ray) in rays.iter().enumerate() {
                 bits.fill(0);
                 self.rank_bounds.add_hit_ranks(ray, &mut bits);
-                // A ray that meets no part is still asked, of this rank: nobody may end while
+                // A ray that enters no part is still sent, to this rank: no rank may end while
                 // others have rays.
                 let mut nobody = true;
                 for r in ranks_in(&bits).filter(|&r| r < size) {
@@ -292,7 +294,7 @@ impl SecondaryRays<'_> {
             } else {
                 side.frame.closest(&rays, places.as_deref(), &mut met);
             }
-            // A mask, then what was met.
+            // A mask, then the hits.
             let mut out = vec![0; rays.len().div_ceil(32)];
             for (i, m) in met.into_iter().enumerate() {
                 if let Some(mut m) = m {
@@ -342,17 +344,17 @@ impl SecondaryRays<'_> {
     }
 }
 
-/// What is asked of rays; the same on all ranks.
+/// What a request asks of its rays; the same on all ranks.
 #[derive(Clone, Copy)]
 enum RayQuery<'a> {
-    /// What they meet first; with pixels, depth and distance as well.
+    /// Their closest hits; with pixels, depth and distance too.
     Closest { pixels: Option<&'a [Vec<u32>]> },
-    /// Of rays to light: what they meet that may let it through, or that something opaque is in the
-    /// way.
+    /// For light rays: the surfaces they hit that may let light pass, or that an opaque one blocks
+    /// them.
     Light,
 }
 
-/// Of each point of the tile a bit for each rank into whose bounds one of its light rays comes.
+/// For each point of the tile, a bit for each rank whose bounds one of its light rays enters.
 fn ranks_to_ask(rank_bounds: &RankBounds, tile: &TileState) -> Vec<u16> {
     let words = rank_bounds.bit_words();
     let mut bits = vec![0; words * tile.light_points().len()];
@@ -362,7 +364,7 @@ fn ranks_to_ask(rank_bounds: &RankBounds, tile: &TileState) -> Vec<u16> {
     bits
 }
 
-/// The same with the rank that was hit alone.
+/// The same, with only the rank that was hit.
 fn rank_that_was_hit(rank_bounds: &RankBounds, tile: &TileState, hit: &[u32]) -> Vec<u16> {
     let words = rank_bounds.bit_words();
     let mut bits = vec![0; words * tile.light_points().len()];

@@ -1,4 +1,4 @@
-//! A sort-last frame: camera rays, then wave after wave of what leaves their hits.
+//! A sort-last frame: camera rays, then bounce after bounce of secondary rays.
 use super::options::{FrameOptions, FrameOutput, SecondaryRayPolicy};
 use super::rank_bounds::RankBounds;
 use super::rank_frame::{RankFrame, each};
@@ -19,16 +19,17 @@ pub struct DataParallel {
     part: Part,
     options: FrameOptions,
     rank_bounds: RankBounds,
-    /// Why light crosses borders as it does; empty until the first frame that has such light.
+    /// The chosen policy and its reason; `None` until the first frame with secondary light rays.
     decision: Option<ghost::Decision>,
 }
 
 impl DataParallel {
-    /// Tells all ranks the bounds of all parts. All ranks must call it, and [`DataParallel::frame`]
-    /// with the same arguments.
+    /// Exchanges the bounds of all parts. All ranks must call it, and [`DataParallel::frame`] with
+    /// the same arguments.
     ///
     /// # Errors
-    /// [`FrameError::Ranks`] when there are not as many ranks as parts, or the transport's.
+    /// [`FrameError::Ranks`] when the numbers of ranks and parts differ, or errors of the
+    /// transport.
     pub fn new(
         comm: &mut dyn Communicator,
         part: Part,
@@ -47,7 +48,7 @@ impl DataParallel {
             |w: &[u32]| Vec3::new(f32::from_bits(w[0]), f32::from_bits(w[1]), f32::from_bits(w[2]));
         let bounds: Vec<Aabb> =
             all.iter().map(|w| Aabb::new(vector(&w[..3]), vector(&w[3..]))).collect();
-        // No ray would come into such a box: the rank would be left out without a word.
+        // No ray enters a box with NaN, so the rank would be silently left out.
         if let Some(from) = bounds.iter().position(|b| b.min.is_nan() || b.max.is_nan()) {
             let error = channel.message_error(from, "bounds of its part", numbers.len());
             channel.abort(&error.to_string());
@@ -57,7 +58,7 @@ impl DataParallel {
         Ok(DataParallel { part, options, rank_bounds, decision: None })
     }
 
-    /// What this rank holds.
+    /// The part that this rank holds.
     pub fn part(&self) -> &Part {
         &self.part
     }
@@ -164,7 +165,8 @@ impl DataParallel {
             .all(channel, &owners)
     }
 
-    /// Decides, once and on all ranks alike, how light crosses borders, and builds what that needs.
+    /// Chooses, once and identically on all ranks, how light crosses borders, and builds what that
+    /// needs.
     fn secondary_ray_policy(
         &mut self,
         channel: &mut RankChannel<'_>,

@@ -1,4 +1,4 @@
-//! Finished tiles to one rank.
+//! Collects finished tiles on one rank.
 use super::rank_frame::{RankFrame, each};
 use super::request_reply::{Inbox, RankChannel, Tag};
 use super::tile_hits::TileHits;
@@ -9,21 +9,21 @@ use rt_core::distributed::{DistributedFrame, Pass, TileState};
 use rt_core::frame::Frame;
 use std::ops::Range;
 
-/// One rank's part in bringing the picture to the root.
+/// One rank's side of collecting the image at the root.
 pub(super) struct TileCollector<'a> {
     side: &'a RankFrame<'a>,
     tiles: &'a mut [TileState],
     /// Number of the first of `tiles`.
     first: usize,
     root: Option<usize>,
-    /// On the root.
+    /// The image, on the root.
     picture: Option<Frame>,
-    /// Of each rank, the next tile that is to come from it.
+    /// By rank, the next tile expected from it.
     next: Vec<usize>,
 }
 
 impl<'a> TileCollector<'a> {
-    /// Nothing has come yet. `tiles` are this rank's.
+    /// A collector that has received nothing. `tiles` are this rank's.
     pub(super) fn new(
         channel: &RankChannel<'_>,
         side: &'a RankFrame<'a>,
@@ -40,7 +40,7 @@ impl<'a> TileCollector<'a> {
         Ok(TileCollector { side, tiles, first: owners.tiles[rank].start, root, picture, next })
     }
 
-    /// Posts the receives of all tiles, which come in `chunks` from each rank.
+    /// Posts the receives of all tiles, which arrive in `chunks` from each rank.
     pub(super) fn post_receives(
         &self,
         channel: &mut RankChannel<'_>,
@@ -64,7 +64,7 @@ impl<'a> TileCollector<'a> {
         Ok(())
     }
 
-    /// Gives the tiles in `range` the colours of their nearest hits, and sends them on.
+    /// Sets the tiles in `range` to the colours of their nearest hits, and sends them.
     pub(super) fn finish(
         &mut self,
         channel: &mut RankChannel<'_>,
@@ -92,7 +92,7 @@ impl<'a> TileCollector<'a> {
         self.send(channel, range)
     }
 
-    /// Sends finished tiles to the root; on the root, puts them in their places.
+    /// Sends finished tiles to the root; on the root, writes them into the image.
     fn send(
         &mut self,
         channel: &mut RankChannel<'_>,
@@ -123,7 +123,7 @@ impl<'a> TileCollector<'a> {
         words.is_empty().then_some(())
     }
 
-    /// The next chunk of tiles of rank `from`.
+    /// Writes the next chunk of tiles of rank `from` into the image.
     pub(super) fn put_chunk(
         &mut self,
         channel: &mut RankChannel<'_>,
@@ -143,7 +143,7 @@ impl<'a> TileCollector<'a> {
         placed.ok_or_else(|| channel.message_error(from, "tiles", words.len()))
     }
 
-    /// All tiles at once, at the end of a frame.
+    /// Collects all tiles at once, at the end of a frame.
     pub(super) fn all(
         mut self,
         channel: &mut RankChannel<'_>,
@@ -158,7 +158,7 @@ impl<'a> TileCollector<'a> {
         Ok(self.picture)
     }
 
-    /// The picture, after a pass in which tiles were sent as they were finished.
+    /// The image, after a pass in which tiles were sent as they were finished.
     pub(super) fn into_picture(self) -> Option<Frame> {
         self.picture
     }

@@ -1,4 +1,4 @@
-//! What camera rays meet in a tile.
+//! Hits of the camera rays in a tile.
 use rt_core::distributed::ShadingHit;
 
 /// Slots of a tile.
@@ -25,15 +25,15 @@ impl Nearest {
 
     pub(super) fn is_before(&self, other: &Nearest) -> bool {
         let key = |n: &Nearest| (n.instance, n.primitive);
-        // Nothing has t infinite and the highest numbers: every hit comes before it.
+        // Empty slots have infinite t and the highest numbers, so every hit comes before them.
         self.t < other.t || (self.t == other.t && key(self) < key(other))
     }
 }
 
-/// What the camera rays of one owned tile meet.
+/// The hits of the camera rays of one owned tile.
 pub(super) struct TileHits {
     pub(super) nearest: Vec<Nearest>,
-    /// Everything about the hits, where it was asked for.
+    /// Details of the hits, where they were requested.
     pub(super) hits: Vec<Option<ShadingHit>>,
 }
 
@@ -47,7 +47,7 @@ impl TileHits {
         self.nearest.iter().map(|n| (n.rank != u32::MAX).then_some(n.color)).collect()
     }
 
-    /// The rank whose hit is the nearest, of each slot; `u32::MAX` for none.
+    /// The rank whose hit is the nearest in a slot; `u32::MAX` for none.
     pub(super) fn winner(&self, slot: usize) -> u32 {
         self.nearest[slot].rank
     }

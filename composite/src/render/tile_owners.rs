@@ -1,39 +1,40 @@
-//! Who owns which tiles. All ranks know all bounds, so all find the same owners without a message.
+//! Which rank owns which tiles. All ranks know all bounds, so all compute the same owners without a
+//! message.
 use rt_core::distributed::DistributedFrame;
 use rt_core::math::Aabb;
 use std::ops::Range;
 
-/// Tiles of each rank, and which ranks have something to say about which tile.
+/// Tiles of each rank, and which ranks have hits to send for which tile.
 pub(super) struct TileOwners {
     /// Consecutive tiles of each rank.
     pub(super) tiles: Vec<Range<usize>>,
-    /// Of each rank, whether a camera ray of a tile can meet its part.
+    /// By rank, whether a camera ray of a tile can hit its part.
     touched: Vec<Vec<bool>>,
 }
 
 impl TileOwners {
-    /// Tiles in `bounds.len()` runs of about the same work: a tile counts once, and once more for
-    /// each part that may be seen in it.
+    /// Divides tiles into `bounds.len()` runs of about the same work. The work of a tile is 1 if no
+    /// part can be visible in it, otherwise 8 plus the number of such parts.
     pub(super) fn new(frame: &DistributedFrame<'_>, bounds: &[Aabb]) -> TileOwners {
         let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_overlapping(*b)).collect();
         let work = |tile: usize| {
             let parts = touched.iter().filter(|t| t[tile]).count() as u64;
-            // Uncovered tiles are filled with background; covered ones are shaded as well, whatever
-            // number of parts is there.
+            // Uncovered tiles are only filled with background; covered ones are shaded too,
+            // whatever their number of parts.
             if parts == 0 { 1 } else { 8 + parts }
         };
         let work: Vec<u64> = (0..frame.num_tiles()).map(work).collect();
         TileOwners { tiles: cut(&work, bounds.len()), touched }
     }
 
-    /// Tiles of chunk `chunk` of `chunks` of `owner`'s: what travels together.
+    /// The tiles of chunk `chunk` of `chunks` of `owner`, which are sent together.
     pub(super) fn chunk(&self, owner: usize, (chunk, chunks): (usize, usize)) -> Range<usize> {
         let Range { start, end } = self.tiles[owner];
         let at = |k: usize| start + (end - start) * k / chunks;
         at(chunk)..at(chunk + 1)
     }
 
-    /// The tiles of a chunk of `owner` that rank `from` may see something in.
+    /// The tiles of a chunk of `owner` in which rank `from` may see something.
     pub(super) fn shared(
         &self,
         from: usize,
@@ -43,7 +44,7 @@ impl TileOwners {
         self.chunk(owner, chunk).filter(move |&tile| self.touched[from][tile])
     }
 
-    /// Whether `from` has anything to say to `owner` about a chunk.
+    /// Whether `from` has messages for `owner` about a chunk.
     pub(super) fn has_messages(&self, from: usize, owner: usize, chunk: (usize, usize)) -> bool {
         self.shared(from, owner, chunk).next().is_some()
     }

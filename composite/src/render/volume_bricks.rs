@@ -1,20 +1,20 @@
 //! Which rank holds which bricks of which volumes.
 //!
-//! Where volumes overlap, a span of a ray needs the blocks of all of them at once. So whoever holds
-//! a brick of a volume also holds what coarser volumes have there, and answers for every span in
-//! which that volume is the finest: little has to be held twice then. (The first volume of the
-//! scene, tried before, had others hold five times a fine volume that was turned against a coarse
-//! one.)
+//! Where volumes overlap, a span of a ray needs the blocks of all of them at once. So a rank that
+//! holds a brick of a volume also holds what coarser volumes have there, and computes every span in
+//! which that volume is the finest. This way little is held twice. (The first volume of the scene,
+//! tried before, had others hold five times a fine volume that was rotated against a coarse one.)
 use super::FrameError;
 use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3};
 use rt_core::scene::{Scene, VolumeInstance};
 use rt_core::volume::{Brick, MACROCELL, Volume};
 use std::sync::Arc;
 
-/// Work of a block without extinction or that is not needed, of one that has some and is.
+/// Work of a block without extinction or that is not needed, relative to one with extinction that
+/// is needed.
 const CLEAR_WORK: f64 = 0.02;
 
-/// A brick of a volume, and who holds it.
+/// A brick of a volume, and the ranks that hold it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct VolumeBrick {
     pub(super) volume: usize,
@@ -22,20 +22,21 @@ pub(super) struct VolumeBrick {
     pub(super) holders: Vec<u16>,
 }
 
-/// All bricks of all volumes that are media. Projections see whole volumes: every rank holds those.
+/// All bricks of all volumes that are media. Projections need whole volumes, so every rank holds
+/// those.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct VolumeBricks {
     pub(super) all: Vec<VolumeBrick>,
-    /// Of each volume whether a block has any extinction, x fastest.
+    /// By volume, whether a block has any extinction, x fastest.
     occupied: Vec<Vec<bool>>,
-    /// Of each volume its blocks per axis.
+    /// By volume, its blocks per axis.
     blocks: Vec<UVec3>,
-    /// Of each volume how many are finer than it.
+    /// By volume, how many volumes are finer.
     finer: Vec<usize>,
 }
 
 impl VolumeBricks {
-    /// Every medium in one brick for each of `ranks` ranks.
+    /// Cuts every medium into one brick for each of `ranks` ranks.
     pub(super) fn one_per_rank(scene: &Scene, ranks: usize) -> VolumeBricks {
         let mut volume_bricks = VolumeBricks { finer: finer(scene), ..VolumeBricks::default() };
         for placed in &scene.volumes {
@@ -52,7 +53,7 @@ impl VolumeBricks {
         volume_bricks
     }
 
-    /// Cuts a volume anew: a brick for each list of ranks, which hold it.
+    /// Cuts a volume again: a brick for each list of ranks, which hold it.
     pub(super) fn cut(&mut self, scene: &Scene, volume: usize, holders: &[Vec<u16>]) {
         self.all.retain(|volume_brick| volume_brick.volume != volume);
         let placed = &scene.volumes[volume];
@@ -73,15 +74,15 @@ impl VolumeBricks {
         self.occupied[volume][((block.z * blocks.y + block.y) * blocks.x + block.x) as usize]
     }
 
-    /// The piece whose holder has the blocks of all volumes that are `here`; `likely` is looked at
-    /// first.
+    /// The brick whose holder has the blocks of all volumes in `here`; checks `likely` first.
     pub(super) fn find(&self, here: &[(usize, UVec3)], likely: Option<usize>) -> Option<usize> {
         let (volume, block) = *here.iter().min_by_key(|(v, _)| self.finer[*v])?;
         let has = |p: &VolumeBrick| p.volume == volume && p.brick.contains(block);
         likely.filter(|p| has(&self.all[*p])).or_else(|| self.all.iter().position(has))
     }
 
-    /// Whom `rank` asks about a piece: itself if it can, and else not everybody the same.
+    /// The rank that `rank` asks about a brick: itself if it holds it, otherwise a holder chosen to
+    /// spread requests.
     pub(super) fn holder(&self, volume_brick: usize, rank: usize) -> usize {
         let holders = &self.all[volume_brick].holders;
         match holders.iter().find(|h| usize::from(**h) == rank) {
@@ -90,7 +91,7 @@ impl VolumeBricks {
         }
     }
 
-    /// What `rank` holds, by the pieces' numbers.
+    /// The data that `rank` holds, by brick number.
     pub(super) fn brick_data(&self, scene: &Scene, rank: usize) -> Vec<Option<BrickData>> {
         let holds = |p: &VolumeBrick| {
             p.holders.iter().any(|h| usize::from(*h) == rank) && !p.brick.is_empty()
@@ -99,10 +100,10 @@ impl VolumeBricks {
     }
 }
 
-/// The ranks of `holders` as they are kept.
+/// Checks `holders` and converts them to the stored form.
 ///
 /// # Errors
-/// [`FrameError::Holders`] for lists that cannot be followed.
+/// [`FrameError::Holders`] for invalid lists.
 pub(super) fn checked(
     scene: &Scene,
     volume: usize,
@@ -139,7 +140,7 @@ pub(super) fn checked(
     Ok(holders.iter().map(|list| list.iter().map(|r| *r as u16).collect()).collect())
 }
 
-/// What a rank holds for one piece: its brick, and what coarser volumes have there.
+/// What a rank holds for one brick: its blocks, and what coarser volumes have there.
 #[derive(Clone)]
 pub(super) struct BrickData {
     /// By volume.
@@ -166,7 +167,7 @@ impl BrickData {
         BrickData { parts }
     }
 
-    /// The part of a volume that is here.
+    /// The part of a volume in this data.
     pub(super) fn volume(&self, volume: usize) -> Option<&Volume> {
         self.parts[volume].as_ref().map(|(_, part)| &**part)
     }
@@ -175,18 +176,18 @@ impl BrickData {
         self.parts[volume].as_ref().is_some_and(|(brick, _)| brick.contains(block))
     }
 
-    /// Values of grids here.
+    /// Number of grid values in this data.
     pub(super) fn num_values(&self) -> usize {
         self.parts.iter().flatten().map(|(_, part)| part.grid().values.len()).sum()
     }
 }
 
-/// From the space relative to the volume's origin.
+/// Transform from the space relative to the volume's origin.
 fn world_from_object(placed: &VolumeInstance) -> DAffine3 {
     placed.world_from_object * DAffine3::from_translation(placed.volume.origin())
 }
 
-/// Where cell 0 begins: half a spacing before the first point where cells are boxes around points.
+/// Start of cell 0: half a spacing before the first point where cells are boxes around points.
 fn first_cell(volume: &Volume) -> DVec3 {
     if volume.has_cells_around_points() { -0.5 * volume.grid().spacing } else { DVec3::ZERO }
 }
@@ -198,7 +199,7 @@ fn corners(volume: &Volume, brick: Brick) -> [DVec3; 2] {
     [at(brick.first), at(brick.end)]
 }
 
-/// The eight corners of a box, seen from elsewhere, as a box there.
+/// The bounding box of a box's eight corners after a transform.
 fn moved(there: DAffine3, lo: DVec3, hi: DVec3) -> [DVec3; 2] {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for i in 0..8 {
@@ -209,8 +210,8 @@ fn moved(there: DAffine3, lo: DVec3, hi: DVec3) -> [DVec3; 2] {
     [low, high]
 }
 
-/// Blocks of `volume` that a box comes near to, by a cell: rays are rounded where they come into
-/// another volume's space.
+/// Blocks of `volume` that a box overlaps or nearly overlaps, by one cell: rays are rounded when
+/// they enter another volume's space.
 fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Brick {
     let [low, high] = moved(there, lo, hi);
     let cell = |p: DVec3| (p - first_cell(volume)) / volume.grid().spacing;
@@ -220,8 +221,8 @@ fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Bric
     Brick { first: first.min(end), end }
 }
 
-/// Of each volume how many have more cells to a length of the world; of those with as many, the
-/// first in the scene counts as finer.
+/// By volume, how many have smaller cells in world space; of equal ones, the first in the scene
+/// counts as finer.
 fn finer(scene: &Scene) -> Vec<usize> {
     let cell = |placed: &VolumeInstance| {
         let size = DMat3::from_diagonal(placed.volume.grid().spacing);
@@ -232,7 +233,7 @@ fn finer(scene: &Scene) -> Vec<usize> {
     (0..cells.len()).map(|v| (0..cells.len()).filter(|other| before(*other, v)).count()).collect()
 }
 
-/// Of a block of a volume whether a finer medium is all around it, so that it is never the finest.
+/// Whether a block of a volume is completely inside a finer medium, so that it is never the finest.
 fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -> bool {
     let here = &scene.volumes[volume];
     let others: Vec<(&VolumeInstance, DAffine3)> = scene
@@ -246,7 +247,7 @@ fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -
         .collect();
     move |block| {
         let [lo, hi] = corners(&here.volume, Brick { first: block, end: block + 1 });
-        // By a cell of each at least: rays are rounded.
+        // With a margin of at least one cell of each: rays are rounded.
         let margin = here.volume.grid().spacing;
         others.iter().any(|(placed, there)| {
             let [low, high] = moved(*there, lo - margin, hi + margin);
@@ -266,7 +267,7 @@ fn blocks_of(brick: Brick) -> impl Iterator<Item = UVec3> {
 }
 
 /// Cuts a volume into `count` bricks with about the same number of blocks that have extinction and
-/// are not `covered`, and leaves covered ones at their sides away.
+/// are not `covered`, and omits covered blocks at their sides.
 fn bricks(volume: &Volume, count: usize, covered: &impl Fn(UVec3) -> bool) -> Vec<Brick> {
     let mut out = Vec::with_capacity(count);
     let all = Brick { first: UVec3::ZERO, end: volume.blocks() };

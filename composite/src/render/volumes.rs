@@ -1,10 +1,9 @@
-//! Volumes in bricks: rays are carried through them, from near to far, with what they have
-//! collected.
+//! Volumes in bricks: rays traverse them from near to far, and the accumulated light is sent along.
 //!
-//! The owner of a pixel knows which bricks a ray meets in which order ([`super::volume_bricks`]). It asks
-//! a holder of the first one, takes back what the ray has collected there, and asks the next: one
-//! round of questions per brick along a ray. Sums are made in the order in which one node makes
-//! them, so they have the same bits.
+//! The owner of a pixel knows which bricks a ray enters in which order ([`super::volume_bricks`]).
+//! It sends the ray to a holder of the first brick, receives what the ray has accumulated there,
+//! and sends it to the next: one round of requests per brick along a ray. Sums are made in the
+//! order in which one node makes them, so they have the same bits.
 use super::rank_frame::RankFrame;
 use super::request_reply::RankChannel;
 use super::{Activity, FrameError, RankReport};
@@ -13,23 +12,23 @@ use rt_core::distributed::{ShadingHit, TileState, VolumeRay};
 use rt_core::ray::Ray;
 use rt_core::volume::{PartialIntegral, VolumeSample};
 
-/// Words that say which piece, and which spans of a ray.
+/// Words for the brick and the spans of a ray.
 const HEAD: usize = 3;
-/// Those, a ray and what it has collected.
+/// Those words, a ray and its accumulated light.
 const WORDS: usize = HEAD + 8 + PartialIntegral::WORDS;
 
-/// Spans of a ray that are in the same piece.
+/// Consecutive spans of a ray in the same brick.
 struct BrickSpan {
     brick: usize,
     first: usize,
     end: usize,
 }
 
-/// A ray on its way through the bricks.
+/// A ray that traverses the bricks.
 struct BrickTraversal {
     tile: usize,
     ray: VolumeRay,
-    /// The next one last.
+    /// Remaining bricks in reverse order.
     remaining: Vec<BrickSpan>,
     collected: PartialIntegral,
 }
@@ -65,8 +64,8 @@ impl BrickTraversal {
     }
 }
 
-/// Carries the rays of `tiles`, which end where they `met` something, through all ranks' bricks,
-/// and gives the tiles what they collect.
+/// Traverses all ranks' bricks with the rays of `tiles`, which end at their hits in `met`, and
+/// gives the tiles the light that they accumulate.
 pub(super) fn composite_volumes(
     channel: &mut RankChannel<'_>,
     side: &RankFrame<'_>,
@@ -83,7 +82,7 @@ pub(super) fn composite_volumes(
     }
     channel.record_span(Activity::Shade);
     loop {
-        // ---- To the next brick.
+        // ---- Send rays to their next brick.
         let mut requests: Vec<Vec<u32>> = vec![Vec::new(); size];
         let mut asked: Vec<Vec<usize>> = vec![Vec::new(); size];
         for (k, j) in journeys.iter_mut().enumerate() {
@@ -134,7 +133,7 @@ pub(super) fn composite_volumes(
             break;
         }
     }
-    // ---- To the tiles.
+    // ---- Give the samples to the tiles.
     let mut samples: Vec<Vec<VolumeSample>> =
         tiles.iter().map(|t| vec![VolumeSample::CLEAR; t.num_rays()]).collect();
     for j in &journeys {
@@ -148,7 +147,7 @@ pub(super) fn composite_volumes(
     Ok(())
 }
 
-/// The answer to one question; `None` for a question that is not for this rank.
+/// The reply to one request; `None` for a request that is not for this rank.
 fn continue_ray(
     side: &RankFrame<'_>,
     words: &[u32; WORDS],
