@@ -52,8 +52,8 @@ pub struct Options {
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
-    /// Longest wait for one message without a sign of life of those it depends on. A renderer that
-    /// takes longer calls [`Communicator::alive`] now and then, as for each tile.
+    /// Longest wait for one message without a sign of life from the ranks it depends on. A renderer
+    /// that takes longer calls [`Communicator::alive`] regularly, for example for each tile.
     pub timeout: Duration,
     /// Whether all ranks wait for each other at the end, so that success on one rank means success
     /// on all. Without it a rank that has sent its part returns at once and learns of a fault of

@@ -1,8 +1,8 @@
-//! Ranks as threads of one process: every rank has a mailbox for each other rank, messages are
-//! moved and not copied.
+//! Ranks as threads of one process: every rank has a mailbox for each other rank, and messages are
+//! moved, not copied.
 //!
-//! The whole group shares one lock. It is held for the move of one pointer, never while pixels are
-//! worked on.
+//! The whole group shares one lock. It is held while one pointer moves, never while pixels are
+//! processed.
 use super::{Arrival, BufferPool, CommError, Communicator, Receive};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -18,16 +18,16 @@ struct State {
     aborted: Option<(usize, String)>,
     at_barrier: Vec<bool>,
     barriers_done: u64,
-    /// When each rank has last sent anything or said that it is at work.
+    /// When each rank last sent anything or called `alive`.
     heartbeats: Vec<Instant>,
-    /// For whom each rank waits: the sources of its receives. At a barrier these are all who are
-    /// not there.
+    /// The ranks that each rank waits for: the sources of its receives. At a barrier these are all
+    /// ranks that have not arrived.
     waits_for: Vec<Vec<usize>>,
 }
 
 impl State {
-    /// The last sign of life of those for whom `rank` waits, and of those they wait for in turn,
-    /// but not of `rank` itself.
+    /// The last sign of life of the ranks that `rank` waits for, and of those they wait for in
+    /// turn, but not of `rank` itself.
     fn last_heartbeat(&self, rank: usize) -> Option<Instant> {
         let ranks = 0..self.heartbeats.len();
         let mut seen = vec![false; ranks.len()];
@@ -48,19 +48,19 @@ impl State {
 }
 
 struct Group {
-    /// When the group was made; all ranks count their time from here.
+    /// When the group was made; all ranks measure time from here.
     begin: Instant,
     state: Mutex<State>,
-    /// One per rank, so that a message wakes its receiver alone.
+    /// One per rank, so that a message wakes only its receiver.
     wake: Vec<Condvar>,
-    /// Of all ranks together: buffers travel with their messages, and a rank that only receives
-    /// would hoard them.
+    /// Shared by all ranks: buffers move with their messages, and a rank that only receives would
+    /// accumulate them.
     pool: Mutex<BufferPool>,
 }
 
 impl Group {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while the lock is held, so a poisoned state is still a whole one.
+        // Nothing panics while the lock is held, so a poisoned state is still consistent.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -71,19 +71,19 @@ impl Group {
     }
 }
 
-/// One rank of a group of threads. Dropping it leaves the group: whoever still waits for this rank
-/// gets [`CommError::PeerLost`], but messages already sent still arrive.
+/// One rank of a group of threads. Dropping it leaves the group: ranks that still wait for this
+/// rank get [`CommError::PeerLost`], but messages already sent still arrive.
 pub struct ThreadComm {
     rank: usize,
     group: Arc<Group>,
     /// Receives not yet served, oldest first, by source and tag.
     posted: BTreeMap<(usize, u32), VecDeque<(u64, usize)>>,
-    /// Messages that belong to a receive that nobody has waited for yet.
+    /// Messages for receives that nobody has waited for yet.
     early: Vec<(u64, Vec<u8>)>,
     next_id: u64,
 }
 
-/// A group of `size` ranks; hand each element to its own thread.
+/// A group of `size` ranks; pass each element to its own thread.
 pub fn group(size: usize) -> Vec<ThreadComm> {
     let state = State {
         mail: (0..size).map(|_| vec![Mailbox::new(); size]).collect(),
@@ -168,8 +168,8 @@ impl ThreadComm {
 }
 
 impl Group {
-    /// Waits until `ready` gives something, the group is aborted, or `timeout` has passed since the
-    /// last sign of life of the `sources` (then `None`).
+    /// Waits until `ready` returns something, the group is aborted, or `timeout` has passed since
+    /// the last sign of life of the `sources` (then `None`).
     fn wait<T>(
         &self,
         rank: usize,
@@ -333,12 +333,12 @@ impl Communicator for ThreadComm {
         }
         let mut state = self.group.lock();
         if state.barriers_done > before {
-            // The last rank came between the end of the wait and the lock.
+            // The last rank arrived between the end of the wait and the lock.
             return Ok(());
         }
         let missing = state.at_barrier.iter().position(|&here| !here).unwrap_or(rank);
-        // This rank no longer waits: without this, a latecomer would pass a barrier that has failed
-        // here.
+        // This rank no longer waits: otherwise a rank that arrives later would pass a barrier that
+        // has failed here.
         state.at_barrier[rank] = false;
         Err(CommError::BarrierTimeout { rank, missing, waited_ms: timeout.as_millis() as u64 })
     }

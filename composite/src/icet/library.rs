@@ -1,4 +1,4 @@
-//! Finding IceT and its functions.
+//! Searching and loading IceT.
 use super::IcetError;
 use libloading::os::unix::{Library as Dynamic, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::ffi::{c_int, c_void};
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The variable that names IceT's core library.
 const VARIABLE: &str = "RTSV_ICET";
-/// How the file may be called: in ParaView, and by itself.
+/// Names of the file: in ParaView, and standalone.
 const NAMES: &[&str] = &["libvtkIceTCore-pv", "libvtkIceTCore", "libIceTCore.so"];
 
 fn folders() -> Vec<PathBuf> {
@@ -53,7 +53,7 @@ pub fn find() -> Result<PathBuf, IcetError> {
     Err(missing())
 }
 
-/// The error that says that there is none.
+/// The error if no library is found.
 pub fn missing() -> IcetError {
     let folders: Vec<String> =
         folders().iter().map(|folder| folder.display().to_string()).collect();
@@ -114,15 +114,15 @@ pub(super) struct Library {
 }
 
 impl Library {
-    /// Loads IceT; `private` from a copy of the file, so that its global variables are this rank's
-    /// own.
+    /// Loads IceT. With `private`, loads a copy of the file, so that this rank has its own global
+    /// variables.
     pub(super) fn open(path: &Path, private: bool) -> Result<Self, IcetError> {
         let unusable = |reason: String| IcetError::Unusable { path: path.to_path_buf(), reason };
         let dynamic = if private {
             static COPIES: AtomicU64 = AtomicU64::new(0);
             let number = COPIES.fetch_add(1, Ordering::Relaxed);
-            // The address of a local tells apart ranks that have copies of this library too (SMPI),
-            // and so of the counter.
+            // Ranks may have copies of this library too (SMPI), and so of the counter; the address
+            // of a local variable differs between them.
             let salt = &raw const number as usize;
             let name = format!("composite-icet-{}-{salt:x}-{number}.so", std::process::id());
             let copy = std::env::temp_dir().join(name);
@@ -130,7 +130,7 @@ impl Library {
                 .map_err(|e| unusable(format!("no copy at {}: {e}", copy.display())))?;
             // SAFETY: IceT's core has no initialisers.
             let dynamic = unsafe { Dynamic::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) };
-            // It stays mapped without its name.
+            // It stays mapped after its name is removed.
             let _ = std::fs::remove_file(&copy);
             dynamic
         } else {
@@ -142,7 +142,7 @@ impl Library {
         Ok(Self { functions, _dynamic: ManuallyDrop::new(dynamic) })
     }
 
-    /// A communicator of IceT's own MPI layer, from the library beside the core.
+    /// A communicator of IceT's own MPI layer, from the library in the same folder as the core.
     pub(super) fn own_mpi_layer(
         &self,
         core: &Path,

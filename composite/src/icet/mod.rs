@@ -1,12 +1,11 @@
 //! IceT (K. Moreland, W. Kendall, T. Peterka, J. Huang, "An Image Compositing Solution at Scale",
-//! SC11) on the same ranks and the same frames: the library that the thesis used, and what our
-//! times are compared with.
+//! SC11) on the same ranks and the same frames. The thesis used this library, and our times are
+//! compared with it.
 //!
 //! The stock build of a distribution is loaded at run time (Debian: package `paraview`); nothing of
-//! it is linked or shipped. Under Open MPI it uses its own MPI layer. Elsewhere it gets its
-//! messages through its table of functions: from MPI directly (MPICH, SMPI), or over a
-//! [`Communicator`] between threads, where every rank has a copy of the library, because IceT keeps
-//! its state in globals.
+//! it is linked or shipped. Under Open MPI it uses its own MPI layer. Otherwise its table of
+//! functions sends its messages: by MPI directly (MPICH, SMPI), or over a [`Communicator`] between
+//! threads. Then every rank has a copy of the library, because IceT keeps its state in globals.
 #![allow(unsafe_code, reason = "calls into IceT, which is found at run time")]
 
 mod library;
@@ -29,13 +28,13 @@ use table::Table;
 /// Why IceT could not be used.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
 pub enum IcetError {
-    /// Not on this machine.
+    /// Not found on this machine.
     #[error(
         "IceT was not found (looked for {looked_for}): install the Debian package `paraview`, \
          or name the library libvtkIceTCore or libIceTCore in RTSV_ICET"
     )]
     Missing {
-        /// Where it was looked for.
+        /// Where it was searched.
         looked_for: String,
     },
     /// Found, but not usable.
@@ -46,7 +45,7 @@ pub enum IcetError {
         /// Why.
         reason: String,
     },
-    /// A frame does not fit.
+    /// A frame has the wrong size.
     #[error("a frame of {found} values where IceT was set up for {expected}")]
     FrameSize {
         /// Values needed.
@@ -62,7 +61,7 @@ pub enum IcetError {
     },
 }
 
-/// IceT's single-image strategies; all are used below its strategy `reduce`, the default.
+/// IceT's single-image strategies; all are used within its strategy `reduce`, the default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IcetStrategy {
     /// Binary swap.
@@ -76,7 +75,7 @@ pub enum IcetStrategy {
 }
 
 impl IcetStrategy {
-    /// Those compared with.
+    /// The strategies of the comparison.
     pub const ALL: [Self; 4] = [Self::BinarySwap, Self::RadixK, Self::RadixKr, Self::Tree];
 
     /// Name as in IceT's own timing program.
@@ -131,7 +130,7 @@ pub enum IcetImage<'a> {
     RgbaF32(&'a [[f32; 4]]),
 }
 
-/// How IceT's messages travel. Boxes have a fixed address, which IceT keeps.
+/// How IceT's messages are sent. The boxes have a fixed address, which IceT stores.
 enum MessageLayer {
     /// Its own layer for Open MPI.
     Own,
@@ -192,8 +191,8 @@ impl Icet {
         )
     }
 
-    /// IceT over any communicator between threads, set up for images of this size that go to
-    /// rank 0. The communicator is to be passed again with every frame.
+    /// IceT over any communicator between threads, set up for images of this size that go to rank
+    /// 0. Every frame needs the same communicator.
     ///
     /// # Errors
     /// [`IcetError`].
@@ -230,7 +229,7 @@ impl Icet {
         height_px: u32,
         rank: usize,
     ) -> Result<Self, IcetError> {
-        // Numbers are those of IceT.h.
+        // Constants of IceT.h.
         let (composite_mode, color, depth) = match mode {
             IcetMode::Depth => (0x0301, 0xC001, 0xD001),
             IcetMode::BlendU8 => (0x0302, 0xC001, 0xD000),
@@ -266,21 +265,22 @@ impl Icet {
         }
     }
 
-    /// Chooses the strategy of the frames to come.
+    /// Sets the strategy of the next frames.
     pub fn set_strategy(&mut self, strategy: IcetStrategy) {
         // SAFETY: a context is current.
         unsafe { (self.library.functions.single_image_strategy)(strategy.code()) };
     }
 
-    /// Front-to-back order of the ranks, for blending.
+    /// Sets the front-to-back order of the ranks, for blending.
     pub fn set_order(&mut self, front_to_back: &[usize]) {
         let order: Vec<c_int> = front_to_back.iter().map(|&rank| rank as c_int).collect();
         // SAFETY: IceT copies one number for each rank.
         unsafe { (self.library.functions.composite_order)(order.as_ptr()) };
     }
 
-    /// Composites a frame; all ranks call this. `bounds` holds all that was drawn. `comm` is the
-    /// communicator of [`over_comm`](Self::over_comm) and not used over MPI. Rank 0 gets the image.
+    /// Composites a frame; all ranks call this. `bounds` contains everything that was drawn. `comm`
+    /// is the communicator of [`over_comm`](Self::over_comm); it is not used over MPI. Rank 0 gets
+    /// the image.
     ///
     /// # Errors
     /// [`IcetError::FrameSize`], [`IcetError::Reported`].
@@ -353,7 +353,7 @@ impl Icet {
         }
     }
 
-    /// Whether its messages go over its own MPI layer.
+    /// Whether its messages use its own MPI layer.
     pub fn uses_own_layer(&self) -> bool {
         matches!(self.message_layer, MessageLayer::Own)
     }

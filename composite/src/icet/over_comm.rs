@@ -6,14 +6,14 @@ use std::ffi::c_int;
 use std::marker::PhantomData;
 use std::time::Duration;
 
-/// IceT has no timeouts of its own.
+/// Timeout of each wait, because IceT has none of its own.
 const TIMEOUT: Duration = Duration::from_secs(60);
-/// Added to IceT's tags, to keep them apart from ours.
+/// Added to IceT's tags, to separate them from ours.
 const FIRST_TAG: u32 = 8192;
-/// Number of a send request: its bytes are copied, so it is complete at once.
+/// The request number of every send: its bytes are copied, so it is complete at once.
 const SENT: usize = usize::MAX;
 
-/// A receive that IceT has posted, and where it wants the bytes.
+/// A receive that IceT has posted, and the address for its bytes.
 struct Pending {
     receive: Receive,
     to: *mut u8,
@@ -27,7 +27,7 @@ pub(super) struct OverComm {
     pending: Vec<Option<Pending>>,
 }
 
-/// Takes the communicator back when it goes.
+/// Ends the loan of the communicator when it is dropped.
 pub(super) struct CommGuard<'a> {
     over: *mut OverComm,
     _comm: PhantomData<&'a mut dyn Communicator>,
@@ -78,7 +78,7 @@ impl OverComm {
     }
 }
 
-/// IceT cannot be told of an error.
+/// Panics on an error, because IceT cannot be told of one.
 fn or_abort<T>(result: Result<T, CommError>) -> T {
     result.unwrap_or_else(|error| panic!("IceT's messages cannot go on: {error}"))
 }
@@ -222,7 +222,7 @@ impl Transport for OverComm {
         if let Some(done) = requests.iter().position(|&request| request == SENT) {
             return done;
         }
-        // All receives that are waited for, and whose they are.
+        // All receives that are waited for, and the positions of their requests.
         let (mut posted, mut owners) = (Vec::new(), Vec::new());
         for (position, &request) in
             requests.iter().enumerate().filter(|(_, request)| **request != 0)

@@ -1,5 +1,5 @@
-//! IceT's messages by MPI's own functions, without a copy, as its own MPI layer does: for MPICH and
-//! SMPI, for which distributions build no such layer.
+//! IceT's messages by MPI's own functions, without a copy, as in IceT's own MPI layer: for MPICH
+//! and SMPI, for which distributions build no such layer.
 use super::table::Transport;
 use crate::comm::mpi::{Handle, Mpi};
 use std::ffi::{c_int, c_void};
@@ -26,8 +26,8 @@ impl OverMpi {
             self.requests.len() - 1
         });
         self.requests[index] = request;
-        // A send may be complete at once and have no request; its number still has to differ from
-        // no number.
+        // A send may be complete at once and have no request; its number must still differ from 0,
+        // which means none.
         index + 1
     }
 
@@ -223,7 +223,7 @@ impl Transport for OverMpi {
             number => self.requests[number - 1],
         });
         let done = self.mpi.wait_any_of(&handles.collect::<Vec<_>>());
-        // Where none is active, all that are left are complete.
+        // If none is active, all remaining ones are complete.
         let done = done.or_else(|| requests.iter().position(|&request| request != 0)).unwrap_or(0);
         if requests[done] != 0 {
             self.requests[requests[done] - 1] = null;

@@ -1,13 +1,12 @@
 //! IceT's communicator: a table of functions that it calls for every message
 //! (`IceTCommunicatorStruct` of IceT.h).
 //!
-//! Whatever carries the messages is a [`Transport`]; the functions here only turn IceT's counts and
-//! types into bytes. IceT has no way to hear of an error, so a failing transport ends the process
-//! with a message.
+//! A [`Transport`] carries the messages; the functions here only convert IceT's counts and types
+//! into bytes. IceT cannot be told of an error, so a failing transport ends the process with a
+//! message.
 use std::ffi::{c_int, c_void};
 
-/// Moves bytes for IceT. Pointers are valid for the given bytes as long as MPI would need them to
-/// be.
+/// Moves bytes for IceT. Pointers are valid for the given bytes as long as MPI would need them.
 pub(super) trait Transport {
     fn rank(&self) -> usize;
     fn size(&self) -> usize;
@@ -26,9 +25,9 @@ pub(super) trait Transport {
         source: c_int,
         recv_tag: c_int,
     );
-    /// `send` is null where the rank's part is in its place already (here and below).
+    /// `send` is null if the rank's part is already in its final position (here and below).
     fn gather(&mut self, send: *const u8, count: usize, recv: *mut u8, root: c_int);
-    /// `counts` and `offsets` in bytes; empty but on the root.
+    /// `counts` and `offsets` in bytes; empty except on the root.
     fn gatherv(
         &mut self,
         send: *const u8,
@@ -45,7 +44,7 @@ pub(super) trait Transport {
     /// A number for the request, not 0.
     fn irecv(&mut self, bytes: *mut u8, count: usize, source: c_int, tag: c_int) -> usize;
     fn wait(&mut self, request: usize);
-    /// Position of the one that is complete; zeros are no requests.
+    /// Position of a complete request; zeros are no requests.
     fn wait_any(&mut self, requests: &[usize]) -> usize;
 }
 
@@ -98,7 +97,7 @@ pub(super) struct Table {
     data: *mut c_void,
 }
 
-/// The table for a transport at `data`, which must stay where it is and be a `T`.
+/// The table for a transport at `data`, which must not move and must be a `T`.
 pub(super) fn of<T: Transport>(data: *mut c_void) -> Table {
     Table {
         duplicate,

@@ -1,13 +1,13 @@
 //! Ranks as processes of an MPI job: Open MPI, MPICH or SimGrid's SMPI, whichever started them.
 //!
-//! The library is looked for when the program runs (`dlopen`), so that one binary serves all and
-//! building needs none. Which one is the launcher's choice ([`launcher`]); what calls itself by an
+//! The library is loaded at run time (`dlopen`), so one binary works with all of them and building
+//! needs none. The launcher determines which one is loaded ([`launcher`]); a library with an
 //! unknown name is refused ([`Abi`]).
 //!
-//! Faults: waits poll, so they end at their timeout; a rank that gives up tells the others by a
-//! notice. MPI itself cannot go on after that, so a program ends with [`MpiComm::end_job`]. A
-//! killed rank is noticed by the launcher, which ends the job (Open MPI and MPICH both do). Under
-//! SMPI time is simulated and waits block: SimGrid itself finds ranks that wait for ever.
+//! Faults: waits poll, so they end at their timeout, and a rank that gives up tells the others with
+//! a notice. MPI itself cannot continue after that, so a program ends with [`MpiComm::end_job`].
+//! The launcher notices a killed rank and ends the job (Open MPI and MPICH both do). Under SMPI
+//! time is simulated and waits block: SimGrid itself finds ranks that wait forever.
 #![allow(unsafe_code, reason = "calls into an MPI library found at run time")]
 
 mod abi;
@@ -42,32 +42,32 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use transfer::Transfers;
 
-/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB. Room is
-/// made chunk by chunk, as they come: how long a message may be follows from what its sender has
-/// announced, and need not be true.
+/// Bytes of a full chunk: MPI counts in `int`, and some transports have trouble near 2 GiB. Memory
+/// is allocated chunk by chunk as they arrive, because the length that a sender has announced may
+/// be false.
 const CHUNK_BYTES: usize = 1 << 26;
-/// `MPI_THREAD_FUNNELED` in all three ABIs: there may be other threads, but this one calls.
+/// `MPI_THREAD_FUNNELED` in all three ABIs: other threads may exist, but only this one calls MPI.
 const FUNNELED: c_int = 1;
-/// How long a message of a rank that has left may still be on its way.
+/// How long a message of a rank that has left may still be in flight.
 const LATE_MESSAGE_TIMEOUT: Duration = Duration::from_millis(200);
-/// How long a rank that leaves waits for its messages to be taken.
+/// How long a rank that leaves waits for its messages to be received.
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
-/// Messages on their way from which on a sender looks which of them have left, if it has not needed
-/// their buffers before.
+/// Number of messages in flight from which on a sender checks which of them are complete, if it has
+/// not needed their buffers before.
 const REAP_AT: usize = 512;
-/// Polls before the processor is offered to others, where every rank has its own.
+/// Polls before a rank yields its processor, where every rank has its own.
 const SPINS: u32 = 2000;
-/// Offers of the processor before a rank sleeps, where ranks share processors.
+/// Yields before a rank sleeps, where ranks share processors.
 const YIELDS: u32 = 100;
-/// How long it sleeps then.
+/// Duration of that sleep.
 const POLL_SLEEP: Duration = Duration::from_micros(20);
 /// Longest wait for the other ranks when the group is made.
 const STARTUP_TIMEOUT: Duration = Duration::from_secs(300);
-/// How often a waiting rank looks for notices.
+/// How often a waiting rank polls for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
 
-/// All ranks of the MPI job that this process belongs to. There is one per process; it is used by
-/// the thread that made it.
+/// All ranks of the MPI job that this process belongs to. There is one per process, and only the
+/// thread that made it may use it.
 ///
 /// Dropping it leaves the group and ends MPI (`MPI_Finalize`) if this object started it, unless the
 /// group was aborted.
@@ -79,7 +79,7 @@ pub struct MpiComm {
     transfers: Transfers,
     notices: Notices,
     heartbeats: Heartbeats,
-    /// When notices were last looked for beside work.
+    /// When notices were last polled between computations.
     looked: Instant,
     left: Vec<bool>,
     aborted: Option<(usize, String)>,
@@ -100,7 +100,7 @@ pub struct MpiComm {
 static STARTED: AtomicBool = AtomicBool::new(false);
 
 impl MpiComm {
-    /// Starts MPI, if nobody has yet, with all ranks of the job.
+    /// Starts MPI with all ranks of the job, unless it is started already.
     ///
     /// # Errors
     /// [`MpiError`]: no launcher, no library, one with an unknown binary interface, or a second
@@ -123,7 +123,7 @@ impl MpiComm {
             return Err(MpiError::StartedTwice);
         }
 
-        // Start, unless the program around us has.
+        // Start MPI, unless the surrounding program has.
         let mut initialized: c_int = 0;
         let check = |mpi: &Mpi, call: &str, code: c_int| match code {
             0 => Ok(()),
@@ -153,8 +153,8 @@ impl MpiComm {
         }
         mpi.started();
 
-        // Communicators of our own, so that no message is mistaken for one of the program around
-        // us.
+        // Separate communicators, so that no message is mistaken for one of the surrounding
+        // program.
         let duplicate = || {
             let mut comm: Handle = 0;
             // SAFETY: every rank of the job makes the same calls in the same order.
@@ -203,18 +203,18 @@ impl MpiComm {
         Ok(comm)
     }
 
-    /// The machine of every rank, numbered in the order of their first ranks. Ranks of which
-    /// neither MPI nor the system says that they share one count as apart. The same on all ranks.
+    /// The machine of every rank, numbered in the order of their first ranks. Ranks count as
+    /// separate unless MPI or the system says that they share a machine. The same on all ranks.
     pub fn nodes(&self) -> &[usize] {
         &self.nodes
     }
 
-    /// Which binary interface the library has.
+    /// The binary interface of the library.
     pub fn abi(&self) -> Abi {
         self.mpi.abi
     }
 
-    /// What the library says of itself, first line.
+    /// The first line of the library's version text.
     pub fn library_version(&self) -> &str {
         self.mpi.version.lines().next().unwrap_or_default()
     }
@@ -230,8 +230,8 @@ impl MpiComm {
     }
 
     /// Ends all processes of the job, this one included, with exit code `code` (`MPI_Abort`). For
-    /// programs, after an error: say what went wrong before. Gives the others a moment to say it as
-    /// well.
+    /// programs after an error: report the error before. Gives the other ranks a moment to report
+    /// it too.
     pub fn end_job(mut self, code: i32) {
         let begin = Instant::now();
         while begin.elapsed() < LATE_MESSAGE_TIMEOUT && self.mpi.abi != Abi::Smpi {
@@ -242,7 +242,7 @@ impl MpiComm {
         unsafe { (self.mpi.functions.abort)(self.mpi.world, code) };
     }
 
-    /// The library, for a rival that is to use the same one.
+    /// The library, for IceT, which has to use the same one.
     pub(crate) fn library(&self) -> Rc<Mpi> {
         Rc::clone(&self.mpi)
     }
@@ -277,14 +277,15 @@ impl MpiComm {
         }
     }
 
-    /// Answers whoever has asked for a sign of life of this rank, as far as it has done anything.
+    /// Answers ranks that have asked for a sign of life, if this rank has made steps since its last
+    /// answer.
     fn answer_heartbeat_requests(&mut self) {
         let heartbeats = self.heartbeats.take_replies();
         self.notices.send_heartbeats(&self.mpi, heartbeats);
     }
 
-    /// To be called while waiting, behind [`process_notices`](Self::process_notices): gives and
-    /// takes signs of life.
+    /// Call this while waiting, after [`process_notices`](Self::process_notices): sends and
+    /// receives signs of life.
     fn update_timeout(&mut self, patience: &mut HeartbeatTimeout, sources: &[usize], now: Instant) {
         if self.mpi.abi == Abi::Smpi {
             return;
@@ -305,7 +306,7 @@ impl MpiComm {
         }
     }
 
-    /// One of `posted` that is complete.
+    /// A complete receive of `posted`.
     fn complete(&mut self, posted: &mut Vec<Receive>) -> Option<Arrival> {
         let position_of = |id| posted.iter().position(|receive| receive.id == id);
         let (position, message) = self.transfers.take(position_of)?;
@@ -332,7 +333,7 @@ impl Communicator for MpiComm {
         self.clock.working_secs(&self.mpi)
     }
 
-    /// Never of simulated ranks, whose messages take simulated time on one machine too.
+    /// Never for simulated ranks, whose messages take simulated time on one machine too.
     fn is_one_node(&self) -> bool {
         self.mpi.abi != Abi::Smpi && self.nodes.iter().all(|&shared| shared == 0)
     }
@@ -351,7 +352,7 @@ impl Communicator for MpiComm {
         let Self { transfers, mpi, clock, .. } = self;
         clock.around(|| {
             transfers.send(mpi, destination, tag, message)?;
-            // Asking costs as much as sending a small message, so not for every one.
+            // Checking costs as much as sending a small message, so not for every one.
             if transfers.outgoing() >= REAP_AT {
                 transfers.reclaim_buffers(mpi);
             }
@@ -406,11 +407,11 @@ impl Communicator for MpiComm {
             }
             let now = Instant::now();
             if patience.is_over(now) {
-                // Whoever gave up first knows better what is wrong.
+                // The rank that gave up first knows better what is wrong.
                 if self.mpi.abi != Abi::Smpi {
                     self.process_notices()?;
                 }
-                // A sign may have come while this rank had no processor.
+                // A sign of life may have arrived while this rank had no processor.
                 if !timeout.is_zero() {
                     let sources: Vec<usize> = posted.iter().map(|receive| receive.source).collect();
                     self.update_timeout(&mut patience, &sources, now);
@@ -421,8 +422,8 @@ impl Communicator for MpiComm {
             }
             polls += 1;
             if self.oversubscribed && polls > YIELDS {
-                // Whoever only yields uses up its share of the processor and is served last when
-                // its message has come.
+                // A rank that only yields uses up its share of the processor and is scheduled last
+                // when its message arrives.
                 std::thread::sleep(POLL_SLEEP);
             } else if self.oversubscribed || polls > SPINS {
                 std::thread::yield_now();
@@ -457,7 +458,7 @@ impl Communicator for MpiComm {
     }
 
     fn throttle_sends(&mut self, tag: u32, most: usize, patience: Duration) {
-        // Where no message travels by itself, waiting for it only holds up the others.
+        // Where no message travels in the background, waiting for it only delays the others.
         if self.is_one_node() {
             return;
         }
@@ -511,8 +512,8 @@ impl Communicator for MpiComm {
         }
     }
 
-    /// Simulated ranks block anyway, so there the library's own all-gather takes the place of ours,
-    /// which has timeouts.
+    /// Simulated ranks block anyway, so they use the library's own all-gather instead of the one
+    /// here, which has timeouts.
     fn all_gather(
         &mut self,
         mine: &[u8],

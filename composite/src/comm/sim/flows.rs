@@ -1,12 +1,12 @@
-//! Messages that share the network interfaces: each has its fair part of both ends, from when it is
-//! sent until it is through.
+//! Messages that share the network interfaces: each has its fair share of both ends, from when it
+//! is sent until its last byte has left.
 //!
-//! Fair is the largest smallest part (max-min): the end where parts are smallest decides for all
-//! messages there, what these leave elsewhere is shared by the others, and so on (D. Bertsekas, R.
-//! Gallager, "Data Networks", 1992, section 6.5.2). It is what adapters do that serve their queues
-//! in turn, and what SimGrid computes. Interfaces that send one message after the other would be
-//! kinder to programs that cut pictures in slices: their first slices would arrive first instead of
-//! all at about the same time.
+//! Fair means max-min: the smallest share is as large as possible. The end where shares are
+//! smallest decides for all messages there, the others share what these leave elsewhere, and so on
+//! (D. Bertsekas, R. Gallager, "Data Networks", 1992, section 6.5.2). Adapters that serve their
+//! queues in turn behave like this, and SimGrid computes it. Interfaces that send one message after
+//! the other would favour programs that cut images into slices: their first slices would arrive
+//! first instead of all at about the same time.
 use std::collections::BTreeMap;
 
 struct Flow {
@@ -16,20 +16,20 @@ struct Flow {
     to: usize,
     /// Seconds it would still take alone, at the time of the last change.
     left_secs: f64,
-    /// Part of an interface that it has.
+    /// Its share of an interface.
     rate: f64,
 }
 
-/// All messages on their way.
+/// All messages in flight.
 pub(super) struct Flows {
     ranks: usize,
-    /// Of the last change: a beginning or an end. Nothing is added up in between, so that times do
-    /// not depend on when somebody looks.
+    /// Time of the last change: a beginning or an end. Nothing is accumulated in between, so that
+    /// times do not depend on when somebody asks.
     since_secs: f64,
     active: Vec<Flow>,
-    /// When those that are through were.
+    /// End times of the messages that have ended.
     through_secs: BTreeMap<u64, f64>,
-    /// Whom those went to that are through since [`take_receivers`](Self::take_receivers).
+    /// Receivers of the messages that have ended since [`take_receivers`](Self::take_receivers).
     reached: Vec<usize>,
     next: u64,
 }
@@ -46,7 +46,7 @@ impl Flows {
         }
     }
 
-    /// Begins a message that would take `secs` alone; what ended before must have been
+    /// Begins a message that would take `secs` alone; messages that ended before must have been
     /// [`end`](Self::end_next)ed. Returns its number.
     pub(super) fn begin(
         &mut self,
@@ -63,8 +63,8 @@ impl Flows {
         number
     }
 
-    /// Ends the messages that are through next, if that is not after `until_secs`; whether there
-    /// are such.
+    /// Ends the messages that end next, if that is not after `until_secs`. Returns whether there
+    /// are any.
     pub(super) fn end_next(&mut self, until_secs: f64) -> bool {
         let ends = |flow: &Flow| self.since_secs + flow.left_secs / flow.rate;
         let Some(next_secs) = self.active.iter().map(ends).min_by(f64::total_cmp) else {
@@ -84,9 +84,9 @@ impl Flows {
         true
     }
 
-    /// Whose messages have another time of arrival than when this was asked last: all that are on
-    /// their way, because a beginning or an end changes what others have, and those that are
-    /// through since.
+    /// Receivers of messages whose time of arrival has changed since the last call: all messages in
+    /// flight, because a beginning or an end changes the shares of the others, and those that have
+    /// ended since.
     pub(super) fn take_receivers(&mut self) -> Vec<usize> {
         let mut receivers = std::mem::take(&mut self.reached);
         receivers.extend(self.active.iter().map(|flow| flow.to));
@@ -95,8 +95,8 @@ impl Flows {
         receivers
     }
 
-    /// How many messages of a sender with this tag are on their way, and when, as far as is known,
-    /// the first of them will be through.
+    /// How many messages of a sender with this tag are in flight, and the end time of the first of
+    /// them, as far as is known.
     pub(super) fn leaving(&self, from: usize, tag: u32) -> (usize, f64) {
         let own = self.active.iter().filter(|flow| (flow.from, flow.tag) == (from, tag));
         own.fold((0, f64::INFINITY), |(count, first), flow| {
@@ -104,7 +104,7 @@ impl Flows {
         })
     }
 
-    /// When a message was or, as far as is known, will be through.
+    /// The end time of a message, as far as is known.
     pub(super) fn end_secs(&self, number: u64) -> f64 {
         if let Some(secs) = self.through_secs.get(&number) {
             return *secs;
@@ -113,7 +113,7 @@ impl Flows {
         flow.map_or(f64::INFINITY, |flow| self.since_secs + flow.left_secs / flow.rate)
     }
 
-    /// Nobody will ask for this one again.
+    /// Forgets a message whose end time will not be needed again.
     pub(super) fn forget(&mut self, number: u64) {
         self.through_secs.remove(&number);
     }
@@ -126,10 +126,11 @@ impl Flows {
         self.since_secs = self.since_secs.max(now_secs);
     }
 
-    /// Gives every message its part.
+    /// Computes the share of every message.
     fn share(&mut self) {
         let ranks = self.ranks;
-        // Ends of senders, then of receivers: what is left of each, and for how many.
+        // Ends of senders, then of receivers: the remaining capacity of each, and for how many
+        // messages.
         let mut left = vec![1.0_f64; 2 * ranks];
         let mut count = vec![0_usize; 2 * ranks];
         for flow in &self.active {
@@ -143,7 +144,7 @@ impl Flows {
             let ends = (0..2 * ranks).filter(|&end| count[end] > 0);
             let smallest = ends.clone().map(part).fold(f64::INFINITY, f64::min);
             tight.fill(false);
-            // Equal but for rounding.
+            // Equal except for rounding.
             ends.for_each(|end| tight[end] = part(end) <= smallest * (1.0 + 1e-12));
             let active = &mut self.active;
             open.retain(|&index| {
@@ -151,7 +152,7 @@ impl Flows {
                 let ends = [flow.from, ranks + flow.to];
                 let is_fixed = ends.iter().any(|&end| tight[end]);
                 if is_fixed {
-                    // Never nothing, whatever rounding has left.
+                    // Never zero, whatever rounding has left.
                     flow.rate = smallest.max(1e-9);
                     for end in ends {
                         left[end] -= smallest;

@@ -1,11 +1,11 @@
-//! A simulated network: ranks as threads of one process whose messages take the time that a model
-//! of a network says.
+//! A simulated network: ranks as threads of one process whose messages take the time that a network
+//! model computes.
 //!
-//! Every rank has a clock. What it computes between two calls advances it by the processor time its
-//! thread took (or by what [`SimComm::compute`] is told), and messages by the LogGP model of
-//! [`Network`]. So one machine with few cores gives the times of many nodes, with nothing
-//! installed. What the model leaves out: contention inside the network, noise of operating systems,
-//! and that a node's caches and memory belong to it alone (here many ranks share them).
+//! Every rank has a clock. Computation between two calls advances it by the processor time of its
+//! thread (or by the argument of [`SimComm::compute`]), and messages advance it by the LogGP model
+//! of [`Network`]. So one machine with few cores gives the times of many nodes, with nothing
+//! installed. The model omits contention inside the network, noise of operating systems, and that a
+//! node's caches and memory belong to it alone (here many ranks share them).
 //!
 //! ```
 //! use composite::comm::sim::{Compute, Network, run};
@@ -34,12 +34,12 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Where the time of computing comes from.
+/// Source of the time of computing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Compute {
     /// Processor time of the rank's thread, times this: 1 for nodes as fast as this machine.
     Measured(f64),
-    /// Only what [`SimComm::compute`] is told: every run has the same times.
+    /// Only the arguments of [`SimComm::compute`]: every run has the same times.
     Given,
 }
 
@@ -127,7 +127,7 @@ impl SimComm {
         self
     }
 
-    /// Adds `secs` of computing to this rank's clock, beside what is measured.
+    /// Adds `secs` of computing to this rank's clock, in addition to the measured time.
     pub fn compute(&mut self, secs: f64) {
         let group = Arc::clone(&self.group);
         let mut schedule = group.lock();
@@ -138,7 +138,7 @@ impl SimComm {
         self.since_secs = cpu_secs();
     }
 
-    /// Computing since the last call, onto the clock.
+    /// Adds the computing time since the last call to the clock.
     fn charge_compute(&mut self, schedule: &mut Schedule) {
         if let Compute::Measured(scale) = self.compute {
             schedule.ranks[self.rank].clock_secs += (cpu_secs() - self.since_secs).max(0.0) * scale;
@@ -163,12 +163,12 @@ impl SimComm {
         }
     }
 
-    /// Ends a call: waits for a core to go on computing.
+    /// Ends a call: waits for a core to continue computing.
     fn until_computing(&mut self, mut schedule: MutexGuard<'_, Schedule>) {
         let group = Arc::clone(&self.group);
         schedule.ranks[self.rank].state = State::Ready;
         group.dispatch(&mut schedule);
-        // After an abort nobody keeps time any more.
+        // After an abort the clocks no longer matter.
         while schedule.aborted.is_none()
             && !matches!(schedule.ranks[self.rank].state, State::Computing)
         {
@@ -257,14 +257,14 @@ impl Communicator for SimComm {
         let (found, mut schedule) = loop {
             schedule.wait(rank, wanted.clone(), deadline_secs);
             schedule = self.until_granted(&group, schedule)?;
-            // ---- What arrived first, of the lowest rank among equals.
+            // ---- The message that arrived first, of the lowest rank among equals.
             let found = wanted.iter().enumerate().filter_map(|(i, w)| {
                 schedule.find(rank, w).map(|(at, arrival)| (i, at, arrival, w.source))
             });
             let found = found.min_by(|a, b| a.2.total_cmp(&b.2).then(a.3.cmp(&b.3)));
             let now_secs = schedule.ranks[rank].clock_secs;
             let found = found.filter(|f| f.2 <= deadline_secs.max(now_secs));
-            // Who is at work may yet send, or whom it lets wait.
+            // A rank that is at work may still send, or the rank that it makes wait.
             let others = schedule.ranks.iter().enumerate().filter(|(other, _)| *other != rank);
             let heartbeat_secs = others.map(|(_, other)| other.heartbeat_secs).fold(0.0, f64::max);
             let later_secs = heartbeat_secs + timeout.as_secs_f64();
@@ -329,7 +329,7 @@ impl Communicator for SimComm {
         let end_secs = schedule.ranks[self.rank].clock_secs + patience.as_secs_f64();
         loop {
             let now_secs = schedule.ranks[self.rank].clock_secs;
-            // First all that others may do before now.
+            // First let others do everything that happens before now.
             schedule.wait(self.rank, Vec::new(), now_secs);
             let Ok(granted) = self.until_granted(&group, schedule) else { return };
             schedule = granted;
@@ -337,7 +337,7 @@ impl Communicator for SimComm {
             if count <= most || now_secs >= end_secs {
                 break;
             }
-            // Others may slow it down meanwhile: then it is looked at again.
+            // Others may slow it down meanwhile: then this is checked again.
             let until_secs = first_secs.max(now_secs).min(end_secs);
             schedule.wait(self.rank, Vec::new(), until_secs);
             let Ok(granted) = self.until_granted(&group, schedule) else { return };

@@ -1,12 +1,12 @@
-//! What a message costs: the LogGP model.
+//! Network parameters: the LogGP model.
 
 /// A network in the parameters of LogGP (Culler et al., "LogP", PPoPP 1993; Alexandrov et al.,
-/// "LogGP", SPAA 1995), with a network interface per rank, whose two directions are shared fairly
-/// by the messages that are under way. Between interfaces the network is perfect: nothing is in the
-/// way of anything else.
+/// "LogGP", SPAA 1995), with one network interface per rank. The messages in flight share both
+/// directions of an interface fairly. Between interfaces the network is perfect, without
+/// contention.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Network {
-    /// For reports.
+    /// Name in reports.
     pub name: &'static str,
     /// o: seconds a processor is busy with sending or receiving a message.
     pub overhead_secs: f64,
@@ -16,14 +16,14 @@ pub struct Network {
     pub gap_secs: f64,
     /// G: seconds per byte.
     pub byte_secs: f64,
-    /// What messages from so many bytes on take instead, longest first: factors of the latency and
-    /// of the seconds per byte.
+    /// Corrections for messages from a number of bytes on, longest first: factors of the latency
+    /// and of the seconds per byte.
     pub corrections: &'static [(usize, f64, f64)],
 }
 
-/// The corrections with which SimGrid 3.32 simulates MPI unless it is told otherwise
-/// (`smpi/lat-factor`, `smpi/bw-factor`): measured on gigabit Ethernet, where TCP and the protocols
-/// of MPI make long messages late. The factors of bytes are the inverse of those of bandwidth.
+/// SimGrid 3.32's default corrections for MPI (`smpi/lat-factor`, `smpi/bw-factor`): measured on
+/// gigabit Ethernet, where TCP and the protocols of MPI delay long messages. The factors of bytes
+/// are the inverse of those of bandwidth.
 const SMPI: &[(usize, f64, f64)] = &[
     (65_472, 11.6436, 1.0 / 0.940_694),
     (15_424, 3.48845, 1.0 / 0.697_866),
@@ -72,7 +72,7 @@ impl Network {
         corrections: &[],
     };
 
-    /// No costs: for what is left when messages are free.
+    /// No costs: measures what remains when messages are free.
     pub const FREE: Network = Network {
         name: "free",
         overhead_secs: 0.0,

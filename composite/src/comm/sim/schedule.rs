@@ -1,8 +1,8 @@
-//! Whose turn it is: what has the lowest virtual time is done first, so that every message finds
-//! the network as it would be then.
+//! The scheduler: what has the lowest virtual time is done first, so that every message finds the
+//! network as it would be at that time.
 //!
-//! Ranks are threads. Between two calls a rank computes, and up to a few ranks do so at once: they
-//! cannot disturb each other. A call takes effect when no other rank can do anything earlier: a
+//! Ranks are threads. Between two calls a rank computes, and a few ranks may do so at once because
+//! they cannot affect each other. A call takes effect when no other rank can do anything earlier; a
 //! computing rank counts with the time at which it began.
 use super::flows::Flows;
 use super::network::Network;
@@ -11,20 +11,20 @@ use std::collections::VecDeque;
 /// When a message arrives.
 #[derive(Clone, Copy)]
 pub(super) enum Delivery {
-    /// It is too short to be in anybody's way.
+    /// At this time: it is too short to delay other messages.
     Until(f64),
     /// With the last byte of this flow, and the latency after it.
     With(u64, f64),
 }
 
-/// A message under way or arrived.
+/// A message that is in flight or has arrived.
 pub(super) struct QueuedMessage {
     pub(super) tag: u32,
     pub(super) delivery: Delivery,
     pub(super) message: Vec<u8>,
 }
 
-/// What a waiting rank would take: the `index`-th message from `source` with `tag`.
+/// What a waiting rank accepts: the `index`-th message from `source` with `tag`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PostedReceive {
     pub(super) source: usize,
@@ -37,11 +37,11 @@ pub(super) struct PostedReceive {
 pub(super) enum State {
     /// Between two calls, on its thread.
     Computing,
-    /// Wants to compute, and waits for a core.
+    /// Waits for a core to compute.
     Ready,
     /// In a call that takes effect at its clock.
     Acting,
-    /// In a call that takes effect when one of these is there, or at the deadline: at
+    /// In a call that takes effect when one of these has arrived, or at the deadline: at
     /// `earliest_secs`, as far as is known.
     Waiting { wanted: Vec<PostedReceive>, deadline_secs: f64, earliest_secs: f64 },
     /// Its call may take effect.
@@ -52,7 +52,7 @@ pub(super) enum State {
 
 pub(super) struct Rank {
     pub(super) clock_secs: f64,
-    /// When it last said that it is at work, or sent anything.
+    /// When it last sent anything or called `alive`.
     pub(super) heartbeat_secs: f64,
     pub(super) state: State,
     /// By sender.
@@ -84,7 +84,7 @@ impl Schedule {
         }
     }
 
-    /// The message a rank wants, if it has been sent.
+    /// The message that a rank waits for, if it has been sent.
     pub(super) fn find(&self, rank: usize, wanted: &PostedReceive) -> Option<(usize, f64)> {
         let mail = self.ranks[rank].mail[wanted.source].iter().enumerate();
         let (at, mail) = mail.filter(|(_, m)| m.tag == wanted.tag).nth(wanted.index)?;
@@ -95,7 +95,7 @@ impl Schedule {
         Some((at, arrival_secs))
     }
 
-    /// Sends `message` when a rank's clock says so: it shares the interfaces from then on.
+    /// Sends `message` at the time of the rank's clock; from then on it shares the interfaces.
     pub(super) fn send(&mut self, from: usize, to: usize, tag: u32, message: Vec<u8>) {
         let now_secs = self.ranks[from].clock_secs;
         let Network { gap_secs, byte_secs, .. } = self.network;
@@ -112,7 +112,7 @@ impl Schedule {
         };
         self.ranks[to].mail[from].push_back(QueuedMessage { tag, delivery, message });
         self.reevaluate(to);
-        // What is under way may have become slower.
+        // Messages in flight may have become slower.
         self.reevaluate_receivers();
     }
 
@@ -125,15 +125,15 @@ impl Schedule {
         mail.message
     }
 
-    /// The share of a message has changed: only for those it goes to does that change anything.
-    /// (When all ranks looked, at 128 ranks that was three quarters of all computing.)
+    /// Updates the receivers of messages whose share has changed; nobody else is affected.
+    /// (Updating all ranks took three quarters of all computing at 128 ranks.)
     fn reevaluate_receivers(&mut self) {
         for rank in self.flows.take_receivers() {
             self.reevaluate(rank);
         }
     }
 
-    /// Whether a wanted message will never come.
+    /// Whether a message that a rank waits for will never arrive.
     pub(super) fn is_lost(&self, rank: usize, wanted: &PostedReceive) -> bool {
         matches!(self.ranks[wanted.source].state, State::Gone) && self.find(rank, wanted).is_none()
     }
@@ -145,8 +145,8 @@ impl Schedule {
         self.reevaluate(rank);
     }
 
-    /// To be called when something has changed for a rank that may wait: a message was sent to it,
-    /// or another rank has gone.
+    /// Call this when something has changed for a rank that may wait: a message was sent to it, or
+    /// another rank has left.
     pub(super) fn reevaluate(&mut self, rank: usize) {
         let r = &self.ranks[rank];
         let State::Waiting { wanted, deadline_secs, .. } = &r.state else { return };
@@ -161,7 +161,7 @@ impl Schedule {
         }
     }
 
-    /// The earliest time at which a rank can do something that others notice.
+    /// The earliest time at which a rank can do something that affects others.
     fn earliest_secs(&self, rank: usize) -> f64 {
         match &self.ranks[rank].state {
             State::Gone => f64::INFINITY,
@@ -170,7 +170,7 @@ impl Schedule {
         }
     }
 
-    /// Lets go on who may; `wake` is called for each of them.
+    /// Lets ranks continue that may; calls `wake` for each of them.
     pub(super) fn dispatch(&mut self, mut wake: impl FnMut(usize)) {
         let computing = self.ranks.iter().filter(|r| matches!(r.state, State::Computing)).count();
         let mut free = self.cores.saturating_sub(computing);
@@ -187,8 +187,8 @@ impl Schedule {
         let next = loop {
             let times = (0..self.ranks.len()).map(|r| (self.earliest_secs(r), r));
             let next = times.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            // A message that is through leaves its part to others, which then arrive earlier than
-            // was known.
+            // A message that ends leaves its share to others, which then arrive earlier than was
+            // known.
             let until_secs = next.map_or(0.0, |next| next.0);
             if !until_secs.is_finite() || !self.flows.end_next(until_secs) {
                 break next;
@@ -199,7 +199,7 @@ impl Schedule {
             && matches!(self.ranks[rank].state, State::Acting | State::Waiting { .. })
         {
             wake(rank);
-            // A waiting rank keeps what it wants in its call.
+            // The call of a waiting rank keeps its own list of receives.
             self.ranks[rank].state = State::Granted;
         }
     }
@@ -240,9 +240,10 @@ mod tests {
             now_secs += random(1000) as f64 * 1e-9;
             let (from, to) = (random(RANKS), random(RANKS));
             schedule.ranks[from].clock_secs = now_secs;
-            // Whoever really sends does not wait. A rank that waits here has another clock now.
+            // A sender is not waiting. A rank that waits here has another clock now.
             schedule.reevaluate(from);
-            // Some too short to share an interface, some long enough to meet many others there.
+            // Some are too short to share an interface, some long enough to overlap many others
+            // there.
             let message = vec![0; [8, 4096, 65_536][random(3)]];
             schedule.send(from, to, 3, message);
             let [known, found] = known_and_found(&mut schedule);

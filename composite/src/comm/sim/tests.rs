@@ -176,7 +176,7 @@ fn a_slow_modelled_rank_that_gives_signs_of_life_is_waited_for_beyond_the_timeou
         }
     });
     assert!(results.into_iter().all(|result| result == Ok(Ok(()))));
-    // Without a sign it is missed.
+    // Without a sign of life it times out.
     let results = run(2, Network::QDR_AS_SMPI, Compute::Given, |mut comm| match comm.rank() {
         0 => comm.recv(1, 1, 8, patience).map(|_| ()),
         _ => {
