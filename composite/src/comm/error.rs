@@ -64,7 +64,7 @@ pub enum CommError {
     /// A rank number that the group does not have.
     #[error("there is no rank {peer} in a group of {size}")]
     NoSuchRank {
-        /// The number.
+        /// The rank number.
         peer: usize,
         /// Size of the group.
         size: usize,

@@ -19,8 +19,8 @@ use std::sync::atomic::Ordering;
 /// Most chunks of an owner's tiles; all ranks process them one after the other. With more chunks,
 /// less is left to send at the end, but in more messages.
 const CHUNKS: usize = 4;
-/// Tiles of a chunk at least: with fewer, messages and looking for them cost more than travelling
-/// while others trace gains (measured with 100 tiles and 128 ranks).
+/// Least tiles of a chunk: with fewer, sending and polling messages costs more than the overlap
+/// with tracing gains (measured with 100 tiles and 128 ranks).
 const CHUNK_TILES: usize = 8;
 /// Tiles traced between two polls for messages.
 const TILES_PER_LOOK: usize = 4;

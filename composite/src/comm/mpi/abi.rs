@@ -1,10 +1,10 @@
-//! What differs between MPI implementations below the level of C source: handles, sizes and magic
+//! Differences between MPI implementations below the level of C source: handles, sizes and magic
 //! numbers.
 //!
-//! The standard fixes names and arguments, not the binary interface. Open MPI's and SMPI's handles
-//! are pointers, MPICH's are `int`s. A `usize` argument carries both: on x86-64 and aarch64 the
-//! callee reads the register's lower half where it wants an `int`. Read from the installed headers
-//! (`mpi.h`, `smpi.h`) of the versions named in [`Abi::of_version`].
+//! The standard fixes names and arguments, not the binary interface. Handles of Open MPI and SMPI
+//! are pointers, those of MPICH are `int`s. A `usize` argument carries both: on x86-64 and aarch64
+//! the callee reads the register's lower half where it expects an `int`. The numbers are from the
+//! installed headers (`mpi.h`, `smpi.h`) of the versions named in [`Abi::of_version`].
 use super::MpiError;
 
 /// A binary interface.
@@ -18,7 +18,7 @@ pub enum Abi {
     Smpi,
 }
 
-/// Numbers of one ABI that are not symbols.
+/// Constants of one ABI that are not symbols.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Constants {
     /// Bytes of a request in an array of requests.
@@ -27,7 +27,7 @@ pub(super) struct Constants {
     pub(super) status_ignore: usize,
     /// `MPI_ANY_SOURCE`.
     pub(super) any_source: i32,
-    /// Where `MPI_SOURCE` is in a status, in bytes.
+    /// Offset of `MPI_SOURCE` in a status, in bytes.
     pub(super) status_source: usize,
     /// `MPI_IN_PLACE`.
     pub(super) in_place: usize,
@@ -36,7 +36,7 @@ pub(super) struct Constants {
 }
 
 impl Abi {
-    /// Name as in messages.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::OpenMpi => "Open MPI",
@@ -45,8 +45,8 @@ impl Abi {
         }
     }
 
-    /// The ABI of the library that calls itself `version` (`MPI_Get_library_version`). What is not
-    /// known by name is refused: calls with handles of the wrong kind would not fail but go astray.
+    /// The ABI of the library with the version text `version` (`MPI_Get_library_version`). Unknown
+    /// libraries are refused: calls with handles of the wrong kind would not fail but misbehave.
     ///
     /// # Errors
     /// [`MpiError::UnknownAbi`] with the library's name.

@@ -1,12 +1,12 @@
-//! What time it is for a rank.
+//! The clock of a rank.
 //!
-//! Under SMPI every look at the simulated clock hands the processor to other simulated ranks, whose
-//! work empties the caches: a program that measures itself would be slowed by that alone. There the
-//! clock is read where a call has waited, and from then on the time that passes here counts, which
-//! is about what SMPI itself will add (it adds processor time, but to ask for that takes most of a
-//! microsecond, which would be added too). Calls that do not wait take no simulated time, but may
-//! hand over: what happened meanwhile is taken out. So right behind a wait or barrier the time is
-//! exact, and spans within a frame are as good as the machine is quiet.
+//! Under SMPI every reading of the simulated clock yields the processor to other simulated ranks,
+//! whose work evicts the caches: measuring alone would slow a program down. So the simulated clock
+//! is read only after a call that has waited. From then on the time that passes here counts, which
+//! is about what SMPI itself will add (it adds processor time, but reading that takes most of a
+//! microsecond, which would be added too). Calls that do not wait take no simulated time but may
+//! yield, so the time inside them is subtracted. Right after a wait or barrier the time is
+//! therefore exact, and spans within a frame are as accurate as the machine is quiet.
 use super::abi::Abi;
 use super::library::Mpi;
 use std::cell::Cell;
@@ -53,7 +53,7 @@ impl Clock {
         simulated + (self.own_secs() - own)
     }
 
-    /// As [`now`](Self::now), for spans in which nothing is waited for.
+    /// Like [`now`](Self::now), for spans in which nothing is waited for.
     pub(super) fn working_secs(&self, mpi: &Mpi) -> f64 {
         if self.simulated { self.own_secs() } else { library_secs(mpi) }
     }
@@ -62,7 +62,7 @@ impl Clock {
         self.here_secs() - self.inside.get()
     }
 
-    /// Makes a call of the library that does not wait.
+    /// Wraps a call of the library that does not wait.
     pub(super) fn around<T>(&self, call: impl FnOnce() -> T) -> T {
         if !self.simulated {
             return call();
@@ -73,7 +73,7 @@ impl Clock {
         result
     }
 
-    /// To be called after every call of the library that may have waited.
+    /// Call this after every call of the library that may have waited.
     pub(super) fn waited(&self) {
         self.anchor.set(None);
     }

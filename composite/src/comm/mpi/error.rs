@@ -1,4 +1,4 @@
-//! Why there is no MPI to talk over.
+//! Errors of starting MPI.
 
 /// Why MPI could not be started.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
@@ -16,26 +16,26 @@ pub enum MpiError {
          or name the library in COMPOSITE_MPI"
     )]
     NoLibrary {
-        /// Why these libraries were looked for.
+        /// Why these libraries were tried.
         reason: String,
-        /// The loader's words about each.
+        /// The loader's error text for each.
         tried: String,
     },
     /// The library lacks a function.
     #[error("{library} has no function {symbol}: it is no MPI library, or an old one")]
     MissingSymbol {
-        /// Which library.
+        /// The library.
         library: String,
-        /// Which function.
+        /// The function.
         symbol: String,
     },
-    /// The library's binary interface is not known.
+    /// The library's binary interface is unknown.
     #[error(
         "the MPI library calls itself `{version}`, whose binary interface is not known here: \
          use Open MPI 4 or 5, MPICH 3 or 4 (or a library with MPICH's ABI), or SimGrid's SMPI 3"
     )]
     UnknownAbi {
-        /// First line of what the library says of itself.
+        /// First line of the library's version text.
         version: String,
     },
     /// A second communicator for all ranks of the job.
@@ -44,9 +44,9 @@ pub enum MpiError {
     /// A call failed while starting.
     #[error("{call} failed while starting MPI: {reason}")]
     Call {
-        /// Which call.
+        /// The call.
         call: String,
-        /// The library's words.
+        /// The error text of the library.
         reason: String,
     },
 }

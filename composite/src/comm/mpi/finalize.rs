@@ -1,4 +1,4 @@
-//! The end of a rank: what was sent arrives, the others learn that it leaves, and MPI is finalized.
+//! The end of a rank: its messages arrive, the others learn that it leaves, and MPI is finalized.
 
 use super::{Abi, Communicator, DRAIN_TIMEOUT, MpiComm};
 use std::time::{Duration, Instant};
@@ -17,7 +17,7 @@ impl Drop for MpiComm {
             return;
         }
 
-        // What was sent shall arrive before the news that this rank has left.
+        // Messages must arrive before the notice that this rank has left.
         let begin = Instant::now();
         self.transfers.reclaim_buffers(&self.mpi);
         while self.transfers.outgoing() > 0
@@ -35,8 +35,8 @@ impl Drop for MpiComm {
             std::thread::yield_now();
         }
 
-        // MPI_Finalize waits for all ranks, as every MPI program does at its end; after a fault
-        // there is no such end, and whoever still works may yet report one.
+        // MPI_Finalize waits for all ranks, as at the end of every MPI program. After a fault not
+        // all ranks reach it, and a rank that is still working may yet report one.
         if self.finalize && self.aborted.is_none() {
             while self.others().any(|other| !self.left[other]) {
                 if self.process_notices().is_err() {

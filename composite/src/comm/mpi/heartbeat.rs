@@ -1,35 +1,36 @@
-//! Signs of life: whoever waits long for a rank asks whether it is at work, and counts its timeout
-//! from the last answer.
+//! Signs of life: a rank that waits long for another asks whether it is at work, and counts its
+//! timeout from the last answer.
 //!
-//! A rank counts its steps: messages it sent, messages it got, and calls of
-//! [`alive`](crate::Communicator::alive). Asked, it tells its count if it has grown since it last
-//! told that rank. A rank that itself waits makes no steps, but hands on what it hears from those
-//! it waits for; each count of each rank counts once, so two ranks that wait for each other do not
-//! keep each other alive. Nothing is sent unless somebody waits for a quarter of its timeout.
+//! A rank counts its steps: messages it sent, messages it received, and calls of
+//! [`alive`](crate::Communicator::alive). When asked, it answers with its count if that has grown
+//! since its last answer to the same rank. A rank that itself waits makes no steps, but forwards
+//! the signs of those it waits for. Each count of each rank counts once, so two ranks that wait for
+//! each other do not keep each other alive. Nothing is sent until a rank has waited for a quarter
+//! of its timeout.
 use std::time::{Duration, Instant};
 
-/// Asks in a timeout.
+/// Requests per timeout.
 const REQUESTS_PER_TIMEOUT: u32 = 4;
 
-/// The steps of a rank, as far as is known.
+/// The steps of a rank, as far as known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Heartbeat {
-    /// Whose steps.
+    /// The rank that made the steps.
     pub(super) origin: usize,
     pub(super) steps: u64,
 }
 
-/// What is known of signs on this rank.
+/// What this rank knows of signs of life.
 pub(super) struct Heartbeats {
     rank: usize,
     steps: u64,
-    /// Of each rank the most steps it is known to have made; new ones are signs of life.
+    /// By rank, the most steps it is known to have made; new ones are signs of life.
     newest: Vec<u64>,
-    /// Ranks that want a sign of this one.
+    /// Ranks that have requested a sign of this one.
     requesters: Vec<usize>,
-    /// Own steps that each rank has been told of.
+    /// By rank, the own steps that have been reported to it.
     reported_steps: Vec<u64>,
-    /// Signs that have come, with the rank that gave them.
+    /// Signs that have arrived, with their sender.
     unread: Vec<(usize, Heartbeat)>,
 }
 
@@ -45,7 +46,7 @@ impl Heartbeats {
         }
     }
 
-    /// This rank has done something.
+    /// Counts a step of this rank.
     pub(super) fn step(&mut self) {
         self.steps += 1;
     }
@@ -62,7 +63,7 @@ impl Heartbeats {
         }
     }
 
-    /// Signs of this rank's own steps, for those who asked and do not know of them.
+    /// Signs of this rank's own steps, for requesters that do not know of them.
     pub(super) fn take_replies(&mut self) -> Vec<(usize, Heartbeat)> {
         let heartbeat = Heartbeat { origin: self.rank, steps: self.steps };
         let reported_steps = &mut self.reported_steps;
@@ -78,8 +79,8 @@ impl Heartbeats {
         out
     }
 
-    /// Of what has come, whether anything is a new sign of one of those waited for; and those
-    /// signs, for the ranks that wait for this one.
+    /// Checks the signs that have arrived. Returns whether any is a new sign of a rank that is
+    /// waited for, and those signs, to be forwarded to the ranks that wait for this one.
     pub(super) fn take_new(
         &mut self,
         waited_for: impl Fn(usize) -> bool,
@@ -106,10 +107,10 @@ impl Heartbeats {
     }
 }
 
-/// How long a rank goes on waiting.
+/// The timeout of a wait.
 pub(super) struct HeartbeatTimeout {
     timeout: Duration,
-    /// When the wait began or a sign of life came.
+    /// When the wait began or the last sign of life arrived.
     since: Instant,
     asked: Instant,
 }
@@ -123,7 +124,7 @@ impl HeartbeatTimeout {
         now.duration_since(self.since) >= self.timeout
     }
 
-    /// Whether those waited for are to be asked now.
+    /// Whether the ranks that are waited for are to be asked now.
     pub(super) fn is_request_due(&mut self, now: Instant) -> bool {
         let asks = now.duration_since(self.asked) >= self.timeout / REQUESTS_PER_TIMEOUT;
         if asks {
@@ -158,7 +159,7 @@ mod tests {
 
     #[test]
     fn who_waits_hands_on_each_sign_once_so_that_a_ring_of_waiting_ranks_falls_silent() {
-        // Rank 0 waits for 1, which waits for 2 and 0; 2 is at work, and then no more.
+        // Rank 0 waits for 1, which waits for 2 and 0; 2 is at work, and then no longer.
         let mut heartbeats = [Heartbeats::new(0, 3), Heartbeats::new(1, 3), Heartbeats::new(2, 3)];
         heartbeats[2].step();
         heartbeats[2].requested_by(1);

@@ -1,16 +1,16 @@
-//! Which MPI a process belongs to: the one whose launcher started it.
+//! Which MPI library a process uses: that of the launcher that started it.
 use super::MpiError;
 use std::ffi::OsString;
 
-/// Names this variable may have, or the path of a library.
+/// The variable that selects the library, by name or path.
 pub const CHOICE_VARIABLE: &str = "COMPOSITE_MPI";
 
-/// Libraries to look for, in this order.
+/// Libraries to try, in this order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Choice {
     /// File names, as for `dlopen`.
     pub libraries: Vec<String>,
-    /// Why these.
+    /// Why these were chosen.
     pub reason: String,
 }
 
@@ -19,9 +19,9 @@ pub const OPEN_MPI: &[&str] = &["libmpi.so.40", "libmpi.so"];
 /// File names of MPICH's library; Intel MPI and MVAPICH use the second.
 pub const MPICH: &[&str] = &["libmpich.so.12", "libmpi.so.12", "libmpich.so"];
 
-/// A variable of this process. One that is not UTF-8 is set too, and a library whose name is not is
-/// named as well as it can be by the error that says it was not found: as if it were not set,
-/// another library would be taken without a word.
+/// An environment variable. If its value is not UTF-8, it is converted with replacement characters,
+/// and the error for the missing library names it. If it were treated as unset, another library
+/// would be loaded silently.
 pub fn variable(name: &str) -> Option<String> {
     std::env::var_os(name).map(text)
 }
@@ -66,8 +66,8 @@ pub fn choose(variable: impl Fn(&str) -> Option<String>) -> Result<Choice, MpiEr
     Err(MpiError::NotLaunched)
 }
 
-/// Processors of this machine. What the standard library says is less where the launcher has bound
-/// each rank to its own.
+/// Number of processors of this machine. The standard library reports fewer where the launcher has
+/// bound each rank to its own.
 pub(super) fn processors_here() -> usize {
     let online = std::fs::read_to_string("/sys/devices/system/cpu/online").unwrap_or_default();
     count_ranges(online.trim())

@@ -1,4 +1,4 @@
-//! An MPI library found at run time: its functions, with one set of signatures for all ABIs.
+//! An MPI library loaded at run time: its functions, with one set of signatures for all ABIs.
 use super::MpiError;
 use super::abi::{Abi, Constants};
 use super::launcher::{self, Choice};
@@ -83,7 +83,7 @@ pub(crate) struct Mpi {
     pub(crate) functions: Functions,
     pub(crate) abi: Abi,
     pub(super) constants: Constants,
-    /// What the library says of itself.
+    /// The library's version text.
     pub(crate) version: String,
     /// `MPI_COMM_WORLD`.
     pub(crate) world: Handle,
@@ -102,7 +102,7 @@ pub(crate) struct Mpi {
 }
 
 impl Mpi {
-    /// The MPI that is already in the process (linked, or SMPI around it), else that of the
+    /// The MPI that is already in the process (linked, or SMPI around it), otherwise that of the
     /// launcher.
     pub(super) fn load() -> Result<Self, MpiError> {
         let this = Library::this();
@@ -170,7 +170,7 @@ impl Mpi {
         })
     }
 
-    /// To be called once, after MPI was started: SMPI's world is a variable that is set then.
+    /// Call this once, after MPI was started: SMPI sets the variable of its world then.
     pub(super) fn started(&mut self) {
         if self.abi == Abi::Smpi {
             // SAFETY: the address of SMPI's variable of type MPI_Comm, a pointer, which lives as
@@ -179,7 +179,7 @@ impl Mpi {
         }
     }
 
-    /// The library's words for an error code.
+    /// The library's text for an error code.
     pub(crate) fn error_text(&self, code: c_int) -> String {
         let mut text = vec![0_u8; 8192];
         let mut length = 0;
@@ -197,7 +197,7 @@ impl Mpi {
         self.constants.in_place as *const c_void
     }
 
-    /// Waits for one of `requests` and says which; `None` if all are null.
+    /// Waits for one of `requests` and returns its index; `None` if all are null.
     pub(crate) fn wait_any_of(&self, requests: &[Handle]) -> Option<usize> {
         let mut index: c_int = -1;
         let count = requests.len() as c_int;
@@ -215,7 +215,7 @@ impl Mpi {
         usize::try_from(index).ok().filter(|&index| index < requests.len())
     }
 
-    /// The status argument where nobody looks at it.
+    /// The status argument of calls whose status is not used.
     pub(crate) fn status_ignore(&self) -> *mut Status {
         self.constants.status_ignore as *mut Status
     }
@@ -249,7 +249,7 @@ fn open_first(choice: &Choice, flags: c_int) -> Result<(Library, String), MpiErr
     Err(MpiError::NoLibrary { reason: choice.reason.clone(), tried: tried.join("; ") })
 }
 
-/// What the first library of `names` that can be loaded says of itself, with its ABI if that is
+/// The name and version text of the first library of `names` that can be loaded, and its ABI if
 /// known. For `composite doctor`: nothing is started.
 ///
 /// # Errors

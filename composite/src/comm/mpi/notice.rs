@@ -1,5 +1,5 @@
-//! News about the group itself: a rank gives up, has left, asks for a sign of life or gives one.
-//! They go beside the messages, on a communicator of their own, and are looked for while waiting.
+//! Notices about the group itself: a rank gives up, has left, requests a sign of life or gives one.
+//! They use a communicator of their own, and waiting ranks poll for them.
 use super::heartbeat::Heartbeat;
 use super::library::{Handle, Mpi, Status};
 use std::ffi::c_int;
@@ -9,10 +9,10 @@ const LEFT: u8 = 0;
 const ABORTED: u8 = 1;
 const HEARTBEAT_REQUEST: u8 = 2;
 const HEARTBEAT: u8 = 3;
-/// Longer reasons are cut; a notice must be small enough to travel without its receiver's help.
+/// Longer reasons are cut; a notice must be small enough to arrive without its receiver's help.
 const LONGEST: usize = 2000;
 
-/// What was heard.
+/// A received notice.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Notice {
     Left {
@@ -22,11 +22,11 @@ pub(super) enum Notice {
         by: usize,
         reason: String,
     },
-    /// It wants a sign of life.
+    /// The rank requests a sign of life.
     HeartbeatRequest {
         rank: usize,
     },
-    /// It, or one it waits for, has made so many steps.
+    /// The rank, or one it waits for, has made a number of steps.
     Heartbeat {
         rank: usize,
         heartbeat: Heartbeat,
@@ -92,14 +92,14 @@ impl Notices {
                     &raw mut request,
                 )
             };
-            // Whether a notice could be sent changes nothing: its receivers have their timeouts.
+            // A failure to send a notice changes nothing: its receivers have their timeouts.
             if code == 0 {
                 self.sent.push((request, message));
             }
         }
     }
 
-    /// Whether all notices have left.
+    /// Whether all notices have been sent.
     pub(super) fn delivered(&mut self, mpi: &Mpi) -> bool {
         self.sent.retain_mut(|(request, _)| {
             let mut flag: c_int = 0;
@@ -112,7 +112,7 @@ impl Notices {
         self.sent.is_empty()
     }
 
-    /// The next notice that has come.
+    /// The next notice that has arrived.
     pub(super) fn receive(&mut self, mpi: &Mpi) -> Option<Notice> {
         let mut status: Status = [0; 8];
         let mut flag: c_int = 0;

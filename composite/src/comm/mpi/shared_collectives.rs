@@ -1,4 +1,4 @@
-//! Ranks of one machine in the memory that they share: how it is made, and their meetings in it.
+//! Barriers and all-gathers of the ranks of one machine in their shared memory, and its set-up.
 
 use super::heartbeat::HeartbeatTimeout;
 use super::{
@@ -8,14 +8,13 @@ use super::{
 use std::time::{Duration, Instant};
 
 impl MpiComm {
-    /// For tests: has this rank wait so long behind each meeting in shared memory, as one does to
-    /// whom the system gives no processor.
+    /// For tests: makes this rank wait this long after each collective call in shared memory, like
+    /// a rank that the system gives no processor.
     pub fn delay_after_collectives(&mut self, behind_meetings: Duration) {
         self.delay_after_collectives = behind_meetings;
     }
 
-    /// Makes what the ranks of one machine share, if they are all of one machine and all of them
-    /// can.
+    /// Sets up the shared memory, if all ranks are on one machine and all of them can map it.
     pub(super) fn share_memory(&mut self) -> Result<(), CommError> {
         if self.size < 2 || !self.is_one_node() {
             return Ok(());
@@ -42,7 +41,7 @@ impl MpiComm {
         Ok(())
     }
 
-    /// A barrier of ranks that share memory, or an all-gather of strings, which it gives.
+    /// A barrier of ranks that share memory, or an all-gather of strings, which it returns.
     pub(super) fn collective_in_memory(
         &mut self,
         string: Option<&[u8]>,
@@ -79,7 +78,7 @@ impl MpiComm {
         let mut patience = HeartbeatTimeout::new(timeout, begin);
         let mut received = begin;
         loop {
-            // What was sent before may need this rank's help to arrive.
+            // Messages sent before may need this rank's help to arrive.
             let helps = self.transfers.outgoing() > 0;
             shared.sleep(if helps { POLL_SLEEP } else { NOTICE_INTERVAL });
             if shared.passed() {
@@ -100,7 +99,7 @@ impl MpiComm {
             }
             if patience.is_over(now) {
                 self.process_notices()?;
-                // A sign may have come while this rank had no processor.
+                // A sign of life may have arrived while this rank had no processor.
                 let missing: Vec<usize> = shared.missing().collect();
                 self.update_timeout(&mut patience, &missing, now);
                 if !patience.is_over(now) {

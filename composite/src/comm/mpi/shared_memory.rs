@@ -1,12 +1,12 @@
-//! Memory that the processes of one machine share: a small table in which ranks meet without
-//! messages, and a room for each rank's pixels.
+//! Memory that the processes of one machine share: a small table for collective calls without
+//! messages, and a segment for each rank's pixels.
 //!
-//! Each piece is a file without a name (`memfd_create`), opened by the others through the process
-//! that made it, so nothing is left behind whatever happens to a process. Ranks wait on a word of
-//! the table (`futex`): they sleep until they are woken, which matters where ranks share
-//! processors. There, whoever polls for messages takes the processor from those it waits for, and
-//! Linux (6.18) moves a process that yields behind all others, so that it is served last when its
-//! message has come.
+//! The table and each segment are files without a name (`memfd_create`). Other ranks open them
+//! through the process that made them, so nothing is left behind whatever happens to a process.
+//! Ranks wait on a word of the table (`futex`) and sleep until they are woken, which matters where
+//! ranks share processors. There, a rank that polls for messages takes the processor from those it
+//! waits for, and Linux (6.18) moves a process that yields behind all others, so that it is
+//! scheduled last when its message has arrived.
 use crate::comm::{CommError, SharedSegments};
 use rustix::fs::{FallocateFlags, MemfdFlags, fallocate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
@@ -17,12 +17,12 @@ use std::os::fd::AsRawFd as _;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-/// Words of 32 bits for a rank's entry: one line of the cache.
+/// Words of 32 bits in a rank's entry: one cache line.
 const ENTRY: usize = 16;
-/// Words of what a rank says at a meeting ([`SharedMemory::slot`]): the meeting's number, what it
-/// came for, and 248 bytes.
+/// Words of a rank's contribution to a collective call ([`SharedMemory::slot`]): the number of the
+/// call, its kind or length, and 248 bytes.
 const STRING: usize = 64;
-/// What stands in place of a length where a rank came to a barrier.
+/// Value of the length in a barrier.
 const BARRIER: u32 = u32::MAX;
 /// Longest string that the table holds.
 pub(super) const LONGEST: usize = 4 * (STRING - 2);
@@ -39,11 +39,11 @@ const FILE: usize = 2;
 const GENERATION: usize = 3;
 const KIB: usize = 4;
 const REFUSED: usize = 5;
-/// Behind which meeting its room was written last.
+/// The collective call after which its segment was last written.
 const PUBLISHED: usize = 6;
 
-/// Where the table is: process and file of rank 0, and what stands in it, so that the process of
-/// that number in another container is not taken for it.
+/// Where the table is: process and file of rank 0, and a nonce in the table, so that a process with
+/// the same number in another container is not mistaken for it.
 pub(super) type Address = [u32; 3];
 
 struct Mapping {
@@ -52,7 +52,8 @@ struct Mapping {
 }
 
 impl Mapping {
-    /// All of a file, which must be that long. `fill` has its pages made at once.
+    /// Maps a whole file, which must have at least this length. With `fill` its pages are allocated
+    /// at once.
     fn of(file: &File, bytes: usize, fill: bool) -> std::io::Result<Self> {
         if file.metadata()?.len() < bytes as u64 {
             return Err(std::io::ErrorKind::UnexpectedEof.into());
@@ -110,7 +111,7 @@ impl Drop for Mapping {
 
 fn nameless_file(bytes: usize) -> std::io::Result<File> {
     let file = File::from(memfd_create("composite", MemfdFlags::CLOEXEC)?);
-    // Reserved, so that memory that is not there is an error here and not a fault later.
+    // Reserved, so that missing memory is an error here and not a fault later.
     fallocate(&file, FallocateFlags::empty(), 0, bytes as u64)?;
     Ok(file)
 }
@@ -123,13 +124,13 @@ fn is_alive(process: u32) -> bool {
     std::path::Path::new("/proc").join(process.to_string()).exists()
 }
 
-/// A rank's room, as it is mapped here.
+/// A rank's segment as mapped in this process.
 struct Segment {
     generation: u32,
     mapping: Mapping,
 }
 
-/// See the module.
+/// The table and the segments of all ranks; see the module page.
 pub(super) struct SharedMemory {
     rank: usize,
     size: usize,
@@ -138,9 +139,9 @@ pub(super) struct SharedMemory {
     own_file: Option<File>,
     _table_file: Option<File>,
     segments: Vec<Option<Segment>>,
-    /// How often this rank has come to a meeting: to a barrier or an all-gather.
+    /// How many collective calls (barriers or all-gathers) this rank has entered.
     arrivals: Cell<u32>,
-    /// Behind which meeting it has laid its pixels down.
+    /// The collective call after which it last published its pixels.
     published: Cell<u32>,
 }
 
@@ -149,7 +150,7 @@ fn table_bytes(size: usize) -> usize {
 }
 
 impl SharedMemory {
-    /// The table that this rank makes for all, and where it is.
+    /// The table that this rank makes for all, and its address.
     pub(super) fn make(size: usize) -> std::io::Result<(Self, Address)> {
         let file = nameless_file(table_bytes(size))?;
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
@@ -188,12 +189,12 @@ impl SharedMemory {
         self.table.word(ENTRY * (rank + 1) + word)
     }
 
-    /// Says that this rank has come to the next meeting, to a barrier or (with a string) to an
-    /// all-gather; wakes all if it is the last one.
+    /// Enters the next collective call: a barrier, or (with a string) an all-gather. Wakes all
+    /// ranks if this is the last one.
     ///
-    /// The string can be read behind the meeting. There are two sets of them, and a rank is at most
-    /// one meeting ahead of another, so nobody writes what another still reads: a rank that runs
-    /// ahead is not mistaken for one that came for the same reason.
+    /// The string can be read after the call is complete. There are two sets of strings, and a rank
+    /// is at most one call ahead of another, so no rank overwrites what another still reads, and a
+    /// rank that is ahead is not mistaken for one in the current call.
     pub(super) fn arrive(&self, string: Option<&[u8]>) {
         let number = self.arrivals.get().wrapping_add(1);
         self.arrivals.set(number);
@@ -214,12 +215,12 @@ impl SharedMemory {
         }
     }
 
-    /// Whether all have come to the meeting at which this rank is.
+    /// Whether all ranks have entered the call that this rank is in.
     pub(super) fn passed(&self) -> bool {
         self.table.word(EPOCH).load(Ordering::Acquire) == self.arrivals.get()
     }
 
-    /// Sleeps until all have come or the time has passed, or for no reason.
+    /// Sleeps until all ranks have arrived or the time has passed; may also wake spuriously.
     pub(super) fn sleep(&self, most: Duration) {
         let before = self.arrivals.get().wrapping_sub(1);
         let most = futex::Timespec {
@@ -229,17 +230,17 @@ impl SharedMemory {
         let _ = futex::wait(self.table.word(EPOCH), futex::Flags::empty(), before, Some(&most));
     }
 
-    /// Ranks that have not come.
+    /// Ranks that have not arrived.
     pub(super) fn missing(&self) -> impl Iterator<Item = usize> {
         let here = self.arrivals.get();
         (0..self.size)
             .filter(move |&rank| self.entry(rank, ARRIVALS).load(Ordering::Acquire) != here)
     }
 
-    /// What all have said at the meeting that has passed; nothing if it was a barrier.
+    /// The strings of all ranks in the completed call; empty for a barrier.
     ///
     /// # Errors
-    /// [`CommError::OutOfStep`] if some came to a barrier and others to an all-gather.
+    /// [`CommError::OutOfStep`] if some ranks called a barrier and others an all-gather.
     pub(super) fn gathered(&self) -> Result<Vec<Vec<u8>>, CommError> {
         let length = |rank| self.table.word(self.slot(rank) + 1).load(Ordering::Relaxed);
         let (waiting, gathering): (Vec<usize>, Vec<usize>) =
@@ -262,18 +263,18 @@ impl SharedMemory {
         Ok(strings.collect())
     }
 
-    /// First word of what `rank` says at the meeting at which this rank is.
+    /// First word of the contribution of `rank` to the call that this rank is in.
     fn slot(&self, rank: usize) -> usize {
         let set = self.arrivals.get() as usize % 2;
         ENTRY * (self.size + 1) + STRING * (set * self.size + rank)
     }
 
-    /// A room of at least so many bytes for this rank.
+    /// Makes a segment of at least `bytes` for this rank.
     fn make_segment(&mut self, bytes: usize) -> std::io::Result<()> {
         if self.segments[self.rank].as_ref().is_some_and(|segment| segment.mapping.bytes >= bytes) {
             return Ok(());
         }
-        // A little more than needed: frames are alike but not equal.
+        // A little more than needed: frames are similar but not equal.
         let bytes = (bytes + bytes / 4).next_multiple_of(1 << 16);
         let file = nameless_file(bytes)?;
         let mapping = Mapping::of(&file, bytes, true)?;
@@ -299,12 +300,13 @@ impl SharedSegments for SharedMemory {
         self.published.set(self.arrivals.get());
         self.entry(self.rank, PUBLISHED).store(self.arrivals.get(), Ordering::Relaxed);
         if self.rank == 0 {
-            // Whoever took bands of the last frame has come to a barrier since, and nobody takes
-            // one before the next.
+            // Ranks that took bands of the last frame have reached a barrier since, and no rank
+            // takes one before the next.
             self.table.word(NEXT_BAND).store(0, Ordering::Relaxed);
         }
         if let (Ok(()), Some(segment)) = (made, &self.segments[self.rank]) {
-            // SAFETY: between the meeting of a frame and its barrier only its owner uses a room.
+            // SAFETY: between the all-gather of a frame and its barrier only its owner uses a
+            // segment.
             fill(unsafe { segment.mapping.write(0, used) });
         }
     }
@@ -339,7 +341,7 @@ impl SharedSegments for SharedMemory {
                 .and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
             let mapping = match mapping {
                 Ok(mapping) => mapping,
-                // A room is there as long as its process is.
+                // A segment exists as long as its process.
                 Err(_) if !is_alive(process) => {
                     return Err(CommError::PeerLost { rank: self.rank, peer: rank });
                 }
@@ -353,8 +355,8 @@ impl SharedSegments for SharedMemory {
     fn segment(&self, rank: usize, bytes: usize) -> &[u8] {
         let Some(segment) = self.segments[rank].as_ref() else { return &[] };
         let bytes = bytes.min(segment.mapping.bytes);
-        // SAFETY: behind the barrier that follows `publish` nobody writes what was laid until all
-        // have met again.
+        // SAFETY: after the barrier that follows `publish` nobody writes the published pixels until
+        // all ranks have entered the next collective call.
         unsafe { segment.mapping.read(0, bytes) }
     }
 
@@ -364,15 +366,15 @@ impl SharedSegments for SharedMemory {
 
     fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8])) {
         if let Some(segment) = &self.segments[rank] {
-            // SAFETY: who has taken a band is the only one to write it, and it is read behind the
-            // next barrier.
+            // SAFETY: only the rank that has taken a band writes it, and it is read after the next
+            // barrier.
             write(unsafe { segment.mapping.write(from, bytes) });
         }
     }
 
     fn band(&self, rank: usize, from: usize, bytes: usize) -> &[u8] {
         let Some(segment) = &self.segments[rank] else { return &[] };
-        // SAFETY: behind the barrier that follows the bands nobody writes them.
+        // SAFETY: after the barrier that follows the bands nobody writes them.
         unsafe { segment.mapping.read(from, bytes) }
     }
 }
@@ -381,7 +383,7 @@ impl SharedSegments for SharedMemory {
 mod tests {
     use super::*;
 
-    /// Three ranks in one process, which finds its own files as others would.
+    /// Three ranks in one process, which opens its own files as other processes would.
     fn three() -> [SharedMemory; 3] {
         let (first, address) = SharedMemory::make(3).unwrap();
         [
@@ -398,7 +400,7 @@ mod tests {
             node.arrive((node.rank < 2).then_some(&b"drawn"[..]));
         }
         assert!(nodes.iter().all(SharedMemory::passed));
-        // Rank 2 is quick: before the others have read a word, it says what they expect.
+        // Rank 2 is fast: before the others have read a word, it contributes what they expect.
         let expected =
             |rank| Err(CommError::OutOfStep { rank, gathering: vec![0, 1], waiting: vec![2] });
         assert_eq!(nodes[2].gathered(), expected(2));

@@ -1,24 +1,24 @@
-//! On which machine each rank is: what MPI says of it (`MPI_Comm_split_type`, MPI 3.1, section
-//! 6.4.2), and what the system says.
+//! Which machine each rank is on, according to MPI (`MPI_Comm_split_type`, MPI 3.1, section 6.4.2)
+//! and to the system.
 //!
-//! Two ranks count as of one machine if MPI finds them in one memory and all else that is known of
-//! their machines is the same: the kernel's boot, the name, and what the variable [`NODE_VARIABLE`]
-//! says. Where MPI cannot tell, the kernel's boot must be known. Variables of launchers are not
-//! asked: not every launcher sets them.
+//! Two ranks are on one machine if MPI reports that they share memory and everything else that is
+//! known of their machines is equal: the kernel's boot id, the name, and the value of the variable
+//! [`NODE_VARIABLE`]. If MPI cannot tell, the boot id must be known. Variables of launchers are not
+//! used, because not every launcher sets them.
 use super::Communicator as _;
 use super::library::{Handle, Mpi};
 use std::ffi::c_int;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
-/// Ranks in whose environments this variable differs do not share memory, wherever they are.
+/// Ranks with different values of this variable do not share memory, wherever they are.
 const NODE_VARIABLE: &str = "COMPOSITE_NODE";
 
-/// Bytes that a rank says of its machine.
+/// Bytes of a rank's machine id.
 const BYTES: usize = 12;
-/// Stands for the lowest rank of this machine where MPI cannot tell.
+/// Replaces the lowest rank of this machine where MPI cannot tell.
 const UNKNOWN: u32 = u32::MAX;
 
-/// What this rank says of its machine: equal bytes, one machine.
+/// This rank's machine id: equal bytes, same machine.
 pub(super) fn id_of_this_rank(mpi: &Mpi, comm: Handle, rank: usize, name: &str) -> [u8; BYTES] {
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
     let node = std::env::var_os(NODE_VARIABLE);
@@ -33,7 +33,7 @@ fn machine_id(
     rank: usize,
 ) -> [u8; BYTES] {
     let mut hasher = DefaultHasher::new();
-    // Of whose machine nothing is known is alone.
+    // A rank whose machine is unknown is alone.
     let alone = (lowest.is_none() && boot.is_none()).then_some(rank);
     (boot, name, node, alone).hash(&mut hasher);
     let mut bytes = [0; BYTES];
@@ -42,8 +42,8 @@ fn machine_id(
     bytes
 }
 
-/// The lowest rank that shares memory with this one, as MPI says; all ranks must call it. `None` if
-/// the library has no such function or it fails.
+/// The lowest rank that shares memory with this one according to MPI; all ranks must call it.
+/// `None` if the library has no such function or it fails.
 fn lowest_in_memory(mpi: &Mpi, comm: Handle, rank: usize) -> Option<u32> {
     let (split, free) = (mpi.split_type?, mpi.comm_free?);
     let mut here: Handle = 0;
@@ -82,7 +82,7 @@ fn lowest_in_memory(mpi: &Mpi, comm: Handle, rank: usize) -> Option<u32> {
     all.as_chunks::<4>().0.iter().map(|rank| u32::from_le_bytes(*rank)).min()
 }
 
-/// Numbers of machines, in the order of their first ranks.
+/// Numbers the machines in the order of their first ranks.
 pub(super) fn numbered_nodes(ids: &[Vec<u8>]) -> Vec<usize> {
     let mut found: Vec<&[u8]> = Vec::new();
     ids.iter()
@@ -136,7 +136,7 @@ mod tests {
         assert!(same(&by_boot(0), &by_boot(1)));
         let by_name = |rank| of(None, None, "localhost", None, rank);
         assert!(!same(&by_name(0), &by_name(1)));
-        // Where /proc cannot be read, MPI's word is enough.
+        // Where /proc cannot be read, MPI's answer is enough.
         let by_mpi = |rank| of(Some(0), None, "host", None, rank);
         assert!(same(&by_mpi(0), &by_mpi(1)));
     }

@@ -1,13 +1,13 @@
-//! Messages on their way: buffers that MPI reads or writes stay here until it is done with them.
+//! Messages in flight: buffers that MPI reads or writes stay here until it is done with them.
 //!
-//! MPI counts bytes in an `int`, so a message travels as *chunks*: any number of full ones and one
-//! that is not full, possibly empty. A message shorter than a chunk, which is nearly every one, is
-//! one MPI message.
+//! MPI counts bytes in an `int`, so a message is sent as *chunks*: any number of full ones and one
+//! that is not full, possibly empty. A message shorter than a chunk, as nearly all are, is one MPI
+//! message.
 use super::library::{Handle, Mpi, Status};
 use crate::comm::{BufferPool, CommError};
 use std::ffi::c_int;
 
-/// Stands for a request that has been completed; no library has such a handle.
+/// Marks a request that has been completed; no library has such a handle.
 const COMPLETE: Handle = Handle::MAX;
 
 /// A message that MPI may still be reading.
@@ -30,12 +30,12 @@ struct Incoming {
     received: usize,
     /// Null when no chunk is being received.
     request: Handle,
-    /// Bytes that the present chunk may have.
+    /// Capacity of the current chunk in bytes.
     posted: usize,
     done: bool,
 }
 
-/// All that is on its way from and to this rank.
+/// All messages in flight from and to this rank.
 pub(super) struct Transfers {
     rank: usize,
     comm: Handle,
@@ -47,7 +47,7 @@ pub(super) struct Transfers {
     pub(super) pool: BufferPool,
     /// Receives that are complete and not yet taken.
     finished: Vec<u64>,
-    /// Used again by every poll.
+    /// Reused by every poll.
     requests: Vec<Handle>,
     owners: Vec<usize>,
 }
@@ -112,8 +112,8 @@ impl Transfers {
         result
     }
 
-    /// An empty buffer with room for `capacity` bytes: one given back, one of a message that has
-    /// left meanwhile, or a new one.
+    /// An empty buffer with the given `capacity`: a recycled one, that of a message that has been
+    /// sent meanwhile, or a new one.
     pub(super) fn buffer(&mut self, mpi: &Mpi, capacity: usize) -> Vec<u8> {
         if let Some(buffer) = self.pool.fitting(capacity) {
             return buffer;
@@ -122,7 +122,7 @@ impl Transfers {
         self.pool.take(capacity)
     }
 
-    /// Takes back the buffers of messages that have left, in one call for all.
+    /// Reclaims the buffers of messages that have been sent, in one call for all.
     pub(super) fn reclaim_buffers(&mut self, mpi: &Mpi) {
         let requests: Vec<Handle> =
             self.outgoing.iter().flat_map(|message| message.requests.iter().copied()).collect();
@@ -151,7 +151,7 @@ impl Transfers {
                 mpi.status_ignore(),
             )
         };
-        // Undefined, which is negative, if there was nothing to look at.
+        // Undefined, which is negative, if there was no request.
         let done = usize::try_from(done).unwrap_or(0).min(indices.len());
         if code != 0 || done == 0 {
             return;
@@ -181,7 +181,7 @@ impl Transfers {
         self.outgoing.len()
     }
 
-    /// The same, of those with this tag.
+    /// The number of those with this tag.
     pub(super) fn outgoing_of(&self, tag: u32) -> usize {
         self.outgoing.iter().filter(|message| message.tag == tag).count()
     }
@@ -235,7 +235,7 @@ impl Transfers {
     }
 
     /// Whether the next chunk of its source and tag belongs to this receive: those before it must
-    /// not need another one.
+    /// not need another chunk.
     fn may_start(&self, index: usize) -> bool {
         let this = &self.incoming[index];
         let ahead = self.incoming[..index]
@@ -273,8 +273,8 @@ impl Transfers {
         if code == 0 { Ok(()) } else { Err(failed(mpi, self.rank, "MPI_Irecv", code)) }
     }
 
-    /// The first of `wanted` that is complete, and its message. Looks at complete ones only: with a
-    /// hundred receives posted, a walk over all of them after each message takes longer than the
+    /// The first of `wanted` that is complete, and its message. Checks complete ones only: with a
+    /// hundred receives posted, a scan of all of them after each message takes longer than the
     /// messages.
     pub(super) fn take(
         &mut self,
@@ -288,8 +288,8 @@ impl Transfers {
         Some((position, self.incoming.remove(index).buffer))
     }
 
-    /// Lets MPI work and takes at most one chunk in; `wait` blocks until one has come, else it
-    /// looks once. Says whether one came.
+    /// Lets MPI work and receives at most one chunk; with `wait` it blocks until one has arrived,
+    /// otherwise it polls once. Returns whether a chunk arrived.
     pub(super) fn progress(&mut self, mpi: &Mpi, wait: bool) -> Result<bool, CommError> {
         self.requests.clear();
         self.owners.clear();
@@ -366,7 +366,7 @@ impl Transfers {
         }
         this.done = true;
         self.finished.push(this.id);
-        // Whoever had to wait for this one.
+        // Start the receives that had to wait for this one.
         let (source, tag) = (this.source, this.tag);
         for index in owner + 1..self.incoming.len() {
             let other = &self.incoming[index];
