@@ -1,4 +1,4 @@
-//! Colours: four channels in 8 or 16 bits, half or single precision, and how one is laid over
+//! Colours: four channels in 8 or 16 bits, half or single precision, and how one is composited over
 //! another.
 use crate::simd::runs;
 use bytemuck::Pod;
@@ -20,7 +20,7 @@ pub trait Color: Copy + PartialEq + Debug + Send + Sync + Pod {
     /// Porter and Duff's `front over back` for premultiplied colours (SIGGRAPH 1984, table of
     /// section 4.2).
     fn over(front: Self, back: Self) -> Self;
-    /// The channels as numbers, 1 for a full one.
+    /// The channels as floating-point numbers; a full channel is 1.
     fn to_f32(self) -> [f32; 4];
     /// The nearest colour of this format; integer formats are clamped to 0 … 1.
     fn from_f32(channels: [f32; 4]) -> Self;
@@ -34,8 +34,8 @@ pub trait Color: Copy + PartialEq + Debug + Send + Sync + Pod {
     }
 }
 
-/// RGBA8. Blending rounds to nearest (IceT truncates, which loses faint layers); for many faint
-/// layers use one of the others.
+/// RGBA8. Blending rounds to nearest (IceT truncates, which loses faint layers). For many faint
+/// layers use another format.
 impl Color for [u8; 4] {
     const TRANSPARENT: Self = [0; 4];
 
@@ -67,7 +67,7 @@ impl Color for [u8; 4] {
     }
 }
 
-/// 16 bits a channel, 65535 for 1: eight bytes a pixel, and 128 faint layers keep an error of
+/// 16 bits per channel, 65535 for 1, eight bytes per pixel. 128 faint layers have an error of
 /// 0.13/255, and any 128 layers one below 1/255.
 impl Color for [u16; 4] {
     const TRANSPARENT: Self = [0; 4];
@@ -95,8 +95,8 @@ impl Color for [u16; 4] {
     }
 }
 
-/// Half precision: eight bytes a pixel with the range of floating point; joined in single precision
-/// and rounded once.
+/// Half precision: eight bytes per pixel with the range of floating point. Colours are composited
+/// in single precision and rounded once.
 impl Color for [f16; 4] {
     const TRANSPARENT: Self = [f16::ZERO; 4];
 

@@ -1,12 +1,12 @@
-//! Ranks that reach into each other: every pixel is a list of transparent fragments with depths,
-//! and at most one opaque surface.
+//! Compositing of ranks that overlap in depth: every pixel is a list of transparent fragments with
+//! depths, and at most one opaque surface.
 //!
-//! `over` in rank order is right only where ranks are one behind the other
+//! `over` in rank order is only correct where ranks are one behind the other
 //! ([`Frame::with_depth_range`](crate::Frame::with_depth_range) checks that). Here the owner of a
-//! tile gets the fragments of all ranks, keeps those in front of the nearest opaque surface, sorts
-//! them by depth and lays them over each other once, in `f64`: opaque geometry and transparent
-//! layers of all ranks in one pass (IceT takes either depth or blending), and the same bits for
-//! every partition of the same fragments among ranks.
+//! tile receives the fragments of all ranks, keeps those in front of the nearest opaque surface,
+//! sorts them by depth and blends them once, in `f64`. This composites opaque geometry and
+//! transparent layers of all ranks in one pass (IceT takes either depth or blending), and gives the
+//! same bits for every partition of the same fragments among ranks.
 use crate::codec::{Codec, MessageError, checksum};
 use crate::collect::Collector;
 use crate::comm::Communicator;
@@ -42,8 +42,8 @@ pub struct DeepFrame<'a> {
 }
 
 impl<'a> DeepFrame<'a> {
-    /// Fragments pixel after pixel, in any order within a pixel; `ends[i]` is the index behind the
-    /// last fragment of pixel `i`.
+    /// Fragments pixel after pixel, in any order within a pixel; `ends[i]` is one past the index of
+    /// the last fragment of pixel `i`.
     ///
     /// # Errors
     /// [`CompositeError::FrameSize`] if `ends` has another length than the image has pixels,
@@ -75,9 +75,9 @@ impl<'a> DeepFrame<'a> {
         Ok(Self { width_px, height_px, fragments, ends, opaque: None })
     }
 
-    /// The same with an opaque surface at some pixels: colours (not premultiplied by anything,
-    /// alpha 1) and depths in the unit of the fragments; infinity or NaN where there is none. At
-    /// equal depths a surface hides fragments, and the highest rank's surface wins.
+    /// The same frame with opaque surfaces: colours (not premultiplied, alpha 1) and depths in the
+    /// unit of the fragments; infinity or NaN where there is no surface. At equal depths a surface
+    /// hides fragments, and the highest rank's surface wins.
     ///
     /// # Errors
     /// [`CompositeError::FrameSize`] if a slice has another length than the image has pixels.
@@ -103,7 +103,7 @@ impl<'a> DeepFrame<'a> {
         )
     }
 
-    /// The rectangle in which there is anything, and how many depths are not numbers.
+    /// The bounding rectangle of fragments and surfaces, and the number of NaN depths.
     fn drawn(&self) -> (Rect, u64) {
         let (mut rect, mut nan) = (Rect::EMPTY, 0);
         for index in 0..self.ends.len() {
@@ -133,9 +133,9 @@ fn check_length(
     Err(CompositeError::FrameSize { slice, width_px, height_px, expected, found })
 }
 
-/// Composites deep frames; every rank of `comm` calls this once a frame. Always by direct send;
-/// `options.order` says which of equally deep fragments is in front (the first) and which of
-/// equally deep surfaces is seen (the last). The image is premultiplied.
+/// Composites deep frames; every rank of `comm` calls this once per frame. The strategy is always
+/// direct send. `options.order` says which of equally deep fragments is in front (the first) and
+/// which of equally deep surfaces is visible (the last). The image is premultiplied.
 ///
 /// # Errors
 /// As [`composite`](crate::composite).
@@ -176,7 +176,7 @@ fn composite_or_fail(
         }
     }
 
-    // Who owns what, and what will come.
+    // Assign tiles, and post receives.
     let tiles = balanced(&exchange.drawn);
     let part_of = |order_index: usize, rects: &[Rect]| {
         rects[order_index].intersection(&tiles[order.own_index])
@@ -221,7 +221,7 @@ fn composite_or_fail(
         }
     }
 
-    // Receive, and join when all is there.
+    // Receive, and merge when all messages have arrived.
     let mut parts: Vec<Option<Vec<u8>>> = vec![None; exchange.num_ranks()];
     let own_part = part_of(order.own_index, &everything);
     if !own_part.is_empty() {
@@ -287,7 +287,7 @@ fn encode(frame: &DeepFrame<'_>, part: Rect, fingerprint: u64) -> Vec<u8> {
         for x in part.x0..part.x1 {
             let (fragments, surface) =
                 frame.of_pixel(y as usize * frame.width_px as usize + x as usize);
-            // What an opaque surface of this rank hides nobody will see; NaN is in front of
+            // Fragments behind an opaque surface of this rank are invisible; NaN is in front of
             // nothing.
             let limit = surface.map_or(f32::INFINITY, |surface| surface.depth);
             let seen = fragments
@@ -365,7 +365,7 @@ fn check(bytes: &[u8], part: Rect, fingerprint: u64) -> Result<(), MessageError>
     if (fragments, surfaces) == (number(5), number(6)) { Ok(()) } else { Err(MessageError::Mask) }
 }
 
-/// Goes through the pixels of a checked message in order.
+/// Iterates over the pixels of a checked message in order.
 struct Reader<'a> {
     part: Rect,
     counts: std::slice::Iter<'a, [u8; 4]>,
@@ -399,7 +399,7 @@ fn fragment(bytes: &[u8; RECORD_BYTES]) -> Fragment {
     Fragment { color: [red, green, blue, alpha], depth }
 }
 
-// ---- Joining ------------------------------------------------------------------------------------
+// ---- Merging ----------------------------------------------------------------------------------
 fn merge(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<BlendedPixel> {
     let mut layer = Layer::empty(tile, None);
     let (mut pixel, mut fragments) = (0, Vec::new());
@@ -410,7 +410,7 @@ fn merge(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<BlendedPixel> {
             for reader in &mut readers {
                 let part = &reader.part;
                 if part.x0 <= x && x < part.x1 && part.y0 <= y && y < part.y1 {
-                    // The later place wins ties.
+                    // The later rank in order wins ties.
                     if let Some(surface) = reader.next(&mut fragments)
                         && nearest.is_none_or(|held| surface.depth <= held.depth)
                     {
@@ -425,8 +425,8 @@ fn merge(tile: Rect, mut readers: Vec<Reader<'_>>) -> Layer<BlendedPixel> {
     layer
 }
 
-/// Fragments in front of `surface`, nearest first, and `surface` behind them. Equal depths keep
-/// their order.
+/// Blends the fragments in front of `surface`, nearest first, and `surface` behind them. Equal
+/// depths keep their order.
 fn blend(fragments: &mut Vec<Fragment>, surface: Option<Fragment>) -> [f64; 4] {
     if let Some(surface) = surface {
         fragments.retain(|fragment| fragment.depth < surface.depth);
@@ -443,7 +443,7 @@ fn blend(fragments: &mut Vec<Fragment>, surface: Option<Fragment>) -> [f64; 4] {
     color
 }
 
-/// The reference: all frames in one place, one pixel after the other, in `f64`.
+/// The reference: all frames on one node, one pixel after the other, in `f64`.
 ///
 /// # Errors
 /// [`CompositeError::NoFrames`], [`CompositeError::SizesDiffer`].

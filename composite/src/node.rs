@@ -1,5 +1,5 @@
-//! Ranks of one node that are one process: their frames are merged in its memory, and nodes
-//! composite what comes out.
+//! Nodes with several ranks in one process: their frames are merged in its memory, and nodes
+//! composite the results.
 use crate::comm::Communicator;
 use crate::compositor::{CompositeOutput, Compositor};
 use crate::error::CompositeError;
@@ -11,14 +11,14 @@ use crate::simd::Kernels;
 use std::num::NonZeroUsize;
 
 impl<P: Composite> Compositor<P> {
-    /// Composites the frames of all ranks of this node with each other, in one memory and with
-    /// `threads` threads, and the result with those of the other nodes, by messages. Ranks of
-    /// `comm` are nodes here; every node calls this once a frame.
+    /// Composites the frames of all ranks of this node in one memory with `threads` threads, and
+    /// then the result with those of the other nodes, by messages. Ranks of `comm` are nodes here;
+    /// every node calls this once per frame.
     ///
     /// The ranks of node 0 come first, then those of node 1, and so on. Images with depth have the
     /// bits of the serial reference over all ranks. For blended formats nodes are the outer
-    /// grouping: the bits are those of the reference over the nodes' references, which are also
-    /// those over all ranks where nodes are equally large and all numbers are powers of two.
+    /// grouping: the bits are those of the reference over the nodes' references. They equal those
+    /// over all ranks if nodes have the same size and all counts are powers of two.
     ///
     /// # Errors
     /// As [`Compositor::composite`], and as [`composite_shared`].

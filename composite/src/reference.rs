@@ -1,4 +1,4 @@
-//! The serial reference: all frames in one place, one pixel after the other. Every strategy gives
+//! The serial reference: all frames on one node, one pixel after the other. Every strategy gives
 //! these bits.
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image};
@@ -28,7 +28,7 @@ pub fn composite_serial<P: Composite>(frames: &[Frame<'_, P>]) -> Result<Image<P
     Ok(Image { width_px, height_px, colors, depths })
 }
 
-/// Width and height of all frames.
+/// Checks that all frames have one size, and returns it.
 pub(crate) fn check_sizes<P: Composite>(
     frames: &[Frame<'_, P>],
 ) -> Result<(u32, u32), CompositeError> {

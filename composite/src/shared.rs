@@ -1,8 +1,8 @@
-//! Frames of several ranks in one memory: merged straight from their planes, without messages.
+//! Merges the frames of several ranks in one memory, straight from their planes, without messages.
 //!
-//! Rows of the result are worked on by several threads; each row is read once from every frame that
-//! drew there and written once, so this costs what reading the frames costs. Messages cost that and
-//! several times more: on a node, use this; between nodes, messages
+//! Several threads work on rows of the result. Each row is read once from every frame that drew
+//! there and written once, so the cost is that of reading the frames. Messages cost that and
+//! several times more: use this on a node, and messages between nodes
 //! ([`Compositor::composite_node`]). TOD-Tree (A. V. P. Grosset, M. Prasad, C. Christensen, A.
 //! Knoll, C. Hansen, PGV15) found the same for its mixture of OpenMP and MPI.
 use crate::error::CompositeError;
@@ -25,10 +25,10 @@ use nearest::NearestRows;
 /// Rows that a thread takes at a time.
 pub(crate) const BAND_ROWS: usize = 16;
 
-/// Composites frames of one memory, in rank order, with `threads` threads. The bits are those of
+/// Composites frames in one memory, in rank order, with `threads` threads. The bits are those of
 /// [`composite_serial`](crate::composite_serial).
 ///
-/// `spare` is an image to write over; without `depth` the result has colours only.
+/// `spare` is an image that may be overwritten; without `depth` the result has colours only.
 ///
 /// # Errors
 /// [`CompositeError::NoFrames`], [`CompositeError::SizesDiffer`].
@@ -41,10 +41,10 @@ pub fn composite_shared<P: Composite>(
     Ok(merge(frames, threads, depth, spare, Kernels::new(None))?.image)
 }
 
-/// What frames have given.
+/// The merged frames.
 pub(crate) struct MergeResult<P: Composite> {
     pub(crate) image: Image<P>,
-    /// Of each frame, depths that are not a number.
+    /// Number of NaN depths of each frame.
     pub(crate) nan_depths: Vec<u64>,
 }
 
@@ -99,7 +99,7 @@ pub(crate) fn merge<P: Composite>(
     Ok(MergeResult { image: Image { width_px, height_px, colors, depths }, nan_depths })
 }
 
-/// Rows `first_row…` of all views into `colors` and, if it is not empty, `depths`.
+/// Merges rows from `first_row` on of all views into `colors` and, if it is not empty, `depths`.
 pub(crate) fn merge_band<P: Composite>(
     kernels: Kernels,
     rows: &mut Rows<P>,
@@ -131,7 +131,7 @@ pub(crate) fn merge_band<P: Composite>(
     }
 }
 
-/// What one thread needs to merge rows.
+/// Scratch buffers of a thread that merges rows.
 pub(crate) struct Rows<P: Composite> {
     width: usize,
     columns: Columns<{ nearest::BLOCK }>,

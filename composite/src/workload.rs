@@ -1,29 +1,29 @@
-//! Frames to measure compositing with, made without a renderer: what each of p ranks would have
+//! Synthetic frames to measure compositing without a renderer: what each of p ranks would have
 //! drawn of its brick of a volume.
 //!
-//! Three ways in which pixels are spread, after what chapter 3 of the thesis renders: solid pieces
-//! (*discs*), pieces that all cover the whole image (*dense*, the worst case of volume rendering),
-//! and the same pieces as scattered short runs (*frag*: streamlines, particles). Everything is a
-//! function of scene, moment, rank and size, so each rank makes its own frame.
+//! There are three distributions of pixels, after what chapter 3 of the thesis renders: solid
+//! bricks (*discs*), bricks that all cover the whole image (*dense*, the worst case of volume
+//! rendering), and discs as scattered short runs (*frag*: streamlines, particles). Everything is a
+//! function of workload, moment, rank and size, so each rank makes its own frame.
 use crate::mix64::mix64;
 use crate::rect::Rect;
 use std::fmt;
 use std::str::FromStr;
 
-/// How the pixels of the ranks are spread.
+/// How the pixels of the ranks are distributed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Workload {
-    /// Every rank's brick as one solid, shaded ellipse; neighbours overlap. 1 to 4 layers where
+    /// Every rank's brick is one solid, shaded ellipse, and neighbours overlap. 1 to 4 layers where
     /// anything is drawn.
     Discs,
-    /// Every pixel of every rank is drawn, as a tilted plane each; planes cross.
+    /// Every rank draws every pixel, as a tilted plane; planes intersect.
     Dense,
     /// A sixth of the pixels of the discs, in runs of three.
     Frag,
 }
 
 impl Workload {
-    /// All of them.
+    /// All workloads.
     pub const ALL: [Self; 3] = [Self::Discs, Self::Dense, Self::Frag];
 
     /// Name as on the command line.
@@ -62,7 +62,8 @@ pub struct SyntheticFrame {
     pub colors: Vec<[u8; 4]>,
     /// 0 (near) to 1 (background).
     pub depths: Vec<f32>,
-    /// Around all that is drawn, as a renderer knows it from the projection of its bounding box.
+    /// Bounding rectangle of everything drawn, as a renderer knows it from the projection of its
+    /// bounding box.
     pub bounds: Rect,
 }
 
@@ -79,7 +80,7 @@ impl SyntheticFrame {
         }
     }
 
-    /// Pixels with something in them.
+    /// Number of active pixels.
     pub fn active(&self) -> u64 {
         self.depths.iter().filter(|&&depth| depth < 1.0).count() as u64
     }
@@ -99,14 +100,14 @@ impl SyntheticFrame {
     }
 }
 
-/// A brick, projected: centre and radii in pixels, depth of its centre.
+/// A projected brick: centre and radii in pixels, depth of its centre.
 struct ProjectedBrick {
     center_px: (f32, f32),
     radii_px: (f32, f32),
     depth: f32,
 }
 
-/// The `ranks` bricks of a cube in a grid that is as even as its factors allow.
+/// Divides a cube into `ranks` bricks, in a grid as even as the factors of `ranks` allow.
 fn grid(ranks: usize) -> [usize; 3] {
     let mut factors = Vec::new();
     let (mut left, mut divisor) = (ranks, 2);
@@ -126,7 +127,7 @@ fn grid(ranks: usize) -> [usize; 3] {
     sides
 }
 
-/// Brick `rank` of `ranks`, seen by a camera that goes around the cube.
+/// Projects brick `rank` of `ranks`; the camera orbits the cube.
 fn project(
     moment: u64,
     rank: usize,
@@ -151,14 +152,14 @@ fn project(
     }
 }
 
-/// A number that looks random: the first that SplitMix64 makes of a seed.
+/// A pseudorandom number: the first output of SplitMix64 with this seed.
 fn scatter(number: u64) -> u64 {
     mix64(number.wrapping_add(0x9e37_79b9_7f4a_7c15))
 }
 
 impl Workload {
-    /// Draws what `rank` of `ranks` sees at `moment` (the number of a frame) into `target`, over
-    /// what was there.
+    /// Draws what `rank` of `ranks` sees at `moment` (the number of a frame) into `target`, which
+    /// is cleared first.
     pub fn draw(self, moment: u64, rank: usize, ranks: usize, target: &mut SyntheticFrame) {
         target.colors.fill([0; 4]);
         target.depths.fill(1.0);
@@ -228,7 +229,7 @@ fn draw_disc(
                 continue;
             }
             let towards = (1.0 - square).sqrt();
-            // The rank's share of depth keeps most ties out, but equal depths of symmetric bricks
+            // The rank's share of depth prevents most ties, but equal depths of symmetric bricks
             // remain.
             target.depths[index] = (depth - 0.05 * towards + 1e-5 * rank as f32).clamp(0.01, 0.99);
             let light = 0.25 + 0.75 * towards;

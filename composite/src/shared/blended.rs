@@ -1,5 +1,5 @@
-//! Formats without depth: some pixels of all frames in the canonical grouping, which are joined
-//! while they are in the first cache.
+//! Formats without depth: merges a block of pixels of all frames in the canonical grouping while
+//! they are in the first-level cache.
 use super::columns::Columns;
 use crate::layer::View;
 use crate::pixel::Composite;
@@ -8,19 +8,19 @@ use crate::simd::runs::over_one_by_one;
 use crate::simd::{Kernels, at_level};
 use std::ops::Range;
 
-/// Pixels of a block. Eight frames of f32 are read as streams of 4 KB; of 64 pixels (1 KB) dense
-/// scenes took a quarter longer. The groups that wait still fit into the first cache.
+/// Pixels of a block. Eight frames of f32 are read as streams of 4 KB; with 64 pixels (1 KB) dense
+/// workloads took a quarter longer. The waiting groups still fit into the first-level cache.
 pub(super) const BLOCK: usize = 256;
 
-/// What a thread needs to merge rows.
+/// Scratch buffers of a thread that merges rows.
 pub(super) struct BlendedRows<P: Composite> {
-    /// Groups that wait for what is behind them: the first is in the image, each other one here.
+    /// Groups that wait for those behind them: the first is in the image, each other one here.
     waiting: Vec<[P::Color; BLOCK]>,
     /// The slot of the last frame of each group.
     slots: Vec<usize>,
 }
 
-/// The pixels of a frame, and which of the block those are.
+/// The pixels of a frame, and their range in the block.
 type SingleGroup<'a, C> = (&'a [C], Range<usize>);
 
 impl<P: Composite> BlendedRows<P> {
@@ -28,7 +28,7 @@ impl<P: Composite> BlendedRows<P> {
         Self { waiting: Vec::new(), slots: Vec::new() }
     }
 
-    /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors`.
+    /// Merges rows from `first_row` on into `colors`; `columns` says which frames drew where.
     pub(super) fn merge_rows(
         &mut self,
         kernels: Kernels,
@@ -46,7 +46,7 @@ impl<P: Composite> BlendedRows<P> {
         );
     }
 
-    /// `put_behind` lays its second argument over its first.
+    /// `put_behind` composites its second argument over its first.
     #[inline(always)]
     fn merge(
         &mut self,
@@ -70,7 +70,7 @@ impl<P: Composite> BlendedRows<P> {
         }
     }
 
-    /// As a binary counter carries, where slots in which nobody has drawn are nothing to be joined.
+    /// Merges like carries of a binary counter; slots in which no frame drew are skipped.
     #[inline(always)]
     fn merge_block(
         &mut self,
@@ -82,7 +82,7 @@ impl<P: Composite> BlendedRows<P> {
         put_behind: &impl Fn(&[u8], &mut [P::Color]),
     ) {
         self.slots.clear();
-        // The last group, as long as it is one frame: its pixels stay where they are.
+        // The last group, as long as it is a single frame: its pixels are not copied.
         let mut alone: Option<SingleGroup<'_, P::Color>> = None;
         for &index in drawn {
             let slot = folding.slot(index);
@@ -108,7 +108,7 @@ impl<P: Composite> BlendedRows<P> {
         }
     }
 
-    /// Copies the last group to where it waits.
+    /// Copies the last group to its waiting position.
     #[inline(always)]
     fn hold(&mut self, target: &mut [P::Color], (colors, pixels): &SingleGroup<'_, P::Color>) {
         let held = match self.slots.len() {
@@ -125,7 +125,7 @@ impl<P: Composite> BlendedRows<P> {
         held[pixels.end..].fill(P::EMPTY.color());
     }
 
-    /// Lays the last group behind the one before it.
+    /// Composites the last group behind the one before it.
     #[inline(always)]
     fn merge_last(
         &mut self,
@@ -134,14 +134,14 @@ impl<P: Composite> BlendedRows<P> {
         put_behind: &impl Fn(&[u8], &mut [P::Color]),
     ) {
         let groups = self.slots.len();
-        // Both are one group, whose last slot is that of the latter.
+        // Both are one group now, whose last slot is that of the latter.
         if let Some(last) = self.slots.pop()
             && let Some(before) = self.slots.last_mut()
         {
             *before = last;
         }
         let pixels = target.len();
-        // The last one is here only if it is not alone.
+        // The last group is here only if it is not a single frame.
         let place = (groups - 2).min(self.waiting.len());
         let (before, last) = self.waiting.split_at_mut(place);
         let before = match before.last_mut() {
@@ -158,7 +158,7 @@ impl<P: Composite> BlendedRows<P> {
     }
 }
 
-/// How far up in the balanced tree two slots meet.
+/// The level of the balanced tree at which two slots are merged.
 fn merge_level(one: usize, other: usize) -> u32 {
     usize::BITS - (one ^ other).leading_zeros()
 }

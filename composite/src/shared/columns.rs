@@ -1,13 +1,13 @@
-//! Who has drawn in which blocks of a row.
+//! Which frames drew in which blocks of a row.
 use crate::layer::View;
 use crate::pixel::Composite;
 use std::ops::Range;
 
-/// The frames that have drawn in each block (of `BLOCK` pixels) of a row, in their order; only
-/// those need to be read.
+/// The frames that drew in each block (of `BLOCK` pixels) of a row, in their order; only those need
+/// to be read.
 #[derive(Default)]
 pub(super) struct Columns<const BLOCK: usize> {
-    /// For each block, which part of `drawn` are its frames.
+    /// For each block, the range of its frames in `drawn`.
     blocks: Vec<Range<usize>>,
     drawn: Vec<usize>,
     /// Frames of the row, and their columns.
@@ -15,7 +15,8 @@ pub(super) struct Columns<const BLOCK: usize> {
 }
 
 impl<const BLOCK: usize> Columns<BLOCK> {
-    /// Looks at row `y`, and says before which row up to `end_row` others have drawn.
+    /// Finds the frames of row `y`, and returns the row up to `end_row` before which this does not
+    /// change.
     pub(super) fn look_up<P: Composite>(
         &mut self,
         views: &[View<'_, P>],
@@ -47,7 +48,7 @@ impl<const BLOCK: usize> Columns<BLOCK> {
         end
     }
 
-    /// The first column of each block, and the numbers of its frames.
+    /// The first column of each block, and the indices of its frames.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &[usize])> {
         self.blocks
             .iter()

@@ -1,9 +1,9 @@
-//! Formats with depth: of 64 pixels first the depths of eight frames, then the colours of those
-//! that have won.
+//! Formats with depth: for 64 pixels reads first the depths of eight frames, then the colours of
+//! the nearest ones.
 //!
-//! One frame after the other would read the colours of all that are nearest for a while (a third of
-//! them, of layers in any order), and read and write what it holds again and again. Here every
-//! pixel of the image is written once, and only those colours are read that are seen.
+//! Merging one frame after the other would read the colours of all that are nearest for a while (a
+//! third of them, for layers in any order), and read and write the result repeatedly. Here every
+//! pixel of the image is written once, and only visible colours are read.
 use super::columns::Columns;
 use crate::color::Color;
 use crate::layer::View;
@@ -14,9 +14,9 @@ use crate::simd::{Kernels, at_level, for_runs};
 use bytemuck::{cast_slice, cast_slice_mut};
 use fearless_simd::{Bytes, Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u8x64, u32x16};
 
-/// Pixels of a block: what it takes to find a block of a frame, and to guess wrongly how many
-/// frames there are, is spread over four words. (Blocks of one word took 190 cycles each and 24 for
-/// each frame.)
+/// Pixels of a block. The costs of finding a block of a frame and of mispredicting the number of
+/// frames are spread over its words. (Blocks of one word took 190 cycles each and 24 for each
+/// frame.)
 pub(super) const BLOCK: usize = WORD * WORDS;
 
 /// Pixels of a word of flags: four vectors of 16.
@@ -25,11 +25,11 @@ const WORD: usize = 64;
 /// Words of a block.
 const WORDS: usize = 2;
 
-/// Frames whose blocks are looked at together. (Of 32, sparse frames took 15 % longer: all places
-/// are written for each block.)
+/// Frames whose blocks are processed together. (With 32, sparse frames took 15 % longer, because
+/// all slots are written for each block.)
 const TOGETHER: usize = 8;
 
-/// The farthest depth that is not background: where it is held at the beginning, whoever is not
+/// The farthest depth that is not background. It is the initial depth, so any frame that is not
 /// behind it has drawn something.
 const FARTHEST: f32 = f32::from_bits(1.0_f32.to_bits() - 1);
 
@@ -38,7 +38,7 @@ const FARTHEST: f32 = f32::from_bits(1.0_f32.to_bits() - 1);
 struct Block<'a, C> {
     colors: &'a [C; BLOCK],
     depths: &'a [f32; BLOCK],
-    /// The pixels that count.
+    /// The pixels within the frame's bounds.
     lanes: [u64; WORDS],
 }
 
@@ -46,17 +46,17 @@ struct Block<'a, C> {
 struct BlockResult<'a, C> {
     colors: &'a mut [C; BLOCK],
     depths: [f32; BLOCK],
-    /// Pixels where nobody has drawn: their colours and depths are not set.
+    /// Pixels that no frame drew: their colours and depths are not set.
     background: [u64; WORDS],
-    /// Whether a depth was not a number.
+    /// Whether any depth was NaN.
     has_nan: bool,
 }
 
-/// What a thread needs to merge rows.
+/// Scratch buffers of a thread that merges rows.
 pub(super) struct NearestRows<P: Composite> {
-    /// Depths that are not a number, of each frame.
+    /// Number of NaN depths of each frame.
     pub(super) nan: Vec<u64>,
-    /// Blocks that reach beyond the planes of a frame, filled up.
+    /// Padded copies of blocks that extend past the planes of a frame.
     edges: Vec<([P::Color; BLOCK], [f32; BLOCK])>,
 }
 
@@ -65,8 +65,8 @@ impl<P: Composite> NearestRows<P> {
         Self { nan: Vec::new(), edges: Vec::new() }
     }
 
-    /// Rows `first_row…`, for which `columns` says who has drawn where, into `colors` and, if it is
-    /// not empty, `depths`.
+    /// Merges rows from `first_row` on into `colors` and, if it is not empty, `depths`; `columns`
+    /// says which frames drew where.
     pub(super) fn merge_rows(
         &mut self,
         kernels: Kernels,
@@ -188,14 +188,14 @@ fn lanes<P: Composite>(view: &View<'_, P>, x: usize) -> [u64; WORDS] {
         let x = x + WORD * word;
         let before = first.saturating_sub(x).min(WORD) as u32;
         let inside = end.saturating_sub(x).min(WORD) as u32;
-        // Shifts by 64 leave nothing.
+        // Shifts by 64 leave no bit.
         let from_first = u64::MAX.checked_shl(before).unwrap_or(0);
         from_first & !u64::MAX.checked_shl(inside).unwrap_or(0)
     })
 }
 
-/// The block of row `y` that begins in column `x`, whatever it holds outside the frame's bounds, if
-/// the planes reach so far.
+/// The block of row `y` that begins in column `x`, if the planes extend so far. It may hold
+/// anything outside the frame's bounds.
 #[inline(always)]
 fn within_planes<'a, P: Composite>(
     view: &View<'a, P>,
@@ -210,7 +210,8 @@ fn within_planes<'a, P: Composite>(
     Some((view.colors.get(start..)?.first_chunk()?, view.depths.get(start..)?.first_chunk()?))
 }
 
-/// Appends the block of row `y` that begins in column `x`, if it is not within the planes.
+/// Appends a padded copy of the block of row `y` that begins in column `x`, if it is not within the
+/// planes.
 #[inline(always)]
 fn fill_up<P: Composite>(
     view: &View<'_, P>,
@@ -230,8 +231,8 @@ fn fill_up<P: Composite>(
     edges.push((colors, depths));
 }
 
-/// Takes from each pixel of a word of `blocks` and `held` the nearest, and of equally near ones the
-/// last.
+/// Selects for each pixel of a word the nearest of `blocks` and `held`, and the last of equally
+/// near ones.
 #[inline(always)]
 fn take_nearest<C: Color, S: Simd>(
     simd: S,
@@ -243,7 +244,7 @@ fn take_nearest<C: Color, S: Simd>(
     let load = |quarter: usize, depths: &[f32; BLOCK]| {
         f32x16::from_slice(simd, &depths[first + 16 * quarter..first + 16 * quarter + 16])
     };
-    // Who is nearest so far, for each frame in turn.
+    // Which pixels of each frame are nearest so far, frame by frame.
     let mut wins = [0_u64; TOGETHER];
     let mut nearest = [f32x16::splat(simd, 0.0); 4];
     for quarter in 0..4 {
@@ -266,8 +267,8 @@ fn take_nearest<C: Color, S: Simd>(
         }
         any |= *wins;
     }
-    // A sum is a number if all depths are. Of infinite ones it need not be, but then they are only
-    // looked at one by one.
+    // A sum is no NaN if no depth is. With infinite depths it may be one, but then the depths are
+    // only checked one by one.
     let sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
     held.has_nan |= !sum.simd_eq(sum).all_true();
     for quarter in 0..4 {
@@ -275,13 +276,12 @@ fn take_nearest<C: Color, S: Simd>(
             .store_slice(&mut held.depths[first + 16 * quarter..first + 16 * quarter + 16]);
     }
 
-    // The last who was nearest is, so from the last frame on, until there is somebody for each
-    // pixel.
+    // The last frame that was nearest wins, so scan from the last frame until every pixel has one.
     let winners = blocks.iter().zip(&wins).rev();
     if C::BYTES == 4 {
         let held_bytes: &mut [u8] = cast_slice_mut(&mut held.colors[first..first + WORD]);
         let mut merged = [u32x16::splat(simd, 0); 4];
-        // Colours are only held if somebody before has drawn here.
+        // Colours are only valid if an earlier frame drew here.
         if held.background[word] != u64::MAX {
             for quarter in 0..4 {
                 merged[quarter] = colors_16(simd, &held_bytes[64 * quarter..64 * quarter + 64]);
@@ -343,7 +343,7 @@ fn take_nearest_scalar<C: Color>(
     take_runs(blocks.iter().zip(&wins).rev(), any, word, held);
 }
 
-/// Colours of winners run by run.
+/// Copies the colours of winners run by run.
 #[inline(always)]
 fn take_runs<'a, 'b: 'a, C: Color>(
     winners: impl Iterator<Item = (&'a Block<'b, C>, &'a u64)>,
@@ -364,7 +364,7 @@ fn take_runs<'a, 'b: 'a, C: Color>(
     held.background[word] &= !any;
 }
 
-/// Each frame with those of the pixels `any` in which it is the first to have a flag.
+/// Calls for each frame with those of the pixels `any` in which it is the first with a flag.
 #[inline(always)]
 fn for_winners<'a, 'b: 'a, C: Color>(
     winners: impl Iterator<Item = (&'a Block<'b, C>, &'a u64)>,

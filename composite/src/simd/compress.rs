@@ -1,11 +1,11 @@
-//! From a row of pixels to its active pixels, side by side.
+//! Compresses a row of pixels to its active pixels.
 use crate::simd::for_runs;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::runs::{colors_16, padded_16};
 use fearless_simd::Simd;
 
-/// Appends the values of `SIZE` bytes in `row` whose bits are set in the words at `mask_at` of
-/// `out` itself.
+/// Appends the values of `SIZE` bytes in `row` whose bits are set in the mask words at `mask_at` of
+/// `out`.
 #[inline(always)]
 pub(crate) fn append_active<const SIZE: usize, S: Simd>(
     simd: S,
@@ -13,7 +13,7 @@ pub(crate) fn append_active<const SIZE: usize, S: Simd>(
     mask_at: usize,
     row: &[u8],
 ) {
-    // Room for the whole row and one vector more, so that nothing below has to grow the buffer.
+    // Capacity for the whole row and one vector more, so that the buffer need not grow below.
     out.reserve(row.len() + 64);
     for (index, block) in row.chunks(64 * SIZE).enumerate() {
         let word = word_at(out, mask_at + 8 * index);
@@ -47,8 +47,8 @@ pub(crate) fn append_active_scalar<const SIZE: usize>(
 #[inline(always)]
 fn append_by_runs<const SIZE: usize>(out: &mut Vec<u8>, word: u64, block: &[u8]) {
     for_runs(word, |first, length| {
-        // Short runs are the rule in fragmented pictures, and a copy of fixed length costs less
-        // than one that must look.
+        // Short runs are common in fragmented images, and a copy of fixed length costs less than
+        // one of variable length.
         let (from, bytes) = (first * SIZE, length * SIZE);
         if bytes <= 16 && from + 16 <= block.len() {
             out.extend_from_slice(&block[from..from + 16]);
@@ -59,7 +59,7 @@ fn append_by_runs<const SIZE: usize>(out: &mut Vec<u8>, word: u64, block: &[u8])
     });
 }
 
-/// Whether there is an instruction for it.
+/// Returns whether there is an instruction for it.
 #[inline(always)]
 fn append_by_vectors<const SIZE: usize, S: Simd>(
     simd: S,

@@ -1,4 +1,5 @@
-//! From the active pixels of a message back to rows: joined to what is held, or put in place.
+//! Expands the active pixels of a message to rows: merges them with the held pixels, or copies
+//! them.
 use crate::color::Color;
 use crate::pixel::Composite;
 use crate::simd::for_runs;
@@ -15,22 +16,22 @@ pub(crate) struct SparseRow<'a> {
     pub(crate) colors: &'a [u8],
     /// Empty if the message has no depths.
     pub(crate) depths: &'a [u8],
-    /// The whole message from the colours and from the depths on: what may be read, though not
-    /// used.
+    /// The whole message from the colours and from the depths on: bytes that may be read though
+    /// they are not used.
     pub(crate) behind_colors: &'a [u8],
     pub(crate) behind_depths: &'a [u8],
 }
 
-/// How what comes is joined to what is held.
+/// How incoming pixels are merged with the held ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// It comes from ranks before those held: in front, or the loser of ties.
+    /// They come from ranks before those held: in front, or the loser of ties.
     Lower,
-    /// It comes from ranks behind those held.
+    /// They come from ranks after those held.
     Higher,
 }
 
-/// Joins consecutive pixels, active or not, to those held.
+/// Merges consecutive pixels, active or not, into those held.
 #[inline(always)]
 pub(crate) fn merge_run<P: Composite, S: Simd>(
     simd: S,
@@ -85,7 +86,7 @@ pub(crate) fn clean_run<P: Composite, S: Simd>(
 #[inline(always)]
 pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &mut [f32]) {
     for (colors, depths) in colors.chunks_mut(64).zip(depths.chunks_mut(64)) {
-        // Most blocks are active as a whole: to look at them all is done four at a time, to branch
+        // Most blocks are entirely active: testing all of them is done four at a time, branching
         // for each is not.
         if depths.iter().fold(true, |all, depth| all & (*depth < 1.0)) {
             continue;
@@ -98,7 +99,7 @@ pub(crate) fn clean_run_scalar<P: Composite>(colors: &mut [P::Color], depths: &m
     }
 }
 
-/// Joins a row of a message to the row held.
+/// Merges a row of a message into the row held.
 #[inline(always)]
 pub(crate) fn merge_row<P: Composite, S: Simd>(
     simd: S,
@@ -182,8 +183,8 @@ pub(crate) fn merge_row_scalar<P: Composite>(
     }
 }
 
-/// Writes a row of a message over `colors` and, if it is not empty, `depths`: the background too. A
-/// message for rows with depths must bring depths.
+/// Overwrites `colors` and, if it is not empty, `depths` with a row of a message, including its
+/// background. A message for rows with depths must have depths.
 #[inline(always)]
 pub(crate) fn copy_row<P: Composite, S: Simd>(
     simd: S,
@@ -209,8 +210,8 @@ pub(crate) fn copy_row_scalar<P: Composite>(
     copy_words::<P>(row, colors, depths, |_, _, _| false);
 }
 
-/// `place` may write the colours of a word of 64 pixels, of which so many were taken before, and
-/// say that it has.
+/// `copy` may write the colours of a word of 64 pixels; it gets the number of colours read before,
+/// and returns whether it has written them.
 #[inline(always)]
 fn copy_words<P: Composite>(
     row: SparseRow<'_>,
@@ -276,8 +277,8 @@ fn words(mask: &[u8]) -> impl Iterator<Item = u64> {
     mask.chunks_exact(8).map(bytemuck::pod_read_unaligned)
 }
 
-/// Joins as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens
-/// of a depth format with colours of four bytes. Says how many pixels those are.
+/// Merges as many of the 64 pixels of a word as there are vectors for: none, or all whole sixteens
+/// of a depth format with colours of four bytes. Returns the number of pixels merged.
 #[inline(always)]
 fn merge_by_vectors<P: Composite, S: Simd>(
     simd: S,
@@ -332,8 +333,8 @@ fn merge_by_vectors<P: Composite, S: Simd>(
     0
 }
 
-/// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Whether
-/// there is an instruction for it.
+/// Writes up to 64 pixels with colours of four bytes, background where `word` has no bit. Returns
+/// whether there is an instruction for it.
 #[inline(always)]
 fn copy_by_vectors<P: Composite, S: Simd>(
     simd: S,
@@ -352,7 +353,7 @@ fn copy_by_vectors<P: Composite, S: Simd>(
         for (quarter, held) in bytes.chunks_mut(64).enumerate() {
             let lanes = (word >> (16 * quarter)) as u16;
             let packed = padded_16(avx512, row.behind_colors, 4 * taken);
-            // A colour of a depth or a premultiplied format that is not there is all zeros.
+            // The empty colour of a depth or a premultiplied format is all zeros.
             let colors: u32x16<_> = expand_16(avx512, packed.into(), lanes).simd_into(avx512);
             let colors = colors.bitcast::<u8x64<_>>();
             if held.len() == 64 {

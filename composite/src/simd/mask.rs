@@ -1,17 +1,17 @@
-//! Which pixels of a row are active: 64 of them a word, lowest bit first.
+//! Masks of the active pixels of a row: 64 pixels per word, lowest bit first.
 use crate::color::Color;
 use crate::pixel::Composite;
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16, u32x16};
 
-/// What a row, or several, held.
+/// Counts of one row or several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Counts {
     pub(crate) active: usize,
-    /// Depths that are not a number.
+    /// NaN depths.
     pub(crate) nan: u64,
 }
 
-/// Calls `put` with every word of the row. `depths` is empty for formats without depth.
+/// Calls `put` with every mask word of the row. `depths` is empty for formats without depth.
 #[inline(always)]
 pub(crate) fn row_words<P: Composite, S: Simd>(
     simd: S,
@@ -35,7 +35,7 @@ pub(crate) fn row_words<P: Composite, S: Simd>(
             put(word);
         }
         if !rest.is_empty() {
-            // Slabs and small bricks have rows of less than a word.
+            // Slabs and small bricks have rows shorter than a word.
             let one = f32x16::splat(simd, 1.0);
             let (quarters, last) = rest.as_chunks::<16>();
             let (mut word, mut not_numbers) = (0, 0);
@@ -116,8 +116,8 @@ pub(crate) fn row_words_scalar<P: Composite>(
     }
 }
 
-/// 64 flags, each 0 or 1, as bits. The product moves the flag of byte i by 7 (8 - i) bits, to bit
-/// 56 + i; no two flags meet anywhere, so nothing is carried.
+/// Packs 64 flags, each 0 or 1, into bits. The product moves the flag of byte i by 7 (8 - i) bits,
+/// to bit 56 + i; no two flags collide, so there is no carry.
 pub(crate) fn packed(flags: &[u8; 64]) -> u64 {
     let eights = flags.as_chunks::<8>().0.iter().enumerate();
     eights.fold(0, |word, (index, eight)| {

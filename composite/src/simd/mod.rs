@@ -2,9 +2,9 @@
 //! blending.
 //!
 //! Each is written once, generic over the vector type, and compiled for every instruction set; the
-//! best one is chosen at run time. [`SimdLevel::Scalar`] goes pixel by pixel through
-//! [`combine`](crate::combine) and is the reference the others are tested against: all levels give
-//! the same bits.
+//! best one is chosen at run time. [`SimdLevel::Scalar`] processes pixel by pixel with
+//! [`combine`](crate::combine) and is the reference in the tests of the others: all levels give the
+//! same bits.
 pub(crate) mod compress;
 pub(crate) mod expand;
 pub(crate) mod mask;
@@ -13,10 +13,10 @@ pub(crate) mod runs;
 
 use fearless_simd::Level;
 
-/// An instruction set the kernels can be limited to, for tests and for measurements.
+/// An instruction set to which the kernels can be limited, for tests and measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
-    /// One pixel after the other, for every machine.
+    /// One pixel after the other, on every machine.
     Scalar,
     /// 128-bit with the instructions of x86-64-v2.
     Sse42,
@@ -29,7 +29,7 @@ pub enum SimdLevel {
 }
 
 impl SimdLevel {
-    /// The levels this machine can run, lowest first.
+    /// The levels that this machine supports, lowest first.
     pub fn available() -> Vec<Self> {
         let levels = [Self::Scalar, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
         levels
@@ -54,8 +54,7 @@ impl SimdLevel {
         }
     }
 
-    /// The level as fearless_simd knows it; `None` for [`SimdLevel::Scalar`] and where the machine
-    /// lacks it.
+    /// The level in fearless_simd; `None` for [`SimdLevel::Scalar`] and if the machine lacks it.
     fn token(self) -> Option<Level> {
         let _best = Level::new();
         #[cfg(target_arch = "x86_64")]
@@ -77,7 +76,7 @@ impl SimdLevel {
 pub(crate) struct Kernels(pub(crate) Option<Level>);
 
 impl Kernels {
-    /// The wanted level, or the best one where it is not wanted or not there.
+    /// The requested level, or the best one if none is requested or the machine lacks it.
     pub(crate) fn new(wanted: Option<SimdLevel>) -> Self {
         match wanted {
             Some(SimdLevel::Scalar) => Self(None),
@@ -89,8 +88,8 @@ impl Kernels {
 
 /// Runs one expression compiled for the vectors of the chosen level, or the scalar one.
 ///
-/// Not `fearless_simd::dispatch!`, which makes one more copy of every kernel, for processors
-/// without SSE4.2: those of before 2008.
+/// Not `fearless_simd::dispatch!`, which makes one more copy of every kernel, for processors before
+/// 2008, without SSE4.2.
 macro_rules! at_level {
     ($kernels:expr, $simd:ident => $vectors:expr, $scalar:expr) => {
         match $kernels.0 {
@@ -131,13 +130,13 @@ pub(crate) fn for_runs(mut word: u64, mut visit: impl FnMut(usize, usize)) {
         let first = word.trailing_zeros();
         let length = (word >> first).trailing_ones();
         visit(first as usize, length as usize);
-        // Adding the lowest one carries through the run; what it sets behind the run must not stay
-        // set.
+        // Adding the lowest one carries through the run; the bit that it sets after the run must be
+        // cleared.
         word &= !(u64::MAX >> (64 - length) << first);
     }
 }
 
-/// 64 bytes from `at` on; zeros where `bytes` has ended.
+/// 64 bytes from `at` on, padded with zeros after the end of `bytes`.
 #[inline(always)]
 pub(crate) fn load_64(bytes: &[u8], at: usize) -> [u8; 64] {
     if let Some(Ok(whole)) = bytes.get(at..at + 64).map(TryInto::try_into) {

@@ -1,10 +1,10 @@
-//! Colours of four bytes whose alpha is full, as three bytes and back: a quarter less for the wire
-//! that brings the image to one rank.
+//! Colours of four bytes with full alpha, packed into three bytes and back: a quarter fewer bytes
+//! in the messages that collect the image.
 use crate::simd::runs::colors_16;
 use fearless_simd::{Bytes, Simd, SimdBase, u8x64, u32x16};
 
-/// The colours in `out` from `start` on as three bytes each, in place. False, and nothing is
-/// changed, if an alpha is not full.
+/// Packs the colours in `out` from `start` on into three bytes each, in place. Returns false, and
+/// changes nothing, if an alpha is not full.
 #[inline(always)]
 pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize) -> bool {
     let length = out.len() - start;
@@ -21,8 +21,8 @@ pub(crate) fn drop_full_alpha<S: Simd>(simd: S, out: &mut Vec<u8>, start: usize)
         return false;
     }
 
-    // Sixteen bytes at a time are moved down by a quarter; the four that are too many are written
-    // over by what comes next.
+    // Sixteen bytes at a time are moved down by a quarter; the next write overwrites the four
+    // superfluous bytes.
     let packed: [u8; 64] =
         std::array::from_fn(|i| if i % 16 < 12 { (i % 16 / 3 * 4 + i % 16 % 3) as u8 } else { 0 });
     let packed = u8x64::from_slice(simd, &packed);
@@ -57,7 +57,7 @@ pub(crate) fn drop_full_alpha_scalar(out: &mut Vec<u8>, start: usize) -> bool {
         two.copy_from_slice(&out[from..from + 8]);
         let two = u64::from_le_bytes(two);
         let six = two & 0xff_ffff | two >> 8 & 0xffff_ff00_0000;
-        // The two bytes that are too many are written over by what comes next.
+        // The next write overwrites the two superfluous bytes.
         out[to..to + 8].copy_from_slice(&six.to_le_bytes());
         (from, to) = (from + 8, to + 6);
     }
@@ -73,7 +73,7 @@ fn drop_rest(out: &mut Vec<u8>, mut from: usize, mut to: usize) {
     out.truncate(to);
 }
 
-/// Colours of three bytes as four, with full alpha, in place of what `wide` held.
+/// Unpacks colours of three bytes to four, with full alpha, replacing the content of `wide`.
 #[inline(always)]
 pub(crate) fn give_full_alpha<S: Simd>(simd: S, narrow: &[u8], wide: &mut Vec<u8>) {
     let colors = narrow.len() / 3;

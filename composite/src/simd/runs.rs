@@ -1,4 +1,5 @@
-//! Joining runs of consecutive pixels: the nearest one wins, or one colour is laid over another.
+//! Merges runs of consecutive pixels: the nearest one wins, or one colour is composited over
+//! another.
 use crate::color::Color;
 use crate::simd::load_64;
 use bytemuck::{cast_slice, cast_slice_mut, pod_read_unaligned};
@@ -16,8 +17,8 @@ pub(crate) fn colors_16<S: Simd>(simd: S, bytes: &[u8]) -> u32x16<S> {
 /// Takes the pixels that are nearer than those held; equal depths too if `wins_ties`. Held depths
 /// are at most 1.
 ///
-/// `colors` and `depths` are raw values, one for each of `held_colors`; depths of 1 and beyond and
-/// NaN are never taken.
+/// `colors` and `depths` are raw values, one for each of `held_colors`. NaN and depths of 1 or more
+/// are never taken.
 #[inline(always)]
 pub(crate) fn nearest_run<C: Color, S: Simd>(
     simd: S,
@@ -114,8 +115,8 @@ fn nearest_rest<C: Color>(
     }
 }
 
-/// The depth test of sixteen pixels, of which `lanes` says which take part. Colours that lose are
-/// not even read: of eight layers in any order a third is.
+/// The depth test of sixteen pixels, limited to `lanes`. Colours that lose are not even read: of
+/// eight layers in any order only a third are.
 #[inline(always)]
 pub(crate) fn take_nearer<S: Simd>(
     simd: S,
@@ -135,7 +136,7 @@ pub(crate) fn take_nearer<S: Simd>(
     if lanes != u64::MAX {
         wins &= fearless_simd::mask32x16::from_bitmask(simd, lanes);
     }
-    // Most blocks of a picture are taken whole or not at all.
+    // Most blocks of an image are taken entirely or not at all.
     if wins.any_true() {
         wins.select(depth, held).store_slice(held_depth);
         let merged = wins.select(color(), colors_16(simd, held_color));
@@ -229,15 +230,15 @@ pub(crate) fn over_f32<S: Simd>(
     over_one_by_one(&others[64 * blocks..], &mut held[4 * blocks..], others_in_front);
 }
 
-/// All lanes of those of four pixels whose four lanes are all zero; a bit is set for each lane that
-/// is.
+/// A mask of all lanes of those of four pixels whose four lanes are all zero; `zero_lanes` has a
+/// bit for each zero lane.
 #[inline(always)]
 fn lanes_of_empty_pixels(zero_lanes: u64) -> u64 {
     let pairs = zero_lanes & (zero_lanes >> 1);
     (pairs & (pairs >> 2) & 0x1111) * 0xf
 }
 
-/// Loads up to sixteen colours or depths that may reach beyond the end of a message.
+/// Loads up to sixteen colours or depths that may extend past the end of a message.
 #[inline(always)]
 pub(crate) fn padded_16<S: Simd>(simd: S, bytes: &[u8], at: usize) -> u32x16<S> {
     colors_16(simd, &load_64(bytes, at))
