@@ -25,8 +25,8 @@ pub trait Color: Copy + PartialEq + Debug + Send + Sync + Pod {
     /// The nearest colour of this format; integer formats are clamped to 0 … 1.
     fn from_f32(channels: [f32; 4]) -> Self;
 
-    /// Lays `others` (raw colours, one for each of `held`) over or under `held`; colours with no
-    /// bit set change nothing.
+    /// Composites `others` (raw colours, one for each of `held`) over or under `held`; colours with
+    /// all bits zero change nothing.
     #[doc(hidden)]
     #[inline(always)]
     fn over_run<S: Simd>(_simd: S, others: &[u8], held: &mut [Self], others_in_front: bool) {

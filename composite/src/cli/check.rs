@@ -1,5 +1,5 @@
-//! `composite check`: does this machine's transport carry every strategy to the bits of the serial
-//! reference? And, for tests, do faults end as they should?
+//! `composite check`: does every strategy give the bits of the serial reference over this machine's
+//! transport? For tests it also injects faults.
 use super::first_ranks::FirstRanks;
 use super::hard_cases;
 use super::ranks::{RankArgs, RankComm};
@@ -43,7 +43,7 @@ pub(super) struct CheckArgs {
 enum Fault {
     /// Ended by a signal, as when memory runs out.
     Killed,
-    /// Alive, but busy with something else.
+    /// Alive, but does not communicate.
     Stalled,
     /// A panic.
     Panic,
@@ -55,11 +55,11 @@ enum Fault {
     Leaves,
     /// A message of pixels arrives with a wrong bit.
     Corrupt,
-    /// No fault: it renders for three timeouts, and says so.
+    /// No fault: it renders for three timeouts, with signs of life.
     Slow,
 }
 
-/// Odd sizes, fewer pixels than ranks, and one that needs more than one word a row.
+/// Odd sizes, fewer pixels than ranks, and rows of more than one mask word.
 const SIZES_PX: [(u32, u32); 4] = [(1, 1), (7, 3), (67, 5), (150, 41)];
 const STRATEGIES: [Strategy; 5] = [
     Strategy::DirectSend,
@@ -73,13 +73,13 @@ const STRATEGIES: [Strategy; 5] = [
 struct CheckReport {
     ranks: usize,
     transport: String,
-    /// Machines that the ranks are on.
+    /// Number of machines that the ranks are on.
     nodes: usize,
     /// Numbers of ranks that were checked.
     counts: Vec<usize>,
     images: u64,
     images_differ: u64,
-    /// Of the hard cases.
+    /// Counts of the hard cases.
     hard_images: u64,
     hard_images_differ: u64,
 }
@@ -160,7 +160,7 @@ pub(super) fn check(
                     }
                 }
             }
-            // Nobody leaves while others still composite.
+            // No rank leaves while others still composite.
             comm.comm().barrier(timeout)?;
             let [hard_images, hard_images_differ] = hard;
             Ok(CheckReport {
@@ -206,8 +206,8 @@ pub(super) fn check(
     )
 }
 
-/// Composites one scene with depth and blended, in shared memory if wanted and possible; on rank 0,
-/// whether each image has the bits of the reference.
+/// Composites one workload with depth and blended, in shared memory if wanted and possible. Returns
+/// on rank 0 whether each image has the bits of the reference.
 fn one_frame(
     comm: &mut dyn Communicator,
     scene: Workload,
@@ -226,7 +226,7 @@ fn one_frame(
     };
     let (drawn, glass) = draw(rank);
     let order = scene.front_to_back(1, ranks);
-    // Everybody's frames, in the order of compositing, where they are compared.
+    // All ranks' frames, in the order of compositing, on the rank that compares.
     let everybody: Vec<_> =
         if rank == 0 { order.iter().map(|&rank| draw(rank)).collect() } else { Vec::new() };
     let options =
@@ -264,18 +264,18 @@ fn bits_are_equal<P: Composite>(a: &crate::Image<P>, b: &crate::Image<P>) -> boo
     a.to_bytes() == b.to_bytes()
 }
 
-/// Room that a receive may take before anything has come: beside its chunk, what the allocator and
-/// the library take.
+/// Most memory that a receive may take before anything has arrived: what the allocator and the
+/// library take in addition to its chunk.
 const MOST_ROOM_BYTES: u64 = 1 << 28;
 
-/// Bytes of this process's address space; 0 where the system does not say.
+/// Bytes of this process's address space; 0 where the system does not report it.
 fn address_space_bytes() -> u64 {
     let pages = std::fs::read_to_string("/proc/self/statm").ok();
     let pages = pages.and_then(|text| text.split(' ').next()?.parse::<u64>().ok());
     pages.unwrap_or(0) * 4096
 }
 
-/// Messages of many lengths around the ring, each byte checked.
+/// Sends messages of many lengths around the ring and checks each byte.
 fn big_messages(
     comm: &mut dyn Communicator,
     is_a_process: bool,
@@ -285,11 +285,11 @@ fn big_messages(
     let byte = |rank: usize, at: usize| (at.wrapping_mul(31) ^ rank ^ (at >> 8)) as u8;
     let (next, previous) = ((rank + 1) % size, (rank + size - 1) % size);
     const LENGTHS: [usize; 9] = [0, 1, 999, 1000, 1001, 2000, 65_536, 100_000, 3_000_000];
-    // What is announced and does not come takes no room.
+    // A posted message that does not arrive takes no memory.
     let before = address_space_bytes();
     let announced = comm.post_recv(previous, 78, 1 << 40)?;
     comm.send(next, 78, vec![rank as u8; 3])?;
-    // Of a process that other ranks share nobody can say what took its room.
+    // If ranks share a process, the memory cannot be attributed to one of them.
     let more = if is_a_process { address_space_bytes().saturating_sub(before) } else { 0 };
     anyhow::ensure!(
         more <= MOST_ROOM_BYTES,
@@ -297,7 +297,7 @@ fn big_messages(
     );
     let came = comm.wait_any(&mut vec![announced], timeout)?.message;
     anyhow::ensure!(came == [previous as u8; 3], "{came:?} from rank {previous}");
-    // All are posted before the first is sent, and taken in the order of arrival.
+    // All are posted before the first is sent, and received in the order of arrival.
     let mut posted = Vec::new();
     for length in LENGTHS {
         posted.push(comm.post_recv(previous, 77, length)?);
@@ -321,12 +321,12 @@ fn big_messages(
     Ok(())
 }
 
-/// What the highest rank does instead of its part.
+/// The faults of the highest rank.
 fn fail(comm: &mut RankComm, fault: Fault, timeout: Duration) -> anyhow::Result<()> {
     let comm = comm.comm();
     let culprit = comm.rank() + 1 == comm.size();
     if fault == Fault::Corrupt {
-        // All composite the same frame.
+        // All ranks composite the same frame.
         let frame =
             Frame::<DepthPixel<[u8; 4]>>::with_depth(150, 41, &[[1; 4]; 6150], &[0.5; 6150])?;
         let options = Options { timeout, verify: true, in_memory: false, ..Options::default() };

@@ -1,5 +1,5 @@
 //! `composite compare`: our compositing and IceT's, frame by frame on the same ranks and frames, in
-//! one table for any lists of numbers of ranks, sizes, scenes, formats and instruction sets.
+//! one table for any lists of numbers of ranks, sizes, workloads, formats and instruction sets.
 mod measure;
 mod table;
 
@@ -53,7 +53,7 @@ pub(super) struct CompareArgs {
     frames: Option<u64>,
 }
 
-/// What a word of `--scene` stands for.
+/// The workloads of one word of `--scene`.
 type Workloads = &'static [Workload];
 
 pub(super) fn compare(
@@ -64,7 +64,7 @@ pub(super) fn compare(
     if let Some(size) = args.size.iter().find(|size| !(1..=32_768).contains(*size)) {
         return Err(UsageError(format!("an image of {size}x{size}: give 1 to 32768")).into());
     }
-    // Before any rank is started: without the rival there is nothing to compare with.
+    // Before any rank is started: without IceT there is nothing to compare with.
     let icet = icet::find().map_err(|error| UsageError(error.to_string()))?;
     let counts = args.ranks.counts();
     if args.ranks.is_rank() || counts.len() < 2 {
@@ -83,7 +83,7 @@ pub(super) fn compare(
         );
     }
 
-    // A job for each number of ranks, and one table of all.
+    // One job for each number of ranks, and one table of all.
     let mut all: Option<Comparison> = None;
     let mut status = Status::Success;
     for &ranks in counts {
@@ -107,7 +107,7 @@ pub(super) fn compare(
     Ok(status)
 }
 
-/// All that is asked of one group of ranks.
+/// All measurements on one group of ranks.
 fn one_job(
     comm: &mut RankComm,
     args: &CompareArgs,
@@ -145,8 +145,8 @@ fn one_job(
     Ok(Comparison { machine, rows })
 }
 
-/// This program with one number of ranks, and what it has found; its notes and errors go where ours
-/// go.
+/// Runs this program with one number of ranks and returns its result; its notes and errors go where
+/// ours go.
 fn started_again(
     ranks: usize,
     arguments: &[OsString],

@@ -1,5 +1,5 @@
-//! `composite demo`: a data set rendered in parts ([`demo_data`]), or frames made without a
-//! renderer composited; with a plot of what each rank did when.
+//! `composite demo`: renders a data set in parts ([`demo_data`]) or composites synthetic frames,
+//! with a plot of each rank's activities over time.
 use super::demo_args::DemoArgs;
 use super::rank_records::RankTimes;
 use super::ranks::RankComm;
@@ -28,7 +28,7 @@ struct DemoReport {
     ranks: Vec<RankTimes>,
 }
 
-/// The frame that is shown, on rank 0.
+/// The last frame, on rank 0.
 type FinishedDemo = (String, f64, Vec<[u8; 4]>, Vec<RankTimes>);
 
 pub(super) fn demo(
@@ -42,7 +42,7 @@ pub(super) fn demo(
         )
         .into());
     }
-    // Before anything is rendered: a folder that cannot be made is found out now.
+    // Before anything is rendered, so that a folder that cannot be made is reported now.
     if !args.ranks.is_rank() {
         std::fs::create_dir_all(&args.out)
             .with_context(|| format!("cannot make the folder {}", args.out.display()))
@@ -92,7 +92,7 @@ pub(super) fn demo(
     )
 }
 
-/// The colours are taken as linear light; what nobody drew stays transparent.
+/// Colours are taken as linear light; pixels that nobody drew stay transparent.
 fn write_picture(path: &std::path::Path, size: u32, colors: &[[u8; 4]]) -> anyhow::Result<()> {
     let linear: Vec<[f32; 4]> =
         colors.iter().map(|c| c.map(|channel| f32::from(channel) / 255.0)).collect();

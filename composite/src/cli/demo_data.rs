@@ -1,4 +1,4 @@
-//! `composite demo` of a data set: generated, cut into parts, rendered by all ranks.
+//! `composite demo` of a data set: generates it, cuts it into parts, and renders it on all ranks.
 use super::demo_args::DemoArgs;
 use super::rank_records::RankRecord;
 use super::ranks::RankComm;
@@ -21,14 +21,14 @@ struct DemoReport {
     size_px: u32,
     frame_ms: f64,
     light: String,
-    /// Triangles and other primitives that cannot be hit: with NaN, infinite or absurd corners.
+    /// Primitives that cannot be hit: with NaN, infinite or absurd corners.
     unusable: usize,
     picture: PathBuf,
     plot: PathBuf,
     ranks: Vec<RankRecord>,
 }
 
-/// The frame that is shown, on rank 0.
+/// The last frame, on rank 0.
 struct FinishedDemo {
     transport: String,
     light: String,
@@ -52,7 +52,7 @@ pub(super) fn demo(
         cut_by_view: args.cut_by_view,
         ..Demo::default()
     };
-    // Ranks that are threads share what is made before the frame.
+    // Ranks that are threads share the data made before the frame.
     let shared: Mutex<Option<Arc<PreparedDemo>>> = Mutex::new(None);
     args.ranks.run(
         common,
@@ -127,7 +127,7 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Resul
     Ok(Status::Success)
 }
 
-/// What a rank may tell of its frame: some hundred thousand spans.
+/// Most bytes of a rank's record: some hundred thousand spans.
 const MOST_LINE_BYTES: usize = 1 << 24;
 
 fn frames(
@@ -153,7 +153,7 @@ fn frames(
         colors = done.frame.map(|f| f.color).unwrap_or(colors);
         report = done.report;
     }
-    // Lengths first: how many spans a rank has is its own affair.
+    // Lengths first, because ranks have different numbers of spans.
     let mine = serde_json::to_vec(&RankRecord::new(rank, triangles, &report))?;
     let lengths = comm.all_gather(&(mine.len() as u64).to_le_bytes(), 8, timeout)?;
     let length =

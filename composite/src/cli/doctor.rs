@@ -1,4 +1,4 @@
-//! `composite doctor`: what there is on this machine, and what to do about what is not.
+//! `composite doctor`: what this machine has, and how to get what it lacks.
 use super::mpirun;
 use crate::comm::mpi::{inspect, launcher};
 use crate::icet;
@@ -67,7 +67,7 @@ fn mpi(what: &'static str, names: &[&str], package: &str) -> Finding {
     }
 }
 
-/// First line that a program prints of itself.
+/// The first line that a program prints about itself.
 fn version_of(program: impl AsRef<std::ffi::OsStr>, flag: &str) -> Option<String> {
     let output = Command::new(program).arg(flag).output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned()

@@ -1,5 +1,5 @@
-//! The first ranks of a group as a group of their own, so that one launch checks several numbers of
-//! ranks; and a rank whose messages are damaged, for tests.
+//! A group of the first ranks of a group, so that one launch checks several numbers of ranks; and a
+//! rank whose messages are damaged, for tests.
 use crate::comm::{
     Arrival, CommError, Communicator, FIRST_RESERVED_TAG, Receive, SharedSegments, collective,
 };
@@ -9,17 +9,17 @@ use std::time::Duration;
 pub(super) struct FirstRanks<'a> {
     inner: &'a mut dyn Communicator,
     size: usize,
-    /// Whether this rank's next message of pixels gets a wrong bit.
+    /// Whether this rank's next message with pixels gets a wrong bit.
     damage: bool,
 }
 
 impl<'a> FirstRanks<'a> {
-    /// The first `size` ranks of `inner`; `None` for a rank that is none of them.
+    /// The first `size` ranks of `inner`; `None` on the other ranks.
     pub(super) fn new(inner: &'a mut dyn Communicator, size: usize) -> Option<Self> {
         (inner.rank() < size && size <= inner.size()).then_some(Self { inner, size, damage: false })
     }
 
-    /// All ranks; this one's first message of pixels arrives with a wrong bit.
+    /// All ranks; this one's first message with pixels arrives with a wrong bit.
     pub(super) fn damaged(inner: &'a mut dyn Communicator) -> Self {
         let size = inner.size();
         Self { inner, size, damage: true }
@@ -43,7 +43,7 @@ impl Communicator for FirstRanks<'_> {
         self.inner.working_secs()
     }
 
-    // Plans follow from it: ranks that are wrapped and ranks that are not must agree.
+    // Plans depend on it: ranks that are wrapped and ranks that are not must agree.
     fn is_one_node(&self) -> bool {
         self.inner.is_one_node()
     }
@@ -89,7 +89,7 @@ impl Communicator for FirstRanks<'_> {
         self.inner.wait_any(posted, timeout)
     }
 
-    // All ranks must take part in the same way: a whole group in the way of its transport.
+    // All ranks must take the same path: a whole group uses the barrier of its transport.
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
         if self.size == self.inner.size() {
             return self.inner.barrier(timeout);

@@ -5,23 +5,23 @@ const LEFT: f64 = 70.0;
 const ROW: f64 = 22.0;
 const TOP: f64 = 64.0;
 
-/// What is drawn.
+/// Content and size of a chart.
 pub(super) struct Chart<'a> {
     pub(super) title: &'a str,
-    /// Names and colours of what bars stand for.
+    /// Names and colours of the bars.
     pub(super) legend: &'a [(&'static str, &'static str)],
     /// Ranks and their bars, from the top.
     pub(super) rows: Vec<(usize, Vec<Bar>)>,
     /// The time axis goes from 0 to here.
     pub(super) end_ms: f64,
-    /// Places on the axis and what is written there.
+    /// Positions on the axis and their labels.
     pub(super) ticks: Vec<(f64, String)>,
     pub(super) tick_color: &'static str,
-    /// Under the axis.
+    /// Text under the axis.
     pub(super) note: Option<&'static str>,
     /// Length of the axis.
     pub(super) axis_px: f64,
-    /// Right of the axis.
+    /// Margin right of the axis.
     pub(super) margin_px: f64,
 }
 

@@ -1,5 +1,5 @@
-//! `composite check --hard`: cases that compositors are known to get wrong, by name, by every
-//! strategy, over whatever carries the messages.
+//! `composite check --hard`: cases that compositors are known to get wrong, by name, with every
+//! strategy, over any transport.
 use crate::comm::Communicator;
 use crate::compositor::{Compositor, Options};
 use crate::error::CompositeError;
@@ -10,7 +10,7 @@ use crate::reference::composite_serial;
 use crate::strategies::Strategy;
 use std::time::Duration;
 
-/// What a rank draws.
+/// What each rank draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Case {
     /// The same depth on all ranks: the highest rank wins, always.
@@ -19,9 +19,9 @@ enum Case {
     StrangeDepths,
     /// Half empty, with ties.
     Sizes,
-    /// Every third rank has nothing.
+    /// Every third rank has drawn nothing.
     EmptyRanks,
-    /// Nobody has anything.
+    /// No rank has drawn anything.
     AllEmpty,
 }
 
@@ -40,21 +40,21 @@ const STRANGE: [f32; 12] = [
     0.5,
 ];
 
-/// A number below 2^16 from three.
+/// A pseudorandom number below 2^16 from three numbers.
 fn noise(a: usize, b: usize, c: usize) -> u64 {
     mix64((a as u64) << 40 ^ (b as u64) << 20 ^ c as u64) & 0xffff
 }
 
 impl Case {
-    /// Sizes in pixels that are checked on `ranks` ranks. Of the 335 sizes from 1x1 to 67x5, every
-    /// rank count of a group of `most` has its share.
+    /// Sizes in pixels that are checked on `ranks` ranks. The 335 sizes from 1x1 to 67x5 are
+    /// divided among the rank counts of a group of `most`.
     fn sizes(self, ranks: usize, most: usize) -> Vec<(u32, u32)> {
         match self {
             Case::Sizes => {
                 let all = (0..67 * 5).filter(|k| k % most == ranks % most);
                 all.map(|k| (1 + k % 67, 1 + k / 67)).map(|(w, h)| (w as u32, h as u32)).collect()
             }
-            // One with fewer pixels than any group has ranks.
+            // The first has fewer pixels than any group has ranks.
             _ => vec![(1, 1), (37, 5)],
         }
     }
@@ -77,8 +77,8 @@ impl Case {
     }
 }
 
-/// Images composited and those with a wrong bit, on rank 0. With `repeats`, the image of equal
-/// depths is made as often as that.
+/// Number of images composited and of those with a wrong bit, on rank 0. The image of equal depths
+/// is composited `repeats` times.
 pub(super) fn run(
     comm: &mut dyn Communicator,
     strategies: &[Strategy],
@@ -124,7 +124,8 @@ pub(super) fn run(
     Ok(count)
 }
 
-/// Composites what `draw` gives for each rank `times` times and compares with the serial reference.
+/// Composites the frames that `draw` returns for each rank `times` times and compares with the
+/// serial reference.
 fn one<P: Composite, D>(
     comm: &mut dyn Communicator,
     compositor: &mut Compositor<P>,

@@ -1,4 +1,4 @@
-//! The command line: ranks are started, or joined, and one of the jobs below is done on them.
+//! The command line: starts or joins ranks and runs one of the jobs below on them.
 
 mod check;
 mod compare;

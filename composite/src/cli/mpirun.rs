@@ -4,24 +4,24 @@ use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::process::{Command, ExitStatus};
 
-/// Names the launcher to use instead of `mpirun`.
+/// The variable that names the launcher to use instead of `mpirun`.
 pub(super) const LAUNCHER_VARIABLE: &str = "COMPOSITE_MPIRUN";
 
-/// The launcher that is used.
+/// The launcher to use.
 pub(super) fn launcher() -> OsString {
     std::env::var_os(LAUNCHER_VARIABLE)
         .filter(|name| !name.is_empty())
         .unwrap_or_else(|| "mpirun".into())
 }
 
-/// Whether this is the superuser, without whom Open MPI does not ask twice.
+/// Whether this process runs as root, for which Open MPI requires two confirmations.
 fn is_root() -> bool {
     use std::os::unix::fs::MetadataExt as _;
     std::fs::metadata("/proc/self").is_ok_and(|me| me.uid() == 0)
 }
 
-/// What Open MPI needs to run more ranks than there are processors without waiting for whole time
-/// slices, and in a container. Others ignore it.
+/// Settings that Open MPI needs in a container, and to run more ranks than there are processors
+/// without waiting for whole time slices. Others ignore them.
 pub(super) fn settings(ranks: usize) -> Vec<(&'static str, &'static str)> {
     let mut settings = vec![("OMPI_MCA_btl", "self,vader")];
     if is_root() {
@@ -63,7 +63,7 @@ pub(super) fn start(
     Ok(outcome(status))
 }
 
-/// A launcher ends as the first rank that failed; anything unknown is a failure.
+/// A launcher exits with the code of the first rank that failed; any other code is a failure.
 pub(super) fn outcome(status: ExitStatus) -> Status {
     match status.code() {
         Some(0) => Status::Success,

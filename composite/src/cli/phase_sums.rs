@@ -1,4 +1,4 @@
-//! What each rank did in a frame, as a Gantt chart and as a table with IceT's columns.
+//! A Gantt chart and a table, with IceT's columns, of what each rank did in a frame.
 use super::gantt::{Bar, Chart};
 use super::rank_records::RankTimes;
 use std::fmt::Write as _;
@@ -6,8 +6,7 @@ use std::fmt::Write as _;
 /// Name, colour, and seconds of a rank.
 type Phase = (&'static str, &'static str, fn(&RankTimes) -> f64);
 
-/// The phases in the order in which they begin; the colours are Okabe and Ito's, which the
-/// colour-blind can tell apart.
+/// The phases in the order in which they begin, in the colour-blind-safe colours of Okabe and Ito.
 const PHASES: [Phase; 5] = [
     ("render", "#009e73", |line| line.render_secs),
     ("compress", "#56b4e9", |line| line.compress_secs),
@@ -16,8 +15,8 @@ const PHASES: [Phase; 5] = [
     ("collect", "#cc79a7", |line| line.collect_secs),
 ];
 
-/// One bar for each rank. Phases of a frame alternate many times; a bar shows their sums one after
-/// the other.
+/// One bar for each rank and phase. Phases of a frame alternate many times; the bars show their
+/// sums, one after the other.
 pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
     let longest = lines.iter().map(|line| line.total_secs).fold(1e-9, f64::max);
     let step = nice_step(1e3 * longest / 6.0);
@@ -51,7 +50,7 @@ pub(super) fn svg(title: &str, lines: &[RankTimes]) -> String {
     chart.svg()
 }
 
-/// The same as a table.
+/// The same sums as a table.
 pub(super) fn table(lines: &[RankTimes]) -> String {
     let mut text = format!(
         "{:>4} {:>10} {:>12} {:>9} {:>8} {:>11} {:>9} {:>12}",
@@ -112,7 +111,7 @@ mod tests {
     #[test]
     fn bars_are_as_long_as_their_phases() {
         let text = svg("a frame", &[line(0), line(1)]);
-        // 4 ms of an axis of 8.
+        // 4 ms on an axis of 8 ms.
         assert!(text.contains("width=\"380.00\""), "{text}");
         assert_eq!(text.matches("rank 1: ").count(), PHASES.len());
     }

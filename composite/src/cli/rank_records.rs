@@ -1,9 +1,9 @@
-//! What one rank did in the frame of a demo, as it travels to rank 0 and into JSON.
+//! What one rank did in the frame of a demo, as sent to rank 0 and written to JSON.
 use crate::render::{Activity, RankReport, Span};
 use crate::report::Report;
 use serde::{Deserialize, Serialize};
 
-/// What one rank did in the frame that is shown, in seconds, and bytes.
+/// What one rank did in the last frame, in seconds, and bytes.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct RankTimes {
     pub(super) rank: usize,
@@ -63,7 +63,7 @@ impl RankTimes {
     }
 }
 
-/// What one rank did in the frame that is shown.
+/// What one rank did in the last frame.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct RankRecord {
     pub(super) rank: usize,
@@ -80,7 +80,7 @@ pub(super) struct RankRecord {
     pub(super) answered_rays: u64,
     pub(super) rounds: u32,
     pub(super) bytes_sent: u64,
-    /// Activity (place in [`Activity::ALL`]), begin and end in milliseconds.
+    /// Activity (index in [`Activity::ALL`]), beginning and end in milliseconds.
     pub(super) spans: Vec<(usize, f64, f64)>,
 }
 

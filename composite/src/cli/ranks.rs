@@ -8,7 +8,7 @@ use std::ffi::OsString;
 use std::io::Write as _;
 use std::time::Duration;
 
-/// The largest job that is started: more threads or processes on one machine measure nothing.
+/// The largest job: more threads or processes on one machine measure nothing.
 const MOST_RANKS: usize = 4096;
 
 /// The network of `--model`, which is that of `--smpi`.
@@ -46,7 +46,7 @@ pub(super) struct RankArgs {
     linger_ms: u64,
 }
 
-/// One rank, whatever it is.
+/// One rank on any transport.
 pub(super) enum RankComm {
     Thread(threads::ThreadComm),
     Mpi(Box<MpiComm>),
@@ -62,7 +62,7 @@ impl RankComm {
         }
     }
 
-    /// Machines that the ranks are on.
+    /// Number of machines that the ranks are on.
     pub(super) fn nodes(&mut self) -> usize {
         match self {
             Self::Thread(_) => 1,
@@ -79,7 +79,7 @@ impl RankComm {
         }
     }
 
-    /// What carries the messages.
+    /// Name of the transport.
     pub(super) fn transport(&self) -> String {
         match self {
             Self::Thread(_) => "threads".to_string(),
@@ -102,7 +102,7 @@ impl RankArgs {
         Duration::from_secs_f64(self.timeout.clamp(0.001, 1e6))
     }
 
-    /// What is to be said of every number of simulated ranks.
+    /// The caveat of every number from simulated ranks.
     pub(super) fn caveat(&self) -> Option<String> {
         if smpirun::inside() {
             return Some(smpirun::CAVEAT.to_string());
@@ -119,7 +119,7 @@ impl RankArgs {
         self.smpi || self.model
     }
 
-    /// The numbers of ranks that were asked for.
+    /// The requested numbers of ranks.
     pub(super) fn counts(&self) -> &[usize] {
         &self.ranks
     }
@@ -150,8 +150,9 @@ impl RankArgs {
         }
     }
 
-    /// Does `work` on every rank, starting them if this is not one, and hands what rank 0 made to
-    /// `finish`. `arguments` are this program's own, for processes that are to do the same.
+    /// Does `work` on every rank, starting them if this process is not one, and passes the result
+    /// of rank 0 to `finish`. `arguments` are this program's own, for processes that are to do the
+    /// same.
     pub(super) fn run<T: Send>(
         &self,
         common: CommonArgs,
@@ -177,7 +178,7 @@ impl RankArgs {
             result
         };
         let results = if self.model {
-            // One at a time computes, so that ranks do not disturb each other.
+            // One rank computes at a time, so that ranks do not disturb each other.
             let measured = sim::Compute::Measured(1.0);
             sim::run_on(ranks, MODEL, measured, 1, |comm| on_rank(RankComm::Model(comm)))
         } else {
@@ -189,10 +190,10 @@ impl RankArgs {
             match result.map_err(anyhow::Error::from).and_then(|inner| inner) {
                 Ok(value) if rank == 0 => root = Some(value),
                 Ok(_) => {}
-                // That somebody gave up is said by all; why, by that one.
+                // All ranks report that the group was aborted; the rank that gave up reports why.
                 Err(error) => {
                     if first_error.as_ref().is_none_or(is_echo) {
-                        // What is wrong with the command is no one rank's.
+                        // A usage error is not specific to a rank.
                         let of_all = error.is::<UsageError>();
                         first_error = Some(if of_all {
                             error
@@ -238,7 +239,7 @@ impl RankArgs {
                 }
             }
             Err(error) => {
-                // In one piece: all ranks write here, and what they write piece by piece is mixed.
+                // In one write: all ranks write here, and separate writes would be interleaved.
                 let line = format!("error: {}: {error:#}\n", comm.location());
                 let _ = std::io::stderr().write_all(line.as_bytes());
                 comm.comm().abort(&format!("{error:#}"));

@@ -1,5 +1,5 @@
-//! Starting this program as simulated ranks: SimGrid's `smpirun`, a made platform, and the program
-//! as a shared library.
+//! Starts this program as simulated ranks: SimGrid's `smpirun`, a generated platform, and the
+//! program as a shared library.
 //!
 //! Computation is measured on this machine (CPU time of each rank), communication is simulated: a
 //! non-blocking crossbar of nodes with one 4X QDR InfiniBand adapter each, 3.2 GB/s both ways, half
@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const LIBRARY: &str = "libcomposite_smpi.so";
-/// Names the shared library instead.
+/// The variable that names the shared library to use.
 const LIBRARY_VARIABLE: &str = "COMPOSITE_SMPI_LIBRARY";
 
-/// What is said of every number that was made this way.
+/// The caveat of every number from SMPI.
 pub(super) const CAVEAT: &str = "simulated network (SimGrid SMPI): non-blocking crossbar, one 3.2 \
                                  GB/s 4X QDR adapter per node; \
      computing measured on this machine's cores; no noise of operating systems, no shared memory \
@@ -24,7 +24,7 @@ pub(super) const CAVEAT: &str = "simulated network (SimGrid SMPI): non-blocking 
 
 /// Whether this is a simulated rank.
 pub(super) fn inside() -> bool {
-    // smpirun exports it to the simulation (and says that programs may use it).
+    // smpirun exports it to the simulation (its documentation says that programs may use it).
     std::env::var_os("SMPI_GLOBAL_SIZE").is_some()
 }
 
@@ -45,13 +45,13 @@ pub(super) fn start(
     command.args(["-np", &ranks.to_string()]);
     command.arg("-platform").arg(&platform).arg("-hostfile").arg(&hosts);
     command.args([
-        // A second of computing here is a second there, and every microsecond counts.
+        // A second of computing here is a simulated second, and every microsecond counts.
         "--cfg=smpi/host-speed:1Gf",
         "--cfg=smpi/simulate-computation:yes",
         "--cfg=smpi/cpu-threshold:1e-7",
         // The default collectives are pathological from 96 ranks on (13 times slower).
         "--cfg=smpi/coll-selector:mpich",
-        // Looking whether a message has left, and what time it is, costs no simulated time.
+        // Polling for messages and reading the clock cost no simulated time.
         "--cfg=smpi/test:0",
         "--cfg=smpi/wtime:0",
         "--log=root.thresh:error",
@@ -90,13 +90,13 @@ fn hosts_text(ranks: usize) -> String {
     })
 }
 
-/// Places where cargo puts the library, given where this program is.
+/// Paths where cargo puts the library, relative to this program.
 fn candidates(program: &Path) -> Vec<PathBuf> {
     let folder = program.parent().unwrap_or(Path::new("."));
     vec![folder.join("examples").join(LIBRARY), folder.join(LIBRARY)]
 }
 
-/// The program as a shared library: named, beside the program, or built now.
+/// The program as a shared library: the named one, one next to this program, or one built now.
 fn library(common: CommonArgs) -> anyhow::Result<PathBuf> {
     if let Some(named) = std::env::var_os(LIBRARY_VARIABLE) {
         return Ok(PathBuf::from(named));

@@ -1,11 +1,10 @@
-//! When each rank of a data-parallel frame did what: a Gantt chart and a table.
+//! What each rank of a data-parallel frame did when: a Gantt chart and a table.
 use super::gantt::{Bar, Chart};
 use super::rank_records::RankRecord;
 use crate::render::Activity;
 use std::fmt::Write as _;
 
-/// Colours of Okabe and Ito, which the colour-blind can tell apart, in the order of
-/// [`Activity::ALL`].
+/// Colour-blind-safe colours of Okabe and Ito, in the order of [`Activity::ALL`].
 const COLORS: [&str; 6] = ["#009e73", "#0072b2", "#f0e442", "#56b4e9", "#dddddd", "#cc79a7"];
 
 /// A row for each rank, a bar for each span.

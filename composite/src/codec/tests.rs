@@ -14,7 +14,7 @@ fn all_kernels() -> Vec<Kernels> {
     SimdLevel::available().into_iter().map(|level| Kernels::new(Some(level))).collect()
 }
 
-/// Planes of an image in which `active` says what is drawn.
+/// Planes of an image in which `active` pixels are drawn.
 fn planes<F: Composite>(width: u32, height: u32, active: impl Fn(u32, u32) -> bool) -> Layer<F> {
     let bounds = Rect::of_size(width, height);
     let mut layer = Layer::empty(bounds, None);
@@ -46,7 +46,7 @@ fn pattern(kind: u32, x: u32, y: u32) -> bool {
     }
 }
 
-/// Joins one pixel by the operator itself.
+/// Merges one pixel with the operator itself.
 fn merge_one<F: Composite>(held: &mut Layer<F>, layer: &Layer<F>, x: u32, y: u32, side: Side) {
     let pixel = |view: View<'_, F>| {
         let (color, depth) = view.row(y, x, x + 1);
@@ -59,7 +59,7 @@ fn merge_one<F: Composite>(held: &mut Layer<F>, layer: &Layer<F>, x: u32, y: u32
     depths.iter_mut().for_each(|depth| *depth = merged.depth());
 }
 
-/// Encoding and every way of reading, at every level, against the scalar one.
+/// Encoding and all decoders, at every level, against the scalar ones.
 fn check_format<F: Composite>() {
     let rects = [
         Rect { x0: 0, y0: 0, x1: 150, y1: 5 },
@@ -86,7 +86,7 @@ fn check_format<F: Composite>() {
                     let part = codec(kernels).decode::<F>(&message, rect, depths).unwrap();
                     assert_eq!(part.active, counts.active);
 
-                    // Placed, it is what was drawn.
+                    // Copied, it equals what was drawn.
                     let mut placed = planes::<F>(150, 5, |_, _| true);
                     let (colors, placed_depths) = (&mut placed.colors, &mut placed.depths);
                     let placed_depths: &mut [f32] = if depths { placed_depths } else { &mut [] };
@@ -100,8 +100,8 @@ fn check_format<F: Composite>() {
                         continue;
                     }
 
-                    // Joined, from either side and as a message or as a view, it has the bits of
-                    // the operator, pixel by pixel.
+                    // Merged from either side, as a message or as a view, it has the bits of the
+                    // operator, pixel by pixel.
                     for side in [Side::Lower, Side::Higher] {
                         let mut one_by_one = held.clone();
                         for y in rect.y0..rect.y1 {
@@ -223,10 +223,10 @@ fn another_fingerprint_or_part_is_named() {
 
 #[test]
 fn lengths_beyond_two_to_the_31_bytes_are_counted_right() {
-    // 46341^2 pixels are just beyond 2^31, and their messages beyond 2^34 bytes.
+    // 46341^2 pixels are just above 2^31, and their messages above 2^34 bytes.
     let rect = Rect::of_size(46_341, 46_341);
     assert_eq!(longest::<P>(&rect), 64 + 46_341 * 725 * 8 + 46_341 * 46_341 * 8);
-    // A header that announces as much is judged by its length, in 64 bits.
+    // A header that announces as much is checked by its length, in 64 bits.
     let codec = codec(Kernels::new(None));
     let (.., mut message) = good(false);
     message.truncate(HEADER_BYTES);
@@ -249,8 +249,8 @@ proptest! {
         prop_assert!(codec.decode::<P>(&bytes, rect, true).is_err());
     }
 
-    /// Lies with a right checksum: the decoder must find the contradiction itself, and what it
-    /// accepts can be read.
+    /// Invalid headers with a correct checksum: the decoder must find the contradiction itself, and
+    /// what it accepts must be readable.
     #[test]
     fn consistent_checksums_do_not_make_the_decoder_trust_the_numbers(
         changes in proptest::collection::vec((24..200_usize, any::<u8>()), 1..6),

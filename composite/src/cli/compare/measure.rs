@@ -1,4 +1,4 @@
-//! Both compositors on the same ranks and frames, frame by frame in turn.
+//! Measures both compositors on the same ranks and frames, alternating frame by frame.
 use super::table::{Pixels, Row};
 use crate::cli::ranks::RankComm;
 use crate::compositor::{Compositor, Options};
@@ -16,14 +16,14 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Frames before the clock counts: buffers are made and connections opened.
+/// Frames before measuring starts, in which buffers are allocated and connections opened.
 const WARM_UP: u64 = 3;
-/// Largest difference of a channel that counts as equal where floating-point colours are blended:
+/// Largest difference of a channel that counts as equal where floating-point colours are blended.
 /// IceT groups the ranks differently for every strategy, so its own strategies differ by about as
 /// much.
 const BLEND_TOLERANCE: f32 = 1e-5;
 
-/// What is the same for all frames of a measurement.
+/// Settings that are the same for all frames of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
     pub(super) size_px: u32,
@@ -46,17 +46,17 @@ pub(super) struct Bench<'a> {
     glass: Vec<[f32; 4]>,
 }
 
-/// The places of one rank that is a thread at tables that it shares with the others.
+/// One rank's members of shared-memory groups, for ranks that are threads.
 pub(super) struct GroupMembers {
     depth: SharedMemoryRank<DepthPixel<[u8; 4]>>,
     blend: SharedMemoryRank<PremultipliedPixel<[f32; 4]>>,
 }
 
-/// Places for all ranks, until they come.
+/// The members of all ranks, until the ranks take them.
 pub(super) struct Groups(Vec<Mutex<Option<GroupMembers>>>);
 
 impl Groups {
-    /// For ranks that are threads; 0 if they are not, or are to send messages.
+    /// For ranks that are threads; 0 if they are processes or have to send messages.
     pub(super) fn new(ranks: usize) -> Self {
         let members = shared_memory_group(ranks).into_iter().zip(shared_memory_group(ranks));
         Self(
@@ -123,8 +123,8 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The frame at hand by IceT's strategy of this number, and what `look` makes of the image
-    /// where it is.
+    /// Composites the current frame with IceT's strategy of this number, and calls `look` with the
+    /// image where there is one.
     fn run_icet<T>(
         &mut self,
         strategy: usize,
@@ -150,7 +150,7 @@ impl<'a> Bench<'a> {
         Ok(theirs.map(look))
     }
 
-    /// Frames of one scene.
+    /// Measures frames of one workload.
     pub(super) fn measure(
         &mut self,
         scene: Workload,
@@ -171,7 +171,7 @@ impl<'a> Bench<'a> {
             }
             let timed = moment >= WARM_UP;
 
-            // Renderers of one process draw into images that they can share.
+            // Renderers of one process can draw into shared images.
             let shared = members.is_some().then(|| self.shared()).transpose()?;
             let turns = rotated_order(1 + IcetStrategy::ALL.len(), moment);
             let ours_at = turns.iter().position(|turn| *turn == 0).unwrap_or(0);
@@ -213,7 +213,7 @@ impl<'a> Bench<'a> {
                     (done.image.map(CompositeImage::Depth), done.report)
                 }
                 _ => {
-                    // The order changes from frame to frame; buffers stay.
+                    // The order changes from frame to frame; the buffers remain.
                     self.blend.set_order(Some(order));
                     let frame = Frame::premultiplied(
                         self.drawn.width_px,
@@ -233,7 +233,7 @@ impl<'a> Bench<'a> {
                 reports.push(report);
             }
 
-            // IceT's strategies whose turn was before ours, and those whose turn is now.
+            // Compare with IceT's strategies that ran before ours, and run the remaining ones.
             if let Some(ours) = &image {
                 pixels_differ +=
                     copies.iter().map(|theirs| count_differing(ours, theirs.image())).sum::<u64>();
@@ -254,7 +254,7 @@ impl<'a> Bench<'a> {
             }
         }
 
-        // What all ranks sent.
+        // Bytes and messages sent by all ranks.
         let mine = [sent, reports.last().map_or(0, |report| report.messages_sent)];
         let bytes: Vec<u8> = mine.iter().flat_map(|number| number.to_le_bytes()).collect();
         let all = self.comm.comm().all_gather(&bytes, 16, timeout)?;
@@ -306,9 +306,10 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The order of a frame's turns, the same on all ranks: rotated from frame to frame, and reversed
-/// in every second one, so that each is first, last and behind each neighbour equally often. As in
-/// `runner` of the member bench, which may use composite and may not be used by it.
+/// The order in which a frame is composited by each, the same on all ranks: rotated from frame to
+/// frame, and reversed in every second one, so that each is first, last and after each neighbour
+/// equally often. The same as in `runner` of the member bench, which may use composite and may not
+/// be used by it.
 fn rotated_order(count: usize, frame: u64) -> Vec<usize> {
     let mut turns: Vec<usize> =
         (0..count).map(|i| (i + frame as usize / 2) % count.max(1)).collect();
@@ -318,7 +319,7 @@ fn rotated_order(count: usize, frame: u64) -> Vec<usize> {
     turns
 }
 
-/// IceT's image, which it keeps only until its next frame.
+/// A copy of IceT's image, which it keeps only until its next frame.
 enum IcetPixels {
     Rgba8(Vec<[u8; 4]>),
     RgbaF32(Vec<[f32; 4]>),
@@ -340,7 +341,7 @@ impl IcetPixels {
     }
 }
 
-/// What a rank has drawn, as an image of its own.
+/// What a rank has drawn, as an owned image.
 enum Shared {
     Depth(Arc<Image<DepthPixel<[u8; 4]>>>),
     Blend(Arc<Image<PremultipliedPixel<[f32; 4]>>>),

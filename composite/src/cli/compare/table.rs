@@ -1,4 +1,4 @@
-//! What `composite compare` prints: a table, or the same as JSON.
+//! The output of `composite compare`: a table, or the same as JSON.
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -19,7 +19,7 @@ impl Pixels {
     }
 }
 
-/// What is printed.
+/// The output.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Comparison {
     pub(super) machine: Machine,
@@ -57,7 +57,7 @@ pub(super) struct Row {
     pub(super) ours_mb: f64,
     pub(super) ours_messages: u64,
     pub(super) rivals_ms: BTreeMap<String, f64>,
-    /// This rank's (rank 0's) share of our median frame, by column.
+    /// Time by column of rank 0 in our median frame.
     pub(super) columns_ms: BTreeMap<String, f64>,
 }
 
