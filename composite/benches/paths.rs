@@ -1,8 +1,9 @@
-//! Milliseconds per frame over threads, by scene, format and instruction set, with IceT's columns.
+//! Milliseconds per frame over threads, by workload, format and instruction set, with IceT's
+//! columns.
 //!
 //! Ranks are threads of this process and share its cores, so the numbers are costs of computation
-//! and copying, not of a network. Variants of one line are run frame by frame in turn, so that
-//! other load on the machine falls on all of them alike.
+//! and copying, not of a network. Variants of one line run alternately, frame by frame, so that
+//! other load on the machine affects all of them equally.
 //!
 //! `cargo bench -p composite --bench paths -- [SIZE] [RANKS…] [WORDS…]`
 use composite::{
@@ -18,7 +19,7 @@ use std::time::{Duration, Instant};
 #[path = "../src/mix64.rs"]
 mod mix64;
 
-/// One rank's picture: colours, depths, where it drew.
+/// One rank's frame: colours, depths, where it drew.
 struct Picture {
     colors: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -26,7 +27,7 @@ struct Picture {
     bounds: Rect,
 }
 
-/// `dense`: every pixel of every rank; `discs`: a disc a rank, about two layers deep; `frag`: a
+/// `dense`: every pixel of every rank; `discs`: a disc per rank, about two layers deep; `frag`: a
 /// sixth of their pixels, in runs of three.
 fn picture(scene: &str, rank: usize, ranks: usize, size: u32) -> Picture {
     let n = size as usize;
@@ -68,7 +69,7 @@ fn picture(scene: &str, rank: usize, ranks: usize, size: u32) -> Picture {
     made
 }
 
-/// Milliseconds of processor time that all threads of this process have used.
+/// Milliseconds of processor time of all threads of this process.
 fn cpu_ms() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 / 1e6
@@ -90,14 +91,14 @@ fn f32_frame(
     Frame::premultiplied(size, size, &picture.floats)?.with_bounds(picture.bounds)
 }
 
-/// The line in which one call merges all frames in shared memory, while the ranks wait.
+/// The variant in which one call merges all frames in shared memory, while the ranks wait.
 const SHARED: &str = "shared merge";
 
 fn main() {
     let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let arguments = || std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let numbers: Vec<usize> = arguments().filter_map(|word| word.parse().ok()).collect();
-    // Other words choose lines whose scene or variant contains them.
+    // Other words select lines whose workload or variant contains them.
     let words: Vec<String> =
         arguments().filter(|w| w.parse::<usize>().is_err() && w != "--bench").collect();
     let size = numbers.first().copied().unwrap_or(1024) as u32;
@@ -265,8 +266,8 @@ fn main() {
     }
 }
 
-/// A frame whose rendering is waiting (as for another device or other cores), in 16 tiles: rendered
-/// and then composited, and streamed.
+/// A frame whose rendering only waits (as for another device or other cores), in 16 tiles: rendered
+/// and then composited, or streamed.
 fn streamed(ranks: usize, size: u32) {
     const RENDER: Duration = Duration::from_millis(48);
     let pictures: Vec<Picture> =
@@ -289,7 +290,7 @@ fn streamed(ranks: usize, size: u32) {
                     let mut stream =
                         compositor.stream(&mut comm, (size, size), Rect::of_size(size, size))?;
                     for tile in 0..16 {
-                        // What compositing has cost does not delay rendering, which goes on
+                        // The time of compositing does not delay rendering, which continues
                         // elsewhere.
                         std::thread::sleep(
                             (RENDER * (tile + 1) / 16).saturating_sub(begin.elapsed()),

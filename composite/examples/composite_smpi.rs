@@ -1,14 +1,13 @@
-//! The program `composite` as a shared library, in which SimGrid's `smpirun` looks for `main`: it
-//! loads one private copy for each simulated rank. Made by `cargo build -p composite --example
+//! The program `composite` as a shared library with a `main`, for SimGrid's `smpirun`: it loads one
+//! private copy for each simulated rank. Built by `cargo build -p composite --example
 //! composite_smpi`; `composite compare --smpi` does that itself.
 //!
-//! An example because a package has one library, which programs are linked with and which must not
-//! have a `main`.
+//! This is an example because a package has only one library, which programs link and which must
+//! not have a `main`.
 #![deny(unsafe_code)]
 #![allow(unsafe_code, reason = "the one function that SimGrid calls")]
 
-// A test harness has a `main` of its own; what the library exports is tested from outside
-// (tests/mpi).
+// A test harness has a `main` of its own; the library's export is tested from outside (tests/mpi).
 #[cfg(not(test))]
 mod exported {
     use std::ffi::{CStr, OsString, c_char, c_int};
@@ -18,8 +17,8 @@ mod exported {
     ///
     /// # Safety
     /// As of every `main`: `argv` holds `argc` strings.
-    // SAFETY: SimGrid looks for this name in this library, and no other library of the process is
-    // asked for it.
+    // SAFETY: SimGrid looks up this name in this library, and no other library of the process is
+    // searched for it.
     #[unsafe(no_mangle)]
     pub(crate) unsafe extern "C" fn main(argc: c_int, argv: *const *const c_char) -> c_int {
         let argument = |i: usize| {

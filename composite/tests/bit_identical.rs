@@ -1,5 +1,5 @@
-//! Every strategy gives the bits of the serial reference: all rank counts to 17, odd sizes, depth
-//! and ordered blending.
+//! Every strategy gives the bits of the serial reference: all rank counts up to 17, odd sizes,
+//! depth and ordered blending.
 use composite::{
     Communicator, Composite, CompositeError, CompositeOutput, Destination, Frame, Image, Options,
     PixelFormat, Strategy, composite_serial, threads,
@@ -32,8 +32,8 @@ impl Random {
     }
 }
 
-/// What one rank drew: about half of the image in runs, depths from a few values so that ties are
-/// common.
+/// The frame of one rank: about half of the image in runs, with depths from a few values so that
+/// ties are common.
 struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -66,7 +66,8 @@ fn draw(rank: usize, size_px: (u32, u32)) -> TestFrame {
     drawn
 }
 
-/// Composites over threads; the whole image, put together from pieces if it was left distributed.
+/// Composites over threads; returns the whole image, assembled from pieces if it was left
+/// distributed.
 fn over_threads<P: Composite>(frames: &[Frame<'_, P>], options: &Options) -> Image<P> {
     let results: Vec<CompositeOutput<P>> = threads::run(frames.len(), |mut comm| {
         let frame = &frames[comm.rank()];
@@ -167,7 +168,7 @@ fn fourteen_to_seventeen_ranks_give_the_bits_of_the_serial_reference() {
     check_rank_counts(14..=17);
 }
 
-/// Guards the tests above against being vacuous: another grouping does give other bits.
+/// Makes sure that the tests above can fail: another grouping gives other bits.
 #[test]
 fn a_chain_instead_of_the_canonical_grouping_would_be_noticed() {
     let drawn: Vec<TestFrame> = (0..9).map(|rank| draw(rank, (64, 33))).collect();
@@ -195,7 +196,7 @@ fn equal_depths_everywhere_give_the_highest_rank_a_thousand_times() {
     let depth = [0.5; 6];
     let frames: Vec<_> =
         colors.iter().map(|c| Frame::with_depth(3, 2, c, &depth).unwrap()).collect();
-    // The group is used for frame after frame: messages of one frame must not mix with those of the
+    // The group composites several frames: messages of one frame must not mix with those of the
     // next.
     for strategy in STRATEGIES {
         let results = threads::run(ranks, |mut comm| {
@@ -256,7 +257,7 @@ fn ranks_that_drew_nothing_send_no_pixel_and_background_is_exact() {
     }
 }
 
-/// The smallest rectangle there is, in the corner where sizes end.
+/// The smallest rectangle that is not empty, in the last corner of the image.
 #[test]
 fn a_single_pixel_in_the_last_corner_is_not_lost() {
     let (w, h) = (61, 35);

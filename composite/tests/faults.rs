@@ -1,4 +1,4 @@
-//! Faults end in a named error on every rank, for every strategy, and never in a hang.
+//! Every fault ends in a named error on every rank, with every strategy, and never in a hang.
 use composite::comm::{Arrival, Receive};
 use composite::{
     CommError, Communicator, CompositeError, Destination, Frame, MessageError, Options, Strategy,
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 const STRATEGIES: [Strategy; 4] =
     [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 4 }];
 const RANKS: usize = 5;
-/// Sends in every strategy: it is folded into rank 0.
+/// This rank sends in every strategy: it is folded into rank 0.
 const CULPRIT: usize = 1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ enum Fault {
     Panic,
 }
 
-/// A communicator whose first message from [`CULPRIT`] goes wrong.
+/// A communicator that damages the first message of [`CULPRIT`].
 struct Faulty {
     inner: threads::ThreadComm,
     fault: Fault,
@@ -44,7 +44,7 @@ impl Communicator for Faulty {
         tag: u32,
         mut message: Vec<u8>,
     ) -> Result<(), CommError> {
-        // Messages with pixels; the calls that all ranks take part in have tags of their own.
+        // Only messages with pixels; collective calls have other tags.
         self.sent += usize::from(tag < composite::comm::FIRST_RESERVED_TAG);
         if self.rank() == CULPRIT && tag < composite::comm::FIRST_RESERVED_TAG && self.sent == 1 {
             match self.fault {
@@ -92,7 +92,7 @@ impl Communicator for Faulty {
     }
 }
 
-/// The error of every rank; a rank that succeeded fails the test.
+/// The error of every rank; the test fails if a rank succeeds.
 fn errors_of(fault: Fault, strategy: Strategy, timeout: Duration) -> Vec<CompositeError> {
     let color = [[200_u8, 100, 50, 255]; 21];
     let depth = [0.5; 21];
@@ -177,7 +177,7 @@ fn a_stalled_rank_hears_that_the_others_have_given_up() {
     let results = threads::run(3, |mut comm| {
         let frame = Frame::premultiplied(7, 3, &color).unwrap();
         if comm.rank() == 2 {
-            // Longer than the timeout and the longer wait at the end together.
+            // Longer than the timeout and the longer final wait together.
             std::thread::sleep(Duration::from_millis(2500));
         }
         let options = Options { timeout: Duration::from_millis(500), ..Options::default() };
@@ -194,7 +194,7 @@ fn ranks_that_render_different_sizes_or_formats_find_out() {
     for strategy in STRATEGIES {
         let options = Options { strategy, timeout: LONG, ..Options::default() };
         let results = threads::run(RANKS, |mut comm| {
-            // The same number of pixels, so that only the fingerprint can tell.
+            // The same number of pixels, so that only the fingerprint differs.
             let (w, h) = if comm.rank() == CULPRIT { (3, 7) } else { (7, 3) };
             let color = [[200_u8, 100, 50, 255]; 21];
             let frame = Frame::premultiplied(w, h, &color).unwrap();

@@ -12,7 +12,7 @@ mod mix64;
 const STRATEGIES: [Strategy; 4] =
     [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 8 }];
 
-/// A number below 2^16 from four.
+/// A pseudorandom number below 2^16 from four numbers.
 fn noise(a: usize, b: usize, c: usize, d: usize) -> u64 {
     mix64((a as u64) << 48 ^ (b as u64) << 32 ^ (c as u64) << 16 ^ d as u64) & 0xffff
 }
@@ -30,8 +30,8 @@ fn planes<C: composite::Color>(rank: usize, w: usize, h: usize) -> (Vec<C>, Vec<
     (0..w * h).map(pixel).unzip()
 }
 
-/// The same group and the same compositors for many frames: buffers of one must not show in the
-/// next.
+/// The same group and the same compositors for many frames: buffers of one frame must not affect
+/// the next.
 fn check_many<P: Composite + Send>(
     ranks: usize,
     sizes: &[(usize, usize)],
@@ -160,7 +160,7 @@ fn ranks_with_different_strategies_or_options_hear_of_it_at_once() {
         Options { destination: Destination::Distributed, ..Options::default() },
         Options { depth: false, ..Options::default() },
         Options { order: Some(vec![2, 1, 0]), ..Options::default() },
-        // Those who confirm would wait for those who do not.
+        // Ranks with a final barrier would wait for those without.
         Options { final_barrier: false, ..Options::default() },
         Options { verify: true, ..Options::default() },
     ];
@@ -205,20 +205,20 @@ fn the_automatic_strategy_is_the_same_on_every_rank_and_follows_a_given_network(
 
 // ---- Accuracy of formats: 128 faint layers ------------------------------------------------------
 const LAYERS: usize = 128;
-/// Pixels of the experiment `accuracy-composite`, all with other layers.
+/// Pixels of the experiment `accuracy-composite`, each with different layers.
 const PIXELS: usize = 512 * 512;
 
 /// Premultiplied colour of `layer` at pixel `k`, as in the experiment `accuracy-composite`: three
-/// channels of other shares of the opacity, all varying by a tenth from pixel to pixel and layer to
-/// layer, in golden-ratio steps.
+/// channels with different shares of the opacity, which vary by a tenth between pixels and layers,
+/// in golden-ratio steps.
 fn layer_color(alpha: f64, layer: usize, k: usize) -> [f64; 4] {
     let vary = |step: f64| 1.0 + 0.1 * ((layer as f64 * 0.618_034 + k as f64 * step).fract() - 0.5);
     let a = alpha * vary(0.754_878);
     [a * 0.9 * vary(0.569_840), a * 0.5, a * 0.2, a]
 }
 
-/// Largest error of these layers in units of 1/255 against `exact`: what the format makes of the
-/// colours and opacities themselves counts too.
+/// Largest error of these layers against `exact`, in units of 1/255. It includes the rounding of
+/// the colours and opacities themselves to the format.
 fn error_of_layers<C: composite::Color>(layers: &[Vec<[f64; 4]>], exact: &[[f64; 4]]) -> f64
 where
     PremultipliedPixel<C>: Composite<Color = C>,
@@ -238,7 +238,7 @@ where
         .fold(0.0, f64::max)
 }
 
-/// The sum of layers, front to back.
+/// The layers composited front to back.
 fn sum_of_layers(layers: &[Vec<[f64; 4]>]) -> Vec<[f64; 4]> {
     let mut sums = vec![[0.0_f64; 4]; layers[0].len()];
     for layer in layers {
@@ -281,7 +281,7 @@ fn recorded() -> Vec<(String, f64)> {
 
 #[test]
 fn errors_of_128_faint_layers_are_those_of_the_table() {
-    /// Pixels at once, so that the layers fit into the cache.
+    /// Pixels per batch, so that the layers fit into the cache.
     const AT_ONCE: usize = 1 << 10;
     let mut worst = [("u8", 0.0_f64), ("u16", 0.0), ("f16", 0.0), ("f32", 0.0)];
     for alpha in [0.005, 0.02, 0.1] {
@@ -303,8 +303,8 @@ fn errors_of_128_faint_layers_are_those_of_the_table() {
     for (format, error) in worst {
         let (_, most) =
             recorded.iter().find(|(name, _)| name == format).expect("a format of the record");
-        // The same bits as those of the experiment; only the arithmetic of the error itself may be
-        // rounded otherwise.
+        // The same bits as in the experiment; only the arithmetic of the error itself may be
+        // rounded differently.
         assert!((error - most).abs() <= 1e-9 * most, "{format}: {error}, and {most} in the record");
     }
 }
@@ -325,7 +325,7 @@ fn errors_of_128_equal_white_layers_are_those_of_the_book() {
         assert!(f16_error <= 0.25, "f16, alpha {alpha}: {f16_error}");
         assert!(f32_error <= 1.3e-4, "f32, alpha {alpha}: {f32_error}");
     }
-    // Guards the limits: eight bits do not keep them.
+    // Makes sure that the limits can fail: eight bits exceed them.
     assert!(error_of_white_layers::<[u8; 4]>(0.005) > 10.0);
 }
 
@@ -356,9 +356,9 @@ fn the_book_quotes_the_record_of_128_faint_layers() {
 
 #[test]
 fn an_integer_format_errs_by_two_steps_a_layer_at_most_whatever_the_colours() {
-    // Half a step where a colour is stored, half where it is joined. What is left of the light errs
-    // by a step a layer likewise, and of these steps a layer takes no more into a colour than it
-    // takes away by its opacity: all layers together one a layer.
+    // Half a step where a colour is stored, half where it is composited. The remaining light has an
+    // error of a step per layer likewise, and a layer adds no more of these steps to a colour than
+    // it removes by its opacity: all layers together add one per layer.
     const MOST: f64 = 2.0 * LAYERS as f64;
     fn steps_of_error<C: composite::Color>(steps: f64, layers: &[Vec<[f64; 4]>]) -> f64
     where
@@ -386,8 +386,8 @@ fn an_integer_format_errs_by_two_steps_a_layer_at_most_whatever_the_colours() {
         let of_layer = |layer| (0..2000).map(|pixel| color(layer, pixel)).collect();
         let layers: Vec<Vec<[f64; 4]>> = (0..LAYERS).map(of_layer).collect();
         let worst = steps_of_error::<C>(steps, &layers);
-        // These colours are always the same. They were measured to err by 31.4 steps of 8 bits and
-        // 31.6 of 16.
+        // These colours are always the same. Their measured error was 31.4 steps of 8 bits and 31.6
+        // of 16.
         assert!((31.0..=32.0).contains(&worst), "{worst} steps");
     }
     check::<[u8; 4]>(255.0);
@@ -429,10 +429,10 @@ fn ranks_that_reach_behind_those_after_them_are_refused_where_they_meet() {
     }
 }
 
-/// One rank's fragments, where those of each pixel end, and its surfaces.
+/// One rank's fragments, the end indices of its pixels, and its surfaces.
 type Dealt = (Vec<Fragment>, Vec<usize>, Vec<[f32; 4]>, Vec<f32>);
 
-/// Fragments of a scene, dealt out to ranks at random: layers of all ranks lie between each other.
+/// Fragments of a scene, distributed to ranks at random: layers of all ranks alternate in depth.
 fn deal(ranks: usize, w: usize, h: usize) -> Vec<Dealt> {
     let mut dealt: Vec<_> = (0..ranks)
         .map(|_| (Vec::new(), Vec::new(), vec![[0.0; 4]; w * h], vec![f32::INFINITY; w * h]))
@@ -450,7 +450,7 @@ fn deal(ranks: usize, w: usize, h: usize) -> Vec<Dealt> {
         }
         for (rank, (fragments, ends, colors, depths)) in dealt.iter_mut().enumerate() {
             ends.push(fragments.len());
-            // The same surface for every number of ranks, held by one of them.
+            // The same surface for every number of ranks, on one of them.
             if noise(8, 9, 1, pixel).is_multiple_of(3)
                 && noise(8, 9, 2, pixel) as usize % ranks == rank
             {
@@ -485,11 +485,11 @@ fn layers_of_ranks_that_reach_into_each_other_are_sorted_exactly_for_every_parti
                 assert!((f64::from(found[channel]) - exact[channel]).abs() <= 1e-6);
             }
         }
-        // The bits of one node, which has all fragments.
+        // The bits of one node that has all fragments.
         let bytes = image.to_bytes();
         assert!(*one_node.get_or_insert_with(|| bytes.clone()) == bytes, "{ranks} ranks");
     }
-    // Guards against being vacuous: blending rank by rank is wrong here.
+    // Makes sure that the test can fail: blending rank by rank is wrong here.
     let dealt = deal(3, w, h);
     let flattened: Vec<Vec<[f32; 4]>> = dealt
         .iter()

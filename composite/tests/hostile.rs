@@ -1,5 +1,4 @@
-//! Peers whose numbers are not to be trusted: what they announce is refused by name before anything
-//! is made room for.
+//! Ranks that announce false numbers are refused by name before memory is allocated for them.
 use composite::comm::{Arrival, Receive};
 use composite::{
     CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination,
@@ -16,14 +15,14 @@ const LIAR: usize = 1;
 const STRATEGIES: [Strategy; 4] =
     [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 4 }];
 
-/// A communicator whose rank [`LIAR`] changes what it says to all, and that counts the room that is
-/// asked for.
+/// A communicator whose rank [`LIAR`] falsifies its contributions to all-gathers, and that counts
+/// the requested memory.
 struct Lying<F> {
     inner: threads::ThreadComm,
     lie: F,
     /// All-gathers so far.
     gathered: usize,
-    /// Bytes of receives and buffers.
+    /// Bytes of requested receives and buffers.
     room: usize,
 }
 
@@ -96,8 +95,8 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
 
 type Ended = (Result<(), CompositeError>, usize);
 
-/// What each of three ranks gets, and the room it asked for, when rank [`LIAR`] says `rect` in
-/// place of where it drew.
+/// The result of each of three ranks, and the memory it requested, when rank [`LIAR`] reports
+/// `rect` instead of where it drew.
 fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
     let lie = move |number: usize, said: &mut Vec<u8>| {
         if number == 0 && said.len() == 32 {
@@ -128,7 +127,7 @@ fn check_rect(rect: [u32; 4]) {
             let timeout = Duration::from_millis(300);
             let options = Options { strategy, destination, timeout, ..Options::default() };
             let ends = with_rect(rect, &options);
-            // Three ranks' parts, joined and collected, twice over for all the rounds there are.
+            // Three ranks' parts, merged and collected, doubled to cover all rounds.
             let most = 3 * 2 * (PIXELS * 8 + 4096);
             for (rank, (result, room)) in ends.iter().enumerate() {
                 assert!(
@@ -155,7 +154,7 @@ fn a_rectangle_beyond_the_image_is_refused_by_the_name_of_its_sender() {
         [0, 0, u32::MAX, u32::MAX],
         [u32::MAX - 1, 3, u32::MAX, 4],
         [30, 30, 40, 40],
-        // Inside out: nothing was drawn.
+        // Inverted corners: nothing was drawn.
         [9, 9, 3, 3],
         [u32::MAX, u32::MAX, 0, 0],
     ] {
@@ -205,7 +204,7 @@ proptest! {
     ) {
         let lie = move |number: usize, honest: &mut Vec<u8>| {
             if number == 0 {
-                // With and without the right fingerprint.
+                // With and without the correct fingerprint.
                 let honest_part = [0, 8, 24][keep].min(honest.len());
                 honest.truncate(honest_part);
                 honest.extend_from_slice(&said);

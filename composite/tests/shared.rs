@@ -1,4 +1,4 @@
-//! Frames of one memory, merged without messages, and nodes of several ranks: the bits of the
+//! Frames in one memory, merged without messages, and nodes of several ranks: the bits of the
 //! serial reference.
 use composite::{
     Color, Communicator, Composite, CompositeError, Compositor, DepthPixel, Destination, Frame,
@@ -10,8 +10,8 @@ use std::sync::{Arc, Mutex};
 
 const SIZE: (u32, u32) = (70, 37);
 
-/// One rank's planes, and a rectangle around what it drew (odd ranks only; others leave it to be
-/// found).
+/// One rank's planes, and a rectangle around what it drew (for odd ranks only; for others it must
+/// be found).
 struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -84,12 +84,12 @@ fn merging_in_one_memory_gives_the_bits_of_the_serial_reference() {
     }
 }
 
-/// Threads as nodes, each with ranks of its own; the image at the first node.
+/// Threads as nodes, each with its own ranks; returns the image of the first node.
 fn over_nodes<P: Composite>(nodes: &[&[Frame<'_, P>]]) -> Vec<u8> {
     let results = threads::run(nodes.len(), |mut comm| {
         let mut compositor = Compositor::new(Options::default());
         let frames = nodes[comm.rank()];
-        // Twice, so that buffers of the first frame are written over.
+        // Twice, so that buffers of the first frame are overwritten.
         let threads = NonZeroUsize::new(2).unwrap();
         compositor.composite_node(&mut comm, frames, threads).unwrap();
         compositor.composite_node(&mut comm, frames, threads).unwrap()
@@ -114,8 +114,8 @@ fn nodes_of_several_ranks_give_the_bits_of_all_ranks() {
         let flat = composite_serial(&z).unwrap().to_bytes();
         assert!(over_nodes(&z_nodes) == flat, "depth, nodes of {sizes:?}");
 
-        // Blending: the reference of the nodes' references, which is that of all ranks if all
-        // numbers are powers of two.
+        // Blending: the reference over the nodes' references, which equals that over all ranks if
+        // all counts are powers of two.
         let found = over_nodes(&blended_nodes);
         let of_nodes: Vec<_> =
             blended_nodes.iter().map(|node| composite_serial(node).unwrap()).collect();
@@ -174,7 +174,7 @@ fn ranks_at_a_table_give_the_bits_of_the_serial_reference_frame_after_frame() {
             let rank = comm.rank();
             let mut shared_rank = members[rank].lock().unwrap().take().unwrap();
             for repeat in 0..4 {
-                // With depths and without, to the first rank and to the last.
+                // With and without depths, to the first rank and to the last.
                 let root = if repeat < 2 { 0 } else { ranks - 1 };
                 let options = Options {
                     depth: repeat % 2 == 0,
@@ -236,7 +236,7 @@ fn random_images<P: Composite>(
     let pixels = (width * height) as usize;
     (0..ranks)
         .map(|rank| {
-            // Runs of what is drawn and what is not, so that whole blocks are either, too.
+            // Runs of active and inactive pixels, so that whole blocks are either, too.
             let mut run = (0, false);
             let mut colors = Vec::with_capacity(pixels);
             let mut depths = Vec::with_capacity(pixels);

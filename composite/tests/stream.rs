@@ -1,5 +1,5 @@
-//! Tiles handed in while rendering goes on: the same bits, overlap that can be seen in the order of
-//! events, and named errors.
+//! Tiles submitted during rendering: the same bits, overlap visible in the order of events, and
+//! named errors.
 use composite::{
     Communicator, CompositeError, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, Rect,
     Strategy, composite_serial, threads,
@@ -22,7 +22,7 @@ fn bounds_of(rank: usize) -> Rect {
     Rect { x0: shift, y0: shift / 2, x1: (shift + 50).min(W), y1: (shift / 2 + 40).min(H) }
 }
 
-/// Tiles of 16x16 of the whole image, in an order of each rank's own.
+/// Tiles of 16x16 of the whole image, in a different order on each rank.
 fn tiles(rank: usize) -> Vec<Rect> {
     let mut tiles = Vec::new();
     for y0 in (0..H).step_by(16) {
@@ -86,7 +86,7 @@ fn a_streamed_frame_has_the_bits_of_the_serial_reference_whatever_the_order_of_t
                 let mut stream = compositor.stream(&mut comm, (W, H), bounds_of(rank)).unwrap();
                 for (index, tile) in tiles(rank).into_iter().enumerate() {
                     draw_tile(rank, tile, &mut planes);
-                    // Some tiles are left to the end.
+                    // Some tiles are left to `finish`.
                     if index >= skipped {
                         stream
                             .tile_done(
@@ -164,7 +164,7 @@ fn misuse_of_a_stream_is_named_on_every_rank() {
     let frame = Frame::premultiplied(W, H, &colors).unwrap();
     let whole = Rect::of_size(W, H);
 
-    // A tile handed in twice.
+    // A tile submitted twice.
     let results = threads::run(3, |mut comm| {
         let rank = comm.rank();
         let mut compositor = Compositor::new(Options::default());
@@ -183,7 +183,7 @@ fn misuse_of_a_stream_is_named_on_every_rank() {
         assert!(text.unwrap().contains("were handed in twice"));
     }
 
-    // A stream that is not finished.
+    // A stream that is dropped before it is finished.
     let results = threads::run(2, |mut comm| {
         let rank = comm.rank();
         let mut compositor = Compositor::new(Options::default());

@@ -129,7 +129,7 @@ impl RankArgs {
         smpirun::inside() || (self.mpi && launcher::launched(launcher::variable))
     }
 
-    /// Whether ranks are threads, of which all that this process has work at once.
+    /// Whether ranks are threads of this process that all run at once.
     pub(super) fn are_threads(&self) -> bool {
         !(self.mpi || self.smpi || self.model || smpirun::inside())
     }

@@ -1,4 +1,4 @@
-//! `composite demo`: what it draws, over threads, simulated ranks and MPI, and what it refuses.
+//! `composite demo`: its images over threads, simulated ranks and MPI, and the input it refuses.
 
 use super::program::{peer, run};
 use std::path::Path;
@@ -19,8 +19,8 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
         (ran.code, ran.text)
     };
     let triangle = |a: &str| format!("v {a}\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 2 3 4\n");
-    // ---- Strange, and shown: more ranks than triangles, a corner that is no place, far from
-    // everything, without any size.
+    // ---- Unusual but rendered: more ranks than triangles, a corner with NaN, far from everything,
+    // without any size.
     let (code, text) = demo(&["-n", "64", "--data", &file("few.obj", &triangle("0 0 0"))]);
     assert_eq!(code, Some(0), "{text}");
     assert!(!text.contains("-0.00"), "no time is less than nothing: {text}");
@@ -31,7 +31,7 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
     let point = "v 5 5 5\nv 5 5 5\nv 5 5 5\nf 1 2 3\n";
     let (code, text) = demo(&["-n", "3", "--data", &file("point.obj", point)]);
     assert_eq!(code, Some(0), "{text}");
-    // ---- Not to be shown, with the reason.
+    // ---- Refused, with the reason.
     let known = file("known.obj", &triangle("0 0 0"));
     let missing = folder.join("missing.vtp").to_str().expect("a path in UTF-8").to_owned();
     for (wish, words) in [
@@ -77,7 +77,7 @@ fn demo_draws_a_bar_for_every_rank() {
     assert!(png.starts_with(b"\x89PNG"));
 }
 
-/// `composite demo` of this data set: its picture and what it printed.
+/// `composite demo` of this data set: its image and its output.
 fn demo_of(data: &str, more: &[&str], variables: &[(&str, &Path)]) -> (Vec<u8>, serde_json::Value) {
     let name = format!("composite-demo-{}-{}", std::process::id(), more.join("").replace('-', "_"));
     let folder = std::env::temp_dir().join(name);

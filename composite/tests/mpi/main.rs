@@ -1,5 +1,5 @@
-//! The program over real transports: Open MPI, MPICH, SimGrid; IceT beside it; and faults that must
-//! end in bounded time.
+//! The program over real transports: Open MPI, MPICH, SimGrid; IceT on the same ranks; and faults
+//! that must end in bounded time.
 //!
 //! These are peers (CONTRIBUTING.md): a missing one skips its tests with a note, or fails them
 //! where RTSV_REQUIRE_PEERS is set.
@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// `composite check` in groups of `counts` ranks, all in one launch of as many as the largest
-/// needs: every strategy, scene and size, with depth and blended. With `hard`, the hard cases as
-/// well.
+/// `composite check` in groups of `counts` ranks, all in one launch of as many ranks as the largest
+/// needs: every strategy, workload and size, with depth and blended. With `hard`, also the hard
+/// cases.
 fn check(
     counts: &[usize],
     hard: bool,
@@ -33,14 +33,14 @@ fn check(
     let number = |key: &str| checked[key].as_u64().unwrap_or_else(|| panic!("{key} in {checked}"));
     assert_eq!(checked["ranks"].to_string(), ranks);
     assert!(checked["transport"].as_str().is_some_and(|t| t.contains(transport)), "{checked}");
-    // All processes of a launch share memory: they merge each frame there, and direct send is
-    // checked by messages besides. Groups of some send messages.
+    // All processes of a launch share memory and merge each frame there; direct send is checked
+    // with messages too. Groups of some of the ranks send messages.
     let besides = if arguments.contains(&"--mpi") { 24 } else { 0 };
     assert_eq!(
         (number("images"), number("images_differ")),
         (120 * counts.len() as u64 + besides, 0)
     );
-    // Equal depths alone are composited a hundred times or a thousand for each number of ranks.
+    // Equal depths alone are composited a hundred or a thousand times for each number of ranks.
     assert_eq!(number("hard_images") > 100 * counts.len() as u64, hard, "{checked}");
     assert_eq!(number("hard_images_differ"), 0);
 }
@@ -87,8 +87,8 @@ fn messages_cut_into_chunks_arrive_whole_and_in_order() {
     }
 }
 
-/// The shared library if cargo has made it with this test (`cargo test --workspace` does); else the
-/// program makes it.
+/// The shared library if cargo has built it with this test (`cargo test --workspace` does);
+/// otherwise the program builds it.
 fn simulated_program() -> Vec<(&'static str, PathBuf)> {
     let program = Path::new(env!("CARGO_BIN_EXE_composite"));
     let folder = program.parent().expect("a program is in a folder");
@@ -128,7 +128,7 @@ fn simulated_ranks_carry_every_strategy_to_the_bits_of_the_reference() {
 }
 
 // ---- IceT ---------------------------------------------------------------------------------------
-/// Runs `composite compare` and checks what it prints.
+/// Runs `composite compare` and checks its output.
 fn compare(more: &[&str], variables: &[(&str, &Path)]) {
     let arguments = [&["compare", "--json", "--size", "200", "--frames", "2"], more].concat();
     let ran = run(&arguments, variables);
@@ -179,8 +179,8 @@ fn open_mpi_in_shared_memory_and_by_messages_gives_the_same_pixels() {
     for (more, strategy) in
         [(&[][..], "SharedMemory"), (&["--messages", "--strategy", "direct"][..], "DirectSend")]
     {
-        // Two numbers of ranks, sizes and formats make one table; in every row the pixels are those
-        // of IceT.
+        // Two numbers of ranks, sizes and formats give one table; in every row the pixels equal
+        // those of IceT.
         let lists = [
             "compare",
             "--json",
@@ -251,14 +251,15 @@ fn without_a_launcher_mpi_says_so_and_ends_with_2() {
 }
 
 // ---- Faults -------------------------------------------------------------------------------------
-/// Of fault `order`, where ranks share memory. Messages tell a barrier from a meeting by their
-/// tags, and end with a timeout.
+/// The error of fault `order` where ranks share memory. With messages, the tags tell a barrier from
+/// an all-gather, and the wait ends with a timeout.
 #[cfg(target_os = "linux")]
 const OUT_OF_STEP: &[&str] = &["ranks 0, 1 came to an all-gather and rank 2 to a barrier"];
 #[cfg(not(target_os = "linux"))]
 const OUT_OF_STEP: &[&str] = &["from rank 2", "at a barrier in vain"];
 
-/// The highest of three ranks fails; all must end, without success, and say these words.
+/// The highest of three ranks fails; all must end without success, and the output must contain
+/// `words`.
 fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &str) {
     let arguments = ["check", transport, "-n", "3", "--timeout", "2", "--fault", kind];
     let ran = run(&arguments, variables);
@@ -275,7 +276,7 @@ fn fault(kind: &str, words: &[&str], variables: &[(&str, &Path)], transport: &st
 fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
     let variables: [(&str, &Path); 1] = [("COMPOSITE_MPIRUN", &mpirun)];
-    // The launcher's words, or ours.
+    // The launcher's message, or ours.
     fault("killed", &["signal 9", "Killed"], &variables, "--mpi");
     fault("stalled", &["message from rank 2", "rank 2 did not come"], &variables, "--mpi");
     fault(
@@ -293,7 +294,8 @@ fn faults_over_open_mpi_end_with_a_named_error_in_bounded_time() {
 #[test]
 fn ranks_that_read_late_do_not_take_a_barrier_for_what_they_expect() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
-    // As on a busy machine: the others read what was said at a meeting when rank 2 is long past it.
+    // As on a busy machine: the others read the strings of an all-gather long after rank 2 has left
+    // it.
     let late =
         ["check", "--mpi", "-n", "3", "--timeout", "5", "--linger-ms", "300", "--fault", "order"];
     let ran = run(&late, &[("COMPOSITE_MPIRUN", &mpirun)]);
@@ -302,7 +304,7 @@ fn ranks_that_read_late_do_not_take_a_barrier_for_what_they_expect() {
     assert!(!ran.text.contains("No such file"), "{}", ran.text);
 }
 
-/// What `check` says of a job in which the highest rank works for three timeouts.
+/// The output of `check` for a job in which the highest rank works for three timeouts.
 fn slow(transport: &str, variables: &[(&str, &Path)]) {
     let arguments = ["check", transport, "-n", "3", "--timeout", "2", "--fault", "slow", "--json"];
     let ran = run(&arguments, variables);
@@ -316,7 +318,7 @@ fn a_rank_that_works_for_longer_than_the_timeout_and_says_so_is_waited_for() {
     for variable in ["RTSV_MPIRUN", "RTSV_MPIRUN_MPICH"] {
         let Some(mpirun) = peer(variable) else { continue };
         slow("--mpi", &[("COMPOSITE_MPIRUN", &mpirun)]);
-        // By messages, between machines: rank 0 waits for rank 1, which waits for rank 2.
+        // With messages, between machines: rank 0 waits for rank 1, which waits for rank 2.
         let ran =
             launched(&mpirun, &[], &["-n", "3"], &APART, &["--timeout", "2", "--fault", "slow"]);
         assert_eq!(ran.code, Some(0), "{}", ran.text);
@@ -329,7 +331,7 @@ fn a_rank_that_works_for_longer_than_the_timeout_and_says_so_is_waited_for() {
 }
 
 // ---- Machines -----------------------------------------------------------------------------------
-/// Shell words that have every rank say that it is on a machine of its own.
+/// Shell code that puts every rank on a machine of its own.
 const APART: [&str; 1] = ["COMPOSITE_NODE=of-${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"];
 
 /// `composite check` started by a launcher with these arguments, each rank in a shell that sets
@@ -375,7 +377,8 @@ fn launched(
     ProgramOutput { code: status.code(), stdout, text, took }
 }
 
-/// Machines that the ranks found, and images that were composited, all of which must be right.
+/// The number of machines that the ranks found and of images composited, all of which must be
+/// correct.
 fn nodes_and_images(ran: &ProgramOutput) -> (u64, u64) {
     assert_eq!(ran.code, Some(0), "{}", ran.text);
     let checked: serde_json::Value =
@@ -386,7 +389,7 @@ fn nodes_and_images(ran: &ProgramOutput) -> (u64, u64) {
 
 #[test]
 fn ranks_of_one_machine_find_each_other_without_the_variables_of_their_launcher() {
-    // Merged in memory besides, which only ranks of one machine can.
+    // Also merged in memory, which only ranks of one machine can do.
     let in_memory = if cfg!(target_os = "linux") { 24 } else { 0 };
     if let Some(mpirun) = peer("RTSV_MPIRUN") {
         let none =
@@ -404,7 +407,7 @@ fn ranks_of_one_machine_find_each_other_without_the_variables_of_their_launcher(
 
 #[test]
 fn ranks_of_two_machines_do_not_believe_that_they_share_one() {
-    // MPICH believes in two machines if they have two names.
+    // MPICH assumes two machines if they have two names.
     if let Some(mpirun) = peer("RTSV_MPIRUN_MPICH") {
         for environment in [&["-u MPI_LOCALNRANKS -u MPI_LOCALRANKID"][..], &[]] {
             let hosts = ["-launcher", "fork", "-hosts", "localhost:1,127.0.0.1:1"];

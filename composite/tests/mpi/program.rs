@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Far beyond what any of these runs needs, on a slow and busy machine too; a hang fails here.
+/// Far longer than any of these runs needs, even on a slow and busy machine; a hang fails here.
 pub(super) const BOUND: Duration = Duration::from_secs(100);
 
 pub(super) fn peer(variable: &str) -> Option<PathBuf> {
@@ -22,7 +22,7 @@ pub(super) fn peer(variable: &str) -> Option<PathBuf> {
 pub(super) struct ProgramOutput {
     pub(super) code: Option<i32>,
     pub(super) stdout: String,
-    /// With stderr.
+    /// Output including stderr.
     pub(super) text: String,
     pub(super) took: Duration,
 }
@@ -38,8 +38,8 @@ pub(super) fn run(arguments: &[&str], variables: &[(&str, &Path)]) -> ProgramOut
     {
         command.env_remove(launcher);
     }
-    // Naming the lines of a backtrace takes seconds on a busy machine, longer than the waits that
-    // are tested here.
+    // Symbolising a backtrace takes seconds on a busy machine, longer than the waits that are
+    // tested here.
     command.env("RUST_BACKTRACE", "0");
     command.envs(variables.iter().copied());
     let Output { status, stdout, stderr } = command.output().expect("coreutils' timeout runs");

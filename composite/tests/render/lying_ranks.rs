@@ -1,4 +1,4 @@
-//! Ranks that announce other numbers than they keep to: refused by name, before or when it matters.
+//! Ranks that announce other numbers than they send: refused by name, early enough.
 use crate::{frame_options, scenes};
 use composite::comm::{Arrival, Receive};
 use composite::render::{
@@ -12,10 +12,10 @@ const RANKS: usize = 3;
 const LIAR: usize = 1;
 /// Numbers of a rank about ghost zones: triangles for each rank, its own, other parts near them.
 const GHOST_NUMBERS: usize = RANKS + 2;
-/// Numbers of a rank about questions: words for each rank.
+/// Numbers of a rank about requests: words for each rank.
 const LENGTHS: usize = RANKS;
 
-/// A communicator whose rank [`LIAR`] changes the numbers that it gives to all, checksum and all.
+/// A communicator whose rank [`LIAR`] falsifies the numbers that it gathers, with a valid checksum.
 struct Lying<F> {
     inner: threads::ThreadComm,
     lie: F,
@@ -85,7 +85,7 @@ impl<F: Fn(&mut [u32])> Communicator for Lying<F> {
     }
 }
 
-/// What stands in front of a short message. Honest numbers must pass with it: see below.
+/// The checksum in front of a short message. Unchanged numbers must pass with it: see below.
 fn checksum(body: &[u8]) -> u64 {
     let mix = |state: u64, value: u64| {
         (state ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
@@ -99,7 +99,7 @@ fn checksum(body: &[u8]) -> u64 {
     })
 }
 
-/// What each rank gets when rank [`LIAR`] changes its numbers.
+/// The error of each rank when rank [`LIAR`] falsifies its numbers.
 fn frame(policy: SecondaryRayPolicy, lie: impl Fn(&mut [u32]) + Sync) -> Vec<Option<FrameError>> {
     let case = scenes::occlusion_alone();
     let partition = Partition::new(&case.scene, RANKS, &Split::Triangles);
@@ -113,8 +113,8 @@ fn frame(policy: SecondaryRayPolicy, lie: impl Fn(&mut [u32]) + Sync) -> Vec<Opt
     results.into_iter().map(|result| result.expect("no rank panics").err()).collect()
 }
 
-/// No rank gets a picture; one finds what cannot be and says so, and the others say that or hear of
-/// it.
+/// No rank gets an image. One finds the invalid numbers and reports them, and the others report the
+/// same or that the group was aborted.
 fn assert_refused(ends: &[Option<FrameError>], words: &str) {
     let found = |end: &Option<FrameError>| {
         matches!(end, Some(FrameError::Announced { from: LIAR, reason, .. })
@@ -158,7 +158,7 @@ fn ghost_triangles_to_oneself_are_refused_by_all_and_by_the_name_of_their_rank()
 
 #[test]
 fn fewer_ghost_triangles_than_were_announced_are_refused() {
-    // What is announced stays below what the rank has: only what comes tells.
+    // The announced number is at most what the rank has, so only the data that arrive show the lie.
     let ends = frame(SecondaryRayPolicy::GhostZones, |words| {
         if words.len() == GHOST_NUMBERS {
             assert!(words[0] > 0, "the liar has triangles near rank 0's part");

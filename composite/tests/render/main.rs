@@ -1,4 +1,4 @@
-//! The picture of many ranks is the picture of one node, bit for bit.
+//! The image of many ranks equals the image of one node, bit for bit.
 mod lying_ranks;
 mod scenes;
 mod volumes;
@@ -28,7 +28,7 @@ fn frame_options(light: SecondaryRayPolicy) -> FrameOptions {
     }
 }
 
-/// All ranks' outputs; the picture is that of the last rank.
+/// All ranks' outputs; the image is that of the last rank.
 fn many(case: &Case, ranks: usize, split: &Split, light: SecondaryRayPolicy) -> Vec<FrameOutput> {
     dealt(case, &Partition::new(&case.scene, ranks, split), light)
 }
@@ -125,7 +125,7 @@ fn frames_without_secondary_rays_send_none_and_have_the_bits_of_one_node() {
                 many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
             assert_same(&expected, &outputs, &format!("{samples} samples, {ranks} ranks"));
             for o in &outputs {
-                // Later rays of the geometry pass are answered by nobody, because there are none.
+                // There are no secondary rays of the geometry pass to answer.
                 assert_eq!(
                     (o.report.points_sent, o.report.rays_sent, o.report.answered_rays),
                     (0, 0, 0)
@@ -176,7 +176,7 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
                     &format!("{samples} samples, {ranks} ranks, stream {stream}"),
                 );
                 // Some rank has finished tiles before it has traced its last ray, or none has.
-                // (With few tiles for each rank it does not pay.)
+                // (With few tiles per rank streaming does not pay.)
                 let overlaps = |o: &FrameOutput| {
                     let mut spans = o.report.spans.iter().map(|s| s.activity);
                     let last = spans.clone().rposition(|a| a == Activity::Render);
@@ -226,7 +226,7 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
     }
 }
 
-/// Of each rank the values of volumes' grids that it holds.
+/// By rank, the number of grid values of volumes that it holds.
 fn values_held(case: &Case, partition: &Partition) -> Vec<usize> {
     let part = |rank| partition.part(&case.scene, rank, &BuildOptions::default()).unwrap();
     (0..partition.parts()).map(|rank| part(rank).volume_values()).collect()
@@ -258,11 +258,11 @@ fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
         );
         let asked = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
         assert_same(&expected, &asked, &format!("asking, {ranks} ranks"));
-        // Few points are asked of others with ghost zones: those whose hit is another rank's, once
-        // each.
+        // With ghost zones few points are sent to other ranks: those whose hit is another rank's,
+        // once each.
         let traced = |o: &[FrameOutput]| o.iter().map(|o| o.report.answered_rays).sum::<u64>();
         assert!(traced(&ghost) < traced(&asked), "{} {}", traced(&ghost), traced(&asked));
-        // Built for one frame zones are dear, for thousands cheap: see the words.
+        // Zones are expensive for one frame and cheap for thousands: see the reason.
         let once = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
         let often =
             many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 100_000 });
@@ -334,7 +334,7 @@ fn ranks_that_render_different_pictures_all_get_an_error() {
         }
         let frame_options =
             FrameOptions { timeout: Duration::from_secs(5), ..FrameOptions::default() };
-        // A rank that is late finds the group ended already.
+        // A rank that is late may find the group ended already.
         let mut renderer = DataParallel::new(&mut comm, part, frame_options)?;
         renderer.frame(&mut comm, &case.camera, &options)
     });

@@ -1,4 +1,4 @@
-//! Scenes that have light across borders of parts.
+//! Scenes with light across borders of parts.
 use rt_core::bvh::Geometry;
 use rt_core::camera::Camera;
 use rt_core::colormap::ColorMap;
@@ -24,8 +24,8 @@ pub(crate) struct Case {
     pub(crate) options: RenderOptions,
 }
 
-/// Bumps over a square of 4 x 4 that stand on edge at some places, with smooth normals and a colour
-/// per triangle.
+/// Bumps over a square of 4 x 4 that are vertical in places, with smooth normals and a colour per
+/// triangle.
 pub(crate) fn bumps(shift: DVec3, cells: u32) -> TriMesh {
     let n = cells + 1;
     let at = |k: u32| {
@@ -96,8 +96,8 @@ pub(crate) fn options() -> RenderOptions {
 
 pub(crate) const AMBIENT: [f32; 3] = [0.3; 3];
 
-/// Shadows, area lights and ambient occlusion, with light at a finite place: what the exchange of
-/// light bits is for.
+/// Shadows, area lights and ambient occlusion, with a light at a finite position: tests the
+/// exchange of occlusion bits.
 pub(crate) fn shadows_and_occlusion(shift: DVec3) -> Case {
     let lamp = Light::point(shift + DVec3::new(1.0, 1.0, 4.0));
     let sun = Light::directional(DVec3::new(0.6, -0.3, 0.7))
@@ -124,13 +124,13 @@ pub(crate) fn occlusion_alone() -> Case {
     }
 }
 
-/// A shaded volume around the surfaces, seen also through glass and layers; and one alone.
+/// A shaded volume around the surfaces, also visible through glass and layers; and one alone.
 pub(crate) fn volumes() -> Vec<Case> {
     let dims = UVec3::new(41, 37, 29);
     let value = |k: u32| {
         let (x, y, z) = (k % dims.x, k / dims.x % dims.y, k / dims.x / dims.y);
         let at = Vec3::new(x as f32, y as f32, z as f32) * 0.3;
-        // Clear in one corner, and one point is missing.
+        // Transparent in one corner, and one point is missing.
         let v =
             if x < 12 && y < 15 { 0.0 } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * at.z.sin() };
         if k == 20_000 { f32::NAN } else { v }
@@ -189,7 +189,7 @@ pub(crate) fn volumes() -> Vec<Case> {
     out
 }
 
-/// Streamtubes, cylinders and spheres, of which parts hold only their own.
+/// Streamtubes, cylinders and spheres, of which each part holds only its own.
 pub(crate) fn arrays_of_shapes() -> Case {
     let mut b = SceneBuilder::new();
     let (mut points, mut offsets, mut radii) = (Vec::new(), vec![0], Vec::new());
@@ -231,7 +231,7 @@ pub(crate) fn arrays_of_shapes() -> Case {
     Case { name: "arrays of shapes", scene, camera: camera(DVec3::ZERO), options: options() }
 }
 
-/// No light that leaves a hit.
+/// No secondary ray leaves a hit.
 pub(crate) fn headlight(samples: u32) -> Case {
     Case {
         name: "headlight",
@@ -241,7 +241,7 @@ pub(crate) fn headlight(samples: u32) -> Case {
     }
 }
 
-/// Several waves: mirror, gloss and glass, transparent layers, paths.
+/// Several bounces: mirror, gloss and glass, transparent layers, paths.
 pub(crate) fn several_waves() -> Vec<Case> {
     let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
     let ambient = Light::ambient(AMBIENT);

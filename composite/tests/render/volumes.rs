@@ -1,5 +1,4 @@
-//! Several volumes, each in bricks or whole on some ranks, that share space with each other and
-//! with surfaces.
+//! Several volumes, in bricks or whole on some ranks, that overlap each other and surfaces.
 use super::scenes::{self, AMBIENT, Case, camera, matte, options};
 use super::{assert_same, dealt, differing_pixels, many, one_node, values_held};
 use composite::render::{FrameError, Partition, SecondaryRayPolicy, Split};
@@ -16,7 +15,8 @@ use rt_core::volume::{
     Blend, GradientOpacity, Interpolation, Volume, VolumeOptions, VolumeQuality, VolumeShading,
 };
 
-/// Waves in a box from `origin` with `size`, on `dims` points, in the colours from `low` to `high`.
+/// A box from `origin` with `size`, filled with a wave pattern on `dims` points, in the colours
+/// from `low` to `high`.
 fn waves(
     dims: [u32; 3],
     origin: DVec3,
@@ -31,7 +31,7 @@ fn waves(
         let p =
             UVec3::new(k % dims.x, k / dims.x % dims.y, k / dims.x / dims.y).as_dvec3() * spacing;
         let at = p.as_vec3() * 4.0 + Vec3::splat(opacity);
-        // Clear at one side, and one point is missing.
+        // Transparent at one side, and one point is missing.
         if k == 777 { f32::NAN } else { 0.5 + 0.5 * at.x.sin() * at.y.cos() * (at.z + 0.7).sin() }
     };
     let grid =
@@ -59,8 +59,8 @@ fn shaded() -> VolumeOptions {
     VolumeOptions { shading: Some(shading), ..VolumeOptions::default() }
 }
 
-/// Three media: a coarse one, a fine one turned and stretched across it, and one that is wholly
-/// inside the first.
+/// Three media: a coarse one, a fine one rotated and stretched across it, and one completely inside
+/// the first.
 fn three() -> Vec<VolumeInstance> {
     let coarse = waves(
         [21, 26, 19],
@@ -124,7 +124,7 @@ fn several_volumes_that_overlap_have_the_bits_of_one_node() {
     (stepped.name, stepped.options.volume_quality) = ("steps", VolumeQuality::Step { voxels: 0.7 });
     for case in [glass, layers, alone(three()), stepped] {
         let expected = one_node(&case);
-        // Otherwise the test says nothing about mixing.
+        // Otherwise the test would not cover mixing.
         for out in 0..3 {
             let mut without = case.scene.clone();
             without.volumes.remove(out);
@@ -164,7 +164,7 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
             "one whole on each rank",
             [vec![everybody.clone()], cut(&[0, 1, 2, 3, 4]), cut(&[4, 3, 2, 1, 0])],
         ),
-        // Rank 3 has nothing of any volume.
+        // Rank 3 holds nothing of any volume.
         ("each whole on another", [cut(&[4]), cut(&[1]), vec![vec![2, 0]]]),
         (
             "bricks twice",
@@ -183,7 +183,7 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
         match name {
             "all whole everywhere" => {
                 assert!(held.iter().all(|h| *h >= whole / 2), "{held:?} of {whole}");
-                // Everybody answers himself: nobody else is asked about volumes.
+                // Every rank answers its own requests: no other rank is asked about volumes.
                 let rays = outputs.iter().map(|o| o.report.rays_sent).sum::<u64>();
                 assert_eq!(rays, 0, "{name}");
             }
