@@ -4,14 +4,14 @@
 //! | bytes | content |
 //! |---|---|
 //! | 0..8 | `COMPOS03` |
-//! | 8..16 | checksum of the header behind it, and of everything if the flag says so |
+//! | 8..16 | checksum of the rest of the header, and of the mask and pixels if flag 4 is set |
 //! | 16..24 | fingerprint of what is composited: sizes, format, strategy, rank order |
 //! | 24..32 | flags: 1 mask present, 2 depths present, 4 checksum covers pixels, 8 colours have three bytes and full alpha |
 //! | 32..48 | `u32` each: first column, first row, end of columns, end of rows |
 //! | 48..56 | number of active pixels |
 //! | 56..64 | zero |
-//! | then | mask: for every row words of 64 pixels, lowest bit first; left out if all or no pixels are active |
-//! | then | for every row the colours of its active pixels, then (if the flag says so) their depths |
+//! | then | mask: for every row words of 64 pixels, lowest bit first; omitted if all or no pixels are active |
+//! | then | for every row the colours of its active pixels, then (if flag 2 is set) their depths |
 //!
 //! All numbers are little-endian, and pixels have the same bytes as in memory. Counts have 64 bits,
 //! also in arithmetic. The decoder trusts nothing: an accepted message can be read without a

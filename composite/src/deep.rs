@@ -266,9 +266,9 @@ fn composite_or_fail(
 }
 
 // ---- Messages -----------------------------------------------------------------------------------
-// Header: magic, checksum of all behind it, fingerprint, rectangle, number of fragments, number of
-// surfaces. Then for every pixel its number of fragments, with the highest bit set if there is a
-// surface; the fragments; the surfaces. A record is colour and depth.
+// Header: magic, checksum of everything after it, fingerprint, rectangle, number of fragments,
+// number of surfaces. Then for every pixel its number of fragments, with the highest bit set if
+// there is a surface; the fragments; the surfaces. A record is colour and depth.
 
 const MAGIC: u64 = u64::from_le_bytes(*b"COMPDEEP");
 const HEADER_BYTES: usize = 64;

@@ -89,8 +89,8 @@ pub(crate) fn is_possible<P: Composite>(
     laid.saturating_add(image) <= MOST_BYTES && exchange.comm.shared_segments().is_some()
 }
 
-/// The image at the root; returns after a barrier. `None` on all ranks if there was not enough
-/// memory.
+/// The image at the root; returns after a barrier. The outer `None` is returned on all ranks if
+/// there was not enough memory.
 pub(crate) fn run<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     view: &View<'_, P>,

@@ -272,7 +272,7 @@ mod tests {
         let dense = vec![Rect::of_size(1024, 1024); 64];
         // Bandwidth counts: every byte once.
         assert_eq!(NetworkCosts::QDR.choose::<P>(&dense[..8], true), Strategy::DirectSend);
-        // Measured 8.1 ms against 12.6 by radix-k, which collects only when all is joined.
+        // Measured 8.1 ms against 12.6 by radix-k, which collects only when all is merged.
         let blended = NetworkCosts::QDR.choose::<PremultipliedPixel<[f32; 4]>>(&dense[..8], true);
         assert_eq!(blended, Strategy::DirectSend);
         // 127 messages to each of 128 ranks cost more than sending a seventh of the bytes again:
@@ -305,7 +305,7 @@ mod tests {
             );
             assert_eq!(network.estimate_secs::<P>(strategy, &large[..1], true), 0.0);
         }
-        // The physical limit of dense images: 8 MB in over 3.2 GB/s, while colours come to the
+        // The physical limit of dense images: 8 MB in over 3.2 GB/s, while colours go to the
         // root. Simulated by SMPI it takes 3.5 ms.
         let secs = network.estimate_secs::<P>(Strategy::DirectSend, &large, true);
         assert!(secs > 2.5e-3 && secs < 4.5e-3, "{secs}");

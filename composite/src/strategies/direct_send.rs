@@ -59,10 +59,10 @@ const FULL_SHARE: u64 = 256;
 ///
 /// The collecting rank also receives the finished image, over the same wire. With a share `x` of
 /// the exchange `e` and of the image `g` (bytes received), it receives `x e + (1 - x) g` while each
-/// other rank receives `(1 - x) e / (p - 1)`. They are equal for `x = (e / (p - 1) - g) / (e p / (p
-/// - 1) - g)`, which is zero for more than a handful of ranks. Two ranks get equal shares: what one
-/// does not merge the other must, and both work all the time. So do ranks that share one memory,
-/// where every byte costs time of the same processors.
+/// other rank receives `(1 - x) e / (p - 1)`. They are equal for
+/// `x = (e / (p - 1) - g) / (e p / (p - 1) - g)`, which is zero for more than a handful of ranks.
+/// Two ranks get equal shares: what one does not merge the other must, and both work all the time.
+/// So do ranks that share one memory, where every byte costs time of the same processors.
 fn owners<P: Composite>(drawn: &[Rect], root: Option<usize>) -> Vec<Owner> {
     let num_ranks = drawn.len();
     let whole = drawn.iter().fold(Rect::EMPTY, |all, rect| all.around(rect)).pixels();

@@ -104,8 +104,8 @@ fn simulated_program() -> Vec<(&'static str, PathBuf)> {
 
 #[test]
 fn the_shared_library_for_smpirun_exports_main() {
-    // `cargo test` makes it beside this test; a test that was asked for alone is not followed by
-    // it.
+    // `cargo test` builds it in the same folder as this test, but not if only this test is
+    // selected.
     let Some((_, library)) = simulated_program().pop() else {
         eprintln!("SKIPPED: cargo has not made the example composite_smpi");
         return;

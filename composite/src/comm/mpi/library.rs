@@ -8,7 +8,7 @@ use std::ffi::{c_char, c_int, c_void};
 /// A handle (communicator, data type, error handler, request) of any ABI.
 pub(crate) type Handle = usize;
 
-/// `malloc`ed room for a status of any ABI: the largest has 24 bytes.
+/// Memory for a status of any ABI: the largest has 24 bytes.
 pub(crate) type Status = [u64; 8];
 
 macro_rules! functions {

@@ -131,7 +131,7 @@ mod tests {
         ] {
             assert!(!same(&first, &other));
         }
-        // Without MPI's word, the boot of the kernel decides; without that too, nobody is together.
+        // Without MPI's answer, the boot id decides; without that too, every rank is alone.
         let by_boot = |rank| of(None, Some("b0"), "host", None, rank);
         assert!(same(&by_boot(0), &by_boot(1)));
         let by_name = |rank| of(None, None, "localhost", None, rank);

@@ -195,7 +195,7 @@ mod tests {
         // Half of the time alone, then two at half speed until the first is through, then alone
         // again.
         assert_eq!(ends_of(&[(0, 1, 0.0, 4.0), (0, 2, 2.0, 4.0)]), [6.0, 8.0]);
-        // Three come to rank 3; the sender of the first has another message, which gets the two
+        // Three go to rank 3; the sender of the first has another message, which gets the two
         // thirds that are left.
         let ends =
             ends_of(&[(0, 3, 0.0, 1.0), (1, 3, 0.0, 1.0), (2, 3, 0.0, 1.0), (0, 1, 0.0, 1.0)]);
