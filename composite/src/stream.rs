@@ -67,7 +67,7 @@ impl<P: Composite> Compositor<P> {
     ) -> Result<Stream<'a, P>, CompositeError> {
         let begin_secs = comm.now();
         let begun = self.begin_stream(comm, size_px, bounds);
-        // If the stream could not begin, the compositor gets its buffers back.
+        // The stream borrows `comm` only if it has begun; otherwise `comm` aborts the group below.
         match begun {
             Ok((order, codec)) => {
                 let options = self.options.clone();

@@ -17,7 +17,7 @@ pub enum FrameError {
     /// The transport.
     #[error(transparent)]
     Comm(#[from] CommError),
-    /// A message has not the expected content.
+    /// A message does not have the expected content.
     #[error(
         "rank {rank} got an unusable message from rank {from} ({what}, {words} words): all ranks \
          must render the same scene, camera and options"
