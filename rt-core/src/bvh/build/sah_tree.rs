@@ -1,5 +1,5 @@
-//! A fragment's binary tree by the surface area heuristic, top down: bins for large sets, every cut
-//! of the sorted order for small ones.
+//! Builds a fragment's binary tree top down by the surface area heuristic: with bins for large
+//! sets, by a full sweep for small ones.
 
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{SahConfig, SearchSpace, halve, leaf_tests, split_into};
@@ -9,14 +9,15 @@ use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use std::ops::Range;
 
-/// Sets up to this size are cut by trying every place along each axis.
+/// Sets up to this size are swept: every split of the sorted order is tried on each axis.
 const SWEEP: usize = 8;
-/// Below this depth sets are halved instead of cut by cost. Cost-driven cuts of adversarial input
-/// (sizes that grow like 2^k) can peel off one primitive at a time; halving bounds the depth by
-/// this plus log2 of the count, and with it the traversal stack.
+/// Below this depth, sets are halved instead of split by cost. Splits by cost can peel off one
+/// primitive at a time from adversarial input (sizes that grow like 2^k). Halving limits the depth
+/// to this plus log2 of the count, and so limits the traversal stack.
 pub(super) const MAX_COST_DEPTH: usize = 36;
 
-/// The tree over `refs` (at least one), whose order is lost; `spare` is as long.
+/// Builds the tree over `refs` (at least one). Reorders `refs` and uses `spare`, which has the same
+/// length, as scratch memory.
 pub(crate) fn sah_tree(
     refs: &mut [PrimRef],
     spare: &mut [PrimRef],
@@ -39,8 +40,8 @@ struct SahTree {
 }
 
 impl SahTree {
-    /// Fills `node` with `refs`, which are the fragment's primitives from place `first` on; `spare`
-    /// is as long.
+    /// Builds the subtree of `node` over `refs`, the fragment's primitives from index `first` on.
+    /// `spare` has the same length.
     fn build(
         &mut self,
         node: usize,
@@ -60,7 +61,8 @@ impl SahTree {
         let child = self.tree.open(node);
         let by_cost = depth <= MAX_COST_DEPTH;
         if by_cost && n <= SWEEP {
-            // Both sides are leaves or one is left to sweep: no need for the boxes of the centres.
+            // Each side becomes a leaf or is swept again, so the boxes of the centres are not
+            // needed.
             let axes = if self.sah.longest_axis_only { longest_axis(bounds) } else { 0..3 };
             let (at, bounds) = dispatch!(self.level, simd => sweep(simd, refs, axes));
             let (left, right) = refs.split_at_mut(at);
@@ -70,7 +72,7 @@ impl SahTree {
         }
         let cut =
             by_cost.then(|| split_into(refs, spare, bounds, self.sah, &mut self.space)).flatten();
-        // The cut moved everything to `spare`; halves stay where they are.
+        // The split moved everything to `spare`. Halves stay in `refs`.
         let (s, spare) = match cut {
             Some(s) => (s, refs),
             None => (halve(refs), spare),
@@ -88,8 +90,8 @@ fn longest_axis(bounds: &SetBounds) -> Range<usize> {
     axis..axis + 1
 }
 
-/// Sorts `refs` (two to eight) along the axis with the cheapest cut; returns how many go left and
-/// the boxes of both sides.
+/// Sorts `refs` (two to eight) along the axis with the cheapest split. Returns the number of
+/// primitives on the left and the bounds of both sides.
 #[inline(always)]
 fn sweep<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
     simd.vectorize(
@@ -134,15 +136,15 @@ fn sweep_body<S: Simd>(
     (at, [left, right].map(SetBounds::of))
 }
 
-/// The places of the first `n` primitives sorted by centre, in the low three bits: `[i][axis]` is
-/// the i-th along an axis.
+/// Sorts the first `n` primitives by centre. The low three bits of `[i][axis]` are the index of the
+/// i-th primitive along an axis.
 ///
-/// Keys are the centres with their last three bits replaced by the place, so they differ, and a
+/// Keys are the centres with their last three bits replaced by the index, so no two are equal. A
 /// sorting network (19 exchanges, Knuth vol. 3, section 5.3.4) sorts all axes at once without a
 /// branch.
 #[inline(always)]
 fn orders(refs: &[PrimRef; SWEEP], n: usize) -> [[u32; 4]; SWEEP] {
-    // Finite even where the sum of two coordinates overflows: NaN would break the network.
+    // Finite even where the sum of two coordinates overflows, because NaN would break the network.
     let limit = Vec4::splat(0.5 * f32::MAX);
     let mut keys: [Vec4; SWEEP] = std::array::from_fn(|i| {
         let c = if i < n { refs[i].center2().clamp(-limit, limit) } else { Vec4::MAX };
@@ -174,7 +176,7 @@ mod tests {
             let huge = if case % 3 == 0 { f32::MAX } else { 1.0 };
             let refs: [PrimRef; SWEEP] = std::array::from_fn(|i| {
                 let p = r.direction() * r.unit();
-                // Some equal, some at zero.
+                // Some positions are equal, some are zero.
                 let p = if r.unit() < 0.2 { Vec3::ZERO } else { p * huge };
                 PrimRef::new(Aabb::new(p, p), i as u32)
             });
@@ -185,7 +187,7 @@ mod tests {
                 all.sort_unstable();
                 assert_eq!(all, (0..n).collect::<Vec<_>>(), "case {case} axis {axis}");
                 for w in places[..n].windows(2) {
-                    // Twice the centre, as far as it can be told from a larger one.
+                    // Twice the centre, clamped where larger values cannot be distinguished.
                     let center2 =
                         |i: usize| (2.0 * refs[i].bounds().min[axis]).clamp(-1.7e38, 1.7e38);
                     let [a, b] = [w[0], w[1]].map(center2);

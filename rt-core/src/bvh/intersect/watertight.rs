@@ -1,18 +1,18 @@
-//! Ray-triangle test in a sheared space (Woop, Benthin and Wald, "Watertight Ray/Triangle
-//! Intersection", JCGT 2013).
+//! Watertight ray-triangle test in a sheared space (Woop, Benthin and Wald, "Watertight
+//! Ray/Triangle Intersection", JCGT 2013).
 //!
-//! The triangle is moved to the ray's origin and sheared so that the ray becomes the z axis; three
-//! 2-D edge functions then decide on which side of each edge the origin lies. Two triangles that
-//! share an edge evaluate the same products for it with opposite signs, and rounding is monotone:
-//! fl(a·b) − fl(c·d) has the sign of the exact value or is zero. A zero is decided by the exact
-//! products in f64. So a ray never passes between them.
+//! The triangle is translated to the ray's origin and sheared so that the ray becomes the z axis.
+//! Three 2-D edge functions then decide on which side of each edge the origin lies. Two triangles
+//! that share an edge evaluate the same products for it with opposite signs. Rounding is monotone,
+//! so fl(a·b) − fl(c·d) has the sign of the exact value or is zero. A zero is decided by the exact
+//! products in f64. So a ray never passes between the two triangles.
 //!
-//! No fused multiply-add anywhere: every instruction set then gives the same bits, in packets and
-//! for single rays, and the products above stay equal on both sides of an edge.
+//! The test uses no fused multiply-add, so every instruction set gives the same bits, in packets
+//! and for single rays, and the products above are equal on both sides of an edge.
 
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
-/// Axis order and shear that turn a ray's direction into +z.
+/// Axis order and shear that map a ray's direction to +z.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shear {
     pub(crate) kx: usize,
@@ -35,8 +35,8 @@ impl Shear {
     #[inline(always)]
     pub(crate) fn new(d: [f32; 3]) -> Self {
         let kz = dominant_axis(d);
-        // The paper swaps kx and ky for negative d[kz] to keep the winding; both windings are hits
-        // here, so nothing depends on it.
+        // The paper swaps kx and ky for negative d[kz] to keep the winding. Here both windings are
+        // hits, so nothing depends on it.
         let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
         let sz = 1.0 / d[kz];
         Shear { kx, ky, kz, sx: d[kx] * sz, sy: d[ky] * sz, sz }
@@ -54,9 +54,9 @@ pub(crate) struct Candidate<V, M> {
     pub(crate) v: V,
 }
 
-/// Tests lanes of (triangle, ray) pairs. `a`, `b`, `c` are the vertices minus the ray's origin in
-/// axis order kx, ky, kz. `None` when no lane passes the edge tests. `EXACT` decides zeros in f64
-/// (watertight).
+/// Tests lanes of (triangle, ray) pairs. `a`, `b`, `c` are the vertices minus the ray's origin, in
+/// the axis order kx, ky, kz. Returns `None` when no lane passes the edge tests. `EXACT` decides
+/// zeros in f64 (watertight).
 #[inline(always)]
 pub(crate) fn test<S, V, const EXACT: bool>(
     simd: S,
@@ -79,17 +79,18 @@ where
     let mut u = cx * by - cy * bx;
     let mut v = ax * cy - ay * cx;
     let mut w = bx * ay - by * ax;
-    // All of one sign, zeros included.
+    // All signs equal, zeros allowed.
     let mut inside = one_sign(simd, u, v, w);
     if !inside.any_true() {
         return None;
     }
     if EXACT {
-        // A zero matters only where the other two agree in sign: then it is the smallest or the
-        // largest of the three.
+        // A zero matters only where the other two values agree in sign. There it is the smallest or
+        // the largest of the three.
         let undecided = inside & (u.min(v).min(w).simd_eq(zero) | u.max(v).max(w).simd_eq(zero));
         if undecided.any_true() {
-            // Only those lanes: the others keep the bits they would have in any other company.
+            // Only the undecided lanes change. The bits of the others must not depend on their
+            // neighbours.
             u = undecided.select(exact(simd, cx, by, cy, bx), u);
             v = undecided.select(exact(simd, ax, cy, ay, cx), v);
             w = undecided.select(exact(simd, bx, ay, by, ax), w);
@@ -98,8 +99,8 @@ where
     }
     let det = u + v + w;
     let inside = inside & det.simd_ne(zero);
-    // Weights first: products of tiny edge functions and distances would underflow, and t with
-    // them.
+    // The weights are computed first: products of tiny edge functions and distances would
+    // underflow, and so would t.
     let scale = V::splat(simd, 1.0) / det;
     let (u, v, w) = (u * scale, v * scale, w * scale);
     let t = (u * a[2] + v * b[2] + w * c[2]) * sz;
@@ -113,8 +114,8 @@ fn one_sign<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, u: V, v: V, w: V) 
     u.min(v).min(w).simd_ge(zero) | u.max(v).max(w).simd_le(zero)
 }
 
-/// p·q − r·s from exact f64 products, rounded to f32: zero only when the difference is. Out of line
-/// and in scalar code: it runs for one ray in thousands.
+/// p·q − r·s from exact f64 products, rounded to f32. The result is zero only when the difference
+/// is. Not inlined, and scalar code, because it runs for one ray in thousands.
 #[inline(never)]
 fn exact<S: Simd, V: SimdFloat<S, Element = f32> + Lanes<S>>(simd: S, p: V, q: V, r: V, s: V) -> V {
     let (p, q, r, s) = (p.lanes(), q.lanes(), r.lanes(), s.lanes());
@@ -122,12 +123,13 @@ fn exact<S: Simd, V: SimdFloat<S, Element = f32> + Lanes<S>>(simd: S, p: V, q: V
         let d = p.as_ref()[i] as f64 * q.as_ref()[i] as f64
             - r.as_ref()[i] as f64 * s.as_ref()[i] as f64;
         let f = d as f32;
-        // The cast may flush a tiny difference to zero, which would claim a tie that is not there.
+        // The cast may flush a tiny difference to zero, which would report a tie where there is
+        // none.
         if f == 0.0 && d != 0.0 { f32::MIN_POSITIVE.copysign(d as f32) } else { f }
     })
 }
 
-/// A vector as its lanes.
+/// Conversion of a vector to an array of its lanes.
 pub(crate) trait Lanes<S> {
     type Array: AsRef<[f32]>;
     fn lanes(self) -> Self::Array;

@@ -1,4 +1,4 @@
-//! Triangles in leaves: four to a leaf, their vertices stored in it.
+//! Storage of triangles in leaves: four to a leaf, with their vertices.
 
 use super::local_frame::LocalFrame;
 use super::wide::{ChildRef, LEAF_SIZE, LeafWriter, Unit};
@@ -25,17 +25,17 @@ pub(crate) fn leaf_floats(units: &[Unit], leaf: ChildRef) -> &[f32; 8 * TRI_LEAF
     bytemuck::cast_ref(leaf)
 }
 
-/// The four triangle numbers of a leaf; unused places repeat the last.
+/// The four triangle numbers of a leaf. Unused slots repeat the last number.
 #[inline(always)]
 pub(crate) fn leaf_triangle_ids(leaf: &[f32; 8 * TRI_LEAF_UNITS]) -> [u32; 4] {
     std::array::from_fn(|i| leaf[36 + i].to_bits())
 }
 
-/// Puts a mesh's triangles into leaves.
+/// Writes a mesh's triangles into leaves.
 pub(crate) struct TriWriter<'m> {
     mesh: &'m TriMesh,
     frame: &'m LocalFrame,
-    /// Positions are stored as they are.
+    /// Positions are stored unchanged.
     plain: bool,
 }
 
@@ -73,7 +73,8 @@ impl LeafWriter for TriWriter<'_> {
     fn write(&self, prims: &[u32], out: &mut [Unit]) {
         let floats: &mut [f32] = bytemuck::cast_slice_mut(out);
         let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
-        // Unused places, and triangles that a refit made unusable, are points: no area, never hit.
+        // Unused slots, and triangles that a refit made invalid, are stored as points: they have no
+        // area and are never hit.
         let last = prims.len() - 1;
         for slot in 0..LEAF_SIZE {
             let id = prims[slot.min(last)];
@@ -96,15 +97,15 @@ impl LeafWriter for TriWriter<'_> {
 
 /// A primitive's box, wider by 2⁻²⁰ of its largest extent.
 ///
-/// The triangle test rounds the corners after the shear: an edge moves by up to 5·2⁻²⁴ of the
-/// triangle's extent (7 with the box's own rounding), which next to a ray that starts close to a
-/// large triangle is far more than the slack of the slab test. The test's decision is consistent,
-/// its neighbour across the edge leaves the ray to it; so a box that stands exactly on the edge
-/// must not say no. (Measured on a cube, rays from 10⁻⁶ to 1 of its size off an edge, aimed 10⁻⁹ to
-/// 10⁻⁶ beside it: 68 of 454,656 were lost to tight boxes.)
+/// The triangle test rounds the corners after the shear. An edge moves by up to 5·2⁻²⁴ of the
+/// triangle's extent (7 with the box's own rounding). For a ray that starts close to a large
+/// triangle this is far more than the slack of the slab test. The triangle test is consistent: the
+/// neighbour across the edge rejects a ray that belongs to this triangle. So a box whose side lies
+/// exactly on the edge must not reject the ray. (Measured on a cube, rays from 10⁻⁶ to 1 of its
+/// size off an edge, aimed 10⁻⁹ to 10⁻⁶ beside it: 68 of 454,656 were lost with tight boxes.)
 ///
-/// Always wider than the corners, so that a ray in the plane of a box's side meets the box whatever
-/// the sign of a zero in its direction.
+/// The box is always wider than the corners, so a ray in the plane of a box's side hits the box
+/// whatever the sign of a zero in its direction.
 #[inline]
 pub(crate) fn widened(b: Aabb) -> Aabb {
     let margin = b.extent().max_element() * (8.0 * f32::EPSILON);

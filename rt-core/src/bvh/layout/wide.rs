@@ -1,27 +1,28 @@
 //! The memory layout of an 8-wide bounding volume hierarchy.
 //!
-//! Nodes and leaves live in one array of 32-byte units. A node is 7 units: the six planes of its
-//! eight children's boxes, one row of eight floats each (x low, x high, y low, y high, z low, z
-//! high), and a row of child references. A leaf follows close to its parent, so both often share a
-//! page. 32-byte units instead of 64-byte lines: a triangle leaf is 160 bytes, which touches three
-//! cache lines wherever it starts, and 16 M triangles take 55 bytes each instead of 66.
+//! Nodes and leaves are stored in one array of 32-byte units. A node has 7 units: six rows of eight
+//! floats with the planes of its eight children's boxes (x low, x high, y low, y high, z low, z
+//! high), and a row of child references. A leaf follows close to its parent, so both are often on
+//! the same page. The unit is 32 bytes, not a 64-byte cache line, because a triangle leaf is 160
+//! bytes: it touches three cache lines wherever it starts, and 16 M triangles take 55 bytes each
+//! instead of 66.
 
 use crate::math::Aabb;
 use glam::Vec3;
 
-/// Children of a node.
+/// Number of children of a node.
 pub(crate) const WIDTH: usize = 8;
-/// Primitives a leaf can hold.
+/// Largest number of primitives in a leaf.
 pub(crate) const LEAF_SIZE: usize = 4;
-/// Units of a node.
+/// Number of units of a node.
 pub(crate) const NODE_UNITS: usize = 7;
 /// The row of child references.
 pub(crate) const CHILD_ROW: usize = 6;
 
-/// Deepest tree the traversal stack is made for: each node on the path leaves at most seven
-/// siblings behind.
+/// Depth of the deepest tree that the traversal stack can hold: each node on the path leaves at
+/// most seven siblings on it.
 pub(crate) const MAX_DEPTH: usize = (STACK_SIZE - WIDTH) / (WIDTH - 1);
-/// Entries of a traversal stack.
+/// Number of entries of a traversal stack.
 pub(crate) const STACK_SIZE: usize = 640;
 
 /// 32 bytes: eight floats, or the bits of eight child references.
@@ -38,7 +39,7 @@ impl Unit {
         bytemuck::cast_ref(&self.0)
     }
 
-    /// The unit as integers, to write.
+    /// The unit as mutable integers.
     #[inline(always)]
     pub(crate) fn bits_mut(&mut self) -> &mut [u32; 8] {
         bytemuck::cast_mut(&mut self.0)
@@ -54,9 +55,9 @@ pub(crate) struct ChildRef(pub(crate) u32);
 impl ChildRef {
     const LEAF: u32 = 1 << 31;
     const OFFSET: u32 = (1 << 29) - 1;
-    /// Units an arena may have: 16 GiB.
+    /// Largest number of units in an arena: 16 GiB.
     pub(crate) const MAX_UNITS: usize = Self::OFFSET as usize;
-    /// No child; its box is empty, so it is never followed.
+    /// No child. Its box is empty, so it is never visited.
     pub(crate) const NONE: ChildRef = ChildRef(u32::MAX);
 
     pub(crate) fn node(unit: usize) -> Self {
@@ -82,20 +83,20 @@ impl ChildRef {
         (self.0 & Self::OFFSET) as usize
     }
 
-    /// Primitives of a leaf.
+    /// Number of primitives in a leaf.
     #[inline(always)]
     pub(crate) fn count(self) -> usize {
         ((self.0 >> 29) & 3) as usize + 1
     }
 }
 
-/// A hierarchy; the root node is at unit 0.
+/// An 8-wide hierarchy. The root node is at unit 0.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WideBvh {
     pub(crate) units: Vec<Unit>,
-    /// Box around everything; empty without primitives.
+    /// Bounds of all primitives. Empty if there are none.
     pub(crate) bounds: Aabb,
-    /// Most nodes on a path from the root to a leaf.
+    /// Largest number of nodes on a path from the root to a leaf.
     pub(crate) depth: usize,
 }
 
@@ -105,7 +106,7 @@ impl Default for Aabb {
     }
 }
 
-/// Writes a node with `children` (at most eight) into `out` (seven units).
+/// Writes a node with at most eight `children` into the seven units of `out`.
 pub(crate) fn write_node(out: &mut [Unit], children: &[(Aabb, ChildRef)]) {
     for row in 0..3 {
         out[2 * row].0 = [f32::INFINITY; WIDTH];
@@ -126,7 +127,7 @@ pub(crate) fn set_box(node: &mut [Unit], slot: usize, b: Aabb) {
     }
 }
 
-/// Writes the ids of a leaf whose primitives are looked up elsewhere (shapes, instances): one unit.
+/// Writes the ids of a leaf whose primitives are stored elsewhere (shapes, instances): one unit.
 pub(crate) fn write_id_leaf(out: &mut [Unit], ids: impl Iterator<Item = u32>) {
     let row = out[0].bits_mut();
     *row = [u32::MAX; 8];
@@ -142,9 +143,9 @@ pub(crate) fn get_box(node: &[Unit], slot: usize) -> Aabb {
     Aabb::new(lo, hi)
 }
 
-/// Puts primitives into leaves.
+/// Writes primitives into leaves.
 pub(crate) trait LeafWriter: Sync {
-    /// Units per leaf.
+    /// Number of units of a leaf.
     const UNITS: usize;
     /// Writes up to four primitives into a leaf's units.
     fn write(&self, prims: &[u32], out: &mut [Unit]);

@@ -1,12 +1,13 @@
-//! Sixteen rays in any direction: together while they share the way, then two by two.
+//! Traversal by sixteen rays in any direction: together near the root, then two by two.
 //!
-//! Ambient-occlusion and bounce rays of neighbouring points fly apart, so packets with common
-//! bounds do not pay (measured: sorting 16,384 of them by direction into packets took 1.7 times the
-//! single rays' time). But they start close together: the nodes around their origins, most of the
-//! way down the tree, are the same for all. There a box is tested against sixteen rays at once; a
-//! subtree that only a few of them meet is left to [`super::pair`], which tests eight boxes against
-//! one ray, for two rays in turns. (The idea is that of Benthin et al., "Combining Single and
-//! Packet-Ray Tracing for Arbitrary Ray Distributions on the Intel MIC Architecture", 2012.)
+//! Ambient-occlusion and bounce rays of neighbouring points diverge, so packets with common bounds
+//! do not pay (measured: sorting 16,384 of them by direction into packets took 1.7 times the time
+//! of single rays). But the rays start close together: the nodes around their origins, most of the
+//! path down the tree, are the same for all. In these nodes, a box is tested against sixteen rays
+//! at once. A subtree that only a few of them hit is left to [`super::pair`], which tests eight
+//! boxes against one ray, for two rays in turns. (The idea is from Benthin et al., "Combining
+//! Single and Packet-Ray Tracing for Arbitrary Ray Distributions on the Intel MIC Architecture",
+//! 2012.)
 
 use super::pair::{RayQueue, RayTask, traverse_pairs};
 use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, inflate_t};
@@ -19,24 +20,24 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
 
-/// With this many rays or fewer a subtree is walked by each for itself. Found on ambient occlusion
-/// (any hit) and on rays with random ends (closest hit) among one million triangles, by their
-/// ratios to Embree in separate runs: 8 instead of 5 loses 1 to 4 % for the former, 5 or 12 instead
-/// of 8 a tenth for the latter.
+/// With this many rays or fewer, each ray traverses the subtree by itself. Chosen on ambient
+/// occlusion (any hit) and on rays with random ends (closest hit) among one million triangles, by
+/// the ratios to Embree in separate runs: 8 instead of 5 loses 1 to 4 % for any-hit rays; 5 or 12
+/// instead of 8 loses a tenth for closest-hit rays.
 const MAX_SINGLE_RAYS_ANY: u32 = 5;
 const MAX_SINGLE_RAYS_CLOSEST: u32 = 8;
 
-/// A subtree, and the rays that meet its box.
+/// A subtree and the rays that hit its box.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Entry {
-    /// The nearest of the rays' distances to the box; not used for occlusion.
+    /// Distance of one of the rays to the box, for the order of visits. Not used for occlusion.
     distance: f32,
     child: u32,
     rays: u16,
 }
 
-/// The rays of `active` lanes against a triangle hierarchy; answers go into `hits` (for occlusion,
-/// `prim` 0 where something is on the ray).
+/// Traces the rays of the `active` lanes through a triangle hierarchy and writes the results into
+/// `hits` (for occlusion, `prim` is 0 where something blocks the ray).
 #[inline(never)]
 pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(
     simd: S,
@@ -71,10 +72,10 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
     let t_min = f32x16::from_slice(simd, &rays.t_min);
     let slack = f32x16::splat(simd, BOX_SLACK);
     let skip = f32x16::splat(simd, inflate_t(1.0));
-    // Closest hits so far; the limits of rays that are finished lie before every box.
+    // Distances of the closest hits so far. The limits of finished rays are nearer than every box.
     let mut t = rays.t_max;
 
-    // Every ray enters some five subtrees: its constants are worth keeping.
+    // Every ray enters about five subtrees, so it pays to keep its constants.
     let mut setups = [RaySetup::new(&rays.get(0)); LANES];
     for lane in 1..LANES {
         setups[lane] = RaySetup::new(&rays.get(lane));
@@ -92,7 +93,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
         if child.is_leaf()
             || met.count_ones() <= (if ANY { MAX_SINGLE_RAYS_ANY } else { MAX_SINGLE_RAYS_CLOSEST })
         {
-            // ---- Each for itself from here, two at a time.
+            // ---- Few rays or a leaf: each ray separately from here, two at a time.
             let (setups, start) = (&setups, child);
             if ANY {
                 let mut queue =
@@ -106,8 +107,8 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
             continue;
         }
 
-        // ---- A node for many: each child's box against all rays. The rays differ in octant, so
-        // both planes of an axis are sorted per ray.
+        // ---- A node for many rays: each child's box against all of them. The rays differ in
+        // octant, so both planes of an axis are sorted per ray.
         count(Counter::Nodes, 1);
         let at = child.unit();
         let node: &[Unit; NODE_UNITS] =
@@ -117,7 +118,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
         let base = stack.len();
         for slot in 0..8 {
             if refs[slot] == ChildRef::NONE.0 {
-                // Nodes fill their slots in order.
+                // A node fills its slots in order.
                 break;
             }
             count(Counter::GroupBoxes, 1);
@@ -132,8 +133,8 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
                 continue;
             }
             prefetch::<4>(units, ChildRef(refs[slot]).unit());
-            // Rays outside `hit` may have smaller numbers here; as an order of visits that is good
-            // enough.
+            // Another ray of `hit` may be nearer than the first one. The order of visits need not
+            // be exact.
             let distance =
                 if ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
             stack.push(Entry { distance, child: refs[slot], rays: hit });
@@ -144,7 +145,7 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
     }
 }
 
-/// Lanes whose closest hit in the subtree at `start` is wanted.
+/// Lanes for which the closest hit in the subtree at `start` is requested.
 struct ClosestQueue<'a, 'r, const EXACT: bool> {
     setups: &'r [RaySetup; LANES],
     t: &'a mut [f32; LANES],
@@ -182,7 +183,7 @@ impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for ClosestQueue<'_, 'r, EX
     }
 }
 
-/// Lanes of which it is asked whether anything in the subtree at `start` is in their way.
+/// Lanes for which any hit in the subtree at `start` is requested.
 struct AnyQueue<'a, 'r, const EXACT: bool> {
     setups: &'r [RaySetup; LANES],
     t: &'a [f32; LANES],
@@ -220,7 +221,7 @@ impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for AnyQueue<'_, 'r, EXACT>
     }
 }
 
-/// The lowest lane of a set that is not empty.
+/// Removes and returns the lowest lane of a non-empty set.
 #[inline(always)]
 fn take_lane(lanes: &mut u16) -> usize {
     let lane = lanes.trailing_zeros() as usize & 15;

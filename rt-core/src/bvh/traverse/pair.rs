@@ -1,12 +1,12 @@
-//! Two rays at a time, each on its own way.
+//! Traversal by two independent rays in turns.
 //!
-//! A lone ray waits: for the node, for its boxes' distances, for the branch on them; the
-//! processor's units stand idle most of a step. Two independent rays in one loop fill each other's
-//! pauses. Their boxes are tested before the first branch on either, so that a branch that was
-//! guessed wrongly throws away little of the other ray's work. (Measured on one million triangles:
-//! rays with random ends 1.2 to 1.3 times as fast as one by one, ambient occlusion 1.05 to 1.1
-//! times. Collecting rays and subtrees of several steps first, so that fewer walk alone, lost 5 %:
-//! a ray that is answered early is of no more use then.)
+//! A single ray waits for the node, for the distances to its boxes and for the branch on them, so
+//! the processor's units are idle for most of a step. Two independent rays in one loop fill each
+//! other's pauses. The boxes of both are tested before the first branch on either, so a
+//! mispredicted branch discards little of the other ray's work. (Measured on one million triangles:
+//! rays with random ends run 1.2 to 1.3 times as fast as one by one, ambient occlusion 1.05 to 1.1
+//! times. Collecting rays and subtrees of several steps first, so that fewer are traced alone, lost
+//! 5 %: it does not exploit rays that are answered early.)
 
 use super::single::{BOX_SLACK, LeafTest, RaySetup, inflate_t, push_children};
 use super::three;
@@ -16,18 +16,18 @@ use crate::simd::{Stack, StackMemory};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
-/// Rays to be walked, and where their answers go.
+/// Source of the rays to trace, and receiver of their results.
 pub(crate) trait RayQueue<'r, S: Simd> {
     type Leaf: LeafTest<S> + Copy;
 
     /// The next ray.
     fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>>;
 
-    /// What ray `number` found.
+    /// Takes the result of ray `number`.
     fn done(&mut self, number: usize, leaf: Self::Leaf);
 }
 
-/// A ray and the subtree it is to walk.
+/// A ray and the subtree to traverse.
 pub(crate) struct RayTask<'r, L> {
     pub(crate) number: usize,
     pub(crate) ray: &'r RaySetup,
@@ -36,7 +36,7 @@ pub(crate) struct RayTask<'r, L> {
     pub(crate) leaf: L,
 }
 
-/// A ray on its way, at an inner node.
+/// State of a ray that has reached an inner node.
 struct Traversal<'m, S: Simd, L> {
     number: usize,
     origin: [f32x8<S>; 3],
@@ -66,7 +66,7 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
         }
     }
 
-    /// Another ray in this one's place.
+    /// Replaces this ray with another one.
     #[inline(always)]
     fn restart(&mut self, simd: S, task: RayTask<'_, L>) {
         let ray = task.ray;
@@ -87,7 +87,7 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
         units[at..at + NODE_UNITS].try_into().expect("a slice of that length")
     }
 
-    /// Distances to the eight boxes and which are met. No branches.
+    /// Distances to the eight boxes, and a mask of those that the ray hits. No branches.
     #[inline(always)]
     fn boxes(&self, simd: S, node: &[Unit; NODE_UNITS]) -> (f32x8<S>, u32) {
         let [nx, ny, nz] = self.near;
@@ -101,7 +101,7 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
         (near, hit.to_bitmask() as u32)
     }
 
-    /// Goes on to the next inner node, testing the leaves on the way. False at the end.
+    /// Continues to the next inner node and tests the leaves on the way. Returns false at the end.
     #[inline(always)]
     fn advance<const ORDERED: bool>(
         &mut self,
@@ -117,8 +117,8 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
         self.pop_to_node(simd, units, child.is_none())
     }
 
-    /// Tests leaves and takes from the stack until an inner node is reached; `pop`: the current
-    /// reference is used up.
+    /// Tests leaves and pops entries until an inner node is reached. `pop` says that the current
+    /// reference is already used up.
     #[inline(always)]
     fn pop_to_node(&mut self, simd: S, units: &[Unit], mut pop: bool) -> bool {
         loop {
@@ -143,7 +143,8 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
     }
 }
 
-/// The next ray that is to walk an inner node; those that start at a leaf are done at once.
+/// The next ray whose subtree starts at an inner node. Rays that start at a leaf are finished at
+/// once.
 #[inline(always)]
 fn next_traversal<'r, S: Simd, Q: RayQueue<'r, S>>(
     simd: S,
@@ -161,7 +162,7 @@ fn next_traversal<'r, S: Simd, Q: RayQueue<'r, S>>(
     }
 }
 
-/// All rays of the queue, each in its subtree.
+/// Traces all rays of the queue, each in its subtree.
 #[inline(always)]
 pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: bool>(
     simd: S,
@@ -207,7 +208,7 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: boo
     }
 }
 
-/// The last ray's way to the end.
+/// Finishes the last ray alone.
 #[inline(never)]
 fn finish_last<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,

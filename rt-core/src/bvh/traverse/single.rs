@@ -1,4 +1,4 @@
-//! One ray at a time: eight boxes per step, nearest child first.
+//! Traversal by one ray at a time: eight boxes per step, nearest child first.
 
 use super::three;
 use crate::bvh::intersect::watertight::Shear;
@@ -9,37 +9,37 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
-/// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴, so that a box is never missed
-/// whose triangle the ray meets.
+/// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴. With it, the box test never
+/// rejects a box whose triangle the triangle test hits.
 ///
-/// Ize ("Robust BVH Ray Traversal", JCGT 2013) has 6 u for the slab test by itself. The triangle
-/// test shears with a slope that carries roundings of its own, which turns the ray against the
-/// slabs by 3 u at either end, and multiplying with this factor rounds once more. What the triangle
-/// test loses in proportion to the triangle instead of the distance is in the boxes:
-/// [`crate::bvh::layout::triangles::widened`]. So boxes decide nothing: single rays, packets and
-/// every tree give the same answer.
+/// Ize ("Robust BVH Ray Traversal", JCGT 2013) derives 6 u for the slab test by itself. The
+/// triangle test shears with a slope that has rounding errors of its own: they turn the ray against
+/// the slabs by 3 u at either end. The multiplication by this factor rounds once more. Errors of
+/// the triangle test that are proportional to the size of the triangle, not to the distance, are
+/// covered by the boxes: see [`crate::bvh::layout::triangles::widened`]. So box tests never decide
+/// an answer: single rays, packets and every tree give the same one.
 pub(crate) const BOX_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// A little beyond `t`, for skipping boxes: a triangle's `t` and its box's distance round
-/// differently, and of two surfaces at the same place both must be seen for the lower number to
-/// win.
+/// A distance slightly larger than `t`, from which boxes are skipped. A triangle's `t` and its
+/// box's distance round differently, and of two surfaces at the same distance both must be tested
+/// so that the lower number wins.
 #[inline(always)]
 pub(crate) fn inflate_t(t: f32) -> f32 {
     t * (1.0 + 32.0 * f32::EPSILON)
 }
 
-/// Smallest direction component as it enters a reciprocal, 2⁻¹²⁴: the reciprocal is finite, which
-/// keeps 0·∞ out of the slab test. Not larger: local space of a mesh of size 10²⁵ has directions of
-/// 10⁻²⁵.
+/// Smallest magnitude of a direction component in a reciprocal, 2⁻¹²⁴. It keeps the reciprocal
+/// finite, so 0·∞ cannot occur in the slab test. It must not be larger: in the local space of a
+/// mesh of size 10²⁵, directions are about 10⁻²⁵.
 pub(crate) const MIN_COMPONENT: f32 = 4.0 * f32::MIN_POSITIVE;
 
-/// What a ray needs in every step, computed once.
+/// Constants of a ray that every step needs, computed once.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RaySetup {
     pub(crate) origin: [f32; 3],
     pub(crate) rcp: [f32; 3],
-    /// Row of the plane the ray meets first, per axis; the other one is that row with the lowest
-    /// bit flipped.
+    /// Per axis, the row of the plane that the ray reaches first. The other plane is that row with
+    /// the lowest bit flipped.
     pub(crate) near: [usize; 3],
     pub(crate) shear: Shear,
     pub(crate) t_min: f32,
@@ -56,7 +56,7 @@ impl RaySetup {
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.dir.to_array();
         let rcp = d.map(safe_reciprocal);
-        // Near planes follow the sign of the reciprocal, so that -0.0 and +0.0 agree with it.
+        // Near planes follow the sign of the reciprocal, so -0.0 and +0.0 agree with it.
         let near = std::array::from_fn(|a| 2 * a + (rcp[a] < 0.0) as usize);
         RaySetup {
             origin: ray.origin.to_array(),
@@ -68,17 +68,18 @@ impl RaySetup {
     }
 }
 
-/// What happens at a leaf.
+/// The primitive test at a leaf.
 pub(crate) trait LeafTest<S: Simd> {
-    /// Tests the primitives of `leaf`; lowers `skip_t`, the distance from which boxes are skipped,
-    /// to [`inflate_t`] the closest hit so far. Returns true when the search is over.
+    /// Tests the primitives of `leaf`. Lowers `skip_t`, the distance from which boxes are skipped,
+    /// to [`inflate_t`] of the closest hit so far. Returns true when the search is over.
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 }
 
-/// Walks the leaves whose boxes the ray meets before `t_max`, widened by rounding errors in every
-/// mode: it costs nothing. `ORDERED` goes to the nearest child first (any-hit queries do not care).
+/// Visits the leaves whose boxes the ray enters before `t_max`. Boxes are widened for rounding
+/// errors in every mode, because that costs nothing. `ORDERED` visits the nearest child first;
+/// any-hit queries do not need it.
 ///
-/// Never inlined: one body per instruction set, leaf kind and mode. Inlined into its callers it
+/// Never inlined: one body per instruction set, leaf kind and mode. Inlining it into its callers
 /// multiplied the compile time by thirty.
 #[inline(never)]
 pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
@@ -94,7 +95,8 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     );
 }
 
-/// [`traverse`] without its own function, for callers that have the instruction set already.
+/// [`traverse`] without a function of its own, for callers already compiled for the instruction
+/// set.
 #[inline(always)]
 pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
@@ -106,7 +108,7 @@ pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     traverse_from::<S, L, ORDERED>(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
 }
 
-/// The subtree at `start`.
+/// Traverses the subtree at `start`.
 #[inline(always)]
 pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     simd: S,
@@ -121,13 +123,13 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
-    // The slack enters the far planes' reciprocals, which costs nothing in the loop. Far distances
-    // below zero never matter: t_min is not below.
+    // The slack is part of the far planes' reciprocals, so it costs nothing in the loop. Far
+    // distances below zero never matter, because t_min is not negative.
     let slack = f32x8::splat(simd, BOX_SLACK);
     let rcp_far: [f32x8<S>; 3] = three!(|a| rcp[a] * slack);
     let [nx, ny, nz] = ray.near;
-    // Distance in the high half, so that integer order is order of distance; t_min >= 0 keeps it
-    // non-negative.
+    // The distance is in the high half, so integer order is the order of distances. t_min >= 0
+    // keeps the distance non-negative.
     let mut memory = StackMemory::<u64, STACK_SIZE>::new();
     let mut stack = Stack::empty(&mut memory);
     let mut current = start;
@@ -160,7 +162,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
                 continue;
             }
         }
-        // ---- Next entry that still lies before the closest hit.
+        // ---- The next entry that is still nearer than the closest hit.
         loop {
             let Some(e) = stack.pop() else { return };
             if f32::from_bits((e >> 32) as u32) <= skip_t {
@@ -171,9 +173,9 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
     }
 }
 
-/// Where to go from a node of which the boxes in `mask` are met, at the distances `near`: the
-/// nearest child when `ORDERED`, any otherwise; the others wait on the stack. `None`: what comes
-/// next is on the stack.
+/// Selects the next child of a node, given the boxes in `mask` that the ray hits at the distances
+/// `near`. Returns the nearest child when `ORDERED`, any child otherwise, and pushes the others on
+/// the stack. `None` means that the next entry is on the stack.
 #[inline(always)]
 pub(super) fn push_children<S: Simd, const ORDERED: bool>(
     units: &[Unit],
@@ -207,8 +209,8 @@ pub(super) fn push_children<S: Simd, const ORDERED: bool>(
         }
         return Some(child);
     }
-    // Up to three are sorted in registers: which of two boxes is nearer is a coin toss, so no
-    // branch may ask.
+    // Up to three are sorted in registers. Which of two boxes is nearer is unpredictable, so this
+    // code has no branches.
     let (a, b) = (entry(first), entry(mask.trailing_zeros() as usize));
     mask &= mask - 1;
     let (e0, e1) = (a.min(b), a.max(b));

@@ -1,4 +1,4 @@
-//! A ray against the triangles of a leaf.
+//! Test of a ray against the triangles of a leaf.
 
 use super::single::{LeafTest, RaySetup, inflate_t};
 use super::three;
@@ -8,7 +8,7 @@ use crate::bvh::layout::wide::{ChildRef, Unit};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x4, mask32x4};
 
-/// The closest triangle so far.
+/// The closest hit so far.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClosestTri {
     pub(crate) t: f32,
@@ -18,7 +18,7 @@ pub(crate) struct ClosestTri {
     pub(crate) found: bool,
 }
 
-/// The four triangles of a leaf against a ray: candidate lanes, if any.
+/// Tests the four triangles of a leaf against a ray. Returns the candidate lanes, if any.
 #[inline(always)]
 fn test_leaf<S: Simd, const EXACT: bool>(
     simd: S,
@@ -42,7 +42,7 @@ pub(crate) struct ClosestLeaf<'r, const EXACT: bool> {
 }
 
 impl<'r, const EXACT: bool> ClosestLeaf<'r, EXACT> {
-    /// Goes on from a hit found elsewhere in the tree.
+    /// Continues from a hit found elsewhere in the tree.
     #[inline(always)]
     pub(crate) fn continuing(ray: &'r RaySetup, best: ClosestTri) -> Self {
         ClosestLeaf { ray, best }
@@ -50,8 +50,7 @@ impl<'r, const EXACT: bool> ClosestLeaf<'r, EXACT> {
 
     #[inline(always)]
     pub(crate) fn new(ray: &'r RaySetup, t_max: f32) -> Self {
-        // Number 0 with t_max: nothing at exactly t_max can win the tie, which makes the range
-        // half-open.
+        // Number 0 with t_max: nothing at exactly t_max can win the tie, so the range is half-open.
         ClosestLeaf { ray, best: ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false } }
     }
 }

@@ -1,14 +1,16 @@
 //! Traces up to 256 coherent rays at a time: tiles of primary rays, shadow rays to one light,
 //! sorted ambient occlusion rays.
 //!
-//! Two levels of bounds do most of the work. All rays of a packet share one octant, so intervals of
-//! their reciprocal directions (and origins) bound every ray's distance to a plane. A node's eight
-//! children are tested against the whole packet at once, and a child that survives against the
-//! intervals of its sixteen groups of sixteen rays at once; only groups that reach a leaf test its
-//! triangles, sixteen rays at a time. (Interval packets: Boulos et al. 2006, Overbeck et al. 2008;
-//! two levels: measured in this project, 1.2 to 2 times faster than flat packets of 64 or 256.)
+//! Most of the work is done on two levels of bounds. All rays of a packet share one octant, so
+//! intervals of their reciprocal directions (and origins) bound every ray's distance to a plane. A
+//! node's eight children are first tested against the whole packet at once. A child that passes is
+//! tested against the intervals of its sixteen groups of sixteen rays at once. Only groups that
+//! reach a leaf test its triangles, sixteen rays at a time. (Interval packets: Boulos et al. 2006,
+//! Overbeck et al. 2008; two levels: measured in this project, 1.2 to 2 times faster than flat
+//! packets of 64 or 256.)
 //!
-//! The triangle test is the single ray's, operation by operation, so both give the same bits.
+//! The triangle test does the same operations in the same order as the test for single rays, so
+//! both give the same bits.
 
 mod load;
 mod switch_to_single;
@@ -22,7 +24,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u32x16}
 pub(crate) use load::PacketLimits;
 use triangles::Triangles;
 
-/// Groups of sixteen rays in a packet, at most.
+/// Largest number of groups of sixteen rays in a packet.
 pub(crate) const GROUPS: usize = 16;
 
 type Row = [f32; LANES];
@@ -36,19 +38,20 @@ pub(crate) struct Packet {
     /// Reciprocal directions, for packets without a common origin.
     rcp: [[Row; 3]; GROUPS],
     t_min: [Row; GROUPS],
-    /// Closest hit so far; starts as the ray's limit.
+    /// Distance of the closest hit so far. Starts as the ray's limit.
     pub(crate) t: [Row; GROUPS],
     pub(crate) u: [Row; GROUPS],
     pub(crate) v: [Row; GROUPS],
     pub(crate) prim: [[u32; LANES]; GROUPS],
-    /// Lanes still looking for a hit.
+    /// Lanes that still search for a hit.
     active: [u16; GROUPS],
-    /// Lanes that have one.
+    /// Lanes that have a hit.
     pub(crate) hit: [u16; GROUPS],
     // Per group: intervals of reciprocal directions (per axis smallest and largest) and origins,
     // and the largest t.
     rcp_bounds: [[Row; 2]; 3],
-    /// The end of the origins' interval that makes near planes nearest, and the other one.
+    /// The end of the origins' interval that gives the nearest distances to near planes. The next
+    /// field holds the other end.
     origin_near: [Row; 3],
     origin_far: [Row; 3],
     group_t: Row,
@@ -58,20 +61,20 @@ pub(crate) struct Packet {
     near: [usize; 3],
     axes: [usize; 3],
     common_origin: bool,
-    /// A shear in the middle of the packet's; the bounds below are differences from it.
+    /// A shear in the middle of the packet's shears. The bounds below are differences from it.
     shear_mid: [f32; 2],
-    /// Per group, for x and y: smallest and largest shear. Packets with a common origin only.
+    /// Per group, for x and y: smallest and largest shear. Only for packets with a common origin.
     shear_bounds: [[Row; 2]; 2],
-    /// Largest difference from `shear_mid` of all groups.
+    /// Largest difference from `shear_mid` over all groups.
     shear_span: [f32; 2],
-    /// Whether testing the rays of groups one by one against boxes pays off with a common origin,
-    /// learned from earlier packets: closest hits, occlusion.
+    /// Whether per-ray box tests pay off with a common origin, learned from earlier packets: one
+    /// entry for closest hits, one for occlusion.
     slabs: [SlabHeuristic; 2],
 }
 
-/// Whether per-ray box tests reject enough of the groups whose intervals intersect a box. They do
-/// for shadow rays of points at many depths and not for tiles of pixels; no measure of the
-/// intervals predicted this as well as trying. Results do not depend on it.
+/// Decides whether per-ray box tests reject enough of the groups whose intervals intersect a box.
+/// They do so for shadow rays from points at many depths, but not for tiles of pixels. No measure
+/// of the intervals predicted this as well as trying. Results do not depend on it.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlabHeuristic {
     /// Groups tested and groups kept recently.
@@ -83,7 +86,7 @@ struct SlabHeuristic {
     since: u8,
 }
 
-/// Per-ray box tests in one traversal.
+/// Counts of per-ray box tests in one traversal.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlabCounts {
     /// Groups tested, groups kept, and their rays that intersect the boxes.
@@ -100,9 +103,9 @@ impl SlabHeuristic {
     /// of the time; 0.66 and 0.93 for rays from a light, where they save a third and cost a
     /// quarter.
     const KEPT: f32 = 0.75;
-    /// When a tested group has fewer rays than this, the packet loses coherence, and the tests find
-    /// the few rays that are traced faster alone. One value tried: rays from a light among pipes
-    /// took 94 instead of 133 ms, among isosurfaces nothing changed.
+    /// When a tested group has fewer rays than this on average, the packet loses coherence, and the
+    /// tests find the few rays that are traced faster alone. One value was tried: rays from a light
+    /// among pipes took 94 instead of 133 ms; among isosurfaces nothing changed.
     const RAYS: f32 = 5.0;
 
     fn next(&mut self) -> bool {
@@ -149,7 +152,7 @@ impl Packet {
         })
     }
 
-    /// Writes the hits of the loaded rays; lanes without one are left as they are.
+    /// Writes the hits of the loaded rays. Lanes without a hit keep their contents.
     pub(crate) fn store<const ANY: bool>(&self, out: &mut [HitBlock], instance: u32) {
         for (g, h) in out.iter_mut().enumerate().take(GROUPS) {
             let hit = self.hit[g];
@@ -172,7 +175,7 @@ impl Packet {
         }
     }
 
-    /// Writes every lane of the packet's blocks: hits of `instance`, and misses.
+    /// Writes every lane of the packet's blocks: hits of `instance`, or misses.
     #[inline(never)]
     pub(crate) fn store_all<S: Simd>(&self, simd: S, out: &mut [HitBlock], instance: u32) {
         simd.vectorize(
@@ -212,8 +215,8 @@ impl Packet {
         }
     }
 
-    /// The leaves of a hierarchy that some group of the packet may reach before its limit, with the
-    /// distance to the leaf's box.
+    /// Collects the leaves of a hierarchy that some group of the packet may reach before its limit,
+    /// each with the distance to its box.
     pub(crate) fn collect<S: Simd>(
         &mut self,
         simd: S,
@@ -226,11 +229,11 @@ impl Packet {
 
 /// Callback for the leaves that a packet reaches.
 trait PacketLeaf<S: Simd> {
-    /// All rays start at one point.
+    /// Whether all rays start at one point.
     const COMMON: bool;
 
-    /// `reached` are the groups whose bounds meet the leaf's box, first at `distance`. Returns the
-    /// groups whose limits changed.
+    /// Tests the leaf for the groups `reached`, whose bounds intersect its box, at `distance` at
+    /// the nearest. Returns the groups whose limits changed.
     fn leaf(
         &mut self,
         packet: &mut Packet,
@@ -241,7 +244,8 @@ trait PacketLeaf<S: Simd> {
         distance: f32,
     ) -> u16;
 
-    /// The few rays that meet an inner node's box: `lanes` of the groups `reached`. Likewise.
+    /// Traces one by one the few rays that hit an inner node's box: `lanes` of the groups
+    /// `reached`. Returns the groups whose limits changed.
     fn switch_to_single(
         &mut self,
         packet: &mut Packet,

@@ -11,31 +11,31 @@ use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, f32x16};
 
-/// A child to visit, by the index of its box: the node's unit times eight plus the slot.
+/// A child to visit, identified by the index of its box: the node's unit times eight plus the slot.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Entry {
-    /// Distance in the high half.
+    /// The distance in the high half, the index in the low half.
     key: u64,
     /// Groups whose bounds intersect the box.
     groups: u16,
 }
 
-/// Smallest distance to a plane over intervals of origins (`o` is the end that makes it smallest)
-/// and reciprocal directions.
+/// Smallest distance to a plane over intervals of origins and reciprocal directions. `o` is the end
+/// of the origins' interval that makes it smallest.
 #[inline(always)]
 fn nearest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
     let p = plane - o;
     (p * rcp_lo).min(p * rcp_hi)
 }
 
-/// Largest distance, likewise.
+/// Largest distance to a plane over the same intervals. `o` is the end that makes it largest.
 #[inline(always)]
 fn farthest<S: Simd, V: SimdFloat<S, Element = f32>>(plane: V, o: V, rcp_lo: V, rcp_hi: V) -> V {
     let p = plane - o;
     (p * rcp_lo).max(p * rcp_hi)
 }
 
-/// The six planes of child `slot` in the order near x, y, z, far x, y, z.
+/// The six planes of child `slot`, in the order near x, y, z, far x, y, z.
 #[inline(always)]
 fn planes(node: &[Unit; NODE_UNITS], near: [usize; 3], slot: usize) -> [f32; 6] {
     let at = |row: usize| node[row & 7].0[slot & 7];
@@ -43,7 +43,8 @@ fn planes(node: &[Unit; NODE_UNITS], near: [usize; 3], slot: usize) -> [f32; 6] 
 }
 
 impl Packet {
-    /// Groups that may intersect the box with these planes before `group_t`, by their intervals.
+    /// Groups that may intersect the box with these planes before `group_t`, judged by their
+    /// intervals.
     #[inline(always)]
     fn groups_in_box<S: Simd>(
         &self,
@@ -53,7 +54,8 @@ impl Packet {
         common: bool,
     ) -> u16 {
         let (n, f): ([f32x16<S>; 3], [f32x16<S>; 3]) = if common {
-            // One origin: the sign of a plane's offset says which end of the interval is nearest.
+            // With one origin, the sign of a plane's offset tells which end of the interval is
+            // nearest.
             let p: [f32; 3] = three!(|a| planes[a] - self.origin_near[a][0]);
             let q: [f32; 3] = three!(|a| planes[a + 3] - self.origin_near[a][0]);
             (
@@ -81,8 +83,8 @@ impl Packet {
         near.simd_le(far).to_bitmask() as u16
     }
 
-    /// `SLABS`: groups whose intervals meet a box are tested ray by ray before they go on. Returns
-    /// how many were and what came of it.
+    /// Traverses the hierarchy. With `SLABS`, groups whose intervals intersect a box are also
+    /// tested ray by ray before they continue. Returns the counts of these tests.
     #[inline(never)]
     pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
         &mut self,
@@ -137,9 +139,9 @@ impl Packet {
         let mut node_at = 0;
         let mut groups = self.groups;
         'nodes: loop {
-            // ---- A node: its eight boxes against the packet, then each that is met against the
-            // groups. Testing the groups here, for all children in a row, lets their long chains of
-            // operations overlap; at the pop they would wait for one another.
+            // ---- A node: its eight boxes against the packet, then each box that passes against
+            // the groups. Testing the groups here, for all children in a row, lets their long
+            // chains of operations overlap. At the pop they would wait for one another.
             count(Counter::Nodes, 1);
             let node: &[Unit; NODE_UNITS] =
                 units[node_at..node_at + NODE_UNITS].try_into().expect("a slice of that length");
@@ -177,7 +179,7 @@ impl Packet {
                 stack.sort_descending_from(base);
             }
 
-            // ---- Entries, nearest first, until an inner node is reached.
+            // ---- Pops entries, nearest first, until an inner node is reached.
             loop {
                 let Some(Entry { key, groups: mut reached }) = stack.pop() else { break 'nodes };
                 let distance = f32::from_bits((key >> 32) as u32);
@@ -211,7 +213,7 @@ impl Packet {
                     continue 'nodes;
                 }
                 if !SLABS {
-                    // Hits found since the push may lie before the leaf.
+                    // Hits found since the push may be nearer than the leaf.
                     count(Counter::GroupBoxes, 1);
                     reached &= self.groups_in_box(
                         simd,
@@ -246,9 +248,9 @@ impl Packet {
         slabs
     }
 
-    /// Of the groups in `reached`, those with a ray that meets the box, and how many rays do;
-    /// `lanes` gets which. The intervals of rays with different origins or diverging directions say
-    /// little far away; this test is each ray's own.
+    /// Returns the groups of `reached` with a ray that hits the box, and the number of such rays.
+    /// Writes their lanes to `lanes`. The intervals of rays with different origins or diverging
+    /// directions are weak bounds far away; this test is exact for each ray.
     #[inline(always)]
     fn cull_rays<S: Simd>(
         &self,
@@ -260,7 +262,7 @@ impl Packet {
     ) -> (u16, u32) {
         let (mut kept, mut rays) = (0, 0);
         let mut rest = reached;
-        // The origin all rays share is subtracted once.
+        // The common origin is subtracted only once.
         let shared = |a: usize| if common { self.origin_near[a][0] } else { 0.0 };
         let p: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a] - shared(a)));
         let q: [f32x16<S>; 3] = three!(|a| f32x16::splat(simd, planes[a + 3] - shared(a)));
