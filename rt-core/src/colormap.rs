@@ -1,5 +1,5 @@
-//! One-dimensional lookup from scalar to colour (thesis section 3.2.5): scalars are interpolated
-//! first and mapped then, so a colour map stays sharp inside large triangles.
+//! Maps scalars to colours with a one-dimensional lookup table (thesis section 3.2.5). Scalars are
+//! interpolated first and then mapped, so a colour map stays sharp inside large triangles.
 
 use crate::ray::LANES;
 use crate::simd::vectors::Row;
@@ -8,14 +8,14 @@ use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16};
 /// Linear RGBA.
 pub type Rgba = [f32; 4];
 
-/// How a scalar becomes a colour: linear interpolation between evenly spaced colours over `range`.
+/// A colour map: linear interpolation between evenly spaced colours over `range`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorMap {
     /// At least one colour, evenly spaced over `range`; linear RGB, alpha is opacity.
     pub colors: Vec<Rgba>,
     /// Scalars at the first and the last colour. Values outside get the end colours.
     pub range: [f32; 2],
-    /// Logarithmic in the scalar (both ends of `range` must be positive).
+    /// Whether the map is logarithmic in the scalar (both ends of `range` must be positive).
     pub log: bool,
     /// Colour of NaN scalars.
     pub nan_color: Rgba,
@@ -28,7 +28,7 @@ impl ColorMap {
         ColorMap { colors, range, log: false, nan_color: [1.0, 0.0, 1.0, 1.0] }
     }
 
-    /// Checks the numbers; the error names the field, its value and what it must be.
+    /// Checks the numbers. The error contains the field, its value and the valid values.
     pub(crate) fn check(&self) -> Result<(), (&'static str, String, &'static str)> {
         if self.colors.is_empty() {
             return Err(("color map", "without colours".into(), "one with at least one colour"));
@@ -52,7 +52,7 @@ impl ColorMap {
         Err(("color map's range", format!("{:?}", self.range), rule))
     }
 
-    /// Colour of `scalar`.
+    /// The colour of `scalar`.
     #[inline]
     pub fn lookup(&self, scalar: f32) -> Rgba {
         if scalar.is_nan() {
@@ -60,7 +60,7 @@ impl ColorMap {
         }
         let [a, b] = self.range;
         let t = if self.log { (scalar / a).ln() / (b / a).ln() } else { (scalar - a) / (b - a) };
-        // A range of zero width gives NaN or infinity here: step at the value.
+        // A range of zero width gives NaN or infinity here. The map then is a step at that value.
         let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) };
         let x = t * (self.colors.len() - 1) as f32;
         let i = (x as usize).min(self.colors.len() - 1);
@@ -69,12 +69,12 @@ impl ColorMap {
         std::array::from_fn(|c| self.colors[i][c] + (self.colors[j][c] - self.colors[i][c]) * f)
     }
 
-    /// [`ColorMap::lookup`] of sixteen scalars, with the same bits: a row per channel.
+    /// [`ColorMap::lookup`] of sixteen scalars, with the same bits. `out` has one row per channel.
     #[inline(always)]
     pub(crate) fn lookup_block<S: Simd>(&self, simd: S, scalars: f32x16<S>, out: &mut [Row; 4]) {
         let v = |x: f32| f32x16::splat(simd, x);
         if self.log {
-            // Logarithms are not vectorised: each lane by itself.
+            // Logarithms are not vectorised, so each lane is computed by itself.
             for lane in 0..LANES {
                 let color = self.lookup(scalars[lane]);
                 for c in 0..4 {
@@ -88,7 +88,7 @@ impl ColorMap {
         let t = t.simd_eq(t).select(t.max(v(0.0)).min(v(1.0)), v(0.5));
         let last = self.colors.len() - 1;
         let x = t * v(last as f32);
-        // Not negative, so rounding down is truncation.
+        // Not negative, so truncation rounds down.
         let i = x.floor();
         let f = x - i;
         let (mut low, mut high) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);

@@ -16,7 +16,7 @@ pub struct Grid {
     pub values: Vec<f32>,
 }
 
-/// Why a grid cannot be used.
+/// Reasons why a grid cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
     /// The number of values does not match the dimensions.
@@ -29,12 +29,12 @@ pub enum GridError {
         /// Number of values.
         found: usize,
     },
-    /// Spacing is zero, negative or not finite, or the origin is not finite.
+    /// The spacing is zero, negative or not finite, or the origin is not finite.
     #[error("grid {field} is {value}; it must be {rule}")]
     Geometry {
         /// "spacing" or "origin".
         field: &'static str,
-        /// The offending value.
+        /// The invalid value.
         value: DVec3,
         /// What is allowed.
         rule: &'static str,
@@ -42,7 +42,7 @@ pub enum GridError {
 }
 
 impl Grid {
-    /// A checked grid.
+    /// A grid with checked values.
     pub fn new(
         dims: UVec3,
         origin: DVec3,
@@ -66,7 +66,7 @@ impl Grid {
         Ok(Grid { dims, origin, spacing, values })
     }
 
-    /// Value at point (i,j,k). Panics outside.
+    /// Value at point (i,j,k). Panics outside the grid.
     #[inline]
     pub fn at(&self, i: u32, j: u32, k: u32) -> f32 {
         self.values[self.index(i, j, k)]
@@ -137,8 +137,8 @@ impl Grid {
         ]
     }
 
-    /// Cell and position inside it (0..=1) of the continuous index `p`, clamped to the grid. NaN
-    /// goes to 0.
+    /// The cell of the continuous index `p`, clamped to the grid, and the position inside it
+    /// (0..=1). NaN becomes 0.
     #[inline]
     pub fn cell_of(&self, p: Vec3) -> (UVec3, Vec3) {
         let last = (self.dims - UVec3::ONE).as_vec3();

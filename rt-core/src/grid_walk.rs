@@ -1,11 +1,11 @@
-//! Walking a ray through the cells of a uniform grid, such that everyone who walks any part of the
-//! grid sees the same cells.
+//! Traversal of the cells of a uniform grid along a ray. Every traversal of any part of the grid
+//! finds the same cells.
 //!
 //! The ray parameter at which a grid plane is crossed is a pure function of the ray and the plane's
-//! number, and which of several planes crossed at the same parameter comes first is fixed (x before
-//! y before z). Hence blocks of cells that are walked separately agree on the sequence of cells and
-//! on the parameters between them to the last bit: what leaves one block enters the next.
-//! (Amanatides and Woo 1987 add increments instead; their sums differ between blocks.)
+//! number. The order of planes crossed at the same parameter is fixed (x before y before z). Hence
+//! blocks of cells that are traversed separately agree to the last bit on the sequence of cells and
+//! on the parameters between them: a ray that leaves one block enters the next at the same
+//! parameter. (Amanatides and Woo 1987 add increments instead; their sums differ between blocks.)
 
 use glam::DVec3;
 
@@ -17,29 +17,31 @@ pub(crate) struct IndexRay {
     inverse: [f64; 3],
 }
 
-/// A stretch of the ray inside one cell.
+/// The part of the ray inside one cell.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Crossing {
     /// Lowest point of the cell.
     pub(crate) cell: [i64; 3],
     pub(crate) t0: f64,
     pub(crate) t1: f64,
-    /// Axis of the face entered through; `None` where the ray's range begins inside the cell.
+    /// Axis of the face through which the ray enters; `None` where the ray's range begins inside
+    /// the cell.
     pub(crate) entry: Option<usize>,
-    /// Axis of the face left through; `None` where the ray's range ends inside the cell.
+    /// Axis of the face through which the ray leaves; `None` where the ray's range ends inside the
+    /// cell.
     pub(crate) exit: Option<usize>,
 }
 
 impl IndexRay {
-    /// From a ray relative to the grid's point (0,0,0).
+    /// Converts a ray relative to the grid's point (0,0,0).
     #[inline]
     pub(crate) fn new(o: DVec3, d: DVec3, spacing: DVec3) -> Self {
         let d = d / spacing;
         IndexRay { o: (o / spacing).to_array(), d: d.to_array(), inverse: d.recip().to_array() }
     }
 
-    /// When the plane number `i` across `axis` is crossed. Not for axes the ray does not move
-    /// along.
+    /// Parameter at which the ray crosses plane number `i` of `axis`. Undefined for axes along
+    /// which the ray does not move.
     #[inline]
     fn plane(&self, axis: usize, i: i64) -> f64 {
         (i as f64 - self.o[axis]) * self.inverse[axis]
@@ -51,8 +53,9 @@ impl IndexRay {
         std::array::from_fn(|a| self.o[a] + t * self.d[a])
     }
 
-    /// Entry and exit position of a crossing inside its cell, 0..=1. The coordinate across a face
-    /// is exactly 0 or 1, and the others are the same numbers for both cells of the face.
+    /// Entry and exit position of a crossing inside its cell, 0..=1. The coordinate perpendicular
+    /// to a face is exactly 0 or 1, and the other coordinates are the same numbers for both cells
+    /// of the face.
     #[inline]
     pub(crate) fn fractions(&self, c: &Crossing, size: i64) -> ([f64; 3], [f64; 3]) {
         let scale = 1.0 / size as f64;
@@ -70,10 +73,10 @@ impl IndexRay {
         (p, q)
     }
 
-    /// Visits the cells of `lo..hi` that the ray meets within `[t_min, t_max]`, in order, until
+    /// Visits the cells of `lo..hi` that the ray crosses within `[t_min, t_max]`, in order, until
     /// `visit` returns false. Cells are `size` grid cells wide (`lo` must be a multiple of it; `hi`
     /// may cut the last one short). `last` is the number of cells of the whole grid per axis: a ray
-    /// that runs exactly in the grid's last plane belongs to the cell before it.
+    /// exactly in the grid's last plane belongs to the cell before it.
     #[inline]
     pub(crate) fn walk(
         &self,
@@ -85,8 +88,8 @@ impl IndexRay {
         t_max: f64,
         mut visit: impl FnMut(&Crossing) -> bool,
     ) {
-        // Where the ray enters and leaves the box, and through which face: of planes crossed at
-        // once, the last is the entry, the first the exit.
+        // Parameters and faces at which the ray enters and leaves the box. Of planes crossed at the
+        // same parameter, the last is the entry and the first the exit.
         let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
         let (mut entry, mut exit) = (0, 0);
         for a in 0..3 {
@@ -114,7 +117,8 @@ impl IndexRay {
             return;
         }
 
-        // The cell where the walk starts: planes that the ray has crossed by then are behind it.
+        // The cell where the traversal starts. Planes that the ray has crossed by then are behind
+        // it.
         let starts_inside = enter <= t_min;
         let start = if starts_inside { t_min } else { enter };
         let behind = |a: usize, i: i64| {
@@ -122,7 +126,7 @@ impl IndexRay {
             t < start || (t == start && (starts_inside || a < entry))
         };
         let mut cell = [0i64; 3];
-        // The next plane to be crossed along each axis: its number and parameter.
+        // The next plane along each axis: its number and parameter.
         let mut plane = [0i64; 3];
         let mut next = [f64::INFINITY; 3];
         for a in 0..3 {
@@ -164,7 +168,7 @@ impl IndexRay {
             }
         }
 
-        // From face to face.
+        // Steps from face to face.
         let mut crossing = Crossing {
             cell,
             t0: start,

@@ -1,6 +1,6 @@
-//! Small numerical tools with stated error behaviour.
+//! Small numerical functions with documented error behaviour.
 //!
-//! Lengths are in the unit of the scene; nothing here has a tolerance of its own.
+//! Lengths are in the unit of the scene. No function has a tolerance of its own.
 
 mod split_mix;
 
@@ -19,7 +19,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that contains nothing; growing it by a point gives that point.
+    /// The empty box. Growing it by a point gives that point.
     pub const EMPTY: Aabb =
         Aabb { min: Vec3::splat(f32::INFINITY), max: Vec3::splat(f32::NEG_INFINITY) };
 
@@ -33,7 +33,7 @@ impl Aabb {
         points.into_iter().fold(Aabb::EMPTY, |b, p| b.grown(*p))
     }
 
-    /// Grown to contain `p`.
+    /// The smallest box around this one and `p`.
     #[inline]
     pub fn grown(self, p: Vec3) -> Self {
         Aabb { min: self.min.min(p), max: self.max.max(p) }
@@ -45,13 +45,13 @@ impl Aabb {
         Aabb { min: self.min.min(o.min), max: self.max.max(o.max) }
     }
 
-    /// True when it contains no point.
+    /// Whether the box contains no point.
     #[inline]
     pub fn is_empty(self) -> bool {
         !(self.min.x <= self.max.x && self.min.y <= self.max.y && self.min.z <= self.max.z)
     }
 
-    /// Middle point.
+    /// The centre of the box.
     #[inline]
     pub fn center(self) -> Vec3 {
         0.5 * self.min + 0.5 * self.max
@@ -63,7 +63,7 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// Half the surface area (the SAH's measure); 0 for the empty box.
+    /// Half the surface area, as the surface area heuristic uses it; 0 for the empty box.
     #[inline]
     pub fn half_area(self) -> f32 {
         let e = self.extent().max(Vec3::ZERO);
@@ -115,15 +115,15 @@ pub fn orthonormal_basis(n: Vec3) -> (Vec3, Vec3) {
     )
 }
 
-/// `p` (f64) split into the nearest f32 point and nothing else: a helper that names the rounding.
+/// `p` rounded to the nearest f32 point. The function exists to name the rounding.
 #[inline]
 pub fn round_to_f32(p: DVec3) -> Vec3 {
     p.as_vec3()
 }
 
-/// The middle one of `values`, of an even number the larger of the two: always a value that was
-/// there. `None` of nothing. The order is that of [`f64::total_cmp`], in which NaN is beyond
-/// infinity; the values are left in another order.
+/// The upper median of `values`: the middle value, or the larger of the two middle ones. The result
+/// is always one of the values; `None` if there are none. The order is that of [`f64::total_cmp`],
+/// in which NaN is above infinity. The values are reordered.
 ///
 /// ```
 /// use rt_core::math::median_high;

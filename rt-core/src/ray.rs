@@ -1,18 +1,18 @@
-//! Rays, hits, and their blocks of 16.
+//! Rays, hits, and blocks of 16 of them.
 //!
 //! All coordinates here are in *render space*: world coordinates minus
 //! [`crate::bvh::World::origin`], in f32.
 
 use glam::Vec3;
 
-/// "No primitive": the id in a block lane that hit nothing.
+/// The primitive id of a block lane without a hit.
 pub const NO_HIT: u32 = u32::MAX;
 
-/// Lanes of a [`RayBlock`].
+/// Number of lanes of a [`RayBlock`].
 pub const LANES: usize = 16;
 
-/// A ray. Hits are reported for `t_min <= t < t_max`; `dir` need not have unit length, and `t` is
-/// in units of it.
+/// A ray. Hits are reported for `t_min <= t < t_max`. `dir` need not have unit length; `t` is in
+/// units of its length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Start point.
@@ -26,7 +26,7 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// A ray without end, starting at `origin`.
+    /// A ray without a limit, starting at `origin`.
     pub fn new(origin: Vec3, dir: Vec3) -> Self {
         Ray { origin, dir, t_min: 0.0, t_max: f32::INFINITY }
     }
@@ -36,14 +36,14 @@ impl Ray {
         Ray { t_max, ..self }
     }
 
-    /// The point at parameter `t`. Off the surface by the rounding of `t`: to start a secondary
-    /// ray, take the point and its error bound from the hit primitive instead.
+    /// The point at parameter `t`. The rounding of `t` moves it off the surface: to start a
+    /// secondary ray, use the point and its error bound from the hit primitive instead.
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + self.dir * t
     }
 
-    /// False when a ray can hit nothing or has NaN in it; such rays are answered "no hit" without
-    /// traversal.
+    /// Whether the ray can hit anything: false for an empty range or NaN. Such rays are answered
+    /// with "no hit" without traversal.
     #[inline]
     pub fn is_valid(&self) -> bool {
         self.origin.is_finite()
@@ -98,7 +98,7 @@ impl RayBlock {
         t_max: [-1.0; LANES],
     };
 
-    /// Puts `ray` into lane `lane`.
+    /// Writes `ray` into lane `lane`.
     #[inline]
     pub fn set(&mut self, lane: usize, ray: &Ray) {
         [self.ox[lane], self.oy[lane], self.oz[lane]] = ray.origin.to_array();
@@ -118,7 +118,7 @@ impl RayBlock {
         }
     }
 
-    /// Blocks from rays in order; the last one is filled up with inactive lanes.
+    /// Packs rays into blocks in order. The last block is filled up with inactive lanes.
     pub fn from_rays(rays: &[Ray]) -> Vec<RayBlock> {
         rays.chunks(LANES)
             .map(|chunk| {
@@ -145,7 +145,7 @@ pub struct HitBlock {
 }
 
 impl HitBlock {
-    /// No lane hit anything.
+    /// A block without hits.
     pub const MISS: HitBlock = HitBlock {
         t: [f32::INFINITY; LANES],
         u: [0.0; LANES],
@@ -166,7 +166,7 @@ impl HitBlock {
         })
     }
 
-    /// Puts a hit, or a miss, into lane `lane`.
+    /// Writes a hit or a miss into lane `lane`.
     #[inline]
     pub fn set(&mut self, lane: usize, hit: Option<Hit>) {
         let h =

@@ -1,18 +1,18 @@
-//! The trilinear interpolant of a cell along a straight line is a cubic; its Bernstein form and its
+//! The trilinear interpolant of a cell along a straight line: a cubic in Bernstein form, and its
 //! first root.
 //!
 //! Parker, Shirley, Livnat, Hansen and Sloan ("Interactive Ray Tracing for Isosurface Rendering",
-//! Visualization 1998) expand it into monomials and solve in closed form; Marmitt, Kleer, Wald,
-//! Friedrich and Slusallek ("Fast and Accurate Ray-Voxel Intersection", VMV 2004) isolate the roots
-//! between its extrema and refine, because the closed form misses. Here the coefficients are
-//! Bernstein ones, obtained by blossoming: all are averages of interpolated values, so their signs
-//! are right, and equal signs prove that there is no root.
+//! Visualization 1998) expand the cubic into monomials and solve it in closed form. Marmitt, Kleer,
+//! Wald, Friedrich and Slusallek ("Fast and Accurate Ray-Voxel Intersection", VMV 2004) isolate the
+//! roots between the extrema and refine, because the closed form misses roots. Here the
+//! coefficients are Bernstein coefficients, obtained by blossoming. All are averages of
+//! interpolated values, so their signs are right, and equal signs prove that there is no root.
 
 /// Trilinear values at the eight corners of the box from `p` to `q` inside a cell (0..=1 per axis),
 /// x fastest.
 #[inline]
 fn resample(v: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 8] {
-    // (1−f)·a + f·b gives a and b exactly at 0 and 1, so a point on a face has the same value from
+    // (1−f)·a + f·b gives a and b exactly at 0 and 1, so a point on a face has the same value in
     // both cells.
     let mix = |a: f64, b: f64, f: f64| (1.0 - f) * a + f * b;
     let mut r = *v;
@@ -50,7 +50,7 @@ fn slope(b: &[f64; 4], u: f64) -> f64 {
     3.0 * (((b[1] - b[0]) * w + 2.0 * (b[2] - b[1]) * u) * w + (b[3] - b[2]) * u * u)
 }
 
-/// Smallest and largest coefficient, between which all values are.
+/// Smallest and largest coefficient. All values of the cubic are between them.
 #[inline]
 pub(crate) fn hull(b: &[f64; 4]) -> (f64, f64) {
     (b[0].min(b[1]).min(b[2].min(b[3])), b[0].max(b[1]).max(b[2].max(b[3])))
@@ -68,9 +68,9 @@ pub(crate) fn split(b: &[f64; 4], u: f64) -> ([f64; 4], [f64; 4]) {
 
 /// The smallest u in 0..=1 where the cubic changes between "below" (< 0) and "not below" (≥ 0).
 ///
-/// When the first and the last coefficient differ in this sense there always is one; so two cells
-/// that agree on the value at their common face cannot both miss a surface that passes between
-/// them.
+/// If the first and the last coefficient differ in this sense, there always is such a u. So two
+/// cells that agree on the value at their common face cannot both miss a surface that passes
+/// between them.
 #[inline]
 pub(crate) fn first_change(b: &[f64; 4]) -> Option<f64> {
     let below = b.map(|x| x < 0.0);
@@ -105,13 +105,13 @@ pub(crate) fn first_change(b: &[f64; 4]) -> Option<f64> {
     None
 }
 
-/// The change between `lo` and `hi`, whose values differ in sign, by Newton's method kept inside
-/// the shrinking bracket.
+/// Finds the change between `lo` and `hi`, whose values differ in sign, with Newton's method
+/// restricted to a shrinking bracket.
 #[inline]
 fn refine(b: &[f64; 4], mut lo: f64, mut hi: f64) -> f64 {
     let lo_below = evaluate(b, lo) < 0.0;
     let (flo, fhi) = (evaluate(b, lo), evaluate(b, hi));
-    // Start with the secant: exact when the cubic is a line, which it nearly is in smooth data.
+    // Starts with the secant, which is exact when the cubic is a line. In smooth data it nearly is.
     let mut u = lo + (hi - lo) * (flo / (flo - fhi));
     for _ in 0..64 {
         if !(u > lo && u < hi) {
@@ -124,7 +124,7 @@ fn refine(b: &[f64; 4], mut lo: f64, mut hi: f64) -> f64 {
             hi = u;
         }
         let step = f / slope(b, u);
-        // 10⁻¹³ of a cell: far below what f32 output can tell.
+        // 10⁻¹³ of a cell is far below the resolution of f32 output.
         if step.abs() < 1e-13 || hi - lo < 1e-13 {
             return (u - step).clamp(lo, hi);
         }
@@ -192,8 +192,8 @@ mod tests {
             let root = first_change(&b);
             if let Some(k) = scan {
                 let u = root.unwrap_or_else(|| panic!("{b:?}: missed the change before {k}"));
-                // The scan may step over a close pair of roots before the one it found, never the
-                // other way round.
+                // The scan may step over a close pair of roots before the root it found; the solver
+                // must not.
                 assert!(u <= k as f64 / steps as f64 + 1e-12, "{b:?}");
                 assert!(evaluate(&b, u).abs() < 1e-12, "{b:?} at {u}: {}", evaluate(&b, u));
                 found += 1;

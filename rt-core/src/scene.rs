@@ -132,7 +132,7 @@ pub struct Scene {
     geometry_colors: Vec<ColorSummary>,
 }
 
-/// Why a scene cannot be rendered.
+/// Reasons why a scene cannot be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// The world could not be built.
@@ -141,9 +141,9 @@ pub enum SceneError {
     /// The numbers of appearances and instances differ.
     #[error("scene has {appearances} appearances for {instances} instances; give one per instance")]
     Appearances {
-        /// How many there are.
+        /// Number of appearances.
         appearances: usize,
-        /// How many are needed.
+        /// Number of instances.
         instances: usize,
     },
     /// The index of an appearance's material is out of range.
@@ -163,9 +163,9 @@ pub enum SceneError {
          the new world with Scene::new"
     )]
     OtherWorld {
-        /// Geometries of the world that the scene was made of.
+        /// Number of geometries in the world that the scene was made of.
         expected: usize,
-        /// Geometries of the world it has.
+        /// Number of geometries in the world it has now.
         found: usize,
     },
     /// A parameter of a material, a light, the environment, ... is out of range.
@@ -323,7 +323,7 @@ pub struct SceneBuilder {
     pub environment: Option<Environment>,
     /// What fills uncovered pixels.
     pub background: Background,
-    /// Ambient occlusion; `None` for none.
+    /// Ambient occlusion; `None` disables it.
     pub ambient_occlusion: Option<AmbientOcclusion>,
     /// Options of the acceleration structure.
     pub build_options: BuildOptions,

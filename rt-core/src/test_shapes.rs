@@ -5,7 +5,7 @@ use crate::mesh::TriMesh;
 use glam::Vec3;
 use std::collections::HashMap;
 
-/// The numbers of [`SplitMix64`] in single precision.
+/// [`SplitMix64`] in single precision.
 pub(crate) struct Random(SplitMix64);
 
 impl Random {
@@ -31,7 +31,7 @@ impl Random {
     }
 }
 
-/// Triangles of many sizes at random places in the unit ball.
+/// Triangles of many sizes at random positions in the unit ball.
 pub(crate) fn noise_soup(n: usize, seed: u64) -> TriMesh {
     let mut r = Random::new(seed);
     let mut mesh = TriMesh::default();
@@ -47,8 +47,8 @@ pub(crate) fn noise_soup(n: usize, seed: u64) -> TriMesh {
     mesh
 }
 
-/// A closed unit sphere: an icosahedron subdivided `level` times, turned so that no edge lies in an
-/// axis plane.
+/// A closed unit sphere: an icosahedron subdivided `level` times, rotated so that no edge lies in a
+/// plane through an axis.
 pub(crate) fn sphere(level: u32) -> TriMesh {
     let p = (1.0 + 5f64.sqrt()) / 2.0;
     let mut v: Vec<glam::DVec3> = Vec::new();

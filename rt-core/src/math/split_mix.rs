@@ -6,7 +6,7 @@ use glam::DVec3;
 /// SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA
 /// 2014): small, fast, and any seed is a good seed.
 ///
-/// Data sets, records and pictures depend on these numbers bit by bit.
+/// Data sets, records and images depend on these numbers bit by bit.
 ///
 /// ```
 /// use rt_core::math::{SplitMix64, mix64};
@@ -19,7 +19,7 @@ use glam::DVec3;
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// The sequence of this seed.
+    /// The sequence with this seed.
     #[inline]
     pub fn new(seed: u64) -> Self {
         SplitMix64(seed)
@@ -33,13 +33,13 @@ impl SplitMix64 {
         mix64(self.0)
     }
 
-    /// Uniform in [0, 1), of 53 bits.
+    /// Uniform in [0, 1), with 53 bits.
     #[inline]
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform in [0, 1), of 24 bits.
+    /// Uniform in [0, 1), with 24 bits.
     #[inline]
     pub fn unit_f32(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u64 << 24) as f32
@@ -60,7 +60,7 @@ impl SplitMix64 {
     }
 }
 
-/// A well-mixed function of 64 bits, one to one: what [`SplitMix64`] makes its counter into.
+/// A one-to-one mixing function of 64 bits. [`SplitMix64`] applies it to its counter.
 #[inline]
 pub fn mix64(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn draws_keep_their_bits() {
-        // Of the generator that data sets and records were made with.
+        // Values of the generator that data sets and records were made with.
         let mut r = SplitMix64::new(5);
         assert_eq!(r.bits(), 0x6303_3b0c_a389_c35a);
         assert_eq!(r.unit().to_bits(), 0x3fe8_12e6_29b2_72e6);

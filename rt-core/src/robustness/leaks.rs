@@ -53,10 +53,10 @@ pub enum RayOrigins {
         /// Its radius.
         radius: f64,
     },
-    /// Between the centre, from which every point of the surface can be seen, and a point of the
-    /// triangle that the ray is aimed at: mostly close to the surface, down to 10⁻⁶ of the way or
-    /// eight steps of f32, whichever is more. (Nearer than that `t` may round to below zero, and
-    /// the ray counts as having started behind the surface.)
+    /// Between the centre, from which every point of the surface is visible, and the point of the
+    /// triangle that the ray is aimed at. Most are close to the surface, down to 10⁻⁶ of the
+    /// distance or eight steps of f32, whichever is more. (Closer to the surface, `t` may round to
+    /// below zero, and the ray counts as having started behind the surface.)
     NearSurface {
         /// World coordinates.
         center: DVec3,
@@ -237,7 +237,7 @@ impl LeakTest<'_> {
     }
 }
 
-/// Below `n`, which is not 0 and at most 2^32.
+/// A random number below `n`, which must be 1 to 2^32.
 fn below(random: &mut SplitMix64, n: usize) -> usize {
     (((random.bits() >> 32) * n as u64) >> 32) as usize
 }

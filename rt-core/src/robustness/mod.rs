@@ -12,7 +12,7 @@ pub use self_shadow::{SelfShadowCount, SelfShadowTest};
 
 use crate::math::SplitMix64;
 
-/// Numbers of a batch of rays, which do not depend on the batches before it.
+/// Random numbers for one batch of rays. They do not depend on the batches before it.
 fn batch_numbers(seed: u64, batch: u64) -> SplitMix64 {
     SplitMix64::new(seed ^ (batch + 1).wrapping_mul(0xd134_2543_de82_ef95))
 }

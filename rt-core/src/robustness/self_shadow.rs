@@ -1,4 +1,4 @@
-//! Secondary rays that meet the surface they start from.
+//! Counts secondary rays that hit the surface from which they start.
 
 use super::batch_numbers;
 use crate::math::{SplitMix64, orthonormal_basis};
@@ -8,18 +8,19 @@ use crate::surface::ResolvedInstance;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// What became of the rays.
+/// Counts of a self-shadow test.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SelfShadowCount {
-    /// Camera rays that hit, and so secondary rays traced.
+    /// Camera rays that hit, which is also the number of secondary rays traced.
     pub rays: u64,
-    /// Secondary rays that were blocked. On a convex surface every one is false.
+    /// Secondary rays that were blocked. On a convex surface, all of these are errors.
     pub blocked: u64,
 }
 
-/// Cameras around a convex closed surface, the first instance of a scene, and from every visible
-/// point a ray outwards (cosine-distributed about the face normal), started as shading starts them.
-/// A ray leaving a convex surface never meets it again.
+/// A test of the first instance of a scene, which must be a convex closed surface. Cameras around
+/// it find visible points. From each point a ray is traced outwards (cosine-distributed about the
+/// face normal), with the same start as in shading. A ray that leaves a convex surface never hits
+/// it again.
 #[derive(Clone, Copy)]
 pub struct SelfShadowTest<'a> {
     /// The scene.
@@ -64,7 +65,7 @@ impl SelfShadowTest<'_> {
     }
 }
 
-/// A direction in the half space of `n`, with density proportional to the cosine.
+/// A random direction in the half space of `n`, with a density proportional to the cosine.
 fn cosine_direction(n: Vec3, random: &mut SplitMix64) -> Vec3 {
     let (t, b) = orthonormal_basis(n);
     let (r2, phi) = (random.unit(), std::f64::consts::TAU * random.unit());

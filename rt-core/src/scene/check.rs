@@ -1,4 +1,4 @@
-//! Whether a scene can be drawn: every index and every number of it.
+//! Checks whether a scene can be rendered: all indices and numbers must be valid.
 
 use super::{Scene, SceneError};
 use crate::bvh::Geometry;
@@ -8,11 +8,12 @@ use crate::mesh::PerElement;
 /// Field, value found, and what it must be.
 type Fault = (&'static str, String, &'static str);
 
-/// Lights are in f32 while they shine: farther ones would be at infinity, and give none.
+/// Largest distance of a light. Shading uses f32, where lights farther away would be at infinity
+/// and give no light.
 const FARTHEST: f64 = 1e37;
 
 impl Scene {
-    /// Checks indices and numbers.
+    /// Checks all indices and numbers of the scene.
     pub fn check(&self) -> Result<(), SceneError> {
         let (appearances, instances) = (self.appearances.len(), self.world.instances().len());
         if appearances != instances {
@@ -83,7 +84,7 @@ impl Scene {
             let geometry = &self.world.geometries()[self.world.instances()[appearance].geometry];
             let expected = |per| match (geometry, per) {
                 (Geometry::Mesh(mesh), PerElement::Vertex) => mesh.positions.len(),
-                // Shapes have one value for each primitive, given as either.
+                // Shapes have one value per primitive, given either per vertex or per primitive.
                 _ => geometry.num_primitives(),
             };
             let colors = a.colors.as_ref().map(|c| ("colors", expected(c.per), c.values.len()));
@@ -109,7 +110,7 @@ impl Scene {
         Ok(())
     }
 
-    /// The environment and the background.
+    /// Checks the environment and the background.
     fn check_surroundings(&self) -> Result<(), SceneError> {
         let error = |what| {
             move |(field, value, rule): Fault| SceneError::OutOfRange {
@@ -155,7 +156,7 @@ fn check_light(l: &Light) -> Result<(), Fault> {
         return Err(("radius", size.to_string(), "0 or positive, finite"));
     }
     let vector = |field, v: glam::DVec3| {
-        // What cannot be normalised would be no direction, and no light.
+        // A vector that cannot be normalised has no direction and would give no light.
         let ok = v.is_finite() && v.try_normalize().is_some();
         let rule = "finite and not zero, 1e-150 to 1e150 long";
         if ok { Ok(()) } else { Err((field, v.to_string(), rule)) }

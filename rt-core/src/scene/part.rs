@@ -1,4 +1,4 @@
-//! Scenes with some of the primitives of a larger one.
+//! Makes scenes with some of the primitives of a larger one.
 
 use super::{Appearance, Scene, SceneError};
 use crate::bvh::{BuildOptions, Geometry, ShapePart, World};
@@ -6,13 +6,14 @@ use crate::mesh::{Attribute, PerElement};
 use std::sync::Arc;
 
 impl Scene {
-    /// This scene with only the primitives `kept[g]` of each geometry g (numbers in ascending
-    /// order; others are sorted and repeated ones left out). Everything else is as it is here,
-    /// instances and materials keep their numbers, and rays meet what they meet here: see
-    /// [`World::build_part`]. Primitive k of geometry g of the part is primitive `kept[g][k]` here.
+    /// This scene with only the primitives `kept[g]` of each geometry g. The numbers are sorted,
+    /// and repeated ones are ignored. Everything else stays as it is: instances and materials keep
+    /// their numbers, and rays hit the kept primitives with the same results as here (see
+    /// [`World::build_part`]). Primitive k of geometry g of the part is primitive `kept[g][k]`
+    /// here.
     ///
     /// # Errors
-    /// [`SceneError::Build`] when a mesh is unusable or `kept` has not one list for each geometry.
+    /// [`SceneError::Build`] when a mesh is invalid or `kept` does not have one list per geometry.
     pub fn part(&self, kept: &[Vec<u32>], options: &BuildOptions) -> Result<Scene, SceneError> {
         let mut vertices_kept = Vec::with_capacity(kept.len());
         let mut triangles_kept = Vec::with_capacity(kept.len());
@@ -39,7 +40,7 @@ impl Scene {
             });
             triangles_kept.push(kept);
         }
-        // A list too few is the builder's error to tell.
+        // The builder reports a missing list.
         let instances = self.world.instances().to_vec();
         let world = World::build_part(geometries, instances, &self.world.global_layout(), options)?;
         let appearances = self
@@ -66,8 +67,8 @@ impl Scene {
     }
 }
 
-/// The values of the vertices or triangles that are kept. Shapes have one value per primitive,
-/// given as either.
+/// Selects the values of the kept vertices or triangles. Shapes have one value per primitive, given
+/// either per vertex or per primitive.
 pub(crate) fn attribute_part<T: Copy>(
     attribute: &Attribute<T>,
     vertices: &[u32],

@@ -1,4 +1,4 @@
-//! What a scene needs to be drawn: read from its lights, materials and attributes.
+//! Finds the effects that a scene needs, from its lights, materials and attributes.
 
 use super::Scene;
 use crate::colormap::ColorMap;
@@ -9,13 +9,14 @@ use crate::shade::reflection_of;
 use std::sync::Arc;
 
 impl Scene {
-    /// True when there is ambient light or an environment that is not black.
+    /// Whether there is ambient light or an environment that is not black.
     pub(crate) fn has_ambient(&self) -> bool {
         self.lights.iter().any(|l| matches!(l.kind, LightKind::Ambient) && l.color != [0.0; 3])
             || self.environment.as_ref().is_some_and(|e| !e.is_black())
     }
 
-    /// Whether instance `i`, whose material is `class`, can let light through by opacity.
+    /// Whether the opacity of instance `i`, whose material is of this `class`, can let light
+    /// through.
     fn may_be_transparent(&self, i: usize, class: OpacityClass) -> bool {
         match class {
             OpacityClass::Opaque => false,
@@ -29,16 +30,16 @@ impl Scene {
     }
 }
 
-/// What a material says about opacity; the same for all its instances.
+/// Opacity of a material, as far as it is the same for all its instances.
 #[derive(Clone, Copy, PartialEq)]
 enum OpacityClass {
     Opaque,
     Transparent,
-    /// As the colours are that the instance has.
+    /// Depends on the colours of the instance.
     ByAttribute,
 }
 
-/// Of each material; the colours of a map that neighbours share are looked at once.
+/// Opacity class of each material. A colour map that consecutive materials share is inspected once.
 fn opacity_classes(materials: &[Material]) -> Vec<OpacityClass> {
     let mut last: Option<(&Arc<ColorMap>, bool)> = None;
     let mut opacity_classes = Vec::with_capacity(materials.len());
@@ -66,7 +67,7 @@ fn opacity_classes(materials: &[Material]) -> Vec<OpacityClass> {
     opacity_classes
 }
 
-/// Of each instance, whether light can pass through it in a frame with these effects.
+/// For each instance, whether light can pass through it in a frame with these effects.
 pub(crate) fn transmits_light(scene: &Scene, effects: Effects) -> Vec<bool> {
     let opacity_classes = opacity_classes(&scene.materials);
     let count = scene.appearances.len().min(scene.world.instances().len());
@@ -84,7 +85,7 @@ pub(crate) fn transmits_light(scene: &Scene, effects: Effects) -> Vec<bool> {
 pub(crate) fn requirements(scene: &Scene) -> Effects {
     let mut used = vec![false; scene.materials.len()];
     let mut transparent = false;
-    // A glyph plot has many instances: what each asks is known of its material and geometry.
+    // A glyph plot has many instances, but their requirements depend only on material and geometry.
     let opacity_classes = opacity_classes(&scene.materials);
     for i in 0..scene.appearances.len().min(scene.world.instances().len()) {
         let material = scene.appearances[i].material;
@@ -98,7 +99,7 @@ pub(crate) fn requirements(scene: &Scene) -> Effects {
         used().any(|m| !matches!(m.model, SurfaceModel::Unlit | SurfaceModel::Dielectric { .. }));
     let lights = || scene.lights.iter().filter(|l| lit && l.casts_shadows());
     let dielectric = used().any(|m| matches!(m.model, SurfaceModel::Dielectric { .. }));
-    // Where roughness varies, it may be anything somewhere.
+    // Where roughness varies, it can have any value somewhere.
     let reflects = |m: &Material, effect| {
         m.reflection_roughness().is_some_and(|r| m.maps.is_some() || reflection_of(r) == effect)
     };
@@ -178,7 +179,7 @@ mod tests {
         assert_eq!(through(&scene, both), [false, true, true]);
         assert_eq!(through(&scene, Effects::REFRACTION), [false, false, true]);
         assert_eq!(through(&scene, Effects::TRANSPARENCY), [false, true, false]);
-        // Another texture in its place: its own answer.
+        // Another texture instead of this one has its own result.
         let whole = Texture::from_linear(1, 1, vec![[1.0; 4]]).unwrap();
         scene.materials[holed] = Material::matte([1.0; 3]).textured(whole);
         assert_eq!(through(&scene, both), [false, false, true]);

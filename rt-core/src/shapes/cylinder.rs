@@ -1,5 +1,5 @@
-//! Cylinders and truncated cones with flat, capped or open ends: what OpenGL's quadrics, VTK's
-//! glyphs and arrows are made of.
+//! Cylinders and truncated cones with flat capped or open ends, as in OpenGL's quadrics and VTK's
+//! glyphs and arrows.
 
 use super::error::{check_count, check_length};
 use super::frustum::{End, Frustum};
@@ -12,9 +12,9 @@ use crate::ray::Ray;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Cylinders between pairs of points; with two radii, truncated cones (a radius of 0 makes a full
-/// cone). Open ones show their inside. `u` of a hit is the position along the axis (0 to 1), `v` is
-/// 1 on a cap and 0 on the side.
+/// Cylinders between pairs of points. Two different radii make a truncated cone, a radius of 0 a
+/// full cone. Open ones show their inside. `u` of a hit is the position along the axis (0 to 1);
+/// `v` is 1 on a cap and 0 on the side.
 #[derive(Debug, Clone)]
 pub struct Cylinders {
     origin: DVec3,
@@ -27,7 +27,7 @@ pub struct Cylinders {
 }
 
 impl Cylinders {
-    /// Cylinder i goes from `points[2i]` to `points[2i + 1]`; the radius is common or given per
+    /// Cylinder i goes from `points[2i]` to `points[2i + 1]`. The radius is common or given per
     /// point.
     pub fn new(points: Vec<Vec3>, radii: Radii, capped: bool) -> Result<Self, ShapeError> {
         check_count("cylinders", points.len() / 2)?;
@@ -89,7 +89,7 @@ impl Cylinders {
         }
     }
 
-    /// The ends of the ray's interval that are surface.
+    /// The ends of the ray's interval in the solid that lie on a surface; an open end is `None`.
     #[inline]
     fn ends(&self, c: &Cylinder, ray: &Ray) -> [Option<End>; 2] {
         match c.frustum().interval(ray.origin.as_dvec3() - c.a, ray.dir.as_dvec3()) {
@@ -147,8 +147,8 @@ impl Shape for Cylinders {
         if !usable {
             return Aabb::EMPTY;
         }
-        // A disc of radius r across the unit vector e reaches r·√(1 − e_i²) along axis i; the sum
-        // form does not cancel near 1.
+        // A disc of radius r perpendicular to the unit vector e reaches r·√(1 − e_i²) along axis i.
+        // The form as a sum does not cancel near 1.
         let e2 = (c.v / c.v.length()).powf(2.0);
         let disc = DVec3::new(e2.y + e2.z, e2.x + e2.z, e2.x + e2.y).map(f64::sqrt);
         let b = c.a + c.v;

@@ -1,12 +1,11 @@
-//! Where a line is inside the lateral surface of a truncated cone, between two planes across its
-//! axis: the common part of [`super::Tubes`] (round ends) and [`super::Cylinders`] (flat or open
-//! ends).
+//! Intersection of a line with a truncated cone between two planes perpendicular to its axis.
+//! [`super::Tubes`] (round ends) and [`super::Cylinders`] (flat or open ends) share it.
 
 use glam::DVec3;
 
-/// A solid of revolution around the axis through a point `a` along `v`: points p with z₀ ≤ (p−a)·v
-/// ≤ z₁ and
-/// |(p−a) × v| ≤ w_a + w_z·(p−a)·v. Everything is scaled by |v|, so that nothing needs normalising.
+/// A solid of revolution around the axis through a point `a` along `v`: the points p with z₀ ≤
+/// (p−a)·v ≤ z₁ and |(p−a) × v| ≤ w_a + w_z·(p−a)·v. Everything is scaled by |v|, so nothing needs
+/// to be normalised.
 pub(super) struct Frustum {
     pub(super) v: DVec3,
     pub(super) z0: f64,
@@ -15,11 +14,11 @@ pub(super) struct Frustum {
     pub(super) w_z: f64,
 }
 
-/// One end of the interval in which a line is inside.
+/// One end of the interval in which a line is inside the solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct End {
     pub(super) t: f64,
-    /// On one of the two end planes, not on the lateral surface.
+    /// Whether the end is on one of the two end planes, not on the lateral surface.
     pub(super) on_plane: bool,
 }
 
@@ -28,11 +27,11 @@ impl Frustum {
     /// solid.
     ///
     /// The lateral surface is f(t) = |P + t·D|² − (W₀ + t·W₁)² = 0 with P = q × v and D = d × v.
-    /// Written with cross products, the radius of a tube a million times longer than thick keeps
-    /// ten digits; expanded into |p|²|v|² − (p·v)² it keeps four.
+    /// With these cross products, the radius of a tube a million times longer than thick keeps ten
+    /// digits; with the expanded form |p|²|v|² − (p·v)² it keeps four.
     #[inline]
     pub(super) fn interval(&self, q: DVec3, d: DVec3) -> Option<[End; 2]> {
-        // Between the planes.
+        // The interval between the planes.
         let (qv, dv) = (q.dot(self.v), d.dot(self.v));
         let (ta, tb) = if dv == 0.0 {
             if qv < self.z0 || qv > self.z1 {
@@ -44,9 +43,9 @@ impl Frustum {
             if x < y { (x, y) } else { (y, x) }
         };
 
-        // The parabola f, expanded around the point of the slab that is nearest to its vertex:
-        // there the constant term is the difference of two nearly equal lengths and nothing larger,
-        // however far the ray's origin is.
+        // The parabola f is expanded around the point of the slab that is nearest to its vertex.
+        // There the constant term is only the difference of two nearly equal lengths, however far
+        // the ray's origin is.
         let (p, dd) = (q.cross(self.v), d.cross(self.v));
         let w0 = self.w_a + self.w_z * qv;
         let w1 = self.w_z * dv;
@@ -62,7 +61,7 @@ impl Frustum {
         let c = (r - ws) * (r + ws);
         let discriminant = b * b - a * c;
 
-        // Roots relative to s; the solid is f ≤ 0.
+        // Roots relative to s. The solid is f ≤ 0.
         let plane = |t: f64| End { t, on_plane: true };
         let side = |t: f64| End { t: s + t, on_plane: false };
         let (near, far) = if discriminant < 0.0 {
@@ -86,9 +85,9 @@ impl Frustum {
                 if a > 0.0 {
                     (side(x.min(y)), side(x.max(y)))
                 } else if a < 0.0 {
-                    // Steeper than the cone: inside before the first root (one nappe) and after the
-                    // second (the other). The slab holds one nappe only; take the part it has more
-                    // of.
+                    // The line is steeper than the cone: it is inside before the first root (one
+                    // nappe) and after the second (the other). The slab contains only one nappe, so
+                    // the longer interval is used.
                     let (lo, hi) = (s + x.min(y), s + x.max(y));
                     if lo - ta > tb - hi {
                         (plane(ta), side(x.min(y)))

@@ -31,8 +31,8 @@ pub struct ShapeHit {
     pub v: f32,
 }
 
-/// A point on a shape, for shading and for the origins of secondary rays, in the shape's object
-/// space.
+/// A point on a shape in the shape's object space, for shading and for the origins of secondary
+/// rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeSurface {
     /// The point, projected back onto the surface so that its error does not grow with the ray's
@@ -85,16 +85,17 @@ pub trait Shape: Send + Sync {
         false
     }
 
-    /// A shape of only these primitives (ascending numbers of this shape's, in that order), without
-    /// the data of others and with the same bits in all results. `None` when the data cannot be
-    /// split: a holder of some primitives then keeps all data.
+    /// A shape with only these primitives (ascending numbers in this shape, kept in that order),
+    /// without the data of the others. All results must have the same bits as in this shape.
+    /// Returns `None` when the data cannot be split: a data server for some of the primitives then
+    /// keeps all data.
     fn part(&self, _primitives: &[u32]) -> Option<Arc<dyn Shape>> {
         None
     }
 
-    /// For a shape that only changes the appearance of another one: that other shape. Its
-    /// primitives, bounds and hits must be the same. A world built from one with that shape
-    /// ([`crate::bvh::World::build_sharing`]) then reuses its tree.
+    /// The other shape, for a shape that only changes the appearance of another one. The
+    /// primitives, bounds and hits of both must be the same. A world built from a world with that
+    /// other shape ([`crate::bvh::World::build_sharing`]) reuses its tree.
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {
         None
     }
@@ -114,13 +115,13 @@ pub enum Radii {
     Each(Vec<f32>),
 }
 
-/// The elements with these numbers.
+/// Selects the elements with these numbers.
 fn picked<T: Copy>(all: &[T], numbers: impl Iterator<Item = usize>) -> Vec<T> {
     numbers.map(|i| all[i]).collect()
 }
 
 impl Radii {
-    /// Those of the elements with these numbers.
+    /// The radii of the elements with these numbers.
     fn part(&self, numbers: impl Iterator<Item = usize>) -> Radii {
         match self {
             Radii::Common(r) => Radii::Common(*r),
@@ -171,7 +172,7 @@ pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
     if !(min.is_finite() && max.is_finite()) {
         return Aabb::EMPTY;
     }
-    // One ulp past the rounded value: rays could leak through a box that only touches its surface,
+    // One ulp past the rounded value. Rays could leak through a box that only touches its surface,
     // because of the one-ulp gap of the traversal's own rounding (see the watertight triangle
     // tests).
     Aabb::new(
@@ -184,8 +185,8 @@ pub(crate) fn outward_box(lo: DVec3, hi: DVec3) -> Aabb {
 /// error of at most `error`.
 pub(crate) fn rounded_point(p: DVec3, error: f64) -> (Vec3, f32) {
     let point = p.as_vec3();
-    // Each component moved by at most half an ulp (2⁻²⁴ relative); √3 of them together, and
-    // f32::MIN_POSITIVE for subnormals.
+    // Rounding moves each component by at most half an ulp (2⁻²⁴ relative), so the point by √3
+    // times as much, plus f32::MIN_POSITIVE for subnormals.
     let rounding =
         3f64.sqrt() * (-24f64).exp2() * p.abs().max_element() + f64::from(f32::MIN_POSITIVE);
     (point, ((rounding + error) as f32).next_up())

@@ -1,21 +1,23 @@
-//! A rounded cone: the convex hull of two spheres, one segment of a tube.
+//! Rounded cones: the convex hull of two spheres, which is one segment of a tube.
 //!
 //! Geometry in the half plane (z along the axis, ρ away from it), with L the distance of the
-//! centres and sin α = (r_a − r_b)/L: the common tangent has the normal (sin α, cos α); it touches
-//! the spheres at z = r_a sin α and z = L + r_b sin α. The signed distance is that to sphere a
-//! before the tangent's foot, to the tangent line between, to sphere b behind (own derivation; the
-//! same body as in Han, Wald, Usher, Wu, Wang, Pascucci, Hansen and Johnson, "Ray Tracing
-//! Generalized Tube Primitives", EuroVis 2019, section 3, and Quilez' `sdRoundCone`).
+//! centres and sin α = (r_a − r_b)/L: the common tangent has the normal (sin α, cos α). It touches
+//! the spheres at z = r_a sin α and z = L + r_b sin α. The signed distance is the distance to
+//! sphere a before the tangent's foot, to the tangent line between the two points of contact, and
+//! to sphere b after them (own derivation; the same body as in Han, Wald, Usher, Wu, Wang,
+//! Pascucci, Hansen and Johnson, "Ray Tracing Generalized Tube Primitives", EuroVis 2019, section
+//! 3, and Quilez' `sdRoundCone`).
 //!
-//! A ray is intersected with three convex solids that cover the hull, the two spheres and the
-//! truncated cone between the two tangent circles, and the hull's interval is the union of theirs.
-//! As the cone's flat ends lie inside the spheres, there is no seam for a ray to slip through.
+//! A ray is intersected with three convex solids that cover the hull: the two spheres and the
+//! truncated cone between the two tangent circles. The hull's interval is the union of the three
+//! intervals. The cone's flat ends lie inside the spheres, so there is no seam through which a ray
+//! can leak.
 
 use super::frustum::Frustum;
 use super::sphere::ray_sphere;
 use glam::DVec3;
 
-/// Which part of the surface a point is on.
+/// The part of the surface that a point is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     /// The sphere around `a`.
@@ -26,7 +28,7 @@ pub(super) enum Part {
     End,
 }
 
-/// The hull of the spheres (a, ra) and (a + v, rb).
+/// The convex hull of the spheres (a, ra) and (a + v, rb).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RoundedCone {
     pub(super) a: DVec3,
@@ -35,18 +37,20 @@ pub(super) struct RoundedCone {
     pub(super) rb: f64,
 }
 
-/// The point of the surface nearest to some point.
+/// The surface point nearest to a given point.
 pub(super) struct Nearest {
-    /// Negative inside.
+    /// Signed distance, negative inside.
     pub(super) distance: f64,
     /// Outward unit normal.
     pub(super) normal: DVec3,
-    /// 0 on the sphere around `a`, 1 on the other, linear between the tangent circles.
+    /// Position along the axis: 0 on the sphere around `a`, 1 on the other, linear between the
+    /// tangent circles.
     pub(super) along: f64,
 }
 
 impl RoundedCone {
-    /// One sphere contains the other (equal centres included): the hull is the larger sphere.
+    /// Whether one sphere contains the other (equal centres included), so that the hull is the
+    /// larger sphere.
     #[inline]
     pub(super) fn is_sphere(&self) -> bool {
         let dr = self.ra - self.rb;
@@ -69,8 +73,9 @@ impl RoundedCone {
             return ray_sphere(c, d, dd, r).map(|(t0, t1)| [(t0, part), (t1, part)]);
         }
 
-        // Most rays that meet the box of a thin diagonal segment pass it: compare the distance of
-        // the two lines, unless they are so parallel that their common normal is only rounding.
+        // Most rays that hit the box of a thin diagonal segment miss the segment. Compares the
+        // distance of the two lines first, unless they are so parallel that their common normal is
+        // only rounding.
         let n = d.cross(self.v);
         let nn = n.length_squared();
         let r_max = self.ra.max(self.rb);
@@ -100,7 +105,8 @@ impl RoundedCone {
                 h[1] = (t1, part);
             }
         };
-        // The body first: where it ties with a sphere, on the tangent circle, it is the body.
+        // The body comes first: where it ties with a sphere, on the tangent circle, the hit is on
+        // the body.
         if let Some([near, far]) = frustum.interval(-oa, d) {
             add(near.t, far.t, Part::Body);
         }
@@ -134,7 +140,8 @@ impl RoundedCone {
         let sin = dr / length;
         let cos = ((1.0 - sin) * (1.0 + sin)).sqrt();
         let z = q.dot(e);
-        // Twice projected: the first leaves the rounding of a long q in the axial direction.
+        // Projected twice: the first projection leaves the rounding of a long q in the axial
+        // direction.
         let radial = q - z * e;
         let radial = radial - radial.dot(e) * e;
         let rho = radial.length();

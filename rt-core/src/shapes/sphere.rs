@@ -1,10 +1,10 @@
 //! Spheres: particles, glyphs, atoms.
 //!
-//! The quadratic is solved in f64 from f32 input with the discriminant as r²·d² − |d × oc|², the
-//! form that does not subtract two large squares (Haines, Günther and Akenine-Möller, "Precision
-//! Improvements for Ray/Sphere Intersection", Ray Tracing Gems ch. 7, eq. 5, which goes back to
-//! Hearn and Baker), and the second root from the product of the roots. Products of f32 coordinates
-//! are exact in f64, so a sphere a million radii away is hit to 10⁻¹⁰ of its radius.
+//! The quadratic is solved in f64 from f32 input. The discriminant is r²·d² − |d × oc|², which does
+//! not subtract two large squares (Haines, Günther and Akenine-Möller, "Precision Improvements for
+//! Ray/Sphere Intersection", Ray Tracing Gems ch. 7, eq. 5, which goes back to Hearn and Baker).
+//! The second root follows from the product of the roots. Products of f32 coordinates are exact in
+//! f64, so a sphere a million radii away is hit to 10⁻¹⁰ of its radius.
 
 use super::error::{check_count, check_length};
 use super::{
@@ -16,7 +16,7 @@ use crate::ray::Ray;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Many spheres. A ray that starts inside one hits its far side. `u` and `v` of a hit are 0.
+/// Many spheres. A ray that starts inside a sphere hits its far side. `u` and `v` of a hit are 0.
 #[derive(Debug, Clone)]
 pub struct Spheres {
     origin: DVec3,
@@ -75,7 +75,7 @@ impl Spheres {
         r
     }
 
-    /// Both roots, the nearer first; f64.
+    /// Both roots in f64, the nearer first.
     #[inline]
     fn roots(&self, prim: u32, ray: &Ray) -> Option<(f64, f64)> {
         let d = ray.dir.as_dvec3();
@@ -125,8 +125,8 @@ impl Shape for Spheres {
         let i = prim as usize;
         let (o, d, t) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), f64::from(hit.t));
         let (center, radius) = (self.centers[i].as_dvec3(), f64::from(self.radii.get(i)));
-        // The root in f64 again: the rounding of `hit.t` would tilt the normal of a small sphere
-        // far away.
+        // Solves for the root in f64 again: the rounding of `hit.t` would tilt the normal of a
+        // small sphere far away.
         let t = match self.roots(prim, ray) {
             Some((near, far)) => {
                 if (near - t).abs() <= (far - t).abs() {
@@ -150,11 +150,11 @@ impl Shape for Spheres {
     }
 }
 
-/// Where the line `t·d` meets the sphere of radius `r` around `oc`, the nearer parameter first.
-/// `dd` is d·d.
+/// Parameters at which the line `t·d` intersects the sphere of radius `r` around `oc`, the nearer
+/// first. `dd` is d·d.
 #[inline]
 pub(super) fn ray_sphere(oc: DVec3, d: DVec3, dd: f64, r: f64) -> Option<(f64, f64)> {
-    // |d × oc|²/d² is the squared distance of centre and line: no square of the distance travelled is subtracted.
+    // |d × oc|²/d² is the squared distance of centre and line, so no square of the distance travelled is subtracted.
     let discriminant = r * r * dd - d.cross(oc).length_squared();
     if discriminant.is_nan() || discriminant < 0.0 {
         return None;

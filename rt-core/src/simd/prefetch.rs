@@ -1,8 +1,9 @@
-//! Asking for memory before it is needed.
+//! Prefetches memory before it is needed.
 
 use crate::bvh::Unit;
 
-/// Starts loading `bytes` from `units[first]` on; out-of-range places are ignored by the processor.
+/// Prefetches `LINES` cache lines from `units[first]` on. The processor ignores out-of-range
+/// addresses.
 #[inline(always)]
 pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -10,8 +11,8 @@ pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let p = units.as_ptr().wrapping_add(first).cast::<i8>();
         for line in 0..LINES {
-            // SAFETY: a prefetch reads nothing the program can see and cannot fault, wherever it
-            // points.
+            // SAFETY: a prefetch reads nothing that the program can see, and it cannot fault,
+            // whatever the address.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(p.wrapping_add(64 * line)) }
         }
     }
@@ -21,7 +22,7 @@ pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
     }
 }
 
-/// Starts loading `items[i]`; out-of-range places are ignored by the processor.
+/// Prefetches `items[i]`. The processor ignores out-of-range addresses.
 #[inline(always)]
 pub(crate) fn prefetch_item<T>(items: &[T], i: usize) {
     #[cfg(target_arch = "x86_64")]

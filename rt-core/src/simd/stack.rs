@@ -1,9 +1,9 @@
-//! A fixed-size stack that starts uninitialised: clearing five kilobytes for every ray would cost
+//! A fixed-size stack that starts uninitialised. Clearing five kilobytes for every ray would cost
 //! more than a short traversal.
 
 use std::mem::MaybeUninit;
 
-/// Room for a [`Stack`].
+/// Memory of a [`Stack`].
 pub(crate) struct StackMemory<T, const N: usize>([MaybeUninit<T>; N]);
 
 impl<T, const N: usize> StackMemory<T, N> {
@@ -13,11 +13,12 @@ impl<T, const N: usize> StackMemory<T, N> {
     }
 }
 
-/// At most `N` entries. Pushing onto a full stack panics: callers bound the depth when they build.
+/// A stack of at most `N` entries. Pushing onto a full stack panics: callers limit the depth when
+/// they build a tree.
 ///
-/// The length stands apart from the memory so that it stays in a register: inside one struct it
-/// lived in memory, and every step of a traversal waited for the store before it (measured: 10 % of
-/// a single ray's time).
+/// The length is outside the memory so that it stays in a register. Inside one struct it was in
+/// memory, and every step of a traversal waited for the previous store (measured: 10 % of a single
+/// ray's time).
 pub(crate) struct Stack<'m, T: Copy, const N: usize> {
     len: usize,
     data: &'m mut [MaybeUninit<T>; N],
@@ -56,8 +57,8 @@ impl<'m, T: Copy, const N: usize> Stack<'m, T, N> {
         self.len
     }
 
-    /// Orders the entries from `base` up so that the smallest is on top. Insertion sort: there are
-    /// at most eight, mostly two or three.
+    /// Sorts the entries from `base` up so that the smallest is on top. Insertion sort: there are
+    /// at most eight entries, mostly two or three.
     #[inline(always)]
     pub(crate) fn sort_descending_from(&mut self, base: usize)
     where

@@ -1,6 +1,6 @@
-//! Sixteen three-dimensional vectors at a time. Operations are those of glam's `Vec3`, in the same
-//! order and without fused steps, so a lane has the bits that the same arithmetic on one `Vec3`
-//! has, at every instruction set.
+//! Arithmetic on sixteen three-dimensional vectors at a time. Operations are those of glam's
+//! `Vec3`, in the same order and without fused multiply-add, so each lane has the bits of the same
+//! arithmetic on one `Vec3`, with every instruction set.
 
 use crate::ray::LANES;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, f32x16, mask32x16};
@@ -74,19 +74,19 @@ impl<S: Simd> Vec3x16<S> {
         Vec3x16 { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
     }
 
-    /// Component by component.
+    /// Componentwise product.
     #[inline(always)]
     pub(crate) fn mul(self, o: Self) -> Self {
         Vec3x16 { x: self.x * o.x, y: self.y * o.y, z: self.z * o.z }
     }
 
-    /// Each vector times its own factor.
+    /// Each vector times its own scalar.
     #[inline(always)]
     pub(crate) fn scale(self, s: f32x16<S>) -> Self {
         Vec3x16 { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 
-    /// Each vector divided by its own number.
+    /// Each vector divided by its own scalar.
     #[inline(always)]
     pub(crate) fn div(self, s: f32x16<S>) -> Self {
         Vec3x16 { x: self.x / s, y: self.y / s, z: self.z / s }
@@ -131,7 +131,8 @@ impl<S: Simd> Vec3x16<S> {
         }
     }
 
-    /// As `Vec3::try_normalize`: unit vectors, and where that worked.
+    /// Like `Vec3::try_normalize`: unit vectors, and a mask of the lanes where normalising
+    /// succeeded.
     #[inline(always)]
     pub(crate) fn try_normalize(self, simd: S) -> (Self, mask32x16<S>) {
         let r = f32x16::splat(simd, 1.0) / self.dot(self).sqrt();

@@ -1,4 +1,4 @@
-//! What a builder knows of a primitive: its box and its number.
+//! A builder's reference to a primitive: its box and its number.
 
 use crate::math::Aabb;
 use fearless_simd::{Simd, SimdBase, f32x8};
@@ -6,10 +6,10 @@ use glam::Vec4;
 
 /// Box and number of a primitive in 32 bytes.
 ///
-/// Low corner, number, negative high corner, −2: with the high corner negated, one minimum over
-/// eight lanes grows a box.
+/// Layout: low corner, number, negative high corner, −2. With the high corner negated, one minimum
+/// over eight lanes grows a box.
 ///
-/// The number has bit 30 set, so that it reads as an ordinary float: a plain small integer would be
+/// The number has bit 30 set, so that it reads as an ordinary float. A plain small integer would be
 /// a denormal, and vector additions that touch denormals are a hundred times slower on some
 /// machines.
 #[derive(Debug, Clone, Copy)]
@@ -18,7 +18,7 @@ pub(crate) struct PrimRef([f32; 8]);
 
 const TAG: u32 = 1 << 30;
 
-/// The largest number of primitives: beyond it the tagged number would read as infinity or NaN.
+/// The largest number of primitives. A larger tagged number would read as infinity or NaN.
 pub(crate) const MAX_PRIMS: usize = 0x3f80_0000;
 
 impl PrimRef {
@@ -38,7 +38,7 @@ impl PrimRef {
         Aabb::new(self.lo().truncate(), self.hi().truncate())
     }
 
-    /// Made from an empty box: nothing to build.
+    /// Whether the box is empty, so there is nothing to build.
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
         self.0[0] > -self.0[4]
@@ -54,14 +54,15 @@ impl PrimRef {
         -Vec4::from_slice(&self.0[4..])
     }
 
-    /// Twice the centre; the fourth lane is meaningless.
+    /// Twice the centre. The fourth lane is meaningless.
     #[inline(always)]
     pub(crate) fn center2(&self) -> Vec4 {
         self.lo() - Vec4::from_slice(&self.0[4..])
     }
 }
 
-/// Box of a set of primitives and box of twice their centres. The fourth lanes are meaningless.
+/// Bounds of a set of primitives, and bounds of twice their centres. The fourth lanes are
+/// meaningless.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SetBounds {
     pub(crate) lo: Vec4,
@@ -87,7 +88,7 @@ impl SetBounds {
         self.center2_hi = self.center2_hi.max(c);
     }
 
-    /// Grows the box of the centres alone.
+    /// Grows only the bounds of the centres.
     #[inline(always)]
     pub(crate) fn grow_centers(&mut self, p: &PrimRef) {
         let c = p.center2();
@@ -122,7 +123,7 @@ impl SetBounds {
     }
 }
 
-/// Box alone, laid out like a [`PrimRef`]: what a bin accumulates.
+/// A box in the layout of a [`PrimRef`]; accumulates the bounds of a bin.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(32))]
 pub(crate) struct Box4([f32; 8]);
@@ -144,7 +145,7 @@ impl Box4 {
             .store_slice(&mut self.0);
     }
 
-    /// Half the surface area; only called on boxes that hold something.
+    /// Half the surface area. Only called on boxes that are not empty.
     #[inline(always)]
     pub(crate) fn half_area(&self) -> f32 {
         let [lx, ly, lz, _, hx, hy, hz, _] = self.0;

@@ -1,9 +1,9 @@
-//! From primitives to an 8-wide hierarchy, top down and in parallel.
+//! Builds an 8-wide hierarchy from primitives, top down and in parallel.
 //!
-//! Large sets are cut in two recursively (each half its own task) down to fragments. Each fragment
-//! becomes a binary tree, and a plan which of its nodes stay as wide ones; then sizes are known,
-//! the arena is made, and every fragment writes its own part of it. Sizes of tasks and fragments
-//! are fixed, so the tree is the same for any number of threads.
+//! Large sets are split in two recursively (each half is its own task) down to fragments. Each
+//! fragment becomes a binary tree with a plan of the nodes to keep as wide nodes. Then all sizes
+//! are known: the arena is allocated, and every fragment writes its own part of it. The sizes of
+//! tasks and fragments are fixed, so the tree is the same for any number of threads.
 
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{SahConfig, SearchSpace, Split, halve, split_into};
@@ -19,9 +19,9 @@ use crate::simd::huge_pages;
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-/// Cuts above the fragments that follow the costs; sets further down are halved.
+/// Largest number of splits by cost above the fragments. Sets further down are halved.
 const MAX_LARGE_CUTS: usize = 20;
-/// Levels of a fragment's binary tree.
+/// Largest depth of a fragment's binary tree.
 const FRAGMENT_DEPTH: usize = MAX_COST_DEPTH + MAX_FRAGMENT_LOG2 as usize;
 /// Largest size of a fragment, as a power of two.
 const MAX_FRAGMENT_LOG2: u32 = 16;
@@ -32,7 +32,7 @@ const _: () = assert!(
     MAX_LARGE_CUTS + 16 + FRAGMENT_DEPTH <= MAX_DEPTH && MAX_BINARY_DEPTH <= FRAGMENT_DEPTH
 );
 
-/// How to make the binary tree of a fragment.
+/// The method to build the binary tree of a fragment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Method {
     /// Top down by the surface area heuristic.
@@ -41,16 +41,16 @@ pub(crate) enum Method {
     Reinsertion,
 }
 
-/// How to build.
+/// Configuration of the builder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BuilderConfig {
     pub(crate) method: Method,
-    /// For the cuts above the fragments, and inside them with SAH.
+    /// For the splits above the fragments, and inside them with SAH.
     pub(crate) sah: SahConfig,
 }
 
 impl BuilderConfig {
-    /// Sets up to this size are built by one task into one fragment.
+    /// Sets up to this size become one fragment, built by one task.
     fn fragment(self) -> usize {
         match self.method {
             Method::Sah => 1 << 14,
@@ -59,7 +59,7 @@ impl BuilderConfig {
     }
 }
 
-/// Parts of the nodes that each pass of the reinsertion tries.
+/// Fractions of the nodes that each pass of the reinsertion tries.
 const REINSERTION_PASSES: [f32; 6] = [1.0, 0.5, 0.33, 0.25, 0.2, 0.15];
 
 /// The tree above the fragments.
@@ -71,7 +71,7 @@ enum CutTree {
 struct Fragment {
     tree: BinaryTree,
     plan: WidePlan,
-    /// obvhs could not build or improve this one.
+    /// Whether obvhs could not build or improve this fragment.
     fell_back: bool,
 }
 
@@ -99,13 +99,14 @@ impl Fragment {
     }
 }
 
-/// Nodes of the arena above the fragments.
+/// A node of the arena above the fragments, or a fragment.
 enum TopNode {
     Wide(Vec<TopNode>, Aabb),
     Fragment(Fragment),
 }
 
-/// Builds a hierarchy over `refs`. What could not be done as `config` says is added to `notes`.
+/// Builds a hierarchy over `refs`. Adds a note to `notes` for each part that could not be built as
+/// `config` says.
 pub(crate) fn build_wide<W: LeafWriter>(
     mut refs: Vec<PrimRef>,
     writer: &W,
@@ -129,9 +130,10 @@ pub(crate) fn build_wide<W: LeafWriter>(
              take their sizes or makes too deep a tree"
         ));
     }
-    // The boxes are in the trees now: 64 bytes a primitive less while the arena is written.
+    // The boxes are now in the trees. Dropping these saves 64 bytes per primitive while the arena
+    // is written.
     drop((refs, spare));
-    // A tree of one leaf still gets a node, so that traversal always starts at one.
+    // A tree of one leaf also gets a node, so that traversal always starts at a node.
     let root = match root {
         TopNode::Fragment(f) if f.plan.nodes.is_empty() => {
             TopNode::Wide(vec![TopNode::Fragment(f)], bounds.aabb())
@@ -145,8 +147,8 @@ pub(crate) fn build_wide<W: LeafWriter>(
     WideBvh { units, bounds: bounds.aabb(), depth }
 }
 
-/// Cuts sets down to fragments, both sides of each cut in parallel, and plans these. `spare` is as
-/// long as `refs`.
+/// Splits sets down to fragments, both sides of each split in parallel, and plans the fragments.
+/// `spare` is scratch memory as long as `refs`.
 fn fragments(
     refs: &mut [PrimRef],
     spare: &mut [PrimRef],
@@ -162,7 +164,7 @@ fn fragments(
     let cut = by_cost
         .then(|| split_into(refs, spare, bounds, config.sah, &mut SearchSpace::new(level)))
         .flatten();
-    // The cut moved everything to `spare`; halves stay where they are.
+    // The split moved everything to `spare`. Halves stay in `refs`.
     let (Split { left, left_bounds, right, right_bounds }, spare) = match cut {
         Some(s) => (s, refs),
         None => (halve(refs), spare),
@@ -175,8 +177,9 @@ fn fragments(
     CutTree::Cut(Box::new([l, r]), bounds.aabb())
 }
 
-/// Wide nodes above the fragments: always opens the set with the largest surface until there are
-/// eight. Few enough not to need the collapse of [`plan`].
+/// Collapses the splits above the fragments into wide nodes: repeatedly opens the set with the
+/// largest surface until there are eight. There are few sets, so the collapse of [`plan`] is not
+/// needed.
 fn collapse_cuts(root: CutTree) -> TopNode {
     let (pair, bounds) = match root {
         CutTree::Fragment(f) => return TopNode::Fragment(f),
@@ -188,7 +191,7 @@ fn collapse_cuts(root: CutTree) -> TopNode {
             CutTree::Cut(_, b) => Some(b.half_area()),
             CutTree::Fragment(_) => None,
         };
-        // The first of equals, so that ties do not depend on anything but the input.
+        // The first of equal areas, so that ties depend only on the input.
         let mut largest: Option<(usize, f32)> = None;
         for (i, a) in sets.iter().enumerate().filter_map(|(i, s)| area(s).map(|a| (i, a))) {
             if largest.is_none_or(|(_, b)| a > b) {
@@ -222,7 +225,7 @@ impl TopNode {
         }
     }
 
-    /// Fragments that obvhs could not build, and all fragments.
+    /// Numbers of fragments that obvhs could not build, and of all fragments.
     fn fallbacks(&self) -> (usize, usize) {
         match self {
             TopNode::Wide(children, _) => children
@@ -233,7 +236,7 @@ impl TopNode {
         }
     }
 
-    /// Units of the arena this takes.
+    /// Number of arena units of this part.
     fn units<W: LeafWriter>(&self) -> usize {
         match self {
             TopNode::Wide(children, _) => {
@@ -277,7 +280,7 @@ impl TopNode {
 struct FragmentWriter<'f, W> {
     fragment: &'f Fragment,
     writer: &'f W,
-    /// The first unit of `out` in the arena.
+    /// Index of the first unit of `out` in the arena.
     base: usize,
     out: &'f mut [Unit],
     next_node: usize,

@@ -1,4 +1,4 @@
-//! Filling a packet: which rays can travel together, and the bounds of each group.
+//! Fills a packet: decides which rays can be traced together and computes the bounds of each group.
 
 use super::{GROUPS, Packet, Row, load_row};
 use crate::bvh::intersect::watertight::dominant_axis;
@@ -7,25 +7,26 @@ use crate::bvh::traverse::three;
 use crate::ray::{LANES, RayBlock};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 
-/// What a packet's rays must keep to.
+/// Limits that a packet's rays must keep.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PacketLimits {
-    /// Directions' largest components.
+    /// Smallest and largest value allowed for a direction's largest component.
     pub(crate) length: (f32, f32),
-    /// Origins' largest distance per axis from a point.
+    /// Centre of the region where origins may be; `reach` is their largest distance from it per
+    /// axis.
     pub(crate) center: [f32; 3],
     pub(crate) reach: f32,
 }
 
 impl PacketLimits {
-    /// Any finite ray.
+    /// Accepts any finite ray.
     pub(crate) const NONE: PacketLimits =
         PacketLimits { length: (0.0, f32::MAX), center: [0.0; 3], reach: f32::INFINITY };
 }
 
 impl Packet {
-    /// Fills the packet from at most sixteen blocks. False when the rays do not share an octant and
-    /// a dominant axis, or when one of them is not finite or outside `limits`.
+    /// Fills the packet from at most sixteen blocks. Returns false when the rays do not share an
+    /// octant and a dominant axis, or when one of them is not finite or outside `limits`.
     #[inline(never)]
     pub(crate) fn load<S: Simd>(
         &mut self,
@@ -44,12 +45,12 @@ impl Packet {
         debug_assert!(blocks.len() <= GROUPS, "{} groups", blocks.len());
         let v = |x: f32| f32x16::splat(simd, x);
 
-        // ---- Which lanes hold rays. The first ray stands for the packet and fills empty lanes, so
-        // that they widen no interval.
+        // ---- Finds the lanes that hold rays. The first ray represents the packet. Its values fill
+        // empty lanes, so these widen no interval.
         self.active = [0; GROUPS];
         self.hit = [0; GROUPS];
-        // Number 0 at the ray's own limit: nothing at exactly t_max can win the tie, which makes
-        // the range half-open.
+        // Number 0 at the ray's own limit: nothing at exactly t_max can win the tie, so the range
+        // is half-open.
         self.prim = [[0; LANES]; GROUPS];
         self.groups = 0;
         for (g, b) in blocks.iter().enumerate() {
@@ -95,8 +96,8 @@ impl Packet {
             let d: [f32x16<S>; 3] = three!(|a| filled(simd, d_rows[a], on));
             let o: [f32x16<S>; 3] = three!(|a| filled(simd, o_rows[a], on));
             let abs: [f32x16<S>; 3] = three!(|a| d[a].abs());
-            // At least as large as the axes after it, larger than those before it: ties go to the
-            // lower axis, as for single rays.
+            // At least as large as the axes after it, and larger than those before it: ties go to
+            // the lower axis, as for single rays.
             let [x, y, z] = abs;
             same &= match kz {
                 0 => x.simd_ge(y) & x.simd_ge(z) & x.simd_gt(v(0.0)),
@@ -162,7 +163,7 @@ impl Packet {
             .store_slice(&mut self.group_t);
         reduce_rows::<S, false>(simd, &self.t_min, 1).store_slice(&mut self.group_t_min);
 
-        // ---- Shears of the groups, as differences from the middle: leaves test triangles' edges
+        // ---- Shears of the groups, as differences from the middle. Leaves test triangles' edges
         // against them.
         if self.common_origin {
             for a in 0..2 {
@@ -180,7 +181,7 @@ impl Packet {
     }
 }
 
-/// A row of rays; empty lanes take the value of the lane that `on` names with its mask.
+/// A row of rays. With `on` (mask and lane), lanes outside the mask get the value of that lane.
 #[inline(always)]
 fn filled<S: Simd>(simd: S, row: &Row, on: Option<(mask32x16<S>, usize)>) -> f32x16<S> {
     let r = load_row(simd, row);
@@ -191,8 +192,8 @@ fn filled<S: Simd>(simd: S, row: &Row, on: Option<(mask32x16<S>, usize)>) -> f32
 }
 
 /// Sixteen reductions over sixteen lanes each: lane g of the result is the smallest (or largest) of
-/// `rows[g * stride]`. Halves of two rows are compared at a time, so the whole takes fifteen steps
-/// instead of sixteen times four and as many transfers to scalar registers.
+/// `rows[g * stride]`. Each step combines two rows, so all reductions take fifteen steps instead of
+/// sixteen times four and as many transfers to scalar registers.
 #[inline(always)]
 fn reduce_rows<S: Simd, const MAX: bool>(simd: S, rows: &[Row], stride: usize) -> f32x16<S> {
     #[inline(always)]
@@ -204,7 +205,8 @@ fn reduce_rows<S: Simd, const MAX: bool>(simd: S, rows: &[Row], stride: usize) -
     fn pair<S: Simd, const MAX: bool>(simd: S, rows: &[Row], stride: usize, i: usize) -> f32x16<S> {
         step::<S, MAX>(load_row(simd, &rows[i * stride]), load_row(simd, &rows[(i + 8) * stride]))
     }
-    // Zipping interleaves, so rows enter in bit-reversed order to come out in their own.
+    // Zipping interleaves lanes. Rows are passed in bit-reversed order, so the results are in the
+    // order of the rows.
     let ab = pair::<S, MAX>(simd, rows, stride, 0);
     let cd = pair::<S, MAX>(simd, rows, stride, 4);
     let ef = pair::<S, MAX>(simd, rows, stride, 2);
