@@ -1,8 +1,8 @@
-//! Building the acceleration structure: every preset, on all threads. `cargo bench -p rt-core
-//! --bench build`
+//! Time to build the acceleration structure with every preset, on all threads. `cargo bench -p
+//! rt-core --bench build`
 //!
-//! For watching a change while working on it; comparisons with other ray tracers, with rounds in
-//! turns, are bench's experiments.
+//! Use it to see the effect of a change during development. Comparisons with other ray tracers, in
+//! alternating rounds, are experiments of `bench`.
 
 mod common;
 
@@ -27,7 +27,7 @@ fn build(c: &mut Criterion) {
     group.finish();
 }
 
-/// Moved vertices under the same tree.
+/// Refits a tree to moved vertices.
 fn refit(c: &mut Criterion) {
     let mut mesh = common::shells();
     let mut world = World::from_mesh(mesh.clone(), &BuildOptions::default()).expect("a sound mesh");
@@ -49,8 +49,8 @@ fn refit(c: &mut Criterion) {
     group.finish();
 }
 
-/// Worlds of many geometries: a thousand small ones, each less than a task of its own, and the same
-/// beside a large one.
+/// Worlds of many geometries: a thousand small ones, each too small for a task of its own, and the
+/// same together with a large one.
 fn many(c: &mut Criterion) {
     let small: Vec<Arc<TriMesh>> = (0..1000).map(|k| Arc::new(common::bumpy(k))).collect();
     let mut with_large = small.clone();

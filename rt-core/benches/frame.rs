@@ -1,4 +1,4 @@
-//! Whole frames on one thread: what a picture costs beyond its rays, and what each effect adds.
+//! Time of whole frames on one thread: the cost of a frame beyond its rays, and of each effect.
 //! `cargo bench -p rt-core --bench frame`
 
 mod common;
@@ -56,10 +56,10 @@ fn frame(c: &mut Criterion) {
         ("point light, shadows", &lamp, color.clone()),
         ("ambient occlusion, 8 rays", &occlusion, color.clone()),
         ("half transparent", &half, color.clone()),
-        // One transparent instance must not make light rays elsewhere slower.
+        // One transparent instance must not slow down light rays elsewhere.
         ("shadows, occlusion, opaque pane", &opaque, color.clone()),
         ("shadows, occlusion, clear pane", &one_pane, color.clone()),
-        // What a frame costs before its first ray.
+        // The cost of a frame before its first ray.
         ("1000 instances, opaque texture", &many, few_pixels),
     ];
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
@@ -80,7 +80,7 @@ fn frame(c: &mut Criterion) {
     group.finish();
 }
 
-/// Shells with a lamp and ambient occlusion, and a small pane in a corner of the picture.
+/// Shells with a lamp and ambient occlusion, and a small pane in a corner of the image.
 fn beside_a_pane(opacity: f32) -> Scene {
     let mut b = SceneBuilder::new();
     b.mesh(common::shells(), Material::matte([0.6, 0.7, 0.8]));
@@ -94,7 +94,7 @@ fn beside_a_pane(opacity: f32) -> Scene {
     b.build().expect("a sound scene")
 }
 
-/// A thousand plates with one opaque picture of a million texels.
+/// A thousand plates with one opaque texture of a million texels.
 fn many_with_a_texture() -> Scene {
     let texels = vec![[0.5, 0.6, 0.7, 1.0]; 1 << 20];
     let texture = Texture::from_linear(1 << 10, 1 << 10, texels).expect("a picture");

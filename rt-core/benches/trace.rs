@@ -1,5 +1,5 @@
-//! Rays without a picture, on one thread: primary rays, shadow rays to a point, ambient occlusion.
-//! `cargo bench -p rt-core --bench trace`
+//! Time of rays without rendering, on one thread: primary rays, shadow rays to a point, ambient
+//! occlusion. `cargo bench -p rt-core --bench trace`
 
 mod common;
 
@@ -21,7 +21,7 @@ fn trace(c: &mut Criterion) {
         let world = World::from_mesh(mesh.clone(), &options).expect("a sound mesh");
         let primary = common::primary_rays(&world, SIZE);
         let points = common::points_met(&world, &mesh, &primary);
-        // From the light to the points: one common origin, which packets can use.
+        // From the light to the points: one common origin, which packets can exploit.
         let light = Vec3::new(4.0, 5.0, 3.0);
         let shadow: Vec<Ray> =
             points.iter().map(|(p, _)| Ray::new(light, *p - light).with_t_max(0.9999)).collect();

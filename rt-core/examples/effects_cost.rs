@@ -1,4 +1,4 @@
-//! What each effect costs: one scene, drawn with one effect more each time.
+//! Measures the cost of each effect: renders one scene with one more effect each time.
 //!
 //! `cargo run --release -p rt-core --example effects_cost -- [pixels per side, default 512]
 //! [rounds, default 3]`
@@ -58,7 +58,7 @@ fn best(rounds: u32, mut run: impl FnMut()) -> Duration {
 }
 
 fn main() {
-    // `args` would panic at what is not UTF-8 before anything could be said about it.
+    // `args` would panic on an argument that is not UTF-8, without a useful message.
     let number = |a: std::ffi::OsString| a.to_str().and_then(|a| a.parse::<u32>().ok());
     let mut arguments = std::env::args_os().skip(1).map(|a| number(a).expect("a whole number"));
     let (n, rounds) = (arguments.next().unwrap_or(512), arguments.next().unwrap_or(3));
@@ -74,8 +74,8 @@ fn main() {
     )
     .expect("the camera is sound");
 
-    // Tracing alone: the same camera rays in blocks of 4 x 4 pixels, 32 x 32 pixels at a time, one
-    // thread.
+    // Tracing alone: the same camera rays in blocks of 4 x 4 pixels, 32 x 32 pixels at a time, on
+    // one thread.
     let (eye, corner) = camera.world_ray([-1.0, 1.0]);
     let (right, down) =
         (camera.world_ray([1.0, 1.0]).1 - corner, camera.world_ray([-1.0, -1.0]).1 - corner);

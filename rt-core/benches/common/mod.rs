@@ -1,4 +1,4 @@
-//! What the benchmarks share: a mesh, a camera, and rays in the order that tiles make them.
+//! Shared by the benchmarks: a mesh, a camera, and rays in the order in which tiles generate them.
 #![allow(dead_code, unreachable_pub, reason = "each benchmark uses its own part")]
 
 use rt_core::bvh::World;
@@ -8,8 +8,8 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
 use std::f32::consts::{PI, TAU};
 
-/// Four wavy shells inside one another, about 260,000 triangles: small triangles, some of them
-/// hidden, as nested isosurfaces have. Normals and scalars per vertex.
+/// Four wavy shells inside one another, about 260,000 triangles. As in nested isosurfaces,
+/// triangles are small and some are hidden. Normals and scalars per vertex.
 pub fn shells() -> TriMesh {
     let (n, m) = (128, 256);
     let mut mesh = TriMesh::default();
@@ -40,7 +40,7 @@ pub fn shells() -> TriMesh {
     mesh
 }
 
-/// A bumpy plate of 800 triangles, one of many.
+/// A bumpy plate of 800 triangles; `number` selects one of many.
 pub fn bumpy(number: usize) -> TriMesh {
     let (n, place) = (20u32, number as f32);
     let corner = |k: u32| {
@@ -58,7 +58,7 @@ pub fn bumpy(number: usize) -> TriMesh {
     mesh
 }
 
-/// All of the shells, filling most of a square picture.
+/// A camera that sees all of the shells; they fill most of a square image.
 pub fn camera() -> Camera {
     let eye = DVec3::new(3.1, 2.2, 4.0);
     Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 100.0]).expect("a sound camera")
@@ -81,8 +81,8 @@ pub fn primary_rays(world: &World, size: u32) -> Vec<RayBlock> {
     RayBlock::from_rays(&rays)
 }
 
-/// Points that rays met, a little off the surface on the side they came from, with the normal
-/// there.
+/// Points that rays hit, moved slightly off the surface to the side the rays came from, with the
+/// normal there.
 pub fn points_met(world: &World, mesh: &TriMesh, rays: &[RayBlock]) -> Vec<(Vec3, Vec3)> {
     let mut hits = vec![HitBlock::MISS; rays.len()];
     world.closest_coherent(rays, &mut hits).expect("one each");

@@ -1,30 +1,30 @@
-//! Why a shape cannot be made, and what had to be left out of one that could.
+//! Errors for shapes that cannot be made, and the report of primitives that were left out.
 
-/// Input that no repair can make sense of.
+/// Invalid input for a shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     /// An array has the wrong number of values.
     #[error("{shape}: `{field}` has {found} values; give one per {per}, {expected} in all")]
     Length {
-        /// Which shape.
+        /// Name of the shape.
         shape: &'static str,
-        /// Which array.
+        /// Name of the array.
         field: &'static str,
-        /// What the values belong to.
+        /// The elements that the values belong to.
         per: &'static str,
-        /// How many are needed.
+        /// Number of values needed.
         expected: usize,
-        /// How many there are.
+        /// Number of values found.
         found: usize,
     },
-    /// More primitives than 32-bit ids can name.
+    /// There are more primitives than 32-bit ids can number.
     #[error("{shape}: {found} primitives; at most {limit} fit in one shape: split it into several")]
     TooLarge {
-        /// Which shape.
+        /// Name of the shape.
         shape: &'static str,
-        /// How many there are.
+        /// Number of primitives.
         found: usize,
-        /// The most that fit.
+        /// Largest number of primitives.
         limit: usize,
     },
     /// The offsets of the polylines do not describe consecutive runs of points.
@@ -33,38 +33,38 @@ pub enum ShapeError {
          number of points, {points}"
     )]
     Offsets {
-        /// Where in the offsets.
+        /// Index into the offsets.
         index: usize,
-        /// What is there (or the last value, when the end is missing).
+        /// The value there, or the last value when the end is missing.
         value: usize,
         /// Number of points.
         points: usize,
     },
-    /// A grid without cells.
+    /// The grid has no cells.
     #[error(
         "{shape}: the grid has {dims} points; it needs at least 2 along each axis to have cells"
     )]
     NoCells {
-        /// Which shape.
+        /// Name of the shape.
         shape: &'static str,
         /// Points per axis.
         dims: glam::UVec3,
     },
-    /// A value outside what the shape can use.
+    /// A value is outside the range that the shape can use.
     #[error("{shape}: {field} is {value}; it must be {rule}")]
     Value {
-        /// Which shape.
+        /// Name of the shape.
         shape: &'static str,
-        /// Which parameter.
+        /// Name of the parameter.
         field: &'static str,
-        /// What was given.
+        /// The value found.
         value: f32,
         /// What is allowed.
         rule: &'static str,
     },
 }
 
-/// What a shape had to leave out. Primitives counted here have empty bounds; the rest is rendered.
+/// Counts of primitives that were left out. They have empty bounds; the rest is rendered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ShapeReport {
     /// Primitives given.

@@ -154,7 +154,8 @@ impl Shape for Spheres {
 /// first. `dd` is d·d.
 #[inline]
 pub(super) fn ray_sphere(oc: DVec3, d: DVec3, dd: f64, r: f64) -> Option<(f64, f64)> {
-    // |d × oc|²/d² is the squared distance of centre and line, so no square of the distance travelled is subtracted.
+    // The squared distance of centre and line is |d × oc|²/d², so no square of the distance
+    // travelled is subtracted.
     let discriminant = r * r * dd - d.cross(oc).length_squared();
     if discriminant.is_nan() || discriminant < 0.0 {
         return None;

@@ -1,5 +1,5 @@
-//! Packets, instruction sets and presets give the single ray's bits, and those are the oracle's
-//! answer.
+//! Packets, instruction sets and presets give the same bits as single rays, and these agree with
+//! the oracle.
 
 use crate::common::*;
 use crate::oracle::{self, check};
@@ -36,7 +36,7 @@ fn views() -> Vec<(&'static str, Vec<Ray>)> {
         ("along an axis", grid_along_z()),
         ("at vertices", at_lattice(eye)),
     ];
-    // Octants change within a block; some lanes have no ray or none that can be traced.
+    // Octants change within a block; some lanes have no ray or an invalid one.
     let mut mixed = inward_rays(1000, 3);
     for (i, r) in mixed.iter_mut().enumerate() {
         match i % 11 {
@@ -52,7 +52,7 @@ fn views() -> Vec<(&'static str, Vec<Ray>)> {
         }
     }
     all.push(("mixed with broken rays", mixed));
-    // The same within tiles, so that packets form around them.
+    // The same within tiles, so that the other rays still form packets.
     let mut holes = tiles.clone();
     for (i, r) in holes.iter_mut().enumerate() {
         match i % 97 {
@@ -68,7 +68,7 @@ fn views() -> Vec<(&'static str, Vec<Ray>)> {
     all
 }
 
-/// Parallel rays along z from a lattice that contains the cubes' planes; zeros of both signs.
+/// Parallel rays along z from a lattice that contains the cubes' planes, with zeros of both signs.
 fn grid_along_z() -> Vec<Ray> {
     (0..33 * 33)
         .map(|i| {
@@ -79,7 +79,7 @@ fn grid_along_z() -> Vec<Ray> {
         .collect()
 }
 
-/// Rays from `eye` exactly at points of a lattice, where the cube has vertices and edges.
+/// Rays from `eye` exactly at points of a lattice on which the cube has vertices and edges.
 fn at_lattice(eye: Vec3) -> Vec<Ray> {
     (0..13 * 13)
         .map(|i| Vec3::new((i % 13) as f32 / 6.0 - 1.0, (i / 13) as f32 / 6.0 - 1.0, 1.0))
@@ -96,7 +96,7 @@ fn packets_and_levels_equal_single_rays_bit_for_bit() {
                 for (name, rays) in &views {
                     let mut first: Option<Vec<_>> = None;
                     for (l, simd) in SimdLevel::available().into_iter().enumerate() {
-                        // Each preset at two levels, all levels over the presets.
+                        // Each preset at two levels, so that all levels occur over the presets.
                         if (k + l) % 2 == 1 {
                             continue;
                         }
@@ -118,7 +118,7 @@ fn packets_and_levels_equal_single_rays_bit_for_bit() {
 
 #[test]
 fn presets_give_the_same_bits() {
-    // The order in which leaves come must not decide anything.
+    // The order of the leaves must not decide the result.
     for (mesh_name, mesh) in meshes() {
         for robustness in Robustness::ALL {
             let worlds = BuildQuality::ALL
@@ -154,7 +154,7 @@ fn single_rays_agree_with_the_f64_oracle() {
     println!("largest error of t: {worst:.2} roundings");
 }
 
-/// Transforms of every kind that can be inverted.
+/// Random invertible transforms of every kind.
 pub(crate) fn placements(n: usize, seed: u64, spread: f64) -> Vec<DAffine3> {
     let mut r = SplitMix64::new(seed);
     (0..n)
@@ -198,10 +198,11 @@ fn many_instances_packets_equal_single_rays_and_the_oracle() {
     println!("largest error of t: {worst:.2} of what rounding may make");
 }
 
-/// The hit is where f64 says, and nothing is surely nearer. Both are held to what rounding may make
-/// of t ([`oracle::Meeting::t_error`]), the same as for one mesh: it grows with the coordinates,
-/// the slant and the slenderness of the triangle where it stands, and transforming rays adds no
-/// more. Returns the error of t as a share of that, or `None` for a miss. (The largest is 0.35.)
+/// Checks that the hit is where the f64 reference puts it and that no other hit is certainly
+/// nearer. Both allow for the rounding error of t ([`oracle::Meeting::t_error`]), as for one mesh.
+/// That error grows with the coordinates, the slant and the slenderness of the triangle;
+/// transforming the rays adds no more. Returns the error of t as a share of the allowed error, or
+/// `None` for a miss. (The largest is 0.35.)
 fn check_instances(
     w: &World,
     geometries: &[TriMesh],
@@ -216,12 +217,12 @@ fn check_instances(
         let place = |p: Vec3| inst.world_from_object.transform_point3(p.as_dvec3());
         geometries[inst.geometry].triangle(i).map(place)
     };
-    // The largest t that the nearest hit may have, whatever the rounding.
+    // The largest t that the nearest hit may have with any rounding.
     let (mut nearest, mut which) = (f64::INFINITY, 0);
     for (k, inst) in instances.iter().enumerate() {
         for i in 0..geometries[inst.geometry].num_triangles() {
             let Some(x) = oracle::meet(corners(inst, i), o, d) else { continue };
-            // Surely inside, also when the ray moves by 10⁻⁵ (see below).
+            // Certainly inside, even when the ray moves by 10⁻⁵ (see below).
             let inside = x.depth > 1e-5 * x.depth_per_length;
             let (low, high) = (x.t - x.t_error, x.t + x.t_error);
             let in_range = low >= ray.t_min as f64 && high < ray.t_max as f64;

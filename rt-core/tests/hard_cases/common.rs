@@ -1,4 +1,4 @@
-//! Meshes, rays and the slow oracle that the tests share.
+//! Meshes, rays and checks that the tests share.
 
 use glam::{DVec3, Vec3};
 use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, World};
@@ -22,8 +22,8 @@ pub(crate) fn all_options() -> Vec<BuildOptions> {
     all
 }
 
-/// Every preset and robustness mode, each at one instruction set in turn: enough where the tree
-/// matters.
+/// Every preset and robustness mode, each at one instruction set in turn. Enough where only the
+/// tree matters.
 pub(crate) fn some_options() -> Vec<BuildOptions> {
     let levels = SimdLevel::available();
     let modes = Robustness::ALL.iter().flat_map(|&r| BuildQuality::ALL.map(|q| (q, r)));
@@ -41,7 +41,7 @@ pub(crate) fn world(mesh: &TriMesh, options: &BuildOptions) -> World {
     World::from_mesh(mesh.clone(), options).expect("a usable mesh")
 }
 
-/// The single rays' hits, after checking that packets give the same bits in order and sorted, and
+/// The hits of single rays. Also checks that packets give the same bits, in order and sorted, and
 /// that occlusion agrees.
 pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Option<Hit>> {
     let single: Vec<Option<Hit>> = rays.iter().map(|r| world.closest(r)).collect();
@@ -91,13 +91,13 @@ pub(crate) fn hits_all_ways(world: &World, rays: &[Ray], what: &str) -> Vec<Opti
     single
 }
 
-/// A hit as bits, so that -0.0 is not 0.0.
+/// The bits of a hit, so that -0.0 differs from 0.0.
 pub(crate) fn bits(h: Option<Hit>) -> Option<[u32; 5]> {
     h.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.prim, h.instance])
 }
 
-/// An icosahedron subdivided `level` times, turned so that no edge lies in an axis plane: unit f64
-/// positions and triangles.
+/// An icosahedron subdivided `level` times, rotated so that no edge lies in a plane through an
+/// axis: unit f64 positions and triangles.
 pub(crate) fn icosphere(level: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let p = (1.0 + 5f64.sqrt()) / 2.0;
     let mut v: Vec<DVec3> = Vec::new();
@@ -108,7 +108,7 @@ pub(crate) fn icosphere(level: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
             v.push(DVec3::from_array(q));
         }
     }
-    // Faces: triples of vertices two apart from one another.
+    // Faces are triples of vertices at distance two from one another.
     let near = |a: usize, b: usize| (v[a] - v[b]).length() < 2.1;
     let mut t: Vec<[u32; 3]> = Vec::new();
     for a in 0..12 {
@@ -147,7 +147,7 @@ pub(crate) fn sphere(level: u32, radius: f64, center: DVec3) -> TriMesh {
     TriMesh::from_f64_positions(&v, t)
 }
 
-/// A torus around the z axis, with the radii 1 and 0.4, of `n` by `m` quads cut in two.
+/// A torus around the z axis with the radii 1 and 0.4, made of `n` by `m` quads split in two.
 pub(crate) fn torus(n: u32, m: u32) -> TriMesh {
     let mut v = Vec::new();
     for i in 0..n {
@@ -166,8 +166,8 @@ pub(crate) fn torus(n: u32, m: u32) -> TriMesh {
     TriMesh::new(v, t.collect())
 }
 
-/// The cube from -1 to 1 with `n` by `n` quads a side, each cut in two: every edge but the
-/// diagonals lies along an axis, where boxes touch it.
+/// The cube from -1 to 1 with `n` by `n` quads per side, each split in two. Every edge except the
+/// diagonals is parallel to an axis, where boxes touch it.
 pub(crate) fn cube(n: u32) -> TriMesh {
     let mut mesh = TriMesh::default();
     let mut index: HashMap<[u32; 3], u32> = HashMap::new();
@@ -193,7 +193,7 @@ pub(crate) fn cube(n: u32) -> TriMesh {
     mesh
 }
 
-/// Triangles of many sizes at random places in the unit ball.
+/// Triangles of many sizes at random positions in the unit ball.
 pub(crate) fn soup(n: usize, seed: u64) -> TriMesh {
     let mut r = SplitMix64::new(seed);
     let mut mesh = TriMesh::default();
@@ -219,7 +219,7 @@ pub(crate) fn inward_rays(n: usize, seed: u64) -> Vec<Ray> {
         .collect()
 }
 
-/// Tiles of sixteen by sixteen pixels of a pinhole camera that looks from `eye` at a square of half
+/// Tiles of sixteen by sixteen pixels of a pinhole camera at `eye`, looking at a square of half
 /// size `half` around `at`.
 pub(crate) fn camera(eye: Vec3, at: Vec3, half: f32, tiles: u32) -> Vec<Ray> {
     let forward = (at - eye).normalize();

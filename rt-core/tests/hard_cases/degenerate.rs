@@ -1,4 +1,4 @@
-//! Meshes and worlds that are empty, broken or without volume.
+//! Meshes and worlds that are empty, invalid or without volume.
 
 use crate::common::*;
 use crate::oracle::check;
@@ -18,7 +18,7 @@ fn worlds_without_anything_are_missed() {
         assert!(hits_all_ways(&nothing, &rays, "nothing").iter().all(Option::is_none));
         let empty = world(&TriMesh::default(), &options);
         assert!(hits_all_ways(&empty, &rays, "no triangles").iter().all(Option::is_none));
-        // An empty mesh among others does not disturb them.
+        // An empty mesh does not affect the other meshes.
         let geometries = vec![
             Geometry::Mesh(Arc::new(TriMesh::default())),
             Geometry::Mesh(Arc::new(sphere(1, 1.0, DVec3::ZERO))),
@@ -139,7 +139,7 @@ fn singular_and_broken_transforms_are_refused_by_number() {
     assert_eq!(e, BuildError::NoSuchGeometry { instance: 0, geometry: 1, count: 1 });
 }
 
-/// Triangles at 2^(k/steps), each as large as its distance from zero: cuts by cost peel off one
+/// Triangles at 2^(k/steps), each as large as its distance from zero. Splits by cost peel off one
 /// primitive at a time.
 fn powers_of_two(exponents: std::ops::Range<i32>, steps: f32) -> TriMesh {
     let mut mesh = TriMesh::default();
@@ -155,7 +155,7 @@ fn powers_of_two(exponents: std::ops::Range<i32>, steps: f32) -> TriMesh {
 #[test]
 fn adversarial_spacing_does_not_overflow_the_stack() {
     let mesh = powers_of_two(-480..480, 16.0);
-    // From the left, through all of them: the nearest is the smallest that reaches the ray's
+    // From the left, through all of them. The nearest is the smallest that reaches the ray's
     // height.
     let heights: Vec<f32> = (-200..400).map(|k| 0.3 * (k as f32 / 16.0).exp2()).collect();
     let rays: Vec<Ray> =
@@ -163,9 +163,9 @@ fn adversarial_spacing_does_not_overflow_the_stack() {
     for options in some_options() {
         let w = world(&mesh, &options);
         if options.robustness == Robustness::Fast {
-            // Without exact decisions a triangle smaller than the rounding of its distance
-            // collapses to a point or a sliver beside the ray and may be hit falsely; whether its
-            // box is looked at then depends on the tree. Fast promises no more than an answer.
+            // Without exact decisions, a triangle smaller than the rounding of its distance
+            // collapses to a point or a sliver and may be hit falsely. Whether its box is visited
+            // then depends on the tree. The fast mode only guarantees an answer.
             assert!(
                 rays.iter().all(|r| w.closest(r).is_some()),
                 "{options:?}: every ray meets a large triangle"
@@ -178,8 +178,8 @@ fn adversarial_spacing_does_not_overflow_the_stack() {
     }
 }
 
-/// More range than products of two lengths have in f32: what is too small may be missed, but
-/// nothing false is hit.
+/// A wider range than products of two lengths can have in f32: triangles that are too small may be
+/// missed, but no false hit may occur.
 #[test]
 fn sizes_over_the_whole_range_of_f32_give_no_false_hits() {
     let mesh = powers_of_two(-120..120, 1.0);

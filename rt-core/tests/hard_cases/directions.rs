@@ -68,8 +68,8 @@ fn scaling_a_direction_scales_t_and_nothing_else() {
     }
 }
 
-/// From inside a closed cube cut into axis-aligned squares, every ray in one of its lattice planes
-/// must hit, whatever the sign of its zeros.
+/// Inside a closed cube of axis-aligned squares, every ray in one of its lattice planes must hit,
+/// whatever the sign of its zeros.
 #[test]
 fn rays_in_box_planes_do_not_leak() {
     let mesh = cube(4);
@@ -108,7 +108,8 @@ fn rays_in_box_planes_do_not_leak() {
 
 #[test]
 fn rays_in_a_face_plane_hit_its_neighbours() {
-    // Along the face z = 1 of a cube: edge-on to it, but the sides are met at their upper edges.
+    // Along the face z = 1 of a cube: the face is edge-on, but rays hit the sides at their upper
+    // edges.
     let mesh = cube(1);
     for options in some_options() {
         let w = world(&mesh, &options);
@@ -119,7 +120,7 @@ fn rays_in_a_face_plane_hit_its_neighbours() {
                 assert!((h.t - 2.0).abs() < 1e-6, "{options:?}: {h:?}");
             }
         }
-        // Just above there is nothing.
+        // Just above the face nothing is hit.
         assert!(w.closest(&Ray::new(Vec3::new(-3.0, 0.1, 1.0f32.next_up()), Vec3::X)).is_none());
     }
 }

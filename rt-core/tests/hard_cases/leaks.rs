@@ -1,4 +1,4 @@
-//! Rays that slip between triangles of closed meshes.
+//! Rays that leak between triangles of closed meshes.
 
 use crate::common::{cube, sphere, torus};
 use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, World};
@@ -7,8 +7,8 @@ use rt_core::mesh::TriMesh;
 use rt_core::robustness::{LeakTest, QueryKind, RayOrigins, RayTarget};
 use rt_core::simd::SimdLevel;
 
-/// Closed meshes and where rays start in them: curved and flat, at zero and far from it, finely and
-/// coarsely cut.
+/// Closed meshes, with the origins of rays inside them: curved and flat, at zero and far from it,
+/// with fine and coarse triangles.
 fn cases() -> Vec<(&'static str, TriMesh, RayOrigins)> {
     let far = DVec3::new(1000.0, 700.0, -1300.0);
     let ball = |center, radius| RayOrigins::Ball { center, radius };
@@ -34,8 +34,8 @@ fn rays_wanted() -> usize {
     std::env::var("RT_CORE_LEAK_RAYS").ok().and_then(|s| s.parse().ok()).unwrap_or(1_000_000)
 }
 
-/// Rays traced and lost in one mode; every combination of case, aim and query, with presets and
-/// instruction sets in turn.
+/// Traces rays in one mode, for every combination of case, target and query, with presets and
+/// instruction sets in turn. Returns the rays traced and the rays lost.
 fn shoot(robustness: Robustness, wanted: usize) -> (u64, u64, Vec<String>) {
     let (cases, levels) = (cases(), SimdLevel::available());
     let each = wanted / (cases.len() * RayTarget::ALL.len() * QueryKind::ALL.len());
@@ -82,7 +82,7 @@ fn watertight_edges() {
 fn fast_mode_leaks_are_counted_and_rare() {
     let (rays, lost, lines) = shoot(Robustness::Fast, rays_wanted() / 4);
     println!("fast: {lost} of {rays} rays leaked\n{}", lines.join("\n"));
-    // Zeros count as inside and boxes are as wide as in the other mode: none of 2.5·10⁷ was lost,
-    // but nothing rules it out.
+    // Zeros count as inside, and boxes are as wide as in the other mode. None of 2.5·10⁷ rays was
+    // lost, but nothing rules a leak out.
     assert!(lost <= rays / 100_000, "{lost} of {rays} rays leaked:\n{}", lines.join("\n"));
 }

@@ -12,8 +12,8 @@ fn check_limits(w: &World, rays: &[Ray], what: &str) {
     let with = |f: &dyn Fn(&Ray, f32) -> Ray| -> Vec<Ray> {
         rays.iter().zip(&free).map(|(r, h)| h.map_or(*r, |h| f(r, h.t))).collect()
     };
-    // Ending exactly at the hit: not hit. One step later: the same hit. Starting exactly there: the
-    // same. One step later: something behind.
+    // A range that ends exactly at the hit has no hit; one step later it has the same hit. A range
+    // that starts exactly there has the same hit; one step later it has a hit behind.
     let up_to = hits_all_ways(w, &with(&|r, t| Ray { t_max: t, ..*r }), what);
     let beyond = hits_all_ways(w, &with(&|r, t| Ray { t_max: t.next_up(), ..*r }), what);
     let from = hits_all_ways(w, &with(&|r, t| Ray { t_min: t, ..*r }), what);
@@ -75,15 +75,16 @@ fn limits_are_exact_for_tiny_and_huge_directions() {
     for options in some_options() {
         let w = world(&sphere(1, 1.0, DVec3::ZERO), &options);
         for length in [1e-42f32, 1e-38, 1e-20, 1e-5, 1e5, 1e20, 1e36] {
-            // Distances near 10⁻³⁰ to 3, so that t is in range for most lengths and underflows or
-            // overflows for the others.
+            // Distances from about 10⁻³⁰ to 3, so that t is in range for most lengths and
+            // underflows or overflows for the others.
             let rays: Vec<Ray> = inward_rays(96, 3)
                 .iter()
                 .map(|r| Ray { dir: r.dir.normalize() * length, t_min: 1e-30, ..*r })
                 .collect();
             for (r, h) in rays.iter().zip(hits_all_ways(&w, &rays, "lengths")) {
                 let Some(h) = h else {
-                    // Misses only where the distance, 2 to 3, over the length is beyond f32.
+                    // Misses are allowed only where the distance, 2 to 3, divided by the length is
+                    // beyond f32.
                     assert!(length < 1e-37 || !w.occluded(r), "{options:?}: {r:?}");
                     continue;
                 };

@@ -1,4 +1,4 @@
-//! Inputs that break ray tracers, one file per disease.
+//! Inputs that break ray tracers, one file per kind of failure.
 
 mod agreement;
 mod common;

@@ -1,4 +1,4 @@
-//! The slow reference: every triangle in f64, and how far an f32 answer may be from it.
+//! The slow reference: tests every triangle in f64, and bounds the error of an f32 result.
 
 use rt_core::glam::DVec3;
 use rt_core::mesh::TriMesh;
@@ -6,18 +6,19 @@ use rt_core::ray::{Hit, Ray};
 
 /// Unit roundoff of f32.
 const U: f64 = 1.0 / (1u64 << 24) as f64;
-/// Roundings allowed. The test has about ten in a chain; the worst seen over all tests here is 3.
+/// Number of roundings allowed. The test has about ten in a chain; the worst seen over all tests
+/// here is 3.
 const ROUNDINGS: f64 = 8.0;
 
-/// A ray against one triangle's plane, in f64.
+/// Intersection of a ray with one triangle's plane, in f64.
 pub(crate) struct Meeting {
     pub(crate) t: f64,
-    /// Smallest barycentric weight: below zero outside, zero on an edge.
+    /// Smallest barycentric weight: negative outside, zero on an edge.
     pub(crate) depth: f64,
-    /// Errors that rounding may make in `t` and `depth`.
+    /// Largest errors that rounding may cause in `t` and `depth`.
     pub(crate) t_error: f64,
     depth_error: f64,
-    /// How much `depth` changes at most when the ray moves by one unit of length.
+    /// Largest change of `depth` when the ray moves by one unit of length.
     pub(crate) depth_per_length: f64,
 }
 
@@ -34,8 +35,8 @@ pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Mee
     let sum = u + v + w;
     let depth = (u / sum).min(v / sum).min(w / sum);
     let t = n.dot(a) / det;
-    // ---- Errors: positions relative to the ray are off by roundings of their size; across a
-    // slanted or slender triangle that is more of t.
+    // ---- Errors: positions relative to the ray have rounding errors in proportion to their size.
+    // On a slanted or slender triangle they cause a larger error of t.
     let cos = (det / (n.length() * dir.length())).abs();
     let length = e1.length().max(e2.length()).max((e2 - e1).length());
     let reach = corners.iter().map(|p| (*p - origin).abs().max_element()).fold(0.0, f64::max);
@@ -46,9 +47,9 @@ pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Mee
     Some(Meeting { t, depth, t_error, depth_error, depth_per_length })
 }
 
-/// Checks `found` against trying every triangle of `mesh` (`world_origin` is that of render space).
-/// The range is the ray's. Returns the error of t in units of what is allowed, or `None` for a
-/// miss.
+/// Compares `found` with the result of trying every triangle of `mesh` (`world_origin` is the
+/// origin of render space). The range is the ray's. Returns the error of t as a share of the
+/// allowed error, or `None` for a miss.
 pub(crate) fn check(
     mesh: &TriMesh,
     world_origin: DVec3,
@@ -59,7 +60,7 @@ pub(crate) fn check(
     let (o, d) = (ray.origin.as_dvec3() + world_origin - mesh.origin, ray.dir.as_dvec3());
     let at = |i: usize| mesh.triangle(i).map(|p| p.as_dvec3());
     let (t_min, t_max) = (ray.t_min as f64, ray.t_max as f64);
-    // The nearest triangle that is hit whatever the rounding.
+    // The nearest triangle that is hit with any rounding.
     let mut sure: Option<(f64, f64, usize)> = None;
     for i in (0..mesh.num_triangles()).filter(|&i| mesh.is_renderable(i)) {
         let Some(m) = meet(at(i), o, d) else { continue };

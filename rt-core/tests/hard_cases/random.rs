@@ -10,7 +10,7 @@ use rt_core::mesh::TriMesh;
 use rt_core::ray::Ray;
 use std::sync::Arc;
 
-/// Any f32, biased to those that hurt.
+/// Any f32, biased towards values that cause trouble.
 fn wild() -> impl Strategy<Value = f32> + Clone {
     prop_oneof![
         4 => -2.0f32..2.0,

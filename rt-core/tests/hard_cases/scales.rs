@@ -22,7 +22,7 @@ fn meshes_from_1e_minus_30_to_1e30_are_hit_like_those_of_size_one() {
     for options in some_options() {
         let one = world(&unit, &options);
         for exponent in [-30, -20, -12, -9, -6, -3, 3, 6, 9, 12, 20, 30] {
-            // A power of two near the power of ten: then the numbers are the same but for their
+            // A power of two near the power of ten. Then the numbers differ only in their
             // exponents.
             let k = ((10f32).powi(exponent).log2().round()).exp2();
             let w = world(&scaled(&unit, k), &options);
@@ -36,7 +36,7 @@ fn meshes_from_1e_minus_30_to_1e30_are_hit_like_those_of_size_one() {
                     assert!((h.t / k / e.t - 1.0).abs() < 1e-6, "{what}: {h:?} is not {e:?}");
                 }
             }
-            // The same with directions as long as the mesh is large: t stays the same.
+            // The same with directions as long as the mesh is large: t does not change.
             for (r, s) in rays.iter().zip(&scaled_rays) {
                 let long = Ray { dir: r.dir * k, ..*s };
                 let (h, e) = (w.closest(&long), one.closest(r));
@@ -71,7 +71,7 @@ fn meshes_of_any_size_are_watertight() {
 }
 
 /// A camera this many sizes away sees the same triangles as one three sizes away in the same
-/// direction with the same perspective would, as the f64 oracle says.
+/// direction with the same perspective, as the f64 oracle computes them.
 #[test]
 fn cameras_1e6_and_1e9_away_lose_nothing() {
     let mesh = sphere(2, 1.0, DVec3::ZERO);
@@ -84,8 +84,7 @@ fn cameras_1e6_and_1e9_away_lose_nothing() {
                 let (x, y) = ((i % 20) as f64 / 10.0 - 0.95, (i / 20) as f64 / 10.0 - 0.95);
                 let target = DVec3::new(x, y, 0.0);
                 let (ray, moved) = w.ray_from_world(eye, (target - eye) / distance);
-                // The oracle gets the moved ray; where that starts is compared with the line in
-                // f64.
+                // The oracle gets the moved ray. Its start is compared with the line in f64.
                 let o = ray.origin.as_dvec3() + w.origin();
                 let off = (o - eye).cross(target - eye).length() / (target - eye).length();
                 assert!(
@@ -98,8 +97,8 @@ fn cameras_1e6_and_1e9_away_lose_nothing() {
                 check(&mesh, w.origin(), &ray, found, "far camera");
                 rays.push(ray);
             }
-            // The square from -0.95 to 0.95 around the unit sphere's centre, seen at an angle of 50
-            // degrees.
+            // The square from -0.95 to 0.95 around the unit sphere's centre, viewed at an angle of
+            // 50 degrees.
             assert!(hits > 250, "distance {distance}: {hits} of 400 hit");
             hits_all_ways(&w, &rays, "far camera");
         }
@@ -115,8 +114,8 @@ fn f32_origins_1e6_and_1e9_away_hit_what_f64_says() {
             let mut r = SplitMix64::new(17);
             let mut rays = Vec::new();
             for _ in 0..300 {
-                // Directions whose f32 rounding still meets the mesh: along axes, or aimed and kept
-                // if they do.
+                // Directions whose f32 rounding still hits the mesh: along the axes, or aimed and
+                // kept if they hit.
                 let o = (r.direction().as_vec3()) * distance;
                 let aim = (r.direction() * 0.5).as_vec3();
                 rays.push(Ray::new(o, aim - o));
@@ -125,8 +124,8 @@ fn f32_origins_1e6_and_1e9_away_hit_what_f64_says() {
             let hits = hits_all_ways(&w, &rays, "far origins");
             assert!(hits[1..].iter().step_by(2).all(Option::is_some), "rays along the axis hit");
             for (ray, h) in rays.iter().zip(hits) {
-                // Barycentrics tell where: the point is on the ray to the mesh's precision although
-                // t is not.
+                // The barycentrics give the position: the point is on the ray to the mesh's
+                // precision, although t is not.
                 let (o, d) = (ray.origin.as_dvec3() + w.origin(), ray.dir.as_dvec3());
                 let miss = (-o).cross(d).length() / d.length();
                 match h {
@@ -165,7 +164,7 @@ fn a_mesh_at_1e9_is_traced_around_its_own_place() {
 
 #[test]
 fn instances_far_from_one_another_keep_their_shape() {
-    // A small sphere at 1e7 beside one of size 1e7.
+    // A small sphere at 1e7 together with one of size 1e7.
     let mesh = Arc::new(sphere(3, 1.0, DVec3::ZERO));
     let small = DVec3::new(3e7, 1e7, 0.0);
     let instances = vec![
@@ -175,7 +174,7 @@ fn instances_far_from_one_another_keep_their_shape() {
     for options in some_options() {
         let w = World::build(vec![Geometry::Mesh(mesh.clone())], instances.clone(), &options)
             .expect("fine");
-        // The f32 grid at 3e7 has steps of 2: an eye on it, 8 away, looking along z.
+        // The f32 grid at 3e7 has steps of 2. The eye is on the grid, 8 away, and looks along z.
         let eye = w.render_from_world(small + DVec3::new(0.0, 0.0, 8.0));
         let h = w.closest(&Ray::new(eye, -Vec3::Z)).expect("straight at the small one");
         assert_eq!(h.instance, 1, "{options:?}");

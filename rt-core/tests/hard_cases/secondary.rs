@@ -1,4 +1,4 @@
-//! Secondary rays must not meet the surface they start from, at any scale and from any camera.
+//! Secondary rays must not hit the surface they start from, at any scale and from any camera.
 
 use crate::common::*;
 use rt_core::bvh::{Geometry, Instance, World};
@@ -33,14 +33,14 @@ fn no_false_self_shadow_at_any_size_place_or_camera_distance() {
 
 #[test]
 fn no_false_self_shadow_without_recentering() {
-    // Positions given in f32 far from zero, where their own grid is coarse.
+    // Positions in f32 far from zero, where the f32 grid is coarse.
     for offset in [10.0f32, 100.0] {
         let mut mesh = sphere(3, 1.0, DVec3::ZERO);
         for p in &mut mesh.positions {
             *p += offset;
         }
         let (rays, blocked) = shadows(world(&mesh, &Default::default()), 3.0, 8192);
-        // The rounded sphere is not quite convex; allow what its grid takes away.
+        // The rounded sphere is not quite convex; allow for the coarseness of the grid.
         assert!(rays > 5000 && blocked == 0, "{blocked} of {rays} at offset {offset}");
     }
 }

@@ -1,5 +1,5 @@
-//! Surfaces in the same place: the lowest instance, then the lowest primitive wins, whoever asks
-//! and in whatever order the tree is walked.
+//! Coincident surfaces: the lowest instance wins, then the lowest primitive, for every query and
+//! every order of traversal.
 
 use crate::common::*;
 use rt_core::bvh::{Geometry, Instance, World};

@@ -1,4 +1,4 @@
-//! Small scenes shared by the picture tests.
+//! Small scenes shared by the tests that render images.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its own part")]
 
 use rt_core::camera::Camera;
@@ -9,13 +9,13 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::{RenderOptions, RenderOutput, render};
 use rt_core::scene::{Scene, SceneBuilder};
 
-/// Two triangles: centre, and half edges.
+/// A rectangle of two triangles, from its centre and its half edges.
 pub fn quad(center: Vec3, a: Vec3, b: Vec3) -> TriMesh {
     let p = [center - a - b, center + a - b, center + a + b, center - a + b];
     TriMesh::new(p.to_vec(), vec![[0, 1, 2], [0, 2, 3]])
 }
 
-/// A horizontal square of half edge `half` at height `z`, outside up.
+/// A horizontal square of half edge `half` at height `z`; its outside faces up.
 pub fn floor(z: f32, half: f32) -> TriMesh {
     quad(Vec3::new(0.0, 0.0, z), Vec3::X * half, Vec3::Y * half)
 }
@@ -80,7 +80,7 @@ pub fn scene(parts: Vec<(TriMesh, Material)>, lights: Vec<Light>) -> Scene {
     b.build().unwrap()
 }
 
-/// Renders and returns everything.
+/// Renders and returns all outputs.
 pub fn draw(scene: &Scene, camera: &Camera, options: RenderOptions) -> RenderOutput {
     render(scene, camera, &options).unwrap()
 }

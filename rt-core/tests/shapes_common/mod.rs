@@ -1,5 +1,5 @@
-//! What the shape tests share: a small deterministic generator and the closest hit by trying every
-//! primitive.
+//! Shared by the shape tests: a small deterministic generator, and the closest hit found by trying
+//! every primitive.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use glam::Vec3;
@@ -7,7 +7,7 @@ use rt_core::math::SplitMix64;
 use rt_core::ray::Ray;
 use rt_core::shapes::{Shape, ShapeHit};
 
-/// The numbers of [`SplitMix64`] in single precision.
+/// [`SplitMix64`] in single precision.
 pub(crate) struct Random(SplitMix64);
 
 impl Random {
@@ -46,8 +46,8 @@ impl Random {
     }
 }
 
-/// The closest hit over all primitives whose bounds are not empty and are met by the ray; ties to
-/// the lower primitive.
+/// The closest hit over all primitives whose bounds are not empty and are hit by the ray. Ties go
+/// to the lower primitive.
 pub(crate) fn closest(shape: &dyn Shape, ray: &Ray) -> Option<(u32, ShapeHit)> {
     let mut best: Option<(u32, ShapeHit)> = None;
     for prim in 0..shape.num_primitives() as u32 {
