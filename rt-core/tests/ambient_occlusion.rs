@@ -1,4 +1,4 @@
-//! Ambient occlusion: closed forms, opacity, and what is said of light that is not there.
+//! Ambient occlusion: closed forms, opacity, and warnings when there is no light to occlude.
 
 mod scenes_common;
 use rt_core::glam::{DVec3, Vec3};
@@ -33,8 +33,8 @@ fn ambient_occlusion_of_a_plane_is_none() {
 
 #[test]
 fn ambient_occlusion_next_to_a_wall_is_its_form_factor() {
-    // Wall x = 0 of height 1 and (nearly) infinite width: a floor point at distance a sees it with
-    // (1 - a/sqrt(a²+1))/2.
+    // Wall x = 0 of height 1 and (nearly) infinite width: from a floor point at distance a it
+    // covers a share of (1 - a/sqrt(a²+1))/2.
     let wall = quad(Vec3::new(0.0, 0.0, 0.5), Vec3::Y * 2000.0, Vec3::Z * 0.5);
     let parts =
         vec![(floor(0.0, 3000.0), Material::matte([1.0; 3])), (wall, Material::matte([1.0; 3]))];
@@ -46,15 +46,15 @@ fn ambient_occlusion_next_to_a_wall_is_its_form_factor() {
         let found = o.frame.color_at(x, 5)[0] as f64;
         assert!((found - expected).abs() < 5e-3, "a = {a}: {found} instead of {expected}");
     }
-    // Limited to a distance shorter than the way to the wall, it is gone.
+    // Limited to a distance shorter than the distance to the wall, occlusion vanishes.
     let near = draw(&ambient_scene(parts, 0.1, 64), &top_camera(5.0, 4.0), options(16));
     assert!((near.frame.color_at(15, 5)[0] - 1.0).abs() < 1e-6);
 }
 
 #[test]
 fn ambient_occlusion_sees_opacity() {
-    // A ceiling of opacity 0.25 over everything: a quarter of the light is gone; an invisible one
-    // takes nothing.
+    // A ceiling of opacity 0.25 over everything blocks a quarter of the light. An invisible one
+    // blocks nothing.
     for (opacity, expected) in [(0.25f32, 0.75f32), (0.0, 1.0)] {
         let ceiling = (floor(0.01, 1000.0), Material::matte([1.0; 3]).with_opacity(opacity));
         let s = ambient_scene(
@@ -62,7 +62,7 @@ fn ambient_occlusion_sees_opacity() {
             f64::INFINITY,
             64,
         );
-        // Seen from between floor and ceiling.
+        // Viewed from between floor and ceiling.
         let c = rt_core::camera::Camera::orthographic(
             DVec3::new(0.0, 0.0, 0.005),
             DVec3::ZERO,

@@ -1,4 +1,4 @@
-//! Lights with an area against the irradiance of polygons and rings, and panoramas.
+//! Area lights against the irradiance of polygons and rings, and panoramas.
 
 mod scenes_common;
 use rt_core::camera::{Camera, CameraError, ThinLens};
@@ -11,7 +11,7 @@ use rt_core::scene::{SceneBuilder, SceneError};
 use scenes_common::*;
 use std::f64::consts::PI;
 
-/// What a white matte floor becomes at the origin under `lights`, with this many shadow rays a
+/// Radiance of a white matte floor at the origin under `lights`, with this many shadow rays per
 /// light.
 fn floor_under(light: Light, rays: u32) -> f64 {
     let mut options = RenderOptions::new(8, 8);
@@ -22,7 +22,7 @@ fn floor_under(light: Light, rays: u32) -> f64 {
 }
 
 /// Irradiance over π at the origin with normal z from a polygon of radiance 1 (Lambert 1760: half
-/// the sum over the edges of angle times the normal of the plane through edge and point).
+/// the sum over the edges of the angle times the normal of the plane through edge and point).
 fn polygon(corners: &[DVec3]) -> f64 {
     let n = corners.len();
     let edge = |i: usize| {
@@ -45,7 +45,7 @@ fn quadrangles_light_as_lambert_s_formula_says() {
         let found = floor_under(light, 64);
         let expected = polygon(&[corner, corner + a, corner + a + b, corner + b]);
         assert!((found - expected).abs() < 0.004 * expected, "{found} instead of {expected}");
-        // The other side is dark unless it shines as well.
+        // The other side is dark unless it emits as well.
         let back = Light::quad(corner, [b, a]).with_color(radiance_one);
         assert_eq!(floor_under(back, 4), 0.0);
         let kind = LightKind::Quad { corner, edges: [b, a], both_sides: true };
@@ -73,7 +73,7 @@ fn rings_light_as_a_disk_less_its_hole() {
         let expected = disk(radius) - disk(inner_radius);
         assert!((found - expected).abs() < 0.004 * expected, "{found} instead of {expected}");
     }
-    // Nothing outside of the cone.
+    // No light outside the cone.
     let kind = LightKind::Ring {
         position: DVec3::new(3.0, 0.0, h),
         direction: -DVec3::Z,
@@ -99,7 +99,8 @@ fn lights_without_an_area_are_named() {
 
 #[test]
 fn panoramas_see_all_around() {
-    // Balls at distance 4 along the axes, each of its own colour; the view goes along -y, up is z.
+    // Balls at distance 4 along the axes, each of a different colour. The view goes along -y, up is
+    // z.
     let eye = DVec3::new(1.0, 2.0, 3.0);
     let around = [
         (-DVec3::Y, [0.5, 0.5]),

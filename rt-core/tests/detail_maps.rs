@@ -18,7 +18,7 @@ use rt_core::texture::{Filter, Texture};
 use scenes_common::*;
 use std::sync::Arc;
 
-/// A picture of one texel.
+/// A texture of one texel.
 fn texel(rgb: [f32; 3]) -> Option<Arc<Texture>> {
     Some(Texture::from_linear(1, 1, vec![[rgb[0], rgb[1], rgb[2], 1.0]]).unwrap().into())
 }
@@ -40,7 +40,8 @@ fn tangents(mesh: TriMesh, t: Vec4) -> TriMesh {
     TriMesh { tangents: Some(vec![t; mesh.positions.len()]), ..mesh }
 }
 
-/// The middle pixel, once by local light alone and once with a shadow pass; both must agree.
+/// The middle pixel, rendered once with local light alone and once with a shadow pass. Both must
+/// agree.
 fn middle(mesh: &TriMesh, material: &Material, lights: &[Light], from: f64) -> [f32; 4] {
     let camera = Camera::orthographic(
         DVec3::new(0.0, 0.0, from),
@@ -84,8 +85,8 @@ fn normal_maps_bend_along_the_texture_coordinates() {
     close(middle(&right_handed, &m, &light, 5.0)[0], n.dot(to_light), "u along x, v along y");
     let mirrored = Vec3::new(n.x, -n.y, n.z);
     close(middle(&left_handed, &m, &light, 5.0)[0], mirrored.dot(to_light), "v against y");
-    // Files of glTF count v downwards, and mean by green the upper edge of the picture all the
-    // same.
+    // glTF files count v downwards, but their green channel still points to the upper edge of the
+    // image.
     let from_top = TextureMaps {
         normal: bend(n),
         rows_from_top: true,
@@ -99,11 +100,11 @@ fn normal_maps_bend_along_the_texture_coordinates() {
     );
     let own = tangents(sheet(-1.0), Vec4::new(1.0, 0.0, 0.0, 1.0));
     close(middle(&own, &down, &light, 5.0)[0], n.dot(to_light), "tangents say it themselves");
-    // From behind the whole frame is turned over.
+    // From behind, the whole tangent frame is reversed.
     let below = Vec3::new(0.2, 0.1, -0.9).normalize();
     let found = middle(&right_handed, &m, &[Light::directional(below.as_dvec3())], -5.0)[0];
     close(found, -n.dot(below), "seen from behind");
-    // The mesh's own tangents come first.
+    // The mesh's own tangents take precedence.
     let own = tangents(sheet(1.0), Vec4::new(0.0, 2.0, 0.0, 1.0));
     let turned = Vec3::new(-n.y, n.x, n.z);
     close(middle(&own, &m, &light, 5.0)[0], turned.dot(to_light), "tangent along y");
@@ -126,8 +127,8 @@ fn vtk_turns_the_normal_before_it_bends_it_and_needs_tangents() {
     assert!(warnings.iter().any(|w| w.contains("lacks tangents")), "{warnings:?}");
 }
 
-/// A mirror bent so far that it would reflect what is below it: it sees along itself instead, and
-/// is not black.
+/// A mirror whose normal map is so steep that it would reflect directions below the surface. It
+/// reflects along the surface instead and is not black.
 #[test]
 fn steep_normal_maps_leave_no_black_points() {
     let n = Vec3::new(0.8, 0.0, 0.6);
@@ -149,7 +150,7 @@ fn steep_normal_maps_leave_no_black_points() {
 #[test]
 fn scale_flattens_or_steepens_a_normal_map() {
     let n = Vec3::new(0.6, 0.0, 0.8);
-    // Steeper ones are bent less: see `steep_normal_maps_leave_no_black_points`.
+    // Steeper normals are corrected: see `steep_normal_maps_leave_no_black_points`.
     for normal_scale in [0.0, 0.5, 1.2] {
         let maps =
             TextureMaps { normal: bend(n), normal_scale, ..TextureMaps::new(MapConvention::Gltf) };
@@ -229,7 +230,7 @@ fn occlusion_dims_ambient_light_for_gltf_and_lamps_too_for_vtk() {
     }
 }
 
-/// A roughness of 0 in one half: only there is the surface a mirror.
+/// A roughness of 0 in one half: only that half is a mirror.
 #[test]
 fn a_map_that_makes_part_of_a_surface_a_mirror_sends_mirror_rays_there() {
     let mut texture = Texture::from_linear(2, 1, vec![[1.0, 0.0, 1.0, 1.0], [1.0; 4]]).unwrap();
@@ -251,7 +252,7 @@ fn a_map_that_makes_part_of_a_surface_a_mirror_sends_mirror_rays_there() {
     assert_eq!(out.frame.color_at(1, 4), [0.25, 0.5, 1.0, 1.0], "mirrored");
 }
 
-/// Detail of a program's own: asked with places that make sense.
+/// User-defined material maps are evaluated at meaningful points.
 #[derive(Debug)]
 struct Checked;
 

@@ -22,7 +22,7 @@ fn options(n: u32) -> RenderOptions {
 
 #[test]
 fn shadow_of_a_square_is_where_geometry_says() {
-    // A 2 x 2 square at height 1 under a point light at height 2: a shadow of 4 x 4.
+    // A 2 x 2 square at height 1 under a point light at height 2 casts a shadow of 4 x 4.
     for light in [
         Light::point(DVec3::new(0.0, 0.0, 2.0)),
         Light::spot(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, 1.5),
@@ -34,7 +34,7 @@ fn shadow_of_a_square_is_where_geometry_says() {
             ],
             vec![light],
         );
-        // Seen from below the square's height: near plane at height 0.5.
+        // Viewed from below the square's height: near plane at height 0.5.
         let c = rt_core::camera::Camera::orthographic(
             DVec3::new(0.0, 0.0, 0.5),
             DVec3::ZERO,
@@ -53,7 +53,7 @@ fn shadow_of_a_square_is_where_geometry_says() {
             }
         }
         assert!(o.report.rays.shadow > 0 && o.report.rays.shadow_blocked > 0);
-        // Without shadows in the light, no ray.
+        // Lights that cast no shadows cause no rays.
         s.lights[0].shadows = false;
         let o = draw(&s, &c, options(64));
         assert_eq!(o.report.rays.shadow, 0);
@@ -76,8 +76,8 @@ fn headlight_sends_no_shadow_rays() {
     assert_eq!(r.primary, 32 * 32);
     assert_eq!(r.total(), r.primary);
     assert!(o.report.effects.is_empty() && o.report.warnings.is_empty());
-    // Asked to cast shadows, it does: in perspective its light is parallel and the eye's rays are
-    // not.
+    // When requested to cast shadows, it does: in perspective its light is parallel and the eye's
+    // rays are not.
     let mut s = s;
     s.lights[0].shadows = true;
     assert!(draw(&s, &camera(DVec3::new(4.0, 0.0, 0.0), 0.6), options(32)).report.rays.shadow > 0);
@@ -131,8 +131,8 @@ fn mirror_shows_the_environment_in_the_mirror_direction() {
     s.environment = Some(Environment::Gradient { bottom: [0.0; 3], top: [1.0; 3], up: Vec3::Z });
     let c = camera(DVec3::new(-3.0, 0.0, 3.0), 0.2);
     let o = draw(&s, &c, options(33));
-    // 45 degrees: the mirrored ray climbs with sin 45°, radiance 0.5 + 0.5 sin 45°; Schlick's white
-    // metal reflects all.
+    // At 45 degrees the mirrored ray rises with sin 45°: radiance 0.5 + 0.5 sin 45°. With Schlick's
+    // approximation, white metal reflects everything.
     let expected = 0.5 + 0.5 * std::f32::consts::FRAC_1_SQRT_2;
     assert!((o.frame.color_at(16, 16)[0] - expected).abs() < 1e-4);
     assert_eq!(o.report.rays.reflection, 33 * 33);
@@ -173,7 +173,7 @@ fn no_reflection_rays_at_specular_zero() {
 
 #[test]
 fn rays_of_mirrors_that_are_left_out_are_counted_and_cost_at_most_their_share() {
-    // Two mirrors of share 0.1 face each other, each gives off 1: the series 1/(1 - 0.1).
+    // Two mirrors of reflectance 0.1 face each other, each emits 1: the series 1/(1 - 0.1).
     let mut m = Material::phong([0.0; 3], 0.0, 1.0).with_emission([1.0; 3]);
     if let SurfaceModel::Phong { mirror, .. } = &mut m.model {
         *mirror = 0.1;
@@ -188,7 +188,8 @@ fn rays_of_mirrors_that_are_left_out_are_counted_and_cost_at_most_their_share() 
     assert!((all - 1.0 / 0.9).abs() < 1e-6 && rays.cut_at_min_contribution == 0, "{all}");
     assert_eq!(rays.cut_at_max_bounces, 16, "after eight reflections");
     let (most, rays) = at(0.005);
-    // The third reflection is not sent: what is missing is 0.001 times what it would have met.
+    // The third reflection is not sent. The missing radiance is 0.001 times the radiance it would
+    // have found.
     assert_eq!((rays.cut_at_min_contribution, rays.cut_at_max_bounces), (16, 0));
     assert!(((all - most) - 0.001 * all).abs() < 1e-6, "{all} {most}");
 }
@@ -223,7 +224,7 @@ fn refracted_ray_leaves_where_snell_says() {
     let o = draw(&s, &c, RenderOptions { effects: Some(only_through), ..options(5) });
     let sin_t = std::f64::consts::FRAC_1_SQRT_2 / 1.5;
     let x = sin_t / (1.0 - sin_t * sin_t).sqrt() + 0.001;
-    // Fresnel loss at both faces, no reflection rays asked for.
+    // Fresnel loss at both faces; reflection rays are not requested.
     let (ci, ct) = (std::f64::consts::FRAC_1_SQRT_2, (1.0 - sin_t * sin_t).sqrt());
     let rp = (1.5 * ci - ct) / (1.5 * ci + ct);
     let rs = (ci - 1.5 * ct) / (ci + 1.5 * ct);
@@ -236,7 +237,8 @@ fn refracted_ray_leaves_where_snell_says() {
 
 #[test]
 fn total_internal_reflection_turns_the_ray_back() {
-    // From inside glass (ior 1.5) at 60°: nothing gets out, the mirrored ray sees what is inside.
+    // From inside glass (ior 1.5) at 60°: total internal reflection, the mirrored ray sees the
+    // inside.
     let mut face = floor(1.0, 100.0);
     face.colors = None;
     let ground = floor(0.0, 100.0);
@@ -368,8 +370,8 @@ fn coplanar_layers_are_one_surface_of_the_lowest_id() {
 
 #[test]
 fn shapes_with_alpha_in_their_colours_are_looked_through() {
-    // Two spheres one behind the other, the front one red and half transparent; and the same
-    // through cylinders and tubes.
+    // Two spheres one behind the other, the front one red and half transparent. The same with
+    // cylinders and tubes.
     let colors = |alpha: f32| vec![[0.0, 0.0, 1.0, 1.0], [1.0, 0.0, 0.0, alpha]];
     let centers = vec![Vec3::ZERO, Vec3::new(0.0, 0.0, 2.0)];
     let ends = || vec![Vec3::new(-1.0, 0.0, 2.0), Vec3::new(1.0, 0.0, 2.0)];
@@ -398,7 +400,7 @@ fn shapes_with_alpha_in_their_colours_are_looked_through() {
                 "shape {k}"
             );
             let o = draw(&s, &top_camera(5.0, 4.0), options(9));
-            // Rays meet the red one on their way in and on their way out.
+            // Rays hit the red one where they enter and where they leave.
             let red = if alpha < 1.0 { 0.75 } else { 1.0 };
             assert_eq!(o.frame.color_at(4, 4), [red, 0.0, 1.0 - red, 1.0], "shape {k}");
             assert_eq!(o.report.rays.opacity_ignored, 0);
@@ -524,7 +526,7 @@ fn every_effect_asked_for_in_vain_is_reported_by_name() {
             o.report.warnings
         );
     }
-    // Asked for, needed, but without a blocker in view.
+    // Requested and needed, but no blocker is in view.
     let s = scene(
         vec![(floor(0.0, 3.0), Material::matte([1.0; 3]))],
         vec![Light::directional(DVec3::Z)],

@@ -14,7 +14,7 @@ use rt_core::scene::{Appearance, SceneBuilder};
 use rt_core::texture::{Filter, Texture};
 use scenes_common::*;
 
-/// Colour of the middle pixel of the floor z = 0 seen from straight above (parallel), where x = y
+/// Colour of the middle pixel of the floor z = 0 viewed from straight above (parallel), where x = y
 /// = 0.
 fn middle(mesh: TriMesh, material: Material, lights: Vec<Light>) -> [f32; 4] {
     draw(&scene(vec![(mesh, material)], lights), &top_camera(5.0, 0.001), RenderOptions::new(1, 1))
@@ -34,7 +34,7 @@ fn phong_highlights_are_opengl_s_and_vtk_s() {
         ..Light::directional(to_light).with_color([0.8; 3])
     };
     let cos = to_light.z as f32;
-    // View is +z. Half vector of view and light; mirrored light against view.
+    // View is +z. Half vector of view and light, and angle between mirrored light and view.
     let half = (to_light + DVec3::Z).normalize().z as f32;
     let mirrored = cos;
     for (highlight, base) in [(PhongForm::HalfVector, half), (PhongForm::Mirrored, mirrored)] {
@@ -77,7 +77,7 @@ fn attenuation_and_spots_follow_opengl() {
     close(spot(0.6, 0.0), 1.0, "inside the cone");
     close(spot(0.5, 0.0), 0.0, "outside the cone");
     close(spot(0.6, 4.0), 0.75f32.powi(2), "cos 30° to the 4th");
-    // A disk shines with the cosine to its normal.
+    // A disk emits with the cosine to its normal.
     let disk = Light::disk(at, axis, 1e-6);
     close(
         middle(floor(0.0, 1.0), Material::matte([1.0; 3]), vec![disk])[0],
@@ -94,7 +94,7 @@ fn lights_in_the_camera_frame_move_with_it() {
     let pictures: Vec<_> =
         eyes.iter().map(|e| draw(&s, &camera(*e, 0.5), RenderOptions::new(33, 33))).collect();
     for p in &pictures[1..] {
-        // The sphere is facetted: silhouettes differ a little; its inside must not.
+        // The sphere is facetted: silhouettes differ slightly, the interior must not.
         let inner = |o: &rt_core::render::RenderOutput, x| o.frame.color_at(x, 16)[0];
         for x in 8..26 {
             assert!((inner(&pictures[0], x) - inner(p, x)).abs() < 0.02, "{x}");
@@ -117,8 +117,8 @@ fn environment_lights_by_its_cosine_weighted_mean() {
 
 #[test]
 fn scalars_are_interpolated_first_and_mapped_then() {
-    // A map that is black but for a narrow white band in the middle: colours mapped at the vertices
-    // would be black everywhere.
+    // A map that is black except for a narrow white band in the middle. Colours mapped at the
+    // vertices would be black everywhere.
     let mut colors = vec![[0.0, 0.0, 0.0, 1.0]; 101];
     colors[50] = [1.0; 4];
     let mut mesh = floor(0.0, 1.0);
@@ -126,7 +126,7 @@ fn scalars_are_interpolated_first_and_mapped_then() {
     let m = Material::unlit([1.0, 0.0, 0.0]).colored_by_scalars(ColorMap::new(colors, [-1.0, 1.0]));
     let p = middle(mesh.clone(), m.clone(), vec![]);
     assert!(p[0] > 0.95 && p[1] > 0.95, "{p:?}");
-    // Without scalars the constant colour is used, and said to be.
+    // Without scalars the constant colour is used, with a warning.
     mesh.scalars = None;
     let o = draw(&scene(vec![(mesh, m)], vec![]), &top_camera(5.0, 1.0), RenderOptions::new(2, 2));
     assert_eq!(o.frame.color_at(0, 0), [1.0, 0.0, 0.0, 1.0]);
@@ -215,7 +215,7 @@ fn recolouring_needs_no_new_world() {
 
 #[test]
 fn sides_choose_the_normal_and_what_is_dark() {
-    // Seen from the back, light at the viewer.
+    // Viewed from the back, with the light at the viewer.
     let mut back = floor(0.0, 1.0);
     back.indices.iter_mut().for_each(|t| t.swap(0, 1));
     let lit = |mesh: &TriMesh, sides| {
@@ -226,8 +226,8 @@ fn sides_choose_the_normal_and_what_is_dark() {
         (lit(&back, Sides::Both), lit(&back, Sides::BothByNormal), lit(&back, Sides::LitOutside)),
         (1.0, 1.0, 0.0)
     );
-    // Shading normals that disagree with the winding: geometry decides for Both, the normal itself
-    // for BothByNormal.
+    // Shading normals that disagree with the winding: the geometry decides for Both, the normal
+    // itself for BothByNormal.
     back.normals = Some(Attribute::per_vertex(vec![Vec3::Z; 4]));
     assert_eq!(
         (lit(&back, Sides::Both), lit(&back, Sides::BothByNormal), lit(&back, Sides::LitOutside)),
@@ -239,8 +239,8 @@ fn sides_choose_the_normal_and_what_is_dark() {
 
 #[test]
 fn normals_of_squeezed_and_mirrored_instances() {
-    // A unit sphere squeezed to an ellipsoid: normals must be those of the ellipsoid, outward also
-    // when mirrored.
+    // A unit sphere scaled to an ellipsoid: normals must be those of the ellipsoid, and outward
+    // even when mirrored.
     for scale in [DVec3::new(2.0, 1.0, 0.5), DVec3::new(-2.0, 1.0, 0.5)] {
         let mut b = SceneBuilder::new();
         let g = b.geometry(Geometry::Mesh(sphere(Vec3::ZERO, 1.0, 64).into()));

@@ -1,4 +1,4 @@
-//! Lights at the eye and along the view: shadow rays are left out only where the eye cannot see a
+//! Lights at the eye and along the view: shadow rays are omitted only where the eye cannot see a
 //! shadow.
 
 mod scenes_common;
@@ -13,7 +13,7 @@ use scenes_common::*;
 
 const EYE: DVec3 = DVec3::new(0.0, 0.0, 4.0);
 
-/// Along the view, and with shadows.
+/// Lights along the view, with shadows.
 fn along_view() -> Light {
     Light { shadows: true, ..Light::headlight() }
 }
@@ -22,7 +22,7 @@ fn at_eye() -> Light {
     Light::point(DVec3::ZERO).in_camera_frame()
 }
 
-/// A square of half edge 1/4 at height 1 above a floor, beside the middle of the picture.
+/// A square of half edge 1/4 at height 1 above a floor, next to the middle of the image.
 fn square_above_floor(light: Light) -> Scene {
     let square = quad(Vec3::new(1.0, 0.0, 1.0), Vec3::X * 0.25, Vec3::Y * 0.25);
     scene(
@@ -48,8 +48,8 @@ fn a_directional_headlight_casts_the_shadows_that_a_perspective_eye_sees() {
     let mut dark = 0;
     for y in 0..n {
         for x in 0..n {
-            // Where the pixel's ray meets the square's height and the floor, in units of the
-            // tangent.
+            // Positions where the pixel's ray intersects the square's height and the floor, in
+            // units of the tangent.
             let at = |k: u32| ((k as f64 + 0.5) / n as f64 * 2.0 - 1.0) * 0.5f64.tan();
             let (tx, ty) = (at(x), at(y));
             let inside = |x: f64, y: f64| (x - 1.0).abs() < 0.25 && y.abs() < 0.25;
@@ -74,19 +74,19 @@ fn light_along_the_camera_rays_sends_no_shadow_rays_from_what_they_meet_first() 
             o.report.warnings
         );
         assert!(o.frame.color.iter().all(|p| p[0] > 0.0), "no shadow can be seen");
-        // Asked for by name, it is said that they do nothing.
+        // When requested by name, a warning says that they have no effect.
         let asked = RenderOptions { effects: Some(Effects::SHADOWS), ..RenderOptions::new(32, 32) };
         let warnings = draw(&square_above_floor(light), &camera, asked).report.warnings;
         assert!(warnings.iter().any(|w| w.starts_with("shadows changes no pixel")), "{warnings:?}");
     }
-    // The other two see shadows.
+    // For the other two, shadows are visible.
     for (camera, light) in [(perspective(), along_view()), (parallel(), at_eye())] {
         let o = draw(&square_above_floor(light), &camera, RenderOptions::new(32, 32));
         assert!(o.report.rays.shadow_blocked > 0);
     }
 }
 
-/// The same light given in world space, where nothing is left out.
+/// The same light in world space, where no shadow ray is omitted.
 fn in_world(light: Light) -> Light {
     let kind = match light.kind {
         // The camera looks along -z with y up: its axes are the world's.
@@ -123,8 +123,8 @@ fn lights_at_the_eye_give_the_picture_of_the_same_lights_in_the_world() {
     for camera in [perspective(), parallel()] {
         compare("local", square_above_floor, &camera, &plain, true);
     }
-    // A mirror shows what the light at the eye misses. No ray goes through its edges: there the
-    // camera's ray may miss what the ray to the light meets.
+    // A mirror shows what the light at the eye does not reach. No ray goes through the mirror's
+    // edges: there the camera's ray may miss what the ray to the light hits.
     let with_mirror = |light| {
         let mirror = quad(Vec3::new(1.2, 0.0, 2.0), Vec3::Y * 1.9, Vec3::Z * 2.0);
         let square = quad(Vec3::new(0.5, 0.0, 1.0), Vec3::X * 0.25, Vec3::Y * 0.5);
@@ -136,7 +136,7 @@ fn lights_at_the_eye_give_the_picture_of_the_same_lights_in_the_world() {
         scene(parts, vec![light])
     };
     compare("mirror", with_mirror, &perspective(), &plain, true);
-    // Light that comes through a translucent surface is dimmed as the eye's view is.
+    // Light through a translucent surface is dimmed by the same factor as the eye's view.
     let with_veil = |light| {
         scene(
             vec![

@@ -1,5 +1,5 @@
-//! What is faint is not left out in silence: unbiased paths, light through many layers, reflectors
-//! whose rays are left out.
+//! Faint light is not omitted silently: unbiased paths, light through many layers, reflectors whose
+//! rays are omitted.
 
 mod scenes_common;
 use rt_core::camera::Camera;
@@ -14,9 +14,8 @@ use scenes_common::*;
 /// Radiance of the emitter.
 const EMITTED: f64 = 1e4;
 
-/// Mean of the pixels inside a closed matte body of this albedo that gives off [`EMITTED`]
-/// everywhere, over what the geometric series says, E / (1 - albedo). Nothing but path tracing is
-/// asked for.
+/// Mean of the pixels inside a closed matte body of this albedo that emits [`EMITTED`] everywhere,
+/// divided by the value of the geometric series, E / (1 - albedo). Only path tracing is requested.
 fn furnace(albedo: f32, samples: u32, seed: u64) -> (f64, u64) {
     let m = Material::matte([albedo; 3]).with_emission([EMITTED as f32; 3]);
     let s = scene(vec![(sphere(Vec3::ZERO, 1.0, 12), Material { flat: true, ..m })], vec![]);
@@ -41,8 +40,8 @@ fn the_path_tracer_is_unbiased_in_a_furnace_of_albedo_0_999() {
 
 #[test]
 fn the_path_tracer_keeps_faint_paths_to_bright_emitters() {
-    // Without roulette before the fourth bounce a path has the first terms of the series exactly;
-    // those behind are 1e-8 to 1e-4 of it.
+    // Without roulette before the fourth bounce, a path has the first terms of the series exactly.
+    // The remaining terms are 1e-8 to 1e-4 of it.
     for (albedo, tolerance) in [(0.01f32, 1e-6), (0.05, 2e-5), (0.3, 0.01)] {
         let (mean, _) = furnace(albedo, 64, 0);
         assert!((mean - 1.0).abs() < tolerance, "albedo {albedo}: {mean} of the closed form");
@@ -51,7 +50,7 @@ fn the_path_tracer_keeps_faint_paths_to_bright_emitters() {
 
 #[test]
 fn light_through_many_layers_is_not_dropped() {
-    // Nine layers of opacity 0.6 let 2.6e-4 through, of a light of 1e4.
+    // Nine layers of opacity 0.6 transmit 2.6e-4 of a light of 1e4.
     for path_tracing in [false, true] {
         let mut parts = vec![(floor(0.0, 10.0), Material::matte([1.0; 3]))];
         for k in 0..9 {

@@ -1,5 +1,5 @@
 //! Rays towards lights are exact at both ends: at the surface, however far the light is, and at the
-//! light, whatever it stands on.
+//! light, even when it lies on a surface.
 
 mod scenes_common;
 use rt_core::bvh::BuildOptions;
@@ -18,10 +18,10 @@ use std::f64::consts::FRAC_PI_2;
 /// A pixel is 1/16: the nearest centre is 1/32 from the blocker's edge, and its shadow is off by at
 /// most the gap times the slope of the light.
 const PIXELS: u32 = 64;
-/// From the floor to what nearly touches it, in radii of the blocker.
+/// Distance from the floor to the surface that nearly touches it, in radii of the blocker.
 const GAP: f64 = 1e-3;
 
-/// Every kind of light with a place at `distance`, in direction `dir` (unit) from the scene,
+/// Every kind of light with a position, at `distance` in direction `dir` (unit) from the scene,
 /// without falloff.
 fn lights(dir: DVec3, distance: f64) -> Vec<(&'static str, Light)> {
     let (at, size) = (dir * distance, 0.01 * distance);
@@ -48,8 +48,8 @@ fn lights(dir: DVec3, distance: f64) -> Vec<(&'static str, Light)> {
     ]
 }
 
-/// A square of half edge `scale` just above a floor, seen from between the two; `veil` adds a
-/// translucent surface out of sight, which has light followed from layer to layer.
+/// A square of half edge `scale` just above a floor, viewed from between the two. `veil` adds a
+/// translucent surface out of sight, so that light is followed from layer to layer.
 fn near_contact(scale: f64, light: Light, level: Option<SimdLevel>, veil: bool) -> (Scene, Camera) {
     let s = scale as f32;
     let mut b = SceneBuilder::new();
@@ -73,8 +73,8 @@ fn expect_contact_shadow(what: &str, scene: &Scene, camera: &Camera, dir: DVec3)
     for y in 0..PIXELS {
         for x in 0..PIXELS {
             let at = |k: u32| (k as f64 + 0.5) / 16.0 - 2.0;
-            // Rows go down. At the blocker's height the ray is at the pixel, moved by less than
-            // 1/32.
+            // Rows go downwards. At the blocker's height the ray is at the pixel, moved by less
+            // than 1/32.
             let shadowed = at(x).abs() < 1.0 && at(y).abs() < 1.0;
             let light = o.frame.color_at(x, y)[0];
             let right = if shadowed { light == 0.0 } else { light > 0.5 * dir.z as f32 };
@@ -140,7 +140,8 @@ fn a_small_model_on_a_huge_ground_keeps_its_shadow() {
     expect_contact_shadow("huge ground", &b.build().unwrap(), &camera, dir);
 }
 
-/// `mesh` turned and moved: planes in general position, whose rounded corners are not in the plane.
+/// `mesh` rotated and translated: planes in general position, whose rounded corners are not in the
+/// plane.
 fn turned(mut mesh: TriMesh, turn: DMat3, scale: f64) -> TriMesh {
     for p in &mut mesh.positions {
         *p = (turn * p.as_dvec3() * scale).as_vec3();
@@ -151,7 +152,8 @@ fn turned(mut mesh: TriMesh, turn: DMat3, scale: f64) -> TriMesh {
 #[test]
 fn a_light_on_a_surface_is_not_hidden_by_it() {
     // A room of floor and ceiling. Lights on the ceiling, of size 0 and with an area whose own
-    // geometry is in the ceiling; the sphere hangs from it, or half of it would be above.
+    // geometry is in the ceiling. The sphere hangs from the ceiling; otherwise half of it would be
+    // above.
     let turns = [
         DMat3::IDENTITY,
         DMat3::from_axis_angle(DVec3::new(0.6, -0.8, 0.0), 0.7) * DMat3::from_rotation_z(0.3),
@@ -159,7 +161,7 @@ fn a_light_on_a_surface_is_not_hidden_by_it() {
     for turn in turns {
         for scale in [1e-6, 1.0, 1e6] {
             for (name, light) in lights(DVec3::Z, 3.0) {
-                // Down to a thousandth of the room below it, and in it.
+                // Down to a thousandth of the room below the ceiling, and exactly in it.
                 for below in [0.0, 1e-3] {
                     let mut b = SceneBuilder::new();
                     b.mesh(turned(floor(0.0, 6.0), turn, scale), Material::matte([1.0; 3]));
@@ -190,13 +192,13 @@ fn a_light_on_a_surface_is_not_hidden_by_it() {
 
 #[test]
 fn flat_lights_are_not_hidden_by_their_own_plane_however_flat_they_fall() {
-    // A wall that ends a thousandth below the ceiling: light from a panel in the ceiling falls onto
-    // its top at 1/3000 of the horizontal.
+    // A wall that ends a thousandth below the ceiling. Light from a panel in the ceiling reaches
+    // its top at an elevation of 1/3000.
     for scale in [1e-6, 1.0, 1e6] {
         for (name, light) in lights(DVec3::Z, 3.0) {
             let light = match light.kind {
                 LightKind::Disk { .. } | LightKind::Quad { .. } => light,
-                // As wide as a ring's cone may be: light as flat as here is within it.
+                // As wide as a ring's cone may be. Light as flat as here is within it.
                 LightKind::Ring { position, direction, inner_radius, radius, .. } => {
                     let (inner_rad, outer_rad) = (FRAC_PI_2, FRAC_PI_2);
                     let kind = LightKind::Ring {
@@ -236,8 +238,8 @@ fn flat_lights_are_not_hidden_by_their_own_plane_however_flat_they_fall() {
 
 #[test]
 fn what_is_just_before_a_light_hides_it() {
-    // A shade a thousandth below the light, with a light near and far, at both ends of the way: the
-    // floor is dark.
+    // A shade a thousandth below the light, with a near and a far light, at both ends of the ray:
+    // the floor is dark.
     for distance in [3.0, 1e3, 1e6] {
         let mut b = SceneBuilder::new();
         b.mesh(floor(0.0, 1.0), Material::matte([1.0; 3]));
@@ -263,7 +265,7 @@ fn lights_beyond_single_precision_are_refused() {
     assert!(error.contains("position") && error.contains("directional"), "{error}");
 }
 
-/// The light of the turned and scaled scene.
+/// The light of the rotated and scaled scene.
 fn moved(light: Light, turn: DMat3, scale: f64) -> Light {
     let place = |p: DVec3| turn * p * scale;
     let kind = match light.kind {
@@ -346,7 +348,7 @@ fn shadow_rays_find_no_false_blockers_at_any_scale_or_offset() {
                 with.report.rays
             );
             assert_eq!(with.report.rays.shadow_blocked, 0, "scale {scale} offset {offset}");
-            // The loops without and with rays take the normal in f32 and in f64.
+            // The loops without and with rays use the normal in f32 and in f64.
             assert!(difference(&with, &without) < 1e-6);
         }
     }

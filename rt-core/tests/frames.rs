@@ -52,13 +52,13 @@ fn busy_scene() -> Scene {
 
 #[test]
 fn window_depth_is_the_matrix_product_at_the_exact_intersection() {
-    // A tilted plane whose intersection with every pixel ray is known in closed form, seen through
-    // hard matrices.
+    // A tilted plane whose intersection with every pixel ray is known in closed form, viewed with
+    // difficult matrices.
     let n = DVec3::new(0.3, -0.2, 1.0);
     let corner = |x: f64, y: f64| Vec3::new(x as f32, y as f32, -(n.x * x + n.y * y) as f32);
     let p = [corner(-64.0, -64.0), corner(64.0, -64.0), corner(64.0, 64.0), corner(-64.0, 64.0)];
     let mesh = TriMesh::new(p.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
-    // The plane of the first triangle as f32 rounding left it.
+    // The plane of the first triangle after rounding to f32.
     let exact = |i: usize| {
         let [a, b, c] = mesh.triangle(i).map(|q| q.as_dvec3());
         (a, (b - a).cross(c - a))
@@ -114,7 +114,7 @@ fn window_depth_is_the_matrix_product_at_the_exact_intersection() {
 
 #[test]
 fn pixel_centres_are_opengl_s_and_row_zero_is_the_top() {
-    // A square covering exactly the upper left quarter of the picture.
+    // A square that covers exactly the upper left quarter of the image.
     let s = scene(
         vec![(quad(Vec3::new(-1.0, 1.0, 0.0), Vec3::X, Vec3::Y), Material::unlit([1.0; 3]))],
         vec![],
@@ -316,7 +316,7 @@ fn only_the_layers_asked_for_are_computed() {
             && o.frame.distance.is_empty()
     );
     assert_eq!((o.frame.depth.len(), o.frame.instance.len()), (1600, 1600));
-    // Nothing is shaded: camera rays only.
+    // Nothing is shaded, so only camera rays are traced.
     assert_eq!(o.report.rays.total(), o.report.rays.primary + o.report.rays.transparency);
     let names: Vec<_> = o.frame.planes().iter().map(|p| p.name).collect();
     assert_eq!(names, ["depth.Z", "id.instance", "id.primitive"]);
@@ -448,8 +448,8 @@ fn stops_by_error_time_and_cancel() {
 
 #[test]
 fn error_estimate_is_about_the_true_error() {
-    // Independent samples: the estimate must be within a factor of 1.5 of the distance to a picture
-    // of many samples.
+    // Independent samples: the estimate must be within a factor of 1.5 of the difference to an
+    // image of many samples.
     let s = busy_scene();
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
     let base = RenderOptions {
@@ -532,7 +532,7 @@ fn asynchronous_errors_arrive_one_frame_later_and_dropping_cancels() {
         Err(RenderError::Option { field: "width", .. })
     ));
     assert_eq!(a.wait().unwrap().unwrap().frame.width, 8);
-    // Hours of work: dropping must not wait for it.
+    // The work would take hours, so dropping must not wait for it.
     a.submit(s, c, RenderOptions { samples: 1 << 24, ..RenderOptions::new(64, 64) }).unwrap();
     let start = std::time::Instant::now();
     drop(a);

@@ -1,5 +1,5 @@
-//! What cannot be drawn is refused, and what changes nothing is said, by name, with the value and a
-//! cure.
+//! Invalid scenes and options are refused, and settings without effect cause a warning. Messages
+//! name the item, the value and a cure.
 
 use rt_core::bvh::{BuildError, BuildOptions, Geometry, World};
 use rt_core::camera::Camera;
@@ -37,7 +37,7 @@ fn camera() -> Camera {
         .unwrap()
 }
 
-/// The scene is refused by name in the check and so in every frame.
+/// The check refuses the scene by name, and so does every frame.
 #[track_caller]
 fn refused(change: impl FnOnce(&mut Scene), what: &str, field: &str, value: &str) {
     let mut scene = plain();
@@ -102,9 +102,9 @@ fn an_up_that_is_not_of_unit_length_is_refused() {
     }
 }
 
-/// The axes around `up` are made from `up` itself, so nothing can be parallel to it: along every
-/// axis, and close to every axis, all directions have a finite radiance, the poles have the
-/// picture's ends, and turning around `up` sees every column.
+/// The axes around `up` are derived from `up` itself, so no choice of `up` is degenerate. Along
+/// every axis and close to every axis, all directions have a finite radiance, the poles have the
+/// colours of the panorama's top and bottom, and a turn around `up` passes every column.
 #[test]
 fn an_environment_may_stand_along_any_axis() {
     let picture = image(|i| [[0.25, 0.5, 1.0][i / 4], (i % 4) as f32, 0.0, 1.0]);
@@ -255,7 +255,7 @@ fn an_instruction_set_that_the_machine_lacks_is_refused_by_name() {
         assert!(words.contains(level.name()), "{words}");
         available.iter().for_each(|a| assert!(words.contains(a.name()), "{words}"));
     }
-    // No machine has both ARM's and x86's.
+    // No machine has both ARM's and x86's instruction sets.
     assert!(lacking > 0);
 }
 
@@ -268,7 +268,7 @@ fn a_size_that_a_light_cannot_have_is_refused() {
     assert_eq!(Light::ambient([1.0; 3]).with_size(0.5), Err(LightSizeError::Ambient));
     assert!(LightSizeError::Cone.to_string().contains("Ring"), "{}", LightSizeError::Cone);
     assert_eq!(Light::quad(place, [DVec3::ZERO; 2]).with_size(0.5), Err(LightSizeError::Quad));
-    // All others get the size that was asked for.
+    // All others get the requested size.
     let quad = Light::quad(place, [DVec3::X * 2.0, DVec3::Y * 0.5]);
     let ring = LightKind::Ring {
         position: place,
@@ -312,7 +312,7 @@ fn a_light_of_highlights_alone_casts_shadows() {
         b.mesh(square(1.0, 0.5), Material::unlit([0.0; 3]));
         b.light(light);
         let scene = b.build().unwrap();
-        // From the side, so that the floor under the plate is seen.
+        // Viewed from the side, so that the floor under the plate is visible.
         let eye = DVec3::new(0.0, -3.0, 0.6);
         let c = Camera::perspective(eye, DVec3::ZERO, DVec3::Z, 0.3, 1.0, [0.1, 20.0]).unwrap();
         let o = render(&scene, &c, &RenderOptions::new(33, 33)).unwrap();
@@ -323,7 +323,7 @@ fn a_light_of_highlights_alone_casts_shadows() {
     assert!(bright > 0.05, "the highlight is there without shadows: {bright}");
     assert_eq!((dark, none), (0.0, 0));
     assert!(blocked > 0);
-    // Without any light, nothing is sent.
+    // Without any light, no ray is sent.
     assert_eq!(draw(Light { highlight_color: Some([0.0; 3]), ..light }).1, 0);
 }
 
@@ -342,7 +342,7 @@ fn what_changes_no_pixel_is_said_by_name() {
     let mut scene = plain();
     scene.lights[0].attenuation = [0.0, 0.0, 1.0];
     warned(&scene, &options, &["light 0 is directional", "its attenuation changes nothing"]);
-    // Colours and scalars that the material does not look at.
+    // Colours and scalars that the material does not use.
     let mut scene = plain();
     let colors = Attribute::per_vertex(vec![[1.0; 4]; 4]);
     scene.appearances[0] =
@@ -354,7 +354,7 @@ fn what_changes_no_pixel_is_said_by_name() {
     scene.materials[0] =
         Material::matte([1.0; 3]).colored_by_scalars(ColorMap::new(vec![], [0.0, 1.0]));
     assert_eq!(warned(&scene, &options, &["instance 0 has colours of its own"]), 1);
-    // Pictures on a shape.
+    // Textures on a shape.
     let mut b = SceneBuilder::new();
     let balls = Spheres::new(vec![Vec3::ZERO], Radii::Common(0.3)).unwrap();
     b.shape(Arc::new(balls), Material::matte([1.0; 3]).textured(image(|_| [0.5; 4])));

@@ -69,7 +69,8 @@ fn closed_furnace_sums_the_geometric_series() {
 
 #[test]
 fn path_tracer_agrees_with_local_shading_on_direct_light() {
-    // A convex matte body under lamps, nothing to bounce to: the same picture from both.
+    // A convex matte body under lamps, with nothing to bounce to: both integrators give the same
+    // image.
     let s = scene(
         vec![(sphere(Vec3::ZERO, 1.0, 24), Material::matte([0.8, 0.5, 0.3]))],
         vec![
@@ -130,7 +131,8 @@ fn opacity_by_chance_has_the_mean_of_opacity_by_layers() {
 
 #[test]
 fn ambient_occlusion_equals_the_path_tracer_s_first_bounce() {
-    // A black-walled corner: what is not blocked sees the ambient light, in both integrators.
+    // A corner with black walls: the unblocked part of the hemisphere sees the ambient light, in
+    // both integrators.
     let wall = quad(Vec3::new(0.0, 0.0, 1.0), Vec3::Y * 50.0, Vec3::Z);
     let parts = || {
         vec![
@@ -185,8 +187,8 @@ fn russian_roulette_and_bounces_do_not_change_the_mean_of_glass() {
         RenderOptions { min_contribution: 0.0, max_bounces: Some(12), ..RenderOptions::new(8, 8) },
     );
     let traced = draw(&s, &c, path(8, 2048));
-    // Rows of reflections between the faces: T² a / (1 - R² a²) with R = 0.04, T = 0.96, a =
-    // e^-0.3; the rest is lost to the sky.
+    // Series of reflections between the faces: T² a / (1 - R² a²) with R = 0.04, T = 0.96, a =
+    // e^-0.3. The rest leaves to the sky.
     let a = (-0.3f64).exp();
     let expected = 0.96 * 0.96 * a / (1.0 - 0.0016 * a * a);
     assert!((mean_red(&whitted) - expected).abs() < 1e-4, "{} {expected}", mean_red(&whitted));
@@ -196,7 +198,7 @@ fn russian_roulette_and_bounces_do_not_change_the_mean_of_glass() {
 #[test]
 fn thin_lens_is_sharp_at_the_focus_distance_only() {
     // Edge of a half plane at distance d from a lens of radius r focused at f: its image is blurred
-    // over r |d - f| / f each side.
+    // over r |d - f| / f on each side.
     let (r, f) = (0.2, 4.0);
     let c = rt_core::camera::Camera::perspective(
         DVec3::new(0.0, 0.0, 4.0),
@@ -228,7 +230,7 @@ fn thin_lens_is_sharp_at_the_focus_distance_only() {
             (partial - expected).abs() <= 2.0,
             "z = {z}: {partial} pixels instead of {expected}: {row:?}"
         );
-        // A pinhole has none.
+        // A pinhole camera has no blur.
         let sharp = RenderOptions { effects: Some(Effects::NONE), ..RenderOptions::new(64, 64) };
         let o = draw(&s, &c, sharp);
         assert!(o.frame.color.iter().all(|p| p[3] == 0.0 || p[3] == 1.0));

@@ -1,4 +1,5 @@
-//! Shapes through the world's acceleration structure must give what trying every primitive gives.
+//! Shapes in the world's acceleration structure must give the same result as trying every
+//! primitive.
 
 mod shapes_common;
 
@@ -34,7 +35,7 @@ fn hits_through_the_world_are_those_of_trying_every_primitive() {
     for (s, shape) in shapes.iter().enumerate() {
         for quality in BuildQuality::ALL {
             let world = world_of(shape.clone(), quality);
-            // The object's origin against the world's.
+            // The difference between the object's origin and the world's.
             let shift = (world.origin() - shape.origin()).as_vec3();
             let mut hits = 0;
             for k in 0..3000 {

@@ -52,7 +52,7 @@ fn value(g: &Grid, p: DVec3) -> f64 {
         .sum()
 }
 
-/// All crossings, by starting again behind each.
+/// All crossings, found by starting again behind each.
 fn crossings(s: &Isosurface, ray: &Ray) -> Vec<f32> {
     let (mut r, mut all) = (*ray, Vec::new());
     while let Some((_, h)) = closest(s, &r) {
@@ -103,7 +103,7 @@ fn no_ray_leaves_a_closed_surface_unseen() {
             Some((prim, h)) => {
                 let p = s.surface(prim, &h, &ray);
                 assert!((value(&g, p.point.as_dvec3()) - 5.3).abs() < 5e-6);
-                // The surface of a coarse ball is not round, but nearly.
+                // The surface of a coarse ball is only nearly round.
                 assert!(
                     p.normal.dot((middle - p.point).normalize()) > 0.95,
                     "normals point to smaller values"
@@ -116,7 +116,7 @@ fn no_ray_leaves_a_closed_surface_unseen() {
 
 #[test]
 fn parity_of_crossings_in_noise() {
-    // Every cell of white noise has a surface, with saddles and tunnels: the number of crossings
+    // Every cell of white noise has a surface, with saddles and tunnels. The number of crossings
     // from an outside point must be even when the other end is outside too, and odd when it is
     // inside.
     let n = 9;
@@ -144,8 +144,8 @@ fn parity_of_crossings_in_noise() {
             if at_end.abs() < 1e-5 {
                 continue; // f32 `at` may be on the other side
             }
-            // Pairs nearer than one ulp of t come out as one; they have to be rare, and here they
-            // must not occur.
+            // Pairs closer than one ulp of t are found as one. They have to be rare, and must not
+            // occur here.
             let odd = all.len() % 2 == 1;
             assert_eq!(odd, at_end < 0.0, "bricks {bricks} ray {k} {ray:?}: {all:?}");
             total += all.len();
@@ -210,8 +210,8 @@ fn agrees_with_a_fine_scan_at_all_scales() {
             match (hit, found) {
                 (Some((_, hit)), Some(t)) => {
                     let error = (f64::from(hit.t) - t).abs();
-                    // A tangential pair may lie between two steps of the scan: then the hit is
-                    // earlier and on the surface.
+                    // A tangential pair may lie between two steps of the scan. Then the hit is
+                    // earlier, and it is on the surface.
                     let on = f(f64::from(hit.t)).abs() < 1e-5 && f64::from(hit.t) < t;
                     assert!(error < 1e-7 * t + 1e-6 * step || on, "{spacing} {k}: {} {t}", hit.t);
                     hits += 1;
@@ -266,7 +266,7 @@ fn t_min_is_inclusive_and_t_max_exclusive() {
     assert_eq!(at(0.0, 4.0), None);
     assert_eq!(at(4f32.next_up(), 9.0), None);
     assert_eq!(at(3.9, 4f32.next_up()), Some(4.0));
-    // The same when the ray starts on the surface, going either way.
+    // The same when the ray starts on the surface, in either direction.
     for dir in [Vec3::X, -Vec3::X] {
         let on = Ray::new(Vec3::new(2.5, 1.2, 3.4), dir);
         assert_eq!(closest(&s, &on).map(|(_, h)| h.t), Some(0.0));
@@ -329,7 +329,7 @@ fn nan_and_infinite_values_empty_their_cells_and_are_counted() {
 
 #[test]
 fn secondary_rays_from_the_surface_do_not_hit_it_again() {
-    // On a plane every outward ray is free: any hit is false.
+    // On a plane every outward ray is free, so any hit is false.
     for (spacing, camera) in [(1.0f32, 5.0f32), (1e-4, 1e3), (1e4, 1e3)] {
         let g = grid(8, DVec3::splat(spacing.into()), |p| 0.8 * p.x + 0.3 * p.y + 0.52 * p.z);
         let s = surface_of(&g, &[6.1], 4);

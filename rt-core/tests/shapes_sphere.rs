@@ -11,8 +11,8 @@ fn one(center: Vec3, radius: f32) -> Spheres {
     Spheres::new(vec![center], Radii::Common(radius)).unwrap()
 }
 
-/// (relative error of t against the distance travelled, distance of the surface point from the
-/// sphere) of an aimed ray.
+/// Errors of an aimed ray: the relative error of t against the distance travelled, and the distance
+/// of the surface point from the sphere.
 fn error_of(center: Vec3, r: f32, origin: Vec3, dir: Vec3) -> Option<(f64, f64)> {
     let s = one(center, r);
     let ray = Ray::new(origin, dir);
@@ -128,7 +128,7 @@ fn secondary_rays_from_the_surface_do_not_hit_it_again() {
             let Some(hit) = s.closest(0, &ray) else { continue };
             let surf = s.surface(0, &hit, &ray);
             let out = surf.normal + 0.999 * rng.unit_vector();
-            // Twice: once for the point's error, once for the rounding of the sum.
+            // Twice the bound: once for the point's error, once for the rounding of the sum.
             let start = surf.point + surf.normal * (2.0 * surf.point_error);
             if out.normalize().dot(surf.normal) > 1e-3 {
                 assert!(

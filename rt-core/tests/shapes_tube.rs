@@ -1,5 +1,5 @@
-//! Tubes and cylinders against a slow reference that knows no quadratic: the union of all spheres
-//! along the axis.
+//! Tubes and cylinders against a slow reference without quadratics: the union of all spheres along
+//! the axis.
 
 mod shapes_common;
 
@@ -21,8 +21,8 @@ fn distance(p: DVec3, a: DVec3, b: DVec3, ra: f64, rb: f64) -> f64 {
 }
 
 /// Entry and exit by search along the ray in [t0, t1] (the distance to a convex body is convex
-/// along a line); `None` also when the ray comes nearer than `graze` to touching, where the
-/// reference cannot decide.
+/// along a line). `None` also when the ray passes within `graze` of touching, where the reference
+/// cannot decide.
 enum Reference {
     Miss,
     Grazing,
@@ -66,7 +66,7 @@ fn rounded_cones_agree_with_the_union_of_spheres() {
         let offset = scale * [0.0f32, 1.0, 100.0][case % 3] * rng.unit_vector();
         let a = offset + scale * rng.cube();
         let b = offset + scale * rng.cube();
-        // Slender, fat, one inside the other, and pointed.
+        // Slender, thick, one sphere inside the other, and pointed.
         let (ra, rb) = match case % 7 {
             0 => (0.05, 0.05),
             1 => (0.3, 0.1),
@@ -98,8 +98,8 @@ fn rounded_cones_agree_with_the_union_of_spheres() {
                 let expected = if near >= 0.0 { near } else { far };
                 let Some(hit) = hit else { panic!("case {case}: missed {near}..{far}") };
                 let error = (f64::from(hit.t) - expected).abs();
-                // The search is good to the square root of f64's resolution at its bend; at grazing
-                // exits the depth decides.
+                // The search is accurate to the square root of f64's resolution at its minimum. At
+                // grazing exits the depth decides.
                 assert!(
                     error <= 1e-6 * expected.abs() + 1e-7 * size / d.length(),
                     "case {case}: {} {expected}",
@@ -213,8 +213,8 @@ fn t_min_is_inclusive_and_t_max_exclusive() {
     assert_eq!(at(9f32.next_up(), 11.0), None);
 }
 
-/// A random walk with bends of every sharpness, varying radii, a repeated point and a swallowed
-/// one.
+/// A random walk with bends of every sharpness, varying radii, a repeated point and a point whose
+/// sphere lies inside its neighbour's.
 fn walk(rng: &mut Random, points: usize, step: f32) -> (Vec<Vec3>, Vec<f32>) {
     let (mut p, mut heading) = (Vec3::ZERO, rng.unit_vector());
     let (mut ps, mut rs) = (vec![p], vec![0.3]);
@@ -257,7 +257,7 @@ fn joints_have_no_gap_and_the_nearest_surface_is_the_union() {
             let ray = Ray::new(target + 8.0 * rng.unit_vector(), Vec3::ZERO);
             let ray = Ray { dir: target - ray.origin, ..ray };
             let (_, hit) = closest(&tubes, &ray).expect("aimed inside a joint's sphere");
-            // Nothing of the union lies before the hit, and the hit is on it.
+            // Nothing of the union is nearer than the hit, and the hit is on it.
             let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
             let at = union(o + d * f64::from(hit.t));
             assert!(at.abs() < 3e-6, "{at}");
@@ -285,7 +285,7 @@ fn a_transparent_polyline_shows_one_entry_and_one_exit_per_passage() {
             let origin = target + 8.0 * rng.unit_vector();
             let ray = Ray::new(origin, target - origin);
             let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-            // Merge the segments' intervals: what the union's boundary crossings must be.
+            // Merge the segments' intervals to get the boundary crossings of the union.
             let mut spans: Vec<(f64, f64)> = Vec::new();
             let mut unclear = false;
             for j in 0..ps.len() - 1 {
@@ -312,8 +312,8 @@ fn a_transparent_polyline_shows_one_entry_and_one_exit_per_passage() {
                     _ => merged.push(s),
                 }
             }
-            // Passages within 1e-4 of merging, or between far segments of a walk that crosses
-            // itself, are not the subject.
+            // Gaps within 1e-4 of merging, or between distant segments of a walk that crosses
+            // itself, are not tested here.
             unclear |= merged.windows(2).any(|w| w[1].0 - w[0].1 < 1e-4);
             let crosses_itself = (0..ps.len() - 1).any(|j| {
                 (j + 2..ps.len() - 1)
@@ -436,7 +436,7 @@ fn cylinders_side_caps_and_open_ends() {
         (s.point - Vec3::new(1.0, 0.0, 1.0)).length() < 1e-6
             && (s.normal - Vec3::X).length() < 1e-6
     );
-    // Exactly at the mantle's edge and at the axis-parallel mantle line.
+    // Exactly at the edge of the lateral surface, and on its line parallel to the axis.
     assert_eq!(t(&capped, ray([-5.0, 0.0, 4.0], [1.0, 0.0, 0.0])), Some(4.0));
     assert!(t(&capped, ray([1.0, 0.0, -1.0], [0.0, 0.0, 1.0])).is_some());
 }

@@ -59,7 +59,7 @@ fn worst(a: [f32; 4], b: [f64; 4]) -> f64 {
     (0..4).map(|c| (f64::from(a[c]) - b[c]).abs()).fold(0.0, f64::max)
 }
 
-/// Fields: smooth, and noise whose every cell turns round.
+/// Fields: a smooth one, and noise whose gradient reverses in every cell.
 fn fields() -> [Grid; 2] {
     let mut rng = Random::new(1);
     let noise: Vec<f32> = (0..12 * 12 * 12).map(|_| rng.range(-1.0, 1.0)).collect();
@@ -84,7 +84,7 @@ fn rays(rng: &mut Random, n: usize) -> Vec<Ray> {
         let origin = 5.5 + [20.0, 3.0][k % 2] * rng.unit_vector();
         all.push(Ray::new(origin, (target - origin) * [1.0, 0.01, 50.0][k % 3]));
     }
-    // In grid planes, along grid lines and diagonals, with both zeros.
+    // In grid planes, along grid lines and diagonals, with both signs of zero.
     for z in [0.0f32, -0.0] {
         all.push(Ray::new(Vec3::new(-3.0, 4.0, 7.0), Vec3::new(1.0, z, -z)));
         all.push(Ray::new(Vec3::new(14.0, 0.0, 11.0), Vec3::new(-0.5, z, z)));
@@ -218,10 +218,10 @@ fn pieces_compose_to_the_whole_with_surfaces_between() {
                 "{both:?} {:?}",
                 whole.rgba
             );
-            // The ray's own range counts, too.
+            // The ray's own range applies, too.
             let limited = v.integrate(&ray.with_t_max(cut), 0.0, INF, &q);
             assert_eq!(limited, a);
-            // Same call, same bits.
+            // The same call gives the same bits.
             assert_eq!(v.integrate(&ray, 0.0, cut, &q), a);
         }
     }
@@ -299,7 +299,7 @@ fn rays_that_miss_or_make_no_sense_are_clear() {
         // A NaN limit is no limit: the ray's own range remains.
         if t0.is_nan() { assert!(s.rgba[3] > 0.9) } else { assert_eq!(s, VolumeSample::CLEAR) }
     }
-    // A tolerance of zero or NaN is the tightest there is, not an endless loop.
+    // A tolerance of zero or NaN means the tightest one, not an endless loop.
     for levels in [0.0, -1.0, f32::NAN] {
         assert!(
             (v.integrate(&ray, 0.0, INF, &tolerance(levels)).rgba[3] - 0.981_684_4).abs() < 1e-6
@@ -313,7 +313,7 @@ fn overlapping_media_add_their_extinction() {
     let make = |color, sigma| volume(grid(9, 1.0, |_| 0.5), single(color), &[[0.0, sigma]]);
     let (red, blue) = (make([1.0, 0.0, 0.0], 0.1), make([0.0, 0.0, 1.0], 0.3));
     let ray = Ray::new(Vec3::new(-4.0, 4.0, 4.0), Vec3::X);
-    // Same place: a mixture in proportion 1 : 3.
+    // At the same position: a mixture in proportion 1 : 3.
     let s = integrate_overlapping(&[(&red, ray), (&blue, ray)], 0.0, INF, &q);
     let alpha = 1.0 - (-0.4f64 * 8.0).exp();
     assert!(worst(s.rgba, [0.25 * alpha, 0.0, 0.75 * alpha, alpha]) < 0.5 / 255.0, "{:?}", s.rgba);
@@ -321,14 +321,14 @@ fn overlapping_media_add_their_extinction() {
     // The order does not matter.
     let t = integrate_overlapping(&[(&blue, ray), (&red, ray)], 0.0, INF, &q);
     assert!(worst(s.rgba, t.rgba.map(f64::from)) < 1e-6);
-    // Half overlapping, blue shifted by 4: three stretches.
+    // Half overlapping, blue shifted by 4: three segments.
     let shifted = Ray::new(ray.origin - Vec3::X * 4.0, ray.dir);
     let s = integrate_overlapping(&[(&red, ray), (&blue, shifted)], 0.0, INF, &q);
     let (a, b, c) = (1.0 - (-0.4f64).exp(), 1.0 - (-1.6f64).exp(), 1.0 - (-1.2f64).exp());
     let (ta, tb) = (1.0 - a, (1.0 - a) * (1.0 - b));
     let exact = [a + ta * b * 0.25, 0.0, ta * b * 0.75 + tb * c, 1.0 - tb * (1.0 - c)];
     assert!(worst(s.rgba, exact) < 0.5 / 255.0, "{:?} {exact:?}", s.rgba);
-    // Apart: composited one over the other.
+    // Disjoint: composited one over the other.
     let far = Ray::new(ray.origin - Vec3::X * 20.0, ray.dir);
     let s = integrate_overlapping(&[(&blue, far), (&red, ray)], 0.0, INF, &q);
     let exact = over(&red.integrate(&ray, 0.0, INF, &q), &blue.integrate(&far, 0.0, INF, &q));

@@ -1,5 +1,5 @@
-//! Volumes that are no medium, and media that depend on gradients, against sums over many small
-//! steps.
+//! Blend modes that are not a medium, and media that depend on gradients, against sums over many
+//! small steps.
 
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3, Vec3};
@@ -48,7 +48,7 @@ fn rays() -> Vec<Ray> {
         .collect()
 }
 
-/// The scalars along a ray at many places inside, and the distance between them.
+/// The scalars at many points along a ray, and the distance between them.
 fn scalars(v: &Volume, ray: &Ray) -> (Vec<f32>, f64) {
     let size = v.bounds().max;
     let step = 1e-3f32;
@@ -188,7 +188,7 @@ fn lights_of_several_colors_add_up() {
     let ray = Ray::new(Vec3::new(3.0, -1.0, 4.0), Vec3::Y);
     let found = v.integrate(&ray, 0.0, f32::INFINITY, &QUALITY);
     let a = 1.0 - (-0.2f64 * 14.0).exp();
-    // The light at the viewer shines along the ray, at right angles to the gradient.
+    // The light at the viewer points along the ray, at right angles to the gradient.
     let factor = [0.1 + 0.8 * 0.5, 0.1 + 0.8 * 0.4 * 0.5f64.sqrt(), 0.1];
     close(found, [a * factor[0], a * factor[1], a * factor[2], a], 1e-4, "three lights");
 }

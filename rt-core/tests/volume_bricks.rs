@@ -1,5 +1,4 @@
-//! Rays carried from brick to brick of a volume collect what they collect in the whole, bit for
-//! bit.
+//! Rays carried from brick to brick of a volume accumulate the same bits as in the whole volume.
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3, Vec3};
 use rt_core::grid::Grid;
@@ -13,7 +12,7 @@ use rt_core::volume::{
 const DIMS: UVec3 = UVec3::new(41, 37, 29);
 const SPACING: DVec3 = DVec3::new(0.1, 0.1, 0.06);
 
-/// Waves, clear in one corner, with a point missing.
+/// Waves that are transparent in one corner, with one point missing.
 fn volume(options: VolumeOptions) -> Volume {
     let value = |k: u32| {
         let (x, y, z) = (k % DIMS.x, k / DIMS.x % DIMS.y, k / DIMS.x / DIMS.y);
@@ -91,7 +90,7 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
                     let ray = ray(n, &mut random);
                     let t1 = if n.is_multiple_of(3) { 0.8 } else { f32::INFINITY };
                     let expected = whole.integrate(&ray, 0.0, t1, &quality);
-                    // Which brick holds which spans.
+                    // Assigns spans to bricks.
                     let mut order: Vec<(usize, usize)> = Vec::new();
                     RaySegments::new(vec![(&whole, ray)], 0.0, t1).spans(|k, here| {
                         let brick = bricks.iter().position(|b| b.contains(here[0].1)).unwrap();
@@ -103,7 +102,7 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
                     let mut carried = PartialIntegral::default();
                     for (k, (brick, first)) in order.iter().enumerate() {
                         let end = order.get(k + 1).map_or(usize::MAX, |next| next.1);
-                        // As it would come out of a message.
+                        // As decoded from a message.
                         let m = PartialIntegral::from_words(&carried.to_words());
                         let segments = RaySegments::new(vec![(&parts[*brick], ray)], 0.0, t1);
                         carried = segments.integrate_spans(*first..end, &quality, m);

@@ -1,5 +1,5 @@
-//! Frames whose rays are answered by several holders of parts of the scene have the bits of frames
-//! in one piece.
+//! Frames whose rays are traced by several data servers, each with a part of the scene, have the
+//! same bits as frames of the whole scene.
 
 use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
@@ -186,7 +186,7 @@ fn cases() -> Vec<Case> {
     out
 }
 
-/// Deals primitives to `parts` at random; with more parts than primitives some are empty.
+/// Distributes primitives to `parts` at random. With more parts than primitives, some are empty.
 fn deal(scene: &Scene, parts: usize, seed: u32) -> Vec<Vec<Vec<u32>>> {
     use rt_core::bvh::Geometry;
     let mut out = vec![vec![vec![]; scene.world.geometries().len()]; parts];
@@ -214,7 +214,7 @@ impl Holder<'_> {
     fn in_whole(&self, scene: &Scene, mut met: ShadingHit) -> ShadingHit {
         let geometry = scene.world.instances()[met.instance as usize].geometry;
         met.primitive = self.kept[geometry][met.primitive as usize];
-        // What travels is words.
+        // Hits travel as words.
         ShadingHit::from_words(&met.to_words())
     }
 }
@@ -227,7 +227,7 @@ fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
     }
 }
 
-/// What light rays meet: no holder is asked where something opaque is.
+/// Hits of light rays. A blocked ray gets its opaque hit, and no data server is asked for more.
 fn light_hits(
     holders: &[Holder<'_>],
     scene: &Scene,
@@ -238,7 +238,7 @@ fn light_hits(
     for h in holders {
         h.frame.light_hits(rays, &mut met);
         for (b, m) in best.iter_mut().zip(&met) {
-            // What is blocked has no primitive.
+            // A blocked ray has no primitive.
             let in_whole = |m: ShadingHit| {
                 if m.is_blocked() {
                     ShadingHit::from_words(&m.to_words())
@@ -324,7 +324,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pas
         }
         return;
     }
-    // ---- Waves.
+    // ---- Wavefronts.
     tile.process_hits(owner, &best).unwrap();
     loop {
         if owner.light_passes_surfaces() {
@@ -402,8 +402,8 @@ fn frames_answered_by_parts_have_the_bits_of_frames_in_one_piece() {
 
 #[test]
 fn a_part_alone_without_the_choices_of_the_whole_would_be_noticed() {
-    // Built as a world of its own, a part far from the origin gets another local space: hits differ
-    // in their last bits.
+    // When a part far from the origin is built as a world of its own, it gets another local space,
+    // and its hits differ in their last bits.
     let mesh = plate(DVec3::ZERO, 24);
     let moved = TriMesh {
         positions: mesh.positions.iter().map(|p| *p + Vec3::new(900.0, 10.0, -3.0)).collect(),
