@@ -227,7 +227,8 @@ fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
     }
 }
 
-/// Hits of light rays. A blocked ray gets its opaque hit, and no data server is asked for more.
+/// Merges the hits of light rays from all data servers. A ray that one of them reports as blocked is
+/// blocked.
 fn light_hits(
     holders: &[Holder<'_>],
     scene: &Scene,
