@@ -21,8 +21,8 @@ pub enum MeshColors {
 /// Values a task works on.
 const CHUNK: usize = 1 << 14;
 
-/// VTK's colours are the numbers that end up in the picture: they are not decoded, and the picture
-/// is not encoded.
+/// VTK's colours are the numbers of the final image: neither the colours are decoded nor the image
+/// encoded.
 fn float(c: [u8; 4]) -> [f32; 4] {
     c.map(|v| f32::from(v) / 255.0)
 }

@@ -45,7 +45,7 @@ struct ProjectedTriangle {
     winding: f64,
 }
 
-/// A pixel of an edge beside the surface.
+/// A pixel of an edge that lies outside the surface's pixels.
 struct Fragment {
     pixel: u32,
     depth: f32,
@@ -105,7 +105,8 @@ impl Edges {
         (0.5 + 0.5 * self.width_px - of_edges).clamp(0.0, 1.0) as f32
     }
 
-    /// Pixels of the edges of triangle `primitive` that lie beside it, in front of `depth`.
+    /// Pixels of the edges of triangle `primitive` that lie outside the triangle and in front of
+    /// `depth`.
     fn outline_fragments(
         &self,
         primitive: usize,

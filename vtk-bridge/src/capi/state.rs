@@ -35,7 +35,7 @@ static PROGRAM_OPTIONS: Mutex<OptionValues> = Mutex::new(BTreeMap::new());
 /// The options of the process, for those who ask without a bridge.
 static PROCESS_OPTIONS: Mutex<EffectiveOptions> = Mutex::new(EffectiveOptions::NONE);
 
-/// VTK's version, as told by [`set_host`]: major in the upper half; 0 when nobody has said.
+/// VTK's version, as set by [`set_host`]: major in the upper half; 0 when it was not set.
 static HOST: AtomicU64 = AtomicU64::new(0);
 
 pub(super) fn set_host(major: u32, minor: u32) {

@@ -1,10 +1,10 @@
-//! What `scripts/capture.py` wrote of one window: picture, window depth, facts, and the bridge's
-//! report where there was one.
+//! Output of `scripts/capture.py` for one window: image, window depth, facts, and the bridge's
+//! report if there was one.
 
 use serde_json::Value;
 use std::path::Path;
 
-/// A picture with its depths, rows from the bottom, as OpenGL has them.
+/// An image with its depths. Rows start at the bottom, as in OpenGL.
 #[derive(Debug, Clone)]
 pub(crate) struct Capture {
     /// Pixels in a row.
@@ -13,7 +13,7 @@ pub(crate) struct Capture {
     pub(crate) height: usize,
     /// 0 to 255.
     pub(crate) rgb: Vec<[u8; 3]>,
-    /// Window depth, 0 to 1; empty where only a picture was kept.
+    /// Window depth, 0 to 1; empty where only the colours were kept.
     pub(crate) depth: Vec<f32>,
     /// Picks, selections, counts.
     pub(crate) facts: Value,
@@ -22,7 +22,7 @@ pub(crate) struct Capture {
 }
 
 impl Capture {
-    /// Reads `NAME.png` and what lies beside it.
+    /// Reads `NAME.png` and the files that belong to it in the same folder.
     pub(crate) fn read(folder: &Path, name: &str) -> Result<Capture, String> {
         let file = |extension: &str| folder.join(format!("{name}.{extension}"));
         let picture = image::open(file("png"))
@@ -66,8 +66,8 @@ impl Capture {
         lists.flatten().filter_map(|w| w.as_str().map(str::to_owned)).collect()
     }
 
-    /// Mean colour, 0 to 255, of the rectangle `[left, bottom, right, top]` given in parts of the
-    /// picture.
+    /// Mean colour, 0 to 255, of the rectangle `[left, bottom, right, top]`, in fractions of the
+    /// image.
     pub(crate) fn color(&self, part: [f64; 4]) -> [f64; 3] {
         let x = |f: f64| ((f * self.width as f64) as usize).min(self.width);
         let y = |f: f64| ((f * self.height as f64) as usize).min(self.height);

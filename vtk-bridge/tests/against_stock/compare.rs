@@ -87,8 +87,8 @@ impl fmt::Display for Measured {
 /// is an edge. About one part in a thousand of the depth range per pixel and pixel.
 const BEND: f32 = 1e-3;
 
-/// True where the 3 by 3 pixels around lie on one surface in both pictures, or show background in
-/// both.
+/// Marks pixels whose 3 by 3 neighbourhood lies on one surface in both images, or shows background
+/// in both.
 fn away_from_edges(a: &Capture, b: &Capture) -> Vec<bool> {
     let (w, h) = (a.width, a.height);
     let mut inner = vec![false; w * h];

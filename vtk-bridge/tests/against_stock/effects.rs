@@ -1,4 +1,4 @@
-//! Every effect, switched on by its variable, changes the picture where and how geometry says.
+//! Every effect, enabled by its variable, changes the image where and how geometry predicts.
 
 use crate::capture::{Capture, bright};
 use crate::peers::skip;
@@ -9,7 +9,7 @@ use std::sync::{Mutex, OnceLock};
 /// Room and ball, or why there are none.
 type Pictures = Result<[Capture; 2], String>;
 
-/// The pictures of `scripts/effects` with some variables set; each combination is drawn once.
+/// The images of `scripts/effects` with some variables set. Each combination is rendered once.
 fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option<[Capture; 2]> {
     static MADE: OnceLock<Mutex<BTreeMap<&str, Pictures>>> = OnceLock::new();
     let made = MADE.get_or_init(Mutex::default);

@@ -6,7 +6,7 @@ use crate::compare::{Bars, faults};
 use crate::peers::{find, scripts, skip};
 use crate::session::{Launch, Program, With, installed, output};
 
-/// Runs the script in ParaView's window and gives its pictures back, or says why it cannot be run
+/// Runs the script in ParaView's window and returns its images, or the reason why it cannot run
 /// here.
 fn pictures() -> Result<[Capture; 4], String> {
     let paraview = find("RTSV_PARAVIEW", &["/usr/bin/paraview"])

@@ -14,7 +14,7 @@ fn plugin_folder() -> PathBuf {
     installed().join("plugins/pv5.11")
 }
 
-/// The script's pictures, drawn once.
+/// The script's images, rendered once.
 fn pictures() -> Option<&'static Run> {
     static RUN: OnceLock<Result<Run, String>> = OnceLock::new();
     let run = RUN.get_or_init(|| {

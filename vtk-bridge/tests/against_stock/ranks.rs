@@ -1,4 +1,4 @@
-//! `mpiexec -n N pvbatch`, composited by ParaView's IceT: the picture must not depend on N.
+//! `mpiexec -n N pvbatch`, composited by ParaView's IceT: the image must not depend on N.
 
 use crate::capture::Capture;
 use crate::peers::{mpirun, scripts, skip};
@@ -34,8 +34,9 @@ fn run(
     Ok((folder, launch.output()))
 }
 
-/// Pixels that are not within `levels` of 255 of any pixel of the other picture that touches their
-/// place. So edges may lie one pixel beside, and nothing else may differ.
+/// Number of pixels that differ by more than `levels` of 255 from the pixel at their position in
+/// the other image and from all its neighbours. So edges may be one pixel off, and nothing else may
+/// differ.
 fn strangers(a: &Capture, b: &Capture, levels: u8) -> usize {
     let (w, h) = (a.width, a.height);
     assert_eq!((w, h), (b.width, b.height));

@@ -1,13 +1,13 @@
-//! All pictures of a script, with us against without us.
+//! Compares all images of a script rendered with and without the bridge.
 
 use crate::compare::{Bars, faults};
 use crate::session::Run;
 
-/// A picture (script, name) that is held to other bars than the rest, or to none, and why.
+/// An image (script, name) with other limits than the rest, or none, and the reason.
 pub(crate) type Exception = (&'static str, &'static str, Option<Bars>, &'static str);
 
-/// What is wrong with our pictures of `script`, a line each. In those of `untraced` there is
-/// nothing to trace.
+/// Differences in our images of `script`, one line each. The images of `untraced` have nothing to
+/// trace.
 pub(crate) fn differences(
     stock: &Run,
     ours: &Run,

@@ -236,7 +236,7 @@ impl Run {
         Ok(run)
     }
 
-    /// Names of all pictures of a script, sorted.
+    /// Names of all images of a script, sorted.
     pub(crate) fn pictures(&self, script: &str) -> Result<Vec<String>, String> {
         if let Some(how) = self.failed.get(script) {
             return Err(format!("{script}: {how}"));
@@ -255,12 +255,12 @@ impl Run {
         }
     }
 
-    /// One picture of a script.
+    /// One image of a script.
     pub(crate) fn capture(&self, script: &str, picture: &str) -> Result<Capture, String> {
         Capture::read(&self.folder.join(script), picture)
     }
 
-    /// Where a picture lies.
+    /// The path of an image.
     pub(crate) fn path(&self, script: &str, picture: &str) -> PathBuf {
         self.folder.join(script).join(format!("{picture}.png"))
     }
@@ -278,7 +278,7 @@ pub(crate) fn scripts_in(folder: &str) -> Vec<PathBuf> {
     scripts
 }
 
-/// A folder for the pictures of a run; kept after the tests, for people to look at.
+/// A folder for the images of a run. It is kept after the tests for inspection.
 pub(crate) fn output(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures").join(name)
 }

@@ -219,8 +219,8 @@ fn one_bad_point_costs_only_its_own_triangles() {
     assert!(told.iter().any(|w| w.contains("not a number")), "{told:?}");
 }
 
-/// OpenGL's own pictures differ in the last digit between sizes; ours must be the same scene
-/// everywhere.
+/// OpenGL's own images differ in the last digit between sizes. Ours must show the same scene at
+/// every size.
 #[test]
 fn size_and_place_do_not_change_our_picture() {
     let Some(both) = both() else { return };
@@ -235,7 +235,7 @@ fn size_and_place_do_not_change_our_picture() {
     }
 }
 
-/// What stock VTK is not held to and we are: its two pictures are 16 levels apart.
+/// A requirement on our images only: the two images of stock VTK differ by 16 levels.
 #[test]
 fn turning_a_volume_or_camera_and_light_is_the_same() {
     let Some(both) = both() else { return };

@@ -33,7 +33,7 @@ fn run(with: With, folder: &str, names: &[String], settings: &[(&str, &str)]) ->
     Run::new(Program::Wheel, with, &scripts, folder, settings).map_err(|reason| skip(&reason)).ok()
 }
 
-/// Compares all pictures of all scripts of a folder; gives the runs back.
+/// Compares all images of all scripts of a folder and returns the runs.
 fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
     let scripts = names(folder);
     let (stock, ours) =

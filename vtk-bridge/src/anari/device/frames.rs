@@ -169,8 +169,8 @@ impl Device {
         }
     }
 
-    /// Pixels of a channel, with their type and the size of the picture; valid until the channel is
-    /// unmapped.
+    /// Pixels of a channel, with their type and the size of the image. They are valid until the
+    /// channel is unmapped.
     pub fn map_frame(
         &self,
         handle: Handle,

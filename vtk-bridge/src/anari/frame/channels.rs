@@ -66,7 +66,7 @@ pub(super) fn over(
         .collect()
 }
 
-/// Colour pixels with `N` components of an already upright picture.
+/// Colour pixels with `N` components of an image that is already upright.
 pub(super) fn color<const N: usize>(
     pixels: impl Iterator<Item = [f32; 4]>,
     data_type: DataType,

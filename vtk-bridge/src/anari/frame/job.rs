@@ -65,8 +65,8 @@ impl Job {
         self.cancel.store(true, Ordering::Relaxed);
     }
 
-    /// Waits for the picture. Called from the drawing itself, as a completion callback may do, it
-    /// does not wait.
+    /// Waits for the image. Returns without waiting when called from the rendering thread itself,
+    /// as a completion callback may do.
     pub(crate) fn wait(&self) -> Arc<FrameImage> {
         let mut picture = lock(&self.picture);
         loop {
@@ -185,8 +185,8 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
     } else {
         Background::Transparent
     };
-    // Ambient light comes from everywhere, so mirrors see it; next to a picture of the sky it only
-    // adds to what is diffuse.
+    // Ambient light comes from everywhere, so mirrors reflect it. Together with an image of the sky
+    // it only adds to diffuse reflection.
     match view.ambient {
         Some(color) if compiled.environment.is_none() => {
             scene.environment = Some(Environment::Constant(color))

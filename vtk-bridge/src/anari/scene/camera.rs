@@ -38,7 +38,7 @@ pub(crate) fn camera_of(
         let nearest = near.unwrap_or_else(|| 1e-9 * far.unwrap_or(reach.max(1e-20)));
         Camera::perspective(eye, target, up, fovy, aspect, [nearest, far.unwrap_or(f64::INFINITY)])?
     };
-    // The part of the picture plane between the region's corners becomes the whole.
+    // The part of the image plane between the region's corners becomes the whole image.
     let crop = if [x0, y0, x1, y1] == [0.0, 0.0, 1.0, 1.0] {
         whole
     } else {

@@ -182,8 +182,8 @@ fn quad(
     Some(CompiledLight::Light(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 
-/// The picture turned so that the renderer, which knows only which way is up, has its middle in the
-/// right direction.
+/// The environment's image, rotated so that its middle is in the right direction. The renderer
+/// itself only has an upward direction.
 fn environment(
     light: &Object,
     color: [f64; 3],
@@ -213,8 +213,8 @@ fn environment(
         for i in 0..width {
             let angle = ((i as f64 + 0.5) / width as f64 - 0.5) * 2.0 * PI;
             let d = east * angle.cos() + north * angle.sin();
-            // Column of the program's picture: its middle is `direction`, and it goes to the right
-            // seen from inside.
+            // Column of the program's image. Its middle is `direction`, and columns go to the right
+            // when viewed from inside.
             let u = 0.5 + d.dot(right).atan2(d.dot(forward)) / (2.0 * PI);
             let x = u * width as f64 - 0.5;
             let (low, part) = (x.floor(), (x - x.floor()) as f32);

@@ -22,7 +22,7 @@ enum Step {
     Nothing,
     /// By the number of the primitive.
     Primitive { values: Arc<Vec<[f32; 4]>>, offset: u64 },
-    /// By a picture of one to three dimensions.
+    /// By an image of one to three dimensions.
     Image(Arc<Image>),
 }
 

@@ -189,7 +189,7 @@ impl Shape for TriangleShape {
         if corners.iter().any(|p| !p.is_finite()) {
             return Aabb::EMPTY;
         }
-        // One step outwards: a ray may meet a triangle that is flat in an axis with a rounding
+        // One step outwards: a ray may hit a triangle that is flat in an axis with a rounding
         // error.
         let b = Aabb::from_points(&corners);
         let (down, up) = (|v: f32| v.next_down(), |v: f32| v.next_up());
