@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes a file under a temporary name beside `path` and renames it, so that neither a crash nor a
-/// second process leaves or sees half a file. `write` gets a buffered writer.
+/// Writes a file under a temporary name in the directory of `path` and renames it, so that neither
+/// a crash nor a second process leaves or reads an incomplete file. `write` gets a buffered writer.
 pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,

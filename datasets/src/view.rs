@@ -9,11 +9,11 @@ pub struct View {
     pub name: String,
     /// World position of the camera.
     pub eye: DVec3,
-    /// World position at the middle of the picture.
+    /// World position at the centre of the image.
     pub target: DVec3,
-    /// Upward in the picture; not parallel to the viewing direction.
+    /// Upward direction in the image; not parallel to the viewing direction.
     pub up: DVec3,
-    /// Angle between the picture's lower and upper border, in degrees.
+    /// Angle between the image's lower and upper border, in degrees.
     pub vertical_fov_degrees: f64,
 }
 

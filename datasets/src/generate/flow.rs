@@ -55,8 +55,8 @@ pub mod names {
     pub const GAS_FRACTION: &str = "gas_fraction";
 }
 
-/// Which fields a generator computes. Large flows take gigabytes, and a schlieren picture in one
-/// gas needs the density only.
+/// The fields that a generator computes. Large flows take gigabytes, and a schlieren image in one
+/// gas needs only the density.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Fields {
     /// The first field only.

@@ -1,4 +1,4 @@
-//! Small closed shapes with known volumes, for tests, examples and first pictures.
+//! Small closed shapes with known volumes, for tests, examples and first renderings.
 
 use super::wavelet::Wavelet;
 use crate::isosurface::{self, Options};

@@ -4,7 +4,7 @@ use super::inside_bits::Block;
 use glam::{DVec3, Vec3};
 
 /// Gradient in value per world unit at point `p`: central where both neighbours are usable,
-/// one-sided at the border of the grid and beside missing values, 0 along an axis without usable
+/// one-sided at the border of the grid and next to missing values, 0 along an axis without usable
 /// neighbours. The block must hold the planes next to `p` that exist.
 pub(crate) fn at_point(block: &Block<'_>, p: [usize; 3], spacing: DVec3) -> Vec3 {
     let stride = [1, block.dims[0]];
@@ -36,7 +36,7 @@ pub(crate) fn at_point(block: &Block<'_>, p: [usize; 3], spacing: DVec3) -> Vec3
 }
 
 /// Unit normal at fraction `t` of the edge from `a` to `b`, away from the larger values. Where the
-/// gradient vanishes (or overflows), the edge itself points the way down.
+/// gradient vanishes (or overflows), the normal follows the edge towards the smaller value.
 pub(crate) fn normal_on_edge(
     block: &Block<'_>,
     a: [usize; 3],

@@ -39,8 +39,8 @@ impl PlaneSource for rt_core::grid::Grid {
 }
 
 /// Extracts one surface, holding about `batch_planes` planes of the field in memory (at least 4).
-/// `progress` is told how many planes are done and may stop the work by returning false: then the
-/// surface ends at that plane.
+/// `progress` gets the number of finished planes and may stop the extraction by returning false;
+/// the surface then ends at that plane.
 pub fn extract_streamed(
     source: &dyn PlaneSource,
     iso: f64,

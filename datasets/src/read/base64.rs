@@ -14,7 +14,7 @@ const TABLE: [u8; 256] = {
     table
 };
 
-/// Decodes quartets from a text until it is told to stop.
+/// Decodes quartets of a text on request.
 pub(crate) struct Decoder<'a> {
     text: &'a [u8],
     /// Position in the text, always between quartets.

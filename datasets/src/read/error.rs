@@ -176,8 +176,9 @@ pub(crate) fn io_error(path: &Path, source: std::io::Error) -> ReadError {
     ReadError::Io { path: path.to_path_buf(), source, cure: cure.into() }
 }
 
-/// A file that another file names, as a path beside it. A name that is absolute or climbs out of
-/// the directory is allowed: the formats allow it and the user opened the file.
+/// The path of a file that another file names, relative to the directory of `path`. An absolute
+/// name, or one that leaves the directory, is allowed: the formats allow it and the user opened the
+/// file.
 pub(crate) fn sibling_path(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name.trim())
 }

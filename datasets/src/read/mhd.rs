@@ -17,7 +17,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a file; the data file is looked for beside `path`.
+/// Reads the content of a file. The data file is looked up in the directory of `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let mut warnings = Vec::new();

@@ -11,12 +11,12 @@ use std::path::Path;
 
 pub(crate) const FORMAT: &str = "OBJ";
 
-/// Reads a `.obj` file, the material files it names and the pictures those name.
+/// Reads an `.obj` file, the material files it names and the textures they name.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of an `.obj` file; other files are looked for beside `path`.
+/// Reads the content of an `.obj` file. Other files are looked up in the directory of `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let warnings = RefCell::new(Vec::new());
     let options = tobj::LoadOptions {

@@ -29,7 +29,7 @@ pub(crate) const FORMAT: &str = "raw volume";
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawDescription {
-    /// The file with the numbers, beside the description.
+    /// The file with the numbers, in the directory of the description.
     pub file: Option<PathBuf>,
     /// Points per axis, x fastest.
     pub dims: [u64; 3],

@@ -1,4 +1,4 @@
-//! Meshes with materials and pictures, as OBJ and glTF files hold them.
+//! Meshes with materials and textures, as in OBJ and glTF files.
 
 use rt_core::mesh::TriMesh;
 use rt_core::texture::{Filter, Wrap};
@@ -10,7 +10,7 @@ pub struct SceneModel {
     pub meshes: Vec<SceneMesh>,
     /// The materials they refer to.
     pub materials: Vec<SurfaceMaterial>,
-    /// The pictures that materials refer to.
+    /// The textures that materials refer to.
     pub textures: Vec<Texture>,
 }
 
@@ -102,8 +102,8 @@ impl Default for SurfaceMaterial {
     }
 }
 
-/// A picture and how it is read: 8 bits a channel, first row at the top. Colours are sRGB with
-/// linear alpha; what else a material reads is linear.
+/// A texture and how it is sampled: 8 bits per channel, first row at the top. Colours are sRGB with
+/// linear alpha; all other material inputs are linear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// Its name or file.
@@ -133,7 +133,8 @@ pub(crate) fn decode_texture(name: &str, bytes: &[u8], v_up: bool) -> Result<Tex
         .with_guessed_format()
         .map_err(|e| e.to_string())?;
     let mut limits = image::Limits::default();
-    // A picture of one colour packs about 1:1000; leave room for small ones.
+    // An image of one colour compresses about 1:1000; the added megabyte leaves room for small
+    // ones.
     limits.max_alloc =
         Some(MAX_TEXTURE_BYTES.min((bytes.len() as u64).saturating_mul(2048) + (1 << 20)));
     reader.limits(limits);

@@ -18,7 +18,7 @@ pub(super) const INSIDE_TOLERANCE: f64 = 1e-9;
 /// A point this far outside may lie in a gap between faces that do not match.
 const NEAR: f64 = 1e-3;
 
-/// What was met on the way.
+/// Special cases counted during rasterization.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Counts {
     /// Samples that lay in gaps between cells.

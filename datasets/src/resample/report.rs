@@ -21,7 +21,7 @@ pub struct ResamplingError {
     pub range: f64,
     /// Places compared.
     pub compared: usize,
-    /// Places that could not be compared: beside nodes without value, off the lattice, hidden or
+    /// Places that could not be compared: next to nodes without value, off the lattice, hidden or
     /// not finite.
     pub not_compared: usize,
 }
@@ -162,7 +162,7 @@ pub(super) fn resampling_error(
     }
 }
 
-/// Linear interpolation; `None` off the lattice and beside nodes without value that have weight.
+/// Linear interpolation. `None` off the lattice and next to nodes without value that have weight.
 fn trilinear(lattice: &Lattice, values: &[f32], p: DVec3) -> Option<f64> {
     let mut cell = [0usize; 3];
     let mut t = [0.0f64; 3];

@@ -12,8 +12,8 @@ use rayon::prelude::*;
 
 /// Image samples per node of the lattice, along each axis.
 const FINER: f64 = 4.0;
-/// An inner radius below this part of the outer one is the first row of cells beside the axis, not
-/// a body: the values there reach to the axis, where by symmetry they have no slope.
+/// An inner radius below this fraction of the outer one is the first row of cells next to the axis,
+/// not a body. The values there extend to the axis, where their slope is zero by symmetry.
 const TO_THE_AXIS: f64 = 0.1;
 
 /// Box of the body of revolution of a mesh whose points lie in the plane z = 0 but for a thin

@@ -1,6 +1,6 @@
 //! Steady compressible flow of a perfect gas in closed form or by one ordinary differential
-//! equation: the flows whose shocks are known exactly, so that a picture of them can be checked
-//! with a ruler.
+//! equation. The shocks of these flows are known exactly, so an image of them can be checked with a
+//! ruler.
 //!
 //! | module | what | source |
 //! |---|---|---|

@@ -1,4 +1,4 @@
-//! Materials of glTF files, and the pictures and samplers they use.
+//! Materials of glTF files, with their textures and samplers.
 
 use super::super::scene::{AlphaMode, SurfaceMaterial, Texture, decode_texture};
 use super::{Reader, resource};
@@ -69,7 +69,8 @@ impl Reader {
         }
     }
 
-    /// Reads a texture into the scene; `None`, and a warning, when its picture cannot be read.
+    /// Reads a texture into the scene. Returns `None` and adds a warning when its image cannot be
+    /// read.
     fn texture(
         &mut self,
         path: &Path,
@@ -78,7 +79,7 @@ impl Reader {
     ) -> Option<usize> {
         let image = texture.source();
         let json = &gltf.as_json().images[image.index()];
-        // The crate takes a picture without a source for granted not to be.
+        // The crate assumes that every image has a source.
         let has_source =
             json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
         let picture =

@@ -35,7 +35,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a file; other files are looked for beside `path`.
+/// Reads the content of a file. Other files are looked up in the directory of `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let gltf = checked(bytes).map_err(fault)?;
@@ -61,7 +61,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let mut stack: Vec<(gltf::Node<'_>, DMat4)> =
         roots.into_iter().rev().map(|n| (n, DMat4::IDENTITY)).collect();
     while let Some((node, parent)) = stack.pop() {
-        // glTF demands trees; a node met twice would make loops.
+        // glTF requires trees. A node visited twice could form a loop.
         if std::mem::replace(&mut reader.visited[node.index()], true) {
             let what = format!("node {} has two parents", node.index());
             return Err(fault(Fault::field("nodes", what)));
@@ -140,7 +140,7 @@ fn buffers(path: &Path, gltf: &gltf::Gltf) -> Result<Vec<Vec<u8>>, ReadError> {
         .collect()
 }
 
-/// What a URI names: data inside it, or a file beside `path`.
+/// The data that a URI refers to: inside the URI, or in a file in the directory of `path`.
 fn resource(path: &Path, uri: &str) -> Result<Vec<u8>, ReadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let fault = |what: &str| Fault::field("a data URI", what).in_file(path, FORMAT);

@@ -111,7 +111,7 @@ pub(crate) fn looks_like_plot3d(bytes: &[u8]) -> bool {
         .any(|r| find(r, bytes, &Plot3dOptions::default()).is_ok())
 }
 
-/// The existing file beside `path` whose name follows from it: by the end of the stem, or by the
+/// The existing file next to `path` whose name follows from it, by the end of the stem or by the
 /// extension.
 pub(crate) fn companion_file(
     path: &Path,
