@@ -124,8 +124,8 @@ fn icosahedron_faces(points: &[DVec3]) -> Vec<[u32; 3]> {
     faces
 }
 
-/// A globe with two poles where `meridians` triangles meet in one vertex: needles, and the hardest
-/// vertices there are.
+/// A globe with two poles where `meridians` triangles share one vertex: needles, and the most
+/// difficult vertices.
 pub fn globe(meridians: u32, parallels: u32) -> TriMesh {
     let mut mesh = TriMesh::new(vec![Vec3::Z], vec![]);
     for j in 1..parallels {

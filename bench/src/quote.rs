@@ -95,7 +95,7 @@ fn documents(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// The document with its quotations, and the plots beside it.
+/// The document with its quotations, and its plots.
 fn quotations_filled(root: &Path, path: &Path, text: &str) -> anyhow::Result<Vec<Quotation>> {
     let mut plots = vec![];
     let mut filled = String::new();

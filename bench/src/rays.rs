@@ -74,14 +74,14 @@ impl RaySet {
     }
 }
 
-/// A square pinhole picture.
+/// A square pinhole camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Name in the tables.
     pub name: &'static str,
     /// Eye, in the mesh's coordinates.
     pub eye: DVec3,
-    /// Unit vectors: right, up, into the picture.
+    /// Unit vectors: right, up, into the image.
     pub axes: [DVec3; 3],
     /// Tangent of half the field of view.
     pub tan_half_fov: f64,

@@ -52,26 +52,26 @@ impl Row {
     }
 }
 
-/// A PNG picture beside the record.
+/// A PNG image stored next to the record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Picture {
     /// Short name; part of the file name.
     pub name: String,
     /// What it shows.
     pub caption: String,
-    /// The file; beside the record, not inside the JSON.
+    /// The file, stored next to the record, not inside the JSON.
     #[serde(skip)]
     pub png: Vec<u8>,
 }
 
-/// A file beside the record that other programs read, or that shows more than a table.
+/// A file stored next to the record that other programs read, or that shows more than a table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Attachment {
     /// Name of the file behind the experiment's, with its ending; an SVG is shown in reports.
     pub name: String,
     /// What it holds.
     pub caption: String,
-    /// The file; beside the record, not inside the JSON.
+    /// The file, stored next to the record, not inside the JSON.
     #[serde(skip)]
     pub bytes: Vec<u8>,
 }
@@ -216,8 +216,7 @@ impl Record {
         Ok(dir.join(format!("{}.json", self.id)))
     }
 
-    /// Reads a record back, with the pictures beside it. A picture that is gone leaves an empty
-    /// one.
+    /// Reads a record and the images stored next to it. A missing image is read as an empty one.
     pub fn read(path: &Path) -> anyhow::Result<Record> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read the record `{}`", path.display()))?;
@@ -247,8 +246,8 @@ impl Record {
     }
 }
 
-/// All records of a directory, by name. JSON of other kinds (a Chrome trace beside a record, what a
-/// program printed) is left alone; a broken record, or a file that is no JSON, is an error.
+/// All records of a directory, by name. Other kinds of JSON (a Chrome trace next to a record, a
+/// program's output) are ignored. A broken record, or a file that is not JSON, is an error.
 pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
     let entries = std::fs::read_dir(dir)
         .with_context(|| format!("cannot read the directory `{}`", dir.display()))?;

@@ -120,14 +120,14 @@ impl Timed {
     }
 }
 
-/// How much longer a rival took: above 1 we are faster.
+/// Ratio of a baseline's time to ours: above 1 we are faster.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
     /// What was compared, ours.
     pub name: String,
     /// What it was compared with.
     pub rival: String,
-    /// Median over the rounds of (rival's time / our time).
+    /// Median over the rounds of (baseline's time / our time).
     pub value: f64,
     /// Interquartile range of the rounds' ratios.
     pub spread: f64,
@@ -166,8 +166,8 @@ pub enum Verdict {
 }
 
 impl Ratio {
-    /// The ratio of times taken in turns: `per_round` is (rival's time / our time) of each round.
-    /// `None` without a finite one.
+    /// The ratio of times measured in alternation: `per_round` is (baseline's time / our time) of
+    /// each round. `None` without a finite one.
     pub fn of_rounds(
         name: impl Into<String>,
         rival: impl Into<String>,
@@ -243,7 +243,7 @@ impl Timings {
         self.get(name).map(|v| v.summary(self.clock))
     }
 
-    /// How much longer `rival` took than `ours`. `None` when one of them was not run.
+    /// Ratio of the time of `rival` to that of `ours`. `None` when one of them was not run.
     pub fn ratio(&self, ours: &str, rival: &str) -> Option<Ratio> {
         let (a, b) = (self.get(ours)?, self.get(rival)?);
         let per_round: Vec<f64> = a

@@ -244,9 +244,9 @@ pub(crate) mod testing {
         })
     }
 
-    /// Compares a tracer that was built from [`mesh`] with brute force. Where a ray meets an edge
-    /// or a silhouette f32 may differ: at most one ray in 2000 may; distances agree to 1e-4 of the
-    /// mesh's size.
+    /// Compares a tracer that was built from [`mesh`] with brute force. Where a ray hits an edge or
+    /// a silhouette, f32 results may differ: at most one ray in 2000 may. Distances agree to 1e-4
+    /// of the mesh's size.
     pub(crate) fn agrees_with_brute_force(tracer: &dyn Tracer) {
         for Case { kind, rays, hits, masks } in cases() {
             let what = format!("{}, {kind}", tracer.name());

@@ -104,7 +104,7 @@ fn scene(
         };
         let watertight = tracers.ours[0].1.view(crate::rt_core_tracer::Mode::Coherent);
         for (kind, rays) in compare::make_rays(mesh, view, size, kinds, &watertight) {
-            // Eight ambient-occlusion rays per pixel: runs of blocks from all over the picture are
+            // Eight ambient-occlusion rays per pixel: runs of blocks from the whole image are
             // enough.
             let rays = rays.thinned(if context.quick { 1 << 18 } else { 1 << 21 });
             if rays.len == 0 {
@@ -122,8 +122,8 @@ fn scene(
                 let ours: &[&str] =
                     if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
                 for tracer in ours {
-                    // Ours is the suited mode, listed first; only rivals have the best picked for
-                    // them.
+                    // Our mode for the kind of rays is listed first. Only for baselines the best
+                    // mode is selected.
                     let Some(c) = contenders.iter().find(|c| c.tracer_name == *tracer) else {
                         continue;
                     };
@@ -177,7 +177,7 @@ fn plots(record: &mut Record) {
     }
 }
 
-/// A rival's name without its mode.
+/// A baseline's name without its mode.
 fn family(rival: &str) -> String {
     rival.split(", ").next().unwrap_or(rival).to_string()
 }

@@ -36,7 +36,7 @@ impl Kind {
         }
     }
 
-    /// Rays that only ask whether anything is in the way.
+    /// Whether the rays only test for occlusion.
     fn occlusion(self) -> bool {
         matches!(self, Kind::Shadow | Kind::ShadowFromLight | Kind::AmbientOcclusion)
     }
@@ -72,7 +72,7 @@ pub(super) fn make_rays(
 
 /// One of the tracers compared.
 pub(super) struct Contender<'a> {
-    /// Name of the tracer with its build: rivals are compared by their best mode.
+    /// Name of the tracer with its build. Baselines are compared by their best mode.
     pub(super) tracer_name: String,
     /// How rays are sent.
     pub(super) mode: String,

@@ -17,18 +17,18 @@ pub(super) const FILTERS: [(&str, FilterSpec); 4] = [
     ("cone", FilterSpec::Cone { nearest: 12 }),
 ];
 
-/// Seed of the references: other photons than any measured picture has.
+/// Seed of the references, which must not share photons with any measured image.
 const REFERENCE_SEED: u64 = 0x5eed;
 
 /// The dissertation's numbers: by filter, the root mean square difference in percent between its
-/// pictures of 1 and 10, of 10 and 100, and of 100 and 1000 samples. No errors: its pictures have
-/// no reference.
+/// images of 1 and 10, of 10 and 100, and of 100 and 1000 samples. It gives no errors, because its
+/// images have no reference.
 const THESIS: [(&str, [f64; 3]); 2] = [("none", [7.75, 2.78, 0.91]), ("cone", [0.83, 2.55, 0.176])];
 
-/// Samples of the first pictures of these pairs; the second ones have ten times as many.
+/// Samples of the first image of each pair. The second image has ten times as many.
 const THESIS_SAMPLES: [u32; 3] = [1, 10, 100];
 
-/// A picture that needs many photons, and its test section.
+/// A schlieren image that needs many photons, and its test section.
 pub(super) struct NoiseCase {
     scene: Scene,
     section: TestSection,
@@ -59,7 +59,7 @@ impl NoiseCase {
         Ok(NoiseCase { scene, section, reference_samples })
     }
 
-    /// The picture with so many photons a pixel, and its seconds.
+    /// Renders the image with this many photons per pixel. Returns it with the time in seconds.
     pub(super) fn picture(
         &self,
         context: &Context<'_>,
@@ -75,7 +75,7 @@ impl NoiseCase {
         Ok((rendered, start.elapsed().as_secs_f64()))
     }
 
-    /// The picture without visible noise.
+    /// Renders the image without visible noise.
     pub(super) fn reference(&self, context: &Context<'_>) -> anyhow::Result<(RenderOutput, f64)> {
         self.picture(
             context,
@@ -87,7 +87,7 @@ impl NoiseCase {
     }
 }
 
-/// Root mean square difference of two pictures, in percent of white.
+/// Root mean square difference of two images, in percent of white.
 pub(super) fn rms_difference(a: &RenderOutput, b: &RenderOutput) -> f64 {
     let squares: f64 =
         a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
@@ -98,7 +98,7 @@ pub(super) fn rms_difference(a: &RenderOutput, b: &RenderOutput) -> f64 {
 const SAMPLINGS: [(&str, Jitter); 2] =
     [("random", Jitter::Random), ("low-discrepancy", Jitter::Sobol)];
 
-/// The picture that the dissertation's numbers stand beside: a knife, and photons all over the
+/// The image that is compared with the dissertation's numbers: a knife, and photons all over the
 /// source.
 const KNIFE: &str = "schlieren, knife";
 
@@ -196,8 +196,8 @@ fn errors(
     Ok(())
 }
 
-/// The dissertation's own quantity, for both of its filters: each picture has ten times the photons
-/// of the one before, and these are the first of its photons.
+/// The dissertation's own quantity, for both of its filters. Each image has ten times the photons
+/// of the previous one, which are the first of its photons.
 fn differences(
     context: &mut Context<'_>,
     record: &mut Record,
@@ -280,7 +280,7 @@ fn describe_errors(rows: &[Row]) -> String {
     words
 }
 
-/// What the differences say beside the dissertation's.
+/// Compares the differences with the dissertation's in words.
 fn describe_differences(rows: &[Row]) -> String {
     let mut words = String::from(
         "`difference` is the dissertation's quantity: it prints root mean square differences \

@@ -158,7 +158,7 @@ impl TracerSet {
         ours.chain(embree).chain(self.obvhs.iter().map(|(n, o)| (n.as_str(), o.cost))).collect()
     }
 
-    /// The names of the rivals.
+    /// The names of the baselines.
     pub(super) fn baseline_names(&self) -> Vec<&str> {
         self.costs().into_iter().map(|(n, _)| n).filter(|n| !n.starts_with("rt-core")).collect()
     }

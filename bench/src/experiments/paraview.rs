@@ -101,7 +101,7 @@ fn columns(record: &mut Record) {
     }
 }
 
-/// What the script is told: data, cameras, sizes.
+/// Input of the script: data, cameras, sizes.
 fn order(subject: &Subject, pixels: u32, quick: bool, folder: &Path) -> anyhow::Result<Value> {
     let entry = catalogue::find(subject.data)?;
     let views = entry.views().into_iter().map(|v| {

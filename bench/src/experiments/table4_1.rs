@@ -125,7 +125,7 @@ fn measure(
     let data = setup.dir.join(format!("{n}")).with_extension(program.format().extension());
     context.report_step(format!("{}, {n} triangles: data", program.name()))?;
     write(mesh, program.format(), &data)?;
-    // CPU time is told in hundredths of a second: groups of frames are long against that.
+    // CPU time is measured in hundredths of a second; groups of frames take much longer than that.
     let (groups, frames) = match (context.quick, n) {
         (true, _) => (3, 5),
         (_, ..2_000_000) => (7, 6),
@@ -152,7 +152,7 @@ fn measure(
         measurement.first_secs = begun.elapsed().as_secs_f64();
         s.frames(if backend == Backend::Llvmpipe { 1 } else { settle })?;
         if backend != Backend::Llvmpipe && !is_built_once(n) {
-            // Builds of the best hierarchy go on beside the frames; they take about a second per
+            // Builds of the best hierarchy continue in the background. They take about a second per
             // million triangles and core.
             std::thread::sleep(std::time::Duration::from_secs_f64(2.0 + n as f64 / 4e5));
         }

@@ -42,7 +42,7 @@ pub(super) fn scene(rest: &str) -> anyhow::Result<Scene> {
     Ok(Scene::from_toml(&format!("[flow]\nfile = \"\"\ndensity = \"-\"\n{rest}"))?)
 }
 
-/// Renders; a cancelled picture is an interrupted experiment.
+/// Renders an image. A cancelled image means an interrupted experiment.
 pub(super) fn render_picture(
     context: &Context<'_>,
     scene: &Scene,
@@ -75,7 +75,7 @@ pub(super) fn check_cancelled(context: &Context<'_>) -> anyhow::Result<()> {
     }
 }
 
-/// The picture as it goes into a record.
+/// Converts an image for a record.
 pub(super) fn picture(
     name: &str,
     caption: String,
@@ -87,7 +87,7 @@ pub(super) fn picture(
     Ok(Picture { name: name.into(), caption, png: std::fs::read(&path)? })
 }
 
-/// Rays through the middle of a picture of `side_m`, in tiles of 4 by 4 as a renderer sends them:
+/// Rays through the middle of an image of `side_m`, in tiles of 4 by 4 in a renderer's order:
 /// `width` by `width` of them.
 pub(super) fn tiles(width: usize, side_m: f64) -> Vec<Start> {
     let at = |block: usize, i: usize| {

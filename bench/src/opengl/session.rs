@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 pub struct Tools {
     /// The X server.
     pub xvfb: PathBuf,
-    /// `gluray`, with its library beside it.
+    /// `gluray`, with its library in the same folder.
     pub gluray: PathBuf,
 }
 

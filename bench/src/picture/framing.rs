@@ -14,8 +14,8 @@ use std::path::Path;
 /// Where the camera stands.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Framing {
-    /// So that the whole subject just fits into the picture, seen from the front, a little from the
-    /// side and from above.
+    /// The whole subject just fits into the image, viewed from the front, slightly from the side
+    /// and from above.
     #[default]
     Fitted,
     /// The same, seen from this direction (towards the eye, world, any length).
@@ -60,7 +60,7 @@ fn corners(found: Option<(DVec3, DVec3)>) -> anyhow::Result<(DVec3, DVec3)> {
 }
 
 impl Framing {
-    /// The camera for everything in a world, z up, in a picture of `size` pixels.
+    /// The camera for everything in a world, z up, for an image of `size` pixels.
     pub fn of(&self, world: &World, size: [u32; 2]) -> anyhow::Result<Camera> {
         let (lo, hi) = corners(bounds_of_surfaces(world))?;
         let outline =
@@ -116,7 +116,7 @@ impl Framing {
     }
 }
 
-/// Calls its argument with every world point that must be in the picture.
+/// Calls its argument with every world point that must be visible in the image.
 pub(super) type Outline<'a> = dyn Fn(&mut dyn FnMut(DVec3)) + 'a;
 
 /// The corners of a box.
@@ -127,8 +127,8 @@ pub(super) fn corners_of_box(lo: DVec3, hi: DVec3) -> [DVec3; 8] {
     })
 }
 
-/// The nearest place from which all points are in the picture, seen from `backward` or from the
-/// front. Flat subjects are seen face on.
+/// The nearest view in which all points are visible, from `backward` or from the front. Flat
+/// subjects are viewed face on.
 fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -> View {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     outline(&mut |p| (lo, hi) = (lo.min(p), hi.max(p)));
@@ -155,9 +155,9 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
     let right = up.cross(backward).normalize_or(DVec3::X);
     let true_up = backward.cross(right);
 
-    // A point at (x, y, z), z towards the eye, is inside the picture's right border when x - eye.x
-    // <= tan (eye.z - z), and so on for the other three: each pair of borders asks for a least
-    // eye.z, and their middle is eye.x or eye.y.
+    // A point at (x, y, z), z towards the eye, is inside the image's right border when x - eye.x <=
+    // tan (eye.z - z), and similarly for the other three borders. Each pair of borders requires a
+    // smallest eye.z, and their middle is eye.x or eye.y.
     let tan = (0.5 * FOV_DEGREES).to_radians().tan() / MARGIN;
     let (tan_x, tan_y) = (tan * aspect, tan);
     let mut most = [f64::NEG_INFINITY; 4];
@@ -205,7 +205,7 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
     View { up, ..View::new("fitted", target + backward * distance, target) }
 }
 
-/// An upward direction for a picture seen along `normal`, an axis.
+/// An upward direction for an image viewed along `normal`, an axis.
 fn other_up(normal: DVec3) -> DVec3 {
     if normal.y.abs() > 0.5 { DVec3::Z } else { DVec3::Y }
 }

@@ -27,7 +27,7 @@ enum Coloring {
     Glass([f32; 3]),
 }
 
-/// A picture of generated data.
+/// An image of generated data.
 #[derive(Debug)]
 pub struct Entry {
     /// Name on the command line.
@@ -47,7 +47,7 @@ pub struct Entry {
     tubes: f32,
 }
 
-/// Where a picture is taken from.
+/// The camera position of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Viewpoint {
     /// All of it, from this direction.
@@ -58,7 +58,7 @@ enum Viewpoint {
     Eye([f64; 3], [f64; 3]),
 }
 
-/// What pictures have in common.
+/// Defaults that all images share.
 const PLAIN: Entry = Entry {
     name: "",
     caption: "",
@@ -75,7 +75,7 @@ const PLAIN: Entry = Entry {
 const SOFT: Effects =
     Effects::SOFT_SHADOWS.union(Effects::SHADOWS).union(Effects::AMBIENT_OCCLUSION);
 
-/// All pictures.
+/// All images.
 pub const ALL: &[Entry] = &[
     Entry {
         name: "wavelet",
@@ -159,7 +159,7 @@ pub const ALL: &[Entry] = &[
     },
 ];
 
-/// The picture of that name; the error lists the names.
+/// The image of that name. The error lists the names.
 pub fn find(name: &str) -> Result<&'static Entry, String> {
     ALL.iter().find(|e| e.name == name).ok_or_else(|| {
         let known: Vec<&str> = ALL.iter().map(|e| e.name).collect();
@@ -167,9 +167,9 @@ pub fn find(name: &str) -> Result<&'static Entry, String> {
     })
 }
 
-/// A picture with what it took.
+/// An image with its request and costs.
 pub struct GalleryImage {
-    /// The picture.
+    /// The image.
     pub rendered: RenderedImage,
     /// How it was wished.
     pub request: RenderRequest,

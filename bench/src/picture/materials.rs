@@ -7,7 +7,8 @@ use rt_core::texture::Texture;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// What a picture is read as: the same file may be a colour here and roughness there.
+/// The interpretation of an image: the same file may be a colour in one material and roughness in
+/// another.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Role {
     /// sRGB with alpha.
@@ -20,7 +21,7 @@ enum Role {
     Linear,
 }
 
-/// The materials of a scene, with their pictures shared.
+/// The materials of a scene, which share textures.
 pub(super) struct SceneMaterials<'a> {
     model: &'a SceneModel,
     made: HashMap<(usize, Role), Arc<Texture>>,
@@ -31,7 +32,7 @@ impl<'a> SceneMaterials<'a> {
         SceneMaterials { model, made: HashMap::new() }
     }
 
-    /// A picture in a role; `None` for a material that has none.
+    /// The texture of an image in a role; `None` for a material without one.
     fn texture(
         &mut self,
         index: Option<usize>,

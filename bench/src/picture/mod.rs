@@ -41,10 +41,10 @@ pub struct RenderRequest {
     pub layers: Layers,
 }
 
-/// A picture and how it came about.
+/// A rendered image with its report and times.
 #[derive(Debug, Clone)]
 pub struct RenderedImage {
-    /// The picture.
+    /// The image.
     pub frame: Frame,
     /// Rays by kind, effects, warnings.
     pub report: RenderReport,
@@ -52,7 +52,7 @@ pub struct RenderedImage {
     pub warnings: Vec<String>,
     /// Wall time of the acceleration structure.
     pub build_secs: f64,
-    /// Wall time of the picture.
+    /// Wall time of the rendering.
     pub render_secs: f64,
 }
 
@@ -80,8 +80,8 @@ impl RenderedImage {
     }
 }
 
-/// Draws a subject. When stopped after the first sample of every pixel, gives the picture so far
-/// ([`RenderedImage::is_interrupted`]); before, [`Interrupted`].
+/// Renders a subject. When stopped after the first sample of every pixel, returns the image so far
+/// ([`RenderedImage::is_interrupted`]). When stopped earlier, returns [`Interrupted`].
 pub fn draw(
     subject: Subject,
     request: &RenderRequest,

@@ -2,7 +2,7 @@
 
 use super::Scale;
 
-/// A range of values laid over a range of positions.
+/// A mapping of a range of values to a range of positions.
 pub(super) struct Mapping {
     scale: Scale,
     low: f64,
