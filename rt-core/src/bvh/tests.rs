@@ -240,7 +240,7 @@ fn rays_among_some_instances_meet_what_is_met_when_all_others_are_gone() {
     }
 }
 
-/// Each ray is taken through all instances, hit after hit, until it meets one of those that count.
+/// Follows each ray through all instances, hit after hit, until it hits a marked one.
 fn check_among(world: &World, marked: &[bool], rays: &[Ray], what: &str) {
     let blocks = RayBlock::from_rays(rays);
     let first_of = |ray: &Ray, wanted: bool| {

@@ -46,7 +46,7 @@ pub struct RenderReport {
     pub samples: u32,
     /// Why rendering ended.
     pub stopped: StopReason,
-    /// Estimated standard error of a pixel (root mean square over the picture, luminance), in 8-bit
+    /// Estimated standard error of a pixel (root mean square over the image, luminance), in 8-bit
     /// grey levels of linear light. `None` below two samples.
     pub error_levels: Option<f32>,
     /// Wall time since the start.

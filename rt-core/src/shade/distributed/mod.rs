@@ -310,7 +310,7 @@ impl<'a> DistributedFrame<'a> {
         self.context.camera.eye().unwrap_or(self.context.origin)
     }
 
-    // ---- The finished picture -------------------------------------------------------------------
+    // ---- The finished image ---------------------------------------------------------------------
     /// An image without any tile.
     pub fn blank_frame(&self) -> Frame {
         let area = self.context.options.area();

@@ -120,7 +120,7 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
         levels += 1;
         for tile in 0..9 {
             let (x, y) = (tile % 3 * TILE, tile / 3 * TILE);
-            // The last ones are cut off by the picture's edge.
+            // The last tiles are cut off by the image's edge.
             let width = if tile % 3 == 2 { 13 } else { TILE };
             let area = TileArea { x, y, width, height: TILE, sample: 0 };
             let mut out = TileLayers::new(Layers::ALL, 1.0, false);

@@ -1,5 +1,5 @@
-//! Light through layers: which rays need to know what comes next, and that the picture is that of
-//! rays which all do.
+//! Light through layers: tests which rays need their next hit, and that the image is the same as
+//! when all rays ask for it.
 
 use crate::bvh::{BuildOptions, Geometry};
 use crate::camera::Camera;
@@ -78,9 +78,8 @@ fn see_through_things(b: &mut SceneBuilder) {
     b.mesh(leaf, Material::matte([1.0; 3]));
 }
 
-/// Colours, as bits, and counters of a picture of four tiles. `marked`: every instance counts as
-/// one that may let light through, so that every ray to light is asked for its closest hit, layer
-/// by layer.
+/// Colours (as bits) and counters of an image of four tiles. With `marked`, every instance counts
+/// as possibly transmissive, so that every light ray is traced for its closest hit, layer by layer.
 fn draw(scene: &Scene, options: &RenderOptions, marked: bool) -> (Vec<[u32; 4]>, RayStats) {
     let mut effects = Effects::required_by(scene);
     if options.path_tracing {
@@ -162,8 +161,8 @@ fn one_transparent_instance_does_not_make_every_light_ray_look_for_its_closest_h
 
 #[test]
 fn an_opaque_surface_blocks_light_where_a_transparent_one_coincides() {
-    // A decal with the lower number on an opaque plate: which of the two is met first must not let
-    // light through the plate.
+    // A decal with the lower number on an opaque plate: whichever of the two is hit first, no light
+    // may pass through the plate.
     for decal_first in [true, false] {
         let mut b = SceneBuilder::new();
         b.mesh(square(0.0, 3.0), Material::matte([1.0; 3]));
