@@ -13,7 +13,7 @@ use rt_core::material::{ColorSource, Material, SurfaceModel};
 use rt_core::scene::Appearance;
 use std::collections::HashMap;
 
-/// The lists. Appearances and encodings are one per instance.
+/// The lists of a scene. Appearances and encodings have one entry per instance.
 #[derive(Default)]
 pub(crate) struct Assembled {
     pub(crate) geometries: Vec<Geometry>,
@@ -21,7 +21,7 @@ pub(crate) struct Assembled {
     pub(crate) appearances: Vec<Appearance>,
     pub(crate) materials: Vec<Material>,
     pub(crate) encodings: Vec<Encoding>,
-    /// One per instance; empty when there are none at all.
+    /// One per instance; empty when there are no edges at all.
     pub(crate) edges: Vec<Option<Edges>>,
 }
 
@@ -174,15 +174,15 @@ impl Assembled {
     }
 }
 
-/// Whether ambient light would show.
+/// Whether ambient light would be visible.
 pub(crate) fn any_ambient(materials: &[Material]) -> bool {
     materials
         .iter()
         .any(|m| matches!(m.model, SurfaceModel::Phong { ambient, .. } if ambient > 0.0))
 }
 
-/// Whether rays are sent for mirrors: properties alone (every physically based surface reflects a
-/// little) do not ask for it.
+/// Whether reflection rays are sent. Material properties alone do not request them, because every
+/// physically based surface reflects a little.
 pub(crate) fn wants_reflections(options: &Options) -> bool {
     options.reflections
         || options.mirror > 0.0

@@ -10,7 +10,7 @@ use rt_core::glam::{DAffine3, DVec2, DVec4};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// Pixels or triangles a task works on.
+/// Number of pixels or triangles per task.
 const CHUNK: usize = 1 << 14;
 /// Beyond sides that are no edges nothing is drawn from here on, pixels.
 const DIAGONAL_CUTOFF_PX: f64 = -0.5;
@@ -23,21 +23,21 @@ pub(crate) struct Edges {
     world_from_object: DAffine3,
     color: [f32; 3],
     width_px: f64,
-    /// Triangles that turn this way in the window are not drawn: 1 or −1 (rows from the top), or
+    /// Triangles with this winding in the window are not drawn: 1 or −1 (rows from the top), or
     /// both.
     culled: [bool; 2],
-    /// How far a corner moves, line widths. VTK 9.1's shader means half a width and takes the
-    /// window to be as wide as its coordinates from −1 to 1: it moves corners by a quarter.
+    /// Distance that a corner moves, in line widths. VTK 9.1's shader means half a width, but
+    /// treats the window as wide as its coordinates from −1 to 1, so it moves corners by a quarter.
     reach: f64,
 }
 
 /// A triangle in the window; x and y in pixels from the top left.
 struct ProjectedTriangle {
     corners: [DVec2; 3],
-    /// Where the geometry shader puts them.
+    /// The corners after the geometry shader moved them.
     moved: [DVec2; 3],
     depths: [f64; 3],
-    /// Of each side, pointing to the inside, with length 1.
+    /// Normal of each side, pointing inwards, with length 1.
     inward: [DVec2; 3],
     /// As in [`PolygonMesh::edges`].
     sides: u8,
@@ -69,8 +69,8 @@ impl Edges {
         }
     }
 
-    /// `None` for triangles with a corner behind the eye, which has no place in the window, and for
-    /// those without an area.
+    /// `None` for triangles with a corner behind the eye, which has no window position, and for
+    /// triangles without area.
     fn project(&self, primitive: usize, view: &View) -> Option<ProjectedTriangle> {
         let indices = self.mesh.indices.get(primitive)?;
         let sides = self.sides.as_ref().map_or(7, |s| s.get(primitive).copied().unwrap_or(7));
@@ -99,7 +99,7 @@ impl Edges {
         Some(ProjectedTriangle { corners, moved, depths, inward, sides, winding: winding.signum() })
     }
 
-    /// How much of the edge's colour shows at distances `d` from the sides of a triangle.
+    /// Weight of the edge's colour at distances `d` from the sides of a triangle.
     fn coverage(&self, t: &ProjectedTriangle, d: &[f64; 3]) -> f32 {
         let of_edges = (0..3).filter(|&i| t.is_edge(i)).map(|i| d[i]).fold(f64::INFINITY, f64::min);
         (0.5 + 0.5 * self.width_px - of_edges).clamp(0.0, 1.0) as f32
@@ -115,14 +115,14 @@ impl Edges {
         out: &mut Vec<Fragment>,
     ) {
         let Some(t) = self.project(primitive, view) else { return };
-        // OpenGL's front turns to the left with rows from the bottom: to the right with rows from
-        // the top.
+        // OpenGL's front faces are counter-clockwise with rows from the bottom, so clockwise with
+        // rows from the top.
         if self.culled[usize::from(t.winding > 0.0)] {
             return;
         }
         let low = t.moved.iter().fold(DVec2::INFINITY, |m, p| m.min(*p)).max(DVec2::ZERO);
         let high = t.moved.iter().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
-        // `as` saturates, and sends what is not a number to 0.
+        // `as` saturates and converts NaN to 0.
         let end = [(high.x + 0.5) as usize, (high.y + 0.5) as usize];
         let (width, height) = (view.width as usize, view.height as usize);
         for y in (low.y - 0.5).ceil().max(0.0) as usize..end[1].min(height) {
@@ -147,7 +147,7 @@ impl ProjectedTriangle {
         self.sides >> side & 1 != 0
     }
 
-    /// From each side, positive inside.
+    /// Distances from each side, positive inside.
     fn distances(&self, p: DVec2) -> [f64; 3] {
         std::array::from_fn(|i| self.inward[i].dot(p - self.corners[i]))
     }
@@ -170,15 +170,15 @@ impl ProjectedTriangle {
     }
 }
 
-/// Draws the edges of all instances into `frame`, which has its identity layers. `edges` is one per
-/// instance, or empty. `first_depth` is that of what lies in front of the opaque surfaces, or
-/// empty.
+/// Draws the edges of all instances into `frame`, which must have its identity layers. `edges` has
+/// one entry per instance, or is empty. `first_depth` is the depth of translucent surfaces in front
+/// of the opaque ones, or is empty.
 pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges>], view: &View) {
     if edges.is_empty() {
         return;
     }
-    // What is translucent in front of the opaque surfaces hides the part of an edge that has no
-    // surface behind it.
+    // Translucent surfaces in front of the opaque ones hide the part of an edge that has no surface
+    // behind it.
     let veiled: Vec<bool> =
         first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
 
@@ -200,7 +200,7 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
         }
     });
 
-    // ---- Beside it.
+    // ---- Outside the surface.
     for e in edges.iter().flatten().filter(|e| e.reach > 0.0) {
         let triangles = (0..e.mesh.indices.len()).into_par_iter().with_min_len(CHUNK);
         let depth = &frame.depth;

@@ -4,7 +4,7 @@ use crate::input::{LightKind, SceneLight};
 use crate::options::Options;
 use rt_core::light::{Light, LightKind as Kind};
 
-/// Lights that change something, for options that may ask for shadows.
+/// Converts the lights that have an effect. `shadows` is true when they may cast shadows.
 pub fn lights(scene: &[SceneLight], shadows: bool, options: &Options) -> Vec<Light> {
     scene.iter().filter_map(|l| light(l, shadows, options)).collect()
 }
@@ -25,7 +25,7 @@ fn light(l: &SceneLight, shadows: bool, options: &Options) -> Option<Light> {
         LightKind::Directional => {
             Kind::Directional { to_light: -axis, angular_radius_rad: options.light_size_rad }
         }
-        // A light that is seen under the angle asked for, from where it looks.
+        // A light with the requested angular size, as seen from the point it is aimed at.
         LightKind::Point => Kind::Point {
             position: l.position,
             radius: axis.length() * options.light_size_rad.tan(),

@@ -18,13 +18,13 @@ use std::sync::Arc;
 
 /// Opacity 1 would be infinite extinction.
 const MAX_OPACITY: f32 = 0.999_999;
-/// Values a task works on.
+/// Number of values per task.
 const CHUNK: usize = 1 << 14;
 
-/// What is kept of one grid.
+/// A cached volume, made from one grid.
 struct CachedVolume {
     volume: Arc<Volume>,
-    /// Of everything but the scalars.
+    /// Hash of everything except the scalars.
     appearance: u64,
     used: bool,
 }
@@ -37,7 +37,7 @@ pub(crate) struct VolumeCache {
 }
 
 impl VolumeCache {
-    /// A new frame.
+    /// Begins a frame.
     pub(crate) fn begin(&mut self) {
         self.placed.clear();
         self.kept.values_mut().for_each(|m| m.used = false);
@@ -110,7 +110,7 @@ impl VolumeCache {
     }
 }
 
-/// A number for everything but the scalars and the place.
+/// A hash of everything except the scalars and the transform.
 fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
     let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
@@ -121,10 +121,11 @@ fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     h.finish()
 }
 
-/// Lights in the axes of a volume at `place`.
+/// Lights in the axes of a volume with the transform `place`.
 fn lights(v: &Input<'_>, place: DAffine3) -> Result<Vec<VolumeLight>, String> {
     let to_volume = place.matrix3.transpose();
-    // Turned and evenly scaled only: elsewhere right angles in the volume are none in the world.
+    // The transform may only rotate and scale evenly. Otherwise right angles in the volume are not
+    // right angles in the world.
     let square = to_volume * place.matrix3;
     let scale = square.x_axis.x;
     let even = square.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(scale)), 1e-6 * scale.abs());
@@ -218,8 +219,7 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
     Volume::new(grid, transfer, options).map_err(|e| format!("a volume: {e}"))
 }
 
-/// Leaves out points that lie on the line between their neighbours: fewer bends, fewer steps of the
-/// integration.
+/// Removes points on the line between their neighbours: fewer bends mean fewer integration steps.
 fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     let mut out: Vec<[f32; 2]> = Vec::with_capacity(points.len());
     for p in points {
@@ -234,9 +234,9 @@ fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     out
 }
 
-/// Window depth for pixels that show a volume: the middle of the ray's way through it, where that
-/// is in front of `depth`. What OpenGL draws before that is in front of the volume, what it draws
-/// behind is seen through it.
+/// Sets the window depth of pixels that show a volume to the middle of the ray's segment inside it,
+/// where that is in front of `depth`. Objects that OpenGL draws nearer appear in front of the
+/// volume; objects farther away are visible through it.
 pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mut [f32]) {
     let world_from_clip = view.clip_from_world.inverse();
     let boxes: Vec<(DAffine3, Vec3, Vec3)> = volumes
@@ -259,8 +259,8 @@ pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mu
             let (mut near, mut far) = (0.0f64, 1.0f64);
             for k in 0..3 {
                 let (u, v) = ((f64::from(lo[k]) - a[k]) / d[k], (f64::from(hi[k]) - a[k]) / d[k]);
-                // Parallel to the face: NaN and infinities leave both ends alone or empty the
-                // stretch, as they should.
+                // Parallel to the face: NaN and infinities either leave both ends unchanged or make
+                // the segment empty, as they should.
                 (near, far) = (near.max(u.min(v)), far.min(u.max(v)));
             }
             if near < far {

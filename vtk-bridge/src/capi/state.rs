@@ -12,27 +12,27 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Behind an [`RtvBridge`].
+/// State behind an [`RtvBridge`].
 pub(super) struct BridgeState {
     pub(super) bridge: Bridge,
     number: u64,
     poisoned: bool,
-    /// The text that the last call gave away.
+    /// The text that the last call returned.
     answer: CString,
-    /// Options set for this bridge alone, over all others.
+    /// Options set for this bridge alone. They override all others.
     own: OptionValues,
     effective_options: EffectiveOptions,
-    /// Between `rtv_begin` and `rtv_end`: options stay what they are.
+    /// True between `rtv_begin` and `rtv_end`; options do not change then.
     in_frame: bool,
 }
 
 /// Values of options by name, as they were set.
 type OptionValues = BTreeMap<String, String>;
 
-/// Options set by the program for all bridges, over those of the environment.
+/// Options set by the program for all bridges. They override the environment.
 static PROGRAM_OPTIONS: Mutex<OptionValues> = Mutex::new(BTreeMap::new());
 
-/// The options of the process, for those who ask without a bridge.
+/// The options of the process, for calls without a bridge.
 static PROCESS_OPTIONS: Mutex<EffectiveOptions> = Mutex::new(EffectiveOptions::NONE);
 
 /// VTK's version, as set by [`set_host`]: major in the upper half; 0 when it was not set.
@@ -48,7 +48,7 @@ fn host_options(host: u64) -> Option<(String, String)> {
     ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
 }
 
-/// Everything that options are made from; what comes later goes over what comes before.
+/// All sources of options. Later ones override earlier ones.
 #[derive(PartialEq)]
 struct OptionSources {
     host: u64,
@@ -58,7 +58,7 @@ struct OptionSources {
 }
 
 impl OptionSources {
-    /// As they are now. The environment is read anew each time, because programs change it (a
+    /// The current sources. The environment is read again each time, because programs change it (a
     /// script's `os.environ`).
     fn now(own: &OptionValues) -> OptionSources {
         let is_ours = |name: &OsString| name.as_encoded_bytes().starts_with(b"RTV_");
@@ -70,7 +70,7 @@ impl OptionSources {
         }
     }
 
-    /// The options, and what in them was not understood.
+    /// The options, and messages about values that were not understood.
     fn parse(&self) -> (Options, Vec<String>) {
         let (environment, unreadable) = readable(&self.environment);
         let set = self.process.iter().chain(&self.own).map(|(n, v)| (n.clone(), v.clone()));
@@ -80,13 +80,13 @@ impl OptionSources {
     }
 }
 
-/// Options with what they were made from, so that they are parsed once per change.
+/// Options with their sources, so that they are parsed only once per change.
 struct EffectiveOptions(Option<(OptionSources, Options, Vec<String>)>);
 
 impl EffectiveOptions {
     const NONE: EffectiveOptions = EffectiveOptions(None);
 
-    /// The options for `sources`, and what in them was not understood.
+    /// The options for `sources`, and messages about values that were not understood.
     fn of(&mut self, sources: OptionSources) -> (&Options, &[String]) {
         if self.0.as_ref().is_some_and(|(from, ..)| *from != sources) {
             self.0 = None;
@@ -104,12 +104,12 @@ pub(super) fn options() -> Options {
     let sources = OptionSources::now(&OptionValues::new());
     match PROCESS_OPTIONS.lock() {
         Ok(mut kept) => kept.of(sources).0.clone(),
-        // A panic while another thread held them; they can be made anew.
+        // A panic occurred while another thread held the lock. The options are parsed again.
         Err(_) => sources.parse().0,
     }
 }
 
-/// Sets an option among `named`; an empty value takes it back. False when it is not understood.
+/// Sets an option among `named`; an empty value unsets it. Returns false for an invalid value.
 fn set(named: &mut OptionValues, name: &str, value: &str) -> bool {
     if value.is_empty() {
         named.remove(name);
@@ -126,7 +126,7 @@ pub(super) fn set_option(name: &str, value: &str) -> bool {
     PROGRAM_OPTIONS.lock().is_ok_and(|mut all| set(&mut all, name, value))
 }
 
-/// An option as a number, for the callers in C; -1 for those they need not know.
+/// An option as a number for callers in C; -1 for options that they need not know.
 pub(super) fn number(options: &Options, name: &str) -> f64 {
     match name {
         "RTV_OFF" => f64::from(u8::from(options.off)),
@@ -154,7 +154,8 @@ impl BridgeState {
         set(&mut self.own, name, value)
     }
 
-    /// As [`number`], with the options of this frame, or those that a frame begun now would have.
+    /// Like [`number`], with the options of this frame, or outside a frame those of a frame that
+    /// would begin now.
     pub(super) fn option(&mut self, name: &str) -> f64 {
         if self.in_frame {
             return number(self.bridge.options(), name);
@@ -162,7 +163,7 @@ impl BridgeState {
         number(self.effective_options.of(OptionSources::now(&self.own)).0, name)
     }
 
-    /// `text` for the caller, until the next call.
+    /// Stores `text` for the caller until the next call.
     pub(super) fn answer(&mut self, text: String) -> *const c_char {
         self.answer = CString::new(text.replace('\0', " ")).unwrap_or_default();
         self.answer.as_ptr()
@@ -224,8 +225,8 @@ impl Drop for BridgeState {
     }
 }
 
-/// A line for the user of the foreign program, each text once in the process. There is nobody else
-/// to tell: we are a guest.
+/// Prints a line for the user of the foreign program, each text once per process. A library inside
+/// a foreign program has no other channel.
 fn warn_user_once(text: &str) {
     static SHOWN_WARNINGS: Mutex<BTreeMap<String, ()>> = Mutex::new(BTreeMap::new());
     let first =
@@ -236,8 +237,9 @@ fn warn_user_once(text: &str) {
     }
 }
 
-/// Calls `work` with the handle; `otherwise` for null, and after a panic, which is told. After a
-/// panic the bridge leaves everything to OpenGL, because what it keeps may be half done.
+/// Calls `work` with the handle. Returns `otherwise` for null, and after a panic, which causes a
+/// warning. After a panic the bridge leaves everything to OpenGL, because its state may be
+/// incomplete.
 ///
 /// # Safety
 /// `bridge` is null or came from `rtv_new`, and no other thread uses it.
@@ -257,8 +259,8 @@ pub(super) unsafe fn with<T>(
     result.unwrap_or(otherwise)
 }
 
-/// Calls `work`; `otherwise` after a panic, which is told. Everything that C calls is inside this:
-/// a panic that reached C would end the program.
+/// Calls `work`. Returns `otherwise` after a panic, which causes a warning. Every function called
+/// from C uses this guard, because a panic that reached C would end the program.
 pub(crate) fn guarded<T>(otherwise: T, work: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let message = panic

@@ -12,7 +12,7 @@ use rt_core::ray::Ray;
 use rt_core::shapes::{Shape, ShapeHit, ShapeSurface};
 use std::sync::Arc;
 
-/// How much nearer than the surface, as a part of the ray's parameter: some roundings of f32.
+/// How much nearer than the surface, as a fraction of the ray's parameter: a few roundings of f32.
 const DEPTH_BIAS: f64 = 1.0 - 1e-6;
 
 /// See the module's text.
@@ -44,7 +44,7 @@ impl Shape for BackFaces {
         match self.corners(prim) {
             Some(_) => {
                 let [a, b, c] = self.mesh.triangle(prim as usize);
-                // Some roundings larger: flat boxes are missed by rays that run along them.
+                // Enlarged by a few roundings, because rays along a flat box miss it.
                 let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
                 let pad = (lo.abs().max(hi.abs()) * 4.0 * f32::EPSILON)
                     .max(Vec3::splat(f32::MIN_POSITIVE));
@@ -61,7 +61,7 @@ impl Shape for BackFaces {
         let (e1, e2) = (b - a, c - a);
         let p = d.cross(e2);
         let det = e1.dot(p);
-        // The normal looks along the ray: from behind.
+        // The normal points along the ray, so the ray comes from behind.
         if det >= 0.0 {
             return None;
         }

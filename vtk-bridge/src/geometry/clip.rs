@@ -9,29 +9,28 @@ use rt_core::glam::{DVec3, Vec2, Vec3, Vec4};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::collections::HashMap;
 
-/// Where a vertex of a clipped mesh comes from: `(1 - t) a + t b` of two vertices of the mesh
-/// before.
+/// Origin of a clipped mesh's vertex: `(1 - t) a + t b` of two vertices of the previous mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClipVertex {
     /// First vertex.
     pub a: u32,
     /// Second vertex.
     pub b: u32,
-    /// Weight of the second.
+    /// Weight of the second vertex.
     pub t: f32,
 }
 
-/// How a clipped mesh relates to the one before, by plane.
+/// Relation of a clipped mesh to the original mesh, by plane.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ClipMap {
     /// For each plane: origins of all vertices in the mesh before that plane.
     pub steps: Vec<Vec<ClipVertex>>,
-    /// Triangle of the unclipped mesh by triangle of the clipped one.
+    /// For each triangle of the clipped mesh, the triangle of the unclipped one.
     pub triangles: Vec<u32>,
 }
 
 impl ClipMap {
-    /// Values of the unclipped mesh's vertices carried over.
+    /// Interpolates values of the unclipped mesh's vertices to the clipped mesh.
     pub fn vertex_values<T: Copy>(&self, values: &[T], mix: impl Fn(T, T, f32) -> T) -> Vec<T> {
         let mut values = values.to_vec();
         for step in &self.steps {
@@ -59,7 +58,7 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
             .iter()
             .map(|o| {
                 let (a, b) = (positions[o.a as usize], positions[o.b as usize]);
-                // In f64: the cut must not depend on how long the edge is.
+                // In f64, because the cut must not depend on the length of the edge.
                 if o.t == 0.0 {
                     a
                 } else {
@@ -90,8 +89,8 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
     )
 }
 
-/// One plane: origins of the vertices that remain or are new, triangles, and the triangle each
-/// comes from.
+/// Clips with one plane. Returns the origins of the remaining and new vertices, the triangles, and
+/// the original triangle of each.
 fn cut(
     origin: DVec3,
     positions: &[Vec3],
@@ -122,7 +121,8 @@ fn cut(
                 polygon.push(*slot);
             }
             if (dv >= 0.0) != (dw >= 0.0) {
-                // Once per edge and always from the same end, so that neighbours stay joined.
+                // Once per edge and always from the same end, so that neighbouring triangles stay
+                // connected.
                 let edge = (v.min(w), v.max(w));
                 let vertex = *on_edges.entry(edge).or_insert_with(|| {
                     let (da, db) = (distance[edge.0 as usize], distance[edge.1 as usize]);

@@ -7,7 +7,7 @@ use rt_core::shapes::{Radii, Spheres, Tubes};
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Adds spheres and tubes where `shape` gives radii.
+/// Adds spheres and tubes where `shape` has radii.
 pub(super) fn add(shape: &Shape<'_>, built: &mut GeometrySet) {
     if shape.point_radius > 0.0 && !shape.verts.is_empty() {
         let centers = points_of(shape, &shape.verts);

@@ -6,7 +6,7 @@ use crate::input::{Cells, Ids, Shape};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Cells a task works on.
+/// Number of cells per task.
 const CHUNK: usize = 1 << 14;
 
 /// Triangles of all polygons, then of all strips, with their cells.
@@ -34,8 +34,8 @@ pub(super) fn triangles(
     (all().map(|t| t.0).collect(), CellOfTriangle::List(Arc::new(all().map(|t| t.1).collect())))
 }
 
-/// Which sides of the triangles of [`triangles`] are edges of their polygon: bit i for the side
-/// from corner i to the next.
+/// Marks the sides of the triangles of [`triangles`] that are edges of their polygon: bit i is the
+/// side from corner i to the next.
 pub(super) fn edges(shape: &Shape<'_>) -> Vec<u8> {
     let polys = expanded(&shape.polys, 0, |_, run, _, out| {
         for k in run.start + 1..run.end.saturating_sub(1) {
@@ -69,7 +69,7 @@ fn expanded(
         .collect()
 }
 
-/// Whether every cell has three points, one cell after the other.
+/// Whether every cell has three points and cells are contiguous.
 fn all_triangles(cells: &Cells<'_>) -> bool {
     let n = cells.len();
     n == 0
@@ -80,7 +80,7 @@ fn all_triangles(cells: &Cells<'_>) -> bool {
                 .all(|i| cells.offsets.at(i) == 3 * i as i64)
 }
 
-/// The connectivity of cells that all are triangles.
+/// The connectivity of cells that are all triangles.
 fn copied(connectivity: &Ids<'_>, n: usize) -> Vec<[u32; 3]> {
     let vertex = |v: i64| u32::try_from(v).unwrap_or(u32::MAX);
     match connectivity {

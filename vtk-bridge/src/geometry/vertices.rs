@@ -4,11 +4,11 @@ use crate::input::Points;
 use rayon::prelude::*;
 use rt_core::glam::{DVec3, Vec3};
 
-/// Points a task works on.
+/// Number of points per task.
 const CHUNK: usize = 1 << 15;
 
-/// Origin and offsets from it: zero and the points themselves where they are `f32`, which is all
-/// the precision there is.
+/// An origin and the offsets from it. For `f32` points these are zero and the points themselves,
+/// because they have no more precision.
 pub(super) fn relative(points: &Points<'_>) -> (DVec3, Vec<Vec3>) {
     match points {
         Points::F32(p) => (DVec3::ZERO, vectors(p)),
@@ -25,8 +25,8 @@ pub(super) fn vectors(values: &[[f32; 3]]) -> Vec<Vec3> {
     values.par_iter().with_min_len(CHUNK).map(|v| Vec3::from(*v)).collect()
 }
 
-/// Middle of the finite points where they lie further from zero than they are apart; else zero, so
-/// that nothing changes.
+/// Centre of the finite points if they are farther from zero than from one another. Otherwise zero,
+/// so that nothing changes.
 fn middle_if_far(points: &[[f64; 3]]) -> DVec3 {
     let empty = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (lo, hi) = points
