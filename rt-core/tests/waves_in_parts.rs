@@ -227,8 +227,8 @@ fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
     }
 }
 
-/// Merges the hits of light rays from all data servers. A ray that one of them reports as blocked is
-/// blocked.
+/// Merges the hits of light rays from all data servers. A ray that one of them reports as blocked
+/// is blocked.
 fn light_hits(
     holders: &[Holder<'_>],
     scene: &Scene,
