@@ -20,35 +20,35 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::ThreadId;
 use std::time::Instant;
 
-/// Everything a drawing needs; it refers to no object of the program.
+/// All input of a rendering. It refers to no object of the program.
 pub(crate) struct Order {
     pub(crate) compiled: CompiledWorld,
     pub(crate) camera: Camera,
     pub(crate) view: RendererSettings,
     pub(crate) channels: BTreeMap<&'static str, DataType>,
-    /// Key of what is drawn, when frames are to be added up.
+    /// Key of the rendered contents, when frames are accumulated.
     pub(crate) accumulate: Option<Vec<u64>>,
     /// Sums of earlier frames.
     pub(crate) sums: Arc<Mutex<Accumulated>>,
-    /// Takes what could not be done, and warnings.
+    /// Receives the error, or the warnings.
     pub(crate) tell: Box<dyn FnOnce(Result<Vec<String>, String>) + Send>,
     /// Called at the end.
     pub(crate) completed: Box<dyn FnOnce() + Send>,
 }
 
-/// A drawing in work or done.
+/// A rendering that is running or finished.
 pub(crate) struct Job {
     picture: Mutex<Option<Arc<FrameImage>>>,
     done: Condvar,
     cancel: Arc<AtomicBool>,
     thread: Mutex<Option<ThreadId>>,
-    /// Whether also the completion callback has returned.
+    /// Whether the completion callback has returned, too.
     over: Mutex<bool>,
     over_signal: Condvar,
 }
 
 impl Job {
-    /// Waits until nothing of the program will be called any more.
+    /// Waits until no more callbacks of the program will be called.
     pub(crate) fn wait_until_over(&self) {
         let mut over = lock(&self.over);
         while !*over && *lock(&self.thread) != Some(std::thread::current().id()) {
@@ -60,7 +60,7 @@ impl Job {
         lock(&self.picture).is_some()
     }
 
-    /// Asks it to stop soon.
+    /// Requests a stop.
     pub(crate) fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);
     }
@@ -81,7 +81,7 @@ impl Job {
     }
 }
 
-/// Starts drawing.
+/// Starts rendering.
 pub(crate) fn start(order: Order) -> Arc<Job> {
     let job = Arc::new(Job {
         picture: Mutex::default(),
@@ -101,7 +101,7 @@ pub(crate) fn start(order: Order) -> Arc<Job> {
             }
         }
     };
-    // Without a thread to be had, the frame is drawn here and now.
+    // If no thread can be started, the frame is rendered on this one.
     if std::thread::Builder::new().name("anari frame".into()).spawn(work.clone()).is_err() {
         work();
     }
@@ -112,8 +112,8 @@ fn run(order: Order, job: &Job) {
     *lock(&job.thread) = Some(std::thread::current().id());
     let started = Instant::now();
     let size = [order.view.options.width, order.view.options.height];
-    // rt-core reports a panic in a tile as an error; this is for everything else, so that nobody
-    // waits for ever.
+    // rt-core reports a panic in a tile as an error. This guard is for all other panics, so that no
+    // caller waits forever.
     let drawn = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| draw(&order, job)));
     let drawn = drawn.unwrap_or_else(|_| {
         Err("internal error: the drawing panicked; please report it".to_owned())
@@ -139,8 +139,8 @@ fn run(order: Order, job: &Job) {
     job.over_signal.notify_all();
 }
 
-/// The world with its acceleration structures: that of the last frame when nothing of it has
-/// changed.
+/// The world with its acceleration structures. If nothing in it has changed, this is the world of
+/// the last frame.
 fn build(compiled: &CompiledWorld) -> Result<Arc<World>, String> {
     let mut built = lock(&compiled.built);
     if let Some(old) = &*built {
@@ -221,7 +221,7 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
         if sums.key != *key {
             *sums = Accumulated { key: key.clone(), ..Accumulated::default() };
         }
-        // One sample would always be the pixel's centre: there would be nothing to add up.
+        // A single sample would always be at the pixel's centre, so accumulation would add nothing.
         options.samples = options.samples.max(2);
         options.seed = u64::from(sums.passes);
     }
@@ -263,7 +263,7 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
             "channel.objectId" => numbers(&frame, &compiled.ids, |id, _| id.object),
             "channel.instanceId" => numbers(&frame, &compiled.ids, |id, _| id.instance),
             "channel.albedo" => {
-                // The colour without light: the same scene, drawn unlit.
+                // The colour without light: the same scene, rendered unlit.
                 let mut flat = scene.clone();
                 flat.materials.iter_mut().for_each(|m| {
                     m.model = SurfaceModel::Unlit;
@@ -278,7 +278,7 @@ fn draw(order: &Order, job: &Job) -> Result<(FrameImage, Vec<String>), String> {
                 let (layers, path_tracing) = (Layers::COLOR, false);
                 let once = RenderOptions { layers, path_tracing, samples: 1, ..options.clone() };
                 let pinhole = ThinLens { aperture_radius: 0.0, focus_distance: 1.0 };
-                // A camera without a lens stays as it is, so there is nothing to refuse.
+                // A camera without a lens stays unchanged, so nothing can be refused.
                 let sharp = if camera.lens().is_some() {
                     camera.with_lens(pinhole).unwrap_or(*camera)
                 } else {

@@ -8,7 +8,7 @@ use crate::anari::object::{Object, Value};
 use rt_core::glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 
-/// Names that a material or sampler may ask for.
+/// Attribute names that a material or sampler may use.
 pub const NAMES: &[&str] = &[
     "color",
     "attribute0",
@@ -21,11 +21,11 @@ pub const NAMES: &[&str] = &[
     "objectNormal",
 ];
 
-/// Names of the attributes that geometries and instances carry.
+/// Names of the attributes that geometries and instances can have.
 pub(crate) const SLOTS: &[&str] =
     &["color", "attribute0", "attribute1", "attribute2", "attribute3"];
 
-/// Where an attribute comes from.
+/// Source of an attribute's values.
 #[derive(Clone)]
 pub(crate) enum Source {
     /// The same everywhere.
@@ -42,30 +42,30 @@ pub(crate) enum Source {
     Normal { world: bool },
 }
 
-/// How primitives of the renderer belong to vertices and primitives of the ANARI geometry.
+/// Maps primitives of the renderer to vertices and primitives of the ANARI geometry.
 #[derive(Default)]
 pub(crate) struct Topology {
-    /// Vertices of each primitive of the renderer: one, two or three in use. Empty when there are
+    /// Vertices of each primitive of the renderer; one, two or three are used. Empty when there are
     /// no vertices.
     pub(crate) vertices: Vec<[u32; 3]>,
-    /// Elements of the arrays `faceVarying.*`.
+    /// Indices of the corners in the arrays `faceVarying.*`.
     pub(crate) corners: Vec<[u32; 3]>,
-    /// ANARI's number of each primitive.
+    /// ANARI's number of each primitive of the renderer.
     pub(crate) numbers: Numbers,
-    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t; else it has ANARI's
-    /// vertices.
+    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t. Otherwise the mesh
+    /// has ANARI's vertices.
     pub(crate) unshared: bool,
 }
 
 /// ANARI's numbers of the renderer's primitives.
 #[derive(Default)]
 pub(crate) enum Numbers {
-    /// The same.
+    /// Equal to the renderer's numbers.
     #[default]
     Same,
-    /// By the renderer's number.
+    /// Listed by the renderer's number.
     Listed(Vec<u32>),
-    /// One for all.
+    /// One number for all primitives.
     All(u32),
 }
 
@@ -79,7 +79,7 @@ impl Topology {
     }
 }
 
-/// A point on a geometry, as far as attributes need it.
+/// A point on a geometry, with the data that attributes need.
 pub(crate) struct HitPoint<'a> {
     pub(crate) topology: &'a Topology,
     /// The renderer's primitive.
@@ -129,7 +129,7 @@ impl Source {
         })
     }
 
-    /// The value at a place; elements past the end of an array are (0, 0, 0, 1).
+    /// The value at a hit point. Elements past the end of an array are (0, 0, 0, 1).
     pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
         let get =
             |v: &[[f32; 4]], i: u32| v.get(i as usize).copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
@@ -160,7 +160,7 @@ impl Source {
         }
     }
 
-    /// What the renderer has to do to get it right everywhere.
+    /// The simplest representation that shows this source exactly.
     pub(crate) fn domain(&self) -> Domain {
         match self {
             Source::Uniform(_) => Domain::Constant,
@@ -171,7 +171,7 @@ impl Source {
     }
 }
 
-/// On what a value depends.
+/// The dependence of a value on its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Domain {
     /// The same everywhere.
@@ -182,6 +182,6 @@ pub(crate) enum Domain {
     Linear,
     /// A texture at coordinates that are linear between vertices.
     Texture,
-    /// Anything: to be computed at every hit.
+    /// Arbitrary: computed at every hit.
     Hit,
 }

@@ -81,13 +81,13 @@ fn ior_of(material: &Object) -> Result<f32, f32> {
     if ior.is_finite() && ior >= 1.0 { Ok(ior) } else { Err(ior) }
 }
 
-/// Of light that falls straight onto glass.
+/// Reflectance of glass at normal incidence.
 fn normal_reflectance(ior: f32) -> f32 {
     ((ior - 1.0) / (ior + 1.0)).powi(2)
 }
 
-/// The attribute or sampler that a parameter names; `None` where it is a number, not set, or cannot
-/// be used.
+/// The attribute or sampler that a parameter names. `None` if the parameter is a number, is not set
+/// or cannot be used.
 fn varying(
     material: &Object,
     name: &str,
@@ -115,7 +115,8 @@ fn varying(
     }
 }
 
-/// What varies besides colour and opacity on `geometry` in `instance`; `None` for nothing.
+/// The inputs besides colour and opacity that vary on `geometry` in `instance`; `None` if there are
+/// none.
 pub(crate) fn material_inputs_of(
     material: &Object,
     geometry: &Object,
@@ -141,7 +142,7 @@ pub(crate) fn material_inputs_of(
     material_inputs.varies().then_some(material_inputs)
 }
 
-/// Where colour and opacity come from on `geometry` in `instance`.
+/// Sources of colour and opacity on `geometry` in `instance`.
 pub(crate) fn surface_color_of(
     material: &Object,
     geometry: &Object,
@@ -166,7 +167,7 @@ pub(crate) fn surface_color_of(
     SurfaceColor { color, opacity, mode }
 }
 
-/// Whether the look depends on where the instance is.
+/// Whether the appearance depends on the instance's position.
 pub(crate) fn uses_world_space(material: &Object) -> bool {
     material.parameters().values().any(|v| match v {
         Value::Text(t) => t.starts_with("world"),

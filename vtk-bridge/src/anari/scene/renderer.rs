@@ -6,17 +6,17 @@ use rt_core::render::RenderOptions;
 use rt_core::scene::AmbientOcclusion;
 use rt_core::volume::VolumeQuality;
 
-/// How a frame is drawn.
+/// Settings for rendering a frame.
 pub(crate) struct RendererSettings {
     pub(crate) options: RenderOptions,
-    /// Radiance from everywhere.
+    /// Radiance from all directions.
     pub(crate) ambient: Option<[f32; 3]>,
     pub(crate) occlusion: Option<AmbientOcclusion>,
     pub(crate) shadows: bool,
     pub(crate) backdrop: FrameBackground,
 }
 
-/// What fills the pixels behind everything.
+/// Background of a frame.
 pub(crate) enum FrameBackground {
     /// Linear, not premultiplied.
     Color([f32; 4]),
@@ -25,7 +25,7 @@ pub(crate) enum FrameBackground {
 }
 
 impl FrameBackground {
-    /// At `x`, `y` in 0..1, y upwards; linear between texels.
+    /// The colour at `x`, `y` in 0..1, y upwards, linear between texels.
     pub(crate) fn at(&self, x: f32, y: f32) -> [f32; 4] {
         let (size, texels) = match self {
             FrameBackground::Color(c) => return *c,
@@ -44,7 +44,7 @@ impl FrameBackground {
     }
 }
 
-/// The options that `renderer` asks for.
+/// The settings that `renderer` requests.
 pub(crate) fn renderer_settings(
     renderer: &Object,
     size: [u32; 2],

@@ -18,7 +18,7 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::scene::Appearance;
 use std::sync::Arc;
 
-/// Ready to be placed.
+/// A surface that is ready for instances.
 #[derive(Clone)]
 pub(crate) struct CompiledSurface {
     pub(crate) geometry: Geometry,
@@ -160,7 +160,7 @@ fn domain_of(surface_color: &SurfaceColor) -> Domain {
         Domain::Linear | Domain::Texture if steps || color.min(opacity) > Domain::Constant => {
             Domain::Hit
         }
-        // Textures hold colours, not opacities.
+        // Textures can hold colours, but not opacities.
         Domain::Texture if color != Domain::Texture => Domain::Hit,
         domain => domain,
     }

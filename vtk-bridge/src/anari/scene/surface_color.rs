@@ -28,7 +28,7 @@ impl Input {
     }
 }
 
-/// What alpha means.
+/// The meaning of alpha.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum AlphaMode {
     Opaque,
@@ -68,19 +68,19 @@ impl SurfaceColor {
     }
 }
 
-/// How a shape's hits belong to vertices.
+/// Maps a shape's hits to vertex weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Weights {
-    /// All of the first vertex.
+    /// The first vertex has all the weight.
     First,
-    /// `u` from the first to the second.
+    /// `u` interpolates from the first vertex to the second.
     Along,
-    /// `u` and `v` are the weights of the second and third.
+    /// `u` and `v` are the weights of the second and third vertex.
     Corners,
 }
 
 impl Weights {
-    /// Weights of the vertices at a hit with the numbers `u` and `v`.
+    /// Weights of the vertices at a hit with the surface coordinates `u` and `v`.
     pub(crate) fn of(self, [u, v]: [f32; 2]) -> [f32; 3] {
         match self {
             Weights::First => [1.0, 0.0, 0.0],
@@ -90,7 +90,7 @@ impl Weights {
     }
 }
 
-/// A shape with painted hits.
+/// A shape whose hits have computed colours.
 pub(crate) struct ColoredShape {
     pub(crate) shape: Arc<dyn Shape>,
     pub(crate) weights: Weights,
@@ -143,7 +143,7 @@ impl Shape for ColoredShape {
     }
 }
 
-/// Triangles as a shape, for paints that meshes cannot hold.
+/// Triangles as a shape, for colours that meshes cannot represent.
 pub(crate) struct TriangleShape(pub(crate) Arc<TriMesh>);
 
 impl TriangleShape {
@@ -153,16 +153,16 @@ impl TriangleShape {
         Some([p(a)?, p(b)?, p(c)?])
     }
 
-    /// Distance and weights of the second and third corner, in f64 from f32 input: the products of
-    /// the edge functions are exact to 2⁻⁵³, so that neighbours along an edge agree for all but the
+    /// Distance and weights of the second and third corner, in f64 from f32 input. The products of
+    /// the edge functions are exact to 2⁻⁵³, so triangles that share an edge agree for all but the
     /// rarest rays.
     fn meet(&self, prim: u32, ray: &Ray) -> Option<(f64, f64, f64)> {
         let o = ray.origin.as_dvec3();
         let [a, b, c] = self.corners(prim)?.map(|p| p.as_dvec3() - o);
         let d = ray.dir.as_dvec3();
-        // Signed volumes against the ray: the three have one sign where the ray passes between the
-        // edges (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013, section 3,
-        // without the shear).
+        // Signed volumes with the ray. All three have the same sign where the ray passes between
+        // the edges (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013, section
+        // 3, without the shear).
         let (u, v, w) = (d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a)));
         let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
         let sum = u + v + w;
@@ -217,7 +217,7 @@ impl Shape for TriangleShape {
                 let id = self.0.indices[prim as usize];
                 let at = |k: usize| n.values[id[k] as usize].as_dvec3();
                 let mixed = (at(0) * (1.0 - u - v) + at(1) * u + at(2) * v).normalize_or(flat);
-                // On the side of the flat one, which decides what is outside.
+                // On the side of the flat normal, which decides the outside.
                 if mixed.dot(flat) < 0.0 { -mixed } else { mixed }
             }
             _ => flat,

@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex};
 
 type FrameCache<T> = HashMap<Vec<u64>, Arc<T>>;
 
-/// What a world object keeps.
+/// Data cached by a world object.
 #[derive(Default)]
 pub struct WorldCache {
     geometries: FrameCache<CompiledGeometry>,
@@ -37,7 +37,7 @@ pub struct WorldCache {
     pub(crate) built: Arc<Mutex<Option<Arc<World>>>>,
 }
 
-/// Everything of a world, in the renderer's terms.
+/// The contents of a world, converted for the renderer.
 #[derive(Default)]
 pub(crate) struct CompiledWorld {
     pub(crate) geometries: Vec<Geometry>,
@@ -52,14 +52,15 @@ pub(crate) struct CompiledWorld {
     pub(crate) built: Arc<Mutex<Option<Arc<World>>>>,
 }
 
-/// What the id channels say of an instance of the renderer.
+/// Values of the id channels for an instance of the renderer.
 pub(crate) struct Ids {
     pub(crate) object: u32,
     pub(crate) instance: u32,
     pub(crate) topology: Arc<Topology>,
 }
 
-/// Values that decide what is made of an object; `keep` chooses its own parameters.
+/// Collects the values that decide the result for an object. `keep` selects the object's own
+/// parameters.
 pub(crate) fn fingerprint(object: &Object, keep: &dyn Fn(&str) -> bool, out: &mut Vec<u64>) {
     out.push(object.handle.0);
     if object.kind.is_array() {
@@ -75,7 +76,7 @@ pub(crate) fn fingerprint(object: &Object, keep: &dyn Fn(&str) -> bool, out: &mu
     }
 }
 
-/// Finds or makes, and keeps for the next frame.
+/// Finds a cached value or makes one, and keeps it for the next frame.
 fn cached<T>(
     old: &FrameCache<T>,
     new: &mut FrameCache<T>,
@@ -142,7 +143,7 @@ struct WorldCompiler<'a> {
     out: CompiledWorld,
     /// Index of each geometry by its address.
     known: HashMap<usize, usize>,
-    /// Index of each look's material by the look's address.
+    /// Index of each appearance's material by the appearance's address.
     materials: HashMap<usize, usize>,
     diagnostics: &'a mut Diagnostics,
 }
