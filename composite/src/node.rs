@@ -21,7 +21,7 @@ impl<P: Composite> Compositor<P> {
     /// over all ranks if nodes have the same size and all counts are powers of two.
     ///
     /// # Errors
-    /// As [`Compositor::composite`], and as [`composite_shared`].
+    /// As [`Compositor::composite`], and as [`crate::composite_shared`].
     pub fn composite_node(
         &mut self,
         comm: &mut dyn Communicator,
