@@ -13,7 +13,7 @@ use rt_core::material::{ColorSource, Material, SurfaceModel};
 use rt_core::scene::Appearance;
 use std::collections::HashMap;
 
-/// The lists of a scene. Appearances and encodings have one entry per instance.
+/// The assembled lists. Appearances and encodings have one entry per instance.
 #[derive(Default)]
 pub(crate) struct Assembled {
     pub(crate) geometries: Vec<Geometry>,
@@ -21,11 +21,11 @@ pub(crate) struct Assembled {
     pub(crate) appearances: Vec<Appearance>,
     pub(crate) materials: Vec<Material>,
     pub(crate) encodings: Vec<Encoding>,
-    /// One per instance; empty when there are no edges at all.
+    /// One entry per instance; empty if no instance has edges.
     pub(crate) edges: Vec<Option<Edges>>,
 }
 
-/// Puts the lists together.
+/// Assembles the lists.
 pub(crate) fn assemble(
     surfaces: &[FrameSurface],
     options: &Options,
@@ -85,7 +85,7 @@ pub(crate) fn assemble(
 }
 
 impl Assembled {
-    /// Edges of the instances from `first` on.
+    /// Adds edges for the instances from index `first` on.
     fn add_edges(&mut self, d: &FrameSurface, first: usize, is_mesh: bool, reach: f64) {
         let Some(mesh) =
             d.built.mesh.as_ref().filter(|m| d.property.edge_width > 0.0 && m.clip_map.is_none())
@@ -181,7 +181,7 @@ pub(crate) fn any_ambient(materials: &[Material]) -> bool {
         .any(|m| matches!(m.model, SurfaceModel::Phong { ambient, .. } if ambient > 0.0))
 }
 
-/// Whether reflection rays are sent. Material properties alone do not request them, because every
+/// Whether to trace reflection rays. Surface properties alone do not request them, because every
 /// physically based surface reflects a little.
 pub(crate) fn wants_reflections(options: &Options) -> bool {
     options.reflections

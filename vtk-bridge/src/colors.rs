@@ -14,21 +14,21 @@ use std::sync::Arc;
 pub enum MeshColors {
     /// RGBA of vertices or triangles.
     Values(Arc<Attribute<[f32; 4]>>),
-    /// Positions in a colour map.
+    /// Positions on a colour map.
     Mapped(Arc<Attribute<f32>>, Arc<ColorMap>),
 }
 
 /// Number of values per task.
 const CHUNK: usize = 1 << 14;
 
-/// VTK's colours are the numbers of the final image: neither the colours are decoded nor the image
-/// encoded.
+/// Converts bytes to floats. VTK writes its colours to the image unchanged, so they are not decoded
+/// here and the image is not encoded.
 fn float(c: [u8; 4]) -> [f32; 4] {
     c.map(|v| f32::from(v) / 255.0)
 }
 
-/// Converts `color` for `built`, or returns the reason why that is impossible. `points` is the
-/// number of points that the colours were made for.
+/// Resolves `color` for `built`, or says why that is impossible. `points` is the number of points
+/// that the colours were made for.
 pub fn resolve(
     color: &Color<'_>,
     built: &PolygonMesh,
@@ -68,8 +68,8 @@ pub fn resolve(
             if coordinates.len() < points || row.is_empty() {
                 return Err(length("points", points, coordinates.len()));
             }
-            // A table whose range is a single number gives 0/0 for that number. OpenGL then uses
-            // the table's first colour.
+            // A lookup table whose range is a single number yields 0/0 for that number; OpenGL then
+            // takes the first colour.
             let place = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-1000.0, 1000.0) };
             let of = |c: &[f32; 2]| if c[1] > 0.5 { f32::NAN } else { place(c[0]) };
             let values: Vec<f32> =
@@ -86,21 +86,21 @@ pub fn resolve(
     }
 }
 
-/// Most entries of a map that steps are made of.
+/// Maximum number of entries of a stepped map.
 const MAP_ENTRIES: usize = 4096;
 
-/// VTK uses the nearest colour of its row, but rt-core's maps are linear between colours. Each
-/// colour is repeated, so that only a small part of the range lies between two different ones.
+/// VTK takes the nearest colour of its row, but rt-core's maps interpolate linearly. Each colour is
+/// therefore repeated, so that only a small part of the range lies between two different ones.
 fn stepped(row: &[[u8; 4]], nan: [u8; 4]) -> ColorMap {
     let repeat = (MAP_ENTRIES / row.len()).max(1);
     let n = row.len() * repeat;
     let colors = row.iter().flat_map(|c| std::iter::repeat_n(float(*c), repeat)).collect();
-    // Entry k of n belongs to the middle of its part of 0..1, as with texels.
+    // Entry k of n is centred in its part of 0..1, as texels are.
     let half = 0.5 / n as f32;
     ColorMap { nan_color: float(nan), ..ColorMap::new(colors, [half, 1.0 - half]) }
 }
 
-/// Converts a texture. Texels are decoded only when the texture is marked as sRGB (see `float`).
+/// Converts a texture; only images marked as sRGB are decoded (see `float`).
 pub fn texture(image: &Image<'_>) -> Option<Texture> {
     let decode = |v: f32| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
     let linear = |c: [u8; 4]| {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Number of pixels or triangles per task.
 const CHUNK: usize = 1 << 14;
-/// Beyond sides that are no edges nothing is drawn from here on, pixels.
+/// Cut-off in pixels: nothing is drawn further than this beyond a side that is not an edge.
 const DIAGONAL_CUTOFF_PX: f64 = -0.5;
 
 /// The edges of one instance.
@@ -23,29 +23,30 @@ pub(crate) struct Edges {
     world_from_object: DAffine3,
     color: [f32; 3],
     width_px: f64,
-    /// Triangles with this winding in the window are not drawn: 1 or −1 (rows from the top), or
-    /// both.
+    /// Whether triangles of each winding in the window are culled: index 0 for winding −1, index 1
+    /// for winding 1 (rows counted from the top).
     culled: [bool; 2],
-    /// Distance that a corner moves, in line widths. VTK 9.1's shader means half a width, but
-    /// treats the window as wide as its coordinates from −1 to 1, so it moves corners by a quarter.
+    /// How far a corner moves, in line widths. VTK 9.1's shader intends half a width, but it treats
+    /// the window as one unit wide although its coordinates run from −1 to 1, so corners move by a
+    /// quarter.
     reach: f64,
 }
 
 /// A triangle in the window; x and y in pixels from the top left.
 struct ProjectedTriangle {
     corners: [DVec2; 3],
-    /// The corners after the geometry shader moved them.
+    /// Corners after the geometry shader has moved them.
     moved: [DVec2; 3],
     depths: [f64; 3],
-    /// Normal of each side, pointing inwards, with length 1.
+    /// Unit normal of each side, pointing inwards.
     inward: [DVec2; 3],
     /// As in [`PolygonMesh::edges`].
     sides: u8,
-    /// 1 or −1.
+    /// Orientation in the window: 1 or −1.
     winding: f64,
 }
 
-/// A pixel of an edge that lies outside the surface's pixels.
+/// A pixel of an edge outside the surface.
 struct Fragment {
     pixel: u32,
     depth: f32,
@@ -69,8 +70,8 @@ impl Edges {
         }
     }
 
-    /// `None` for triangles with a corner behind the eye, which has no window position, and for
-    /// triangles without area.
+    /// Returns `None` for triangles with a corner behind the eye, which has no window position, and
+    /// for triangles without an area.
     fn project(&self, primitive: usize, view: &View) -> Option<ProjectedTriangle> {
         let indices = self.mesh.indices.get(primitive)?;
         let sides = self.sides.as_ref().map_or(7, |s| s.get(primitive).copied().unwrap_or(7));
@@ -99,13 +100,13 @@ impl Edges {
         Some(ProjectedTriangle { corners, moved, depths, inward, sides, winding: winding.signum() })
     }
 
-    /// Weight of the edge's colour at distances `d` from the sides of a triangle.
+    /// How much of the edge's colour is visible at distances `d` from the sides of a triangle.
     fn coverage(&self, t: &ProjectedTriangle, d: &[f64; 3]) -> f32 {
         let of_edges = (0..3).filter(|&i| t.is_edge(i)).map(|i| d[i]).fold(f64::INFINITY, f64::min);
         (0.5 + 0.5 * self.width_px - of_edges).clamp(0.0, 1.0) as f32
     }
 
-    /// Pixels of the edges of triangle `primitive` that lie outside the triangle and in front of
+    /// Finds the pixels of triangle `primitive`'s edges that lie outside it and in front of
     /// `depth`.
     fn outline_fragments(
         &self,
@@ -115,14 +116,14 @@ impl Edges {
         out: &mut Vec<Fragment>,
     ) {
         let Some(t) = self.project(primitive, view) else { return };
-        // OpenGL's front faces are counter-clockwise with rows from the bottom, so clockwise with
-        // rows from the top.
+        // OpenGL's front faces wind counter-clockwise with rows from the bottom, so they wind
+        // clockwise with rows from the top.
         if self.culled[usize::from(t.winding > 0.0)] {
             return;
         }
         let low = t.moved.iter().fold(DVec2::INFINITY, |m, p| m.min(*p)).max(DVec2::ZERO);
         let high = t.moved.iter().fold(DVec2::NEG_INFINITY, |m, p| m.max(*p));
-        // `as` saturates and converts NaN to 0.
+        // `as` saturates and maps NaN to 0.
         let end = [(high.x + 0.5) as usize, (high.y + 0.5) as usize];
         let (width, height) = (view.width as usize, view.height as usize);
         for y in (low.y - 0.5).ceil().max(0.0) as usize..end[1].min(height) {
@@ -147,7 +148,7 @@ impl ProjectedTriangle {
         self.sides >> side & 1 != 0
     }
 
-    /// Distances from each side, positive inside.
+    /// Distances from the sides, positive inside.
     fn distances(&self, p: DVec2) -> [f64; 3] {
         std::array::from_fn(|i| self.inward[i].dot(p - self.corners[i]))
     }
@@ -170,15 +171,15 @@ impl ProjectedTriangle {
     }
 }
 
-/// Draws the edges of all instances into `frame`, which must have its identity layers. `edges` has
-/// one entry per instance, or is empty. `first_depth` is the depth of translucent surfaces in front
-/// of the opaque ones, or is empty.
+/// Draws the edges of all instances into `frame`, which has its identity layers. `edges` has one
+/// entry per instance, or is empty. `first_depth` is the depth of the first surface in front of the
+/// opaque ones, or empty.
 pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges>], view: &View) {
     if edges.is_empty() {
         return;
     }
-    // Translucent surfaces in front of the opaque ones hide the part of an edge that has no surface
-    // behind it.
+    // A translucent surface in front of the opaque ones hides the part of an edge that has no
+    // surface behind it.
     let veiled: Vec<bool> =
         first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
 
@@ -225,8 +226,8 @@ mod tests {
     use super::*;
     use rt_core::glam::{DMat4, Vec3};
 
-    /// A square from pixel (50, 50) to (100, 0), in the middle of the depth, whose diagonal is no
-    /// edge.
+    /// A square from pixel (50, 50) to (100, 0), in the middle of the depth range, whose diagonal
+    /// is not an edge.
     fn square() -> (Edges, View) {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
@@ -260,7 +261,7 @@ mod tests {
         let (edges, view) = square();
         let t = edges.project(0, &view).expect("a triangle");
         let at = |x, y| edges.coverage(&t, &t.distances(DVec2::new(x, y)));
-        // Rows come from the top: the bottom edge is at y = 75.
+        // Rows count from the top, so the bottom edge is at y = 75.
         assert_eq!([at(50.0, 74.5), at(60.0, 72.0), at(50.0, 50.5)], [1.0, 0.0, 0.0]);
         assert!((at(60.0, 73.0) - 0.5).abs() < 1e-6, "the rim fades");
     }
@@ -282,8 +283,8 @@ mod tests {
             frame
         };
         let shown = |f: &Frame, x: usize, y: usize| f.depth[y * 100 + x] < 1.0;
-        // A corner moves by one pixel along the diagonal, that is 0.7 pixels in x and in y: the
-        // pixels whose middle is half a pixel outside.
+        // A corner moves by one pixel along the diagonal, which is 0.7 pixels in x and in y. That
+        // covers the pixels whose centre is half a pixel outside.
         let (again, _) = square();
         let frame = draw(again, 1.0);
         assert!(

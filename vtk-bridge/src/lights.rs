@@ -4,7 +4,7 @@ use crate::input::{LightKind, SceneLight};
 use crate::options::Options;
 use rt_core::light::{Light, LightKind as Kind};
 
-/// Converts the lights that have an effect. `shadows` is true when they may cast shadows.
+/// Converts the lights that have an effect. `options` may request shadows.
 pub fn lights(scene: &[SceneLight], shadows: bool, options: &Options) -> Vec<Light> {
     scene.iter().filter_map(|l| light(l, shadows, options)).collect()
 }
@@ -25,7 +25,7 @@ fn light(l: &SceneLight, shadows: bool, options: &Options) -> Option<Light> {
         LightKind::Directional => {
             Kind::Directional { to_light: -axis, angular_radius_rad: options.light_size_rad }
         }
-        // A light with the requested angular size, as seen from the point it is aimed at.
+        // The light's radius subtends the requested angle at the focal point.
         LightKind::Point => Kind::Point {
             position: l.position,
             radius: axis.length() * options.light_size_rad.tan(),

@@ -16,12 +16,12 @@ use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-/// Opacity 1 would be infinite extinction.
+/// Opacity 1 would mean infinite extinction.
 const MAX_OPACITY: f32 = 0.999_999;
 /// Number of values per task.
 const CHUNK: usize = 1 << 14;
 
-/// A cached volume, made from one grid.
+/// The cached volume of one grid.
 struct CachedVolume {
     volume: Arc<Volume>,
     /// Hash of everything except the scalars.
@@ -29,7 +29,7 @@ struct CachedVolume {
     used: bool,
 }
 
-/// The volumes of a renderer.
+/// The cached volumes of a renderer.
 #[derive(Default)]
 pub(crate) struct VolumeCache {
     kept: HashMap<u64, CachedVolume>,
@@ -37,7 +37,7 @@ pub(crate) struct VolumeCache {
 }
 
 impl VolumeCache {
-    /// Begins a frame.
+    /// Starts a new frame.
     pub(crate) fn begin(&mut self) {
         self.placed.clear();
         self.kept.values_mut().for_each(|m| m.used = false);
@@ -53,20 +53,20 @@ impl VolumeCache {
         &self.placed
     }
 
-    /// Forgets grids that were not added this frame.
+    /// Drops grids that were not added in this frame.
     pub(crate) fn forget_unused(&mut self) {
         self.kept.retain(|_, m| m.used);
     }
 
-    /// Adds `v` at `place`, and what it looks like to `content`. Number of cells, and what the user
-    /// should know.
+    /// Adds `v` at `place` and hashes its appearance into `content`. Returns the number of cells
+    /// and an optional note for the user.
     pub(crate) fn add(
         &mut self,
         v: &Input<'_>,
         place: DAffine3,
         content: &mut DefaultHasher,
     ) -> Result<(u64, Option<String>), String> {
-        // Lights are fixed in the volume's axes, so that a turned volume looks different.
+        // Lights are stored in the volume's axes, so a rotated volume has a different appearance.
         let lights = lights(v, place)?;
         let appearance = appearance_hash(v, &lights);
         (v.key, appearance).hash(content);
@@ -110,7 +110,7 @@ impl VolumeCache {
     }
 }
 
-/// A hash of everything except the scalars and the transform.
+/// Hash of everything except the scalars and the transform.
 fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
     let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
@@ -121,11 +121,11 @@ fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     h.finish()
 }
 
-/// Lights in the axes of a volume with the transform `place`.
+/// Converts lights to the axes of a volume at `place`.
 fn lights(v: &Input<'_>, place: DAffine3) -> Result<Vec<VolumeLight>, String> {
     let to_volume = place.matrix3.transpose();
-    // The transform may only rotate and scale evenly. Otherwise right angles in the volume are not
-    // right angles in the world.
+    // Only rotation and uniform scale are supported: any other transform does not preserve right
+    // angles.
     let square = to_volume * place.matrix3;
     let scale = square.x_axis.x;
     let even = square.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(scale)), 1e-6 * scale.abs());
@@ -206,7 +206,7 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
             Blend::Isosurfaces(values.iter().map(|v| *v as f32).collect())
         }
     };
-    // As OpenGL's textures.
+    // As in OpenGL's textures.
     let clamped_gradients = true;
     let options = VolumeOptions {
         shading,
@@ -219,7 +219,8 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
     Volume::new(grid, transfer, options).map_err(|e| format!("a volume: {e}"))
 }
 
-/// Removes points on the line between their neighbours: fewer bends mean fewer integration steps.
+/// Drops points that lie on the line between their neighbours. Fewer bends mean fewer integration
+/// steps.
 fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     let mut out: Vec<[f32; 2]> = Vec::with_capacity(points.len());
     for p in points {
@@ -234,9 +235,9 @@ fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
     out
 }
 
-/// Sets the window depth of pixels that show a volume to the middle of the ray's segment inside it,
-/// where that is in front of `depth`. Objects that OpenGL draws nearer appear in front of the
-/// volume; objects farther away are visible through it.
+/// Sets the window depth of pixels that show a volume to the middle of the ray's segment through
+/// it, where that is in front of `depth`. What OpenGL draws nearer appears in front of the volume;
+/// what it draws further away is seen through the volume.
 pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mut [f32]) {
     let world_from_clip = view.clip_from_world.inverse();
     let boxes: Vec<(DAffine3, Vec3, Vec3)> = volumes
@@ -259,8 +260,8 @@ pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mu
             let (mut near, mut far) = (0.0f64, 1.0f64);
             for k in 0..3 {
                 let (u, v) = ((f64::from(lo[k]) - a[k]) / d[k], (f64::from(hi[k]) - a[k]) / d[k]);
-                // Parallel to the face: NaN and infinities either leave both ends unchanged or make
-                // the segment empty, as they should.
+                // For rays parallel to the face, NaN and infinities either leave both ends
+                // unchanged or make the interval empty, as intended.
                 (near, far) = (near.max(u.min(v)), far.min(u.max(v)));
             }
             if near < far {

@@ -7,10 +7,10 @@ use crate::input::{
 };
 use rt_core::glam::DMat4;
 
-/// `array` as a slice of `N` numbers each; empty when there is none.
+/// Returns `array` as a slice of `N` numbers per element; empty when there is no array.
 ///
 /// # Safety
-/// The array has the length it says, and nobody writes to it while the result lives.
+/// The array has its stated length, and nobody writes to it while the result lives.
 unsafe fn tuples<'a, T, const N: usize>(
     array: &RtvArray,
     what: &str,
@@ -34,10 +34,10 @@ unsafe fn tuples<'a, T, const N: usize>(
     Ok(unsafe { std::slice::from_raw_parts(data, array.tuples as usize) })
 }
 
-/// `count` structures at `first`; none for null, misaligned or impossibly many.
+/// Returns `count` structures at `first`; none if null, misaligned or impossibly many.
 ///
 /// # Safety
-/// They are there, and nobody writes to them while the result lives.
+/// They exist, and nobody writes to them while the result lives.
 pub(super) unsafe fn slice<'a, T>(first: *const T, count: u64) -> Option<&'a [T]> {
     let bytes = usize::try_from(count).ok()?.checked_mul(size_of::<T>())?;
     if first.is_null() || !first.is_aligned() || bytes > isize::MAX as usize {
@@ -68,7 +68,7 @@ unsafe fn cells<'a>(cells: &RtvCells, what: &str) -> Result<Cells<'a>, String> {
     })
 }
 
-/// The surface with its arrays as slices.
+/// Converts the surface, with its arrays as slices.
 ///
 /// # Safety
 /// As [`surface`].
@@ -90,7 +90,7 @@ unsafe fn image<'a>(i: &RtvImage) -> Result<Option<Image<'a>>, String> {
 /// # Safety
 /// As [`surface`].
 unsafe fn maps<'a>(m: &RtvMaps) -> Result<Maps<'a>, String> {
-    // SAFETY: the caller's promise, for every picture.
+    // SAFETY: the caller's promise, for every image.
     let [material, normal, emissive] =
         unsafe { [image(&m.material)?, image(&m.normal)?, image(&m.emissive)?] };
     let (normal_scale, occlusion_strength) = (m.normal_scale, m.occlusion_strength);
@@ -105,7 +105,7 @@ unsafe fn maps<'a>(m: &RtvMaps) -> Result<Maps<'a>, String> {
 }
 
 /// # Safety
-/// Every array has the length it says, and nobody writes to it while the result lives.
+/// Every array has its stated length, and nobody writes to it while the result lives.
 pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surface<'a>, String> {
     // SAFETY: the caller's promise, for every array.
     unsafe {
@@ -185,7 +185,7 @@ pub(super) unsafe fn surface<'a>(s: &RtvSurface, name: &'a str) -> Result<Surfac
     }
 }
 
-/// The volume with its arrays as slices.
+/// Converts the volume, with its arrays as slices.
 ///
 /// # Safety
 /// As [`surface`].

@@ -12,43 +12,43 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// State behind an [`RtvBridge`].
+/// The state behind an [`RtvBridge`].
 pub(super) struct BridgeState {
     pub(super) bridge: Bridge,
     number: u64,
     poisoned: bool,
     /// The text that the last call returned.
     answer: CString,
-    /// Options set for this bridge alone. They override all others.
+    /// Options set for this bridge alone; they take precedence over all others.
     own: OptionValues,
     effective_options: EffectiveOptions,
-    /// True between `rtv_begin` and `rtv_end`; options do not change then.
+    /// True between `rtv_begin` and `rtv_end`, while options must not change.
     in_frame: bool,
 }
 
-/// Values of options by name, as they were set.
+/// Values of options by name, as set by the caller.
 type OptionValues = BTreeMap<String, String>;
 
-/// Options set by the program for all bridges. They override the environment.
+/// Options set by the program for all bridges; they take precedence over the environment.
 static PROGRAM_OPTIONS: Mutex<OptionValues> = Mutex::new(BTreeMap::new());
 
-/// The options of the process, for calls without a bridge.
+/// The options of the process, for callers without a bridge.
 static PROCESS_OPTIONS: Mutex<EffectiveOptions> = Mutex::new(EffectiveOptions::NONE);
 
-/// VTK's version, as set by [`set_host`]: major in the upper half; 0 when it was not set.
+/// VTK's version, as set by [`set_host`]: major in the upper half; 0 when unknown.
 static HOST: AtomicU64 = AtomicU64::new(0);
 
 pub(super) fn set_host(major: u32, minor: u32) {
     HOST.store(u64::from(major) << 32 | u64::from(minor), Ordering::Relaxed);
 }
 
-/// Options that follow VTK's version. Shaders of versions after 9.2 draw edges on their surfaces
-/// alone.
+/// Options that follow VTK's version. Shaders of versions after 9.2 draw edges only on the surface
+/// itself.
 fn host_options(host: u64) -> Option<(String, String)> {
     ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
 }
 
-/// All sources of options. Later ones override earlier ones.
+/// All sources of options; later ones take precedence over earlier ones.
 #[derive(PartialEq)]
 struct OptionSources {
     host: u64,
@@ -58,7 +58,7 @@ struct OptionSources {
 }
 
 impl OptionSources {
-    /// The current sources. The environment is read again each time, because programs change it (a
+    /// The current sources. The environment is read each time, because programs change it (a
     /// script's `os.environ`).
     fn now(own: &OptionValues) -> OptionSources {
         let is_ours = |name: &OsString| name.as_encoded_bytes().starts_with(b"RTV_");
@@ -70,7 +70,7 @@ impl OptionSources {
         }
     }
 
-    /// The options, and messages about values that were not understood.
+    /// The options, and the settings that were not understood.
     fn parse(&self) -> (Options, Vec<String>) {
         let (environment, unreadable) = readable(&self.environment);
         let set = self.process.iter().chain(&self.own).map(|(n, v)| (n.clone(), v.clone()));
@@ -80,13 +80,13 @@ impl OptionSources {
     }
 }
 
-/// Options with their sources, so that they are parsed only once per change.
+/// Options together with their sources, so that they are parsed once per change.
 struct EffectiveOptions(Option<(OptionSources, Options, Vec<String>)>);
 
 impl EffectiveOptions {
     const NONE: EffectiveOptions = EffectiveOptions(None);
 
-    /// The options for `sources`, and messages about values that were not understood.
+    /// The options for `sources`, and the settings that were not understood.
     fn of(&mut self, sources: OptionSources) -> (&Options, &[String]) {
         if self.0.as_ref().is_some_and(|(from, ..)| *from != sources) {
             self.0 = None;
@@ -99,17 +99,17 @@ impl EffectiveOptions {
     }
 }
 
-/// The options of the process: those of a bridge that has none of its own.
+/// The options of the process, which apply to bridges without options of their own.
 pub(super) fn options() -> Options {
     let sources = OptionSources::now(&OptionValues::new());
     match PROCESS_OPTIONS.lock() {
         Ok(mut kept) => kept.of(sources).0.clone(),
-        // A panic occurred while another thread held the lock. The options are parsed again.
+        // Another thread panicked while it held the lock; the options can be parsed again.
         Err(_) => sources.parse().0,
     }
 }
 
-/// Sets an option among `named`; an empty value unsets it. Returns false for an invalid value.
+/// Sets an option among `named`; an empty value unsets it. Returns false if the value is invalid.
 fn set(named: &mut OptionValues, name: &str, value: &str) -> bool {
     if value.is_empty() {
         named.remove(name);
@@ -126,7 +126,7 @@ pub(super) fn set_option(name: &str, value: &str) -> bool {
     PROGRAM_OPTIONS.lock().is_ok_and(|mut all| set(&mut all, name, value))
 }
 
-/// An option as a number for callers in C; -1 for options that they need not know.
+/// An option as a number for C callers; -1 for options that they do not need.
 pub(super) fn number(options: &Options, name: &str) -> f64 {
     match name {
         "RTV_OFF" => f64::from(u8::from(options.off)),
@@ -154,8 +154,7 @@ impl BridgeState {
         set(&mut self.own, name, value)
     }
 
-    /// Like [`number`], with the options of this frame, or outside a frame those of a frame that
-    /// would begin now.
+    /// As [`number`], with the options of the current frame, or of a frame that would begin now.
     pub(super) fn option(&mut self, name: &str) -> f64 {
         if self.in_frame {
             return number(self.bridge.options(), name);
@@ -225,8 +224,8 @@ impl Drop for BridgeState {
     }
 }
 
-/// Prints a line for the user of the foreign program, each text once per process. A library inside
-/// a foreign program has no other channel.
+/// Prints a line for the user of the host program, each text once per process. A guest library has
+/// no other channel for messages.
 fn warn_user_once(text: &str) {
     static SHOWN_WARNINGS: Mutex<BTreeMap<String, ()>> = Mutex::new(BTreeMap::new());
     let first =
@@ -237,9 +236,8 @@ fn warn_user_once(text: &str) {
     }
 }
 
-/// Calls `work` with the handle. Returns `otherwise` for null, and after a panic, which causes a
-/// warning. After a panic the bridge leaves everything to OpenGL, because its state may be
-/// incomplete.
+/// Calls `work` with the handle. Returns `otherwise` for null and after a panic, which is reported.
+/// After a panic the bridge leaves everything to OpenGL, because its caches may be inconsistent.
 ///
 /// # Safety
 /// `bridge` is null or came from `rtv_new`, and no other thread uses it.
@@ -259,8 +257,8 @@ pub(super) unsafe fn with<T>(
     result.unwrap_or(otherwise)
 }
 
-/// Calls `work`. Returns `otherwise` after a panic, which causes a warning. Every function called
-/// from C uses this guard, because a panic that reached C would end the program.
+/// Calls `work`; returns `otherwise` after a panic, which is reported. Every function that C calls
+/// runs inside this, because a panic that reached C would end the program.
 pub(crate) fn guarded<T>(otherwise: T, work: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let message = panic

@@ -12,10 +12,10 @@ use rt_core::ray::Ray;
 use rt_core::shapes::{Shape, ShapeHit, ShapeSurface};
 use std::sync::Arc;
 
-/// How much nearer than the surface, as a fraction of the ray's parameter: a few roundings of f32.
+/// Factor on the ray parameter of a hit: a few f32 roundings nearer than the surface.
 const DEPTH_BIAS: f64 = 1.0 - 1e-6;
 
-/// See the module's text.
+/// The back faces of a mesh; see the module documentation.
 pub(super) struct BackFaces {
     mesh: Arc<TriMesh>,
 }
@@ -44,7 +44,7 @@ impl Shape for BackFaces {
         match self.corners(prim) {
             Some(_) => {
                 let [a, b, c] = self.mesh.triangle(prim as usize);
-                // Enlarged by a few roundings, because rays along a flat box miss it.
+                // Padded by a few roundings: rays that run along a flat box would miss it.
                 let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
                 let pad = (lo.abs().max(hi.abs()) * 4.0 * f32::EPSILON)
                     .max(Vec3::splat(f32::MIN_POSITIVE));
@@ -61,7 +61,7 @@ impl Shape for BackFaces {
         let (e1, e2) = (b - a, c - a);
         let p = d.cross(e2);
         let det = e1.dot(p);
-        // The normal points along the ray, so the ray comes from behind.
+        // A normal along the ray means a hit from behind.
         if det >= 0.0 {
             return None;
         }

@@ -9,7 +9,8 @@ use rt_core::glam::{DVec3, Vec2, Vec3, Vec4};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::collections::HashMap;
 
-/// Origin of a clipped mesh's vertex: `(1 - t) a + t b` of two vertices of the previous mesh.
+/// Origin of a vertex of a clipped mesh: `(1 - t) a + t b` of two vertices of the mesh before the
+/// cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClipVertex {
     /// First vertex.
@@ -20,10 +21,10 @@ pub struct ClipVertex {
     pub t: f32,
 }
 
-/// Relation of a clipped mesh to the original mesh, by plane.
+/// Relates a clipped mesh to the unclipped one, plane by plane.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ClipMap {
-    /// For each plane: origins of all vertices in the mesh before that plane.
+    /// For each plane, the origins of all vertices in terms of the mesh before that plane.
     pub steps: Vec<Vec<ClipVertex>>,
     /// For each triangle of the clipped mesh, the triangle of the unclipped one.
     pub triangles: Vec<u32>,
@@ -46,7 +47,7 @@ impl ClipMap {
     }
 }
 
-/// The part of `mesh` on the positive side of every plane.
+/// Returns the part of `mesh` on the positive side of every plane.
 pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
     let mut clip_map =
         ClipMap { triangles: (0..mesh.indices.len() as u32).collect(), ..ClipMap::default() };
@@ -58,7 +59,7 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
             .iter()
             .map(|o| {
                 let (a, b) = (positions[o.a as usize], positions[o.b as usize]);
-                // In f64, because the cut must not depend on the length of the edge.
+                // In f64, so that the cut does not depend on the length of the edge.
                 if o.t == 0.0 {
                     a
                 } else {
@@ -89,8 +90,8 @@ pub(super) fn clip(mesh: &TriMesh, planes: &[[f64; 4]]) -> (TriMesh, ClipMap) {
     )
 }
 
-/// Clips with one plane. Returns the origins of the remaining and new vertices, the triangles, and
-/// the original triangle of each.
+/// Clips by one plane. Returns the origins of the remaining and new vertices, the triangles, and
+/// the source triangle of each.
 fn cut(
     origin: DVec3,
     positions: &[Vec3],
@@ -121,8 +122,8 @@ fn cut(
                 polygon.push(*slot);
             }
             if (dv >= 0.0) != (dw >= 0.0) {
-                // Once per edge and always from the same end, so that neighbouring triangles stay
-                // connected.
+                // Computed once per edge and always from the same end, so that neighbouring
+                // triangles stay connected.
                 let edge = (v.min(w), v.max(w));
                 let vertex = *on_edges.entry(edge).or_insert_with(|| {
                     let (da, db) = (distance[edge.0 as usize], distance[edge.1 as usize]);

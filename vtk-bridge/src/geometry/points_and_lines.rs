@@ -7,7 +7,7 @@ use rt_core::shapes::{Radii, Spheres, Tubes};
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Adds spheres and tubes where `shape` has radii.
+/// Adds spheres and tubes if `shape` gives radii.
 pub(super) fn add(shape: &Shape<'_>, built: &mut GeometrySet) {
     if shape.point_radius > 0.0 && !shape.verts.is_empty() {
         let centers = points_of(shape, &shape.verts);
@@ -49,7 +49,7 @@ fn points_of(shape: &Shape<'_>, cells: &Cells<'_>) -> Vec<DVec3> {
     (0..cells.len()).flat_map(|i| cells.run(i)).filter_map(|k| point(shape, cells, k)).collect()
 }
 
-/// Each edge of the polygons once, in the order of first appearance.
+/// Lists each edge of the polygons once, in order of first appearance.
 fn edges(polys: &Cells<'_>) -> Vec<[u32; 2]> {
     let (mut seen, mut out) = (HashSet::new(), Vec::new());
     for i in 0..polys.len() {

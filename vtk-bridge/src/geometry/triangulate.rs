@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Number of cells per task.
 const CHUNK: usize = 1 << 14;
 
-/// Triangles of all polygons, then of all strips, with their cells.
+/// Triangles of all polygons, then of all strips, with the cell of each.
 pub(super) fn triangles(
     shape: &Shape<'_>,
     first_poly: usize,
@@ -34,7 +34,7 @@ pub(super) fn triangles(
     (all().map(|t| t.0).collect(), CellOfTriangle::List(Arc::new(all().map(|t| t.1).collect())))
 }
 
-/// Marks the sides of the triangles of [`triangles`] that are edges of their polygon: bit i is the
+/// Which sides of the triangles of [`triangles`] are edges of their polygon. Bit i stands for the
 /// side from corner i to the next.
 pub(super) fn edges(shape: &Shape<'_>) -> Vec<u8> {
     let polys = expanded(&shape.polys, 0, |_, run, _, out| {
@@ -51,7 +51,7 @@ pub(super) fn edges(shape: &Shape<'_>) -> Vec<u8> {
 
 type Triangle = ([u32; 3], u32);
 
-/// Triangles by chunks of cells, in order.
+/// Triangulates the cells in chunks and keeps their order.
 fn expanded(
     cells: &Cells<'_>,
     first: usize,
@@ -69,7 +69,7 @@ fn expanded(
         .collect()
 }
 
-/// Whether every cell has three points and cells are contiguous.
+/// Whether every cell has three points and the cells follow each other without gaps.
 fn all_triangles(cells: &Cells<'_>) -> bool {
     let n = cells.len();
     n == 0
@@ -80,7 +80,7 @@ fn all_triangles(cells: &Cells<'_>) -> bool {
                 .all(|i| cells.offsets.at(i) == 3 * i as i64)
 }
 
-/// The connectivity of cells that are all triangles.
+/// The connectivity when all cells are triangles.
 fn copied(connectivity: &Ids<'_>, n: usize) -> Vec<[u32; 3]> {
     let vertex = |v: i64| u32::try_from(v).unwrap_or(u32::MAX);
     match connectivity {

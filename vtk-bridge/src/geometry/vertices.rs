@@ -7,8 +7,8 @@ use rt_core::glam::{DVec3, Vec3};
 /// Number of points per task.
 const CHUNK: usize = 1 << 15;
 
-/// An origin and the offsets from it. For `f32` points these are zero and the points themselves,
-/// because they have no more precision.
+/// Origin and offsets from it. For `f32` points these are zero and the points themselves, which
+/// already have all the available precision.
 pub(super) fn relative(points: &Points<'_>) -> (DVec3, Vec<Vec3>) {
     match points {
         Points::F32(p) => (DVec3::ZERO, vectors(p)),
@@ -20,13 +20,13 @@ pub(super) fn relative(points: &Points<'_>) -> (DVec3, Vec<Vec3>) {
     }
 }
 
-/// A copy.
+/// Copies the values.
 pub(super) fn vectors(values: &[[f32; 3]]) -> Vec<Vec3> {
     values.par_iter().with_min_len(CHUNK).map(|v| Vec3::from(*v)).collect()
 }
 
-/// Centre of the finite points if they are farther from zero than from one another. Otherwise zero,
-/// so that nothing changes.
+/// Middle of the finite points if they lie further from zero than from each other. Otherwise zero,
+/// which leaves the points unchanged.
 fn middle_if_far(points: &[[f64; 3]]) -> DVec3 {
     let empty = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (lo, hi) = points
