@@ -21,7 +21,7 @@ pub(super) type StatusCallback = unsafe extern "C" fn(
 /// ANARI's `ANARIFrameCompletionCallback`: user pointer, device, frame.
 type CompletionCallback = unsafe extern "C" fn(*const c_void, *mut c_void, *mut c_void);
 
-/// The device's own handle, known once it is made.
+/// The device's own handle, set after the device is created.
 pub(super) type Own = Arc<AtomicUsize>;
 
 /// The program's status callback.
@@ -31,7 +31,7 @@ pub(super) struct Callback {
     device: Own,
 }
 
-// SAFETY: the user pointer is only handed back; ANARI 1.0 ("Status callback") asks programs for
+// SAFETY: the user pointer is only passed back; ANARI 1.0 ("Status callback") asks programs for
 // callbacks that any thread may call.
 unsafe impl Send for Callback {}
 // SAFETY: as above.
@@ -58,12 +58,12 @@ impl Listener for Callback {
         let source = if m.source == Handle::NULL { device } else { m.source.0 as *mut c_void };
         let (kind, severity, code) =
             (m.source_type.0 as c_int, m.severity as c_int, m.code as c_int);
-        // SAFETY: `new` promised that it may be called; the text lives until it returns.
+        // SAFETY: `new` promised that it may be called; the text lives until the call returns.
         unsafe { function(self.user, device, source, kind, severity, code, text.as_ptr()) };
     }
 }
 
-/// Calls completion callbacks.
+/// Calls the program's completion callbacks.
 pub(super) struct Callbacks(pub(super) Own);
 
 impl Hooks for Callbacks {
@@ -71,8 +71,8 @@ impl Hooks for Callbacks {
         let device = self.0.load(Ordering::Acquire) as *mut c_void;
         // SAFETY: the number came from the program as a parameter of type
         // FRAME_COMPLETION_CALLBACK, which promises a function of this type; function pointers have
-        // the size of `usize` on every platform with the Itanium ABI, and zero was sorted out by
-        // the caller.
+        // the size of `usize` on every platform with the Itanium ABI, and the caller has excluded
+        // zero.
         let function = unsafe { std::mem::transmute::<usize, CompletionCallback>(function) };
         // SAFETY: as above; the program keeps function and user pointer valid while the frame has
         // them as parameters.

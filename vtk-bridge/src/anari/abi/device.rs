@@ -20,7 +20,7 @@ use answers::{
     object_info, object_subtypes, parameter_info, proc_address, render_frame, unmap_frame,
 };
 
-/// `anari::DeviceImpl`: table, then its two members, then ours.
+/// The layout of `anari::DeviceImpl`: its function table, its two members, then our own.
 #[repr(C)]
 pub(super) struct DeviceObject {
     table: *const *const c_void,
@@ -28,7 +28,7 @@ pub(super) struct DeviceObject {
     default_user: *const c_void,
     references: AtomicU64,
     own: Own,
-    /// Status callback and its user pointer, as set; they take effect with a commit.
+    /// Status callback and its user pointer, as set; they take effect on commit.
     staged: Mutex<(usize, usize)>,
     device: Device,
 }
@@ -62,10 +62,10 @@ impl DeviceObject {
     }
 }
 
-/// Runs `f`, whose panic becomes a message and `default`.
+/// Runs `f`. A panic is reported as a message and returns `default`.
 ///
 /// # Safety
-/// `this` is a device object of ours that is not released.
+/// `this` is one of our device objects and has not been released.
 unsafe fn guard<T>(this: This, default: T, f: impl FnOnce(&DeviceObject) -> T) -> T {
     // SAFETY: the caller promised it; all of its fields that change have locks.
     let object = unsafe { &*this };
@@ -88,7 +88,7 @@ fn object(h: Handle) -> Object {
     h.0 as Object
 }
 
-// ---- Making objects -----------------------------------------------------------------------------
+// ---- Object creation ----------------------------------------------------------------------------
 /// # Safety
 /// As ANARI asks of `anariNewArray`: `app` is null or `dims` elements that stay readable until the
 /// array is released.
@@ -196,10 +196,10 @@ plain_constructors! {
 }
 
 // ---- Parameters ---------------------------------------------------------------------------------
-/// The value at `mem`; `None` for types that have none.
+/// Reads the value at `mem`; `None` for types without a value.
 ///
 /// # Safety
-/// `mem` is what ANARI asks for the type: a string, a pointer value, or the address of a value.
+/// `mem` is what ANARI requires for the type: a string, a pointer value, or the address of a value.
 unsafe fn raw(given: DataType, mem: *const c_void) -> Option<Raw> {
     if given == DataType::VOID_POINTER {
         return Some(Raw::Pointer(mem as usize));
@@ -395,7 +395,7 @@ unsafe extern "C" fn release(this: This, o: Object) {
     if last {
         // SAFETY: made by `Box::into_raw` in `create`; the program has no reference left.
         let own = unsafe { Box::from_raw(this) };
-        // Its end waits for frames in work; a panic there must not cross into the program.
+        // Dropping it waits for running frames; a panic there must not reach the program.
         let _ = catch_unwind(AssertUnwindSafe(|| drop(own)));
     }
 }

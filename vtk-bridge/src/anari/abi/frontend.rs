@@ -9,7 +9,7 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 
 const MARK: &CStr = c"anariNewInitializedDevice";
 
-/// What was seen of ANARI's loaders in the process.
+/// What the search found of ANARI's loaders in this process.
 #[derive(Default)]
 struct Seen {
     any: bool,
@@ -17,7 +17,7 @@ struct Seen {
 }
 
 /// Whether the loader calls `newInitializedDevice`. A loader that cannot be found (it may be linked
-/// into the program) is taken for a current one.
+/// into the program) is assumed to be a current one.
 pub(super) fn has_initialized_devices() -> bool {
     // SAFETY: looks a name up in the modules that are visible to all.
     let global = unsafe { !libc::dlsym(libc::RTLD_DEFAULT, MARK.as_ptr()).is_null() };
@@ -51,8 +51,8 @@ fn is_loader(name: &CStr) -> bool {
 }
 
 fn exports_mark(name: *const c_char) -> bool {
-    // SAFETY: NOLOAD only gives another reference to a module that is in the process; it is given
-    // back below.
+    // SAFETY: NOLOAD only returns another reference to a module that is already loaded; the
+    // reference is released below.
     unsafe {
         let module = libc::dlopen(name, libc::RTLD_LAZY | libc::RTLD_NOLOAD);
         if module.is_null() {

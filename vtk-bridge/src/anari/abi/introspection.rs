@@ -15,7 +15,7 @@ struct ParameterEntry {
     data_type: c_int,
 }
 
-/// What is known of one parameter.
+/// The answers about one parameter.
 struct ParameterInfo {
     about: *const c_char,
     extension: *const c_char,
@@ -39,15 +39,15 @@ struct ObjectInfo {
     by_name: BTreeMap<&'static str, ParameterInfo>,
 }
 
-/// Everything, ready to be pointed at.
+/// All answers, in a form that pointers can refer to.
 pub(super) struct Introspection {
     objects: BTreeMap<(DataType, &'static str), ObjectInfo>,
     subtypes: BTreeMap<DataType, StaticList>,
     extensions: StaticList,
 }
 
-// SAFETY: all pointers lead to memory of this value or to strings that are never freed, and nothing
-// is changed after `get` made it.
+// SAFETY: all pointers refer to memory of this value or to strings that are never freed, and
+// nothing changes after `get` made it.
 unsafe impl Send for Introspection {}
 // SAFETY: as above.
 unsafe impl Sync for Introspection {}
@@ -108,7 +108,7 @@ impl Introspection {
     }
 
     fn object(&self, kind: DataType, subtype: &str) -> Option<&ObjectInfo> {
-        // The device itself is asked for without a subtype, too.
+        // Programs also query the device itself, without a subtype.
         let subtype = if kind == DataType::DEVICE { "default" } else { subtype };
         self.objects.iter().find(|((k, s), _)| *k == kind && *s == subtype).map(|(_, o)| o)
     }
@@ -147,7 +147,8 @@ impl Introspection {
         let Some(p) = self.object(kind, subtype).and_then(|o| o.by_name.get(parameter)) else {
             return none;
         };
-        // Numbers are kept with as many components as any type needs; fewer are a part of them.
+        // Numbers are stored with the most components that any type needs; shorter types read a
+        // prefix.
         let floats = |v: &Vec<f32>| {
             let bytes = wanted.size().unwrap_or(usize::MAX);
             if bytes <= 4 * v.len() && matches!(wanted.0, 1068..=1071 | 2008..=2017) {
@@ -188,7 +189,7 @@ fn extension(name: &str) -> *const c_char {
     if name.is_empty() { std::ptr::null() } else { forever(name) }
 }
 
-/// A list of types that ends with 0.
+/// A list of types, terminated by 0.
 fn types(list: &[DataType]) -> Vec<u32> {
     list.iter().map(|t| t.0).chain([0]).collect()
 }

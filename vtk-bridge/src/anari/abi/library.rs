@@ -11,8 +11,8 @@ use crate::capi::guarded;
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
-/// `anari::LibraryImpl`: table, then the members that the loader reads (`libraryHandle()` is not
-/// virtual).
+/// The layout of `anari::LibraryImpl`: its function table, then the members that the loader reads
+/// (`libraryHandle()` is not virtual).
 #[repr(C)]
 struct LibraryObject {
     table: *const *const c_void,
@@ -53,7 +53,7 @@ static TABLE: Table = Table {
     unload_module,
 };
 
-/// The table before `newInitializedDevice` was put in.
+/// The function table of SDKs before `newInitializedDevice` was inserted.
 #[repr(C)]
 struct OldTable {
     offset_to_top: isize,
@@ -82,8 +82,8 @@ static OLD_TABLE: OldTable = OldTable {
     unload_module,
 };
 
-/// The library object over ANARI's loader's arguments: the loaded module, and a status callback for
-/// devices without their own.
+/// Creates the library object from the loader's arguments: the loaded module, and a status callback
+/// for devices without one of their own.
 ///
 /// # Safety
 /// `callback` is null or an `ANARIStatusCallback` that may be called with `user` as long as the
@@ -105,7 +105,7 @@ pub unsafe fn new_library(
     Box::into_raw(Box::new(LibraryObject { table, module, callback, user })).cast()
 }
 
-/// What `anariLoadLibrary("rtv", ...)` calls.
+/// The entry point that `anariLoadLibrary("rtv", ...)` calls.
 ///
 /// # Safety
 /// As for [`new_library`].
@@ -115,12 +115,12 @@ pub unsafe extern "C" fn anari_library_rtv_new_library(
     callback: *const c_void,
     user: *const c_void,
 ) -> *mut c_void {
-    // SAFETY: the loader gives its own arguments, which ANARI defines as `new_library` asks.
+    // SAFETY: the loader passes its own arguments, which ANARI defines as `new_library` requires.
     guarded(std::ptr::null_mut(), || unsafe { new_library(module, callback, user) })
 }
 
 unsafe extern "C" fn destroy(_this: This) {
-    // Destruction in place: there is nothing but numbers.
+    // In-place destruction has nothing to do: the members are plain numbers.
 }
 
 unsafe extern "C" fn delete(this: This) {
@@ -134,8 +134,8 @@ unsafe extern "C" fn new_device(this: This, subtype: *const c_char) -> *mut c_vo
 }
 
 /// # Safety
-/// As ANARI asks of `anariNewDevice`: a library object of ours, and a string that ends with 0 or
-/// null.
+/// As ANARI requires of `anariNewDevice`: one of our library objects, and a null-terminated string
+/// or null.
 unsafe fn make_device(this: This, subtype: *const c_char) -> *mut c_void {
     // SAFETY: the loader calls with the object that it got from us, which nobody changes.
     let library = unsafe { &*this };
@@ -165,7 +165,7 @@ unsafe extern "C" fn new_initialized_device(
     subtype: *const c_char,
     _values: *const c_void,
 ) -> *mut c_void {
-    // The device has no parameters that must be known before it is made.
+    // The device has no parameters that must be known before it is created.
     // SAFETY: the same arguments.
     unsafe { new_device(this, subtype) }
 }

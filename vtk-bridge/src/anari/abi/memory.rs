@@ -6,7 +6,7 @@ use std::ffi::c_void;
 /// ANARI's `ANARIMemoryDeleter`: user pointer, memory.
 pub(crate) type Deleter = unsafe extern "C" fn(*const c_void, *const c_void);
 
-/// Memory of the program: shared with it, or handed over with a deleter.
+/// Memory of the program: shared with the device, or transferred to it with a deleter.
 pub(crate) struct AppMemory {
     start: *const c_void,
     bytes: usize,
@@ -21,12 +21,12 @@ unsafe impl Send for AppMemory {}
 unsafe impl Sync for AppMemory {}
 
 impl AppMemory {
-    /// `bytes` bytes from `start`.
+    /// Wraps `bytes` bytes from `start`.
     ///
     /// # Safety
-    /// They stay readable until this value is dropped, and are not written to but between the
-    /// program's map and unmap of the array; `deleter` may be called with its user pointer and
-    /// `start` once.
+    /// They stay readable until this value is dropped, and are written to only between the
+    /// program's map and unmap of the array; `deleter` may be called once with its user pointer and
+    /// `start`.
     pub(crate) unsafe fn new(
         start: *const c_void,
         bytes: usize,
@@ -49,7 +49,7 @@ impl AppMemory {
         self.start.cast_mut()
     }
 
-    /// Handed over, not just shared.
+    /// Whether ownership was transferred to the device, rather than shared.
     pub(crate) fn is_captured(&self) -> bool {
         self.deleter.is_some()
     }
@@ -70,12 +70,12 @@ pub(crate) struct OwnMemory {
     bytes: usize,
 }
 
-// SAFETY: the program promises (ANARI 1.0, `anariMapArray`) not to write but between map and unmap,
-// and the device reads only outside of that (`Array::mapped` is checked by its callers).
+// SAFETY: the program promises (ANARI 1.0, `anariMapArray`) to write only between map and unmap,
+// and the device reads only outside of that (callers check `Array::mapped`).
 unsafe impl Sync for OwnMemory {}
 
 impl OwnMemory {
-    /// `bytes` zeros, aligned for every ANARI type.
+    /// Allocates `bytes` zeros, aligned for every ANARI type.
     pub(crate) fn zeroed(bytes: usize) -> OwnMemory {
         let words = (0..bytes.div_ceil(16)).map(|_| UnsafeCell::new(0)).collect();
         OwnMemory { words, bytes }
@@ -100,8 +100,8 @@ impl OwnMemory {
         out
     }
 
-    /// Where the program may write; stays the same for the life of this value. Not null, also
-    /// without bytes.
+    /// Where the program may write. The address stays the same for the life of this value and is
+    /// never null, even without bytes.
     pub(crate) fn address(&self) -> *mut c_void {
         self.words.as_ptr().cast_mut().cast()
     }

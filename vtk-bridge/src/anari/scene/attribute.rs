@@ -8,7 +8,7 @@ use crate::anari::object::{Object, Value};
 use rt_core::glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 
-/// Attribute names that a material or sampler may use.
+/// Names that a material or sampler may refer to.
 pub const NAMES: &[&str] = &[
     "color",
     "attribute0",
@@ -21,51 +21,51 @@ pub const NAMES: &[&str] = &[
     "objectNormal",
 ];
 
-/// Names of the attributes that geometries and instances can have.
+/// Names of the attributes that geometries and instances carry.
 pub(crate) const SLOTS: &[&str] =
     &["color", "attribute0", "attribute1", "attribute2", "attribute3"];
 
-/// Source of an attribute's values.
+/// The source of an attribute.
 #[derive(Clone)]
 pub(crate) enum Source {
-    /// The same everywhere.
+    /// The same value everywhere.
     Uniform([f32; 4]),
-    /// Per primitive of the ANARI geometry.
+    /// One value per primitive of the ANARI geometry.
     Primitive(Arc<Vec<[f32; 4]>>),
-    /// Per vertex, interpolated.
+    /// One value per vertex, interpolated.
     Vertex(Arc<Vec<[f32; 4]>>),
-    /// Per corner of each primitive, interpolated.
+    /// One value per corner of each primitive, interpolated.
     FaceVarying(Arc<Vec<[f32; 4]>>),
-    /// The point itself, before or after the instance's transform.
+    /// The hit point itself, before or after the instance's transform.
     Position { world: bool },
     /// The shading normal, before or after the instance's transform.
     Normal { world: bool },
 }
 
-/// Maps primitives of the renderer to vertices and primitives of the ANARI geometry.
+/// Maps the renderer's primitives to vertices and primitives of the ANARI geometry.
 #[derive(Default)]
 pub(crate) struct Topology {
-    /// Vertices of each primitive of the renderer; one, two or three are used. Empty when there are
+    /// Vertices of each primitive of the renderer; one, two or three are used. Empty if there are
     /// no vertices.
     pub(crate) vertices: Vec<[u32; 3]>,
-    /// Indices of the corners in the arrays `faceVarying.*`.
+    /// Element indices of the arrays `faceVarying.*`.
     pub(crate) corners: Vec<[u32; 3]>,
-    /// ANARI's number of each primitive of the renderer.
+    /// ANARI's index of each primitive.
     pub(crate) numbers: Numbers,
-    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t. Otherwise the mesh
+    /// Whether vertex 3t + k of the renderer's mesh is corner k of triangle t; otherwise the mesh
     /// has ANARI's vertices.
     pub(crate) unshared: bool,
 }
 
-/// ANARI's numbers of the renderer's primitives.
+/// ANARI's indices of the renderer's primitives.
 #[derive(Default)]
 pub(crate) enum Numbers {
-    /// Equal to the renderer's numbers.
+    /// The same indices.
     #[default]
     Same,
-    /// Listed by the renderer's number.
+    /// Indexed by the renderer's primitive.
     Listed(Vec<u32>),
-    /// One number for all primitives.
+    /// One index for all primitives.
     All(u32),
 }
 
@@ -82,19 +82,19 @@ impl Topology {
 /// A point on a geometry, with the data that attributes need.
 pub(crate) struct HitPoint<'a> {
     pub(crate) topology: &'a Topology,
-    /// The renderer's primitive.
+    /// Index of the renderer's primitive.
     pub(crate) primitive: u32,
     /// Weights of its vertices.
     pub(crate) weights: [f32; 3],
-    /// In object space.
+    /// Position in object space.
     pub(crate) point: DVec3,
-    /// In object space, unit length.
+    /// Unit normal in object space.
     pub(crate) normal: DVec3,
     pub(crate) world_from_object: &'a DAffine3,
 }
 
 impl Source {
-    /// The attribute `name` of `geometry`, in an instance that may replace it.
+    /// Finds the attribute `name` of `geometry`; the instance may replace it.
     pub(crate) fn of(name: &str, geometry: &Object, instance: Option<&Object>) -> Option<Source> {
         match name {
             "worldPosition" | "objectPosition" => {
@@ -129,7 +129,7 @@ impl Source {
         })
     }
 
-    /// The value at a hit point. Elements past the end of an array are (0, 0, 0, 1).
+    /// The value at a point; elements past the end of an array are (0, 0, 0, 1).
     pub(crate) fn at(&self, p: &HitPoint<'_>) -> [f32; 4] {
         let get =
             |v: &[[f32; 4]], i: u32| v.get(i as usize).copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
@@ -160,7 +160,7 @@ impl Source {
         }
     }
 
-    /// The simplest representation that shows this source exactly.
+    /// How the renderer must evaluate the attribute to be exact everywhere.
     pub(crate) fn domain(&self) -> Domain {
         match self {
             Source::Uniform(_) => Domain::Constant,
@@ -171,10 +171,10 @@ impl Source {
     }
 }
 
-/// The dependence of a value on its position.
+/// How a value varies over a geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Domain {
-    /// The same everywhere.
+    /// Constant on the whole geometry.
     Constant,
     /// Constant on each primitive.
     Face,
@@ -182,6 +182,6 @@ pub(crate) enum Domain {
     Linear,
     /// A texture at coordinates that are linear between vertices.
     Texture,
-    /// Arbitrary: computed at every hit.
+    /// Arbitrary: must be computed at every hit.
     Hit,
 }

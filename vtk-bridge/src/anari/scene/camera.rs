@@ -5,8 +5,8 @@ use crate::anari::object::Object;
 use rt_core::camera::{Camera, CameraError, ThinLens};
 use rt_core::glam::{DMat4, DVec3, DVec4};
 
-/// The camera for a frame of `size` pixels of a scene within `bounds`; an error says what is wrong
-/// with its parameters.
+/// Makes the camera for a frame of `size` pixels of a scene within `bounds`. An error says which of
+/// its parameters is wrong.
 pub(crate) fn camera_of(
     camera: &Object,
     size: [u32; 2],
@@ -19,7 +19,8 @@ pub(crate) fn camera_of(
     let number = |name: &str| camera.numbers(name).map(|v| v[0]);
     let frame_aspect = f64::from(size[0]) / f64::from(size[1]);
     let [x0, y0, x1, y1] = camera.vector("imageRegion", [0.0, 0.0, 1.0, 1.0]);
-    // As far ahead as the eye is from zero, so that the direction survives the sum.
+    // The target is as far ahead as the eye is from the origin, so that the direction survives the
+    // addition.
     let target = eye + direction.normalize_or_zero() * eye.abs().max_element().max(1.0);
     if camera.subtype == "omnidirectional" {
         return Camera::omnidirectional(eye, target, up, [[x0, y0], [x1, y1]]);
@@ -27,7 +28,7 @@ pub(crate) fn camera_of(
     let aspect = number("aspect").unwrap_or(frame_aspect);
     let (near, far) = (number("near"), number("far"));
     let orthographic = camera.subtype == "orthographic";
-    // How far the scene can be; clipping planes that nobody asked for must not cut it.
+    // The farthest that the scene can reach; default clipping planes must not cut it.
     let reach = bounds.map_or(1.0, |[lo, hi]| (lo - eye).abs().max((hi - eye).abs()).length());
     let whole = if orthographic {
         let near = near.unwrap_or(0.0);
@@ -38,7 +39,7 @@ pub(crate) fn camera_of(
         let nearest = near.unwrap_or_else(|| 1e-9 * far.unwrap_or(reach.max(1e-20)));
         Camera::perspective(eye, target, up, fovy, aspect, [nearest, far.unwrap_or(f64::INFINITY)])?
     };
-    // The part of the image plane between the region's corners becomes the whole image.
+    // The part of the image plane between the region's corners is scaled to the whole image.
     let crop = if [x0, y0, x1, y1] == [0.0, 0.0, 1.0, 1.0] {
         whole
     } else {

@@ -32,9 +32,9 @@ pub(crate) enum Body {
 /// The parts of a geometry object.
 #[derive(Default)]
 pub(crate) struct CompiledGeometry {
-    /// Usually one; an isosurface has one per isovalue.
+    /// Usually one element; an isosurface has one per isovalue.
     pub(crate) parts: Vec<Part>,
-    /// In object space.
+    /// Bounds in object space.
     pub(crate) bounds: Option<[DVec3; 2]>,
 }
 
@@ -48,7 +48,7 @@ impl Part {
         matches!(self.body, Body::Mesh(_))
     }
 
-    /// The same as a shape.
+    /// Returns the geometry as a shape.
     pub(crate) fn as_shape(&self) -> (Arc<dyn Shape>, Weights) {
         match &self.body {
             Body::Mesh(mesh) => {
@@ -131,7 +131,8 @@ fn positions(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Vec<Vec
     Some(points)
 }
 
-/// Vertices of each primitive, without those past the end, and what remains' ANARI numbers.
+/// Vertices of each primitive, without primitives that refer past the end, and the ANARI indices of
+/// the remaining ones.
 fn elements<const N: usize>(
     geometry: &Object,
     vertices: usize,
@@ -162,7 +163,7 @@ fn elements<const N: usize>(
     (elements, Numbers::Listed(numbers))
 }
 
-/// Radii by `index`, from an array or the parameter `radius`.
+/// Radii by `index`, from an array or from the parameter `radius`.
 fn radii(geometry: &Object, array: &str, default: f32) -> impl Fn(u32) -> f32 + use<> {
     let listed = geometry.object(array).and_then(|a| a.with_array(|a| a.scalars()));
     // A radius past the end of its array counts as missing. The renderer counts and leaves out
@@ -178,8 +179,8 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
         Numbers::Listed(l) => l[i],
         _ => i as u32,
     };
-    // A quad is the triangles (0, 1, 3) and (2, 3, 1), as Embree cuts it: the diagonal goes from
-    // corner 1 to corner 3.
+    // A quad is split into the triangles (0, 1, 3) and (2, 3, 1), as in Embree: the diagonal goes
+    // from corner 1 to corner 3.
     let cuts: &[[usize; 3]] = if N == 3 { &[[0, 1, 2]] } else { &[[0, 1, 3], [2, 3, 1]] };
     let mut topology = Topology::default();
     let mut owners = Vec::new();
@@ -198,7 +199,7 @@ fn polygons<const N: usize>(geometry: &Object, diagnostics: &mut Diagnostics) ->
         topology.corners = Vec::new();
     }
 
-    // Shading normals, per corner before per vertex.
+    // Shading normals; per corner takes precedence over per vertex.
     let normals = |name: &str| geometry.object(name).and_then(|a| a.with_array(|a| a.vectors()));
     let (of_corners, of_vertices) = (normals("faceVarying.normal"), normals("vertex.normal"));
     let expected = if topology.unshared { topology.vertices.len() * 3 } else { points.len() };
@@ -260,8 +261,8 @@ fn tangents(geometry: &Object, topology: &Topology, vertices: usize) -> Option<V
     })
 }
 
-// ---- Round things -------------------------------------------------------------------------------
-/// Says what a shape leaves out, and wraps it.
+// ---- Spheres, curves, cylinders and cones -------------------------------------------------------
+/// Reports what a shape leaves out, and wraps it.
 fn shape_part(
     geometry: &Object,
     shape: Result<Arc<dyn Shape>, rt_core::shapes::ShapeError>,
@@ -373,7 +374,7 @@ fn curve(geometry: &Object, diagnostics: &mut Diagnostics) -> Option<Part> {
         geometry.object("primitive.index").and_then(|a| a.with_array(|a| a.indices::<1>()));
     let total = listed.as_ref().map_or(points.len().saturating_sub(1), Vec::len);
     let all = listed.unwrap_or_else(|| (0..total as u32).map(|i| [i]).collect());
-    // Sorts segments by their vertices, so that chains are found in any order.
+    // Sorts segments by their vertices, so that chains are found whatever the input order.
     let mut segments: Vec<(u32, u32)> = (0..)
         .zip(&all)
         .map(|(number, [v])| (*v, number))
@@ -462,7 +463,7 @@ fn isosurfaces(geometry: &Object, diagnostics: &mut Diagnostics) -> CompiledGeom
     out
 }
 
-/// The smallest box around both.
+/// The smallest box that contains both.
 pub(crate) fn union(a: Option<[DVec3; 2]>, b: Option<[DVec3; 2]>) -> Option<[DVec3; 2]> {
     match (a, b) {
         (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),

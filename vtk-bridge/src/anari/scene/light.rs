@@ -10,13 +10,13 @@ use rt_core::math::orthonormal_basis;
 use rt_core::texture::{Texture, Wrap};
 use std::f64::consts::PI;
 
-/// What a light object gives.
+/// The result of converting a light object.
 pub(crate) enum CompiledLight {
     Light(Light),
     Environment(Environment),
 }
 
-/// `None`, with a note, when it cannot be used.
+/// Returns `None`, with a diagnostic, if the light cannot be used.
 pub(crate) fn light_of(
     light: &Object,
     place: &DAffine3,
@@ -69,8 +69,8 @@ pub(crate) fn light_of(
     let (kind, strength, attenuation) = match light.subtype.as_str() {
         "directional" => {
             let half = 0.5 * number("angularDiameter").unwrap_or(0.0).clamp(0.0, 3.0);
-            // The irradiance of a disk of uniform radiance L straight ahead is π L sin² of its
-            // radius.
+            // On the axis, a disk of uniform radiance L and angular radius r gives the irradiance π
+            // L sin² r.
             let sized =
                 number("radiance").filter(|_| half > 0.0).map(|l| PI * l * half.sin().powi(2));
             let kind = LightKind::Directional { to_light: -direction, angular_radius_rad: half };
@@ -85,10 +85,10 @@ pub(crate) fn light_of(
             let hole = number("innerRadius").unwrap_or(0.0);
             let area = PI * (radius * radius - hole * hole);
             let sized = number("radiance").filter(|_| radius > 0.0).map(|l| l * area);
-            // Straight ahead; a disk's power is π times that.
+            // Intensity along the axis; the power of a disk is π times that.
             let ahead = number("power").map(|p| p / PI).or(number("intensity")).unwrap_or(1.0);
             let (inner_rad, outer_rad) = cone(light)?;
-            // Nothing of a flat light shines beyond its own plane.
+            // A flat light emits nothing behind its own plane.
             let (inner_rad, outer_rad) = (inner_rad.min(0.5 * PI), outer_rad.min(0.5 * PI));
             let kind = if radius > 0.0 {
                 let inner_radius = number("innerRadius").unwrap_or(0.0);
@@ -134,7 +134,7 @@ pub(crate) fn light_of(
     Some(CompiledLight::Light(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 
-/// A parallelogram; its strength straight ahead is radiance times area.
+/// A parallelogram; its intensity along the normal is radiance times area.
 fn quad(
     light: &Object,
     color: [f64; 3],
@@ -160,7 +160,7 @@ fn quad(
     let side = light.text("side").unwrap_or_default();
     let both_sides = side == "both";
     let sides = if both_sides { 2.0 } else { 1.0 };
-    // Power of a side is π times what it sends straight ahead.
+    // The power of one side is π times its intensity along the normal.
     let strength = number("radiance")
         .map(|l| l * area)
         .or(number("power").map(|p| p / (PI * sides)))
@@ -175,15 +175,15 @@ fn quad(
         );
         return None;
     }
-    // The side that shines is that of the first edge times the second.
+    // The emitting side is the one that the cross product of the first and second edge points to.
     let edges = if side == "back" { [b, a] } else { [a, b] };
     let kind = LightKind::Quad { corner, edges, both_sides };
     let lamp = Light { kind, ..Light::quad(corner, edges) };
     Some(CompiledLight::Light(lamp.with_color(color.map(|c| (c * strength / PI) as f32))))
 }
 
-/// The environment's image, rotated so that its middle is in the right direction. The renderer
-/// itself only has an upward direction.
+/// Rotates the environment image so that its centre has the right direction; the renderer knows
+/// only the up direction.
 fn environment(
     light: &Object,
     color: [f64; 3],
@@ -213,8 +213,8 @@ fn environment(
         for i in 0..width {
             let angle = ((i as f64 + 0.5) / width as f64 - 0.5) * 2.0 * PI;
             let d = east * angle.cos() + north * angle.sin();
-            // Column of the program's image. Its middle is `direction`, and columns go to the right
-            // when viewed from inside.
+            // Column of the program's image: its centre is `direction`, and columns increase to the
+            // right as seen from inside.
             let u = 0.5 + d.dot(right).atan2(d.dot(forward)) / (2.0 * PI);
             let x = u * width as f64 - 0.5;
             let (low, part) = (x.floor(), (x - x.floor()) as f32);

@@ -16,7 +16,8 @@ pub(crate) fn model_of(material: &Object, diagnostics: &mut Diagnostics) -> Mate
         return out;
     }
     let mut unit = |name: &str, default: f32| {
-        // What varies is looked up at the hits; here it must only be able to reflect.
+        // Varying inputs are evaluated at the hits; here the material only has to be able to
+        // reflect.
         let varies =
             matches!(material.parameters().get(name), Some(Value::Text(_) | Value::Object(_)));
         let v = if varies { 1.0 } else { material.f32(name, default) };
@@ -45,7 +46,8 @@ pub(crate) fn model_of(material: &Object, diagnostics: &mut Diagnostics) -> Mate
         );
     }
     out.model = if transmission >= 0.5 {
-        // Beer and Lambert: white light has the attenuation colour after the attenuation distance.
+        // Beer and Lambert: white light takes on the attenuation colour after the attenuation
+        // distance.
         let distance = material.f32("attenuationDistance", f32::INFINITY);
         let color = material.vector("attenuationColor", [1.0; 3]);
         let absorption = color.map(|c| {
@@ -86,8 +88,8 @@ fn normal_reflectance(ior: f32) -> f32 {
     ((ior - 1.0) / (ior + 1.0)).powi(2)
 }
 
-/// The attribute or sampler that a parameter names. `None` if the parameter is a number, is not set
-/// or cannot be used.
+/// Finds the attribute or sampler that a parameter names; `None` if it is a number, not set, or
+/// unusable.
 fn varying(
     material: &Object,
     name: &str,
@@ -115,7 +117,7 @@ fn varying(
     }
 }
 
-/// The inputs besides colour and opacity that vary on `geometry` in `instance`; `None` if there are
+/// Inputs that vary on `geometry` in `instance`, other than colour and opacity; `None` if there are
 /// none.
 pub(crate) fn material_inputs_of(
     material: &Object,
@@ -142,7 +144,7 @@ pub(crate) fn material_inputs_of(
     material_inputs.varies().then_some(material_inputs)
 }
 
-/// Sources of colour and opacity on `geometry` in `instance`.
+/// Finds the sources of colour and opacity on `geometry` in `instance`.
 pub(crate) fn surface_color_of(
     material: &Object,
     geometry: &Object,
@@ -167,7 +169,7 @@ pub(crate) fn surface_color_of(
     SurfaceColor { color, opacity, mode }
 }
 
-/// Whether the appearance depends on the instance's position.
+/// Whether the appearance depends on the instance's transform.
 pub(crate) fn uses_world_space(material: &Object) -> bool {
     material.parameters().values().any(|v| match v {
         Value::Text(t) => t.starts_with("world"),

@@ -9,7 +9,7 @@ use rt_core::material_maps::{BsdfParameters, MaterialEvalContext, MaterialMaps};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// Inputs of a physically based material that are no numbers.
+/// Inputs of a physically based material that are not constants.
 #[derive(Clone)]
 pub(crate) struct MaterialInputs {
     pub(crate) metallic: Option<Input>,
@@ -18,7 +18,7 @@ pub(crate) struct MaterialInputs {
     pub(crate) emissive: Option<Input>,
     pub(crate) occlusion: Option<Input>,
     pub(crate) normal: Option<Sampler>,
-    /// What `specular` is a factor on.
+    /// The reflectance that `specular` scales.
     pub(crate) normal_reflectance: f32,
 }
 
@@ -30,12 +30,12 @@ impl MaterialInputs {
     }
 }
 
-/// The grain of a geometry.
+/// The material maps of a geometry.
 pub(crate) struct BoundMaterialInputs {
     pub(crate) material_inputs: MaterialInputs,
     pub(crate) topology: Arc<Topology>,
     pub(crate) weights: Weights,
-    /// The triangles, also where they are drawn as a shape.
+    /// The triangles, even if they are rendered as a shape.
     pub(crate) mesh: Option<Arc<TriMesh>>,
     pub(crate) world_from_object: DAffine3,
 }
@@ -83,8 +83,8 @@ impl MaterialMaps for BoundMaterialInputs {
 }
 
 impl BoundMaterialInputs {
-    /// The frame is that of the mesh's tangents, else that in which the sampler's attribute grows
-    /// along the triangle.
+    /// The tangent frame is that of the mesh's tangents. Without them, it follows the direction in
+    /// which the sampler's attribute increases along the triangle.
     fn mapped_normal(
         &self,
         sampler: &Sampler,

@@ -19,7 +19,7 @@ pub(crate) use renderer::{FrameBackground, RendererSettings, renderer_settings};
 use super::object::Object;
 use super::status::{Code, Message, Severity};
 
-/// Faults found while looking at objects, for the program.
+/// Diagnostics for the program, collected while objects are converted.
 #[derive(Default)]
 pub(crate) struct Diagnostics(pub(crate) Vec<Message>);
 

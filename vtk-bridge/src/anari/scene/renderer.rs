@@ -6,26 +6,26 @@ use rt_core::render::RenderOptions;
 use rt_core::scene::AmbientOcclusion;
 use rt_core::volume::VolumeQuality;
 
-/// Settings for rendering a frame.
+/// Settings for drawing one frame.
 pub(crate) struct RendererSettings {
     pub(crate) options: RenderOptions,
-    /// Radiance from all directions.
+    /// Ambient radiance, equal from all directions.
     pub(crate) ambient: Option<[f32; 3]>,
     pub(crate) occlusion: Option<AmbientOcclusion>,
     pub(crate) shadows: bool,
     pub(crate) backdrop: FrameBackground,
 }
 
-/// Background of a frame.
+/// The background of a frame.
 pub(crate) enum FrameBackground {
     /// Linear, not premultiplied.
     Color([f32; 4]),
-    /// Spread over the frame; rows from the bottom.
+    /// An image stretched over the frame; rows from the bottom.
     Picture { size: [usize; 2], texels: Vec<[f32; 4]> },
 }
 
 impl FrameBackground {
-    /// The colour at `x`, `y` in 0..1, y upwards, linear between texels.
+    /// The colour at `x`, `y` in 0..1, y upwards; linear between texels.
     pub(crate) fn at(&self, x: f32, y: f32) -> [f32; 4] {
         let (size, texels) = match self {
             FrameBackground::Color(c) => return *c,
@@ -44,7 +44,7 @@ impl FrameBackground {
     }
 }
 
-/// The settings that `renderer` requests.
+/// The options that `renderer` asks for.
 pub(crate) fn renderer_settings(
     renderer: &Object,
     size: [u32; 2],

@@ -7,7 +7,7 @@ use rt_core::glam::{DMat4, DVec4, Vec2};
 use rt_core::texture::{Filter, Texture, Wrap};
 use std::sync::Arc;
 
-/// A sampler ready for evaluation.
+/// A sampler, ready for evaluation.
 #[derive(Clone)]
 pub(crate) struct Sampler {
     input: Source,
@@ -20,9 +20,9 @@ pub(crate) struct Sampler {
 enum Step {
     /// The attribute itself.
     Nothing,
-    /// By the number of the primitive.
+    /// Indexed by the primitive.
     Primitive { values: Arc<Vec<[f32; 4]>>, offset: u64 },
-    /// By an image of one to three dimensions.
+    /// An image of one to three dimensions.
     Image(Arc<Image>),
 }
 
@@ -31,7 +31,7 @@ struct Image {
     dimensions: usize,
     texels: Vec<[f32; 4]>,
     wrap: [Wrap; 3],
-    /// Dimensions in which coordinates outside the image give `border_color`.
+    /// Dimensions outside of which `border_color` applies.
     border: [bool; 3],
     border_color: [f32; 4],
     filter: Filter,
@@ -48,7 +48,7 @@ fn wide(v: [f32; 4]) -> DVec4 {
 }
 
 impl Sampler {
-    /// Returns `None` and adds a note for a sampler that cannot be used.
+    /// Returns `None`, with a diagnostic, for a sampler that cannot be used.
     pub(crate) fn of(
         sampler: &Object,
         geometry: &Object,
@@ -126,7 +126,7 @@ impl Sampler {
         }
     }
 
-    /// The attribute that the sampler reads.
+    /// The input attribute.
     pub(crate) fn attribute(&self, p: &HitPoint<'_>) -> [f32; 4] {
         self.input.at(p)
     }
@@ -175,7 +175,7 @@ fn image(sampler: &Object, diagnostics: &mut Diagnostics) -> Option<Image> {
         if dimensions == 1 { &["wrapMode"] } else { &["wrapMode1", "wrapMode2", "wrapMode3"] };
     let (mut wrap, mut border) = ([Wrap::Clamp; 3], [false; 3]);
     for (d, name) in names.iter().enumerate().take(dimensions) {
-        // The schema accepts no other value.
+        // The schema rejects everything else.
         match sampler.text(name).as_deref() {
             Some("repeat") => wrap[d] = Wrap::Repeat,
             Some("mirrorRepeat") => wrap[d] = Wrap::Mirror,
@@ -222,7 +222,7 @@ impl Image {
         let mut part = [0f64; 3];
         for d in 0..self.dimensions {
             let finite = if coordinate[d].is_finite() { coordinate[d] } else { 0.0 };
-            // Above 2^52 there are no fractions left for interpolation.
+            // Beyond 2^52 there are no fractions left to interpolate with.
             let x = (finite * self.dims[d] as f64).clamp(-4e15, 4e15);
             let x = if self.filter == Filter::Nearest { x } else { x - 0.5 };
             low[d] = x.floor() as i64;
@@ -254,7 +254,7 @@ impl Image {
     }
 }
 
-/// Texel index for `i` in a row of `n` texels, continued outside by `wrap`.
+/// Texel `i` of a row of `n`; outside the row, `wrap` decides.
 fn place(i: i64, n: usize, wrap: Wrap) -> usize {
     let n = n as i64;
     let i = match wrap {

@@ -18,17 +18,17 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::scene::Appearance;
 use std::sync::Arc;
 
-/// A surface that is ready for instances.
+/// A surface, ready to be instanced.
 #[derive(Clone)]
 pub(crate) struct CompiledSurface {
     pub(crate) geometry: Geometry,
     pub(crate) material: Material,
-    /// Its material's index is not set yet.
+    /// Its material index is not set yet.
     pub(crate) appearance: Appearance,
     pub(crate) topology: Arc<Topology>,
 }
 
-/// Puts the paint on a part.
+/// Applies the surface colour to one part.
 pub(crate) fn compile_surface(
     part: &Part,
     model: &Material,
@@ -156,17 +156,17 @@ fn domain_of(surface_color: &SurfaceColor) -> Domain {
     );
     let steps = matches!(surface_color.mode, AlphaMode::Mask { .. });
     match color.max(opacity) {
-        // A threshold between vertices, or a product of two values that both change, is not linear.
+        // A threshold between vertices, or a product of two varying values, is not linear.
         Domain::Linear | Domain::Texture if steps || color.min(opacity) > Domain::Constant => {
             Domain::Hit
         }
-        // Textures can hold colours, but not opacities.
+        // Textures hold colours, not opacities.
         Domain::Texture if color != Domain::Texture => Domain::Hit,
         domain => domain,
     }
 }
 
-/// Calls `f` for every vertex of the mesh that a triangle uses, with its place.
+/// Calls `f` for every vertex of the mesh that a triangle uses, with the hit point there.
 fn at_vertices(mesh: &TriMesh, base: &HitPoint<'_>, mut f: impl FnMut(usize, &HitPoint<'_>)) {
     let mut seen = vec![false; mesh.positions.len()];
     for (t, triangle) in mesh.indices.iter().enumerate() {

@@ -28,7 +28,7 @@ impl Input {
     }
 }
 
-/// The meaning of alpha.
+/// How alpha is interpreted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum AlphaMode {
     Opaque,
@@ -68,19 +68,19 @@ impl SurfaceColor {
     }
 }
 
-/// Maps a shape's hits to vertex weights.
+/// How hits on a shape map to vertices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Weights {
-    /// The first vertex has all the weight.
+    /// The first vertex alone.
     First,
-    /// `u` interpolates from the first vertex to the second.
+    /// `u` interpolates from the first to the second vertex.
     Along,
     /// `u` and `v` are the weights of the second and third vertex.
     Corners,
 }
 
 impl Weights {
-    /// Weights of the vertices at a hit with the surface coordinates `u` and `v`.
+    /// Weights of the vertices at a hit with the parameters `u` and `v`.
     pub(crate) fn of(self, [u, v]: [f32; 2]) -> [f32; 3] {
         match self {
             Weights::First => [1.0, 0.0, 0.0],
@@ -90,7 +90,7 @@ impl Weights {
     }
 }
 
-/// A shape whose hits have computed colours.
+/// A shape whose colour is computed at each hit.
 pub(crate) struct ColoredShape {
     pub(crate) shape: Arc<dyn Shape>,
     pub(crate) weights: Weights,
@@ -143,7 +143,7 @@ impl Shape for ColoredShape {
     }
 }
 
-/// Triangles as a shape, for colours that meshes cannot represent.
+/// Triangles as a shape, for surface colours that meshes cannot represent.
 pub(crate) struct TriangleShape(pub(crate) Arc<TriMesh>);
 
 impl TriangleShape {
@@ -153,14 +153,14 @@ impl TriangleShape {
         Some([p(a)?, p(b)?, p(c)?])
     }
 
-    /// Distance and weights of the second and third corner, in f64 from f32 input. The products of
-    /// the edge functions are exact to 2⁻⁵³, so triangles that share an edge agree for all but the
-    /// rarest rays.
+    /// Returns the distance and the weights of the second and third corner, in f64 from f32 input.
+    /// The products of the edge functions are exact to 2⁻⁵³, so neighbours along an edge agree for
+    /// all but the rarest rays.
     fn meet(&self, prim: u32, ray: &Ray) -> Option<(f64, f64, f64)> {
         let o = ray.origin.as_dvec3();
         let [a, b, c] = self.corners(prim)?.map(|p| p.as_dvec3() - o);
         let d = ray.dir.as_dvec3();
-        // Signed volumes with the ray. All three have the same sign where the ray passes between
+        // Signed volumes against the ray: all three have the same sign if the ray passes between
         // the edges (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013, section
         // 3, without the shear).
         let (u, v, w) = (d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a)));
@@ -189,8 +189,8 @@ impl Shape for TriangleShape {
         if corners.iter().any(|p| !p.is_finite()) {
             return Aabb::EMPTY;
         }
-        // One step outwards: a ray may hit a triangle that is flat in an axis with a rounding
-        // error.
+        // Expanded by one floating-point step, because a ray may hit a triangle that is flat along
+        // an axis with a rounding error.
         let b = Aabb::from_points(&corners);
         let (down, up) = (|v: f32| v.next_down(), |v: f32| v.next_up());
         Aabb::new(
@@ -217,14 +217,14 @@ impl Shape for TriangleShape {
                 let id = self.0.indices[prim as usize];
                 let at = |k: usize| n.values[id[k] as usize].as_dvec3();
                 let mixed = (at(0) * (1.0 - u - v) + at(1) * u + at(2) * v).normalize_or(flat);
-                // On the side of the flat normal, which decides the outside.
+                // On the side of the flat one, which decides what is outside.
                 if mixed.dot(flat) < 0.0 { -mixed } else { mixed }
             }
             _ => flat,
         };
         let size = corners.iter().fold(0f64, |m, p| m.max(f64::from(p.abs().max_element())));
         let rounded = point.as_vec3();
-        // Half an ulp of each coordinate and a few roundings of the weights in f64.
+        // Half an ulp of each coordinate plus a few roundings of the weights in f64.
         let point_error = (1.8 * 2f64.powi(-24) * size + f64::from(f32::MIN_POSITIVE)) as f32;
         ShapeSurface {
             point: rounded,

@@ -10,7 +10,7 @@ use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{Interpolation, Volume, VolumeOptions};
 use std::sync::Arc;
 
-/// The field's grid; `None`, with a note, when it cannot be used.
+/// Converts the field's grid; `None`, with a diagnostic, if it cannot be used.
 pub(crate) fn grid_of(field: &Object, diagnostics: &mut Diagnostics) -> Option<Arc<Grid>> {
     if !field.known {
         return None;
@@ -32,12 +32,12 @@ pub(crate) fn grid_of(field: &Object, diagnostics: &mut Diagnostics) -> Option<A
     }
 }
 
-/// Whether the field has the value of the nearest grid point everywhere.
+/// Whether the field takes the value of the nearest grid point everywhere.
 pub(crate) fn is_nearest(field: &Object) -> bool {
     field.text("filter").as_deref() == Some("nearest")
 }
 
-/// The volume's medium; `None`, with a note, when it cannot be used.
+/// Converts the volume's medium; `None`, with a diagnostic, if it cannot be used.
 pub(crate) fn volume_of(volume: &Object, diagnostics: &mut Diagnostics) -> Option<Arc<Volume>> {
     if !volume.known || !volume.bool("visible", true) {
         return None;
@@ -72,8 +72,8 @@ pub(crate) fn volume_of(volume: &Object, diagnostics: &mut Diagnostics) -> Optio
             format!("{bad} components of `color` are NaN, infinite or negative; they count as 0"),
         );
     }
-    // Opacity and the colours' alpha multiply; both are linear between their own points, so their
-    // product is sampled at the points of both.
+    // Opacity and the colours' alpha are multiplied. Both are linear between their own points, so
+    // their product is sampled at the points of both.
     let points: Vec<[f32; 2]> = knots(opacities.len(), colors.len())
         .into_iter()
         .map(|x| {
@@ -104,7 +104,7 @@ fn color(t: DataType, bytes: &[u8]) -> [f32; 4] {
     t.attribute(bytes)
 }
 
-/// Positions 0..=1 of the points of two evenly spaced lists together.
+/// The union of the point positions, 0..=1, of two evenly spaced lists.
 fn knots(a: usize, b: usize) -> Vec<f32> {
     let of = |n: usize| (0..n).map(move |i| if n == 1 { 0.0 } else { i as f32 / (n - 1) as f32 });
     let mut all: Vec<f32> = of(a).chain(of(b)).collect();
@@ -113,7 +113,7 @@ fn knots(a: usize, b: usize) -> Vec<f32> {
     all
 }
 
-/// A list of evenly spaced values at 0..=1.
+/// A list of values, evenly spaced over 0..=1.
 fn at<T>(list: &[T], x: f32, value: impl Fn(&T) -> f32) -> f32 {
     let p = x * (list.len() - 1) as f32;
     let i = (p as usize).min(list.len() - 1);

@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex};
 
 type FrameCache<T> = HashMap<Vec<u64>, Arc<T>>;
 
-/// Data cached by a world object.
+/// The cached state of a world object.
 #[derive(Default)]
 pub struct WorldCache {
     geometries: FrameCache<CompiledGeometry>,
@@ -37,7 +37,7 @@ pub struct WorldCache {
     pub(crate) built: Arc<Mutex<Option<Arc<World>>>>,
 }
 
-/// The contents of a world, converted for the renderer.
+/// The converted world, in the renderer's types.
 #[derive(Default)]
 pub(crate) struct CompiledWorld {
     pub(crate) geometries: Vec<Geometry>,
@@ -52,15 +52,14 @@ pub(crate) struct CompiledWorld {
     pub(crate) built: Arc<Mutex<Option<Arc<World>>>>,
 }
 
-/// Values of the id channels for an instance of the renderer.
+/// The values that the id channels report for an instance of the renderer.
 pub(crate) struct Ids {
     pub(crate) object: u32,
     pub(crate) instance: u32,
     pub(crate) topology: Arc<Topology>,
 }
 
-/// Collects the values that decide the result for an object. `keep` selects the object's own
-/// parameters.
+/// Fingerprint of the values that determine an object's result; `keep` selects its own parameters.
 pub(crate) fn fingerprint(object: &Object, keep: &dyn Fn(&str) -> bool, out: &mut Vec<u64>) {
     out.push(object.handle.0);
     if object.kind.is_array() {
@@ -76,7 +75,7 @@ pub(crate) fn fingerprint(object: &Object, keep: &dyn Fn(&str) -> bool, out: &mu
     }
 }
 
-/// Finds a cached value or makes one, and keeps it for the next frame.
+/// Finds the result or makes it, and caches it for the next frame.
 fn cached<T>(
     old: &FrameCache<T>,
     new: &mut FrameCache<T>,
@@ -91,7 +90,7 @@ fn cached<T>(
     value
 }
 
-/// A place in the world, with what the instance says of its content.
+/// A transform in the world, with the instance's overrides for its content.
 #[derive(Clone, Copy)]
 struct Placement<'a> {
     world_from_object: DAffine3,
@@ -100,7 +99,8 @@ struct Placement<'a> {
 }
 
 impl CompiledWorld {
-    /// Everything in `world` (or a group or instance, for bounds). Faults become notes.
+    /// Converts everything in `world` (or a group or instance, for bounds). Faults become
+    /// diagnostics.
     pub(crate) fn of(world: &Object, diagnostics: &mut Diagnostics) -> CompiledWorld {
         let mut guard = lock(&world.extra);
         let mut none = WorldCache::default();
@@ -143,7 +143,7 @@ struct WorldCompiler<'a> {
     out: CompiledWorld,
     /// Index of each geometry by its address.
     known: HashMap<usize, usize>,
-    /// Index of each appearance's material by the appearance's address.
+    /// Index of each surface appearance's material, by the appearance's address.
     materials: HashMap<usize, usize>,
     diagnostics: &'a mut Diagnostics,
 }
@@ -189,7 +189,7 @@ impl WorldCompiler<'_> {
         }
     }
 
-    /// Surfaces, volumes and lights of a group or world.
+    /// Adds the surfaces, volumes and lights of a group or world.
     fn content(&mut self, group: &Object, placement: Placement<'_>) {
         for surface in group.objects("surface") {
             self.surface(&surface, placement);
@@ -315,7 +315,7 @@ impl WorldCompiler<'_> {
         }
     }
 
-    /// Bounds of a placed box.
+    /// Bounds of a transformed box.
     fn grow(&mut self, bounds: Option<[DVec3; 2]>, place: &DAffine3) {
         let Some(b) = bounds else { return };
         for i in 0..8usize {

@@ -13,11 +13,11 @@ use super::data_type::DataType;
 /// Value of a parameter that is not set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Default {
-    /// Not set means something of its own.
+    /// An unset parameter has a meaning of its own.
     None,
-    /// Numbers, as FLOAT32 of the first type's length.
+    /// Numbers, as FLOAT32 with as many components as the first type.
     Floats(&'static [f32]),
-    /// A whole number (INT32, UINT32, BOOL).
+    /// An integer (INT32, UINT32, BOOL).
     Whole(u32),
     /// A string.
     Text(&'static str),
@@ -28,23 +28,23 @@ pub enum Default {
 pub struct Parameter {
     /// Its name.
     pub name: &'static str,
-    /// Types it takes.
+    /// Types that it accepts.
     pub types: &'static [DataType],
-    /// Types of elements, if it takes an array.
+    /// Element types, if it accepts an array.
     pub elements: &'static [DataType],
     /// Value when it is not set.
     pub default: Default,
-    /// Strings or data types it takes; empty for any.
+    /// Strings or data types that it accepts; empty for any.
     pub values: &'static [&'static str],
-    /// Data types it takes; empty for any.
+    /// Data types that it accepts; empty for any.
     pub type_values: &'static [DataType],
-    /// Smallest and largest sensible number.
+    /// Smallest and largest sensible values.
     pub range: Option<[f32; 2]>,
-    /// The object does not work without it.
+    /// Whether the object requires it.
     pub required: bool,
-    /// What it does, in a sentence.
+    /// Its effect, in one sentence.
     pub about: &'static str,
-    /// The extension it comes from, without `ANARI_`; empty for the core.
+    /// The extension that defines it, without `ANARI_`; empty for the core.
     pub extension: &'static str,
 }
 
@@ -96,7 +96,7 @@ impl Parameter {
         Parameter { extension, ..self }
     }
 
-    /// Whether `given` is one of its types.
+    /// Whether `given` is one of the accepted types.
     pub fn takes(&self, given: DataType) -> bool {
         self.types.iter().any(|t| t.accepts(given))
     }
@@ -109,9 +109,9 @@ pub struct ObjectSchema {
     pub kind: DataType,
     /// Its subtype; empty where the kind has none.
     pub subtype: &'static str,
-    /// What it is, in a sentence.
+    /// What it is, in one sentence.
     pub about: &'static str,
-    /// The extension it comes from, without `ANARI_`; empty for the core.
+    /// The extension that defines it, without `ANARI_`; empty for the core.
     pub extension: &'static str,
     /// Its parameters, in groups that are shared between subtypes.
     groups: &'static [&'static [Parameter]],
@@ -123,7 +123,7 @@ impl ObjectSchema {
         NAME.iter().chain(self.groups.iter().copied().flatten())
     }
 
-    /// The parameter of that name.
+    /// The parameter with the given name.
     pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
         self.parameters().find(|p| p.name == name)
     }
@@ -132,7 +132,7 @@ impl ObjectSchema {
 const NAME: &[Parameter] =
     &[Parameter::new("name", &[DataType::STRING], "what messages call the object")];
 
-/// Everything the device can make.
+/// All objects that the device can create.
 pub fn objects() -> impl Iterator<Item = &'static ObjectSchema> {
     [geometry::OBJECTS, shading::OBJECTS, scene::OBJECTS, view::OBJECTS].into_iter().flatten()
 }
@@ -142,12 +142,12 @@ pub fn find(kind: DataType, subtype: &str) -> Option<&'static ObjectSchema> {
     objects().find(|o| o.kind == kind && o.subtype == subtype)
 }
 
-/// Subtypes of a kind; empty for kinds without.
+/// Subtypes of a kind; empty for kinds without subtypes.
 pub fn subtypes(kind: DataType) -> impl Iterator<Item = &'static str> {
     objects().filter(move |o| o.kind == kind && !o.subtype.is_empty()).map(|o| o.subtype)
 }
 
-/// The extensions that the device honours, without `ANARI_`.
+/// The extensions that the device supports, without `ANARI_`.
 pub const EXTENSIONS: &[&str] = &[
     "KHR_ARRAY1D_REGION",
     "KHR_CAMERA_DEPTH_OF_FIELD",
@@ -192,7 +192,7 @@ pub const EXTENSIONS: &[&str] = &[
     "KHR_VOLUME_TRANSFER_FUNCTION1D",
 ];
 
-/// Types of colour arrays and images.
+/// Element types of colour arrays and images.
 const COLORS: &[DataType] = &[
     DataType::UFIXED8,
     DataType::UFIXED8_VEC2,

@@ -25,7 +25,7 @@ const CAMERA: &[Parameter] = &[
     Parameter::new("far", FLOAT, "what is farther than this is cut away; nothing when not set"),
 ];
 
-/// Parameters of both renderers.
+/// Parameters shared by both renderers.
 const RENDERER: &[Parameter] = &[
     Parameter {
         elements: super::COLORS,
@@ -87,7 +87,7 @@ const fn channel(
     Parameter { type_values, ..Parameter::new(name, &[DataType::DATA_TYPE], about).of(extension) }
 }
 
-/// The channels of frames.
+/// The channels of a frame.
 pub(super) const CHANNELS: &[Parameter] = &[
     channel(
         "channel.color",

@@ -9,11 +9,11 @@ use crate::anari::status::Severity;
 use crate::capi::guarded;
 use std::ffi::{c_char, c_int, c_void};
 
-// ---- Questions ----------------------------------------------------------------------------------
-/// Writes a property where the program wants it, if it asks for the right type and has enough room.
+// ---- Queries ------------------------------------------------------------------------------------
+/// Writes a property to the program's memory if the type matches and there is enough room.
 ///
 /// # Safety
-/// `mem` may be written to for `size` bytes.
+/// `mem` is writable for `size` bytes.
 unsafe fn write(property: &Property, wanted: DataType, mem: *mut c_void, size: u64) -> bool {
     let (fits, bytes) = match property {
         Property::I32(v) => {
@@ -26,7 +26,7 @@ unsafe fn write(property: &Property, wanted: DataType, mem: *mut c_void, size: u
             (fits, v.iter().flat_map(|f| f.to_ne_bytes()).collect())
         }
         Property::Text(t) => {
-            // As much as there is room for, always with an end.
+            // Truncated to the available room, always with a terminator.
             let room = usize::try_from(size).unwrap_or(usize::MAX).saturating_sub(1);
             let mut bytes = t.as_bytes()[..t.len().min(room)].to_vec();
             bytes.push(0);
@@ -161,7 +161,7 @@ pub(super) unsafe extern "C" fn discard_frame(this: This, o: Object) {
     unsafe { guard(this, (), |d| d.device.discard_frame(handle(o))) }
 }
 
-// ---- The rest -----------------------------------------------------------------------------------
+// ---- Remaining entries --------------------------------------------------------------------------
 pub(super) unsafe extern "C" fn new_extension_object(
     this: This,
     kind: Name,
@@ -185,5 +185,5 @@ pub(super) unsafe extern "C" fn proc_address(_this: This, _name: Name) -> *const
 }
 
 pub(super) unsafe extern "C" fn destroy(_this: This) {
-    // Devices end in `release`; the loader never deletes them.
+    // Devices are destroyed by `release`; the loader never deletes them.
 }
