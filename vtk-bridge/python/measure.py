@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 
-# Values that give about so many million triangles on 201^3 points.
+# Isovalues for the given number of million triangles on 201^3 points.
 ISOS = {
     1: [121, 189],
     2: [105.5, 138.5, 171.5, 204.5],
@@ -29,7 +29,7 @@ def cpu_secs():
 
 
 def run(millions, frames, size):
-    """One process' share: draws, and prints what it took."""
+    """The work of one process: draws, and prints the time it took."""
     import vtk
 
     source = vtk.vtkRTAnalyticSource()

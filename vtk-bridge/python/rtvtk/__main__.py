@@ -40,7 +40,7 @@ def main():
     if module:
         runpy.run_module(arguments[0], run_name="__main__", alter_sys=True)
     else:
-        # As Python does for a script: its own folder comes first.
+        # As Python does for a script, its own folder comes first.
         sys.path[0] = os.path.dirname(os.path.abspath(arguments[0]))
         runpy.run_path(arguments[0], run_name="__main__")
     return 0

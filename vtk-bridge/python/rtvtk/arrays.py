@@ -1,4 +1,4 @@
-"""VTK's arrays as the library takes them: numpy views, and keys that tell when they change. Colours and textures."""
+"""VTK's arrays in the library's layout: numpy views, and keys that change with the data. Also colours and textures."""
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, reference, vtkLookupTable
@@ -8,17 +8,17 @@ from . import library as rtv
 
 
 def key_of(*things):
-    """A number that changes when an object or value does; never 0."""
+    """A number that changes when an object or value changes; never 0."""
     seen = tuple((t.__this__, t.GetMTime()) if hasattr(t, "GetMTime") else t for t in things)
     return hash(seen) & 0xFFFF_FFFF_FFFF_FFFF or 1
 
 
 def numbers(array, kinds, keep):
-    """A VTK array as numpy, in its own type when that is one of `kinds`, else in the first of them."""
+    """A VTK array as numpy, in its own type if that is one of `kinds`, else in the first of them."""
     try:
         found = vtk_to_numpy(array)
     except (TypeError, AttributeError, AssertionError, ValueError):
-        # Implicit and other arrays without memory of their own.
+        # Implicit and other arrays without their own memory.
         n = array.GetNumberOfComponents()
         found = np.array([array.GetTuple(i) for i in range(array.GetNumberOfTuples())]).reshape(-1, n)
     if found.dtype not in kinds:
@@ -54,7 +54,7 @@ def rgba_of(colors):
 
 
 def add_colors(bridge, surface, mapper, data, cell_map, keep):
-    """Colours by the mapper's own lookup."""
+    """Colours from the mapper's own lookup."""
     if not mapper.GetScalarVisibility():
         return
     flag = reference(0)
@@ -64,7 +64,7 @@ def add_colors(bridge, surface, mapper, data, cell_map, keep):
         return
     flag = int(flag)
     if flag == 2 and mapper.GetFieldDataTupleId() < 0:
-        # An array of the field data with a value for each cell; with a tuple's number it would be one colour for everything.
+        # A field-data array with one value per cell; with a tuple index it would be one colour for everything.
         flag = 1
     key = key_of(scalars, mapper.GetLookupTable(), mapper.GetScalarRange(), mapper.GetColorMode(), mapper.GetScalarMode(),
                  mapper.GetInterpolateScalarsBeforeMapping(), mapper.GetUseLookupTableScalarRange(), flag, mapper.GetArrayComponent(),
@@ -75,7 +75,7 @@ def add_colors(bridge, surface, mapper, data, cell_map, keep):
     if flag != 2 and bridge.has_colors(surface.shape_key, key):
         surface.color_source = source
         return
-    # A mapper keeps one array of colours; that of another block must not be taken for this one's.
+    # A mapper caches one array of colours; another block's array must not be reused for this block.
     mapper.ClearColorArrays()
     colors = mapper.MapScalars(data, 1.0)
     coordinates, table = mapper.GetColorCoordinates(), mapper.GetColorTextureMap()
@@ -114,12 +114,12 @@ def why_not_texture(texture):
     return None
 
 
-# Textures of a property by the field of the library that they go to.
+# Textures of a property, by the library's field that receives them.
 MAPS = {"material": "materialTex", "normal": "normalTex", "emissive": "emissiveTex"}
 
 
 class Textures:
-    """Texels as RGBA by the key of their image; those of the last frame are kept."""
+    """Texels as RGBA, by the key of their image; those of the last frame are cached."""
 
     def __init__(self):
         self._kept, self._used = {}, {}
@@ -133,7 +133,7 @@ class Textures:
         surface.texture_srgb, surface.texture_interpolate, surface.texture_repeat = image.srgb, image.interpolate, image.repeat
 
     def maps_of(self, p, texcoords):
-        """The textures of a physically based property besides that of its colour, or `None`."""
+        """The textures of a physically based property other than its colour texture, or `None`."""
         found = {field: p.GetTexture(name) for field, name in MAPS.items() if p.GetTexture(name) is not None}
         if not found:
             return None

@@ -1,4 +1,4 @@
-"""Props to surfaces: which are traced, and why OpenGL draws the others."""
+"""Converts props to surfaces: decides which are traced, and says why OpenGL draws the others."""
 import ctypes as C
 
 import numpy as np
@@ -26,19 +26,19 @@ def _property(p):
     if p.GetEdgeVisibility() and p.GetRepresentation() == SURFACE:
         by_line = not hasattr(p, "GetUseLineWidthForEdgeThickness") or p.GetUseLineWidthForEdgeThickness()
         out.edge_color[:] = p.GetEdgeColor()
-        # OpenGL's are never thinner than this.
+        # OpenGL's lines are never thinner than this.
         out.edge_width = max(1.1, p.GetLineWidth() if by_line else p.GetEdgeWidth())
     return out
 
 
 class Extractor:
-    """Gives props to the bridge, and keeps what was made for them from frame to frame."""
+    """Passes props to the bridge and caches their converted data from frame to frame."""
 
     def __init__(self, bridge):
         self._bridge = bridge
-        # Filters that turn grids into surfaces, by mapper; properties by theirs.
+        # Filters that convert grids to surfaces, by mapper; properties by their VTK object.
         self._filters, self._properties = {}, {}
-        # Surfaces of plain actors, with the times of what they are made from, by actor.
+        # Surfaces of plain actors with the modification times of their inputs, by actor.
         self._plain = {}
         self._shapes, self._textures, self._glyphs, self._volumes = Shapes(), arrays.Textures(), Glyphs(), Volumes()
         self._radii = 0.0, 0.0
@@ -49,7 +49,7 @@ class Extractor:
         self._used = set()
 
     def end_frame(self, rendered):
-        """Forgets what was not used. `rendered`: the bridge was asked for a picture of these props."""
+        """Drops cache entries that were not used. `rendered`: the bridge was asked for an image of these props."""
         for kept in (self._filters, self._properties, self._plain):
             for address in kept.keys() - self._used:
                 del kept[address]
@@ -61,7 +61,7 @@ class Extractor:
             self._shapes.frame_not_drawn()
 
     def add(self, renderer, prop, name):
-        """Gives a prop to the bridge, or raises `Untraceable`."""
+        """Passes a prop to the bridge, or raises `Untraceable`."""
         if isinstance(prop, vtkVolume):
             reason = self._volumes.add(self._bridge, prop, renderer, name)
             if reason:
@@ -86,8 +86,8 @@ class Extractor:
             data = self._surface_of(mapper, data)
         attributes = mapper.GetCompositeDataDisplayAttributes() if hasattr(mapper, "GetCompositeDataDisplayAttributes") else None
         start = dict(opacity=prop.GetProperty().GetOpacity(), color=None, visible=True)
-        # All blocks are looked at before one is given away: what the library and OpenGL both draw
-        # would be blended twice where it is translucent.
+        # All blocks are checked before any is passed on: if the library and OpenGL both drew a
+        # translucent block, it would be blended twice.
         batch = []
         representation = prop.GetProperty().GetRepresentation()
         blocks = list(_leaves(data, attributes, start, ""))
@@ -105,7 +105,7 @@ class Extractor:
                 self._plain[prop.__this__] = self._times(prop, mapper, shown), s, keep
 
     def _commit(self, batch):
-        """Gives a prop's surfaces (the first of each entry) to the library: all, or none."""
+        """Passes all of a prop's surfaces (the first of each entry) to the library, or none."""
         if not batch:
             return
         surfaces = (rtv.Surface * len(batch))(*(entry[0] for entry in batch))
@@ -115,7 +115,7 @@ class Extractor:
             self._shapes.given(s.shape_key)
 
     def _add_again(self, actor, mapper, name):
-        """Gives what was given in the frame before when nothing but the actor's place may have changed. False when more did."""
+        """Passes the surface of the previous frame again if at most the actor's transform changed. Returns False if more changed."""
         kept = self._plain.get(actor.__this__)
         if kept is None:
             return False
@@ -133,23 +133,23 @@ class Extractor:
         return True
 
     def _times(self, actor, mapper, data):
-        """Changes when anything does that a surface is made from; `None` for actors for which that is not known."""
+        """A value that changes when any input of a surface changes; `None` for actors whose inputs are not tracked."""
         if data is None or actor.GetTexture() is not None or actor.GetBackfaceProperty() is not None:
             return None
         parts = mapper, data, actor.GetProperty(), actor.GetShaderProperty()
         return self._radii, *((part.__this__, part.GetMTime()) for part in parts)
 
     def _surface_of(self, mapper, data):
-        """The surface of a data set that is not polygons, made with the filter kept for its mapper."""
+        """The surface of a data set that is not polygonal, made with the cached filter of its mapper."""
         self._used.add(mapper.__this__)
         kept = self._filters.setdefault(mapper.__this__, vtkDataSetSurfaceFilter())
-        # The input of a pipeline would be updated twice; the data themselves know when they changed.
+        # A pipeline connection would update the input twice; the data object itself knows when it changed.
         kept.SetInputData(data)
         kept.Update()
         return kept.GetOutput()
 
     def _start(self, actor, name):
-        """A surface with everything that its actor says, and its matrix."""
+        """A surface with all properties of its actor, and the actor's matrix."""
         s = rtv.Surface()
         s.name = name.encode()
         p = actor.GetProperty()
@@ -179,8 +179,8 @@ class Extractor:
         self._commit(batch)
 
     def _block(self, actor, mapper, data, state, name, alone):
-        """A block's surface, the arrays that it needs, and its data when the next frame may give
-        the surface again as it is."""
+        """A block's surface, the arrays that it needs, and its data if the next frame may reuse
+        the surface unchanged."""
         representation = actor.GetProperty().GetRepresentation()
         keep = []
         s, matrix = self._start(actor, name)
@@ -197,14 +197,14 @@ class Extractor:
         if not state["color"]:
             arrays.add_colors(self._bridge, s, mapper, data, cell_map, keep)
         if s.color_source != rtv.COLOR_PROPERTY:
-            # Colours of points and cells show on both sides.
+            # Colours of points and cells are visible on both sides.
             s.has_back = 0
         if cell_map is not None and s.property.edge_width > 0:
             raise Untraceable("edges of polygons that are not convex")
         texture = actor.GetTexture()
         if actor.GetProperty().GetTexture("albedoTex") is not None:
             texture = actor.GetProperty().GetTexture("albedoTex")
-            # Its alpha takes the place of the opacity.
+            # The texture's alpha replaces the opacity.
             s.property.opacity = 1.0
         if texture is not None:
             if s.has_back:
@@ -225,7 +225,7 @@ class Extractor:
 
 
 def _add_back(surface, own):
-    """The back has the shading model of the front."""
+    """Adds a back-face property; the back uses the shading model of the front."""
     surface.has_back, surface.back = 1, surface.property
     for name in ("ambient_color", "diffuse_color", "specular_color"):
         getattr(surface.back, name)[:] = getattr(own, name)[:]
@@ -245,11 +245,11 @@ def _planes(mapper, matrix):
 
 
 def _leaves(data, attributes, state, name):
-    """The visible polygon data below `data`, with what their blocks say."""
+    """The visible polygon data below `data`, with the attributes of their blocks."""
     if data is None:
         return
     if attributes is not None:
-        # What a block says holds for all below it until one says otherwise.
+        # A block's attributes apply to all blocks below it unless one overrides them.
         state = dict(state)
         if attributes.HasBlockVisibility(data):
             state["visible"] = attributes.GetBlockVisibility(data)

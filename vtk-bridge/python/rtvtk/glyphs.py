@@ -1,4 +1,4 @@
-"""Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does not give them away."""
+"""Glyphs as instances: recomputes the matrices that vtkGlyph3DMapper makes for OpenGL, because it does not expose them."""
 import numpy as np
 from vtkmodules.vtkCommonCore import vtkBitArray
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkDataSet, vtkPolyData
@@ -8,12 +8,12 @@ from .arrays import key_of, numbers, rgba_of
 from .why import Untraceable
 
 _REAL = [np.dtype(np.float64)]
-# Numbers of the mapper's arrays.
+# Indices of the mapper's arrays.
 _SCALE, _INDEX, _MASK, _ORIENTATION = range(4)
 
 
 def sources_of(mapper, data):
-    """The sources by number."""
+    """The glyph sources by index."""
     if mapper.GetUseSourceTableTree():
         raise Untraceable("glyphs from a tree of sources")
     if mapper.GetNumberOfClippingPlanes() > 0:
@@ -62,7 +62,7 @@ def _array(mapper, number, data):
 
 
 def _rotation(axis, degrees):
-    """Rotations (n, 3, 3) about axes (n, 3); an axis of no length turns nothing."""
+    """Rotations (n, 3, 3) about axes (n, 3); an axis of length zero gives no rotation."""
     length = np.linalg.norm(axis, axis=1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
         x, y, z = np.where(length > 0, axis / length, 0.0).T
@@ -109,7 +109,7 @@ def _scales(mapper, array, n, keep):
 
 
 class Glyphs:
-    """Matrices and colours of mappers; those of the last frame are kept."""
+    """Matrices and colours of mappers; those of the last frame are cached."""
 
     def __init__(self):
         self._kept, self._used = {}, {}
@@ -118,11 +118,11 @@ class Glyphs:
         self._kept, self._used = self._used, {}
 
     def of(self, mapper, data, sources):
-        """Number of the source, matrices and colours of its copies, for each source that has any."""
+        """Index of the source, and matrices and colours of its instances, for each source that has any."""
         scale = _array(mapper, _SCALE, data)
         turn = _array(mapper, _ORIENTATION, data) if mapper.GetOrient() else None
         mask = _array(mapper, _MASK, data) if mapper.GetMasking() else None
-        # VTK takes nothing else for a mask.
+        # VTK accepts nothing else as a mask.
         mask = mask if isinstance(mask, vtkBitArray) else None
         index = _array(mapper, _INDEX, data) if mapper.GetSourceIndexing() else None
         settings = (mapper.GetScaleMode(), mapper.GetScaling(), mapper.GetScaleFactor(), mapper.GetClamping(), mapper.GetRange(),

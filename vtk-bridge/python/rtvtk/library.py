@@ -12,7 +12,7 @@ _KINDS = {np.dtype(np.uint8): U8, np.dtype(np.float32): F32, np.dtype(np.float64
 
 
 class RtvError(Exception):
-    """The library cannot be used; the text says why and what to do."""
+    """Raised if the library cannot be used; the text says why and what to do."""
 
 
 class Array(C.Structure):
@@ -20,7 +20,7 @@ class Array(C.Structure):
 
     @classmethod
     def of(cls, numbers):
-        """Over a contiguous numpy array, which must outlive the call that it is for."""
+        """Wraps a contiguous numpy array, which must outlive the call that uses it."""
         tuples = numbers.shape[0]
         return cls(numbers.ctypes.data, tuples, numbers.size // tuples if tuples else 1, _KINDS[numbers.dtype])
 
@@ -138,7 +138,7 @@ def _functions(library, path):
 
 
 def set_host(major, minor):
-    """Tells the library which VTK it is in, and loads it for that. Raises `RtvError` when it cannot be loaded."""
+    """Loads the library and tells it the VTK version. Raises `RtvError` if it cannot be loaded."""
     Bridge.calls()["host"](major, minor)
 
 

@@ -1,4 +1,4 @@
-"""The traced picture in OpenGL's: rectangles over the whole viewport that write its colours and its depth."""
+"""Puts the traced image into OpenGL's framebuffer: rectangles over the whole viewport write its colours and depth."""
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkFloatArray, vtkPoints
@@ -14,10 +14,10 @@ def _depth(name, texture):
             f" / float(1u << (127u - min({name}E, 127u))); ")
 
 
-# What all rectangles begin with; texel centres lie on pixel centres.
+# Common start of all rectangles' shaders; texel centres coincide with pixel centres.
 _FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); if (c.a <= 0.0) discard; " + _depth("d", "rtvDepth")
 _OPAQUE = _FETCH + "gl_FragData[0] = c; gl_FragDepth = d;"
-# Pixels with an opaque surface somewhere: what is in front of it is in the colour.
+# Pixels with an opaque surface; everything in front of it is already in the colour.
 _COVERED = _FETCH + "if (d >= 1.0) discard; gl_FragData[0] = vec4(c.rgb, 1.0); gl_FragDepth = d;"
 # Pixels with translucent surfaces only, blended by VTK with colours that are not premultiplied.
 _THROUGH = _FETCH + "if (d < 1.0) discard; " + _depth("f", "rtvFirst") + "gl_FragData[0] = vec4(c.rgb / c.a, c.a); gl_FragDepth = f;"
@@ -29,7 +29,7 @@ def _rectangle():
     cell.InsertNextCell(4)
     for i, (x, y) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
         points.InsertNextPoint(2 * x - 1, 2 * y - 1, 0)
-        # Rows of the picture come from the top, those of textures from the bottom.
+        # Rows of the image start at the top, those of textures at the bottom.
         coordinates.InsertNextTuple2(x, 1 - y)
         cell.InsertCellPoint(i)
     data = vtkPolyData()
@@ -65,7 +65,7 @@ class _Layer:
             self.images[name] = image
         s = self.actor.GetShaderProperty()
         s.AddVertexShaderReplacement("//VTK::PositionVC::Impl", True, "//VTK::PositionVC::Impl\n  gl_Position = vec4(vertexMC.xy, 0.0, 1.0);\n", False)
-        # In place of the code that would multiply the lit colour with every texture.
+        # Replaces the code that would multiply the lit colour with every texture.
         s.AddFragmentShaderReplacement("//VTK::TCoord::Impl", True, "  { " + shader + " }\n", False)
         s.AddFragmentShaderReplacement("//VTK::Depth::Impl", True, "  gl_FragDepth = gl_FragCoord.z;\n//VTK::Depth::Impl\n", False)
 
@@ -74,18 +74,18 @@ class _Layer:
             height, width, components = plane.shape
             image = self.images[name]
             image.SetDimensions(width, height, 1)
-            # The library's own memory, which lives until it draws again; OpenGL copies it before.
+            # The library's own memory, which is valid until it draws again; OpenGL copies it before then.
             image.GetPointData().SetScalars(numpy_to_vtk(plane.reshape(width * height, components)))
             image.Modified()
 
     def stand(self, place, size):
-        """Its shader does not use its place, but VTK leaves out what lies outside the view."""
+        """Positions the rectangle. Its shader ignores the position, but VTK culls what lies outside the view."""
         self.actor.SetPosition(place)
         self.actor.SetScale(size)
 
 
 class Overlay:
-    """The rectangles of a renderer; made when they are needed."""
+    """The rectangles of a renderer, created on demand."""
 
     def __init__(self):
         self._layers = {}
@@ -96,7 +96,7 @@ class Overlay:
         return self._layers[shader]
 
     def actors(self, picture, camera):
-        """The rectangles that show a picture of the library's."""
+        """The rectangles that show an image of the library."""
         shape = (picture.height, picture.width, 4)
 
         def plane(pointer, bytes_per_pixel):

@@ -1,8 +1,8 @@
-"""The renderer that takes vtkRenderer's place.
+"""The renderer that replaces vtkRenderer.
 
-Before VTK draws, the props that can be traced are given to the library and hidden, and rectangles with the traced picture are put in; afterwards all is
-as it was. What is left (axes, text, lines, volumes) is drawn by OpenGL against the traced picture's depth. Picks and selections see the props as ever:
-while a selector is at work nothing is touched.
+Before VTK draws, the props that can be traced are passed to the library and hidden, and rectangles with the traced image are added; afterwards the
+original state is restored. OpenGL draws the rest (axes, text, lines, volumes) against the traced image's depth. Picking and selection see the
+original props: nothing changes while a selector is active.
 """
 import ctypes as C
 
@@ -44,7 +44,7 @@ class _Watched:
         weak.Set(thing)
         tag = thing.AddObserver("StartEvent", observe)
         self._entries[address] = weak, tag, thing.GetCommand(tag), value
-        # Events of objects that are going come without the object.
+        # Events of objects under destruction come without the object.
         thing.AddObserver("DeleteEvent", lambda *_: self._entries.pop(address, None))
 
 
@@ -57,7 +57,7 @@ class _Tracer:
         self.extractor = Extractor(self.bridge)
         self.overlay = Overlay()
         self.hidden, self.shown, self.switched = [], [], []
-        # How many props more than OpenGL knows of were drawn.
+        # Number of drawn props that OpenGL does not count.
         self.uncounted = 0
         self.failed = False
 
@@ -69,7 +69,7 @@ class _Tracer:
         try:
             self._trace(renderer)
         except Exception as error:
-            # We are a guest in somebody's program: OpenGL draws everything, as without us.
+            # An error here must not break the host program: OpenGL draws everything, as without rtvtk.
             self.end(renderer, None)
             self.failed = True
             self.bridge.warn(f"internal error, OpenGL draws from now on; please report it: {type(error).__name__}: {error}")
@@ -83,7 +83,7 @@ class _Tracer:
         visible = [p for p in (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())) if p.GetVisibility()]
         if width < 1 or height < 1 or not visible or not self.bridge.begin():
             return
-        # Passes read props, depths and normals on their own; this one only draws larger.
+        # Render passes read props, depths and normals themselves; this one only draws at a larger size.
         render_pass = renderer.GetPass()
         if render_pass is not None and render_pass.GetClassName() != "vtkSSAAPass":
             reason = f"a render pass draws this renderer ({render_pass.GetClassName()})"
@@ -92,7 +92,7 @@ class _Tracer:
                 self.bridge.pass_on(f"{prop.GetClassName()} {i}", reason)
             self.bridge.end()
             return
-        # Both are made on first use, from what is visible: before anything is hidden.
+        # Both are created on first use from the visible props, so before anything is hidden.
         camera = renderer.GetActiveCamera()
         prepare_lights(renderer)
         self.extractor.begin_frame()
@@ -121,7 +121,7 @@ class _Tracer:
                 prop.VisibilityOff()
             for actor in self.shown:
                 renderer.AddActor(actor)
-            # OpenGL's shadows and occlusion would see the rectangles. The traced picture has its translucent layers in order already.
+            # OpenGL's shadows and occlusion would see the rectangles. The traced image already has its translucent layers in order.
             for name in ("UseShadows", "UseSSAO", *(["UseDepthPeeling"] if len(self.shown) > 1 else [])):
                 if getattr(renderer, f"Get{name}")():
                     self.switched.append(name)
@@ -139,7 +139,7 @@ class _Tracer:
 
 
 def attach(renderer):
-    """Makes a renderer trace, unless it does already."""
+    """Makes a renderer trace, unless it already does."""
     if renderer.IsA("vtkOpenGLRenderer") and _renderers.get(renderer) is None:
         tracer = _Tracer()
         _renderers.add(renderer, tracer.start, tracer)
@@ -158,7 +158,7 @@ def _watch(window):
 
 
 def install():
-    """From now on every renderer traces. Raises `RtvError` when the library cannot be loaded."""
+    """Makes every renderer trace from now on. Raises `RtvError` if the library cannot be loaded."""
     if hasattr(gl, "_rtvtk_renderer"):
         return
     rtv.set_host(*_VERSION)
@@ -176,7 +176,7 @@ def install():
 
     gl._rtvtk_renderer = RtvRenderer
 
-    # Renderers of classes that programs derive in Python (PyVista's) are found when their window begins to draw.
+    # Renderers of classes derived in Python (PyVista's) are found when their window starts to draw.
     for name in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow", "vtkXOpenGLRenderWindow", "vtkWin32OpenGLRenderWindow", "vtkCocoaRenderWindow"):
         plain = getattr(gl, name, None)
         if plain is not None:

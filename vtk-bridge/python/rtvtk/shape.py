@@ -1,7 +1,7 @@
-"""Points, cells, normals and texture coordinates of polygon data, as the library takes them.
+"""Points, cells, normals and texture coordinates of polygon data, in the library's layout.
 
-Everything is a numpy view of VTK's own memory wherever the types allow. The library keeps what it made of a shape as long as frames use it, so the
-arrays are only looked at in the first frame with a key; later frames pass the key alone.
+Everything is a numpy view of VTK's own memory wherever the types allow. The library caches a converted shape as long as frames use it, so the
+arrays are only read in the first frame with a key; later frames pass the key alone.
 """
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -13,24 +13,24 @@ from .arrays import floats, key_of, numbers
 
 _WHOLE = {np.dtype(np.int64), np.dtype(np.int32)}
 _REAL = [np.dtype(np.float64), np.dtype(np.float32)]
-# The wheel's OpenGL fans polygons of fewer corners, and divides others properly.
+# The wheel's OpenGL draws polygons with fewer corners as fans, and triangulates others properly.
 _DIVIDED_FROM = 7
 
 
 class Shapes:
-    """What the library has: keys of this frame and of the one before."""
+    """Tracks which shapes the library has: keys of this frame and of the previous one."""
 
     def __init__(self):
-        # `_ready`: filled in for a surface that may yet be refused.
+        # `_ready`: filled in for a surface that may still be rejected.
         self._known, self._added, self._ready = {}, {}, {}
 
     def given(self, key):
-        """The library has got a surface with the shape of this key."""
+        """Records that the library received a surface with the shape of this key."""
         if key in self._ready:
             self._added[key] = self._ready[key]
 
     def frame_drawn(self):
-        """The library forgets what a frame that it draws does not use."""
+        """Records that the library dropped the shapes that the drawn frame did not use."""
         self._known, self._added, self._ready = self._added, {}, {}
 
     def frame_not_drawn(self):
@@ -38,21 +38,21 @@ class Shapes:
         self._added, self._ready = {}, {}
 
     def again(self, key):
-        """True when the library has the shape of this key, so that the key alone will do."""
+        """True if the library has the shape of this key, so that the key alone is enough."""
         found = self._added if key in self._added else self._known
         if key in found:
             self._ready[key] = found[key]
         return key in found
 
     def add(self, surface, data, as_points, planes, keep):
-        """Fills in the shape. Returns the cells that the given ones became (`None`: as they are), for colours of cells."""
+        """Fills in the shape. Returns the source cell of each new cell (`None`: unchanged), for colours of cells."""
         points = data.GetPoints()
         coordinates = points.GetData()
         polys = data.GetPolys()
         all_cells = [data.GetVerts(), data.GetLines(), polys, data.GetStrips()]
         of_points = None if surface.property.flat else data.GetPointData().GetNormals()
         of_cells, texcoords = data.GetCellData().GetNormals(), data.GetPointData().GetTCoords()
-        # The shader has a frame for normal maps only where it has normals of points.
+        # The shader has a tangent frame for normal maps only if there are point normals.
         tangents = None if of_points is None else data.GetPointData().GetTangents()
         settings = surface.point_radius, surface.line_radius, surface.edges_only, surface.has_back, as_points
         clip = () if planes is None else tuple(planes.ravel().tolist())
@@ -65,7 +65,7 @@ class Shapes:
             keep.append(planes)
             surface.clip_planes = rtv.Array.of(planes)
         if self.again(key):
-            # Only how many points there are matters now.
+            # Only the number of points matters here.
             surface.points = rtv.Array.of(_some_memory(points.GetNumberOfPoints(), keep))
             return self._ready[key]
         xyz = numbers(coordinates, _REAL, keep).reshape(-1, 3)
@@ -77,7 +77,7 @@ class Shapes:
             self._ready[key] = None
             return None
         runs = [_runs(c, keep) for c in all_cells]
-        # As tubes, polygons have their own edges and no others.
+        # When drawn as tubes, polygons show their own edges only.
         runs[2], became = (runs[2], None) if surface.edges_only else _divided(xyz, polys, runs[2])
         cell_map = None
         if became is not None:
@@ -93,7 +93,7 @@ class Shapes:
 
 
 def _some_memory(n, keep):
-    """An array of `n` points that nobody reads; the system gives memory only to what is touched."""
+    """An array of `n` points that is never read; the system allocates memory only for touched pages."""
     keep.append(np.empty((n, 3), np.float32))
     return keep[-1]
 
@@ -112,7 +112,7 @@ def _runs(array, keep):
         if offsets.dtype not in _WHOLE or connectivity.dtype not in _WHOLE:
             raise TypeError
     except (TypeError, AttributeError, AssertionError, ValueError):
-        # Implicit arrays and others without memory of their own.
+        # Implicit arrays and others without their own memory.
         plain = vtkCellArray()
         plain.DeepCopy(array)
         plain.ConvertTo64BitStorage()
@@ -129,7 +129,7 @@ def _cells(runs, keep):
 
 
 def _divided(xyz, array, runs):
-    """The polygons with the large ones that are not convex cut into triangles, and the number of the old cell by new cell."""
+    """The polygons, with large non-convex ones cut into triangles, and the old cell index of each new cell."""
     if runs is None or array.GetMaxCellSize() < _DIVIDED_FROM:
         return runs, None
     offsets, connectivity = runs
@@ -160,7 +160,7 @@ def _divided(xyz, array, runs):
 
 
 def _bent(corners):
-    """Of polygons (m, n, 3), which turn both ways."""
+    """Which of the polygons (m, n, 3) turn in both directions, so are not convex."""
     corners = corners.astype(np.float64) - corners[:, :1]
     sides = np.roll(corners, -1, 1) - corners
     turns = np.cross(sides, np.roll(sides, -1, 1))
@@ -170,7 +170,7 @@ def _bent(corners):
 
 
 def _ears(corners):
-    """Corner numbers of the triangles of one polygon, or `None` when it cannot be divided (it crosses itself)."""
+    """Corner indices of the triangles of one polygon, or `None` if it cannot be triangulated (it crosses itself)."""
     polygon, ids = vtkPolygon(), vtkIdList()
     polygon.GetPoints().SetNumberOfPoints(len(corners))
     polygon.GetPointIds().SetNumberOfIds(len(corners))

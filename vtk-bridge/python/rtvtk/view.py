@@ -7,7 +7,7 @@ from . import library as rtv
 
 
 def prepare_lights(renderer):
-    """What the renderer would do a moment later."""
+    """Prepares the lights as the renderer itself would a moment later."""
     if renderer.GetLights().GetNumberOfItems() == 0 and renderer.GetAutomaticLightCreation():
         renderer.CreateLight()
     renderer.UpdateLightsGeometryToFollowCamera()
@@ -32,7 +32,7 @@ def add_lights(bridge, renderer):
 
 
 def size_of(renderer):
-    """Pixels of the viewport; of its part in this tile, when a large picture is made of tiles (the call for it needs C pointers)."""
+    """Pixels of the viewport; of its part in this tile, when a large image is made of tiles (the call for it needs C pointers)."""
     window = renderer.GetRenderWindow()
     viewport, tile = renderer.GetViewport(), window.GetTileViewport()
 
@@ -46,7 +46,7 @@ def size_of(renderer):
 def view_of(renderer, width, height):
     out = rtv.View()
     camera = renderer.GetActiveCamera()
-    # Everything is in them: window centre, explicit projections, tiles, the eye of a stereo pair. Depth from -1 to 1, as OpenGL has it.
+    # The matrices contain everything: window centre, explicit projections, tiles, the eye of a stereo pair. Depth from -1 to 1, as OpenGL has it.
     matrix = vtkMatrix4x4()
     projection = camera.GetProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
     vtkMatrix4x4.Multiply4x4(projection, camera.GetModelViewTransformMatrix(), matrix)
@@ -55,7 +55,7 @@ def view_of(renderer, width, height):
     out.background_top[:] = renderer.GetBackground2() if renderer.GetGradientBackground() else renderer.GetBackground()
     out.focus_distance = camera.GetDistance()
     out.width, out.height = width, height
-    # While the mouse turns the scene, interactors ask for several frames a second; still pictures for far less than one.
+    # While the mouse rotates the scene, interactors request several frames a second; for still images far less than one.
     out.interactive = renderer.GetRenderWindow().GetDesiredUpdateRate() > 1.0
     out.shadows = bool(renderer.GetUseShadows())
     return out

@@ -1,4 +1,4 @@
-"""Volumes of uniform grids: which of them the library can draw as VTK does, and why the others stay OpenGL."""
+"""Volumes on uniform grids: decides which of them the library can draw as VTK does, and says why OpenGL draws the others."""
 import ctypes as C
 
 import numpy as np
@@ -9,14 +9,14 @@ from vtkmodules.vtkRenderingCore import vtkAbstractMapper
 from . import library as rtv
 from .arrays import key_of, numbers
 
-# As many entries as OpenGL's tables have.
+# The number of entries of OpenGL's tables.
 _ENTRIES = 1024
 _KINDS = [np.dtype(t) for t in (np.float32, np.float64, np.uint8, np.int32)]
 _MAPPERS = {"vtkSmartVolumeMapper", "vtkGPUVolumeRayCastMapper", "vtkOpenGLGPUVolumeRayCastMapper", "vtkFixedPointVolumeRayCastMapper",
             "vtkMultiBlockVolumeMapper"}
-# VTK's blend modes, which are also the library's numbers.
+# VTK's blend modes; the library uses the same numbers.
 _COMPOSITE, _MAXIMUM, _MINIMUM, _AVERAGE, _ADDITIVE, _ISOSURFACES, _SLICE = range(7)
-# What OpenGL's table of opacities by gradient reaches to, of the range of the scalars.
+# The upper end of OpenGL's gradient-opacity table, as a fraction of the scalar range.
 _GRADIENT_RANGE = 0.25
 
 
@@ -29,7 +29,7 @@ def _why_not_blend(mode, p):
         return "a volume with slice blending" if mode == _SLICE else "a volume with a blend mode that is not known"
     if mode != _COMPOSITE and _has_gradient_opacity(p):
         return "a volume with gradient opacity and another blending than composite"
-    # OpenGL shades the largest scalar by the gradient where the ray ends.
+    # OpenGL shades the largest scalar with the gradient at the end of the ray.
     if mode in (_MAXIMUM, _MINIMUM) and p.GetShade(0):
         return "a shaded volume with maximum or minimum intensity blending"
     return None
@@ -59,13 +59,13 @@ def _why_not_property(p):
 
 
 class _Lights:
-    """The lights of shaded volumes: six numbers each, as the library has them; none for one white headlight. `reason`: why OpenGL has to shade."""
+    """The lights of shaded volumes, six numbers each, in the library's layout; none for one white headlight. `reason`: why OpenGL has to shade."""
 
     def __init__(self, renderer):
         lights = renderer.GetLights()
         on = [light for light in (lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())) if light.GetSwitch()]
         self.rows, self.reason = [], None
-        # OpenGL's other formula, for all but one headlight of full strength: no ambient part, and highlights of its own.
+        # OpenGL uses another formula unless there is exactly one headlight of full strength: no ambient term, and different highlights.
         self.several = len(on) > 1 or not all(light.LightTypeIsHeadlight() and light.GetIntensity() == 1 for light in on)
         if not on:
             self.reason = "a shaded volume without a light"
@@ -78,14 +78,14 @@ class _Lights:
         white = all(tuple(light.GetDiffuseColor()) == tuple(light.GetSpecularColor()) == (1, 1, 1) for light in on)
         if self.several or not white:
             for light in on:
-                # A headlight alone is at the viewer, not parallel.
+                # A single headlight is at the viewer, not directional.
                 place = zip(light.GetTransformedPosition(), light.GetTransformedFocalPoint())
                 towards = [p - f for p, f in place] if self.several else [0.0] * 3
                 self.rows.append([*towards, *(light.GetIntensity() * c for c in light.GetDiffuseColor())])
 
 
 def _image_of(mapper):
-    """The image of a mapper, or why there is none."""
+    """The image data of a mapper, or the reason why there are none."""
     connected = mapper.GetNumberOfInputConnections(0) > 0
     if connected and mapper.GetInputAlgorithm(0, 0):
         mapper.GetInputAlgorithm(0, 0).Update()
@@ -101,13 +101,13 @@ def _image_of(mapper):
         if len(leaves) == 1 and isinstance(leaves[0], vtkImageData):
             return leaves[0]
         if len(leaves) > 1:
-            # Each block would need tables over the range of all.
+            # Each block would need tables over the range of all blocks.
             return "a volume of several blocks"
     return "a volume that is not image data"
 
 
 class Volumes:
-    """Tables of transfer functions; those of the last frame are kept."""
+    """Tables of transfer functions; those of the last frame are cached."""
 
     def __init__(self):
         self._kept, self._used = {}, {}
@@ -116,7 +116,7 @@ class Volumes:
         self._kept, self._used = self._used, {}
 
     def add(self, bridge, volume, renderer, name):
-        """Gives a volume to the bridge. Returns why OpenGL has to draw it, or `None`."""
+        """Passes a volume to the bridge. Returns why OpenGL has to draw it, or `None`."""
         mapper = volume.GetMapper()
         if volume.GetClassName() != "vtkVolume":
             return "OpenGL draws volumes of this class"
@@ -155,7 +155,7 @@ class Volumes:
         if not bridge.has_volume(v.scalar_key):
             v.scalars = rtv.Array.of(numbers(scalars, _KINDS, keep).reshape(-1, 1))
 
-        # ---- Place: index times spacing, turned by the image's directions, moved to its first point, then the prop's matrix.
+        # ---- Transform: index times spacing, rotated by the image's directions, moved to its first point, then the prop's matrix.
         first, local = [0.0] * 3, np.eye(4)
         image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
         directions = image.GetDirectionMatrix()
@@ -171,7 +171,7 @@ class Volumes:
         blend = mapper.GetBlendMode()
         colors, opacities, gradients = self._tables(p, low, high)
         if blend in (_AVERAGE, _ADDITIVE):
-            # Means and sums are of the scalars themselves, from black to white.
+            # Average and additive blending use the scalars themselves, mapped from black to white.
             colors = np.repeat(np.linspace(0, 1, _ENTRIES, dtype=np.float32)[:, None], 3, 1)
             keep.append(colors)
             first, last = mapper.GetAverageIPScalarRange()
@@ -183,7 +183,7 @@ class Volumes:
             v.isovalues = rtv.Array.of(keep[-1])
         v.colors, v.opacities, v.blend = rtv.Array.of(colors), rtv.Array.of(opacities), blend
         if gradients is not None:
-            # OpenGL takes differences over n / (n - 1) of the distance of points and back, and scales them by the mean of the spacings.
+            # OpenGL takes central differences over n / (n - 1) of the point spacing, and scales them by the mean of the spacings.
             reach = sum(n / (n - 1) for n in dims) / 3
             v.gradient_opacities, v.steepest = rtv.Array.of(gradients), _GRADIENT_RANGE * (high - low) / (sum(image.GetSpacing()) / 3 * reach)
         v.unit_distance = p.GetScalarOpacityUnitDistance(0)

@@ -1,4 +1,4 @@
-"""Why OpenGL has to draw an actor, as far as the actor itself and its cells say."""
+"""Reasons in an actor itself and in its cells for which OpenGL has to draw it."""
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
 from . import arrays
@@ -11,12 +11,12 @@ _PBR = 3
 
 
 class Untraceable(Exception):
-    """OpenGL has to draw a prop; the text says why."""
+    """Raised for a prop that OpenGL has to draw; the text says why."""
 
 
 def check_actor(actor, mapper, point_radius, line_radius):
     p = actor.GetProperty()
-    # Classes that Python derives (PyVista's) have the names of VTK's classes below them.
+    # Classes derived in Python (PyVista's) are known by the names of their VTK base classes.
     if actor.GetClassName() not in ACTORS:
         raise Untraceable("OpenGL draws props of this class")
     if p.GetRepresentation() == WIREFRAME and line_radius <= 0:
