@@ -1,8 +1,8 @@
-//! Base64 (RFC 4648) as VTK and glTF write it: several padded pieces may follow each other, white
-//! space may lie between. The crate `base64` decodes one piece without white space, whole, so it
-//! serves for writing only.
+//! Base64 (RFC 4648) as VTK and glTF write it: several padded blocks may follow each other, with
+//! white space between them. The crate `base64` decodes a single complete block without white
+//! space, so it serves for writing only.
 
-/// Values of the letters; 64 marks a letter that does not belong.
+/// Values of the characters; 64 marks a character outside the alphabet.
 const TABLE: [u8; 256] = {
     let mut table = [64u8; 256];
     let letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -14,14 +14,14 @@ const TABLE: [u8; 256] = {
     table
 };
 
-/// Decodes quartets of a text on request.
+/// Decodes groups of four characters from a text, up to a requested length.
 pub(crate) struct Decoder<'a> {
     text: &'a [u8],
-    /// Position in the text, always between quartets.
+    /// Position in the text, always between groups.
     pub(crate) pos: usize,
 }
 
-/// A byte that is not base64, and where.
+/// A byte that is not base64, and its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BadByte {
     pub(crate) pos: usize,
@@ -33,15 +33,15 @@ impl<'a> Decoder<'a> {
         Decoder { text, pos: 0 }
     }
 
-    /// Appends bytes to `out` until it holds `len` or the text ends. It may hold up to two bytes
-    /// more than asked for: quartets are not split.
+    /// Appends bytes to `out` until it holds `len` or the text ends. It may append up to two bytes
+    /// more than requested, because groups are not split.
     pub(crate) fn fill(&mut self, out: &mut Vec<u8>, len: usize) -> Result<(), BadByte> {
         while out.len() < len {
             let mut quartet = [0u8; 4];
             let (mut n, mut padding) = (0, 0);
             while n < 4 {
                 let Some(&byte) = self.text.get(self.pos) else {
-                    // A quartet that the text breaks off is not data.
+                    // A group that the end of the text cuts off is not data.
                     return Ok(());
                 };
                 let value = TABLE[byte as usize];
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn padded_pieces_one_after_the_other_are_read_through() {
-        // The test vectors of RFC 4648, then two pieces in a row with white space, as VTK writes
+        // The test vectors of RFC 4648, then two blocks in a row with white space, as VTK writes
         // header and data.
         for (plain, coded) in [
             ("", ""),

@@ -1,12 +1,12 @@
-//! Tables as text: a line of column names, then one row a line. Commas, or semicolons or tabs if
-//! the header has them instead.
+//! Tables as text: a line of column names, then one row per line. Cells are separated by commas, or
+//! by semicolons or tabs if the header uses them instead.
 //!
 //! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty
-//! lines and lines that begin with `#` are skipped. Columns are asked for by name, so their order
+//! lines and lines that begin with `#` are skipped. Callers request columns by name, so their order
 //! does not matter.
 //!
-//! The lexer is our own because the crate csv does not refuse broken quotes: the book, "Decisions
-//! and their reasons".
+//! The lexer is our own because the crate csv does not reject broken quotes: see the book,
+//! "Decisions and their reasons".
 
 use super::ReadError;
 use super::error::{At, Fault, read_bytes};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const FORMAT: &str = "CSV";
 
-/// A table with named columns; cells stay text until a column of numbers is asked for.
+/// A table with named columns. Cells stay text until a column of numbers is requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CsvTable {
     path: PathBuf,
@@ -36,7 +36,7 @@ pub fn read(path: &Path) -> Result<CsvTable, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads a table from its bytes; `path` is for messages.
+/// Reads a table from its bytes; `path` is used in messages only.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<CsvTable, ReadError> {
     parse(path, bytes).map_err(|f| f.in_file(path, FORMAT))
 }
@@ -108,13 +108,13 @@ fn unclosed(line: u64, cell: String) -> Fault {
     Fault::new(At::Line(line), what, "close the quote on the same line; double the quotes inside")
 }
 
-/// The cells of a line without surrounding space and quotes; `Err` with the cell whose quotes are
-/// wrong.
+/// Splits a line into cells without surrounding space and quotes; `Err` holds the cell whose quotes
+/// are invalid.
 fn cells(line: &str, separator: char) -> Result<Vec<String>, String> {
     let mut out = Vec::new();
     let mut rest = line;
     loop {
-        // Space that is not itself the separator (a tab may be).
+        // White space that is not itself the separator (a tab may be).
         let start = rest.trim_start_matches(|c: char| c.is_whitespace() && c != separator);
         if let Some(quoted) = start.strip_prefix('"') {
             let mut cell = String::new();
@@ -157,15 +157,15 @@ impl CsvTable {
     pub fn path(&self) -> &Path {
         &self.path
     }
-    /// Names of the columns, in order.
+    /// Names of the columns, in file order.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
-    /// What stands between cells.
+    /// The separator between cells.
     pub fn separator(&self) -> char {
         self.separator
     }
-    /// The header as it stands in the file.
+    /// The header as written in the file.
     pub fn header_text(&self) -> &str {
         &self.header
     }
@@ -173,15 +173,15 @@ impl CsvTable {
     pub fn len(&self) -> usize {
         self.rows.len()
     }
-    /// True when there is only a header.
+    /// True if there is only a header.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
-    /// Row `row` as it stands in the file; panics when out of range.
+    /// Row `row` as written in the file; panics when out of range.
     pub fn row_text(&self, row: usize) -> &str {
         &self.rows[row].text
     }
-    /// Line of row `row` in the file, from 1; panics when out of range.
+    /// Line number of row `row` in the file, from 1; panics when out of range.
     pub fn line(&self, row: usize) -> u64 {
         self.rows[row].line
     }
@@ -190,7 +190,7 @@ impl CsvTable {
         &self.rows[row].cells[column]
     }
 
-    /// Which column has this name; capitals matter only if that tells columns apart.
+    /// Index of the column with this name. Case matters only if it distinguishes columns.
     pub fn column_index(&self, name: &str) -> Result<usize, ReadError> {
         if let Some(i) = self.columns.iter().position(|c| c == name) {
             return Ok(i);
@@ -206,7 +206,7 @@ impl CsvTable {
         Err(Fault::new(At::Field("the header".into()), what, cure).in_file(&self.path, FORMAT))
     }
 
-    /// The numbers of a column. A cell that is not a finite number is an error with its line,
+    /// The numbers of a column. A cell that is not a finite number gives an error with its line,
     /// column and content.
     ///
     /// ```
@@ -238,7 +238,7 @@ impl CsvTable {
             .collect()
     }
 
-    /// An error about the value in a cell, for checks that callers make.
+    /// Makes an error about the value in a cell, for checks by callers.
     pub fn cell_error(&self, row: usize, column: &str, what: &str, cure: &str) -> ReadError {
         let index = self.columns.iter().position(|c| c.eq_ignore_ascii_case(column));
         let (line, cell) = match (self.rows.get(row), index) {
@@ -319,7 +319,7 @@ mod tests {
                 .to_string()
                 .contains("in line 2")
         );
-        // Capitals do not matter unless they tell columns apart.
+        // Case does not matter unless it distinguishes columns.
         assert!(table("A,a\n1,2\n").unwrap().numbers("a").is_ok());
         assert!(table("Ab,aB\n1,2\n").unwrap().numbers("ab").is_err());
     }

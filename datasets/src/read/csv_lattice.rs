@@ -1,19 +1,20 @@
-//! Tables of points that form a lattice, as solvers and ParaView export them, as data sets.
+//! Converts tables of points that form a lattice, as solvers and ParaView export them, to data
+//! sets.
 
 use super::ReadError;
 use super::csv::{CsvTable, FORMAT};
 use super::error::{At, Fault};
 use crate::model::{Attributes, DataArray, Dataset, RectilinearGrid, Values};
 
-/// Names of the columns with coordinates; capitals do not matter. `Points:0` is ParaView's.
+/// Names of the coordinate columns, case-insensitive. `Points:0` is ParaView's.
 const COORDINATES: [&[&str]; 3] = [
     &["x", "x_m", "Points:0", "Points_0"],
     &["y", "y_m", "Points:1", "Points_1"],
     &["z", "z_m", "Points:2", "Points_2"],
 ];
 
-/// The table as a rectilinear grid: every combination of its x, y and z must occur once, in any
-/// order. All other columns of numbers become point arrays. A missing z (or y) is 0.
+/// Converts the table to a rectilinear grid: every combination of its x, y and z must occur once,
+/// in any order. All other columns of numbers become point arrays. A missing z (or y) is 0.
 ///
 /// ```
 /// use datasets::read::{csv, csv_lattice};
@@ -48,7 +49,7 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
         };
         let mut distinct = values.clone();
         distinct.sort_by(f64::total_cmp);
-        // −0 and 0 are the same place.
+        // −0 and 0 are the same coordinate.
         distinct.dedup_by(|a, b| a == b);
         of_rows.push(values);
         coordinates.push(distinct);
@@ -66,7 +67,7 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
         return Err(fault(what, "export the mesh itself (.vtu, .vts), or points on a lattice"));
     }
 
-    // Which row holds which point of the lattice.
+    // The row of each lattice point.
     let mut row_of = vec![usize::MAX; table.len()];
     for row in 0..table.len() {
         let at = [0, 1, 2].map(|a| coordinates[a].partition_point(|x| *x < of_rows[a][row]));
@@ -84,7 +85,7 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
 
     let mut attributes = Attributes::default();
     for (i, name) in table.columns().iter().enumerate().filter(|(i, _)| !is_coordinate[*i]) {
-        // Columns of text are left alone; a number missing among numbers is an error.
+        // Text columns are ignored; a missing number in a column of numbers is an error.
         if table.cell(0, i).parse::<f64>().is_err() {
             continue;
         }

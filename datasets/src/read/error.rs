@@ -1,16 +1,16 @@
-//! What can go wrong when reading, always with the file, the place and the cure.
+//! Errors of the readers. Each names the file, the position and the cure.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where in a file.
+/// A position in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum At {
     /// Offset from the start of the file, in bytes.
     Byte(u64),
     /// Line of a text, from 1.
     Line(u64),
-    /// A field, array or element.
+    /// The name of a field, array or element.
     Field(String),
 }
 
@@ -24,15 +24,15 @@ impl fmt::Display for At {
     }
 }
 
-/// Why a file cannot be read.
+/// Reason why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The operating system refuses.
+    /// The operating system refused access.
     #[error("{}: cannot be read; {cure}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's message.
         source: std::io::Error,
         /// What to do.
         cure: String,
@@ -44,14 +44,14 @@ pub enum ReadError {
         path: PathBuf,
         /// Name of the format.
         format: &'static str,
-        /// Where.
+        /// The position.
         at: At,
-        /// What is wrong, with the value.
+        /// What is wrong, with the value found.
         what: String,
         /// What to do.
         cure: String,
     },
-    /// The content may be right, but this program does not read it.
+    /// The content may be valid, but this program does not read it.
     #[error("{}: {format} file that uses something not read here: {at}: {what}; \
              {cure}", path.display())]
     Unsupported {
@@ -59,21 +59,21 @@ pub enum ReadError {
         path: PathBuf,
         /// Name of the format.
         format: &'static str,
-        /// Where.
+        /// The position.
         at: At,
-        /// What it uses.
+        /// The unsupported feature.
         what: String,
         /// What to do.
         cure: String,
     },
-    /// Neither the ending of the name nor the content tells the format.
+    /// Neither the file extension nor the content identifies the format.
     #[error("{}: unknown kind of file ({what}); files read here: {known}", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// What was looked at.
+        /// What was examined.
         what: String,
-        /// The formats there are.
+        /// The supported formats.
         known: &'static str,
     },
 }
@@ -90,7 +90,7 @@ impl ReadError {
     }
 }
 
-/// A fault inside a file whose name is not known here; [`Fault::in_file`] adds it.
+/// A fault in a file whose name is not known yet; [`Fault::in_file`] adds it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub(crate) at: At,
@@ -99,9 +99,9 @@ pub(crate) struct Fault {
     pub(crate) unsupported: bool,
 }
 
-/// The cure when a file is shorter than it says.
+/// The cure for a file that is shorter than it declares.
 pub(crate) const TRUNCATED: &str = "the file is probably truncated: copy or write it again";
-/// The cure when a file contradicts itself.
+/// The cure for a file that contradicts itself.
 pub(crate) const BROKEN: &str =
     "the file contradicts itself: write it again with the program that made it";
 
@@ -137,9 +137,9 @@ impl From<crate::model::ModelError> for Fault {
     }
 }
 
-/// A declared number of items as a length, refused when `available` bytes cannot hold that many of
-/// at least `each` bytes. Everything whose size a file declares passes here before memory is taken
-/// for it.
+/// Converts a declared number of items to a length. It is rejected if `available` bytes cannot hold
+/// that many items of at least `each` bytes. Every size that a file declares is checked here before
+/// memory is allocated for it.
 pub(crate) fn fits(
     count: u64,
     each: usize,
@@ -165,7 +165,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     std::fs::read(path).map_err(|source| io_error(path, source))
 }
 
-/// An operating system's error with the cure that goes with it.
+/// Adds the matching cure to an operating system error.
 pub(crate) fn io_error(path: &Path, source: std::io::Error) -> ReadError {
     let cure = match source.kind() {
         std::io::ErrorKind::NotFound => "check the name and the directory",
@@ -176,14 +176,13 @@ pub(crate) fn io_error(path: &Path, source: std::io::Error) -> ReadError {
     ReadError::Io { path: path.to_path_buf(), source, cure: cure.into() }
 }
 
-/// The path of a file that another file names, relative to the directory of `path`. An absolute
-/// name, or one that leaves the directory, is allowed: the formats allow it and the user opened the
-/// file.
+/// Resolves the name of another file relative to the file that contains it. Absolute names and
+/// names that leave the directory are allowed: the formats allow them and the user opened the file.
 pub(crate) fn sibling_path(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name.trim())
 }
 
-/// Bytes with a position, for binary formats.
+/// Bytes with a read position, for binary formats.
 pub(crate) struct Cursor<'a> {
     pub(crate) data: &'a [u8],
     pub(crate) pos: usize,
@@ -206,7 +205,7 @@ impl<'a> Cursor<'a> {
         self.pos += n;
         Ok(out)
     }
-    /// The next line without its end, as text; `None` at the end of the data.
+    /// The next line as text, without its line end; `None` at the end of the data.
     pub(crate) fn line(&mut self) -> Option<String> {
         if self.remaining() == 0 {
             return None;
@@ -235,7 +234,7 @@ impl<'a> Cursor<'a> {
         count: u64,
         what: &str,
     ) -> Result<crate::model::Values, Fault> {
-        // A number takes a digit and a separator, but for the last.
+        // Every number takes at least a digit and a separator, except for the last one.
         let count = fits(count, 2, self.remaining() + 1, self.at(), what)?;
         let mut missing = false;
         let words = (0..count).map_while(|_| {

@@ -17,7 +17,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a file. The data file is looked up in the directory of `path`.
+/// Reads the content of a file; the data file is resolved relative to `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let mut warnings = Vec::new();
@@ -56,7 +56,7 @@ struct Header {
 }
 
 impl Header {
-    /// The fields; the data of a local file starts behind the line ElementDataFile.
+    /// Parses the fields; the data of a local file starts after the line ElementDataFile.
     fn parse(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
         let mut cursor = Cursor::new(bytes);
         let mut fields = BTreeMap::new();
@@ -102,7 +102,7 @@ impl Header {
         })
     }
 
-    /// Skips HeaderSize bytes; -1 means: the values are the end of the file.
+    /// Skips HeaderSize bytes; -1 means that the values are at the end of the file.
     fn skip<'a>(&self, data: &'a [u8], volume: &Volume) -> Result<&'a [u8], Fault> {
         let skip = self.numbers::<i64>("HeaderSize")?.and_then(|v| v.first().copied()).unwrap_or(0);
         if skip == -1 {
@@ -171,7 +171,7 @@ impl Header {
     }
 }
 
-/// The scalar type of a name.
+/// The scalar type with the given name.
 fn element_type(name: &str) -> Result<ScalarType, Fault> {
     Ok(match name.trim_end_matches("_ARRAY") {
         "MET_CHAR" => ScalarType::I8,

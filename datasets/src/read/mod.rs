@@ -1,8 +1,8 @@
-//! Readers for the files that users have. [`open`] finds the format by the name and by the content.
+//! Readers for common file formats. [`open`] detects the format by the content and the name.
 //!
-//! Rules all readers keep: input never makes them panic; memory is taken only for sizes that the
-//! bytes of the file can justify; what is left out is named in [`LoadedFile::warnings`]; every
-//! error names the file, the place and the cure.
+//! Rules that all readers follow: input never makes them panic; memory is allocated only for sizes
+//! that the bytes of the file can justify; everything left out is named in
+//! [`LoadedFile::warnings`]; every error names the file, the position and the cure.
 
 pub(crate) mod base64;
 pub mod csv;
@@ -31,17 +31,17 @@ use crate::model::{Dataset, ModelError, SurfaceReport};
 use rt_core::mesh::TriMesh;
 use std::path::PathBuf;
 
-/// What a file held.
+/// The content of a loaded file.
 #[derive(Debug, Clone)]
 pub struct LoadedFile {
     /// Name of the format, for messages.
     pub format: &'static str,
     /// The data.
     pub content: Content,
-    /// What was left out or repaired, one sentence each; empty when all is well.
+    /// What was left out or repaired, one sentence each; empty if nothing was.
     pub warnings: Vec<String>,
-    /// For a time series: every file with its time, in order. `content` is the first time; open the
-    /// others by their path.
+    /// For a time series: every file with its time, in order. `content` holds the first time; open
+    /// the others by their path.
     pub time_steps: Vec<TimeStep>,
 }
 
@@ -58,16 +58,16 @@ pub enum Content {
 /// One file of a time series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeStep {
-    /// Its time, in the unit of the program that wrote it.
+    /// Its time, in the unit of the program that wrote the file.
     pub time: f64,
-    /// Its part, when a time has several files.
+    /// Its part number, if a time has several files.
     pub part: i64,
     /// The file.
     pub path: PathBuf,
 }
 
 impl LoadedFile {
-    /// The data set; an error for a scene, which has meshes only.
+    /// The data set; an error for a scene, which contains meshes only.
     pub fn dataset(&self) -> Result<&Dataset, ModelError> {
         match &self.content {
             Content::Data(d) => Ok(d),
@@ -79,9 +79,9 @@ impl LoadedFile {
         }
     }
 
-    /// Everything that has a surface, as triangle meshes with materials. A data set gives one mesh
-    /// with no material. `color_by` names an array of a data set; scenes carry their own colours
-    /// and ignore it.
+    /// Converts everything with a surface to triangle meshes with materials. A data set gives one
+    /// mesh without a material. `color_by` names an array of a data set; scenes have their own
+    /// colours and ignore it.
     pub fn to_meshes(
         &self,
         color_by: Option<&str>,

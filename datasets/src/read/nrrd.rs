@@ -13,12 +13,12 @@ use std::path::Path;
 
 pub(crate) const FORMAT: &str = "NRRD";
 
-/// Reads a `.nrrd` file, or a `.nhdr` header with the data file it names.
+/// Reads a `.nrrd` file, or a `.nhdr` header with the data file that it names.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a file. A detached data file is looked up in the directory of `path`.
+/// Reads the content of a file; a detached data file is resolved relative to `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let mut warnings = Vec::new();
@@ -58,7 +58,7 @@ struct Header {
 }
 
 impl Header {
-    /// The fields, and what follows the empty line that ends them.
+    /// Parses the fields, and returns what follows the empty line that ends them.
     fn parse(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
         let mut cursor = Cursor::new(bytes);
         let magic = cursor.line().unwrap_or_default();
@@ -117,8 +117,8 @@ impl Header {
         }
     }
 
-    /// Skips lines, then bytes, as the header says. -1 bytes means: the values are the end of the
-    /// file.
+    /// Skips lines, then bytes, as the header says. -1 bytes means that the values are at the end
+    /// of the file.
     fn skip<'a>(
         &self,
         data: &'a [u8],
@@ -162,8 +162,7 @@ impl Header {
             let what = format!("{} sizes for {dimension} dimensions; 1 to 4 are read", sizes.len());
             return Err(Fault::field("field `sizes`", what));
         }
-        // With four axes, or when the kind of the first says so, the first axis holds the
-        // components.
+        // With four axes, or if the kind of the first says so, the first axis holds the components.
         const COMPONENT_KINDS: [&str; 16] = [
             "vector",
             "covariant-vector",
@@ -252,7 +251,7 @@ impl Header {
     }
 }
 
-/// `(x,y,z)` vectors and `none`; two-dimensional ones get z = 0.
+/// Parses `(x,y,z)` vectors and `none`; two-dimensional vectors get z = 0.
 fn vectors(text: &str) -> Result<Vec<Option<DVec3>>, String> {
     let mut out = Vec::new();
     let mut rest = text.trim();

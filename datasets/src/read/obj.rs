@@ -1,4 +1,4 @@
-//! Wavefront OBJ with its materials (MTL), by way of the crate `tobj`.
+//! Wavefront OBJ with its materials (MTL), read with the crate `tobj`.
 
 use super::error::{At, BROKEN, Fault, read_bytes, sibling_path};
 use super::scene::{SceneMesh, SceneModel, SurfaceMaterial, decode_texture};
@@ -11,12 +11,12 @@ use std::path::Path;
 
 pub(crate) const FORMAT: &str = "OBJ";
 
-/// Reads an `.obj` file, the material files it names and the textures they name.
+/// Reads a `.obj` file, the material files that it names and their image files.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of an `.obj` file. Other files are looked up in the directory of `path`.
+/// Reads the content of an `.obj` file; other files are resolved relative to `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let warnings = RefCell::new(Vec::new());
     let options = tobj::LoadOptions {
@@ -53,8 +53,8 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         Ok(list) => list.iter().for_each(|m| add_material(m, path, &mut scene, &mut warnings)),
         Err(e) => warnings.push(format!("materials left out: {e}")),
     }
-    // Points and lines would spoil the attributes of the faces around them, so `tobj` skips them:
-    // count them here.
+    // `tobj` skips points and lines, because they would corrupt the attributes of the surrounding
+    // faces. They are counted here.
     let not_faces = bytes
         .split(|&b| b == b'\n')
         .filter(|l| l.starts_with(b"l ") || l.starts_with(b"p "))
@@ -87,9 +87,9 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     })
 }
 
-/// The first number of a face with more digits than 32 bits have, and its line. `tobj` 4.0.5
-/// (`add_vertex`) multiplies indices before it compares them with the number of vertices: such ones
-/// overflow and may come out as others.
+/// The first face index that does not fit in 32 bits, and its line. `tobj` 4.0.5 (`add_vertex`)
+/// multiplies indices before it compares them with the number of vertices, so such indices overflow
+/// and may become other ones.
 fn oversized_index(bytes: &[u8]) -> Option<(u64, String)> {
     let digits_32_bits = 10;
     let lines = (1..).zip(bytes.split(|&b| b == b'\n'));

@@ -7,13 +7,13 @@ use super::{
 use std::io::Read;
 use std::path::Path;
 
-/// The formats there are, for messages.
+/// The supported formats, for messages.
 pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm), VTK \
                          legacy (.vtk), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), OBJ, glTF, PLY, STL";
 
-/// Bytes looked at.
+/// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,9 +30,9 @@ enum Format {
     Stl,
 }
 
-/// Reads a file of any format that this crate knows. The content decides; where it does not tell
-/// (OBJ, raw, PLOT3D), the ending of the name does. A name that contradicts the content gives a
-/// warning, not an error.
+/// Reads a file of any format that this crate supports. The content decides; for formats without a
+/// signature (OBJ, raw, PLOT3D), the file extension does. A name that contradicts the content gives
+/// a warning, not an error.
 ///
 /// ```
 /// let dir = tempfile::tempdir()?;
@@ -56,7 +56,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
     let format = match (by_content, by_name) {
         (Some(f), _) | (None, Some(f)) => f,
         (None, None) => {
-            // Binary files called .bin, .dat and so on: PLOT3D if the sizes add up.
+            // Binary files with extensions such as .bin or .dat: PLOT3D if the sizes add up.
             if !head.is_empty() && plot3d::looks_like_plot3d(&read_bytes(path)?) {
                 Format::Plot3d
             } else {
@@ -107,7 +107,7 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
     }
 }
 
-/// True when the number of triangles in the header of a binary STL file explains its length.
+/// True if the number of triangles in the header of a binary STL file matches its length.
 fn stl_size(head: &[u8], length: u64) -> bool {
     let n = head.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
     n.is_some_and(|n| n > 0 && 84 + 50 * u64::from(n) == length)

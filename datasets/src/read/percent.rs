@@ -1,6 +1,6 @@
 //! Percent-encoding of names (RFC 3986, section 2.1), which legacy VTK files and glTF use.
 
-/// `%20` and so on as the signs they stand for; what is not valid stays as it is.
+/// Decodes `%20` and similar sequences; invalid sequences stay unchanged.
 pub(crate) fn decoded(name: &str) -> String {
     let b = name.as_bytes();
     let mut out = Vec::with_capacity(b.len());

@@ -15,7 +15,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a `.ply` file; `path` is for messages only.
+/// Reads the content of a `.ply` file; `path` is used in messages only.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     let data = parse(bytes, &mut warnings).map_err(|f| f.in_file(path, FORMAT))?;
@@ -46,7 +46,8 @@ struct Element {
     properties: Vec<Property>,
 }
 
-/// The columns of an element: one value per row, or for lists all entries and the end of each row.
+/// The columns of an element. A column holds one value per row; for lists, it holds all entries and
+/// the end of each row.
 struct Columns {
     plain: Vec<Values>,
     lists: Vec<(Values, Vec<usize>)>,
@@ -149,9 +150,9 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
     }
 }
 
-/// All rows of an element.
+/// Reads all rows of an element.
 fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Result<Columns, Fault> {
-    // The least a row can take: in binary its numbers, in text a digit and a separator each.
+    // The minimum size of a row: in binary its numbers, in text a digit and a separator each.
     let least: usize = element
         .properties
         .iter()
@@ -236,8 +237,7 @@ fn vertices(element: &Element, columns: Columns, out: &mut PolyData) -> Result<(
         element.properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
     let column = |name: &str| names.iter().position(|n| *n == name);
     let mut used = vec![false; names.len()];
-    // Columns side by side as one array; `None` when one is missing or (for colours) of another
-    // type.
+    // Interleaves columns to one array; `None` if one is missing or (for colours) of another type.
     let mut joined = |title: &str, wanted: &[&str], bytes_only: bool| -> Option<DataArray> {
         let at: Vec<usize> = wanted.iter().map(|n| column(n)).collect::<Option<_>>()?;
         let first = columns.plain[at[0]].kind();
@@ -311,7 +311,7 @@ fn faces(
                 Fault::field("element `face`", format!("face {} has no end", b.cell))
             })?;
         } else {
-            // Strips follow each other with -1 between them.
+            // Strips are separated by -1.
             ids.split(|&k| k == -1)
                 .filter(|s| !s.is_empty())
                 .for_each(|s| out.strips.push(s.iter().map(|&k| Cells::id(k))));

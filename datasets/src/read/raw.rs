@@ -1,4 +1,5 @@
-//! Raw volumes: numbers without a header, described by a TOML file beside them or by the file name.
+//! Raw volumes: numbers without a header, described by a TOML file in the same directory or by the
+//! file name.
 //!
 //! `bonsai.raw` is described by `bonsai.toml` (or `bonsai.raw.toml`):
 //! ```toml
@@ -12,7 +13,8 @@
 //! skip_bytes = 0
 //! name = "density"
 //! ```
-//! Without it, names like `bonsai_256x256x256_uint8.raw` (Open SciVis Datasets) are understood.
+//! Without a description, names like `bonsai_256x256x256_uint8.raw` (Open SciVis Datasets) are
+//! parsed.
 
 use super::error::{At, BROKEN, Fault, io_error, read_bytes};
 use super::volume::Volume;
@@ -29,11 +31,11 @@ pub(crate) const FORMAT: &str = "raw volume";
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawDescription {
-    /// The file with the numbers, in the directory of the description.
+    /// The file with the numbers, relative to the description.
     pub file: Option<PathBuf>,
     /// Points per axis, x fastest.
     pub dims: [u64; 3],
-    /// `u8`, `f32` and so on; `uint8`, `float32` and so on are understood too.
+    /// `u8`, `f32` and so on; `uint8`, `float32` and so on are accepted too.
     #[serde(rename = "type")]
     pub scalar_type: String,
     /// `little` or `big`.
@@ -55,7 +57,7 @@ pub struct RawDescription {
     pub name: Option<String>,
 }
 
-/// Byte order, as TOML spells it.
+/// Byte order, as spelled in TOML.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ByteOrder {
@@ -105,7 +107,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_values(&file, &description)
 }
 
-/// A description from TOML.
+/// Parses a description in TOML.
 pub(crate) fn parse_description(text: &str) -> Result<RawDescription, Fault> {
     toml::from_str(text).map_err(|e| {
         let line = e
@@ -125,7 +127,7 @@ fn sibling_description(path: &Path) -> Option<PathBuf> {
     [path.with_extension("toml"), PathBuf::from(long)].into_iter().find(|p| p.is_file())
 }
 
-/// Size and type out of a name such as `head_512x512x106_uint16.raw`.
+/// Parses size and type from a name such as `head_512x512x106_uint16.raw`.
 pub fn from_file_name(name: &str) -> Option<RawDescription> {
     let stem = name.rsplit_once('.').map_or(name, |(s, _)| s);
     let words: Vec<&str> = stem.split('_').collect();

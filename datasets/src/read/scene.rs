@@ -3,19 +3,19 @@
 use rt_core::mesh::TriMesh;
 use rt_core::texture::{Filter, Wrap};
 
-/// A scene out of a file; positions are world positions, transforms are applied.
+/// A scene from a file. Transforms are applied, so positions are world positions.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SceneModel {
     /// The meshes.
     pub meshes: Vec<SceneMesh>,
-    /// The materials they refer to.
+    /// The materials that the meshes refer to.
     pub materials: Vec<SurfaceMaterial>,
-    /// The textures that materials refer to.
+    /// The images that the materials refer to.
     pub textures: Vec<Texture>,
 }
 
 impl SceneModel {
-    /// Triangles of all meshes.
+    /// Number of triangles in all meshes.
     pub fn num_triangles(&self) -> usize {
         self.meshes.iter().map(|m| m.mesh.num_triangles()).sum()
     }
@@ -32,19 +32,19 @@ pub struct SceneMesh {
     pub material: Option<usize>,
 }
 
-/// What the opacity of a material means (glTF 2.0, section 3.9.4).
+/// How the opacity of a material is interpreted (glTF 2.0, section 3.9.4).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum AlphaMode {
-    /// Nothing: all of it is seen.
+    /// Ignored: the surface is opaque.
     Opaque,
-    /// Below this number nothing is seen, else all.
+    /// Transparent below this number, opaque otherwise.
     Mask(f32),
-    /// The share of light that is stopped.
+    /// The fraction of light that is blocked.
     #[default]
     Blend,
 }
 
-/// How a surface looks, in the terms of glTF's metallic-roughness model. Colours are linear RGB(A).
+/// The appearance of a surface, in glTF's metallic-roughness model. Colours are linear RGB(A).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceMaterial {
     /// Its name in the file.
@@ -53,30 +53,30 @@ pub struct SurfaceMaterial {
     pub base_color: [f32; 4],
     /// Index into [`SceneModel::textures`], sRGB with alpha; multiplies `base_color`.
     pub base_color_texture: Option<usize>,
-    /// What the opacity means.
+    /// How the opacity is interpreted.
     pub alpha: AlphaMode,
     /// 0 = dielectric, 1 = metal.
     pub metallic: f32,
-    /// 0 = mirror, 1 = matt.
+    /// 0 = mirror, 1 = fully rough.
     pub roughness: f32,
-    /// Index of a texture whose green multiplies `roughness` and whose blue multiplies `metallic`;
-    /// linear.
+    /// Index of a linear texture whose green channel multiplies `roughness` and whose blue channel
+    /// multiplies `metallic`.
     pub metallic_roughness_texture: Option<usize>,
-    /// Index of a texture of normals: 2 rgb - 1 along tangent, its partner and normal; linear.
+    /// Index of a linear normal map: 2 rgb - 1 along tangent, bitangent and normal.
     pub normal_texture: Option<usize>,
-    /// Factor on the first two components of those.
+    /// Factor on the first two components of the normal map.
     pub normal_scale: f32,
-    /// Index of a texture whose red is the share of ambient light that gets in; linear.
+    /// Index of a linear texture whose red channel is the fraction of ambient light that arrives.
     pub occlusion_texture: Option<usize>,
-    /// 0 for none of that, 1 for all.
+    /// Strength of the occlusion texture: 0 for no effect, 1 for the full effect.
     pub occlusion_strength: f32,
-    /// Light given off.
+    /// Emitted light.
     pub emissive: [f32; 3],
-    /// Index of a texture that multiplies `emissive`, sRGB.
+    /// Index of an sRGB texture that multiplies `emissive`.
     pub emissive_texture: Option<usize>,
     /// Refractive index.
     pub ior: f32,
-    /// Seen from both sides.
+    /// Whether the surface is visible from both sides.
     pub double_sided: bool,
 }
 
@@ -102,7 +102,7 @@ impl Default for SurfaceMaterial {
     }
 }
 
-/// A texture and how it is sampled: 8 bits per channel, first row at the top. Colours are sRGB with
+/// An image and its sampling: 8 bits per channel, first row at the top. Colours are sRGB with
 /// linear alpha; all other material inputs are linear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
@@ -117,14 +117,14 @@ pub struct Texture {
     /// True when texture coordinate v = 0 is the lower edge (OBJ), false when it is the upper edge
     /// (glTF).
     pub v_up: bool,
-    /// Horizontal and vertical behaviour outside 0..=1.
+    /// Horizontal and vertical wrap mode outside 0..=1.
     pub wrap: [Wrap; 2],
-    /// How texels are combined.
+    /// How texels are filtered.
     pub filter: Filter,
 }
 
-/// Pictures with more bytes than this when unpacked are refused: a few compressed bytes can declare
-/// any size.
+/// Maximum size in bytes of a decoded image; larger ones are rejected, because a few compressed
+/// bytes can declare any size.
 const MAX_TEXTURE_BYTES: u64 = 1 << 30;
 
 /// Decodes PNG or JPEG bytes.
@@ -133,8 +133,7 @@ pub(crate) fn decode_texture(name: &str, bytes: &[u8], v_up: bool) -> Result<Tex
         .with_guessed_format()
         .map_err(|e| e.to_string())?;
     let mut limits = image::Limits::default();
-    // An image of one colour compresses about 1:1000; the added megabyte leaves room for small
-    // ones.
+    // An image of one colour compresses about 1:1000; leave room for small ones.
     limits.max_alloc =
         Some(MAX_TEXTURE_BYTES.min((bytes.len() as u64).saturating_mul(2048) + (1 << 20)));
     reader.limits(limits);

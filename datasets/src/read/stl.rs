@@ -1,7 +1,8 @@
-//! STL triangle files, text and binary. Corners at the same place (bit for bit) become one point.
+//! STL triangle files, text and binary. Corners at the same position (bit for bit) become one
+//! point.
 //!
-//! The format repeats every corner for each triangle; without welding no normal could be smooth and
-//! no edge shared.
+//! The format repeats every corner for each triangle. Without welding, no normal could be smooth
+//! and no edge shared.
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, read_bytes};
 use super::{Content, LoadedFile, ReadError};
@@ -20,7 +21,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a `.stl` file; `path` is for messages only.
+/// Reads the content of a `.stl` file; `path` is used in messages only.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     // Binary files may begin with `solid` too, so the size decides.
@@ -40,7 +41,7 @@ fn declared_triangles(bytes: &[u8]) -> Option<u64> {
     Some(u64::from(u32::from_le_bytes(b.try_into().ok()?)))
 }
 
-/// True when the length is what a binary file with its number of triangles has.
+/// True if the length matches that of a binary file with its number of triangles.
 pub(crate) fn has_binary_size(bytes: &[u8]) -> bool {
     let expected = |n: u64| n * TRIANGLE_BYTES as u64 + HEADER_BYTES as u64 + 4;
     declared_triangles(bytes).is_some_and(|n| expected(n) == bytes.len() as u64)
@@ -54,7 +55,7 @@ struct Welder {
 
 impl Welder {
     fn id(&mut self, p: [f32; 3]) -> u32 {
-        // -0 and 0 are the same place.
+        // -0 and 0 are the same coordinate.
         let key = p.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
         *self.index.entry(key).or_insert_with(|| {
             self.points.push(p);
@@ -80,7 +81,7 @@ fn binary_triangles(bytes: &[u8], warnings: &mut Vec<String>) -> Result<PolyData
     for record in body.as_chunks::<TRIANGLE_BYTES>().0 {
         let real =
             |i: usize| f32::from_le_bytes([record[i], record[i + 1], record[i + 2], record[i + 3]]);
-        // The normal comes first; it follows from the corners.
+        // The normal comes first; it is ignored, because it follows from the corners.
         for corner in 0..3 {
             let at = 12 + 12 * corner;
             ids.push(welder.id([real(at), real(at + 4), real(at + 8)]));

@@ -1,4 +1,4 @@
-//! What the simple volume formats (NRRD, MetaImage, raw) have in common.
+//! Code shared by the simple volume formats (NRRD, MetaImage, raw).
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED};
 use crate::model::{DataArray, Dataset, Endian, ImageData, ScalarType, Values};
