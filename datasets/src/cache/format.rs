@@ -1,6 +1,6 @@
-//! The cache's file format: plain arrays behind a small header, guarded by a checksum. It is
-//! private to one machine, so numbers are in native byte order; a marker refuses files of the other
-//! order.
+//! The cache's file format: plain arrays after a small header, protected by a checksum. The cache
+//! is private to one machine, so numbers are in native byte order; a marker rejects files of the
+//! other order.
 //!
 //! | part | content |
 //! |---|---|
@@ -13,12 +13,13 @@ use glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::io::{self, Read, Write};
 
-/// Part of the file name, too. Raise it when the format *or a generator's output* changes.
+/// Format version, which is also part of the file name. Raise it when the format *or a generator's
+/// output* changes.
 pub(super) const VERSION: u32 = 1;
 
 const MAGIC: [u8; 8] = *b"RTSVMESH";
 const BYTE_ORDER: u32 = 0x0102_0304;
-/// Bytes handled between two checksum updates.
+/// Number of bytes between two checksum updates.
 const CHUNK_BYTES: usize = 1 << 20;
 
 const POSITIONS: u32 = 1;
@@ -61,8 +62,8 @@ pub(super) fn write(out: &mut dyn Write, key: &str, mesh: &TriMesh) -> io::Resul
     w.inner.write_all(&sum.to_ne_bytes())
 }
 
-/// `length` is the file's: arrays that would not fit into it are refused before memory is asked
-/// for.
+/// `length` is the file's length: arrays that do not fit into it are rejected before memory is
+/// allocated.
 pub(super) fn read(input: impl Read, length: u64, key: &str) -> Result<TriMesh, String> {
     let mut r = ChecksumStream { inner: input, crc: flate2::Crc::new() };
     let mut magic = [0u8; 8];
@@ -112,7 +113,7 @@ pub(super) fn read(input: impl Read, length: u64, key: &str) -> Result<TriMesh, 
     Ok(mesh)
 }
 
-/// A reader or writer that sums what passes.
+/// A reader or writer that computes the checksum of all bytes that pass through it.
 struct ChecksumStream<T> {
     inner: T,
     crc: flate2::Crc,

@@ -1,4 +1,4 @@
-//! The 256 ways a surface can pass through a cell, derived from two rules instead of typed in.
+//! The 256 cases of a surface in a cell, derived from two rules instead of typed in.
 //!
 //! 1. **Faces decide.** On each of the six faces, walking around it, every run of inside corners is
 //!    cut off by one segment from where the walk enters it to where it leaves. On an ambiguous face
@@ -33,22 +33,21 @@ pub(crate) const EDGE_CORNERS: [[u8; 2]; 12] = [
     [3, 7],
 ];
 
-/// The corners of each face, counter-clockwise seen from outside the cell.
+/// The corners of each face, counter-clockwise as seen from outside the cell.
 const FACES: [[u8; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-/// More triangles than any case has would be a bug in the derivation; a test counts them.
+/// Maximum number of triangles per case. More would be a bug in the derivation; a test counts them.
 pub(crate) const MAX_TRIANGLES: usize = 5;
 
-/// What one case draws.
+/// The triangles of one case.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Case {
     /// Bit e is set when edge e is crossed.
     pub(crate) crossed: u16,
-    /// How many of `triangles` are used.
+    /// Number of entries of `triangles` in use.
     pub(crate) count: u8,
-    /// Edge numbers, counter-clockwise seen from the outside (from where values are below the
-    /// isovalue).
+    /// Edge numbers, counter-clockwise as seen from the side where values are below the isovalue.
     pub(crate) triangles: [[u8; 3]; MAX_TRIANGLES],
 }
 
@@ -72,9 +71,9 @@ fn derive(inside: u8) -> Case {
         case.crossed |= ((is_inside(*a) != is_inside(*b)) as u16) << e;
     }
 
-    // Rule 1. The walks are counter-clockwise seen from outside the cell. From where a walk enters
-    // the inside to where it leaves: that direction makes the loops counter-clockwise seen from the
-    // low values (a test measures it).
+    // Rule 1. The walks are counter-clockwise as seen from outside the cell. Each segment runs from
+    // where a walk enters the inside to where it leaves, which makes the loops counter-clockwise as
+    // seen from the low values (a test measures it).
     let mut next = [None; 12];
     for face in FACES {
         let corner = |i: usize| face[i % 4];

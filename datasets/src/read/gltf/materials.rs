@@ -1,4 +1,4 @@
-//! Materials of glTF files, with their textures and samplers.
+//! Materials of glTF files, with their images and samplers.
 
 use super::super::scene::{AlphaMode, SurfaceMaterial, Texture, decode_texture};
 use super::{Reader, resource};
@@ -6,8 +6,7 @@ use gltf::texture::{MagFilter, WrappingMode};
 use rt_core::texture::{Filter, Wrap};
 use std::path::Path;
 
-/// Textures of the file that have been asked for: their number in the scene, or nothing where they
-/// cannot be read.
+/// Requested textures of the file: their index in the scene, or `None` if they cannot be read.
 type TextureSlots = Vec<Option<Option<usize>>>;
 
 impl Reader {
@@ -69,8 +68,7 @@ impl Reader {
         }
     }
 
-    /// Reads a texture into the scene. Returns `None` and adds a warning when its image cannot be
-    /// read.
+    /// Reads a texture into the scene; `None`, with a warning, if its image cannot be read.
     fn texture(
         &mut self,
         path: &Path,

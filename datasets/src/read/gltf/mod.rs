@@ -1,9 +1,9 @@
 //! glTF 2.0 (`.gltf` with its buffers, `.glb`): triangles, transforms, vertex colours,
-//! metallic-roughness materials with all their pictures.
+//! metallic-roughness materials with all their textures.
 //!
-//! The crate `gltf` checks the JSON; accessors are decoded here, because every offset and count has
+//! The crate `gltf` checks the JSON. Accessors are decoded here, because every offset and count has
 //! to be checked against the buffers. Not read: animation, skins, morph targets, cameras, lights,
-//! compressed meshes; extensions of materials but the index of refraction and the strength of
+//! compressed meshes; extensions of materials except the index of refraction and the strength of
 //! emission.
 
 mod materials;
@@ -24,10 +24,11 @@ pub(crate) const FORMAT: &str = "glTF";
 /// Magic, version and length at the beginning of a `.glb` file.
 const GLB_HEADER_BYTES: u32 = 12;
 
-/// What is read beyond glTF 2.0.
+/// Supported extensions of glTF 2.0.
 const EXTENSIONS: [&str; 2] = ["KHR_materials_ior", "KHR_materials_emissive_strength"];
 
-/// One mesh may appear many times; scenes with more triangles than this in all are refused.
+/// Maximum number of triangles in a scene. One mesh may appear many times, so larger scenes are
+/// rejected.
 const MAX_TRIANGLES: usize = 1 << 28;
 
 /// Reads a `.gltf` or `.glb` file with the files it names.
@@ -35,7 +36,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a file. Other files are looked up in the directory of `path`.
+/// Reads the content of a file; other files are resolved relative to `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let gltf = checked(bytes).map_err(fault)?;
@@ -49,7 +50,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     };
     reader.visited.resize(gltf.nodes().len(), false);
     reader.materials(path, &gltf);
-    // Without a scene all nodes that are nobody's child are shown.
+    // Without a scene, all nodes without a parent are shown.
     let roots: Vec<gltf::Node<'_>> = match gltf.default_scene().or_else(|| gltf.scenes().next()) {
         Some(scene) => scene.nodes().collect(),
         None => {
@@ -61,7 +62,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let mut stack: Vec<(gltf::Node<'_>, DMat4)> =
         roots.into_iter().rev().map(|n| (n, DMat4::IDENTITY)).collect();
     while let Some((node, parent)) = stack.pop() {
-        // glTF requires trees. A node visited twice could form a loop.
+        // glTF requires trees; a node visited twice would make a cycle.
         if std::mem::replace(&mut reader.visited[node.index()], true) {
             let what = format!("node {} has two parents", node.index());
             return Err(fault(Fault::field("nodes", what)));
@@ -101,9 +102,9 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     })
 }
 
-/// The scene after the crate's own checks. Those index the accessors of primitives before they are
-/// checked (gltf-json 1.4.1, mesh.rs) and subtract the header from the length of a `.glb` file
-/// before they look at it (gltf 1.4.1, binary.rs), so that is done here first.
+/// Parses the scene with the crate's own checks. They index the accessors of primitives before
+/// those are checked (gltf-json 1.4.1, mesh.rs), and subtract the header from the length of a
+/// `.glb` file before they examine it (gltf 1.4.1, binary.rs), so both are checked here first.
 fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
     if let Some([magic, _, length]) = bytes.as_chunks::<4>().0.first_chunk::<3>()
         && magic == b"glTF"
@@ -140,7 +141,7 @@ fn buffers(path: &Path, gltf: &gltf::Gltf) -> Result<Vec<Vec<u8>>, ReadError> {
         .collect()
 }
 
-/// The data that a URI refers to: inside the URI, or in a file in the directory of `path`.
+/// Resolves a URI: embedded data, or a file relative to `path`.
 fn resource(path: &Path, uri: &str) -> Result<Vec<u8>, ReadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let fault = |what: &str| Fault::field("a data URI", what).in_file(path, FORMAT);
@@ -232,7 +233,7 @@ impl Reader {
                 "`{name}`: {dropped} triangles left out: they name vertices that do not exist"
             ));
         }
-        // A mirror turns triangles inside out (glTF 2.0, section 3.7.4).
+        // A reflection reverses the orientation of triangles (glTF 2.0, section 3.7.4).
         if world_from_node.determinant() < 0.0 {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
@@ -251,8 +252,8 @@ impl Reader {
         if let Some(a) = p.get(&Semantic::Normals) {
             let normals = self.tuples::<3>(&a, &format!("normals of `{name}`"))?;
             one_per_vertex(normals.len(), "normals")?;
-            // Normals go with the inverse transpose; the cofactors are that without a division that
-            // may fail.
+            // Normals transform by the inverse transpose; the matrix of cofactors is proportional
+            // to it and needs no division that may fail.
             let m = DMat3::from_mat4(world_from_node);
             let cofactors = DMat3::from_cols(
                 m.y_axis.cross(m.z_axis),
@@ -260,7 +261,7 @@ impl Reader {
                 m.x_axis.cross(m.y_axis),
             );
             let sign = if world_from_node.determinant() < 0.0 { -1.0 } else { 1.0 };
-            // Normals that nothing turns keep every bit.
+            // Normals that are not rotated keep every bit.
             let turned = |v: &[f32; 3]| {
                 let v = Vec3::from(*v);
                 if m == DMat3::IDENTITY && v.is_finite() {
@@ -279,7 +280,8 @@ impl Reader {
             let tangents = self.tuples::<4>(&a, &format!("tangents of `{name}`"))?;
             one_per_vertex(tangents.len(), "tangents")?;
             let m = DMat3::from_mat4(world_from_node);
-            // Tangents lie in the surface and go with it; a mirror turns the frame's sense.
+            // Tangents lie in the surface and transform with it; a reflection reverses the frame's
+            // handedness.
             let sense = if world_from_node.determinant() < 0.0 { -1.0 } else { 1.0 };
             let turned = |&[x, y, z, w]: &[f32; 4]| {
                 let t = (m * Vec3::new(x, y, z).as_dvec3()).normalize_or_zero().as_vec3();
@@ -322,7 +324,7 @@ impl Reader {
             return Err(Fault::new(at(), what, TRUNCATED));
         };
         let count = a.count();
-        // The last element need not be followed by a whole stride.
+        // The last element does not need a whole stride after it.
         let needed = (count as u64)
             .saturating_sub(1)
             .checked_mul(stride as u64)
@@ -332,8 +334,8 @@ impl Reader {
         Ok((0..count).map(|i| &bytes[i * stride..i * stride + size]).collect())
     }
 
-    /// The elements as `N` floats each; integers are fractions of their largest value when the file
-    /// says so.
+    /// The elements as `N` floats each; normalised integers become fractions of their largest
+    /// value.
     fn tuples<const N: usize>(
         &self,
         a: &gltf::Accessor<'_>,

@@ -1,7 +1,8 @@
-//! Which of PLOT3D's layouts a file has: nothing in the file says so, but its size does.
+//! Determines which of PLOT3D's layouts a file has. Nothing in the file states it, but its size
+//! does.
 //!
 //! Grid: [number of blocks], points per axis of each block, then per block all x, all y, all z and
-//! perhaps all iblank. Solution: the same head, then per block four reference numbers and the
+//! perhaps all iblank. Solution: the same header, then per block four reference numbers and the
 //! conserved variables. Fortran's unformatted files put each of these in a record between two
 //! length marks. Source: PLOT3D User's Manual (Walatka, Buning, Pierce and Elson, NASA TM 101067,
 //! 1990), chapter 8.
@@ -17,7 +18,7 @@ pub(super) enum Role {
     Solution,
 }
 
-/// One way to lay out the file.
+/// One possible layout of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     pub(super) endian: Endian,
@@ -30,7 +31,7 @@ pub(super) struct Layout {
     pub(super) axes: usize,
 }
 
-/// A layout with the sizes it gives.
+/// A layout with the sizes that follow from it.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     pub(super) layout: Layout,
@@ -41,11 +42,11 @@ pub(super) struct Plan {
     trailing: usize,
 }
 
-/// More trailing bytes than this are not padding but another layout.
+/// Maximum number of trailing bytes; more are not padding but another layout.
 const MAX_PADDING: usize = 4096;
 
 impl Layout {
-    /// Every layout that `options` allow, likelier ones first.
+    /// All layouts that `options` allow, more likely ones first.
     fn candidates(role: Role, options: &Plot3dOptions) -> Vec<Layout> {
         let mut list = Vec::new();
         for axes in [3, 2] {
@@ -100,8 +101,8 @@ impl Layout {
         }
     }
 
-    /// The sizes if the file has this layout: record marks agree, and the blocks fill the file but
-    /// for zero padding.
+    /// The sizes, if the file has this layout: record marks agree, and the blocks fill the file
+    /// except for zero padding.
     fn plan(self, role: Role, bytes: &[u8]) -> Option<Plan> {
         let mut at = 0usize;
         let mark = |at: &mut usize, len: u64| -> Option<()> {
@@ -158,8 +159,8 @@ impl Layout {
     }
 }
 
-/// The layout of `bytes`: the first one that fills the file exactly, else the first that does but
-/// for zero padding.
+/// The layout of `bytes`: the first one that fills the file exactly, else the first one that fills
+/// it except for zero padding.
 pub(super) fn find(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Plan, Fault> {
     let mut plans: Vec<Plan> =
         Layout::candidates(role, options).into_iter().filter_map(|l| l.plan(role, bytes)).collect();

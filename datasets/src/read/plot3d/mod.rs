@@ -1,6 +1,6 @@
 //! PLOT3D grids and solutions: binary of either byte order, with or without Fortran's record marks,
-//! one or more blocks, plane or solid, with or without iblank; and plain text. The layout is found
-//! from the size of the file.
+//! one or more blocks, two- or three-dimensional, with or without iblank; and plain text. The
+//! layout is detected from the size of the file.
 
 mod layout;
 
@@ -14,23 +14,23 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const FORMAT: &str = "PLOT3D";
 
-/// What is known about the files beforehand; everything left `None` is found out.
+/// What is known about the files in advance; everything left `None` is detected.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Plot3dOptions {
-    /// The solution ("q") file. Without it, a file beside the grid with the usual name is taken:
-    /// `nameq.bin` for `namexyz.bin`, `name.q` for `name.xyz`, `.x`, `.g`, `.grid` or `.p3d`.
+    /// The solution ("q") file. Without it, a file in the grid's directory with the usual name is
+    /// used: `nameq.bin` for `namexyz.bin`, `name.q` for `name.xyz`, `.x`, `.g`, `.grid` or `.p3d`.
     pub solution: Option<PathBuf>,
     /// Byte order.
     pub endian: Option<Endian>,
     /// Fortran record marks.
     pub records: Option<bool>,
-    /// Does the file begin with a number of blocks?
+    /// Whether the file begins with a number of blocks.
     pub multi_block: Option<bool>,
-    /// Does the grid have iblank values?
+    /// Whether the grid has iblank values.
     pub iblank: Option<bool>,
-    /// 4 or 8.
+    /// Bytes per real number: 4 or 8.
     pub real_bytes: Option<usize>,
-    /// Plane grid.
+    /// Whether the grid is two-dimensional.
     pub two_dimensional: Option<bool>,
 }
 
@@ -75,7 +75,7 @@ pub fn read(path: &Path, options: &Plot3dOptions) -> Result<LoadedFile, ReadErro
     Ok(opened(blocks, warnings))
 }
 
-/// Reads a grid from its bytes, and the solution if given; `path` is for messages only.
+/// Reads a grid from its bytes, and the solution if given; `path` is used in messages only.
 pub fn read_from_bytes(
     path: &Path,
     grid: &[u8],
@@ -104,15 +104,15 @@ fn opened(mut blocks: Vec<StructuredGrid>, warnings: Vec<String>) -> LoadedFile 
     LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: Vec::new() }
 }
 
-/// True when `bytes` have the size of a binary PLOT3D grid or solution.
+/// True if `bytes` have the size of a binary PLOT3D grid or solution.
 pub(crate) fn looks_like_plot3d(bytes: &[u8]) -> bool {
     [Role::Grid, Role::Solution]
         .into_iter()
         .any(|r| find(r, bytes, &Plot3dOptions::default()).is_ok())
 }
 
-/// The existing file next to `path` whose name follows from it, by the end of the stem or by the
-/// extension.
+/// An existing file in the directory of `path` whose name is derived from it: by the end of the
+/// stem, or by the extension.
 pub(crate) fn companion_file(
     path: &Path,
     stems: &[(&str, &str)],
@@ -135,7 +135,7 @@ pub(crate) fn companion_file(
     None
 }
 
-/// Text files hold nothing but numbers and white space.
+/// Text files contain only numbers and white space.
 fn is_text(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     !head.is_empty()
@@ -229,7 +229,7 @@ fn add_solution(
     Ok(())
 }
 
-/// The values at `at`; 0 where that is out of range (the third component of plane flows).
+/// The values at `at`; 0 if out of range (the third component of two-dimensional flows).
 fn picked(values: &Values, at: &[usize]) -> Values {
     match values {
         Values::F32(v) => {
@@ -291,8 +291,8 @@ fn binary_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bl
     Ok((dims, blocks))
 }
 
-/// Text: the same numbers in the same order. Whether there is a number of blocks follows from how
-/// many numbers there are.
+/// Reads text: the same numbers in the same order. The count of the numbers tells whether the file
+/// begins with a number of blocks.
 fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Blocks, Fault> {
     let text = String::from_utf8_lossy(bytes);
     let words: Vec<&str> =
@@ -382,7 +382,7 @@ fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bloc
     Err(Fault::new(At::Byte(0), what, TRUNCATED))
 }
 
-/// Numbers as Fortran writes them: the exponent may be D.
+/// Parses numbers as Fortran writes them: the exponent letter may be D.
 fn reals(words: &[&str]) -> Result<Vec<f64>, Fault> {
     words
         .iter()

@@ -1,15 +1,15 @@
-//! Numbers, texts and attributes of legacy files.
+//! Numbers, strings and attributes of legacy files.
 
 use super::Section;
 use crate::model::{Attributes, DataArray, Endian, ScalarType, Values};
 use crate::read::error::{BROKEN, Cursor, Fault, fits};
 use crate::read::percent::decoded;
 
-/// A legacy file while it is read.
+/// A legacy file during parsing.
 pub(super) struct Input<'a> {
     pub(super) cursor: Cursor<'a>,
     pub(super) binary: bool,
-    /// Version 5: cells come as offsets and connectivity.
+    /// Version 5: cells are stored as offsets and connectivity.
     pub(super) offsets_and_connectivity: bool,
 }
 
@@ -23,7 +23,7 @@ impl<'a> Input<'a> {
         self.cursor.word().map(|w| String::from_utf8_lossy(w).into_owned())
     }
 
-    /// The next word, without moving on.
+    /// The next word, without consuming it.
     pub(super) fn peek(&mut self) -> String {
         let at = self.cursor.pos;
         let word = self.text_word().unwrap_or_default();
@@ -62,7 +62,7 @@ impl<'a> Input<'a> {
         list.ok_or_else(bad)?.try_into().map_err(|_| Fault::field(what, "wrong number of numbers"))
     }
 
-    /// `count` values of the type that the file names `ty`, which start on the next line.
+    /// Reads `count` values of the file's type `ty`; they start on the next line.
     pub(super) fn values(&mut self, ty: &str, count: u64, what: &str) -> Result<Values, Fault> {
         if ty == "bit" {
             return self.bits(count, what);
@@ -83,7 +83,7 @@ impl<'a> Input<'a> {
         Ok(Values::from_bytes(kind, bytes, Endian::Big))
     }
 
-    /// Bits, eight to the byte in binary files, as bytes 0 and 1.
+    /// Reads bits, eight per byte in binary files, as bytes 0 and 1.
     fn bits(&mut self, count: u64, what: &str) -> Result<Values, Fault> {
         if !self.binary {
             return self.cursor.numbers(ScalarType::U8, count, what);
@@ -93,7 +93,7 @@ impl<'a> Input<'a> {
         Ok(Values::U8((0..count as usize).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect()))
     }
 
-    /// Moves behind the end of the present line: binary data starts there.
+    /// Moves past the end of the current line, where binary data starts.
     pub(super) fn end_of_line(&mut self) {
         self.cursor.line();
     }
@@ -108,7 +108,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// One attribute of the present section.
+    /// Reads one attribute of the current section.
     pub(super) fn attribute(
         &mut self,
         keyword: &str,
@@ -121,8 +121,7 @@ impl<'a> Input<'a> {
             return self.field(section, out, warnings);
         }
         if keyword == "LOOKUP_TABLE" {
-            // A table of colours: name and number of entries. The files' own colour maps are not
-            // used.
+            // A lookup table: name and number of entries. The files' own colour maps are not used.
             let name = self.need_word("name of the lookup table")?;
             let n = self.count("size of the lookup table")?;
             let ty = if self.binary { "unsigned_char" } else { "float" };
@@ -158,7 +157,8 @@ impl<'a> Input<'a> {
             "COLOR_SCALARS" => {
                 let components = self.count("number of colour components")?;
                 if !self.binary {
-                    // Text files give colours as fractions, binary files as bytes: make both bytes.
+                    // Text files store colours as fractions, binary files as bytes: convert both to
+                    // bytes.
                     let total = n.saturating_mul(components);
                     let v = self.cursor.numbers(ScalarType::F32, total, "colours")?.to_f32();
                     let bytes = v.iter().map(|x| (x * 255.0).round() as u8).collect();
@@ -210,7 +210,7 @@ impl<'a> Input<'a> {
     ) -> Result<(), Fault> {
         self.need_word("name of the field")?;
         let arrays = self.count("number of arrays")?;
-        // An array takes at least its line.
+        // An array takes at least one line.
         let arrays = fits(arrays, 8, self.cursor.remaining() + 8, self.cursor.at(), "arrays")?;
         for _ in 0..arrays {
             while self.peek().eq_ignore_ascii_case("METADATA") {
@@ -246,8 +246,9 @@ impl<'a> Input<'a> {
         Ok(())
     }
 
-    /// Texts: one a line and percent-encoded, or in binary files with their length in front
-    /// (vtkDataWriter.cxx: the two high bits of the first byte tell how many bytes the length has).
+    /// Strings: one per line and percent-encoded, or in binary files preceded by their length
+    /// (vtkDataWriter.cxx: the two high bits of the first byte give the number of bytes of the
+    /// length).
     fn texts(&mut self, count: u64, variants: bool) -> Result<Vec<String>, Fault> {
         if variants {
             let cure = "write the file again without variant arrays";
@@ -303,8 +304,8 @@ fn push(
     Ok(())
 }
 
-/// A scalar type by the name it has in legacy files. `vtkIdType` is written with 32 bits in binary
-/// files.
+/// The scalar type with the given name in legacy files. `vtkIdType` is written with 32 bits in
+/// binary files.
 fn scalar_type(name: &str, binary: bool) -> Option<ScalarType> {
     Some(match name {
         "char" | "signed_char" | "vtktypeint8" => ScalarType::I8,

@@ -66,7 +66,7 @@ impl Input<'_> {
 
 impl UnstructuredGrid {
     /// In legacy files the "point ids" of a polyhedron are its faces: their number, then the size
-    /// and ids of each. Moves them to where they belong; the cell gets the distinct points of its
+    /// and ids of each. Moves them to the list of faces; the cell gets the distinct points of its
     /// faces.
     pub(super) fn split_polyhedra(&mut self) -> Result<(), Fault> {
         if !self.types.contains(&POLYHEDRON) || !self.faces_of_cell.is_empty() {

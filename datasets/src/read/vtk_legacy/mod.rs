@@ -1,8 +1,7 @@
-//! VTK's legacy files (`.vtk`), versions 1.0 to 5.1, ascii and binary (always most significant byte
-//! first).
+//! VTK's legacy files (`.vtk`), versions 1.0 to 5.1, ascii and binary (always big-endian).
 //!
 //! Source: "VTK File Formats" (Kitware), section "Simple legacy formats"; version 5 stores cells as
-//! offsets and connectivity. What VTK 9.7 writes in both versions is tested against.
+//! offsets and connectivity. Tested against what VTK 9.7 writes in both versions.
 
 mod arrays;
 mod cells;
@@ -24,7 +23,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_from_bytes(path, &read_bytes(path)?)
 }
 
-/// Reads the content of a `.vtk` file; `path` is for messages only.
+/// Reads the content of a `.vtk` file; `path` is used in messages only.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let mut warnings = Vec::new();
     let data = parse(bytes, &mut warnings).map_err(|f| f.in_file(path, FORMAT))?;
@@ -36,7 +35,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     })
 }
 
-/// What the keywords read so far have said.
+/// The state from the keywords read so far.
 #[derive(Default)]
 struct Parts {
     points: Points,
@@ -49,7 +48,7 @@ struct Parts {
     attributes: Attributes,
 }
 
-/// What arrays belong to at present.
+/// What the following arrays belong to.
 #[derive(Clone, Copy, PartialEq)]
 enum Section {
     Geometry,
@@ -124,7 +123,7 @@ fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
     Ok(data)
 }
 
-/// The data set of kind `kind` from what was read.
+/// Builds the data set of kind `kind` from what was read.
 fn assemble(kind: &str, parts: Parts, warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
     let Parts { points, mut poly, mut grid, dims, origin, spacing, coordinates, attributes } =
         parts;

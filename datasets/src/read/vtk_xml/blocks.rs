@@ -10,7 +10,7 @@ use crate::model::Endian;
 use crate::read::base64::{BadByte, Decoder};
 use crate::read::error::{At, BROKEN, Fault, TRUNCATED, fits};
 
-/// How arrays are compressed.
+/// The compression of arrays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Compressor {
     None,
@@ -18,23 +18,23 @@ pub(crate) enum Compressor {
     Lz4,
 }
 
-/// What the whole file has in common.
+/// Properties of the whole file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Encoding {
     pub(crate) endian: Endian,
-    /// Bytes of a number in the headers: 4 or 8.
+    /// Bytes per number in the headers: 4 or 8.
     pub(crate) header_bytes: usize,
     pub(crate) compressor: Compressor,
 }
 
-/// The bytes of an array where the file has them.
+/// The encoded bytes of an array, as stored in the file.
 #[derive(Clone, Copy)]
 pub(crate) enum EncodedBytes<'a> {
     Base64(&'a [u8]),
     Raw(&'a [u8]),
 }
 
-/// No compressor shrinks data by more than this: zlib 1:1032 (zlib's technical notes), LZ4 1:255.
+/// The highest ratio of any compressor: zlib 1:1032 (zlib's technical notes), LZ4 1:255.
 const MAX_RATIO: u64 = 1040;
 
 /// The bytes of the array `name`, uncompressed.
@@ -90,7 +90,7 @@ pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Resul
     }
     let sizes: Vec<u64> = (3..3 + blocks).map(|i| number(&head[i * w..(i + 1) * w])).collect();
 
-    // Sizes that the bytes cannot justify are refused before memory is taken.
+    // Sizes that the bytes cannot justify are rejected before memory is allocated.
     let compressed = sizes.iter().try_fold(0u64, |n, &s| n.checked_add(s)).unwrap_or(u64::MAX);
     fits(compressed, 1, source.most_bytes_left(), at(), "compressed bytes")?;
     let full = blocks as u64 - u64::from(last > 0);
@@ -147,7 +147,7 @@ fn inflate(block: &[u8], target: &mut [u8]) -> Result<usize, String> {
     }
 }
 
-/// Bytes out of raw or base64 text, in order.
+/// A sequential reader of bytes from raw data or base64 text.
 #[derive(Clone)]
 struct Source<'a> {
     stored: EncodedBytes<'a>,
@@ -160,7 +160,7 @@ impl<'a> Source<'a> {
         Source { stored, pos: 0, name }
     }
 
-    /// An upper bound on the bytes still to come.
+    /// An upper bound on the number of remaining bytes.
     fn most_bytes_left(&self) -> usize {
         match self.stored {
             EncodedBytes::Raw(b) => b.len() - self.pos,
@@ -168,7 +168,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Appends to `out` until it has `len` bytes (base64: up to two more) or there are no more.
+    /// Appends to `out` until it has `len` bytes (base64: up to two more) or the input ends.
     fn fill(&mut self, out: &mut Vec<u8>, len: usize) -> Result<(), Fault> {
         if out.len() >= len {
             return Ok(());
@@ -185,8 +185,8 @@ impl<'a> Source<'a> {
                 let result = decoder.fill(out, len);
                 self.pos += decoder.pos;
                 if let Err(BadByte { pos, byte }) = result {
-                    // Appended text is followed by the closing tag, where data that is too short
-                    // ends.
+                    // Appended text is followed by the closing tag, which ends data that is too
+                    // short.
                     if byte == b'<' || byte == b'_' {
                         return Err(self.ended(&format!("{len} bytes ({} found)", out.len())));
                     }
@@ -202,8 +202,8 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// A header of `len` bytes. In base64 it is followed by what its last quartet holds beyond it,
-    /// if that is not padding.
+    /// Reads a header of `len` bytes. In base64, it also returns the bytes of its last group beyond
+    /// the header, unless those are padding.
     fn piece(&mut self, len: usize) -> Result<Vec<u8>, Fault> {
         let mut out = Vec::new();
         if len <= self.most_bytes_left().saturating_add(2) {

@@ -5,15 +5,15 @@ use crate::model::{DataArray, Endian, ScalarType, Values};
 use crate::read::error::{At, BROKEN, Fault};
 use roxmltree::Node;
 
-/// The two halves of a file: text that is XML, and bytes after `_` that need not be.
+/// The two parts of a file: XML text, and bytes after `_` that need not be XML.
 pub(crate) struct XmlWithAppendedData<'a> {
     /// The XML, with an empty `AppendedData` element.
     pub(crate) head: String,
-    /// Everything after the underscore; the closing tags are still there.
+    /// Everything after the underscore, including the closing tags.
     pub(crate) appended: &'a [u8],
 }
 
-/// Cuts the file at the appended data, which may be raw bytes that no XML parser accepts.
+/// Splits the file at the appended data, which may be raw bytes that no XML parser accepts.
 pub(crate) fn split(bytes: &[u8]) -> Result<XmlWithAppendedData<'_>, Fault> {
     const TAG: &[u8] = b"<AppendedData";
     let find = |what: &[u8], from: usize| {
@@ -61,7 +61,7 @@ pub(crate) struct XmlFile<'a> {
     appended_is_raw: bool,
 }
 
-/// Options that keep small texts from growing into large trees.
+/// Parser options that keep small texts from growing into large trees.
 pub(crate) fn parse_tree(text: &str) -> Result<roxmltree::Document<'_>, Fault> {
     let options =
         roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: u32::MAX, ..Default::default() };
@@ -102,7 +102,7 @@ impl<'a> XmlFile<'a> {
                 return Err(bad_attribute(root, "header_type", other, "UInt32 or UInt64"));
             }
         };
-        // An unreadable compressor is an error only once an array needs it.
+        // An unsupported compressor is an error only if an array needs it.
         let encoding = match root.attribute("compressor") {
             None | Some("") => Ok(Compressor::None),
             Some("vtkZLibDataCompressor") => Ok(Compressor::Zlib),
@@ -127,8 +127,7 @@ impl<'a> XmlFile<'a> {
         Ok(XmlFile { root, encoding, appended, appended_is_raw })
     }
 
-    /// The array in element `node`. `Ok(None)` is an array of a type that is skipped, after a
-    /// warning.
+    /// The array in element `node`. `Ok(None)` means that its type is skipped, with a warning.
     pub(crate) fn array(
         &self,
         node: Node<'_, '_>,
@@ -214,7 +213,8 @@ impl<'a> XmlFile<'a> {
         })
     }
 
-    /// The texts of an array of type `String`: letters as numbers, each text ended by a zero.
+    /// The strings of an array of type `String`: characters as numbers, each string terminated by a
+    /// zero.
     pub(crate) fn texts(&self, node: Node<'_, '_>) -> Result<Vec<String>, Fault> {
         let name = node.attribute("Name").unwrap_or("");
         let bytes = match node.attribute("format").unwrap_or("ascii") {
@@ -260,7 +260,7 @@ impl<'a> XmlFile<'a> {
     }
 }
 
-/// A scalar type by the name it has in XML files, older ones included.
+/// The scalar type with the given name in XML files, including older names.
 pub(crate) fn scalar_type(name: &str) -> Option<ScalarType> {
     match name {
         "vtkIdType" => Some(ScalarType::I64),
@@ -271,7 +271,7 @@ pub(crate) fn scalar_type(name: &str) -> Option<ScalarType> {
     }
 }
 
-/// The fault of an attribute with a value that is not allowed.
+/// The fault for an attribute with an invalid value.
 pub(crate) fn bad_attribute(
     node: Node<'_, '_>,
     attribute: &str,

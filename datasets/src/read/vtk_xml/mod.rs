@@ -2,8 +2,8 @@
 //! .pvd .vtm`).
 //!
 //! All encodings (ascii, inline base64, appended base64, appended raw), both header types, both
-//! byte orders, ZLib and LZ4 compression. ParaView writes appended raw data without compression
-//! unless told otherwise; VTK's writers base64 with ZLib. LZMA is refused by name. Source: "VTK
+//! byte orders, ZLib and LZ4 compression. By default, ParaView writes appended raw data without
+//! compression, and VTK's writers write base64 with ZLib. LZMA is rejected by name. Source: "VTK
 //! File Formats" (Kitware), and what VTK 9.7 and ParaView 5.11 write.
 
 pub(crate) mod blocks;
@@ -19,15 +19,15 @@ use std::path::Path;
 
 pub(crate) const FORMAT: &str = "VTK XML";
 
-/// Files may name files that name files; deeper than this is a loop.
+/// Maximum nesting of files that name files; anything deeper is a cycle.
 const MAX_NESTING: usize = 8;
 
-/// Reads a VTK XML file of any kind, with the files it names.
+/// Reads a VTK XML file of any kind, with the files that it names.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_nested(path, 0)
 }
 
-/// Reads one file's content; for files that name others, `path` tells where those are.
+/// Reads one file's content; other files are resolved relative to `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     from_bytes(path, bytes, 0)
 }
@@ -83,7 +83,7 @@ fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, Rea
     Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: steps })
 }
 
-/// Pieces as one data set of kind `kind`, even when there are none.
+/// Combines pieces to one data set of kind `kind`, even if there are none.
 fn merged(kind: &str, pieces: Vec<Dataset>, warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
     if pieces.is_empty() {
         warnings.push(format!("the {kind} is empty: it has no pieces"));

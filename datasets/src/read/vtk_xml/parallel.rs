@@ -29,9 +29,9 @@ pub(super) fn pieces(
         }
         list.push(data);
     }
-    // Lattice pieces with ghost layers overlap; the overlaps agree, so laying them over each other
-    // is right. Ghost cells of other kinds carry `vtkGhostType` and are left out when a surface is
-    // made.
+    // Lattice pieces with ghost layers overlap. The overlaps agree, so copying them over each other
+    // is correct. Ghost cells of other kinds carry `vtkGhostType` and are left out when a surface
+    // is made.
     let data = merged(serial, list, warnings).map_err(|f| f.in_file(path, FORMAT))?;
     if let Some(whole) = super::file::attribute_numbers::<i32, 6>(set, "WholeExtent")
         .map_err(|f| f.in_file(path, FORMAT))?
@@ -49,7 +49,7 @@ pub(super) fn pieces(
     Ok(data)
 }
 
-/// The data set in `file`, which `path` names.
+/// Reads the data set in `file`, which `path` names.
 fn nested(
     path: &Path,
     file: &Path,
@@ -62,7 +62,7 @@ fn nested(
     } else {
         read_nested(file, depth + 1)?
     };
-    // Pieces repeat each other's warnings; once is enough.
+    // Pieces repeat each other's warnings; each is kept once.
     for w in opened.warnings {
         if !warnings.contains(&w) {
             warnings.push(w);

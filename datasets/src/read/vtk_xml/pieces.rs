@@ -9,7 +9,7 @@ use crate::read::error::{At, BROKEN, Fault};
 use glam::{DMat3, DVec3};
 use roxmltree::Node;
 
-/// The kinds of data set that have a file format of their own.
+/// The kinds of data set with their own file format.
 pub(crate) const KINDS: [&str; 5] =
     ["PolyData", "UnstructuredGrid", "ImageData", "RectilinearGrid", "StructuredGrid"];
 
@@ -63,7 +63,8 @@ pub(crate) fn pieces(
     Ok(list)
 }
 
-/// Compares what the piece declares with what it has: a mismatch means that arrays got lost.
+/// Compares the declared sizes of the piece with its arrays: a mismatch means that arrays were
+/// lost.
 fn check_counts(piece: Node<'_, '_>, data: &Dataset) -> Result<(), Fault> {
     let (points, cells) = data.counts();
     let poly_cells = |get: fn(&PolyData) -> &Cells| match data {
@@ -94,7 +95,7 @@ fn check_counts(piece: Node<'_, '_>, data: &Dataset) -> Result<(), Fault> {
 
 type FieldData = (Vec<DataArray>, Vec<(String, Vec<String>)>);
 
-/// The arrays and texts that belong to the data set as a whole.
+/// The arrays and strings that belong to the data set as a whole.
 pub(crate) fn field_data(
     file: &XmlFile<'_>,
     set: Node<'_, '_>,
@@ -130,7 +131,7 @@ fn point_and_cell_data(
         for node in
             section.children().filter(|n| n.has_tag_name("DataArray") || n.has_tag_name("Array"))
         {
-            // A file may hold several times of one array; the first is the one shown.
+            // A file may hold several time steps of one array; the first one is used.
             if node.has_attribute("TimeStep")
                 && arrays.iter().any(|a| Some(a.name.as_str()) == node.attribute("Name"))
             {
@@ -160,7 +161,7 @@ fn point_and_cell_data(
     Ok(())
 }
 
-/// The array of this name inside `section`.
+/// The array with the given name inside `section`.
 fn named_array(
     file: &XmlFile<'_>,
     section: Node<'_, '_>,
@@ -306,8 +307,8 @@ fn unstructured(
     } else if let Some(stream) = named_array(file, section, "faces", warnings)?
         && let Some(ends) = named_array(file, section, "faceoffsets", warnings)?
     {
-        // Before: one stream per cell: number of faces, then per face its number of points and
-        // their ids; -1 for no polyhedron.
+        // Earlier versions: one stream per cell: number of faces, then per face its number of
+        // points and their ids; -1 for no polyhedron.
         let stream: Vec<i64> = integers(&stream.values).collect();
         let mut start = 0usize;
         for (cell, end) in integers(&ends.values).enumerate() {
@@ -329,7 +330,7 @@ fn unstructured(
     Ok(Dataset::UnstructuredGrid(d))
 }
 
-/// Appends the faces of one polyhedron: count, then per face its size and ids. `None` when the
+/// Appends the faces of one polyhedron: count, then per face its size and ids. `None` if the
 /// numbers do not add up.
 pub(crate) fn face_stream(stream: &[i64], faces: &mut Cells) -> Option<()> {
     let mut at = 1;
