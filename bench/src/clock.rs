@@ -9,7 +9,7 @@ use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Which clock a comparison is made by.
+/// The clock that a comparison uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Clock {
@@ -17,14 +17,14 @@ pub enum Clock {
     ThreadCpu,
     /// CPU time of all threads of the process.
     ProcessCpu,
-    /// Time on the wall: right for work on several threads.
+    /// Wall-clock time: right for work on several threads.
     Wall,
 }
 
-/// One stretch of work by all three clocks, in seconds.
+/// The duration of one piece of work by all three clocks, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sample {
-    /// Time on the wall.
+    /// Wall-clock time.
     pub wall_secs: f64,
     /// CPU time of the thread that ran the closure.
     pub thread_cpu_secs: f64,
@@ -48,7 +48,7 @@ fn cpu_secs(clock: ClockId) -> f64 {
     t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
 }
 
-/// Runs `work` once and says how long it took.
+/// Runs `work` once and measures how long it took.
 ///
 /// ```
 /// let (sum, time) = bench::clock::measure(|| (0..1000u64).sum::<u64>());

@@ -7,16 +7,15 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The machine, its state and the program's version.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
-    /// Processor as it names itself.
+    /// The processor's own name.
     pub cpu: String,
     /// Cores this process may use.
     pub cores: usize,
     /// Widest vector instructions: `AVX-512`, `AVX2`, `SSE4.2`, `NEON` or `baseline`.
     pub simd: String,
-    /// Memory in GiB; 0 when the system does not say.
+    /// Memory in GiB; 0 if unknown.
     pub memory_gib: f64,
-    /// Running processes averaged over the last minute at the start; `null` when the system does
-    /// not say.
+    /// Average number of running processes over the last minute, at the start; `null` if unknown.
     pub load_1_min: Option<f64>,
     /// Kernel and its version.
     pub os: String,
@@ -24,24 +23,24 @@ pub struct Machine {
     pub date: String,
     /// Version of this program.
     pub version: String,
-    /// Commit of the working tree; `null` outside a repository. Older records have a `+` behind it
-    /// for [`Machine::dirty`].
+    /// Commit of the working tree; `null` outside a repository. Older records append a `+` for
+    /// [`Machine::dirty`].
     pub commit: Option<String>,
-    /// Whether files under version control had changes that no commit has, records aside; `null`
-    /// outside a repository.
+    /// Whether versioned files other than records had uncommitted changes; `null` outside a
+    /// repository.
     #[serde(default)]
     pub dirty: Option<bool>,
-    /// Optimised build? Times of a debug build mean nothing.
+    /// Whether the build was optimised. Times of a debug build are meaningless.
     pub optimised: bool,
 }
 
-/// Running processes averaged over the last minute; `None` when the system does not say.
+/// Average number of running processes over the last minute; `None` if unknown.
 pub fn load() -> Option<f64> {
     leading_number(&std::fs::read_to_string("/proc/loadavg").unwrap_or_default())
 }
 
 impl Machine {
-    /// Asks the system.
+    /// Queries the system.
     pub fn describe() -> Machine {
         let read = |p: &str| std::fs::read_to_string(p).unwrap_or_default();
         let memory_kib = field(&read("/proc/meminfo"), "MemTotal")
@@ -77,7 +76,7 @@ impl Machine {
     }
 }
 
-/// Lower-case letters and digits, everything else one hyphen.
+/// Keeps lower-case letters and digits; replaces everything else with single hyphens.
 pub fn slug(text: &str) -> String {
     let mut s = String::new();
     for c in text.chars().flat_map(char::to_lowercase) {
@@ -99,7 +98,7 @@ fn leading_number(text: &str) -> Option<f64> {
     text.split_whitespace().next()?.parse().ok()
 }
 
-/// What git says of the tree.
+/// The state of the working tree according to git.
 #[derive(Debug, PartialEq, Eq)]
 struct GitState {
     commit: String,
@@ -107,8 +106,9 @@ struct GitState {
 }
 
 impl GitState {
-    /// Of the repository that `dir` lies in; `None` where there is none, or no git. Records do not
-    /// count as changes: the first one of a run would make the tree of all others dirty.
+    /// The state of the repository that contains `dir`; `None` without a repository or without git.
+    /// Records do not count as changes: the first record of a run would mark the tree as dirty for
+    /// all others.
     fn of(dir: &Path) -> Option<GitState> {
         let git = |args: &[&str]| {
             let mut git = std::process::Command::new("git");
@@ -125,12 +125,12 @@ impl GitState {
         let records = ":(top,exclude)bench/runs";
         let changed =
             git(&["status", "--porcelain", "--untracked-files=no", "--", ":(top)", records]);
-        // What git cannot say is not clean.
+        // If git cannot tell, the tree is not considered clean.
         Some(GitState { commit, dirty: changed.is_none_or(|s| !s.is_empty()) })
     }
 }
 
-/// Widest vector instructions this processor has, of those that make a difference here.
+/// The widest vector instructions of this processor, among those that make a difference here.
 pub fn simd_level() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {

@@ -9,8 +9,8 @@ use peak_alloc::PeakAlloc;
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Runs `work`; returns what it returned and by how many bytes the heap was larger at its height
-/// than at the start. Other threads' memory counts too; what C libraries allocate does not.
+/// Runs `work`. Returns its result and by how many bytes the heap at its peak exceeded the heap at
+/// the start. Other threads' memory is included; allocations of C libraries are not.
 pub fn peak<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let start = HEAP.current_usage();
     HEAP.reset_peak_usage();
@@ -29,7 +29,7 @@ mod tests {
             let (sum, bytes) =
                 peak(|| vec![1u8; block].iter().step_by(4096).map(|&b| u64::from(b)).sum::<u64>());
             assert_eq!(sum, block as u64 / 4096);
-            // Other tests of this process allocate and free meanwhile, far less than this.
+            // Other tests of this process allocate and free at the same time, far less than this.
             assert!(bytes.abs_diff(block as u64) < 64 << 20, "{bytes} B for a block of {block} B");
         }
     }

@@ -21,8 +21,8 @@ pub fn wavelet(size: Size) -> anyhow::Result<Arc<TriMesh>> {
     Ok(Arc::new(surfaces.mesh))
 }
 
-/// The surfaces of the smallest size from a coarser grid of `points` per axis: fewer triangles for
-/// quick runs.
+/// The surfaces of the smallest size from a coarser grid of `points` per axis, which gives fewer
+/// triangles for quick runs.
 pub fn coarse_wavelet(points: u32) -> anyhow::Result<Arc<TriMesh>> {
     let grid = Wavelet::with_points(points).grid()?;
     let surfaces = isosurface::extract(&grid, &Size::M1.isovalues(), Default::default())
@@ -66,12 +66,12 @@ pub fn pipes(count: u32) -> Arc<TriMesh> {
     Arc::new(mesh)
 }
 
-/// A closed sphere-like surface around `center`: an icosahedron whose triangles are cut in four
-/// `level` times, with vertices moved along the radius to 1 + `crumple` x (-1..1). Star-shaped:
-/// every ray from inside meets it.
+/// A closed sphere-like surface around `center`: an icosahedron whose triangles are divided into
+/// four `level` times, with vertices moved along the radius to 1 + `crumple` x (-1..1). It is
+/// star-shaped: every ray from inside hits it.
 pub fn crumpled_sphere(level: u32, crumple: f64, center: DVec3) -> TriMesh {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
-    // Corners of three rectangles, turned so that no edge lies in an axis plane.
+    // Corners of three rectangles, rotated so that no edge lies in an axis plane.
     let tilt = DQuat::from_rotation_arc(DVec3::Z, DVec3::new(0.3, 0.5, 0.8).normalize());
     let mut points: Vec<DVec3> = Vec::new();
     for axis in 0..3 {
@@ -124,8 +124,8 @@ fn icosahedron_faces(points: &[DVec3]) -> Vec<[u32; 3]> {
     faces
 }
 
-/// A globe with two poles where `meridians` triangles share one vertex: needles, and the most
-/// difficult vertices.
+/// A globe with two poles at which `meridians` triangles share one vertex. Its needle triangles and
+/// poles are the hardest cases for a tracer.
 pub fn globe(meridians: u32, parallels: u32) -> TriMesh {
     let mut mesh = TriMesh::new(vec![Vec3::Z], vec![]);
     for j in 1..parallels {

@@ -17,7 +17,7 @@ pub struct Ray64 {
     pub origin: DVec3,
     /// Direction.
     pub direction: DVec3,
-    /// Farthest distance that counts.
+    /// Maximum distance of a hit.
     pub t_max: f64,
 }
 
@@ -53,7 +53,7 @@ impl RaySet {
     }
 
     /// About `limit` of the rays, spread evenly: every n-th run of 1024, so that neighbours stay
-    /// together. All when there are fewer.
+    /// together. All rays if there are fewer.
     pub fn thinned(self, limit: usize) -> RaySet {
         const RUN: usize = 64;
         let step = self.len.div_ceil(limit.max(1)).max(1);
@@ -67,21 +67,21 @@ impl RaySet {
         RaySet { len: whole.len() * LANES, blocks: whole }
     }
 
-    /// Origin and direction of ray `i` as they were rounded.
+    /// Origin and direction of ray `i` after rounding.
     pub fn ray(&self, i: usize) -> (Vec3, Vec3) {
         let (b, l) = (&self.blocks[i / LANES], i % LANES);
         (Vec3::new(b.ox[l], b.oy[l], b.oz[l]), Vec3::new(b.dx[l], b.dy[l], b.dz[l]))
     }
 }
 
-/// A square pinhole camera.
+/// A square pinhole view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Name in the tables.
     pub name: &'static str,
     /// Eye, in the mesh's coordinates.
     pub eye: DVec3,
-    /// Unit vectors: right, up, into the image.
+    /// Unit vectors: right, up, forward.
     pub axes: [DVec3; 3],
     /// Tangent of half the field of view.
     pub tan_half_fov: f64,
@@ -118,7 +118,7 @@ impl View {
         View { name, eye: center + eye, axes: [right, up, forward], tan_half_fov, radius }
     }
 
-    /// Where the point light stands: above the viewer's right shoulder.
+    /// Position of the point light: above the viewer's right shoulder.
     pub fn light(&self) -> DVec3 {
         self.eye + self.axes[0] * self.radius * 0.5 + self.axes[1] * self.radius * 0.7
     }
@@ -151,8 +151,8 @@ pub struct SurfacePoint {
     pub normal: DVec3,
 }
 
-/// The points that rays hit, from the triangle numbers a tracer found. Rays without a hit give
-/// none.
+/// The points that rays hit, from the triangle numbers that a tracer found. Rays without a hit give
+/// no point.
 pub fn surface_points(
     mesh: &TriMesh,
     rays: &RaySet,
@@ -175,7 +175,8 @@ pub fn surface_points(
         if normal.dot(d) > 0.0 {
             normal = -normal;
         }
-        // Distance to the triangle's plane. Edge-on, where that is 0/0, the stored distance serves.
+        // Distance to the triangle's plane. Edge-on, where that is 0/0, the stored distance is
+        // used.
         let (height, slope) = (normal.dot(a - o), normal.dot(d));
         let t = if slope.abs() > 1e-9 {
             height / slope
@@ -206,8 +207,8 @@ pub fn shadow_from_light(points: &[SurfacePoint], light: DVec3) -> RaySet {
     }))
 }
 
-/// Eight cosine-weighted rays per point into the half space above it, stratified 4 x 2, without an
-/// end.
+/// Eight cosine-weighted rays of unlimited length per point into the hemisphere above it,
+/// stratified 4 x 2.
 pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
     RaySet::pack(points.iter().enumerate().flat_map(|(i, p)| {
         let (tx, ty) = p.normal.any_orthonormal_pair();
@@ -223,8 +224,7 @@ pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
     }))
 }
 
-/// Rays from random places inside the mesh's bounds in random directions: no two have anything in
-/// common.
+/// Incoherent rays: from random positions inside the mesh's bounds in random directions.
 pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
     let bounds = mesh.bounds();
     let (lo, hi) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
@@ -256,7 +256,7 @@ fn morton(i: u32) -> (u32, u32) {
     (even(i), even(i >> 1))
 }
 
-/// A 32-bit mixer (Wellons, "Prospecting for hash functions", lowbias32).
+/// A 32-bit hash (Wellons, "Prospecting for hash functions", lowbias32).
 fn hash(x: u32) -> u32 {
     let x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
     let x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);

@@ -12,17 +12,17 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
-/// Version of the record's form; a reader refuses others.
+/// Version of the record's schema; readers reject other versions.
 pub const SCHEMA: &str = "bench-record/1";
 
 /// A column of [`Record::rows`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Column {
-    /// Key in the rows and head of the CSV column.
+    /// Key in the rows and header of the CSV column.
     pub name: String,
     /// Unit; empty for names and counts.
     pub unit: String,
-    /// What it says.
+    /// Its meaning.
     pub meaning: String,
 }
 
@@ -36,47 +36,46 @@ impl Row {
     pub fn new() -> Row {
         Row::default()
     }
-    /// The row with a value more. Numbers that are not finite become null, which is what JSON has
-    /// for them.
+    /// Returns the row with one more value. Non-finite numbers become null, as JSON has no others.
     pub fn with(mut self, column: &str, value: impl Into<Value>) -> Row {
         self.0.insert(column.to_string(), value.into());
         self
     }
-    /// A number, when the column holds one.
+    /// The value as a number, if it is one.
     pub fn number(&self, column: &str) -> Option<f64> {
         self.0.get(column)?.as_f64()
     }
-    /// A text, when the column holds one.
+    /// The value as text, if it is text.
     pub fn text(&self, column: &str) -> Option<&str> {
         self.0.get(column)?.as_str()
     }
 }
 
-/// A PNG image stored next to the record.
+/// A PNG image next to the record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Picture {
     /// Short name; part of the file name.
     pub name: String,
     /// What it shows.
     pub caption: String,
-    /// The file, stored next to the record, not inside the JSON.
+    /// The file's bytes; stored next to the record, not inside the JSON.
     #[serde(skip)]
     pub png: Vec<u8>,
 }
 
-/// A file stored next to the record that other programs read, or that shows more than a table.
+/// A file next to the record that other programs read, or that shows more than a table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Attachment {
-    /// Name of the file behind the experiment's, with its ending; an SVG is shown in reports.
+    /// File name after the experiment's name, with its extension; an SVG is shown in reports.
     pub name: String,
-    /// What it holds.
+    /// What it contains.
     pub caption: String,
-    /// The file, stored next to the record, not inside the JSON.
+    /// The file's bytes; stored next to the record, not inside the JSON.
     #[serde(skip)]
     pub bytes: Vec<u8>,
 }
 
-/// One experiment's outcome.
+/// The outcome of one experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// [`SCHEMA`].
@@ -87,12 +86,11 @@ pub struct Record {
     pub title: String,
     /// Chapter of the dissertation.
     pub chapter: u8,
-    /// The short form, with smaller data and fewer rounds.
+    /// Whether this is the short form, with smaller data and fewer rounds.
     pub quick: bool,
-    /// Where and when.
+    /// The machine and the time.
     pub machine: Machine,
-    /// What spoke against recording it, where the command line insisted
-    /// (`--record-despite-doubts`).
+    /// Objections to recording it that the command line overrode (`--record-despite-doubts`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recorded_despite: Vec<String>,
     /// Wall time of the whole experiment, data and builds included.
@@ -103,7 +101,7 @@ pub struct Record {
     pub rows: Vec<Row>,
     /// Comparisons, above 1 where we are faster.
     pub ratios: Vec<Ratio>,
-    /// What was measured how, in sentences.
+    /// How things were measured, in sentences.
     pub notes: Vec<String>,
     /// What could not be measured, and the cure.
     pub missing: Vec<String>,
@@ -139,12 +137,12 @@ impl Record {
         }
     }
 
-    /// Names a column. The order of the calls is the order in the table.
+    /// Describes a column. The order of the calls is the order in the table.
     pub fn column(&mut self, name: &str, unit: &str, meaning: &str) {
         self.columns.push(Column { name: name.into(), unit: unit.into(), meaning: meaning.into() });
     }
 
-    /// Columns that rows use and nobody explained, once each: a mistake of the experiment.
+    /// Columns that rows use but that are not described, once each: a mistake of the experiment.
     pub fn unexplained_columns(&self) -> Vec<&str> {
         let known = |k: &str| self.columns.iter().any(|c| c.name == k);
         let mut unknown: Vec<&str> = self
@@ -159,7 +157,7 @@ impl Record {
         unknown
     }
 
-    /// The table as CSV (RFC 4180): comment lines with the machine, a head, one line per row.
+    /// The table as CSV (RFC 4180): comment lines with the machine, a header, one line per row.
     pub fn to_csv(&self) -> String {
         let m = &self.machine;
         let mut s = format!("# {} {}: {}\n", self.schema, self.id, one_line(&self.title));
@@ -190,8 +188,8 @@ impl Record {
         s
     }
 
-    /// Writes `ID.json`, `ID.csv` and `ID.PICTURE.png` into a directory, which is made when it is
-    /// not there.
+    /// Writes `ID.json`, `ID.csv` and `ID.PICTURE.png` into a directory, which is created if
+    /// necessary.
     pub fn write(&self, dir: &Path) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(dir).with_context(|| {
             format!(
@@ -216,7 +214,7 @@ impl Record {
         Ok(dir.join(format!("{}.json", self.id)))
     }
 
-    /// Reads a record and the images stored next to it. A missing image is read as an empty one.
+    /// Reads a record back, with its images. A missing image file leaves an empty one.
     pub fn read(path: &Path) -> anyhow::Result<Record> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read the record `{}`", path.display()))?;
@@ -246,8 +244,8 @@ impl Record {
     }
 }
 
-/// All records of a directory, by name. Other kinds of JSON (a Chrome trace next to a record, a
-/// program's output) are ignored. A broken record, or a file that is not JSON, is an error.
+/// All records of a directory, by name. JSON of other kinds (a Chrome trace, a program's output) is
+/// ignored; a broken record, or a file that is not JSON, is an error.
 pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
     let entries = std::fs::read_dir(dir)
         .with_context(|| format!("cannot read the directory `{}`", dir.display()))?;
@@ -261,7 +259,7 @@ pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
     paths.iter().map(|p| Record::read(p)).collect()
 }
 
-/// Whether it is JSON that does not say of itself that it is a record.
+/// Whether it is JSON that does not declare itself a record.
 fn is_of_another_kind(path: &Path) -> bool {
     let text = std::fs::read(path).unwrap_or_default();
     serde_json::from_slice::<serde_json::Value>(&text)

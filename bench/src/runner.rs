@@ -11,22 +11,22 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Rounds without which nothing is called faster or slower: when both are equal, all of five rounds
-/// fall on the same side of 1 once in 16 times; of three, once in 4.
+/// Minimum number of rounds for a verdict of faster or slower. If both are equal, all of five
+/// rounds fall on the same side of 1 once in 16 times; of three, once in 4.
 pub const VERDICT_ROUNDS: usize = 5;
 
 /// How often and how long to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
-    /// Rounds that are not counted: caches, page tables and clock frequency settle.
+    /// Warm-up rounds that are not counted: caches, page tables and clock frequency settle.
     pub warmup_rounds: u32,
-    /// Rounds that are counted, at most.
+    /// Maximum number of counted rounds.
     pub rounds: u32,
     /// No new round starts after this many seconds, but at least `min_rounds` are counted.
     pub budget_secs: f64,
-    /// Rounds that are counted whatever the budget says.
+    /// Minimum number of counted rounds, whatever the time budget.
     pub min_rounds: u32,
-    /// Which clock comparisons are made by.
+    /// The clock for comparisons.
     pub clock: Clock,
     /// Bind the calling thread to one core per round, another in the next round. Only for work on
     /// one thread.
@@ -46,22 +46,22 @@ impl Schedule {
         Schedule { clock: Clock::Wall, pin: false, budget_secs: 60.0, ..Schedule::one_thread() }
     }
 
-    /// Few rounds within `budget_secs`, for `--quick`: they show that everything runs, and decide
-    /// nothing ([`Ratio::verdict`]).
+    /// Few rounds within `budget_secs`, for `--quick`: they show that everything runs, but give no
+    /// verdict ([`Ratio::verdict`]).
     pub fn quick(self, budget_secs: f64) -> Schedule {
         Schedule { rounds: 3, min_rounds: 1, budget_secs, ..self }
     }
 }
 
-/// One of the things compared.
+/// One of the variants to compare.
 pub struct Variant<'a> {
-    /// What the rows and ratios call it.
+    /// Its name in rows and ratios.
     pub name: String,
-    /// Does the work once and returns a number that must be the same every time, such as the hits
-    /// counted: a variant that skips work is found out, and the compiler cannot remove it. With it
-    /// come the times, where the work knows them better than our clocks.
+    /// Does the work once and returns a check number that must be the same every time, such as the
+    /// number of hits. The number exposes a variant that skips work, and prevents the compiler from
+    /// removing the work. It also returns the times, if the work knows them better than our clocks.
     run: Box<dyn FnMut() -> (u64, Option<Sample>) + 'a>,
-    /// Gives that number after the clock has stopped, where finding it is work of its own.
+    /// Computes the check number after the clock has stopped, if that takes work of its own.
     check: Option<Box<dyn FnMut() -> u64 + 'a>>,
 }
 
@@ -71,8 +71,8 @@ impl<'a> Variant<'a> {
         Variant { name: name.into(), run: Box::new(move || (run(), None)), check: None }
     }
 
-    /// A named closure that has another process do the work, or times a part of its own, and says
-    /// what that took.
+    /// A named closure that lets another process do the work, or times a part of its own, and
+    /// returns the time that it took.
     pub fn timed(name: impl Into<String>, mut run: impl FnMut() -> Sample + 'a) -> Self {
         Variant { name: name.into(), run: Box::new(move || (0, Some(run()))), check: None }
     }
@@ -100,14 +100,14 @@ impl<'a> Variant<'a> {
 pub struct Timed {
     /// Name of the variant.
     pub name: String,
-    /// One per round, in order.
+    /// One sample per round, in order.
     pub samples: Vec<Sample>,
     /// What the variant returned, the same in every round.
     pub check: u64,
 }
 
 impl Timed {
-    /// Median and spread by a clock.
+    /// Median and spread by the given clock.
     pub fn summary(&self, clock: Clock) -> Summary {
         let times: Vec<f64> = self.samples.iter().map(|s| s.by(clock)).collect();
         Summary::of(&times).unwrap_or(Summary {
@@ -120,12 +120,12 @@ impl Timed {
     }
 }
 
-/// Ratio of a baseline's time to ours: above 1 we are faster.
+/// How many times longer a baseline took: above 1 we are faster.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
-    /// What was compared, ours.
+    /// Our variant.
     pub name: String,
-    /// What it was compared with.
+    /// The baseline that it is compared with.
     pub rival: String,
     /// Median over the rounds of (baseline's time / our time).
     pub value: f64,
@@ -137,8 +137,8 @@ pub struct Ratio {
     pub high: f64,
     /// Number of rounds.
     pub rounds: usize,
-    /// Whether both took turns. Where they ran one after the other, what the machine did meanwhile
-    /// is in the ratio.
+    /// Whether both variants alternated. If they ran one after the other, changes of the machine's
+    /// load in between are part of the ratio.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub in_turns: bool,
 }
@@ -152,22 +152,22 @@ fn is_yes(value: &bool) -> bool {
     *value
 }
 
-/// What a [`Ratio`] decides.
+/// The verdict of a [`Ratio`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Ours was faster in every round.
     Faster,
     /// Ours was slower in every round.
     Slower,
-    /// Rounds contradict each other.
+    /// The rounds contradict each other.
     Even,
-    /// Fewer rounds than [`VERDICT_ROUNDS`], or not in turns: nothing is decided.
+    /// No verdict: fewer rounds than [`VERDICT_ROUNDS`], or not alternating.
     Open,
 }
 
 impl Ratio {
-    /// The ratio of times measured in alternation: `per_round` is (baseline's time / our time) of
-    /// each round. `None` without a finite one.
+    /// The ratio of alternating times: `per_round` is (baseline's time / our time) of each round.
+    /// `None` without a finite one.
     pub fn of_rounds(
         name: impl Into<String>,
         rival: impl Into<String>,
@@ -186,8 +186,7 @@ impl Ratio {
         })
     }
 
-    /// What the rounds decide. The only place where that is said: reports, summaries and notes ask
-    /// here.
+    /// The verdict of the rounds. Reports, summaries and notes all take it from here.
     pub fn verdict(&self) -> Verdict {
         match (self.rounds >= VERDICT_ROUNDS && self.in_turns, self.low > 1.0, self.high < 1.0) {
             (false, ..) => Verdict::Open,
@@ -197,7 +196,7 @@ impl Ratio {
         }
     }
 
-    /// The ratio and what it decides, in words for a note.
+    /// The ratio and its verdict, in words for a note.
     pub fn in_words(&self) -> String {
         let decides = match self.verdict() {
             Verdict::Faster => "above 1 in every round".into(),
@@ -211,7 +210,7 @@ impl Ratio {
         )
     }
 
-    /// Why there is no verdict, in words; `None` where there is one.
+    /// Why there is no verdict, in words; `None` if there is one.
     pub fn why_open(&self) -> Option<String> {
         match (self.in_turns, self.rounds) {
             (false, _) => Some("not in turns: decides nothing".into()),
@@ -228,12 +227,12 @@ impl Ratio {
 pub struct Timings {
     /// Clock that [`Timings::ratio`] uses.
     pub clock: Clock,
-    /// In the order the variants were given.
+    /// In the order in which the variants were given.
     pub variants: Vec<Timed>,
 }
 
 impl Timings {
-    /// The variant of that name.
+    /// The variant with the given name.
     pub fn get(&self, name: &str) -> Option<&Timed> {
         self.variants.iter().find(|v| v.name == name)
     }
@@ -243,7 +242,7 @@ impl Timings {
         self.get(name).map(|v| v.summary(self.clock))
     }
 
-    /// Ratio of the time of `rival` to that of `ours`. `None` when one of them was not run.
+    /// How many times longer `rival` took than `ours`. `None` if one of them was not run.
     pub fn ratio(&self, ours: &str, rival: &str) -> Option<Ratio> {
         let (a, b) = (self.get(ours)?, self.get(rival)?);
         let per_round: Vec<f64> = a
@@ -282,8 +281,8 @@ impl std::fmt::Display for Unstable {
 impl std::error::Error for Unstable {}
 
 /// The order of round `round` for `n` variants: rotated, and reversed in every second round, so
-/// that each variant runs first, last, and after each of its neighbours equally often. For what
-/// cannot go through [`interleave`], such as ranks that all have to take the same turn.
+/// that each variant runs first, last, and after each of its neighbours equally often. For work
+/// that cannot use [`interleave`], such as ranks that must all follow the same order.
 pub fn order(n: usize, round: usize) -> Vec<usize> {
     let mut o: Vec<usize> = (0..n).map(|i| (i + round / 2) % n.max(1)).collect();
     if round % 2 == 1 {
@@ -292,7 +291,7 @@ pub fn order(n: usize, round: usize) -> Vec<usize> {
     o
 }
 
-/// Runs the variants in turns as `schedule` says.
+/// Runs the variants in alternation, as `schedule` specifies.
 ///
 /// ```
 /// use bench::runner::{Schedule, Variant, interleave};
@@ -308,7 +307,7 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
     let mut timed: Vec<Timed> = Vec::with_capacity(variants.len());
     let start = Instant::now();
 
-    // Warm-up: also the runs that later ones are checked against.
+    // Warm-up. Its results are also the reference for later checks.
     let mut firsts: Vec<Option<u64>> = vec![None; variants.len()];
     for round in 0..schedule.warmup_rounds as usize {
         cores.pin(round);
@@ -351,7 +350,7 @@ fn check(variant: &str, first: &mut Option<u64>, value: u64) -> Result<(), Unsta
     }
 }
 
-/// The cores this thread may run on, given back when dropped.
+/// The cores that this thread may run on; restored on drop.
 struct Cores {
     allowed: Option<CpuSet>,
     ids: Vec<usize>,
@@ -365,7 +364,7 @@ impl Cores {
         Cores { allowed, ids }
     }
 
-    /// Where pinning is not permitted the times only scatter more, so a refusal is not an error.
+    /// If pinning is not permitted, the times only scatter more, so a refusal is not an error.
     fn pin(&self, round: usize) {
         if !self.ids.is_empty() {
             let mut set = CpuSet::new();
@@ -399,8 +398,8 @@ mod tests {
 
     #[test]
     fn a_slow_round_of_the_machine_cancels_in_the_ratio() {
-        // Round 3 ran on a machine ten times as slow; a ratio of means would be off, the median of
-        // ratios is not.
+        // Round 3 ran while the machine was ten times as slow; a ratio of means would be wrong, the
+        // median of ratios is not.
         let r = timings(&[1.0, 1.0, 10.0], &[2.0, 2.0, 20.0]).ratio("ours", "rival").unwrap();
         assert_eq!((r.value, r.spread, r.rounds), (2.0, 0.0, 3));
     }
@@ -512,7 +511,7 @@ mod tests {
         assert!(apart.why_open().unwrap().contains("turns"));
         let both = Ratio::of_rounds("a", "b", &[0.9, 1.1, 1.2, 1.3, 1.4]).unwrap();
         assert_eq!(both.verdict(), Verdict::Even);
-        // A round that could not be measured is none.
+        // A round that could not be measured does not count.
         assert_eq!(Ratio::of_rounds("a", "b", &[2.0, 2.0, 2.0, 2.0, f64::NAN]).unwrap().rounds, 4);
     }
 

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a handful of samples says: the middle and how far they scatter.
+/// The median and the spread of a small sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Half of the samples lie on either side.
+    /// The median.
     pub median: f64,
     /// Smallest sample.
     pub low: f64,
@@ -18,7 +18,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of the finite samples; `None` when there is none.
+    /// Summarises the finite samples; `None` if there are none.
     ///
     /// ```
     /// let s = bench::stats::Summary::of(&[3.0, 1.0, 2.0, 100.0]).unwrap();
@@ -54,7 +54,8 @@ fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted[i] + (next - sorted[i]) * f
 }
 
-/// Geometric mean, the right mean for ratios; `None` when a value is not positive or there is none.
+/// Geometric mean, the right mean for ratios; `None` if a value is not positive or there are no
+/// values.
 pub fn geometric_mean(values: &[f64]) -> Option<f64> {
     if values.is_empty() || values.iter().any(|v| !(v.is_finite() && *v > 0.0)) {
         return None;

@@ -13,16 +13,17 @@ use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock, RaySet};
 use rayon::prelude::*;
 use rt_core::mesh::TriMesh;
 
-/// Anything that answers rays. All coordinates are the mesh's own (relative to its origin).
+/// A ray tracer. All coordinates are the mesh's own (relative to its origin).
 pub trait Tracer: Sync {
-    /// Name with version and mode, as tables show it.
+    /// Name with version and mode, as shown in tables.
     fn name(&self) -> String;
 
-    /// Closest hits of `rays` into `hits`, which has the same length. Empty lanes may get anything.
+    /// Finds the closest hits of `rays` and stores them in `hits`, which has the same length. Empty
+    /// lanes may hold any value.
     fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]);
 
-    /// Whether anything lies on each ray: bit i of a block's mask is lane i. Bits of empty lanes
-    /// are 0.
+    /// Whether each ray hits anything: bit i of a block's mask is lane i. Bits of empty lanes are
+    /// 0.
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]);
 }
 
@@ -38,7 +39,7 @@ impl<T: Tracer + ?Sized> Tracer for &T {
     }
 }
 
-/// What building cost.
+/// The cost of building.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BuildCost {
     /// Time by the wall clock, without copying the input.
@@ -47,24 +48,24 @@ pub struct BuildCost {
     pub cpu_secs: f64,
     /// Memory the structure holds afterwards, without the input mesh.
     pub bytes: u64,
-    /// The most it held while building, when the peer says so.
+    /// Peak memory while building, if the baseline reports it.
     pub peak_bytes: Option<u64>,
 }
 
-/// Why a peer cannot be measured.
+/// Why a baseline cannot be measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BaselineError {
     /// It is not installed.
     #[error("{name} is not installed (looked in {looked_in}); {cure}")]
     NotFound {
-        /// Which peer.
+        /// Its name.
         name: String,
-        /// Where it was looked for.
+        /// Where it was searched for.
         looked_in: String,
         /// How to get it.
         cure: String,
     },
-    /// A library is there and cannot be used.
+    /// A library was found but cannot be used.
     #[error("{path} cannot be used: {reason}")]
     Unusable {
         /// The file.
@@ -72,7 +73,7 @@ pub enum BaselineError {
         /// Why.
         reason: String,
     },
-    /// The mesh has triangles that no peer accepts.
+    /// The mesh has triangles that no baseline accepts.
     #[error(
         "the mesh has {count} triangles with missing or non-finite vertices; peers need a clean \
          mesh: remove them"
@@ -81,21 +82,20 @@ pub enum BaselineError {
         /// How many.
         count: usize,
     },
-    /// The peer reported an error.
+    /// The baseline reported an error.
     #[error("{name} reported {error} while {doing}")]
     Failed {
-        /// Which peer.
+        /// Its name.
         name: String,
         /// Its error.
         error: String,
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
     },
 }
 
 impl BaselineError {
-    /// The message as records keep it, for everyone to read: files by their name alone, without
-    /// this machine's folders.
+    /// The message for records, which are public: file names without this machine's directories.
     pub fn for_a_record(&self) -> String {
         let BaselineError::Unusable { path, reason } = self else { return self.to_string() };
         let file = std::path::Path::new(path);
@@ -106,7 +106,7 @@ impl BaselineError {
     }
 }
 
-/// Refuses meshes that would make a peer read outside its arrays.
+/// Rejects meshes that would make a baseline read outside its arrays.
 pub(crate) fn require_clean(mesh: &TriMesh) -> Result<(), BaselineError> {
     match mesh.validate().skipped() {
         0 => Ok(()),
@@ -152,7 +152,7 @@ pub fn count_hits(rays: &RaySet, hits: &[HitBlock]) -> u64 {
     (0..rays.len).filter(|i| hits[i / LANES].prim[i % LANES] != NO_HIT).count() as u64
 }
 
-/// Number of rays with something on them.
+/// Number of rays that hit anything.
 pub fn count_occluded(masks: &[u16]) -> u64 {
     masks.iter().map(|m| u64::from(m.count_ones())).sum()
 }
@@ -205,7 +205,7 @@ pub(crate) mod testing {
         TriMesh::new(positions, triangles.collect())
     }
 
-    /// A kind of rays, and what every tracer should answer.
+    /// A kind of rays, with the expected answers.
     struct Case {
         kind: &'static str,
         rays: RaySet,
@@ -223,7 +223,7 @@ pub(crate) mod testing {
             let case = |kind, rays: RaySet| {
                 let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
                 closest_all(&exact, &rays, &mut hits, 2);
-                // Something is on a ray exactly when there is a closest hit.
+                // A ray is occluded exactly if it has a closest hit.
                 let lane = |h: &HitBlock, l: usize| u16::from(h.prim[l] != NO_HIT) << l;
                 let masks =
                     hits.iter().map(|h| (0..LANES).fold(0, |m, l| m | lane(h, l))).collect();
@@ -244,9 +244,9 @@ pub(crate) mod testing {
         })
     }
 
-    /// Compares a tracer that was built from [`mesh`] with brute force. Where a ray hits an edge or
-    /// a silhouette, f32 results may differ: at most one ray in 2000 may. Distances agree to 1e-4
-    /// of the mesh's size.
+    /// Compares a tracer that was built from [`mesh`] with brute force. If a ray hits an edge or a
+    /// silhouette, f32 may differ: at most one ray in 2000 may; distances agree to 1e-4 of the
+    /// mesh's size.
     pub(crate) fn agrees_with_brute_force(tracer: &dyn Tracer) {
         for Case { kind, rays, hits, masks } in cases() {
             let what = format!("{}, {kind}", tracer.name());

@@ -24,44 +24,44 @@ use std::time::Instant;
 use style::RenderStyle;
 use subject::Subject;
 
-/// How a subject is drawn.
+/// How to draw a subject.
 #[derive(Debug, Clone)]
 pub struct RenderRequest {
-    /// Pixels per row and rows.
+    /// Width and height in pixels.
     pub size: [u32; 2],
     /// Samples per pixel.
     pub samples: u32,
     /// Materials, lights and effects.
     pub style: RenderStyle,
-    /// Where it is seen from.
+    /// The viewpoint.
     pub framing: Framing,
     /// How the acceleration structure is built.
     pub build: BuildOptions,
-    /// Layers besides colour.
+    /// Layers in addition to colour.
     pub layers: Layers,
 }
 
-/// A rendered image with its report and times.
+/// A rendered image and its statistics.
 #[derive(Debug, Clone)]
 pub struct RenderedImage {
     /// The image.
     pub frame: Frame,
     /// Rays by kind, effects, warnings.
     pub report: RenderReport,
-    /// The wished effects that the scene had no use for.
+    /// Requested effects that have no use in the scene.
     pub warnings: Vec<String>,
-    /// Wall time of the acceleration structure.
+    /// Wall time of building the acceleration structure.
     pub build_secs: f64,
-    /// Wall time of the rendering.
+    /// Wall time of rendering.
     pub render_secs: f64,
 }
 
-/// How drawing is stopped and watched; the default is neither.
+/// Cancellation and progress of drawing; the default has neither.
 #[derive(Default)]
 pub struct RenderControl<'a> {
-    /// Set to true to stop as soon as the tiles in work are done.
+    /// Set to true to stop as soon as the tiles in progress are finished.
     pub cancel: Option<Arc<AtomicBool>>,
-    /// Told after every sample of all pixels how many are done.
+    /// Called with the number of finished samples after every sample of all pixels.
     pub samples_done: Option<&'a mut dyn FnMut(u32)>,
 }
 
@@ -74,14 +74,14 @@ impl RenderControl<'_> {
 }
 
 impl RenderedImage {
-    /// Whether the work was stopped before all samples were done.
+    /// Whether the work was stopped before all samples were finished.
     pub fn is_interrupted(&self) -> bool {
         self.report.stopped == StopReason::Cancelled
     }
 }
 
-/// Renders a subject. When stopped after the first sample of every pixel, returns the image so far
-/// ([`RenderedImage::is_interrupted`]). When stopped earlier, returns [`Interrupted`].
+/// Draws a subject. If stopped after the first sample of every pixel, returns the image so far
+/// ([`RenderedImage::is_interrupted`]); if stopped earlier, [`Interrupted`].
 pub fn draw(
     subject: Subject,
     request: &RenderRequest,
@@ -105,15 +105,15 @@ pub fn draw(
     request.style.scale_to_subject(&mut scene, (hi - lo).length() * 0.5);
     let camera = request.style.lens(framed.camera, framed.focus_distance)?;
 
-    // Glass needs more bounces before what is cut off stops to matter.
+    // Glass needs more bounces before the truncated light becomes negligible.
     let requested = request.style.effects;
     let glass = requested.contains(Effects::REFRACTION);
     let path = requested.contains(Effects::PATH_TRACING);
-    // What was wished is asked for by name, so that the report says what of it changes no pixel.
+    // Requested effects are named, so that the report says which of them change no pixel.
     let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
     let options = RenderOptions {
         effects: Some(needed | requested),
-        // Paths are ended by chance.
+        // Paths end by Russian roulette.
         max_bounces: (!path).then_some(if glass { 16 } else { 8 }),
         samples: request.samples,
         layers: Layers::COLOR | request.layers,
@@ -144,8 +144,8 @@ pub fn draw(
     Ok(RenderedImage { frame, report, warnings, build_secs, render_secs })
 }
 
-/// Whether a warning says that an effect changed nothing which the scene has by itself and nobody
-/// wished for.
+/// Whether a warning says that an effect of the scene itself, which was not requested, changed
+/// nothing.
 fn is_about_unrequested_effect(warning: &str, requested: Effects) -> bool {
     let mut others = Effects::ALL.into_iter().filter(|(e, _)| !requested.contains(*e));
     others.any(|(_, name)| {
