@@ -12,7 +12,7 @@ const SUBDIVISIONS: usize = 8;
 /// Nodes and weights of Gauss quadrature with two points on -1..1.
 const GAUSS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 
-/// A flow about a body that is either plane (`r` = y) or revolved about x (`r` = distance to the x
+/// A flow around a body that is either plane (`r` = y) or revolved about x (`r` = distance to the x
 /// axis).
 pub(crate) trait LayeredFlow: Sync {
     /// Quantities per point.
@@ -26,8 +26,8 @@ pub(crate) trait LayeredFlow: Sync {
     fn at(&self, x_m: f64, r_m: f64, out: &mut [f64]) -> bool;
 }
 
-/// Means over the boxes of a row, and the share of each box that is gas. `sums` has `QUANTITIES +
-/// 1` rows; the last is the gas fraction. Means of boxes without gas are NaN.
+/// Means over the boxes of a row, and the fraction of each box that is gas. `sums` has `QUANTITIES
+/// + 1` rows; the last is the gas fraction. Means of boxes without gas are NaN.
 pub(crate) fn average_row<F: LayeredFlow>(
     flow: &F,
     first_m: DVec3,
@@ -53,13 +53,14 @@ pub(crate) fn average_row<F: LayeredFlow>(
     for jump in 0..4 {
         let xs = at_corners.map(|c| c[jump]);
         let finite = || xs.iter().copied().filter(|x| x.is_finite());
-        // A jump that some corners have and others lack ends within the box's (y, z): where, is not
-        // known; all boxes from its finite positions on are treated finely.
+        // A jump that exists at some corners but not at others ends within the box's (y, z). The
+        // position of that end is unknown, so all boxes from its finite positions on are
+        // subdivided.
         let partly = finite().count() != corners.len();
         let low = finite().fold(f64::INFINITY, f64::min);
         let high = if partly { f64::INFINITY } else { finite().fold(f64::NEG_INFINITY, f64::max) };
         if low.is_finite() {
-            // One box more on each side: curved jumps can reach further between the corners than at
+            // One more box on each side: curved jumps can reach further between the corners than at
             // them.
             let from = (index_of(low).floor() - 1.0).clamp(0.0, n as f64) as usize;
             let to = (index_of(high).floor() + 2.0).clamp(0.0, n as f64) as usize;
@@ -85,13 +86,13 @@ pub(crate) fn average_row<F: LayeredFlow>(
                 // 0/0 in solids: NaN
                 rows[c][i] = (scratch.sums[c * n + i] / scratch.sums[q * n + i]) as f32;
             }
-            // Rounding of sums of lengths must not make a full box "nearly full".
+            // Rounding in sums of lengths must not make a full box "nearly full".
             rows[q][i] = if gas > 1.0 - 1e-9 { 1.0 } else { gas as f32 };
         }
     }
 }
 
-/// Storage of [`average_row`].
+/// Scratch storage of [`average_row`].
 #[derive(Default)]
 pub(crate) struct Scratch {
     sums: Vec<f64>,
@@ -119,7 +120,7 @@ fn add_line<F: LayeredFlow>(
         let (low, high) = (first + (i as f64 - 0.5) * spacing, first + (i as f64 + 0.5) * spacing);
         let mut from = low;
         for to in jumps.into_iter().chain([high]) {
-            // NaN and jumps before the box are passed over; those behind it end at its border.
+            // NaN and jumps before the box are skipped; those after it end at its border.
             let to = if to > from { to.min(high) } else { continue };
             let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
             for g in GAUSS {

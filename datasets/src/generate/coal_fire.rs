@@ -44,7 +44,7 @@ const WIDTH_M: f64 = LENGTH_M * 161.0 / 401.0;
 pub struct CoalFire {
     /// Points over 1.5 m x 0.6 m x 0.6 m; the pipe ends at x = 0, on the axis y = z = 0.
     pub dims: UVec3,
-    /// Another seed, another flame of the same kind.
+    /// The seed; another seed gives another flame of the same kind.
     pub seed: u64,
 }
 

@@ -44,7 +44,7 @@ const HEIGHT_M: f64 = 14.0 * SLOT_M;
 pub struct CombustionJet {
     /// Points; spacing is 14 slots over `dims.y - 1`, the same along all axes.
     pub dims: UVec3,
-    /// Another seed, another jet of the same kind.
+    /// The seed; another seed gives another jet of the same kind.
     pub seed: u64,
 }
 

@@ -46,7 +46,7 @@ const SHAPE: Shape = Shape {
 pub struct Fire {
     /// Points over 1 m x 1 m x 1 m; z is up, the pool in the middle of the floor.
     pub dims: UVec3,
-    /// Another seed, another flicker.
+    /// The seed; another seed gives another flicker.
     pub seed: u64,
 }
 

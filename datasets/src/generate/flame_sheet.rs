@@ -16,11 +16,12 @@ pub(crate) struct Species {
     pub(crate) oxidiser: f64,
     /// Mass fraction in the fuel's stream.
     pub(crate) fuel: f64,
-    /// Mass made (or, negative, used) when one kilogram of the fuel's stream burns completely.
+    /// Mass produced (or, if negative, consumed) when one kilogram of the fuel stream burns
+    /// completely.
     pub(crate) made: f64,
 }
 
-/// Two streams that burn where they meet.
+/// Two streams that burn where they mix.
 pub(crate) struct FlameSheet<'a> {
     pub(crate) species: &'a [Species],
     /// Oxidiser, flame, fuel; K.
@@ -61,7 +62,7 @@ impl FlameSheet<'_> {
         };
         let [cold, flame, hot] = self.temperatures_k;
         let unburnt = |a: f64, b: f64| a + (b - a) * z;
-        // The flame's temperature above that of mixing, at the corner.
+        // The excess of the flame's temperature over that of mixing, at the corner.
         let rise = flame - (cold + (hot - cold) * st);
         let temperature = unburnt(cold, hot) + rise * progress;
         let mut out = vec![0.0, temperature];
@@ -75,7 +76,7 @@ impl FlameSheet<'_> {
         out
     }
 
-    /// [`FlameSheet::at`] for rows.
+    /// Evaluates [`FlameSheet::at`] for rows.
     pub(crate) fn table(&self) -> Table {
         let columns = 2 + self.species.len();
         let mut values = vec![Vec::with_capacity(ENTRIES + 1); columns];
@@ -95,7 +96,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// The value of a column.
+    /// The value of a column at the given mixture fraction.
     pub(crate) fn at(&self, column: usize, z: f32) -> f32 {
         let t = z.clamp(0.0, 1.0) * ENTRIES as f32;
         let i = (t as usize).min(ENTRIES - 1);

@@ -10,9 +10,9 @@ use rt_core::mesh::TriMesh;
 /// A flow on a uniform lattice, in SI units.
 ///
 /// A value is the mean over the box of one spacing around its point (over the part of it that is
-/// not solid), never a sample at the point: shocks and surfaces between points would otherwise be
-/// staircases, which a schlieren picture, being a picture of gradients, shows before anything else.
-/// Smooth generators sample where that is the same to within their own accuracy, and say so.
+/// not solid), never a sample at the point. Otherwise shocks and surfaces between points would
+/// become staircases, which a schlieren image, an image of gradients, shows most clearly. Smooth
+/// generators sample where that is the same to within their own accuracy, and say so.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flow {
     /// Points per axis.
@@ -21,7 +21,7 @@ pub struct Flow {
     pub origin_m: DVec3,
     /// Distance between points.
     pub spacing_m: DVec3,
-    /// The fields; the first is the one that a schlieren picture needs (density, or a refractive
+    /// The fields; the first is the one that a schlieren image needs (density, or a refractive
     /// index).
     pub fields: Vec<Field>,
     /// The solid body, if any: closed, counter-clockwise from outside.
@@ -49,19 +49,19 @@ pub mod names {
     pub const PRESSURE: &str = "pressure";
     /// Mixture fraction: the share of the mass that came from the fuel stream.
     pub const MIXTURE_FRACTION: &str = "mixture_fraction";
-    /// Refractive index, for sample fields that are no gas.
+    /// Refractive index, for sample fields that are not gases.
     pub const REFRACTIVE_INDEX: &str = "refractive_index";
-    /// 1 in gas, 0 in the solid: the share of the box around the point that is gas.
+    /// 1 in gas, 0 in the solid: the fraction of the box around the point that is gas.
     pub const GAS_FRACTION: &str = "gas_fraction";
 }
 
-/// The fields that a generator computes. Large flows take gigabytes, and a schlieren image in one
+/// Which fields a generator computes. Large flows take gigabytes, and a schlieren image of a single
 /// gas needs only the density.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Fields {
     /// The first field only.
     Density,
-    /// All that the generator knows.
+    /// All fields that the generator supports.
     #[default]
     All,
 }
@@ -73,15 +73,15 @@ pub enum FlowError {
     #[error("the lattice has {dims} points; each axis needs 4 to {most} points, and all together \
              at most 2³² points", most = MOST_POINTS)]
     Dims {
-        /// What was asked for.
+        /// The requested number.
         dims: UVec3,
     },
-    /// There is no such flow of gas.
+    /// No gas flow has these parameters.
     #[error(transparent)]
     Gas(#[from] super::gas_dynamics::GasError),
 }
 
-/// Most points along an axis.
+/// Maximum number of points along an axis.
 const MOST_POINTS: u32 = 8192;
 
 impl Flow {
@@ -116,14 +116,14 @@ impl Flow {
         self.fields.iter().find(|f| f.name == name)
     }
 
-    /// A field as a grid for rt-core (a copy of its values).
+    /// A field as a grid for rt-core (copies its values).
     pub fn grid(&self, name: &str) -> Option<Grid> {
         let values = self.field(name)?.values.clone();
         Some(Grid { dims: self.dims, origin: self.origin_m, spacing: self.spacing_m, values })
     }
 
-    /// The fields as VTK image data, to be written as `.vti`. The values move; the body stays
-    /// behind.
+    /// The fields as VTK image data, to be written as `.vti`. The values are moved; the body is
+    /// dropped.
     pub fn into_dataset(self) -> Dataset {
         let mut image = ImageData::new(self.dims.to_array(), self.origin_m, self.spacing_m);
         let arrays =
@@ -167,7 +167,7 @@ impl Flow {
 }
 
 impl Field {
-    /// Smallest and largest finite value; `None` when there is none.
+    /// Smallest and largest finite value; `None` if there is none.
     pub fn range(&self) -> Option<(f32, f32)> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
         let (low, high) =

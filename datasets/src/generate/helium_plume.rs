@@ -37,7 +37,7 @@ const SHAPE: Shape = Shape {
 pub struct HeliumPlume {
     /// Points over 3 m x 4 m x 4 m; z is up, the source in the middle of the floor.
     pub dims: UVec3,
-    /// Another seed, another puff.
+    /// The seed; another seed gives another puff.
     pub seed: u64,
 }
 
@@ -57,7 +57,7 @@ impl HeliumPlume {
         let scratch = || (Displacement::default(), Vec::new());
         flow.fill(wanted, scratch, |(displacement, share), j, k, rows| {
             plume.share_row(displacement, j, k, share);
-            // What rises and mixes is volume: shares are mole fractions.
+            // Volumes rise and mix, so fractions are mole fractions.
             for (i, &x) in share.iter().enumerate() {
                 let x = x as f64;
                 let y = x * HELIUM / (x * HELIUM + (1.0 - x) * AIR);

@@ -25,7 +25,7 @@ pub const ISO: f64 = 0.5;
 
 /// Height of the domain over its width: 1920 / 2048.
 const HEIGHT: f64 = 0.9375;
-/// Thickness over which the share falls from 1 to 0.
+/// Thickness over which the fraction falls from 1 to 0.
 const TRANSITION: f32 = 0.4;
 /// Waves of the undisturbed interface.
 const MODES: usize = 60;
@@ -78,7 +78,8 @@ impl MixingLayer {
     }
 
     /// The interface as a mesh. Memory is bounded by the result: 32 planes of the field exist at a
-    /// time. `progress` hears how many planes are done and stops the work by returning false.
+    /// time. `progress` is called with the number of finished planes and stops the work by
+    /// returning false.
     pub fn surface(
         &self,
         options: Options,
