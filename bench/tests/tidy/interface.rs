@@ -7,7 +7,7 @@ use crate::counted::exceptions;
 use crate::tree::{File, files};
 
 /// The members that people embed, and how many of their public items are not shown yet.
-const NOT_SHOWN: &[(&str, usize)] = &[("composite", 53), ("rt-core", 93), ("schlieren", 171)];
+const NOT_SHOWN: &[(&str, usize)] = &[("composite", 46), ("rt-core", 77), ("schlieren", 154)];
 
 const ITEMS: &[&str] =
     &["fn ", "const fn ", "unsafe fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
