@@ -1,4 +1,4 @@
-//! Fragments that wait until 16 of one draw can be lit together.
+//! Collects fragments until 16 of one draw can be lit together.
 
 use super::nearest::PixelHit;
 use super::{Prepared, mixed, to_bytes};
@@ -26,7 +26,8 @@ impl FragmentBatch {
         s: &PixelHit,
         color: &mut [[u8; 4]],
     ) {
-        // One with room left is of the same draw: others are shaded before the draw changes.
+        // A batch with free lanes always has fragments of this draw. Those of other draws are
+        // shaded before the draw changes.
         debug_assert!(self.count == 0 || self.draw == draw, "a batch is of one draw");
         self.draw = draw;
         let n = self.count;
@@ -57,7 +58,7 @@ impl FragmentBatch {
         self.count = 0;
     }
 
-    /// Colours between vertices that are lit already.
+    /// Interpolates colours between vertices that are already lit.
     fn interpolate(&mut self, p: &Prepared<'_>, lit: &[VertexColors], color: &mut [[u8; 4]]) {
         let s = &*p.draw.state;
         let two = s.lighting && s.two_side;

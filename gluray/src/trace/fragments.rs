@@ -1,7 +1,8 @@
-//! Fragments of a tile's hits, a block of 16 at a time: what [`Prepared::fragment`] does for one.
+//! Computes the fragments of a tile's hits, a block of 16 at a time. [`Prepared::fragment`] does
+//! the same for a single hit.
 //!
-//! Every step is the one of the scalar code, in the same order; what is rare (clip planes, corners
-//! behind the viewer, triangles that cover no centre) is left to it.
+//! Every step matches the scalar code and keeps its order. Rare cases go to the scalar code: clip
+//! planes, corners behind the viewer, triangles that cover no pixel centre.
 
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
 use crate::state::enums::*;
@@ -9,18 +10,18 @@ use crate::state::snapshot::Snapshot;
 use crate::trace::raster::polygon_offset;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 
-/// What came of a lane.
+/// The result of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LaneState {
-    /// Nothing was hit.
+    /// The ray hit nothing.
     Empty,
-    /// A fragment.
+    /// The lane has a fragment.
     Found,
-    /// The scalar code has to look.
+    /// The scalar code must decide.
     Ask,
 }
 
-/// Fragments of a block.
+/// The fragments of a block.
 pub(super) struct FragmentBlock {
     pub(super) lane: [LaneState; LANES],
     weights: [[f64; LANES]; 3],
@@ -29,12 +30,12 @@ pub(super) struct FragmentBlock {
     front: [bool; LANES],
 }
 
-/// Positions and matrices of a block's triangles.
+/// The positions and matrices of a block's triangles.
 struct Corners {
     p: [[[f32; LANES]; 3]; 3],
 }
 
-/// Pixels up to which edge functions of snapped coordinates are exact in f64.
+/// The distance in pixels up to which edge functions of snapped coordinates are exact in f64.
 const EXACT: f32 = 33_554_432.0;
 
 impl FragmentBlock {
@@ -46,7 +47,7 @@ impl FragmentBlock {
         front: [true; LANES],
     };
 
-    /// The fragment in a lane that has one.
+    /// The fragment of a lane. The lane must have one.
     #[inline]
     pub(super) fn get(&self, l: usize) -> Fragment {
         Fragment {
@@ -57,7 +58,8 @@ impl FragmentBlock {
         }
     }
 
-    /// z by w at the depth with polygon offset, where that is further back than without; else NaN.
+    /// z/w at the depth with polygon offset, where the offset moves the fragment back. Otherwise
+    /// NaN.
     #[inline(always)]
     pub(super) fn moved_back(&self, [n, f]: [f64; 2], out: &mut [f64]) {
         for l in 0..LANES {
@@ -66,13 +68,13 @@ impl FragmentBlock {
         }
     }
 
-    /// The fragments of `hits` at pixels from (`x`, `y`) on.
+    /// The fragments of `hits` at the block of pixels that starts at (`x`, `y`).
     #[inline(always)]
     pub(super) fn fill(&mut self, p: &Prepared<'_>, hits: &HitBlock, x: i32, y: i32) {
         let s = &*p.draw.state;
         let mesh = &p.draw.geometry.mesh;
         let mut corners = Corners { p: [[[0.0; LANES]; 3]; 3] };
-        // All loads first: they miss the caches, and so they miss them together.
+        // All loads come first. They miss the caches, and this way the misses overlap.
         let mut indices = [[0_u32; 3]; LANES];
         for l in 0..LANES {
             if hits.prim[l] != NO_HIT {
@@ -89,8 +91,8 @@ impl FragmentBlock {
                 }
             }
         }
-        // Near a plane, and where a shader clips in the middle of pixels but rays are those of
-        // samples, the scalar code decides.
+        // The scalar code decides near a clip plane. It also decides where a shader clips at pixel
+        // centres while the rays go through samples.
         if p.discards && s.sample_place != [0.0; 2] {
             return;
         }
@@ -174,7 +176,7 @@ impl FragmentBlock {
     }
 }
 
-/// `f32::round` without a call: half away from zero.
+/// `f32::round` without a function call. Halves round away from zero.
 #[inline(always)]
 fn rounded(v: f32) -> f32 {
     let t = v as i32 as f32;
@@ -182,7 +184,7 @@ fn rounded(v: f32) -> f32 {
     t + f32::from(u8::from(d >= 0.5)) - f32::from(u8::from(d <= -0.5))
 }
 
-/// As [`crate::trace::raster::covers`], where that is exact in f64; false elsewhere.
+/// Same as [`crate::trace::raster::covers`] where the result is exact in f64. False elsewhere.
 #[inline(always)]
 fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [bool; LANES] {
     let [vx, vy, vw, vh] = viewport.map(|v| v as f32);
@@ -209,7 +211,7 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
                 - (s[b][1][l] - s[a][1][l]) * (x - s[a][0][l])
         };
         let area = edge(0, 1, s[2][0][l], s[2][1][l]);
-        // Clockwise triangles: the same edges the other way round.
+        // Clockwise triangles use the same edges in reverse.
         let sign = if area > 0.0 { 1.0 } else { -1.0 };
         let mut inside = exact[l] & (area != 0.0);
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
@@ -223,8 +225,9 @@ fn covered(c: &[[[f32; LANES]; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> [b
     out
 }
 
-/// As [`crate::trace::raster::steepness`] or [`polygon_offset`], whichever the state asks for: what
-/// the factor of polygon offset multiplies, and what comes to it.
+/// Same as [`crate::trace::raster::steepness`] or [`polygon_offset`], as the state requires.
+/// Returns the value that the factor of polygon offset multiplies, and the value that is added to
+/// it.
 #[inline(always)]
 fn slopes(c: &[[[f32; LANES]; 4]; 3], s: &Snapshot) -> [[f64; LANES]; 2] {
     let depth_scale = s.depth_range[1] - s.depth_range[0];
@@ -258,7 +261,7 @@ mod tests {
     use super::*;
     use crate::trace::raster;
 
-    /// Corners all over the window, on pixel centres and between, with w from 0.5 to 2.
+    /// Corners all over the window, on pixel centres and between them, with w from 0.5 to 2.
     fn triangles() -> Vec<[[f32; 4]; 3]> {
         let mut state = 1_u64;
         let mut random = move || {

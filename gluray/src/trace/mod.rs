@@ -1,9 +1,9 @@
-//! Rays through pixel centres: which triangle each pixel sees, and its colour and depth as the
-//! driver would have made them.
+//! Traces rays through pixel centres. For each pixel this module finds the visible triangle, and
+//! its colour and depth as the driver would have computed them.
 //!
 //! Rays only find the triangle. Depth and attributes are then evaluated on it at the pixel centre
-//! with the rasterizer's own arithmetic (homogeneous edge functions after Olano and Greer 1997), so
-//! they agree with what the driver makes of neighbouring lines and text.
+//! with the rasterizer's own arithmetic (homogeneous edge functions after Olano and Greer 1997).
+//! They therefore agree with the lines and text that the driver draws next to them.
 
 mod fragment_batch;
 mod fragments;
@@ -44,7 +44,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use tile_rays::{AffineRays, TileRays, slot};
 pub(crate) use translucent::{DepthLimits, WeightedSums, depth_sorted, weighted_sums};
 
-/// A rectangle of window pixels, y up.
+/// A rectangle of window pixels. The y axis points up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Rect {
     pub(crate) x: i32,
@@ -82,7 +82,7 @@ impl Rect {
     }
 }
 
-/// Fragments, at most one a pixel.
+/// Fragments, at most one per pixel.
 #[derive(Clone, Default)]
 pub(crate) struct Layer {
     pub(crate) rect: Rect,
@@ -92,37 +92,39 @@ pub(crate) struct Layer {
     pub(crate) covered: usize,
 }
 
-/// Depth where there is no fragment.
+/// The depth of a pixel that has no fragment.
 pub(crate) const UNCOVERED: f32 = 2.0;
 
-/// Side of the tiles that rays are sent in: a packet of 256.
+/// The side of a tile. The rays of a tile form a packet of 256.
 const TILE: i32 = 16;
-/// A depth buffer of 24 bits.
+/// The largest value of a 24-bit depth buffer.
 pub(crate) const DEPTH_STEPS: f64 = 16_777_215.0;
 
-/// Share of w by which a point may be beyond the near or far plane: the driver clips in f32, and a
-/// plane that lies in the far plane is seen.
+/// The share of w by which a point may lie outside the near or far plane. The driver clips in f32,
+/// so it shows a surface that lies exactly in the far plane.
 const SLACK: f64 = 1e-6;
 
-/// A draw made ready for rays.
+/// A draw that is ready for tracing.
 pub(crate) struct Prepared<'a> {
     pub(crate) draw: &'a Draw,
     pub(crate) world: Arc<World>,
     pub(crate) light_positions: Vec<LightPosition>,
-    /// Where it is seen from, in the space of `light_positions`.
+    /// The eye, in the space of `light_positions`.
     pub(crate) eye: Eye,
     camera: Camera,
-    /// Rows of planes in object space that points must be above: near, far, the user's.
+    /// Clip planes in object space. Visible points lie above all of them: near, far, then the
+    /// user's.
     planes: Vec<[f64; 4]>,
-    /// The user's alone.
+    /// Only the user's clip planes.
     clip_planes: Vec<[f64; 4]>,
-    /// A shader throws away what is below them; otherwise triangles are cut.
+    /// True when a shader discards the fragments below the user's planes. Otherwise triangles are
+    /// cut.
     discards: bool,
     pub(crate) rect: Rect,
     pub(crate) lighting: LightingSetup<'a>,
     pub(crate) lit: Option<Vec<VertexColors>>,
     affine_rays: AffineRays,
-    /// OpenGL's lighting at the vertices can be had for 16 fragments at a time.
+    /// True when OpenGL's lighting at the vertices can be computed for 16 fragments at a time.
     blocks: bool,
     pub(crate) image: Option<Arc<Image>>,
     pub(crate) rays: AtomicU64,
@@ -131,10 +133,10 @@ pub(crate) struct Prepared<'a> {
 /// A fragment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fragment {
-    /// Perspective-correct weights of the corners.
+    /// Perspective-correct barycentric weights of the corners.
     pub(crate) weights: [f64; 3],
     pub(crate) depth: f64,
-    /// The depth without polygon offset.
+    /// The depth before polygon offset.
     pub(crate) plain_depth: f64,
     pub(crate) front: bool,
 }
@@ -143,13 +145,13 @@ pub(crate) fn matrix(m: &[f32; 16]) -> DMat4 {
     DMat4::from_cols_array(&m.map(f64::from))
 }
 
-/// True when rays can be made for this matrix.
+/// True when camera rays can be derived from this matrix.
 pub(crate) fn has_rays(clip_from_object: &[f32; 16]) -> bool {
     Camera::from_matrix(matrix(clip_from_object)).is_ok()
 }
 
 impl<'a> Prepared<'a> {
-    /// `None` when nothing of it can be seen.
+    /// Returns `None` when no part of the draw is visible.
     pub(crate) fn new(
         draw: &'a Draw,
         image: Option<Arc<Image>>,
@@ -168,7 +170,7 @@ impl<'a> Prepared<'a> {
         if s.depth_clamp {
             planes.push(row(3).to_array());
             if row(3).truncate() == DVec3::ZERO {
-                // Parallel rays begin before everything, as nothing is cut off.
+                // Nothing is clipped here, so parallel rays start in front of all geometry.
                 planes.extend(tile_rays::slab(draw, row(2)));
             }
         } else {
@@ -182,7 +184,7 @@ impl<'a> Prepared<'a> {
         let mut clip_planes: Vec<[f64; 4]> = s.clip_planes.iter().map(object).collect();
         let mut discards = false;
         if let Shading::Program(program) = &draw.shading {
-            // A shader throws fragments away by the middle of their pixel.
+            // A shader discards fragments by the position of the pixel centre.
             clip_planes = program.clip_planes().iter().map(|p| p.map(f64::from)).collect();
             discards = !clip_planes.is_empty();
         }
@@ -216,7 +218,8 @@ impl<'a> Prepared<'a> {
         let positions = &draw.geometry.mesh.positions;
         let fixed = matches!(draw.shading, Shading::Fixed);
         out.blocks = fixed && out.lighting.lights_blocks(&draw.attributes);
-        // Fewer vertices than pixels: light them all once. Else only those that are seen.
+        // With fewer vertices than pixels, all vertices are lit once. Otherwise only visible ones
+        // are lit.
         if fixed && positions.len() <= 2 * rect.w as usize * rect.h as usize {
             let light = |(i, p): (usize, &rt_core::glam::Vec3)| {
                 out.lighting.vertex(&draw.attributes, i, p.to_array())
@@ -235,8 +238,8 @@ impl<'a> Prepared<'a> {
         &self.clip_planes
     }
 
-    /// The ray through a point of the window, with the part of it that is not clipped; `None` when
-    /// all of it is.
+    /// The ray through a point of the window, limited to the part that is not clipped. Returns
+    /// `None` when all of it is clipped.
     fn ray(&self, x: f64, y: f64) -> Option<(Ray, f64)> {
         let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
         let ndc = [2.0 * (x - vx) / vw - 1.0, 2.0 * (y - vy) / vh - 1.0];
@@ -244,7 +247,7 @@ impl<'a> Prepared<'a> {
         let (mut t0, mut t1) = (f64::NEG_INFINITY, f64::INFINITY);
         for p in &self.planes {
             let terms = [p[0] * origin.x, p[1] * origin.y, p[2] * origin.z, p[3]];
-            // A little more than is visible: the exact test is that of the fragment.
+            // The ray keeps a little more than the visible part. The fragment makes the exact test.
             let a = terms.iter().sum::<f64>() + 1e-6 * terms.iter().map(|v| v.abs()).sum::<f64>();
             let b = p[0] * dir.x + p[1] * dir.y + p[2] * dir.z;
             if b > 0.0 {
@@ -258,8 +261,8 @@ impl<'a> Prepared<'a> {
         if t0.partial_cmp(&t1) != Some(std::cmp::Ordering::Less) {
             return None;
         }
-        // Rays of a parallel projection begin where the program's near plane is; a plane before it
-        // may be the first.
+        // Rays of a parallel projection start at the program's near plane. Another plane in front
+        // of it may come first.
         let back = if t0 < 0.0 && t0.is_finite() { t0 } else { 0.0 };
         let origin = origin + dir * back;
         let (ray, moved) = self.world.ray_from_world(origin, dir);
@@ -281,8 +284,9 @@ impl<'a> Prepared<'a> {
         mesh.triangle(prim).map(|p| transform(&self.draw.clip_from_object, p.to_array()))
     }
 
-    /// Weights of a triangle's corners where its plane is seen at the centre of a pixel, be it
-    /// inside or not; `None` where that is nowhere.
+    /// The weights of a triangle's corners at the point where its plane meets the centre of a
+    /// pixel, whether that point lies inside the triangle or not. Returns `None` where there is no
+    /// such point.
     pub(crate) fn weights_at(&self, prim: usize, x: i32, y: i32) -> Option<[f32; 3]> {
         let [vx, vy, vw, vh] = self.draw.state.viewport.map(f64::from);
         let [dx, dy] = self.draw.state.sample_place.map(f64::from);
@@ -296,8 +300,8 @@ impl<'a> Prepared<'a> {
         (sum != 0.0 && sum.is_finite()).then(|| l.map(|v| (v / sum) as f32))
     }
 
-    /// The fragment as it is shaded: one of several samples takes the colour of the middle of its
-    /// pixel.
+    /// The fragment as it is shaded. With multisampling, a sample takes the colour of its pixel's
+    /// centre.
     pub(crate) fn centred(&self, prim: usize, f: Fragment, x: i32, y: i32) -> Fragment {
         if self.draw.state.sample_place == [0.0; 2] {
             return f;
@@ -306,8 +310,8 @@ impl<'a> Prepared<'a> {
         Fragment { weights, ..f }
     }
 
-    /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer makes
-    /// one.
+    /// The fragment of triangle `prim` at the centre of pixel (`x`, `y`), if the rasterizer
+    /// generates one.
     fn fragment(&self, prim: usize, x: i32, y: i32) -> Option<Fragment> {
         let s = &*self.draw.state;
         let c = self.corners(prim);
@@ -342,7 +346,7 @@ impl<'a> Prepared<'a> {
             return None;
         }
         let weights = l.map(|v| v / sum);
-        // Clipped at the centre, whatever ray found the triangle.
+        // Clipping is decided at the pixel centre, whichever ray found the triangle.
         let middle = match self.discards && s.sample_place != [0.0; 2] {
             true => self.weights_at(prim, x, y).map_or(weights, |w| w.map(f64::from)),
             false => weights,
@@ -359,8 +363,8 @@ impl<'a> Prepared<'a> {
                 return None;
             }
             if height <= slack && !self.discards {
-                // The driver cuts the triangle along the plane: a centre on the cut belongs to what
-                // is above or to the right of it.
+                // The driver cuts the triangle along the plane. A pixel centre on the cut belongs
+                // to the part above it or to the right of it.
                 let across = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
                 let slope = (0..3).map(|i| across[i] * corner(i)).sum::<DVec3>() * sum.signum();
                 let upright = slope.x.abs() > 1e-9 * slope.y.abs();
@@ -374,7 +378,7 @@ impl<'a> Prepared<'a> {
         let [n, f] = s.depth_range;
         let mut depth = n + (f - n) * (z / w * 0.5 + 0.5);
         let plain_depth = depth;
-        // The unit of polygon offset is two steps of the depth buffer (Mesa).
+        // One unit of polygon offset is two steps of the depth buffer (as in Mesa).
         if let Some((factor, units)) = s.polygon_offset {
             let [slope, shift] = match s.offset_by_length {
                 true => polygon_offset(gradient(&c, s.viewport, f - n), s.sample_place),
@@ -390,7 +394,7 @@ impl<'a> Prepared<'a> {
         Some(Fragment { weights, depth, plain_depth, front })
     }
 
-    /// What the pixel sees first. `ray` and `hit` are those of its centre.
+    /// The first visible fragment of the pixel. `ray` and `hit` belong to the pixel's centre.
     fn resolve(
         &self,
         mut ray: Ray,
@@ -409,8 +413,8 @@ impl<'a> Prepared<'a> {
                     found
                 });
             }
-            // On an edge the rule of the rasterizer may give the pixel to a neighbour that the ray
-            // saw beside it.
+            // On an edge, the fill rule may give the pixel to an adjacent triangle that the ray
+            // missed.
             if step == 0
                 && let Some(found) = self.hit_beside_center(h.t, x, y)
             {
@@ -423,8 +427,8 @@ impl<'a> Prepared<'a> {
         None
     }
 
-    /// Polygon offset pushes steep triangles far back, at silhouettes behind others of the same
-    /// draw: the nearest *with* offset counts.
+    /// Polygon offset moves steep triangles far back. At silhouettes they can end up behind other
+    /// triangles of the same draw. This function returns the nearest fragment *after* the offset.
     fn nearest_with_offset(
         &self,
         first: (usize, Fragment),
@@ -453,7 +457,7 @@ impl<'a> Prepared<'a> {
         best
     }
 
-    /// Where the ray through a pixel's centre has a depth.
+    /// The ray parameter at which the ray through a pixel's centre reaches a depth.
     fn parameter_at_depth(&self, depth: f64, x: i32, y: i32) -> Option<f32> {
         let s = &*self.draw.state;
         let [n, f] = s.depth_range;
@@ -494,7 +498,8 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Culled and fill-rule rejected triangles that a ray may pass through before it is given up.
+/// The number of triangles that a ray may pass through, because they are culled or rejected by the
+/// fill rule, before the search stops.
 const MOST_STEPS: usize = 4096;
 
 pub(crate) fn mixed<const N: usize>(v: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {

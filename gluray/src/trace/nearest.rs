@@ -1,4 +1,4 @@
-//! The nearest fragment of every pixel, tile by tile: rays, fragments of what they hit, colours.
+//! Finds the nearest fragment of every pixel, tile by tile: rays, fragments of their hits, colours.
 
 use super::fragment_batch::FragmentBatch;
 use super::fragments::{FragmentBlock, LaneState};
@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Pixels of a tile.
+/// The number of pixels in a tile.
 const PIXELS: usize = (TILE * TILE) as usize;
 
-/// What a pixel sees.
+/// What is visible at a pixel.
 #[derive(Clone, Copy)]
 pub(super) struct PixelHit {
     depth_bits: u32,
@@ -32,7 +32,7 @@ const NOTHING: PixelHit = PixelHit {
     fragment: Fragment { weights: [0.0; 3], depth: 0.0, plain_depth: 0.0, front: true },
 };
 
-/// What a thread needs for a tile.
+/// A thread's buffers for one tile.
 struct TileScratch {
     rays: TileRays,
     fragments: [FragmentBlock; BLOCKS],
@@ -51,7 +51,7 @@ impl TileScratch {
     }
 }
 
-/// The nearest fragment of all draws at every pixel of a share of the rows.
+/// The nearest fragment of all draws at every pixel of a row share.
 pub(crate) fn nearest(
     draws: &[Prepared<'_>],
     settings: &Settings,
@@ -76,7 +76,7 @@ pub(crate) fn nearest(
             let tile_h = (color.len() / w) as i32;
             let mut n = 0;
             let mut batch = FragmentBatch::default();
-            // Tile by tile: what was seen of one stays in the first cache until it is shaded.
+            // A tile's hits stay in the L1 cache until they are shaded.
             for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
                 let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
                 let mut any = false;
@@ -125,8 +125,8 @@ pub(crate) fn nearest(
     (layer, extra)
 }
 
-/// One draw against what was seen so far in a tile, row by row; false when none of it is there.
-/// Unless `begun` nothing was seen so far.
+/// Traces one draw against the nearest fragments of a tile so far, row by row. Returns false when
+/// the draw covers nothing there. While `begun` is false, the tile has no fragments yet.
 fn trace_draw(
     p: &Prepared<'_>,
     index: u32,
@@ -146,8 +146,8 @@ fn trace_draw(
     let (hits, range) = (&rays.hits, p.draw.state.depth_range);
     let (blocks, targets) = (&mut *fragments, &mut *moved);
     dispatch!(Level::new(), _simd => fill(p, hits, tile, blocks, targets, range));
-    // Polygon offset pushes steep triangles far back, at silhouettes behind others of the same
-    // draw.
+    // Polygon offset moves steep triangles far back. At silhouettes they can end up behind other
+    // triangles of the same draw.
     let has_candidates =
         p.draw.state.polygon_offset.is_some() && rays.trace_offset_candidates(p, tile, moved);
     for y in 0..tile.h {
@@ -173,7 +173,7 @@ fn trace_draw(
     true
 }
 
-/// Fragments of a tile's hits, and where polygon offset moved them to.
+/// The fragments of a tile's hits, and the depths to which polygon offset moved them.
 #[inline(always)]
 fn fill(
     p: &Prepared<'_>,

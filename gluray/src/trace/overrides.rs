@@ -1,7 +1,7 @@
-//! What the user changes about materials and lights: applied to a draw before it is traced. The
-//! driver never sees it.
+//! Applies the user's changes to materials and lights. A draw is changed before it is traced. The
+//! driver never sees the changes.
 //!
-//! Mode `match` shows the driver's picture, so nothing is changed there.
+//! Mode `match` shows the driver's image, so nothing is changed there.
 
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
 use crate::classify::vtk::{ProgramLight, VtkProgram};
@@ -11,17 +11,17 @@ use crate::state::snapshot::{GlLight, Snapshot};
 use crate::trace::occlusion::MOST_LIGHTS;
 use std::sync::Arc;
 
-/// What the user makes of a surface beyond OpenGL's lighting.
+/// The user's material properties that OpenGL's lighting does not have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RayMaterial {
     pub(crate) surface: Surface,
-    /// Times the program's own.
+    /// A factor on the program's own opacity.
     pub(crate) opacity: f32,
-    /// Share of mirror reflection added.
+    /// The share of mirror reflection that is added.
     pub(crate) mirror: f32,
     pub(crate) roughness: f32,
     pub(crate) ior: f32,
-    /// Colour of glass.
+    /// The colour of glass.
     pub(crate) tint: [f32; 3],
 }
 
@@ -42,7 +42,7 @@ impl RayMaterial {
     fn new(m: &Material) -> RayMaterial {
         let usual = RayMaterial::default();
         let surface = m.surface.unwrap_or_default();
-        // A surface that is told to have no highlight reflects nothing, and sends no rays for it.
+        // A surface without a highlight reflects nothing, so no rays are traced for it.
         let dull = surface == Surface::Matte || m.specular == Some(0.0);
         RayMaterial {
             surface,
@@ -50,13 +50,13 @@ impl RayMaterial {
             mirror: if dull { 0.0 } else { m.mirror.map_or(usual.mirror, |v| v as f32) },
             roughness: m.roughness.map_or(usual.roughness, |v| v as f32),
             ior: m.ior.map_or(usual.ior, |v| v as f32),
-            // Half of the way to white: two walls of a saturated colour would swallow all light.
+            // Halfway to white. Two walls of a saturated colour would absorb all light.
             tint: m.color.map_or(usual.tint, |c| rgb(c).map(|v| 0.5 + 0.5 * v)),
         }
     }
 }
 
-/// Changes a draw as the settings say. Costs nothing when they say nothing.
+/// Changes a draw according to the settings. Costs nothing when they change nothing.
 pub(crate) fn apply(draw: &mut Draw, settings: &Settings) {
     if settings.mode == Mode::Match {
         return;
@@ -89,7 +89,8 @@ fn rgb(color: [f64; 3]) -> [f32; 3] {
 
 fn repaint(a: &mut Attributes, m: &Material) {
     if let Some([r, g, b]) = m.color.map(rgb) {
-        // Also where vertices have colours, or colours are the material (GL_COLOR_MATERIAL).
+        // Also applies where vertices have colours, or where colours are the material
+        // (GL_COLOR_MATERIAL).
         let alpha = a.colors.at(0)[3];
         a.colors = Values::Constant([r, g, b, alpha]);
     }
@@ -158,7 +159,7 @@ fn relight_program(p: &mut VtkProgram, l: &Lights) {
     p.ambient.iter_mut().for_each(|v| *v *= l.ambient as f32);
     if l.added > 0.0 && p.lights.len() < MOST_LIGHTS {
         let length = l.added_direction.iter().map(|v| v * v).sum::<f64>().sqrt();
-        // VTK's shaders have the direction in which light travels.
+        // VTK's shaders store the direction in which light travels.
         let direction = l.added_direction.map(|v| (-v / length) as f32);
         let color = rgb(l.added_color).map(|v| v * l.added as f32);
         p.lights.push(ProgramLight { direction, color, lamp: None });

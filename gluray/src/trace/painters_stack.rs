@@ -1,11 +1,11 @@
-//! A draw whose order matters, as a stack: each triangle lies in the window's plane, as high as its
-//! place in the order.
+//! Stacks the triangles of a draw whose order matters. Each triangle lies parallel to the window's
+//! plane, at a height equal to its index in drawing order.
 //!
-//! Layers of such draws often lie in one plane (user interfaces, pictures), where a ray from the
-//! eye cannot tell which comes after which. Above the window the last triangle is the highest, and
-//! a ray from above meets them in the reverse order, each by itself. Where the last one replaces
-//! all others, it is the only one that is looked for. Corners are rounded to 1/256 pixel as the
-//! rasterizer does, so slivers are met where it draws them.
+//! Layers of such draws often lie in one plane (user interfaces, images), where a ray from the eye
+//! cannot tell their order. In the stack the last triangle is the highest. A ray from above hits
+//! the triangles in reverse order, one at a time. Where the last triangle replaces all others, the
+//! search stops there. Corners are rounded to 1/256 pixel as in the rasterizer, so rays hit slivers
+//! where the rasterizer draws them.
 
 use super::{Prepared, Rect, slot};
 use crate::trace::raster::snapped;
@@ -16,9 +16,9 @@ use rt_core::ray::{HitBlock, RayBlock};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Heights that are numbers of their own in f32, with halves between them.
+/// The number of heights that are distinct in f32, with halves between them.
 const MOST: usize = 1 << 22;
-/// Coordinates up to which 1/256 pixel is exact in f32, in that unit.
+/// The largest coordinate, in units of 1/256 pixel, that is exact in f32.
 const EXACT: i64 = 1 << 24;
 
 /// The stack.
@@ -28,7 +28,7 @@ pub(super) struct PaintersStack {
 }
 
 impl PaintersStack {
-    /// `None` when corners are behind the eye, or too many or too far off to be stacked.
+    /// Returns `None` when corners are behind the eye, too many or too far away to be stacked.
     pub(super) fn new(p: &Prepared<'_>) -> Option<PaintersStack> {
         let n = p.draw.geometry.mesh.num_triangles();
         if n > MOST {
@@ -54,8 +54,8 @@ impl PaintersStack {
         Some(PaintersStack { world: World::from_mesh(mesh, &options).ok()?, triangles: n })
     }
 
-    /// For each pixel of a tile the triangles over its centre, the last first, until `take` has
-    /// enough of them.
+    /// For each pixel of a tile, passes the triangles over its centre to `take`, the last first,
+    /// until `take` needs no more.
     pub(super) fn each(
         &self,
         p: &Prepared<'_>,
@@ -87,7 +87,7 @@ impl PaintersStack {
                 let mut ray = blocks[b].get(l);
                 let more = hits[b].get(l).filter(|hit| take(i, hit.prim as usize));
                 match more {
-                    // Half of the way to the next.
+                    // Continues halfway to the next triangle.
                     Some(hit) => ray.t_min = (hit.t + 0.5).max(hit.t.next_up()),
                     None => ray.t_max = f32::NEG_INFINITY,
                 }

@@ -1,10 +1,10 @@
-//! Every fragment of one draw, for states in which the order of triangles matters.
+//! Finds every fragment of one draw, for states in which the order of triangles matters.
 //!
-//! Where all of the draw is before the eye its triangles are stacked by their order
-//! ([`PaintersStack`]), and one ray a layer finds them. Elsewhere rays go through each pixel's
-//! centre from surface to surface, 256 at a time; where an edge comes near a centre, four more rays
-//! beside it find the triangles that the fill rule may give the pixel to. Of layers in one plane
-//! those rays see the first alone.
+//! Where the whole draw is in front of the eye, its triangles are stacked in drawing order
+//! ([`PaintersStack`]), and one ray per layer finds them. Otherwise rays go through each pixel's
+//! centre from surface to surface, 256 at a time. Where an edge comes near a centre, four more rays
+//! next to it find the triangles that the fill rule may give the pixel to. Where several layers lie
+//! in one plane, those rays find only the first.
 
 use super::painters_stack::PaintersStack;
 use super::{Layer, MOST_STEPS, Prepared, Rect, TILE, UNCOVERED, slot, to_bytes};
@@ -14,15 +14,16 @@ use rayon::prelude::*;
 use rt_core::ray::{HitBlock, RayBlock};
 use std::sync::atomic::Ordering::Relaxed;
 
-/// How far beside a centre, in pixels.
+/// The distance of the extra rays from the pixel centre, in pixels.
 const OFF: f64 = 1.0 / 200.0;
-/// Edges this near to a centre count as going through it.
+/// An edge that is nearer to a pixel centre than this counts as passing through it.
 const NEAR: f64 = 1.0 / 32.0;
 
-/// Colour and depth of a fragment.
+/// The colour and depth of a fragment.
 type OrderedFragment = ([u8; 4], f32);
 
-/// Layers: the n-th has the n-th fragment of each pixel in the order of the triangles.
+/// The layers of the draw. The n-th layer has the n-th fragment of each pixel, in the order of the
+/// triangles.
 pub(crate) fn ordered_layers(p: &Prepared<'_>) -> Vec<Layer> {
     let rect = p.rect;
     let (w, h) = (rect.w.max(0) as usize, rect.h.max(0) as usize);
@@ -73,8 +74,8 @@ pub(crate) fn ordered_layers(p: &Prepared<'_>) -> Vec<Layer> {
         .collect()
 }
 
-/// True when a fragment replaces whatever is there, so that the last of a pixel is all that is
-/// seen.
+/// True when a fragment replaces the previous content, so that only the last one of a pixel is
+/// visible.
 fn last_is_all(p: &Prepared<'_>) -> bool {
     let s = &*p.draw.state;
     let untested = !s.depth_test || (s.depth_func == ALWAYS && s.depth_mask);
@@ -163,10 +164,10 @@ fn of_tile(p: &Prepared<'_>, tile: Rect, near: &EdgePixels) -> Vec<Vec<OrderedFr
         .collect()
 }
 
-/// Pixels whose centres are near an edge.
+/// The pixels whose centres are near an edge.
 struct EdgePixels {
     rect: Rect,
-    /// `None`: all of them.
+    /// `None` means all pixels.
     marks: Option<Vec<bool>>,
 }
 
@@ -184,7 +185,7 @@ fn near_edges(p: &Prepared<'_>) -> EdgePixels {
     for prim in 0..p.draw.geometry.mesh.num_triangles() {
         let c = p.corners(prim);
         if c.iter().any(|v| v[3] <= 0.0 || !v[3].is_finite()) {
-            // Where an edge goes through the plane of the eye is not worth finding out.
+            // An edge crosses the plane of the eye. Locating it would not pay, so all pixels count.
             return EdgePixels { rect, marks: None };
         }
         let at = c.map(|v| {
@@ -201,8 +202,8 @@ fn near_edges(p: &Prepared<'_>) -> EdgePixels {
     EdgePixels { rect, marks: Some(marks) }
 }
 
-/// Marks the pixels whose centres are near the line from `a` to `b`: where it crosses the rows of
-/// centres, and the columns.
+/// Marks the pixels whose centres are near the line from `a` to `b`. The test uses the points where
+/// the line crosses the rows and columns of centres.
 fn mark(marks: &mut [bool], size: [i32; 2], a: [f64; 2], b: [f64; 2]) {
     for (along, across) in [(1, 0), (0, 1)] {
         let (lo, hi) = (a[along].min(b[along]) - NEAR - 0.5, a[along].max(b[along]) + NEAR - 0.5);
@@ -230,7 +231,7 @@ mod tests {
     #[test]
     fn centres_on_an_edge_are_marked_and_others_are_not() {
         let mut marks = vec![false; 16];
-        // A diagonal through centres, and a level line between rows.
+        // A diagonal through centres, and a horizontal line between rows.
         mark(&mut marks, [4, 4], [0.5, 0.5], [3.5, 3.5]);
         let marked: Vec<usize> = (0..16).filter(|i| marks[*i]).collect();
         assert_eq!(marked, [0, 5, 10, 15]);

@@ -1,17 +1,18 @@
-//! The rasterizer's rules: which pixel centres a triangle covers, and how steep it is.
+//! The rules of the rasterizer: which pixel centres a triangle covers, and how steep it is.
 
-/// Window coordinates of a corner in units of 1/256 pixel, as the driver's rasterizer takes them.
+/// The window coordinates of a corner in units of 1/256 pixel, as the driver's rasterizer snaps
+/// them.
 pub(crate) fn snapped(c: &[f32; 4], viewport: [i32; 4]) -> [i64; 2] {
     let [vx, vy, vw, vh] = viewport.map(|v| v as f32);
     let inverse = 1.0 / c[3];
     let x = c[0] * inverse * (0.5 * vw) + (0.5 * vw + vx);
     let y = c[1] * inverse * (0.5 * vh) + (0.5 * vh + vy);
-    // At most two million pixels off, so that products of differences fit into 64 bits.
+    // At most two million pixels away, so that products of differences fit into 64 bits.
     [x, y].map(|v| (v * 256.0).round().clamp(-5e8, 5e8) as i64)
 }
 
-/// Whether the triangle covers the pixel's centre. A centre on an edge belongs to the triangle
-/// above or to the right of it.
+/// True when the triangle covers the pixel's centre. A centre on an edge belongs to the triangle
+/// above the edge or to the right of it.
 pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> bool {
     let p = c.each_ref().map(|v| snapped(v, viewport));
     let (cx, cy) = (i64::from(x) * 256 + 128, i64::from(y) * 256 + 128);
@@ -26,8 +27,8 @@ pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> b
     (0..3).all(|i| {
         let (a, b) = (p[i], p[(i + 1) % 3]);
         let e = edge(a, b, cx, cy);
-        // Counter-clockwise: an edge that goes down has the triangle on its right side in x, one
-        // that goes right has it above.
+        // In a counter-clockwise triangle, a downward edge has the interior at larger x, and an
+        // edge to the right has it above.
         let inclusive = b[1] < a[1] || (b[1] == a[1] && b[0] > a[0]);
         e > 0 || (e == 0 && inclusive)
     })
@@ -60,9 +61,9 @@ pub(crate) fn gradient(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) 
     [dx, dy]
 }
 
-/// How VTK's shaders move depths back: by the gradient's length. The depth that they start from,
-/// and write for all samples, is that of the pixel's middle: how far that is from the depth at a
-/// sample is the second number.
+/// The terms by which VTK's shaders offset depths. The first is the length of the depth gradient.
+/// Those shaders start from the depth at the pixel's centre and write it for all samples. The
+/// second number is its difference from the depth at the sample.
 pub(crate) fn polygon_offset([dx, dy]: [f64; 2], sample_place: [f32; 2]) -> [f64; 2] {
     let [x, y] = sample_place.map(f64::from);
     [(dx * dx + dy * dy).sqrt(), -(dx * x + dy * y)]

@@ -1,10 +1,11 @@
-//! Which pixels a draw may cover: its box on the screen, as far as that lies before the viewer.
+//! Computes which pixels a draw may cover: its bounding box on the screen, clipped to the part in
+//! front of the viewer.
 
 use super::Rect;
 use crate::capture::draw::Draw;
 use rt_core::glam::{DMat4, DVec3, DVec4};
 
-/// The pixels that a draw may cover: its box on the screen within viewport and scissor.
+/// The pixels that a draw may cover: its box on the screen, within viewport and scissor.
 pub(super) fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
     let s = &*draw.state;
     let [x, y, w, h] = s.viewport;
@@ -38,12 +39,12 @@ pub(super) fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
     }
 }
 
-/// Where a box is in normalised device coordinates, of which `corners` are the clip coordinates
-/// (bit k of the number: the greater end of axis k); `None` when all of it is beyond one plane of
-/// the view volume. What is behind the viewer is cut off: without that, all draws around the viewer
-/// would be looked for in every pixel.
+/// The bounds of a box in normalised device coordinates. `corners` are its clip coordinates (bit k
+/// of the index selects the greater end of axis k). Returns `None` when the whole box is outside
+/// one plane of the view volume. The part behind the viewer is cut off. Otherwise every pixel would
+/// be searched for all draws around the viewer.
 fn on_screen(corners: &[DVec4; 8], depth_clamp: bool) -> Option<[[f64; 2]; 2]> {
-    // Room for what roundings do, as the exact tests are those of each fragment.
+    // Tolerance for rounding. Each fragment makes the exact test.
     const SLACK: f64 = 1e-4;
     let size = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
     let near = |c: &DVec4| if depth_clamp { c.w } else { c.z + c.w * (1.0 + SLACK) } + SLACK * size;
@@ -62,7 +63,7 @@ fn on_screen(corners: &[DVec4; 8], depth_clamp: bool) -> Option<[[f64; 2]; 2]> {
     let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let mut all = false;
     let mut take = |c: DVec4| {
-        // A point beside the eye may be anywhere.
+        // A point in the plane of the eye may project anywhere.
         all |= c.w <= 1e-9 * size;
         for k in 0..2 {
             lo[k] = lo[k].min(c[k] / c.w);
@@ -89,7 +90,7 @@ fn on_screen(corners: &[DVec4; 8], depth_clamp: bool) -> Option<[[f64; 2]; 2]> {
 mod tests {
     use super::*;
 
-    /// Clip coordinates of a box under a frustum of 90 degrees from 1 to 100.
+    /// The clip coordinates of a box under a frustum of 90 degrees from 1 to 100.
     fn corners(lo: [f64; 3], hi: [f64; 3]) -> [DVec4; 8] {
         std::array::from_fn(|i| {
             let p: [f64; 3] = std::array::from_fn(|k| if i >> k & 1 == 0 { lo[k] } else { hi[k] });
@@ -102,7 +103,7 @@ mod tests {
         let b = on_screen(&corners([-1.0, -1.0, -10.0], [1.0, 1.0, -5.0]), false)
             .expect("before the viewer");
         assert!((b[0][0] + 0.2).abs() < 1e-9 && (b[1][1] - 0.2).abs() < 1e-9, "{b:?}");
-        // From behind the viewer to before it, at the right side.
+        // A box from behind the viewer to in front of it, on the right side.
         let b = on_screen(&corners([0.5, -0.1, -10.0], [0.6, 0.1, 10.0]), false)
             .expect("partly before");
         assert!((b[0][0] - 0.05).abs() < 1e-9, "{b:?}");

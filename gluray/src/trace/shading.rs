@@ -1,5 +1,5 @@
-//! The colour of a fragment: vertex colours, texture, fog; or lighting at the fragment itself with
-//! what rays found out about it.
+//! Computes the colour of a fragment. It combines vertex colours, texture and fog, or evaluates
+//! lighting at the fragment itself with the results of rays.
 
 use crate::capture::draw::Shading;
 use crate::classify::vtk::FragmentSample;
@@ -13,7 +13,7 @@ use crate::trace::{Fragment, Prepared, matrix, mixed};
 use rt_core::glam::{DVec3, Mat3};
 
 impl Prepared<'_> {
-    /// Eye-space position and shading normal of a fragment.
+    /// The eye-space position and shading normal of a fragment.
     fn eye_point(&self, prim: usize, w: [f32; 3]) -> ([f32; 3], [f32; 3]) {
         let mesh = &self.draw.geometry.mesh;
         let corners = mesh.indices[prim].map(|i| i as usize);
@@ -31,13 +31,13 @@ impl Prepared<'_> {
         (mixed(eye, w), crate::trace::lighting::normalized(normal))
     }
 
-    /// Object-space normals from those of eye space: the transposed model-view.
+    /// The matrix that takes normals from eye space to object space: the transposed model-view.
     pub(crate) fn normal_from_eye(&self) -> Mat3 {
         let m = crate::trace::occlusion::eye_from_object(self.draw);
         rt_core::glam::DMat3::from_mat4(m).transpose().as_mat3()
     }
 
-    /// Shading normal in eye space, as the program gave it; of any length.
+    /// The shading normal in eye space, as the program gave it. Its length is arbitrary.
     pub(crate) fn smooth_normal(&self, prim: usize, w: [f32; 3]) -> [f32; 3] {
         match &self.draw.shading {
             Shading::Fixed => self.eye_point(prim, w).1,
@@ -47,7 +47,7 @@ impl Prepared<'_> {
         }
     }
 
-    /// The colour of the surface itself, without lights: the diffuse one, with vertex colours and
+    /// The colour of the surface without lighting: the diffuse colour with vertex colours and
     /// texture.
     pub(crate) fn base_color(&self, prim: usize, f: &Fragment) -> [f32; 4] {
         let mesh = &self.draw.geometry.mesh;
@@ -67,7 +67,7 @@ impl Prepared<'_> {
         color
     }
 
-    /// The diffuse colour of fixed function at a vertex.
+    /// The diffuse colour of a fixed-function vertex.
     pub(crate) fn base_of_vertex(&self, i: usize) -> [f32; 4] {
         let (s, a) = (&*self.draw.state, &self.draw.attributes);
         let tracked =
@@ -76,16 +76,17 @@ impl Prepared<'_> {
         c.map(|v| v.clamp(0.0, 1.0))
     }
 
-    /// Texture coordinates of a vertex of fixed function.
+    /// The texture coordinates of a fixed-function vertex.
     pub(crate) fn texture_coordinates(&self, unit: &TextureUnit, i: usize) -> [f32; 4] {
         let p = self.draw.geometry.mesh.positions[i].to_array();
         texturing::coordinates(unit, &self.draw.state, &self.draw.attributes, &self.lighting, i, p)
     }
 
-    /// How many texels of a texture of `size` the fragment of triangle `prim` covers at a pixel;
-    /// `None` where the triangle's plane goes through the eye there.
+    /// The number of texels of a texture of `size` that the fragment of triangle `prim` covers at a
+    /// pixel. Returns `None` where the triangle's plane passes through the eye there.
     ///
-    /// The driver's way: the differences of two by two pixels, from the upper left one to its
+    /// This follows the driver: differences within a quad of two by two pixels, from the upper left
+    /// pixel to its neighbours.
     /// neighbours.
     fn footprint(
         &self,
@@ -96,7 +97,7 @@ impl Prepared<'_> {
     ) -> Option<f32> {
         let s = &*self.draw.state;
         let (x, y) = (pixel.0 & !1, pixel.1);
-        // The rows of a window are counted from its top.
+        // Window rows are counted from the top.
         let (top, below) = match s.framebuffer {
             0 => {
                 let height = s.window_height;
@@ -142,7 +143,7 @@ impl Prepared<'_> {
         self.lit_from(prim, f, mode, ray_scene, (pixel, true), towards)
     }
 
-    /// The same, as somebody sees it who looks along `-towards` (eye space).
+    /// The same for a viewer who looks along `-towards` (in eye space).
     pub(crate) fn shaded_from(
         &self,
         prim: usize,
@@ -155,7 +156,7 @@ impl Prepared<'_> {
         self.lit_from(prim, f, mode, ray_scene, (pixel, false), towards)
     }
 
-    /// Of the pixel we also know whether the eye sees the fragment there.
+    /// For a pixel, the function also knows whether the eye sees the fragment there.
     fn lit_from(
         &self,
         prim: usize,
@@ -187,8 +188,8 @@ impl Prepared<'_> {
             pixel,
         );
         if mode != Mode::Enhance {
-            // Point lights at the eye cast no shadow that it could see; corners dim them all the
-            // same.
+            // Point lights at the eye cast no shadow that the eye could see. Corners dim all of
+            // them equally.
             let mut r = reaches;
             r.lights.iter_mut().for_each(|l| *l *= 0.5 + 0.5 * reaches.ambient);
             return self.color(prim, f, per_pixel, &r, own);
@@ -200,8 +201,8 @@ impl Prepared<'_> {
         [color[0] * dim, color[1] * dim, color[2] * dim, color[3]]
     }
 
-    /// The colour of OpenGL's lighting: at the vertices, or at the fragment itself.
-    /// `pixel` is the window's that sees it, where the eye does.
+    /// The colour of OpenGL's lighting, computed at the vertices or at the fragment itself. `pixel`
+    /// is the window pixel that shows the fragment, where the eye sees it.
     pub(crate) fn color(
         &self,
         prim: usize,

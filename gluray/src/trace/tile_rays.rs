@@ -1,9 +1,9 @@
-//! Rays of a tile: through the centres of 16 x 16 pixels, made 16 at a time.
+//! The rays of a tile through the centres of 16 x 16 pixels, generated 16 at a time.
 //!
-//! Origins and directions are affine in window coordinates, and so are the numerators and
-//! denominators of where planes cut a ray; so what costs a matrix product and a sum of magnitudes
-//! per plane for one ray ([`Prepared::ray`]) costs a few multiplications here. Rays only find
-//! triangles, so the last bits of both ways need not agree.
+//! Origins and directions are affine in window coordinates. So are the numerators and denominators
+//! of the parameters at which planes cut a ray. A single ray ([`Prepared::ray`]) costs a matrix
+//! product and a sum of magnitudes per plane. The affine form needs only a few multiplications.
+//! Rays only find triangles, so the last bits of the two computations need not agree.
 
 use super::{Prepared, Rect, TILE};
 use crate::capture::draw::Draw;
@@ -14,11 +14,11 @@ use rt_core::glam::{DVec3, DVec4};
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Blocks of a tile.
+/// The number of blocks in a tile.
 pub(super) const BLOCKS: usize = 16;
 
-/// A number that is affine in window coordinates: its value at the window's origin, its change with
-/// x, with y.
+/// A function that is affine in window coordinates: its value at the window's origin, and its
+/// change with x and with y.
 #[derive(Debug, Clone, Copy, Default)]
 struct AffineFunction([f64; 3]);
 
@@ -38,11 +38,11 @@ impl AffineFunction {
 struct HalfBlock<S: Simd> {
     origin: [f64x8<S>; 3],
     dir: [f64x8<S>; 3],
-    /// Where rays begin, and what of them is not cut off, from there on.
+    /// Where rays start, and the interval from there on that is not clipped.
     back: f64x8<S>,
     from: f64x8<S>,
     to: f64x8<S>,
-    /// Lanes of which anything is left.
+    /// The lanes whose interval is not empty.
     some: u64,
 }
 
@@ -51,12 +51,13 @@ struct HalfBlock<S: Simd> {
 pub(super) struct AffineRays {
     origin: [AffineFunction; 3],
     dir: [AffineFunction; 3],
-    /// How far above each plane the origin is (a little more than it is), and how that grows along
-    /// the ray.
+    /// The height of the origin above each plane (slightly overestimated), and its growth along the
+    /// ray.
     planes: Vec<[AffineFunction; 2]>,
-    /// Parameter at which rays begin when the scene is far away, so that f32 loses nothing.
+    /// The parameter at which rays start when the scene is far away, so that f32 loses no
+    /// precision.
     start: f64,
-    /// Clip z and w, of the origin and of the direction: what depth a parameter has.
+    /// Clip z and w of the origin and of the direction. They give the depth at a parameter.
     depth: [[AffineFunction; 2]; 2],
 }
 
@@ -64,7 +65,7 @@ impl AffineRays {
     pub(super) fn new(p: &Prepared<'_>) -> AffineRays {
         let [vx, vy, vw, vh] = p.draw.state.viewport.map(f64::from);
         let ndc = |x: f64, y: f64| [2.0 * (x - vx) / vw - 1.0, 2.0 * (y - vy) / vh - 1.0];
-        // Across the whole viewport, so that differences lose nothing.
+        // Differences span the whole viewport, so that they lose no precision.
         let [zero, right, up] =
             [[vx, vy], [vx + vw, vy], [vx, vy + vh]].map(|[x, y]| p.camera.world_ray(ndc(x, y)));
         let affine = |f: &dyn Fn((DVec3, DVec3)) -> f64| {
@@ -84,7 +85,7 @@ impl AffineRays {
             .map(|plane| {
                 let plane = DVec4::from_array(*plane);
                 let n = plane.truncate();
-                // The exact test is that of the fragment: the most that rounding may be anywhere in
+                // The fragment makes the exact test. This is the largest rounding error anywhere in
                 // the rectangle.
                 let size = corners.map(|(x, y)| {
                     let o = axes.map(|k| origin[k].at(x, y) + center[k]);
@@ -107,9 +108,10 @@ impl AffineRays {
         affine_rays
     }
 
-    /// Where the bounds begin along the rays, when they are so far off that f32 would lose bits;
-    /// else 0. The parameter is clip w or the share of the way from the near plane to the far one:
-    /// both are the same for all points of a plane before the viewer.
+    /// The parameter at which the bounds start along the rays, when they are so far away that f32
+    /// would lose bits. Otherwise 0. The parameter is clip w, or the fraction of the distance from
+    /// the near plane to the far plane. Both are equal for all points of a plane parallel to the
+    /// image.
     fn beginning(&self, p: &Prepared<'_>, corners: &[(f64, f64); 4]) -> f64 {
         let bounds = p.draw.geometry.bounds();
         let (middle, radius) =
@@ -127,7 +129,7 @@ impl AffineRays {
         let clip = super::matrix(&p.draw.clip_from_object);
         let (z, w) = (clip.row(2), clip.row(3));
         let parallel = w.truncate() == DVec3::ZERO;
-        // Along a ray the parameter is w itself, or (z + w) / w.
+        // Along a ray, the parameter is w itself or (z + w) / w.
         let row = if parallel { (z + w) / w.w } else { w };
         let at = |v: DVec3| row.truncate().dot(v + p.world.origin()) + row.w;
         debug_assert!(dir.is_finite() && origin.is_finite(), "cameras are finite");
@@ -135,8 +137,8 @@ impl AffineRays {
         (nearest - nearest.abs() * 1e-6).max(0.0)
     }
 
-    /// The rays of one block, whose pixels begin at (`x`, `y`); `used` has a bit for each lane that
-    /// is wanted.
+    /// The rays of one block, whose pixels start at (`x`, `y`). `used` has a bit for each lane that
+    /// is needed.
     #[inline(always)]
     fn block<S: Simd>(
         &self,
@@ -158,7 +160,7 @@ impl AffineRays {
         let zero = f32x16::splat(simd, 0.0);
         let least = a.from.narrow(b.from);
         least.simd_gt(zero).select(least, zero).store_slice(&mut out.t_min);
-        // A little more, as `next_up` would give.
+        // Slightly larger, as `next_up` would make it.
         let most = a.to.narrow(b.to);
         let more = most + most.abs() * 1.2e-7;
         let finite = most.simd_lt(f32x16::splat(simd, f32::MAX));
@@ -185,8 +187,8 @@ impl AffineRays {
             t1 = (b.simd_lt(zero) & t.simd_lt(t1)).select(t, t1);
             none |= (b.simd_eq(zero) & a.simd_lt(zero)).to_bitmask();
         }
-        // Rays of a parallel projection begin where the program's near plane is; a plane before it
-        // may be the first.
+        // Rays of a parallel projection start at the program's near plane. Another plane in front
+        // of it may come first.
         let before = t0.simd_lt(zero) & t0.simd_gt(before_all);
         let back = before.select(t0, splat(self.start));
         let (mut origin, mut dir) = ([zero; 3], [zero; 3]);
@@ -204,8 +206,8 @@ impl AffineRays {
         }
     }
 
-    /// The parameter, from the ray's own origin on, at which the ray through (`x`, `y`) has this z
-    /// by w.
+    /// The parameter, measured from the ray's own origin, at which the ray through (`x`, `y`) has
+    /// this z/w.
     #[inline]
     fn parameter(&self, x: f64, y: f64, z_by_w: f64, shift: f64) -> f32 {
         let [[z, w], [dz, dw]] = self.depth.map(|d| d.map(|a| a.at(x, y)));
@@ -213,14 +215,14 @@ impl AffineRays {
     }
 }
 
-/// The rays and hits of a tile: pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x /
+/// The rays and hits of a tile. Pixel (x, y) of the tile is lane `x % 4 + 4 (y % 4)` of block `x /
 /// 4 + 4 (y / 4)`.
 pub(super) struct TileRays {
     level: Level,
     pub(super) blocks: Vec<RayBlock>,
     pub(super) hits: Vec<HitBlock>,
     shift: [[f64; LANES]; BLOCKS],
-    /// A second look behind the first hits.
+    /// The rays that look for candidates behind the first hits.
     behind: Vec<RayBlock>,
     pub(super) offset_candidates: Vec<HitBlock>,
 }
@@ -237,8 +239,8 @@ impl TileRays {
         }
     }
 
-    /// Sends rays through the pixels of `area`, which is no larger than a tile. False when nothing
-    /// was hit.
+    /// Traces rays through the pixels of `area`, which is no larger than a tile. Returns false when
+    /// no ray hits anything.
     pub(super) fn send(&mut self, p: &Prepared<'_>, area: Rect) -> bool {
         let (level, blocks, shift) = (self.level, &mut self.blocks, &mut self.shift);
         dispatch!(level, simd => make(simd, &p.affine_rays, area, blocks, shift));
@@ -250,9 +252,9 @@ impl TileRays {
         self.hits.iter().any(|h| h.prim.iter().any(|p| *p != rt_core::ray::NO_HIT))
     }
 
-    /// Looks behind first hits that polygon offset moved back: is there anything up to where it
-    /// moved them? `depth` is that place (z by w) for each pixel; NaN for those that were not
-    /// moved.
+    /// Traces the range behind first hits that polygon offset moved back, up to the depth of the
+    /// moved fragment. `depth` is that depth (z/w) for each pixel. It is NaN for pixels whose
+    /// fragment did not move.
     pub(super) fn trace_offset_candidates(
         &mut self,
         p: &Prepared<'_>,
@@ -312,7 +314,7 @@ fn make<S: Simd>(
     }
 }
 
-/// Two planes across clip z between which all of a draw is.
+/// Two planes of constant clip z that enclose the whole draw.
 pub(super) fn slab(draw: &Draw, z: DVec4) -> [[f64; 4]; 2] {
     let b = draw.geometry.bounds();
     let at = |corner: i32| {
@@ -326,7 +328,7 @@ pub(super) fn slab(draw: &Draw, z: DVec4) -> [[f64; 4]; 2] {
     [(z - DVec4::W * (lo - more)).to_array(), (DVec4::W * (hi + more) - z).to_array()]
 }
 
-/// Block and lane of a pixel of a tile.
+/// The block and lane of a pixel of a tile.
 #[inline]
 pub(super) fn slot(x: i32, y: i32) -> (usize, usize) {
     debug_assert!((0..TILE).contains(&x) && (0..TILE).contains(&y), "a pixel of the tile");

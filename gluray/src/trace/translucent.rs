@@ -1,9 +1,9 @@
-//! Translucent surfaces in one go: all fragments of a pixel before its opaque surface, blended in
-//! the order of their depths.
+//! Composites translucent surfaces in one pass. It finds all fragments of a pixel in front of the
+//! opaque surface and blends them in depth order.
 //!
-//! Rays go from surface to surface, 256 at a time. Where a hit is none of the rasterizer's
-//! fragments, an edge is near, and four rays beside the centre find the triangle that the fill rule
-//! gives the pixel to.
+//! Rays go from surface to surface, 256 at a time. A hit that yields no fragment under the
+//! rasterizer's rules is near an edge. Then four rays next to the centre find the triangle that the
+//! fill rule gives the pixel to.
 
 use super::{
     DEPTH_STEPS, Fragment, Layer, MOST_STEPS, Prepared, Rect, TILE, TileRays, UNCOVERED, slot,
@@ -16,56 +16,56 @@ use rayon::prelude::*;
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Depths that fragments may have at most, by pixel of the framebuffer.
+/// The largest depth that fragments may have, per pixel of the framebuffer.
 pub(crate) struct DepthLimits {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) depth: Vec<f32>,
-    /// Depths of other surfaces, as a depth buffer has them; otherwise those of the farthest
-    /// fragments that count themselves.
+    /// True when the limits are depths of other surfaces, as stored in a depth buffer. Otherwise
+    /// they are the depths of the farthest fragments that still count.
     pub(crate) exact: bool,
 }
 
-/// Sums over all fragments of a pixel that count.
+/// Sums over all counted fragments of each pixel.
 #[derive(Default)]
 pub(crate) struct WeightedSums {
     pub(crate) rect: Rect,
-    /// Colours times alpha, added; and what all layers together keep from coming through.
+    /// The sum of colour times alpha, and the share of light that all layers together block.
     pub(crate) colors: Vec<[f32; 4]>,
-    /// Alphas, added.
+    /// The sum of alphas.
     pub(crate) weights: Vec<f32>,
     pub(crate) covered: usize,
 }
 
-/// How far behind its limit a fragment still counts, as VTK has it: the limit is a depth that the
-/// driver computed for such a fragment.
+/// The distance behind its limit up to which a fragment still counts, as in VTK. The limit is a
+/// depth that the driver computed for such a fragment.
 const EPSILON: f64 = 1e-7;
-/// Roundings of a driver that interpolates in f32 from the window's corner on, per depth that a
-/// triangle gains from one pixel to the next.
+/// The rounding error of a driver that interpolates in f32 from the corner of the window, per unit
+/// of depth that a triangle gains from one pixel to the next.
 const ROUNDINGS: f64 = 4096.0 / 16_777_216.0;
-/// What comes through behind this changes no pixel of eight bits.
+/// Below this transmittance, further layers change no pixel of eight bits.
 const LEAST: f32 = 1.0 / 1024.0;
-/// How far beside a centre, in pixels.
+/// The distance of the extra rays from the pixel centre, in pixels.
 const OFF: f64 = 1.0 / 200.0;
 
-/// A fragment of a pixel.
+/// One fragment of a pixel.
 struct LayerFragment {
     draw: usize,
     prim: usize,
     fragment: Fragment,
 }
 
-/// Effects of the mode on translucent surfaces.
+/// The scene for the mode's effects on translucent surfaces.
 fn occlusion_scene<'a>(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<RayScene<'a>> {
     RayScene::new(draws, settings).map(|mut ray_scene| {
-        // What lets light through casts no shadow.
+        // Translucent surfaces cast no shadow.
         ray_scene.clear.fill(true);
         ray_scene
     })
 }
 
-/// Gives each pixel's fragments to `put`, with the places that it has in `out`, row by row. Returns
-/// how many pixels have any.
+/// Passes each pixel's fragments to `put`, row by row, with the pixel's entries in `out`. Returns
+/// how many pixels have fragments.
 fn each_pixel<T: Send>(
     draws: &[Prepared<'_>],
     limit: &DepthLimits,
@@ -97,13 +97,13 @@ fn each_pixel<T: Send>(
     covered.into_inner() as usize
 }
 
-/// Where anything of the draws may be seen.
+/// The part of the window in which the draws may be visible.
 fn bounds(draws: &[Prepared<'_>], limit: &DepthLimits) -> Rect {
     let all = Rect { x: 0, y: 0, w: limit.width as i32, h: limit.height as i32 };
     draws.iter().fold(Rect::default(), |r, d| r.or(d.rect)).and(all)
 }
 
-/// Premultiplied colours of all draws; what it cost beside primary rays.
+/// Premultiplied colours of all draws, and the cost of secondary rays.
 pub(crate) fn depth_sorted(
     draws: &[Prepared<'_>],
     limit: &DepthLimits,
@@ -123,7 +123,7 @@ pub(crate) fn depth_sorted(
     (Layer { rect, color, depth, covered }, cost(ray_scene))
 }
 
-/// Sums of all draws' fragments, in any order; what it cost beside primary rays.
+/// Sums over the fragments of all draws in any order, and the cost of secondary rays.
 pub(crate) fn weighted_sums(
     draws: &[Prepared<'_>],
     limit: &DepthLimits,
@@ -154,12 +154,12 @@ pub(crate) fn weighted_sums(
     (WeightedSums { rect, colors, weights, covered }, cost(ray_scene))
 }
 
-/// Shadow rays and ambient occlusion rays.
+/// The numbers of shadow rays and ambient occlusion rays.
 fn cost(ray_scene: Option<RayScene<'_>>) -> [u64; 2] {
     ray_scene.map_or([0; 2], |a| [a.shadow_rays.into_inner(), a.occlusion_rays.into_inner()])
 }
 
-/// All fragments of a draw in a tile.
+/// Finds all fragments of a draw in a tile.
 fn through(
     p: &Prepared<'_>,
     draw: usize,
@@ -192,7 +192,7 @@ fn through(
                 let (prim, t) = (rays.hits[b].prim[l] as usize, rays.hits[b].t[l]);
                 match p.fragment(prim, at.0, at.1) {
                     None => edges[k] = true,
-                    // Everything that follows is behind it.
+                    // All further hits are behind it.
                     Some(f) if is_behind(p, prim, &f, most(at.0, at.1)) => {
                         rays.blocks[b].t_max[l] = -1.0;
                         continue;
@@ -221,14 +221,15 @@ fn through(
     }
 }
 
-/// How deep fragments of a pixel may be.
+/// The depth limit of a pixel's fragments.
 #[derive(Clone, Copy)]
 struct DepthLimit {
     depth: f64,
     exact: bool,
 }
 
-/// Whether a fragment is behind its limit, where that is not exact by more than roundings.
+/// True when a fragment is behind its limit. For inexact limits, the distance must exceed the
+/// rounding error.
 fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: DepthLimit) -> bool {
     if most.exact {
         return f.depth > most.depth;
@@ -240,7 +241,7 @@ fn is_behind(p: &Prepared<'_>, prim: usize, f: &Fragment, most: DepthLimit) -> b
             > EPSILON + ROUNDINGS * steepness(&p.corners(prim), s.viewport, scale)
 }
 
-/// Fragments of triangles that rays beside the centre meet.
+/// Fragments of the triangles that rays next to the centre hit.
 fn hit_beside_center(
     p: &Prepared<'_>,
     draw: usize,
@@ -268,7 +269,7 @@ fn hit_beside_center(
     }
 }
 
-/// Front to back, premultiplied.
+/// Blends front to back, with premultiplied colours.
 fn blended(
     draws: &[Prepared<'_>],
     found: &mut [LayerFragment],
@@ -286,7 +287,7 @@ fn blended(
         let [r, g, b, a] = p.shaded(f.prim, &f.fragment, settings.mode, ray_scene, at);
         let a = (a * p.draw.ray_material.opacity).clamp(0.0, 1.0);
         for (sum, c) in sum.iter_mut().zip([r, g, b]) {
-            // As each step is written to a buffer of colours from 0 to 1.
+            // Clamps after each step, because each step writes to a buffer of colours from 0 to 1.
             *sum = (*sum + left * a * c.max(0.0)).min(1.0);
         }
         left *= 1.0 - a;

@@ -1,28 +1,29 @@
-//! The views of a frame: draws that share a projection and a viewport, and so one picture that rays
-//! can be sent into.
+//! The views of a frame. A view is a group of draws that share a projection and a viewport, so they
+//! form one image that rays can be traced for.
 //!
-//! Programs with several viewports, or with a small set of axes under a projection of its own, have
-//! several a frame. Light does not pass from one to another.
+//! Programs with several viewports, or with a small set of axes under its own projection, have
+//! several views per frame. Light does not pass from one view to another.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::trace::{Rect, matrix};
 use rt_core::camera::Camera;
 use rt_core::glam::DMat4;
 
-/// How eye space comes to the screen.
+/// How eye space is projected to the screen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View {
-    /// Clip from eye.
+    /// The matrix from eye space to clip space.
     pub(crate) projection: DMat4,
     pub(crate) camera: Camera,
     pub(crate) viewport: Rect,
-    /// All rays have one direction.
+    /// True when all rays have the same direction.
     pub(crate) parallel: bool,
-    /// A surface whose corners turn left as the viewer sees them turns right on the screen.
+    /// True when a surface with counter-clockwise corners, as the viewer sees them, is clockwise on
+    /// the screen.
     pub(crate) mirrored: bool,
 }
 
-/// Clip from eye of a draw.
+/// The matrix of a draw from eye space to clip space.
 fn projection(draw: &Draw) -> DMat4 {
     match &draw.shading {
         Shading::Fixed => matrix(&draw.state.projection),
@@ -30,7 +31,7 @@ fn projection(draw: &Draw) -> DMat4 {
     }
 }
 
-/// Matrices that differ by what f32 makes of a product.
+/// True when two matrices differ by no more than the f32 rounding of a product.
 fn same(a: &DMat4, b: &DMat4) -> bool {
     let (a, b) = (a.to_cols_array(), b.to_cols_array());
     let size = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -38,16 +39,17 @@ fn same(a: &DMat4, b: &DMat4) -> bool {
 }
 
 impl View {
-    /// `None` where rays cannot be made for the draw's projection.
+    /// Returns `None` when no rays can be derived from the draw's projection.
     pub(crate) fn of(draw: &Draw) -> Option<View> {
         let [x, y, w, h] = draw.state.viewport;
         View::new(projection(draw), Rect { x, y, w, h })
     }
 
-    /// `None` where rays cannot be made for `projection`, clip from eye.
+    /// Returns `None` when no rays can be derived from `projection`, the matrix from eye space to
+    /// clip space.
     pub(crate) fn new(projection: DMat4, viewport: Rect) -> Option<View> {
         let camera = Camera::from_matrix(projection).ok()?;
-        // A small triangle that turns left before the viewer.
+        // A small counter-clockwise triangle in front of the viewer.
         let (origin, dir) = camera.world_ray([0.0, 0.0]);
         let (u, v) = (-dir.normalize()).any_orthonormal_pair();
         let at = origin + dir;
@@ -63,7 +65,7 @@ impl View {
         })
     }
 
-    /// Whether the draw is seen this way.
+    /// True when the draw belongs to this view.
     pub(crate) fn holds(&self, draw: &Draw) -> bool {
         let [x, y, w, h] = draw.state.viewport;
         self.viewport == Rect { x, y, w, h } && same(&self.projection, &projection(draw))
@@ -79,8 +81,8 @@ impl View {
     }
 }
 
-/// Numbers of the draws of each view, in the order of their first draws. Draws that rays cannot be
-/// made for are left out.
+/// The indices of the draws of each view. Views come in the order of their first draws. Draws whose
+/// projection allows no rays are left out.
 pub(crate) fn views<'a>(draws: impl Iterator<Item = &'a Draw>) -> Vec<(View, Vec<usize>)> {
     let mut out: Vec<(View, Vec<usize>)> = Vec::new();
     for (i, d) in draws.enumerate() {
@@ -92,23 +94,24 @@ pub(crate) fn views<'a>(draws: impl Iterator<Item = &'a Draw>) -> Vec<(View, Vec
     out
 }
 
-/// Eye space of a camera: right, up, backward, with the eye (of parallel projections: a point in
-/// the middle) as origin.
+/// The eye space of a camera. Its axes point right, up and backward. Its origin is the eye, or a
+/// point in the middle for parallel projections.
 fn eye_space(camera: &Camera) -> DMat4 {
     let axes = camera.world_from_view().transpose();
     let eye = camera.eye().unwrap_or_else(|| camera.world_ray([0.0, 0.0]).0);
     DMat4::from_mat3(axes) * DMat4::from_translation(-eye)
 }
 
-/// Eye from object for a draw of which only clip from object (`clip`) is known. `reference` is both
-/// matrices of another draw: when the two differ by an affine map, both are in one space. `None`
-/// for matrices that rays cannot be made for.
+/// The matrix from object space to eye space for a draw of which only the matrix from object space
+/// to clip space (`clip`) is known. `reference` holds both matrices of another draw. When the two
+/// clip matrices differ by an affine map, both draws share one space. Returns `None` for matrices
+/// that allow no rays.
 pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> Option<DMat4> {
     let placed = reference.and_then(|(other, eye)| {
         let here = other.inverse() * clip;
         let here = here * here.row(3).w.recip();
         let affine = here.row(3).truncate().length() < 1e-5 && here.is_finite();
-        // What roundings leave in the last row is no perspective.
+        // Rounding residue in the last row is not perspective.
         let exact = DMat4::from_cols(
             here.x_axis.with_w(0.0),
             here.y_axis.with_w(0.0),
@@ -120,8 +123,8 @@ pub(crate) fn eye_from_clip(clip: DMat4, reference: Option<(DMat4, DMat4)>) -> O
     placed.or_else(|| Camera::from_matrix(clip).ok().map(|c| eye_space(&c)))
 }
 
-/// Gives eye spaces to draws whose shaders do without: VTK's, where a light at the eye needs
-/// normals alone.
+/// Assigns eye spaces to draws whose shaders have none. These are VTK's shaders, where a light at
+/// the eye needs only normals.
 pub(crate) fn assign_eye_spaces<T>(draws: &mut [(Draw, T)]) {
     let matrices = |d: &Draw| match &d.shading {
         Shading::Program(p) => Some((matrix(&p.clip_from_object), matrix(&p.view_from_object))),
