@@ -1,5 +1,5 @@
-//! OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in f32 and in
-//! the order of Mesa's vertex programs.
+//! Evaluates OpenGL's lighting at a vertex (compatibility profile specification, section 12.2), in
+//! f32 and in the order of Mesa's vertex programs.
 
 mod gouraud;
 mod powers;
@@ -11,7 +11,7 @@ use crate::state::enums::*;
 use crate::state::snapshot::{GlLight, Snapshot};
 use crate::trace::occlusion::{LightPosition, Visibility, vector};
 
-/// Colours of a vertex, clamped: primary and secondary (separate specular), front and back.
+/// The clamped colours of a vertex: primary and secondary (separate specular), front and back.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct VertexColors {
     pub(crate) primary: [[f32; 4]; 2],
@@ -49,12 +49,12 @@ pub(crate) fn product(a: &[f32; 16], b: &[f32; 16]) -> [f32; 16] {
     })
 }
 
-/// `m * (p, 1)`: multiply, then three multiply-adds, as the driver's program has it.
+/// `m * (p, 1)` as a multiplication and three multiply-adds, as in the driver's program.
 pub(crate) fn transform(m: &[f32; 16], p: V3) -> [f32; 4] {
     std::array::from_fn(|r| m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r])
 }
 
-/// What does not change from vertex to vertex.
+/// The values that are equal for all vertices of a draw.
 pub(crate) struct LightingSetup<'a> {
     state: &'a Snapshot,
     /// Inverse of the model-view's upper left, for normals; row by row of the transposed.
@@ -101,7 +101,7 @@ impl<'a> LightingSetup<'a> {
         LightingSetup { state, normal_matrix: inverse, rescale, lights }
     }
 
-    /// Eye-space normal as lighting takes it.
+    /// The eye-space normal that lighting uses.
     pub(crate) fn eye_normal(&self, n: V3) -> V3 {
         let m = &self.normal_matrix;
         // The transposed inverse: columns of the inverse are dotted with the normal.
@@ -109,7 +109,7 @@ impl<'a> LightingSetup<'a> {
         if self.state.normalize { normalized(e) } else { scaled(e, self.rescale) }
     }
 
-    /// Colours of vertex `i` at object-space position `p`.
+    /// The colours of vertex `i` at object-space position `p`.
     pub(crate) fn vertex(&self, attributes: &Attributes, i: usize, p: V3) -> VertexColors {
         let color = attributes.colors.at(i);
         if !self.state.lighting {
@@ -131,8 +131,8 @@ impl<'a> LightingSetup<'a> {
         VertexColors { primary: [front.0, back.0], secondary: [front.1, back.1] }
     }
 
-    /// Colours of a point lit by itself: primary and secondary. `normal` and `color` are
-    /// interpolated, the normal in eye space.
+    /// The colours of a point that is lit by itself: primary and secondary. `normal` and `color`
+    /// are interpolated. The normal is in eye space.
     pub(crate) fn point(
         &self,
         materials: &[Material; 2],
@@ -147,7 +147,7 @@ impl<'a> LightingSetup<'a> {
         self.side(&self.tracked(&materials[side], side, color), eye, normal, reaches)
     }
 
-    /// Where the lights are, in eye space.
+    /// The positions of the lights in eye space.
     pub(crate) fn light_positions(&self) -> Vec<LightPosition> {
         let place = |p: &PreparedLight<'_>| match p.directional {
             true => LightPosition::Directional(vector(p.to_light)),
@@ -156,7 +156,7 @@ impl<'a> LightingSetup<'a> {
         self.lights.iter().map(place).collect()
     }
 
-    /// The material with what GL_COLOR_MATERIAL takes from the colour.
+    /// The material, with the properties that GL_COLOR_MATERIAL takes from the colour.
     fn tracked(&self, m: &Material, side: usize, color: [f32; 4]) -> Material {
         let mut m = *m;
         if let Some((face, what)) = self.state.color_material
@@ -232,8 +232,8 @@ fn power(x: f32, e: f32) -> f32 {
     if e == 0.0 { 1.0 } else { x.powf(e) }
 }
 
-/// Inverse of the upper left 3 x 3 of a column-major matrix, row by row; the identity's when it is
-/// singular (Mesa then leaves normals as they are, too).
+/// The inverse of the upper left 3 x 3 of a column-major matrix, row by row. For a singular matrix
+/// it is the identity (Mesa, too, then leaves normals unchanged).
 fn inverse_3(m: &[f32; 16]) -> [[f32; 3]; 3] {
     let a = |r: usize, c: usize| f64::from(m[4 * c + r]);
     let cofactor = |r: usize, c: usize| {

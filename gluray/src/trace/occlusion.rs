@@ -1,10 +1,9 @@
-//! What rays add to OpenGL's lighting: lights that are hidden, and corners that see little of the
-//! surroundings.
+//! Adds ray-traced visibility to OpenGL's lighting: hidden lights and ambient occlusion.
 //!
-//! Only what is asked for and can change a pixel is computed: no shadow rays from what the eye sees
-//! to a point light at the eye, none where a surface faces away, and no occlusion rays when none
-//! are set. Rays are made in eye space, where all draws of a frame meet, and go through each draw's
-//! own structure.
+//! Only requested effects that can change a pixel are computed. No shadow rays go from points that
+//! the eye sees to a point light at the eye, or where a surface faces away. No occlusion rays are
+//! traced when none are set. Rays are generated in eye space, which all draws of a frame share, and
+//! traverse each draw's own BVH.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::host::config::{Mode, Settings};
@@ -15,15 +14,15 @@ use rt_core::math::SplitMix64;
 use rt_core::ray::Ray;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Most lights of one draw.
+/// The largest number of lights of one draw.
 pub(crate) const MOST_LIGHTS: usize = 8;
 
-/// What reaches a point.
+/// The visibility of lights and surroundings from a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Visibility {
-    /// Share of each light that is not hidden.
+    /// The visible share of each light.
     pub(crate) lights: [f32; MOST_LIGHTS],
-    /// Share of the surroundings that is near nothing.
+    /// The share of the surroundings that is not occluded.
     pub(crate) ambient: f32,
 }
 
@@ -32,27 +31,27 @@ impl Visibility {
     pub(crate) const FULL: Visibility = Visibility { lights: [1.0; MOST_LIGHTS], ambient: 1.0 };
 }
 
-/// Where a light of a draw is, in eye space.
+/// The position of a draw's light in eye space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LightPosition {
-    /// Direction to it.
+    /// The direction to the light.
     Directional(DVec3),
-    /// A point.
+    /// A point light.
     Positional(DVec3),
 }
 
-/// From where a draw is seen, in eye space. The origin is not always it: a program may keep the
-/// place of its camera in the projection.
+/// The viewpoint of a draw in eye space. It is not always the origin, because a program may put the
+/// camera's position into the projection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Eye {
-    /// A point, and how far from it the draw is.
+    /// A point, and its distance from the draw.
     Point(DVec3, f64),
     /// The direction that parallel rays come from.
     Parallel(DVec3),
 }
 
 impl Eye {
-    /// Of the camera that a draw is seen by, given in the draw's own space; `middle` is the draw's.
+    /// The eye of a camera that is given in the draw's own space. `middle` is the draw's centre.
     pub(crate) fn of(camera: &Camera, eye_from_object: &DMat4, middle: DVec3) -> Eye {
         match camera.eye() {
             Some(at) => {
@@ -68,12 +67,12 @@ impl Eye {
 }
 
 impl LightPosition {
-    /// Whether its light goes along the rays of this eye: what it misses the eye cannot see. That
-    /// is so of a point at the eye of a perspective, and of parallel light along parallel rays.
-    /// Parallel light along the view is no such light in perspective: its shadows show beside what
-    /// casts them.
+    /// True when the eye cannot see the shadows of this light, because its light travels along the
+    /// rays of the eye. This holds for a point light at the eye of a perspective, and for parallel
+    /// light along parallel rays. In perspective, parallel light along the view does not qualify:
+    /// its shadows appear next to the objects that cast them.
     pub(crate) fn follows_rays_of(self, eye: Eye) -> bool {
-        // What is left of f32 matrices moves a shadow by much less than a pixel.
+        // The residue of f32 matrices moves a shadow by much less than a pixel.
         const SLACK: f64 = 1e-5;
         match (self, eye) {
             (LightPosition::Positional(p), Eye::Point(at, far)) => (p - at).length() <= SLACK * far,
@@ -86,21 +85,22 @@ impl LightPosition {
     }
 }
 
-/// All draws of a frame, for rays that begin on one and end on any.
+/// All draws of a frame, for rays that start on one draw and may hit any.
 pub(crate) struct RayScene<'a> {
     pub(crate) draws: &'a [Prepared<'a>],
     pub(crate) object_from_eye: Vec<Option<DMat4>>,
-    /// Which draws let light through: they cast no shadow.
+    /// The draws that let light through. They cast no shadow.
     pub(crate) clear: Vec<bool>,
     pub(crate) diagonal: f64,
     pub(crate) settings: &'a Settings,
-    /// Another number for each sample of a pixel: each adds rays of its own to the mean.
+    /// A different number for each sample of a pixel, so that each sample adds its own rays to the
+    /// mean.
     sample: i32,
     pub(crate) shadow_rays: AtomicU64,
     pub(crate) occlusion_rays: AtomicU64,
 }
 
-/// Where a draw's vertices are in eye space.
+/// The matrix of a draw's vertices from object space to eye space.
 pub(crate) fn eye_from_object(draw: &Draw) -> DMat4 {
     let m = match &draw.shading {
         Shading::Fixed => &draw.state.model_view,
@@ -110,7 +110,7 @@ pub(crate) fn eye_from_object(draw: &Draw) -> DMat4 {
 }
 
 impl<'a> RayScene<'a> {
-    /// `None` when the mode asks for nothing beyond OpenGL's lighting.
+    /// Returns `None` when the mode asks only for OpenGL's lighting.
     pub(crate) fn new(draws: &'a [Prepared<'a>], settings: &'a Settings) -> Option<RayScene<'a>> {
         let wanted = settings.effects.shadows || settings.effects.ambient_occlusion_samples > 0;
         if !matches!(settings.mode, Mode::Rich | Mode::Enhance | Mode::Path) || !wanted {
@@ -119,7 +119,7 @@ impl<'a> RayScene<'a> {
         Some(RayScene::of(draws, settings))
     }
 
-    /// The draws, whatever is asked for.
+    /// The scene of the draws, whatever the mode asks for.
     pub(crate) fn of(draws: &'a [Prepared<'a>], settings: &'a Settings) -> RayScene<'a> {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in draws {
@@ -136,7 +136,7 @@ impl<'a> RayScene<'a> {
             let m = eye_from_object(p.draw);
             (m.determinant() != 0.0).then(|| m.inverse())
         };
-        // Places are multiples of a sixteenth of a pixel in [-1/2, 1/2).
+        // Sample positions are multiples of a sixteenth of a pixel in [-1/2, 1/2).
         let [x, y] = draws.first().map_or([0.0; 2], |p| p.draw.state.sample_place);
         let sample = ((x * 256.0) as i32) << 20 ^ ((y * 256.0) as i32) << 11;
         RayScene {
@@ -151,7 +151,7 @@ impl<'a> RayScene<'a> {
         }
     }
 
-    /// Whether anything is between `from` and `from + dir * most` (eye space).
+    /// True when anything lies between `from` and `from + dir * most` (in eye space).
     fn hidden(&self, from: DVec3, dir: DVec3, most: f64) -> bool {
         self.draws.iter().zip(&self.object_from_eye).zip(&self.clear).any(|((p, m), clear)| {
             let Some(m) = m.filter(|_| !clear) else { return false };
@@ -165,8 +165,8 @@ impl<'a> RayScene<'a> {
         })
     }
 
-    /// What reaches a point with the given normal (towards the viewer), both in eye space. `eye` is
-    /// there for a point that is the first on a ray of its.
+    /// The visibility from a point with the given normal (towards the viewer), both in eye space.
+    /// `eye` is set for a point that is the first hit of one of the eye's rays.
     pub(crate) fn visibility(
         &self,
         point: DVec3,
@@ -176,8 +176,8 @@ impl<'a> RayScene<'a> {
         pixel: (i32, i32),
     ) -> Visibility {
         let mut v = Visibility::FULL;
-        // Off the surface by a share of the scene that f32 positions in any of its parts cannot
-        // reach.
+        // Starts off the surface, by a share of the scene's size that exceeds the error of f32
+        // positions anywhere in the scene.
         let from = point + normal * (self.diagonal * 2e-5);
         let effects = &self.settings.effects;
         let mut random = PixelRng::new((pixel.0 ^ self.sample, pixel.1));
@@ -217,7 +217,7 @@ impl<'a> RayScene<'a> {
             let most = effects.ambient_occlusion_radius * self.diagonal;
             let (u, w) = normal.any_orthonormal_pair();
             let open = (0..n).filter(|_| {
-                // Cosine-weighted: a disk lifted onto the hemisphere (Malley's method).
+                // Cosine-weighted: a disk projected onto the hemisphere (Malley's method).
                 let (x, y) = random.on_disk();
                 let dir = u * x + w * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
                 !self.hidden(from, dir, most)
@@ -229,7 +229,7 @@ impl<'a> RayScene<'a> {
     }
 }
 
-/// Numbers that depend on the pixel alone, so that a still picture does not flicker.
+/// Random numbers that depend only on the pixel, so that a still image does not flicker.
 pub(crate) struct PixelRng(SplitMix64);
 
 impl PixelRng {
@@ -237,7 +237,7 @@ impl PixelRng {
         PixelRng(SplitMix64::new((x as u64) << 32 ^ (y as u64) ^ 0x9e37_79b9_7f4a_7c15))
     }
 
-    /// From 0 to below 1.
+    /// The next number in [0, 1).
     pub(crate) fn next(&mut self) -> f64 {
         self.0.unit()
     }
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn pixels_keep_their_random_numbers() {
-        // Also of a pixel left of or above the picture, whose number is negative.
+        // Pixels left of the image or below it have negative coordinates. They work too.
         let mut random = PixelRng::new((3, -4));
         assert_eq!(
             [random.next(), random.next()].map(f64::to_bits),

@@ -1,6 +1,6 @@
-//! Texture unit 0 of fixed function: coordinates at a vertex, texels at a fragment, and the
-//! environment that brings both together (compatibility profile specification, sections 12.1.3,
-//! 8.14 and 16.1).
+//! Fixed-function texturing on unit 0: coordinates at a vertex, texels at a fragment, and the
+//! environment that combines them with the colour (compatibility profile specification, sections
+//! 12.1.3, 8.14 and 16.1).
 
 mod image;
 mod sampling;
@@ -13,10 +13,10 @@ use crate::trace::lighting::{LightingSetup, normalized, transform};
 use image::BaseFormat;
 pub(crate) use image::{Image, Images};
 
-/// Texels of the greatest texture that is read.
+/// The number of texels of the largest texture that is read.
 const MOST_TEXELS: i64 = 1 << 26;
 
-/// Whether rays can follow the sampling of the bound texture; the reason if not.
+/// Checks that rays can reproduce the sampling of the bound texture. The error is the reason.
 pub(crate) fn check_sampling(target: u32) -> Result<(), &'static str> {
     let min = gl::tex_parameter_i::<1>(target, TEXTURE_MIN_FILTER)[0].cast_unsigned();
     let mag = gl::tex_parameter_i::<1>(target, TEXTURE_MAG_FILTER)[0].cast_unsigned();
@@ -26,8 +26,8 @@ pub(crate) fn check_sampling(target: u32) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Why fixed function's sampling of the bound texture cannot be followed; `None` when it can, or
-/// when the texture is incomplete and so left out.
+/// The reason why the fixed-function sampling of the bound texture cannot be reproduced. `None`
+/// when it can, or when the texture is incomplete and therefore disabled.
 pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static str> {
     const TEXTURE_BASE_LEVEL: u32 = 0x813c;
     const TEXTURE_MAX_ANISOTROPY: u32 = 0x84fe;
@@ -63,7 +63,7 @@ pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static
     None
 }
 
-/// Texture coordinates of vertex `i`, generated and transformed.
+/// The texture coordinates of vertex `i`, generated and transformed.
 pub(crate) fn coordinates(
     unit: &TextureUnit,
     state: &Snapshot,
@@ -103,8 +103,8 @@ pub(crate) fn divided(coords: [f32; 4]) -> [f32; 2] {
     [coords[0] / q, coords[1] / q]
 }
 
-/// The fragment's colour after the texture environment. `rho` is how many texels its pixel covers,
-/// where that is known.
+/// The fragment's colour after the texture environment. `rho` is the number of texels that its
+/// pixel covers, where that is known.
 pub(crate) fn apply(
     unit: &TextureUnit,
     image: &Image,
@@ -127,7 +127,7 @@ fn environment(
     f: [f32; 4],
     t: [f32; 4],
 ) -> [f32; 4] {
-    // What GetTexImage gives for luminance and intensity is in the first component.
+    // GetTexImage returns luminance and intensity in the first component.
     let (ct, at) = match base {
         BaseFormat::Alpha => ([0.0; 3], t[3]),
         BaseFormat::Luminance => ([t[0]; 3], 1.0),

@@ -1,9 +1,9 @@
-//! Rays beyond the first surface, for modes `rich` and `enhance`: mirrors, metals, glass, what is
-//! seen through translucent surfaces, a lens, and several samples a pixel (Whitted 1980; Cook,
+//! Traces rays beyond the first surface, for modes `rich` and `enhance`: mirrors, metals, glass,
+//! surfaces behind translucent ones, a lens, and several samples per pixel (Whitted 1980; Cook,
 //! Porter and Carpenter 1984).
 //!
-//! Surfaces are lit as everywhere in these modes, by OpenGL's lighting at the point with shadows
-//! and occlusion. Each kind of ray is sent only where a material or a setting asks for it.
+//! As everywhere in these modes, surfaces are lit by OpenGL's lighting at the point, with shadows
+//! and occlusion. Each kind of ray is traced only where a material or a setting asks for it.
 
 use crate::cluster::row_share::{BAND, RowShare};
 use crate::host::config::{Mode, Settings, Surface};
@@ -16,7 +16,7 @@ use rt_core::glam::{DMat4, DVec3};
 use rt_core::ray::Ray;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Premultiplied colours of a rectangle of the window, and what they cost.
+/// Premultiplied colours of a rectangle of the window, and their cost.
 pub(crate) struct ColorImage {
     pub(crate) rect: Rect,
     pub(crate) rgba: Vec<[f32; 4]>,
@@ -24,7 +24,7 @@ pub(crate) struct ColorImage {
     pub(crate) warnings: Vec<String>,
 }
 
-/// True when a draw's surface is not opaque, by the program or by the user.
+/// True when a draw's surface is not opaque, because of the program or the user.
 pub(crate) fn is_clear(p: &Prepared<'_>, settings: &Settings) -> bool {
     let ray_material = &p.draw.ray_material;
     let through =
@@ -32,7 +32,7 @@ pub(crate) fn is_clear(p: &Prepared<'_>, settings: &Settings) -> bool {
     through || (ray_material.surface == Surface::Glass && settings.effects.refraction)
 }
 
-/// True when one ray a pixel and OpenGL's lighting are not all that is asked for.
+/// True when the settings or materials ask for more than one ray per pixel and OpenGL's lighting.
 pub(crate) fn is_needed(draws: &[Prepared<'_>], settings: &Settings) -> bool {
     let (e, rich) = (&settings.effects, settings.mode == Mode::Rich);
     let answers = |p: &Prepared<'_>| {
@@ -45,12 +45,12 @@ pub(crate) fn is_needed(draws: &[Prepared<'_>], settings: &Settings) -> bool {
         || rich && (e.aperture_radius > 0.0 || draws.iter().any(answers))
 }
 
-/// A frame's draws of one view, for rays of any origin.
+/// The draws of one view of a frame, for rays from any origin.
 struct WhittedTracer<'a> {
     ray_scene: RayScene<'a>,
     view: &'a View,
     eye_from_object: Vec<DMat4>,
-    /// Radiance of what leaves the scene.
+    /// The radiance of rays that leave the scene.
     sky: [f32; 3],
     reflection: AtomicU64,
     refraction: AtomicU64,
@@ -58,19 +58,19 @@ struct WhittedTracer<'a> {
     primary: AtomicU64,
 }
 
-/// A point that a ray met.
+/// A point that a ray hit.
 struct SurfaceHit {
     draw: usize,
     prim: usize,
     fragment: Fragment,
     t: f64,
     point: DVec3,
-    /// Unit normal of the triangle against the ray.
+    /// The unit normal of the triangle, facing the ray's origin.
     normal: DVec3,
     outside: bool,
 }
 
-/// A ray in eye space and how it came about.
+/// A ray in eye space and its history.
 #[derive(Clone, Copy)]
 struct WhittedRay {
     origin: DVec3,
@@ -81,13 +81,13 @@ struct WhittedRay {
     pixel: (i32, i32),
 }
 
-/// Weights below this change no pixel of eight bits.
+/// Rays with a smaller weight change no pixel of eight bits.
 const LEAST_WEIGHT: f32 = 1.0 / 512.0;
-/// Layers of translucent surfaces, and culled or clipped triangles, on one ray.
+/// The limit of translucent layers, and of culled or clipped triangles, on one ray.
 const MOST_LAYERS: usize = 256;
 
-/// Colours of every pixel of `rect` that is in the share. `background` is what the program cleared
-/// to, which mirrors and glass see.
+/// The colours of every pixel of `rect` in the row share. `background` is the program's clear
+/// colour, which mirrors and glass show.
 pub(crate) fn colors(
     draws: &[Prepared<'_>],
     view: &View,
@@ -135,8 +135,8 @@ pub(crate) fn colors(
     }
 }
 
-/// Distances along the viewing direction of the nearest and the farthest point of the draws, at
-/// least a little before the eye.
+/// The distances of the nearest and the farthest point of the draws along the viewing direction.
+/// Both are at least slightly in front of the eye.
 pub(crate) fn distances(draws: &[Prepared<'_>]) -> [f64; 2] {
     let (mut near, mut far) = (f64::INFINITY, 0.0_f64);
     for p in draws {
@@ -152,7 +152,7 @@ pub(crate) fn distances(draws: &[Prepared<'_>]) -> [f64; 2] {
     [near.clamp(1e-4 * far, far), far]
 }
 
-/// Radius and distance of focus of the lens that is set; the reason when there can be none.
+/// The radius and focus distance of the lens in the settings, or the reason why there can be none.
 pub(crate) fn lens(
     draws: &[Prepared<'_>],
     view: &View,
@@ -184,13 +184,14 @@ impl WhittedTracer<'_> {
         })
     }
 
-    /// The mean of a pixel's samples.
+    /// The mean of the samples of a pixel.
     fn pixel(&self, x: i32, y: i32, lens: Option<[f64; 2]>) -> [f32; 4] {
         let n = self.ray_scene.settings.samples.max(1);
         let side = f64::from(n).sqrt().ceil() as u32;
         let mut sum = [0.0_f32; 4];
         for sample in 0..n {
-            // Sample 0 of an ordinary picture goes through the centre; the cells of a grid else.
+            // Sample 0 of an ordinary image goes through the centre. Other samples lie in the cells
+            // of a grid.
             let seed =
                 (x.wrapping_add((sample as i32).wrapping_mul(0x1_0001)), y ^ (sample as i32) << 16);
             let mut random = PixelRng::new(seed);
@@ -206,7 +207,8 @@ impl WhittedTracer<'_> {
                 continue;
             };
             if let Some([radius, focus]) = lens {
-                // Where the pinhole's ray meets the plane in focus, all rays of the lens meet.
+                // All rays through the lens meet at the point where the pinhole ray crosses the
+                // plane in focus.
                 let sharp = path.origin + path.dir * (focus / -path.dir.z);
                 let (u, v) = random.on_disk();
                 path.origin += DVec3::new(u, v, 0.0) * radius;
@@ -219,7 +221,7 @@ impl WhittedTracer<'_> {
         sum.map(|v| v / n as f32)
     }
 
-    /// The ray through a point of the window between the near and the far plane.
+    /// The ray through a point of the window, between the near and the far plane.
     fn primary(&self, x: f64, y: f64, pixel: (i32, i32)) -> Option<WhittedRay> {
         let (origin, dir) = self.view.camera.world_ray(self.view.ndc(x, y));
         let m = self.view.projection;
@@ -235,7 +237,8 @@ impl WhittedTracer<'_> {
             }
         }
         let back = if span[0].is_finite() { span[0] } else { 0.0 };
-        // From the near plane on, so that parallel projections see what is before their origin.
+        // Starts at the near plane, so that parallel projections see the part in front of their
+        // origin.
         let (origin, span) = if self.view.parallel {
             (origin + dir * back, [0.0, span[1] - back])
         } else {
@@ -251,7 +254,7 @@ impl WhittedTracer<'_> {
         })
     }
 
-    /// The nearest surface on a ray; with `pixel` only draws that may cover it.
+    /// The nearest surface on a ray. With `pixel`, only draws that may cover that pixel are tested.
     fn closest(&self, path: &WhittedRay, pixel: Option<(i32, i32)>) -> Option<SurfaceHit> {
         let mut best: Option<SurfaceHit> = None;
         for (i, p) in self.ray_scene.draws.iter().enumerate() {
@@ -325,7 +328,7 @@ impl WhittedTracer<'_> {
         None
     }
 
-    /// What comes along a ray, premultiplied by how much of it surfaces make.
+    /// The radiance along a ray, premultiplied by the share that surfaces contribute.
     fn radiance(&self, path: &WhittedRay, pixel: Option<(i32, i32)>) -> [f32; 4] {
         let mut out = [0.0_f32; 4];
         let mut left = 1.0_f32;
@@ -353,7 +356,7 @@ impl WhittedTracer<'_> {
         out
     }
 
-    /// Colour and opacity of a surface.
+    /// The colour and opacity of a surface.
     fn surface(&self, hit: &SurfaceHit, path: &WhittedRay, left: f32) -> ([f32; 3], f32) {
         let settings = self.ray_scene.settings;
         let (e, p) = (&settings.effects, &self.ray_scene.draws[hit.draw]);
@@ -366,7 +369,7 @@ impl WhittedTracer<'_> {
         let cosine = -hit.normal.dot(dir);
         let eye_normal = self.shading_normal(hit);
         let mirrored = dir - eye_normal * (2.0 * dir.dot(eye_normal));
-        // Shading normals may send a mirrored ray into the surface.
+        // With shading normals, a reflected ray may point into the surface.
         let mirrored = mirrored + hit.normal * (1e-3 - mirrored.dot(hit.normal)).max(0.0);
         if ray_material.surface == Surface::Glass && e.refraction && more {
             return (self.glass(hit, path, dir, weight), 1.0);
@@ -394,7 +397,7 @@ impl WhittedTracer<'_> {
             let mut random = PixelRng::new((path.pixel.0 ^ 0x5bd1, path.pixel.1));
             let mut sum = [0.0_f32; 3];
             for _ in 0..rays {
-                // A lobe as wide as GGX' half vectors of this roughness have it at their median.
+                // The lobe is as wide as the median of the GGX half vectors at this roughness.
                 let spread = f64::from(ray_material.roughness * ray_material.roughness);
                 let (u, v) = mirrored.any_orthonormal_pair();
                 let (x, y) = random.on_disk();
@@ -420,7 +423,8 @@ impl WhittedTracer<'_> {
         (color, opacity)
     }
 
-    /// Fresnel's equations for unpolarised light at an interface, and the two rays that they weigh.
+    /// Fresnel's equations for unpolarised light at an interface, and the two rays that they
+    /// weight.
     fn glass(&self, hit: &SurfaceHit, path: &WhittedRay, dir: DVec3, weight: f32) -> [f32; 3] {
         let ray_material = &self.ray_scene.draws[hit.draw].draw.ray_material;
         let ior = f64::from(ray_material.ior);
@@ -452,7 +456,7 @@ impl WhittedTracer<'_> {
         out
     }
 
-    /// Light from direction `dir`, on the side of the normal.
+    /// The radiance from direction `dir`, on the side of the normal.
     fn send(
         &self,
         hit: &SurfaceHit,
@@ -463,7 +467,7 @@ impl WhittedTracer<'_> {
     ) -> [f32; 3] {
         count.fetch_add(1, Relaxed);
         let from = WhittedRay {
-            // Off the surface as rays to lights are.
+            // Starts off the surface, as shadow rays do.
             origin: hit.point + hit.normal * (self.ray_scene.diagonal * 2e-5),
             dir,
             span: [0.0, f64::INFINITY],
@@ -475,7 +479,7 @@ impl WhittedTracer<'_> {
         [c[0], c[1], c[2]]
     }
 
-    /// Unit shading normal on the side that the ray came from.
+    /// The unit shading normal on the side that the ray came from.
     fn shading_normal(&self, hit: &SurfaceHit) -> DVec3 {
         let p = &self.ray_scene.draws[hit.draw];
         let n = p.smooth_normal(hit.prim, hit.fragment.weights.map(|w| w as f32));

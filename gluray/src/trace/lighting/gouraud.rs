@@ -1,9 +1,9 @@
-//! OpenGL's lighting at the corners of 16 fragments' triangles at a time: [`LightingSetup::vertex`]
-//! for many.
+//! Evaluates OpenGL's lighting at the corners of 16 fragments' triangles at a time. It vectorises
+//! [`LightingSetup::vertex`].
 //!
-//! The order of sums is that of the scalar code. Vectors are written out, because compilers unroll
-//! loops over 16 lanes before they see that they are vectors. Only powers are another function:
-//! exact to a millionth for exponents up to OpenGL's 128.
+//! Sums keep the order of the scalar code. Vectors are written out, because compilers unroll loops
+//! over 16 lanes before they recognise vectors. Only powers use another function. It is exact to a
+//! millionth for exponents up to OpenGL's 128.
 
 use super::LightingSetup;
 use super::powers::powers;

@@ -1,4 +1,4 @@
-//! Powers for highlights, as loops over lanes: `powf` is a call for each.
+//! Computes powers for highlights as loops over lanes. `powf` would be one call per lane.
 
 use fearless_simd::{Simd, SimdBase, SimdNarrow, SimdWiden, f32x16, f64x8};
 use rt_core::ray::LANES;

@@ -1,4 +1,4 @@
-//! All vertices of a small mesh, lit once: [`LightingSetup::vertex`] for 16 at a time.
+//! Lights all vertices of a small mesh once: [`LightingSetup::vertex`] for 16 at a time.
 
 use super::gouraud::{self, F, ZERO};
 use super::{LightingSetup, VertexColors};
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rt_core::glam::Vec3;
 use rt_core::ray::LANES;
 
-/// Vertices that a thread takes at once.
+/// The number of vertices that a thread takes at once.
 const SHARE: usize = 64 * LANES;
 
 impl LightingSetup<'_> {

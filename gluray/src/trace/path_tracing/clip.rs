@@ -1,9 +1,9 @@
-//! The part of a mesh above a plane (Sutherland and Hodgman 1974), with its attributes.
+//! Clips a mesh to the part above a plane (Sutherland and Hodgman 1974), with its attributes.
 
 use rt_core::glam::{Vec2, Vec3};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 
-/// What is left of `mesh` where `plane` · (x, y, z, 1) is not negative.
+/// The part of `mesh` where `plane` · (x, y, z, 1) is not negative.
 pub(super) fn above(mesh: &TriMesh, plane: [f64; 4]) -> TriMesh {
     let height: Vec<f64> = mesh
         .positions
@@ -27,7 +27,8 @@ pub(super) fn above(mesh: &TriMesh, plane: [f64; 4]) -> TriMesh {
                 corners.push(a);
             }
             if (ha >= 0.0) != (hb >= 0.0) {
-                // From the higher end, so that both triangles of an edge get the same point.
+                // Interpolates from the higher end, so that both triangles of an edge get the same
+                // point.
                 let (p, q, hp, hq) = if ha >= 0.0 { (a, b, ha, hb) } else { (b, a, hb, ha) };
                 corners.push(out.between(p, q, (hp / (hp - hq)) as f32));
             }
@@ -55,7 +56,7 @@ fn push<T: Copy>(a: &mut Option<Attribute<T>>, p: u32, q: u32, mix: impl Fn(T, T
 }
 
 impl ClippedMesh {
-    /// A new vertex between two.
+    /// A new vertex between two others.
     fn between(&mut self, p: u32, q: u32, t: f32) -> u32 {
         let m = &mut self.mesh;
         let at = m.positions[p as usize].lerp(m.positions[q as usize], t);
@@ -80,7 +81,7 @@ mod tests {
     fn a_triangle_loses_a_corner_or_two_and_keeps_its_attributes() {
         let mut mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
         mesh.colors = Some(Attribute::per_vertex(vec![[0.0; 4], [1.0; 4], [0.0; 4]]));
-        // x <= 1/4: a quadrilateral is left.
+        // x <= 1/4 leaves a quadrilateral.
         let left = above(&mesh, [-1.0, 0.0, 0.0, 0.25]);
         assert_eq!(left.indices.len(), 2);
         let area = |m: &TriMesh| -> f32 {

@@ -1,4 +1,4 @@
-//! A draw as a mesh with attributes, its material and its place.
+//! Converts a draw into a scene instance: a mesh with attributes, a material and a transformation.
 
 use super::clip;
 use crate::capture::draw::{Shading, Values};
@@ -19,11 +19,11 @@ pub(super) struct DrawInstance {
     pub(super) mesh: TriMesh,
     pub(super) material: Material,
     pub(super) world_from_object: DAffine3,
-    /// Names the mesh's content.
+    /// The key of the mesh's content.
     pub(super) key: u128,
 }
 
-/// What a draw looks like, as far as the path tracer knows it.
+/// The appearance of a draw, as far as the path tracer models it.
 struct SurfaceAppearance {
     color: [f32; 3],
     colors: Option<Attribute<[f32; 4]>>,
@@ -31,7 +31,7 @@ struct SurfaceAppearance {
     normals: Option<Attribute<Vec3>>,
     emission: [f32; 3],
     opacity: f32,
-    /// Highlight colour, exponent, form; `None` for what no light changes.
+    /// The highlight's colour, exponent and form. `None` for a surface that no light changes.
     lit: Option<([f32; 3], f32, PhongForm)>,
     sides: Sides,
 }
@@ -47,7 +47,7 @@ fn warn(warnings: &mut Vec<String>, text: &str) {
     }
 }
 
-/// `None` for what a scene cannot have, with a word about it.
+/// Returns `None` for a draw that a scene cannot hold, with a message about it.
 pub(super) fn part(
     p: &Prepared<'_>,
     view: &View,
@@ -78,7 +78,7 @@ pub(super) fn part(
     };
     let mut mesh =
         TriMesh::new(p.draw.geometry.mesh.positions.clone(), p.draw.geometry.mesh.indices.clone());
-    // The outside is what OpenGL calls front.
+    // The outside of a surface is the side that OpenGL calls front.
     if (linear.determinant() < 0.0) ^ view.mirrored ^ !s.front_is_ccw {
         mesh.indices.iter_mut().for_each(|t| t.swap(0, 1));
     }
@@ -227,7 +227,7 @@ fn program(p: &Prepared<'_>) -> SurfaceAppearance {
     } else {
         program.ground(a, mesh, 0, [1.0, 0.0, 0.0])
     };
-    // VTK's normals have a matrix of their own; the scene has one for positions and normals.
+    // VTK has a separate matrix for normals. The scene has one for positions and normals.
     let to_object = p.normal_from_eye();
     let normals = program.eye_from_normal().map(|m| {
         let each = |i: usize| {

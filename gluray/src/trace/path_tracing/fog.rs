@@ -1,7 +1,7 @@
-//! OpenGL's fog over path-traced pictures: by the depth of the surface that a pixel sees, as on the
-//! traced colours of the other modes.
+//! Applies OpenGL's fog to path-traced images. As with the traced colours of the other modes, the
+//! fog depends on the depth of the surface visible at a pixel.
 //!
-//! What is seen in mirrors or through glass has the fog of the mirror or the glass.
+//! Surfaces seen in mirrors or through glass get the fog of the mirror or the glass.
 
 use crate::state::enums::*;
 use crate::state::snapshot::Fog;
@@ -10,7 +10,7 @@ use crate::trace::view::View;
 use crate::trace::whitted::ColorImage;
 use rt_core::glam::{DMat4, DVec4};
 
-/// How much of a surface is left at eye distance `d`.
+/// The share of a surface's colour that remains at eye distance `d`.
 pub(crate) fn factor(fog: &Fog, d: f32) -> f32 {
     let left = match fog.mode {
         EXP => (-fog.density * d).exp(),
@@ -20,7 +20,7 @@ pub(crate) fn factor(fog: &Fog, d: f32) -> f32 {
     if left.is_nan() { 0.0 } else { left.clamp(0.0, 1.0) }
 }
 
-/// Distances from the eye's plane of points of a view's window.
+/// Computes distances from the eye's plane for points in a view's window.
 struct Unprojection {
     eye_from_clip: DMat4,
     depth_range: [f64; 2],
@@ -35,8 +35,8 @@ impl Unprojection {
     }
 }
 
-/// Fog over what `surfaces`, the draws that have it, cover of a picture in which the nearest
-/// surfaces of all draws are at `all`.
+/// Applies fog to the part of an image that `surfaces`, the draws with fog, cover. `all` holds the
+/// nearest surfaces of all draws.
 pub(crate) fn over(
     colors: &mut ColorImage,
     view: &View,
@@ -58,14 +58,15 @@ pub(crate) fn over(
         };
         let ndc = view.ndc(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let left = factor(fog, eye.distance(ndc, depth));
-        // Premultiplied: where a silhouette covers half a pixel there is half of the fog.
+        // Colours are premultiplied: where a silhouette covers half a pixel, half of the fog
+        // applies.
         for k in 0..3 {
             c[k] = c[k] * left + fog.color[k].clamp(0.0, 1.0) * (1.0 - left) * c[3];
         }
     }
 }
 
-/// Depth at a pixel; where its centre has none, that of the nearest surface beside it.
+/// The depth at a pixel. Where its centre has none, the depth of the nearest adjacent surface.
 fn seen(layer: &Layer, x: i32, y: i32) -> Option<f32> {
     let at = |x: i32, y: i32| {
         let (x, y) = (x - layer.rect.x, y - layer.rect.y);
@@ -114,7 +115,8 @@ mod tests {
         let near = |a: [f32; 4], b: [f32; 4]| a.iter().zip(&b).all(|(x, y)| (x - y).abs() < 1e-3);
         assert!(near(colors.rgba[0], [0.55, 0.3, 0.425, 1.0]), "{:?}", colors.rgba[0]);
         assert_eq!(colors.rgba[2], [0.4, 0.4, 0.4, 1.0], "a nearer draw without fog");
-        // Beside it is a nearer surface without fog: whose half the pixel is nobody knows.
+        // The neighbour shows a nearer surface without fog, so it is unknown whose half the pixel
+        // is.
         assert_eq!(colors.rgba[1], [0.2, 0.2, 0.2, 0.5]);
     }
 }

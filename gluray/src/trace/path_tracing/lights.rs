@@ -1,4 +1,4 @@
-//! The program's lights as rt-core's, in eye space.
+//! Converts the program's lights to rt-core's lights in eye space.
 
 use crate::capture::draw::Shading;
 use crate::host::config::Settings;
@@ -59,20 +59,21 @@ fn of_opengl(l: &GlLight, radius_rad: f64, eye: Eye) -> Option<Light> {
             LightKind::Directional { to_light: DVec3::Z, angular_radius_rad }
         }
         LightKind::Point { radius, .. } => LightKind::Point { position: DVec3::ZERO, radius },
-        // The axis of a cone is given in eye space.
+        // The axis of a spotlight is given in eye space.
         _ => return Some(light),
     };
     Some(Light { kind, ..light }.in_camera_frame())
 }
 
-/// Lamps, and the radiance that comes from everywhere.
+/// The lamps, and the radiance that comes from all directions.
 pub(super) fn of(
     draws: &[Prepared<'_>],
     settings: &Settings,
     warnings: &mut Vec<String>,
 ) -> (Vec<Light>, [f32; 3]) {
     let radius_rad = settings.effects.light_radius_deg.to_radians();
-    // A scene has one set of lights, OpenGL's draws each their own: that of the largest lit draw.
+    // A scene has one set of lights, but each OpenGL draw has its own. The largest lit draw
+    // provides them.
     let mut lit: Vec<&Prepared<'_>> = draws
         .iter()
         .filter(|p| match &p.draw.shading {

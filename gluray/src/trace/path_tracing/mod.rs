@@ -1,8 +1,8 @@
-//! Mode `path`: rt-core's path tracer over the frame's draws, for publication.
+//! Mode `path`: renders the frame's draws with rt-core's path tracer, for publication.
 //!
-//! Each view becomes a scene in eye space. The first picture of something still has all samples
-//! that are set; a program that draws the same again gets the mean of all pictures so far, so a
-//! window left alone becomes smoother. Equal runs give equal pictures.
+//! Each view becomes a scene in eye space. The first image of a scene already has all the samples
+//! that the settings ask for. When a program draws the same content again, it gets the mean of all
+//! images so far, so an idle window becomes smoother. Equal runs give equal images.
 
 mod clip;
 mod draw_instance;
@@ -26,22 +26,22 @@ use rt_core::scene::{Appearance, Scene};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Least samples a pixel: fewer are noise.
+/// The smallest number of samples per pixel. Fewer give only noise.
 const LEAST_SAMPLES: u32 = 16;
-/// Samples after which a picture that does not change is left as it is.
+/// The number of samples after which an unchanged image is final.
 const MOST_SAMPLES: u32 = 1 << 16;
 
-/// What is kept between frames.
+/// State that is kept between frames.
 #[derive(Default)]
 pub(crate) struct PathTracer {
-    /// The world of each view, whose structures serve the next.
+    /// The world of each view. The next frame reuses its acceleration structures.
     worlds: HashMap<usize, Arc<World>>,
-    /// Meshes with their attributes by content, and whether the present frame has them.
+    /// Meshes with their attributes by content, and whether the current frame uses them.
     meshes: HashMap<u128, (Arc<TriMesh>, bool)>,
     progressive: HashMap<usize, ProgressiveImage>,
 }
 
-/// The mean of a view's pictures since it changed last.
+/// The mean of a view's images since its last change.
 struct ProgressiveImage {
     key: u128,
     samples: u32,
@@ -60,7 +60,7 @@ fn stats(r: &RayStats) -> Vec<(&'static str, u64)> {
 }
 
 impl PathTracer {
-    /// The picture of view number `number`.
+    /// The image of view `number`.
     pub(crate) fn colors(
         &mut self,
         draws: &[Prepared<'_>],
@@ -98,7 +98,7 @@ impl PathTracer {
             return ColorImage { rect, rgba, rays: Vec::new(), warnings };
         }
         let done = before.as_ref().map_or(0, |s| s.samples);
-        // Another seed for every picture of the same, so that their mean gets better.
+        // Each image of the same content uses another seed, so that the mean converges.
         let picture = u64::from(done / samples);
         let fresh = crate::cluster::paths(self, draws, view, number, rect, settings, picture);
         warnings.extend(fresh.warnings);
@@ -117,8 +117,8 @@ impl PathTracer {
         ColorImage { rect, rgba: mean, rays: fresh.rays, warnings }
     }
 
-    /// The rows of a share of the picture with number `picture` of a view that rests. `rect` is
-    /// within the viewport.
+    /// The rows of a row share in image number `picture` of an unchanged view. `rect` lies within
+    /// the viewport.
     #[expect(clippy::too_many_arguments, reason = "what helpers are told, one by one")]
     pub(crate) fn picture(
         &mut self,
@@ -147,7 +147,8 @@ impl PathTracer {
         let (w, h) = (rect.w as usize, rect.h as usize);
         let mut rgba = vec![[0.0; 4]; w * h];
         let mut rays: Vec<(&'static str, u64)> = Vec::new();
-        // One band of rows after the other; all at once where all are ours.
+        // Renders one band of rows after the other, or all rows at once when the share is the whole
+        // image.
         let whole = std::iter::once(0..w * h).filter(|_| share == RowShare::WHOLE);
         for part in whole.chain(share.pixels(w, h).filter(|_| share != RowShare::WHOLE)) {
             let (first, rows) = (part.start / w, part.len() / w);
@@ -233,13 +234,13 @@ impl PathTracer {
         Ok((scene, hash(&[&keys])))
     }
 
-    /// Forgets what the last frame did not have.
+    /// Drops everything that the last frame did not use.
     pub(crate) fn frame_done(&mut self) {
         self.meshes.retain(|_, (_, used)| std::mem::take(used));
     }
 }
 
-/// The view's camera, with the lens that is set.
+/// The view's camera, with the lens of the settings.
 fn camera(
     draws: &[Prepared<'_>],
     view: &View,

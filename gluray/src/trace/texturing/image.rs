@@ -1,4 +1,4 @@
-//! Images of textures, read from the driver level by level and kept as it stores them.
+//! Reads texture images from the driver, level by level, and keeps them in the driver's format.
 
 use super::sampling::{Filters, Mip};
 use crate::cluster::codec::{MalformedMessage, Reader, Wire, put_pods};
@@ -8,7 +8,7 @@ use rt_core::texture::{Filter, Texture, Wrap};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// What a texture's components stand for.
+/// The meaning of a texture's components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BaseFormat {
     Alpha,
@@ -22,10 +22,10 @@ pub(crate) enum BaseFormat {
 /// Texels, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Texels {
-    /// Eight bits a component, as most textures have: a quarter of the memory, and read from the
-    /// driver by copying.
+    /// Eight bits per component, as in most textures. It needs a quarter of the memory, and reading
+    /// from the driver is a copy.
     Bytes(Vec<[u8; 4]>),
-    /// What has other sizes.
+    /// Components of other sizes.
     Floats(Vec<[f32; 4]>),
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct Level {
     pub(crate) texels: Texels,
 }
 
-/// A texture: its base level and, with mipmaps, those that follow.
+/// A texture: its base level and, with mipmaps, the levels after it.
 #[derive(Debug, Clone)]
 pub(crate) struct Image {
     /// Never empty.
@@ -123,8 +123,8 @@ impl Wire for Image {
     }
 }
 
-/// What components stand for, from the sizes of red, green, blue, alpha, luminance and intensity:
-/// formats are too many to know all by name.
+/// The meaning of the components, from the sizes of red, green, blue, alpha, luminance and
+/// intensity. There are too many formats to list them by name.
 fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> BaseFormat {
     match (red > 0, alpha > 0, luminance > 0, intensity > 0) {
         (_, _, _, true) => BaseFormat::Intensity,
@@ -136,26 +136,26 @@ fn base_of([red, _, _, alpha, luminance, intensity]: [i32; 6]) -> BaseFormat {
     }
 }
 
-/// The version at which a texture was read, and what it was.
+/// The version at which a texture was read, and its image.
 type VersionedImage = (u64, Option<Arc<Image>>);
 
-/// Images by texture name, with the version they were read at.
+/// Images by texture name, with the version at which they were read.
 #[derive(Default)]
 pub(crate) struct Images {
     images: HashMap<(u32, u32), VersionedImage>,
-    /// Memory of an image that has gone: programs that replace a texture in each frame replace it
-    /// by one of its size.
+    /// The memory of a dropped image. A program that replaces a texture in each frame uses the same
+    /// size again.
     spare: Vec<[u8; 4]>,
-    /// How many were read from the driver.
+    /// The number of images read from the driver.
     pub(crate) read: u64,
 }
 
 impl Images {
-    /// The image of a texture; `None` when it is incomplete (then OpenGL leaves texturing out) or
-    /// cannot be followed.
+    /// The image of a texture. `None` when it is incomplete (OpenGL then disables texturing) or
+    /// cannot be reproduced.
     ///
-    /// Nothing is read before something is drawn with it. Images of earlier versions can never be
-    /// asked for again and go at once, so that no more are held than the program has.
+    /// A texture is read only when something is drawn with it. Images of earlier versions can never
+    /// be needed again and are dropped at once, so no more are held than the program has.
     pub(crate) fn get(&mut self, target: u32, name: u32, version: u64) -> Option<Arc<Image>> {
         if let Some((v, image)) = self.images.get(&(target, name))
             && *v == version
@@ -180,7 +180,7 @@ impl Images {
     }
 }
 
-/// Reads a texture by its name: what is bound may be another by now.
+/// Reads a texture by its name. Another texture may be bound by now.
 fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let bound =
         gl::word(if target == TEXTURE_1D { TEXTURE_BINDING_1D } else { TEXTURE_BINDING_2D });
@@ -214,8 +214,8 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
     let format = of_level(first, TEXTURE_INTERNAL_FORMAT).cast_unsigned();
     let filters =
         Filters::query(target, parameter(TEXTURE_MIN_FILTER), parameter(TEXTURE_MAG_FILTER));
-    // Complete means: all levels are there down to one texel or the last that is allowed, in one
-    // format.
+    // A texture is complete when all levels exist, in one format, down to one texel or to the last
+    // allowed level.
     let smallest = first + width.max(height).ilog2().cast_signed();
     let last = match filters.mip {
         Mip::None => first,
@@ -231,11 +231,11 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
     if !is_complete {
         return None;
     }
-    // Signed components have other steps.
+    // Signed components have other quantisation steps.
     let signed = matches!(format, 0x8f90..=0x8f9b | 0x9010..=0x901b);
     let sizes = COMPONENT_SIZES.map(|what| of_level(first, what));
     let whole = !signed && sizes.iter().all(|bits| matches!(bits, 0 | 8));
-    // Decoded before they are filtered, as the driver does.
+    // Decoded before filtering, as in the driver.
     let encoded =
         matches!(format, 0x8c40..=0x8c4f) && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
     let levels = (first..=last).map(|n| {
@@ -253,7 +253,7 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
     });
     let levels: Vec<Level> = levels.collect();
     if levels.iter().any(|l| l.texels.len() != l.width * l.height) {
-        // Another thread has given it another size meanwhile.
+        // Another thread has resized the texture in the meantime.
         return None;
     }
     Some(Image {
@@ -268,7 +268,7 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
     })
 }
 
-/// A component of sRGB, linear (OpenGL 4.6, equation 8.17).
+/// The linear value of an sRGB component (OpenGL 4.6, equation 8.17).
 fn decoded(v: f32) -> f32 {
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
@@ -307,7 +307,7 @@ impl Image {
         matches!(self.base, BaseFormat::Rgb | BaseFormat::Rgba)
     }
 
-    /// True when no texel lets anything through.
+    /// True when every texel is opaque.
     pub(crate) fn is_opaque(&self) -> bool {
         let opaque = |l: &Level| match &l.texels {
             Texels::Bytes(v) => v.iter().all(|t| t[3] == 255),
@@ -317,8 +317,8 @@ impl Image {
             && (self.wrap != [CLAMP_TO_BORDER; 2] || self.border[3] == 1.0)
     }
 
-    /// The picture as a texture of rt-core's, with what its components stand for; `None` when it
-    /// cannot be one.
+    /// The image as an rt-core texture, with the meaning of its components. `None` when it cannot
+    /// be converted.
     pub(crate) fn as_texture(&self) -> Option<Texture> {
         let rgba = |t: [f32; 4]| match self.base {
             BaseFormat::Alpha => [1.0, 1.0, 1.0, t[3]],

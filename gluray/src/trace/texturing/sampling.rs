@@ -1,33 +1,33 @@
-//! Texels at a fragment: wrapping, filters, and the choice among mipmaps.
+//! Samples textures at a fragment: wrapping, filters and the choice among mipmap levels.
 //!
 //! The footprint of a pixel is the longer of the two derivatives (compatibility profile
-//! specification, equation 8.7), taken as llvmpipe takes them: the differences within each two by
-//! two pixels.
+//! specification, equation 8.7). Derivatives are computed as in llvmpipe: differences within each
+//! quad of two by two pixels.
 
 use super::image::{Image, Level};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
-/// How levels are chosen.
+/// How mipmap levels are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mip {
-    /// The base level alone.
+    /// Only the base level.
     None,
-    /// The nearest.
+    /// The nearest level.
     Nearest,
-    /// Two, blended.
+    /// Two levels, blended.
     Linear,
 }
 
-/// Filters of a texture.
+/// The filters of a texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Filters {
     pub(super) mag_linear: bool,
     pub(super) min_linear: bool,
     pub(super) mip: Mip,
-    /// Added to the level of detail.
+    /// The bias that is added to the level of detail.
     pub(super) bias: f32,
-    /// Its limits.
+    /// The limits of the level of detail.
     pub(super) lod: [f32; 2],
 }
 
@@ -41,8 +41,8 @@ const TEXTURE_LOD_BIAS: u32 = 0x8501;
 /// The driver's limit for levels of detail that it does not look at.
 const DEEPEST: f32 = 14.0;
 
-/// A logarithm as llvmpipe has it: of the square, from one power of two to the next along a
-/// straight line, so up to 0.043 too small.
+/// The logarithm as llvmpipe computes it: of the square, interpolated linearly between powers of
+/// two. It is up to 0.043 too small.
 fn log2(rho: f32) -> f32 {
     let square = rho * rho;
     let whole = square.log2().floor();
@@ -71,12 +71,12 @@ impl Filters {
         }
     }
 
-    /// What a footprint of `rho` texels means: whether the texture is made smaller, the level, and
+    /// The effect of a footprint of `rho` texels: whether the texture is minified, the level, and
     /// the share of the level after it.
     fn choose(&self, rho: f32, last: usize) -> (bool, usize, f32) {
         let [least, most] = [self.lod[0].max(0.0), self.lod[1]];
         let plain = self.bias == 0.0 && least == 0.0 && most >= DEEPEST;
-        // As the driver adjusts it, and only where there is something to adjust.
+        // As the driver adjusts it, and only where an adjustment applies.
         let lod = (log2(rho) + self.bias).max(least).min(most.max(least));
         let smaller = if plain { rho > 1.0 } else { lod > 0.0 };
         let level = match self.mip {
@@ -86,7 +86,7 @@ impl Filters {
             Mip::Linear => lod.floor(),
         };
         let share = if self.mip == Mip::Linear { lod - level } else { 0.0 };
-        // Also where the footprint is no number.
+        // A footprint that is not a number also ends here.
         let inside = level >= 0.0;
         match level as usize {
             _ if !inside => (smaller, 0, 0.0),
@@ -97,12 +97,12 @@ impl Filters {
 }
 
 impl Image {
-    /// True when the footprint of a pixel decides what is sampled.
+    /// True when the footprint of a pixel affects sampling.
     pub(crate) fn needs_footprint(&self) -> bool {
         self.filters.mip != Mip::None || self.filters.min_linear != self.filters.mag_linear
     }
 
-    /// Texels of the base level across and up.
+    /// The width and height of the base level in texels.
     pub(crate) fn size(&self) -> [f32; 2] {
         [self.levels[0].width as f32, self.levels[0].height as f32]
     }
