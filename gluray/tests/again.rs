@@ -1,5 +1,5 @@
-//! Frames that come again: the picture is shown once more without rays as long as nothing has
-//! changed, and never longer.
+//! Frame reuse: an unchanged frame shows the earlier image without new rays, and a changed one
+//! never does.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! The subcommands that need no OpenGL, as a shell sees them.
+//! The subcommands that need no OpenGL, run as from a shell.
 
 use gluray::export::{Object, Scene, write_scene};
 use gluray::panel::ObjectInfo;

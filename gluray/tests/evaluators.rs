@@ -1,5 +1,5 @@
-//! Surfaces and curves of OpenGL's evaluators, one small program each: the driver's picture, and
-//! traced where it can be.
+//! Surfaces and curves of OpenGL's evaluators, one small program each. The image must be the
+//! driver's, traced where possible.
 
 mod common;
 

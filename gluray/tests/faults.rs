@@ -1,5 +1,5 @@
-//! A fault of ours at every function that programs can call: the program gets the driver's picture,
-//! and its errors.
+//! Injects a fault of the library at every function that programs can call. The program must get
+//! the driver's image and errors.
 
 mod common;
 

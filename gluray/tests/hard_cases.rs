@@ -1,4 +1,4 @@
-//! One small program per hard case, natively and through us: colour and depth must agree.
+//! One small program per hard case, run natively and through gluray. Colour and depth must agree.
 
 mod common;
 

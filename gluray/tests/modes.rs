@@ -1,4 +1,4 @@
-//! What the modes beyond `match` change about a picture, by programs whose right pictures are
+//! The changes that the modes beyond `match` make to an image, in programs whose correct images are
 //! known.
 
 mod common;

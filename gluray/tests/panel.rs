@@ -1,4 +1,4 @@
-//! `gluray panel` as programs, the page and strangers talk to it.
+//! `gluray panel`, as programs, the page and unauthenticated clients talk to it.
 #![cfg(feature = "panel")]
 
 mod panel_common;

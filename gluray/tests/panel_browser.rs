@@ -1,4 +1,4 @@
-//! The panel's page in a real browser, with a program that speaks the link.
+//! The panel's page in a real browser, with a program that uses the link.
 //!
 //! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes,
 //! unless RTSV_REQUIRE_PEERS is set.

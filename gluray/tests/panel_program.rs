@@ -1,5 +1,5 @@
-//! The panel with a real OpenGL program: glxgears under Xvfb, switched off and on while it runs,
-//! its scene taken out.
+//! The panel with a real OpenGL program. glxgears runs under Xvfb, tracing is switched off and on,
+//! and the scene is exported.
 #![cfg(feature = "panel")]
 
 mod common;

@@ -1,5 +1,5 @@
-//! Conformance tests of others (piglit) in `match` mode: what passes natively passes through us,
-//! and is traced where it draws filled primitives.
+//! Piglit's conformance tests in `match` mode. A test that passes natively must pass through
+//! gluray, and must be traced where it draws filled primitives.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! Real programs, natively and through us: in `match` mode the pictures must be the driver's.
+//! Real programs, natively and through gluray. In `match` mode the images must be the driver's.
 
 mod common;
 

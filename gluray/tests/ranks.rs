@@ -1,5 +1,5 @@
-//! Ray-parallel mode in real programs: the same picture whatever the number of processes, and also
-//! when helpers go.
+//! Ray-parallel mode in real programs: the image does not depend on the number of processes, even
+//! when helpers are lost.
 
 mod common;
 

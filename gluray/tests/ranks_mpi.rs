@@ -1,5 +1,5 @@
-//! Helpers that are an MPI job, of Open MPI and of MPICH: the same picture, also when the job is
-//! killed. The program is no rank of it.
+//! Helpers that run as an MPI job, under Open MPI and MPICH. The image stays the same, even when
+//! the job is killed. The program itself is not a rank of the job.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! xscreensaver's hacks, a zoo of fixed function: each draws the driver's picture, by rays or
-//! through us.
+//! xscreensaver's hacks, which use many kinds of fixed function. Each must give the driver's image,
+//! traced or passed through.
 
 mod common;
 

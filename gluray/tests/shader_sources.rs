@@ -1,5 +1,5 @@
-//! The sources that VTK 9.1, 9.2 and today's write for surfaces are known, and what scripts have
-//! made of them is not.
+//! The surface shaders of VTK 9.1, 9.2 and the current version are recognised. Shaders that scripts
+//! have changed are not.
 
 mod common;
 

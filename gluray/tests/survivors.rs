@@ -1,4 +1,4 @@
-//! What outlives `gluray run`.
+//! Processes that outlive `gluray run`.
 
 mod common;
 

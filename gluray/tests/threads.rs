@@ -1,5 +1,5 @@
-//! Programs with several threads: each has its own context or none, and sees what others write to
-//! textures.
+//! Programs with several threads. Each thread has its own context or none, and sees what other
+//! threads write to textures.
 
 mod common;
 

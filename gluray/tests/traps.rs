@@ -1,5 +1,5 @@
-//! What programs of all kinds turned out to do, one small program each: the driver's picture, and
-//! traced where it can be.
+//! Unusual behaviour found in real programs, one small program each. The image must be the
+//! driver's, traced where possible.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! The driver behind us is the one that GLVND would have taken: a vendor of our own making tells
-//! whether it was asked.
+//! The driver that gluray loads is the one that GLVND would have chosen. A fake vendor library
+//! records whether it was called.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! The helpers of `gluray run --ranks N`: started before the program, ended after it.
+//! Starts the helpers of `gluray run --ranks N` before the program, and ends them after it.
 
 use crate::cluster::SOCKETS;
 use crate::host::config::environment::variable_of;

@@ -1,4 +1,4 @@
-//! The command line: what was typed becomes a call of the library.
+//! The command line: parses the arguments and calls the library.
 
 mod doctor;
 mod explain;

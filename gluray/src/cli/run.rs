@@ -1,4 +1,4 @@
-//! `gluray run`: the environment for the library, the program, and the account of what happened.
+//! `gluray run`: sets the environment for the library, runs the program and reports what happened.
 
 use super::helpers::Helpers;
 use super::vendor::VendorFolder;

@@ -1,11 +1,10 @@
-//! The folder in which GLVND finds us: names of vendor libraries that lead to our library, and
-//! EGL's description of it.
+//! The folder in which GLVND finds this library: links with the names of vendor libraries that
+//! point to it, and its JSON description for EGL.
 //!
-//! It is the same for all runs with the same library and is never removed: a child of the program
-//! may live on after `gluray run` has ended, with variables that name the folder, and must find a
-//! vendor there when it first uses OpenGL. So it lies where the user's files of running programs
-//! lie, and only the user may write to it and to what it lies in, because programs load code from
-//! there.
+//! The folder is the same for all runs with the same library and is never removed. A child of the
+//! program may outlive `gluray run` with variables that name the folder, and must find a vendor
+//! there when it first uses OpenGL. The folder therefore lies with the user's runtime files. Only
+//! the user may write to it and to its parents, because programs load code from there.
 
 use crate::host::folders;
 use anyhow::{Context as _, bail};

@@ -1,19 +1,19 @@
-//! Values as bytes and back, bit by bit: colours and depths must not change on the way, and what
-//! comes is believed only when it is whole.
+//! Encodes values as bytes and decodes them bit by bit. Colours and depths must not change in
+//! transit, and a message is accepted only when it is complete.
 
 use bytemuck::Pod;
 
-/// A message that is none of ours.
+/// A malformed message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("byte {at}: {what}")]
 pub(crate) struct MalformedMessage {
-    /// Where reading stopped.
+    /// The offset at which reading stopped.
     pub(crate) at: usize,
     /// What was wrong.
     pub(crate) what: String,
 }
 
-/// A message that is being read.
+/// A message that is being decoded.
 pub(crate) struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -46,7 +46,7 @@ impl<'a> Reader<'a> {
         Ok(out)
     }
 
-    /// Nothing may come after the last value.
+    /// Checks that nothing follows the last value.
     pub(crate) fn end(&self) -> Result<(), MalformedMessage> {
         match self.bytes.len() - self.at {
             0 => Ok(()),
@@ -61,7 +61,7 @@ pub(crate) fn put_pods<T: Pod>(out: &mut Vec<u8>, values: &[T]) {
     out.extend_from_slice(bytemuck::cast_slice(values));
 }
 
-/// What can be sent.
+/// A type that can be sent.
 pub(crate) trait Wire: Sized {
     /// Appends the bytes.
     fn put(&self, out: &mut Vec<u8>);
@@ -129,7 +129,7 @@ impl<T: Wire> Wire for Vec<T> {
     }
     fn get(from: &mut Reader<'_>) -> Result<Self, MalformedMessage> {
         let n = usize::get(from)?;
-        // Whoever says that there are more values than bytes is not made room for.
+        // No memory is reserved when a message claims more values than it has bytes.
         if n > from.bytes.len() - from.at {
             return Err(
                 from.fault(format!("a list of {n} values in {} bytes", from.bytes.len() - from.at))
@@ -168,7 +168,7 @@ impl Wire for String {
     }
 }
 
-/// Sends a struct field by field; all of its fields have to be named.
+/// Encodes a struct field by field. All of its fields must be named.
 macro_rules! wire_struct {
     ($t:ident { $($field:ident),* $(,)? }) => {
         impl $crate::cluster::codec::Wire for $t {
@@ -185,7 +185,7 @@ macro_rules! wire_struct {
 }
 pub(crate) use wire_struct;
 
-/// Sends an enum without content as its place in a list.
+/// Encodes a fieldless enum as its index in a list.
 macro_rules! wire_enum {
     ($t:ident { $($variant:ident),* $(,)? }) => {
         impl $crate::cluster::codec::Wire for $t {
@@ -207,7 +207,7 @@ macro_rules! wire_enum {
 }
 pub(crate) use wire_enum;
 
-/// Bytes of a value.
+/// The bytes of a value.
 pub(crate) fn bytes_of<T: Wire>(value: &T) -> Vec<u8> {
     let mut out = Vec::new();
     value.put(&mut out);

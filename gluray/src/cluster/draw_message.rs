@@ -1,5 +1,5 @@
-//! Draws as messages. What is large (shapes, attributes, images) goes by name, and its content
-//! once.
+//! Encodes draws as messages. Large content (shapes, attributes, images) is sent once and then
+//! referred to by its identifier.
 
 use super::codec::{MalformedMessage, Reader, Wire, bytes_of, put_pods, wire_enum, wire_struct};
 use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
@@ -170,7 +170,7 @@ impl Wire for Attributes {
     }
 }
 
-/// Names attributes by their content.
+/// Identifies attributes by their content.
 pub(super) fn name_of_attributes(a: &Attributes) -> u128 {
     fn part<const N: usize>(v: &Values<N>) -> (Vec<u8>, &[u8])
     where
@@ -190,13 +190,12 @@ pub(super) fn name_of_attributes(a: &Attributes) -> u128 {
     hash(&all)
 }
 
-/// Names an image by its content.
+/// Identifies an image by its content.
 pub(super) fn name_of_image(image: &Image) -> u128 {
     hash(&[b"image", &bytes_of(image)])
 }
 
-/// The images of a draw's program: with which it maps values to colours, and which it puts on
-/// surfaces.
+/// The images of a draw's program: its colour map, and the texture on its surfaces.
 pub(super) fn images_of(draw: &Draw) -> [Option<&Arc<Image>>; 2] {
     match &draw.shading {
         Shading::Fixed => [None; 2],
@@ -204,7 +203,7 @@ pub(super) fn images_of(draw: &Draw) -> [Option<&Arc<Image>>; 2] {
     }
 }
 
-/// A draw, with the names of what is large.
+/// A draw, with the identifiers of its large content.
 pub(super) struct DrawMessage {
     pub(super) geometry: u128,
     pub(super) attributes: u128,
@@ -227,7 +226,7 @@ wire_struct!(DrawMessage {
 });
 
 impl DrawMessage {
-    /// Refuses what the tracer could not bear.
+    /// Rejects values that the tracer cannot handle.
     pub(super) fn check(&self, from: &Reader<'_>) -> Result<(), MalformedMessage> {
         const FAR: i32 = 1 << 24;
         let s = &self.state;

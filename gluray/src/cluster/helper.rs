@@ -1,4 +1,4 @@
-//! A helper's life: it keeps what it was told of the scene, and makes the rows it is asked for.
+//! A helper: it keeps the scene that it received and renders the requested rows.
 
 use super::draw_message::DrawMessage;
 use super::requests::{
@@ -23,20 +23,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// How often somebody who waits for work looks whether it is over.
+/// How often an idle helper checks whether it should stop.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// Most pixels of the rectangle around all views of a picture: no driver's framebuffer is larger
-/// than 16384 x 16384.
+/// The largest number of pixels in the bounding rectangle of all views of an image. No driver's
+/// framebuffer is larger than 16384 x 16384.
 const MOST_BETWEEN: i64 = 1 << 28;
 
-/// The scene as far as a program has told it, and what is made of it.
+/// The scene as received from a program, and the structures built from it.
 #[derive(Default)]
 pub(super) struct Helper {
     geometries: HashMap<u128, Arc<Geometry>>,
     attributes: HashMap<u128, Arc<Attributes>>,
     images: HashMap<u128, Arc<Image>>,
-    /// Builds better structures for what rests.
+    /// Builds better structures for geometry at rest.
     cache: GeometryCache,
     path_tracer: PathTracer,
 }
@@ -76,7 +76,7 @@ fn error_reply(number: u64, text: String) -> Vec<u8> {
 }
 
 impl Helper {
-    /// The answer to an order, whatever that is.
+    /// The reply to a request, even a malformed one.
     pub(super) fn answer(&mut self, order: &[u8]) -> Vec<u8> {
         let order = match TraceRequest::read(order) {
             Ok(order) => order,
@@ -116,8 +116,8 @@ impl Helper {
         (cost.builds, cost.refits) = (structures.built, structures.refitted);
         let (area, rows, warnings) = match order.work {
             Work::Nearest => {
-                // Views that are small each may lie so far apart that no memory holds all between
-                // them.
+                // Small views may lie so far apart that the rectangle around them does not fit into
+                // memory.
                 let Rect { x, y, w, h } = ready.iter().fold(Rect::default(), |r, p| r.or(p.rect));
                 if pixels(w, h) > MOST_BETWEEN {
                     return Err(format!("a picture of {w} x {h} pixels at ({x}, {y})"));
@@ -223,7 +223,7 @@ fn colors(colors: &whitted::ColorImage, share: RowShare, cost: &mut TraceCost) -
     rows
 }
 
-/// The first rank's settings, but for the number of threads, which is this process' own.
+/// The first rank's settings, but with this process's own number of threads.
 fn with_own_thread_count(settings: Settings) -> Settings {
     let now = config::current();
     let settings = Settings { threads: now.settings.threads, ..settings };

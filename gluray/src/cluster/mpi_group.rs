@@ -1,9 +1,9 @@
-//! Helpers that are an MPI job: the first of them stands between programs, which know sockets
-//! alone, and the others, who may be on other machines.
+//! Helpers that run as an MPI job. The job's first rank mediates between programs, which use only
+//! sockets, and the other ranks, which may run on other machines.
 //!
-//! There is a socket for each rank, so that a program finds as many helpers as the job has ranks,
-//! and loses one when one is lost. Orders and answers are handed on as they are. The program itself
-//! is no rank of the job.
+//! There is one socket per rank. A program therefore finds as many helpers as the job has ranks,
+//! and loses one helper when one rank is lost. Requests and replies are forwarded unchanged. The
+//! program itself is not a rank of the job.
 
 use super::helper::Helper;
 use super::requests::{MAX_REQUEST_BYTES, REPLY, REQUEST};
@@ -16,29 +16,29 @@ use std::os::unix::net::UnixListener;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// What goes before every message: its kind, whose it is, and how long it is.
+/// The tag of the header before every message: its kind, its program, and its length.
 const HEADER: u32 = 10;
-/// The message itself.
+/// The tag of the message itself.
 const BODY: u32 = 11;
 const HEADER_BYTES: usize = 16;
 /// How long somebody who waits for work rests, and somebody whose work is under way.
 const IDLE_WAIT: Duration = Duration::from_millis(2);
 const BUSY_WAIT: Duration = Duration::from_micros(50);
-/// How long after work one stays awake.
+/// How long a rank keeps polling after work.
 const AWAKE: Duration = Duration::from_millis(300);
 
-/// What a message is about.
+/// The kind of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum MessageKind {
-    /// An order, or the answer to it.
+    /// A request, or the reply to it.
     Work,
-    /// The program is gone, or not served any longer.
+    /// The program is gone, or no longer served.
     Close,
     /// The job ends.
     End,
 }
 
-/// Announces a message of `length` bytes for or from a program.
+/// The header of a message of `length` bytes for or from a program.
 fn header(kind: MessageKind, program: u32, length: usize) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER_BYTES);
     out.extend((kind as u32).to_le_bytes());
@@ -47,7 +47,7 @@ fn header(kind: MessageKind, program: u32, length: usize) -> Vec<u8> {
     out
 }
 
-/// The parts of a head; `None` for what is none.
+/// The fields of a header. `None` when it is malformed.
 fn read_header(bytes: &[u8]) -> Option<(MessageKind, u32, usize)> {
     let bytes: &[u8; HEADER_BYTES] = bytes.try_into().ok()?;
     let word =
@@ -65,7 +65,7 @@ fn read_header(bytes: &[u8]) -> Option<(MessageKind, u32, usize)> {
 /// # Errors
 /// What ended the job other than its first rank's wish.
 pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Result<(), CommError> {
-    // Of each program what it has told.
+    // One helper state per program.
     let mut programs: HashMap<u32, Helper> = HashMap::new();
     let mut posted = vec![comm.post_recv(0, HEADER, HEADER_BYTES)?];
     let mut coming = None;
@@ -91,7 +91,7 @@ pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Res
                     programs.remove(&program);
                     posted.push(comm.post_recv(0, HEADER, HEADER_BYTES)?);
                 }
-                // The end, or what is no head: nothing can be understood from here on.
+                // The job ends, or the header is malformed. Nothing after it can be decoded.
                 Some((MessageKind::End, ..)) | None => return Ok(()),
             },
             (_, Some(program)) => {
@@ -105,7 +105,7 @@ pub(crate) fn serve_group(comm: &mut dyn Communicator, over: &AtomicBool) -> Res
         }
         comm.recycle(arrival.message);
     }
-    // So that programs do without this rank from now on.
+    // Tells programs to continue without this rank.
     match comm.send(0, HEADER, header(MessageKind::End, 0, 0)) {
         Err(CommError::PeerLost { .. }) => Ok(()),
         other => other,
@@ -118,13 +118,13 @@ struct ProgramConnection {
     program: u32,
     rank: usize,
     peer: Peer,
-    /// What is still to be written, from `written` on.
+    /// Data still to be written, from `written` on.
     out: Vec<u8>,
     written: usize,
 }
 
 impl ProgramConnection {
-    /// Writes what can be written without waiting; true when something was.
+    /// Writes as much as possible without blocking. Returns true when anything was written.
     fn write(&mut self) -> bool {
         let before = self.written;
         while self.written < self.out.len() && !self.peer.lost {
@@ -149,10 +149,10 @@ impl ProgramConnection {
     }
 }
 
-/// The first rank at work.
+/// The first rank of the job.
 struct JobCoordinator<'a> {
     comm: &'a mut dyn Communicator,
-    /// Where programs find rank i + 1; `None` once that is lost.
+    /// The socket at which programs find rank i + 1. `None` once that rank is lost.
     listeners: Vec<Option<UnixListener>>,
     connections: Vec<ProgramConnection>,
     posted: Vec<Receive>,
@@ -232,7 +232,7 @@ impl JobCoordinator<'_> {
         Ok(())
     }
 
-    /// Programs lose this rank now, and find it no more.
+    /// Disconnects programs from this rank and stops accepting new ones for it.
     fn lose(&mut self, rank: usize) {
         self.listeners[rank - 1] = None;
         self.posted.retain(|r| r.source != rank);
@@ -263,7 +263,7 @@ impl JobCoordinator<'_> {
     fn forward_requests(&mut self) -> Result<bool, CommError> {
         let mut requests = Vec::new();
         for line in &mut self.connections {
-            // What is no message ends the talk.
+            // A malformed message ends the connection.
             line.peer.lost |= !line.peer.read(MAX_REQUEST_BYTES);
             while let Some((tag, order)) = line.peer.mail.pop_front() {
                 if tag == REQUEST {
@@ -322,7 +322,7 @@ impl JobCoordinator<'_> {
         moved
     }
 
-    /// Programs that go.
+    /// Removes closed connections.
     fn remove_closed(&mut self) -> Result<(), CommError> {
         let gone: Vec<(usize, u32)> =
             self.connections.iter().filter(|l| l.peer.lost).map(|l| (l.rank, l.program)).collect();
@@ -334,8 +334,7 @@ impl JobCoordinator<'_> {
     }
 }
 
-/// Waits until a program says something, at most `time`: MPI cannot be waited for together with
-/// sockets.
+/// Waits for a message of a program, at most `time`. MPI and sockets cannot be waited for together.
 fn rest(connections: &[ProgramConnection], listeners: &[Option<UnixListener>], time: Duration) {
     let said = connections.iter().map(|l| {
         let more = if l.out.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT };

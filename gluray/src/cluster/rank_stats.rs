@@ -1,35 +1,35 @@
-//! What each rank did, for reports.
+//! Statistics of each rank, for reports.
 
 use serde::{Deserialize, Serialize};
 
-/// The account of one rank; 0 is the program itself.
+/// The statistics of one rank. Rank 0 is the program itself.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RankStats {
-    /// Its number.
+    /// The rank's number.
     pub rank: usize,
-    /// Pictures that it made a share of.
+    /// The number of images of which it rendered a share.
     pub pictures: u64,
-    /// Milliseconds in which it made them.
+    /// The time in milliseconds that rendering took.
     pub trace_ms: f64,
-    /// Rank 0 alone: milliseconds in which it waited for the others.
+    /// Only for rank 0: the time in milliseconds that it waited for the others.
     pub wait_ms: f64,
-    /// Bytes that it was sent: the scene, once.
+    /// Bytes sent to it: the scene, once.
     pub sent_bytes: u64,
-    /// Bytes that came back: rows.
+    /// Bytes received from it: rows.
     pub received_bytes: u64,
-    /// Acceleration structures that it built; rank 0's are those of the report's `builds` as well.
+    /// Acceleration structures that it built. Those of rank 0 are also in the report's `builds`.
     pub builds: u64,
-    /// Structures that it took over from where the triangles were before.
+    /// Acceleration structures that it refitted from earlier positions.
     pub refits: u64,
-    /// Rays that it traced, of all kinds.
+    /// Rays of all kinds that it traced.
     pub rays: u64,
     /// Why it was given up.
     pub lost: Option<String>,
 }
 
 impl RankStats {
-    /// Adds another process' account of the same rank.
+    /// Adds the statistics that another process has of the same rank.
     pub fn add(&mut self, other: &RankStats) {
         self.pictures += other.pictures;
         self.trace_ms += other.trace_ms;
@@ -45,7 +45,7 @@ impl RankStats {
     }
 }
 
-/// The accounts of all ranks.
+/// The statistics of all ranks.
 pub(crate) struct RankStatsTable(Vec<RankStats>);
 
 impl RankStatsTable {
@@ -61,7 +61,7 @@ impl RankStatsTable {
         &self.0
     }
 
-    /// A rank was given up.
+    /// Records that a rank was given up.
     pub(crate) fn lost(&mut self, rank: usize, why: &str) {
         self.0[rank].lost.get_or_insert_with(|| why.to_owned());
     }

@@ -1,4 +1,4 @@
-//! What the first rank asks of a helper, and what it gets.
+//! The requests of the first rank to a helper, and the replies.
 
 use super::codec::{MalformedMessage, Reader, Wire, put_pods, wire_struct};
 use super::draw_message::DrawMessage;
@@ -14,18 +14,18 @@ use rt_core::glam::Vec3;
 pub(crate) const REQUEST: u32 = 1;
 pub(crate) const REPLY: u32 = 2;
 
-/// Both ends have to be of one build: messages are memory as it is.
+/// Both ends must be of the same build, because messages are raw memory.
 const GREETING: &str = concat!("gluray ranks 2, version ", env!("CARGO_PKG_VERSION"));
-/// Written as a number, so that machines with the other order of bytes are found out.
+/// Sent as a number, so that a machine with another byte order is detected.
 const BYTE_ORDER: u32 = 0x0102_0304;
 
-/// The most bytes of an order: a scene of 300 million triangles.
+/// The largest request in bytes: a scene of 300 million triangles.
 pub(crate) const MAX_REQUEST_BYTES: usize = 1 << 34;
 
 /// Positions and triangles.
 type Shape = (Vec<Vec3>, Vec<[u32; 3]>);
 
-/// Content that a helper does not have.
+/// Content that a helper does not have yet.
 #[derive(Default)]
 pub(super) struct SceneUpdate {
     pub(super) geometries: Vec<(u128, Shape)>,
@@ -33,7 +33,7 @@ pub(super) struct SceneUpdate {
     pub(super) images: Vec<(u128, Image)>,
 }
 
-/// How eye space comes to the screen.
+/// How eye space is projected to the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ViewParameters {
     pub(crate) projection: [f64; 16],
@@ -43,14 +43,14 @@ pub(crate) struct ViewParameters {
 
 wire_struct!(ViewParameters { projection, viewport, rect });
 
-/// What is to be made.
+/// What to render.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Work {
-    /// The nearest surfaces: colours and depths.
+    /// The nearest surfaces, with colours and depths.
     Nearest,
-    /// Rays beyond them, with the colour behind everything.
+    /// Rays beyond the nearest surfaces, with the background colour.
     Whitted(ViewParameters, [f32; 3]),
-    /// Paths: the number of the view, and of the picture of it.
+    /// Path tracing: the number of the view, and of its image.
     Paths(ViewParameters, [u64; 2]),
 }
 
@@ -94,20 +94,20 @@ impl ViewParameters {
     }
 }
 
-/// Whether a rectangle is one of those that a program's first rank asks for: larger views are the
-/// driver's, so nobody need make room for what a peer says beyond them.
+/// True for a rectangle that a program's first rank may request. Larger views go to the driver, so
+/// no memory is reserved for larger sizes that a peer claims.
 pub(super) fn is_traced([x, y, w, h]: &[i32; 4]) -> bool {
     const FAR: i32 = 1 << 24;
     [x, y, w, h].iter().all(|v| (-FAR..=FAR).contains(*v)) && pixels(*w, *h) <= MOST_PIXELS.into()
 }
 
-/// Pixels of a rectangle; none where a side is negative.
+/// The number of pixels of a rectangle. Zero when a side is negative.
 pub(super) fn pixels(w: i32, h: i32) -> i64 {
     i64::from(w.max(0)) * i64::from(h.max(0))
 }
 
-/// One picture's order. News come first, so that an order that is refused later still leaves a
-/// helper with what it was told.
+/// The request for one image. Updates come first, so that a request that is refused later still
+/// leaves the helper with them.
 pub(super) struct TraceRequest {
     pub(super) number: u64,
     pub(super) forget: Vec<u128>,
@@ -118,7 +118,7 @@ pub(super) struct TraceRequest {
     pub(super) draws: Vec<DrawMessage>,
 }
 
-/// The beginning of an order: news are put behind it, and then the [`OrderEnd`].
+/// Writes the start of a request. Updates follow, then the [`OrderEnd`].
 pub(super) fn put_head(out: &mut Vec<u8>, number: u64, forget: &[u128]) {
     GREETING.to_owned().put(out);
     BYTE_ORDER.put(out);
@@ -180,7 +180,7 @@ impl TraceRequest {
     }
 }
 
-/// The end of an order.
+/// Writes the end of a request.
 pub(super) fn put_end(
     out: &mut Vec<u8>,
     settings: &str,
@@ -195,12 +195,12 @@ pub(super) fn put_end(
     draws.iter().for_each(|d| d.put(out));
 }
 
-/// What a share cost.
+/// The cost of a share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct TraceCost {
     /// Primary, shadow, ambient occlusion, reflection, refraction, transparency, path.
     pub(crate) rays: [u64; 7],
-    /// Structures built, and those taken over from where the triangles were before.
+    /// Acceleration structures built, and structures refitted from earlier positions.
     pub(crate) builds: u64,
     pub(crate) refits: u64,
     pub(crate) took_us: u64,
@@ -208,12 +208,12 @@ pub(crate) struct TraceCost {
 
 wire_struct!(TraceCost { rays, builds, refits, took_us });
 
-/// Kinds of rays in their order in a [`TraceCost`].
+/// The kinds of rays, in their order in a [`TraceCost`].
 pub(crate) const RAYS: [&str; 7] =
     ["primary", "shadow", "ambient occlusion", "reflection", "refraction", "transparency", "path"];
 
 impl TraceCost {
-    /// Counts rays of a kind.
+    /// Adds rays of a kind.
     pub(crate) fn add(&mut self, kind: &str, n: u64) {
         if let Some(at) = RAYS.iter().position(|k| *k == kind) {
             self.rays[at] += n;
@@ -221,7 +221,7 @@ impl TraceCost {
     }
 }
 
-/// The beginning of an answer; rows come behind it where it has no complaint.
+/// The start of a reply. Rows follow unless it reports an error.
 pub(super) struct ReplyHeader {
     pub(super) number: u64,
     pub(super) error_reply: Option<String>,

@@ -1,15 +1,15 @@
-//! Which rows of a picture are whose, and rows as messages: what is covered, without the pixels
-//! between.
+//! Assigns the rows of an image to ranks, and encodes rows as messages that leave out uncovered
+//! pixels.
 
 use super::codec::{MalformedMessage, Reader, put_pods};
 use bytemuck::Pod;
 
-/// Rows that go together: a row of the packets that rays are sent in, so that every rank sends the
-/// packets that one process would.
+/// The rows of a band: one row of ray packets. Every rank therefore traces the same packets that
+/// one process would.
 pub(crate) const BAND: usize = 16;
 
-/// The part of a picture that one rank makes: every `count`-th band from `index` on, so that
-/// everybody has a little of everything.
+/// The part of an image that one rank renders: every `count`-th band starting at `index`, which
+/// spreads the load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RowShare {
     pub(crate) index: u32,
@@ -19,15 +19,15 @@ pub(crate) struct RowShare {
 super::codec::wire_struct!(RowShare { index, count });
 
 impl RowShare {
-    /// All of it.
+    /// The whole image.
     pub(crate) const WHOLE: RowShare = RowShare { index: 0, count: 1 };
 
-    /// Whether a band belongs to it.
+    /// True when a band belongs to this share.
     pub(crate) fn has(self, band: usize) -> bool {
         band % self.count as usize == self.index as usize
     }
 
-    /// Its bands in a picture of `w` x `h` pixels, as ranges of pixels.
+    /// The bands of this share in an image of `w` x `h` pixels, as ranges of pixels.
     pub(crate) fn pixels(self, w: usize, h: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
         let bands = h.div_ceil(BAND);
         (0..bands)
@@ -36,7 +36,7 @@ impl RowShare {
     }
 }
 
-/// Pixels as they are sent: two layers, and which pixels there are at all.
+/// Encodes pixels: two layers, and which pixels are covered.
 pub(crate) fn put_rows<A: Pod, B: Pod>(
     out: &mut Vec<u8>,
     share: RowShare,
@@ -44,7 +44,7 @@ pub(crate) fn put_rows<A: Pod, B: Pod>(
     (a, b): (&[A], &[B]),
     there: impl Fn(usize) -> bool,
 ) {
-    // Lengths of what is left out and what is there, in turn.
+    // Lengths of uncovered and covered runs, alternating.
     let mut runs: Vec<u32> = Vec::new();
     let (mut first, mut second) = (Vec::new(), Vec::new());
     for range in share.pixels(w, h) {
@@ -63,7 +63,8 @@ pub(crate) fn put_rows<A: Pod, B: Pod>(
     put_pods(out, &second);
 }
 
-/// Puts such rows into a picture; the number of pixels that came. A layer that is empty takes none.
+/// Decodes such rows into an image and returns the number of received pixels. An empty layer
+/// receives none.
 pub(crate) fn get_rows<A: Pod, B: Pod>(
     from: &mut Reader<'_>,
     share: RowShare,
@@ -105,9 +106,9 @@ fn copy<T: Pod>(to: &mut [T], begin: usize, from: &[T], done: usize, n: usize) -
     Some(())
 }
 
-/// The most bytes that the rows of a share can come to, with `pixel` bytes a pixel.
+/// The largest size in bytes of the rows of a share, with `pixel` bytes per pixel.
 pub(crate) fn most_bytes(share: RowShare, [w, h]: [usize; 2], pixel: usize) -> usize {
-    // Every second pixel covered is the worst: two numbers for each of them.
+    // The worst case covers every second pixel: two run lengths for each of them.
     share.pixels(w, h).map(|r| r.len() * (pixel + 4) + 16).sum::<usize>() + 64
 }
 

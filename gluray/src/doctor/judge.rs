@@ -1,4 +1,4 @@
-//! What was seen, judged.
+//! Derives findings from the inspected machine.
 
 use super::{Finding, Grade, Machine};
 

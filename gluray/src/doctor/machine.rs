@@ -1,5 +1,5 @@
-//! Looking around. Nothing is loaded into this process: `glxinfo`, if there is one, asks the driver
-//! in a process of its own.
+//! Inspects the machine. Nothing is loaded into this process. If `glxinfo` is installed, it queries
+//! the driver in a process of its own.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -1,7 +1,7 @@
-//! What there is to work with, and what will not work: everything `gluray doctor` says.
+//! Diagnoses the machine for `gluray doctor`: what is available, and what will not work.
 //!
-//! A [`Machine`] is what was seen (files, variables, the answer of `glxinfo`), plain data;
-//! [`findings`] judges it. So each judgement is tested without the machine that it is about.
+//! A [`Machine`] is plain data: files, variables and the output of `glxinfo`. [`findings`]
+//! evaluates it. Each finding can therefore be tested without the machine that causes it.
 
 mod judge;
 mod machine;

@@ -1,4 +1,4 @@
-//! Where files of the user's lie (XDG Base Directory Specification 0.8).
+//! Locates the user's files (XDG Base Directory Specification 0.8).
 
 use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! The user's side: settings, reports, timelines, the control panel and exported scenes.
+//! The parts that face the user: settings, reports, timelines, the control panel and exported
+//! scenes.
 
 pub mod config;
 pub mod export;

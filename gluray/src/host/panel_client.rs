@@ -1,7 +1,7 @@
-//! The library's side of the control panel. Once a frame it takes commands and sends telemetry.
+//! The library's side of the control panel. Once per frame it takes commands and sends telemetry.
 //!
-//! One link for the process, made when the first frame ends. Contexts take up new settings at the
-//! end of their own frame.
+//! The process has one link, created at the end of the first frame. Each context applies new
+//! settings at the end of its own frame.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::capture::geometry_cache::Geometry;

@@ -1,6 +1,6 @@
-//! What was traced, what was passed and why: a JSON file per process, rewritten once a second while
-//! frames come, because many programs end without running any of their exit handlers, and when a
-//! context or the program ends.
+//! Reports what was traced, what went to the driver, and why, in one JSON file per process. The
+//! file is rewritten once per second while frames arrive, because many programs end without running
+//! exit handlers. It is also written when a context or the program ends.
 
 use crate::host::timeline::SpanRecorder;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,9 @@
-//! Pictures that more than the nearest surface of each pixel goes into: mode `path`, and `rich`
+//! Draws images for which the nearest surface of each pixel is not enough: mode `path`, and `rich`
 //! with mirrors, glass, translucency, a lens or several samples.
 //!
-//! Depths stay those of the rasterizer's fragments, so that lines and text of the driver meet the
-//! same surfaces as in every mode; colours come premultiplied and are put over what is there.
+//! Depths are still those of the rasterizer's fragments, so that the driver's lines and text
+//! intersect the same surfaces as in every mode. Colours are premultiplied and composited over the
+//! framebuffer.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::capture::geometry_cache::BuildCounts;
@@ -24,7 +25,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
-/// Whether the mode may need such pictures.
+/// True when the mode may need such images.
 pub(crate) fn is_needed(settings: &Settings) -> bool {
     match settings.mode {
         Mode::Path | Mode::Rich => true,
@@ -33,13 +34,13 @@ pub(crate) fn is_needed(settings: &Settings) -> bool {
     }
 }
 
-/// Whether the mode's own rays smooth silhouettes as well as `samples` of a pixel do: then all
+/// True when the mode's own rays smooth silhouettes as well as `samples` per pixel do. Then all
 /// samples of a pixel get one colour.
 pub(crate) fn has_samples_for(settings: &Settings, samples: u32) -> bool {
     settings.mode == Mode::Path || is_needed(settings) && settings.samples > samples
 }
 
-/// The settings with at least `samples` rays through a pixel.
+/// The settings with at least `samples` rays per pixel.
 pub(crate) fn with_samples(settings: &Settings, samples: u32) -> Cow<'_, Settings> {
     match settings.samples < samples {
         true => Cow::Owned(Settings { samples, ..settings.clone() }),
@@ -47,28 +48,29 @@ pub(crate) fn with_samples(settings: &Settings, samples: u32) -> Cow<'_, Setting
     }
 }
 
-/// One view's part of a frame.
+/// The image of one view of a frame.
 enum ViewImage {
-    /// The nearest surfaces are all that is needed.
+    /// Only the nearest surfaces are needed.
     Surfaces(Layer, Vec<(&'static str, u64)>),
-    /// Colours over what is there, with the depths of what is opaque, and of all.
+    /// Colours to composite over the framebuffer, with the depths of opaque surfaces and of all
+    /// surfaces.
     Over { colors: ColorImage, opaque: Layer, all: Layer },
 }
 
-/// A colour as the framebuffer has it.
+/// A colour in the framebuffer's format.
 pub(crate) fn bytes(c: [f32; 4]) -> [u8; 4] {
     c.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
-/// Depths alone.
+/// Depths without colours.
 fn depths(draws: &[Prepared<'_>], settings: &Settings) -> Layer {
-    // Shading is wasted here, so the cheapest.
+    // Shading is not needed, so the cheapest mode is used.
     let cheap = Settings { mode: Mode::Match, ..settings.clone() };
     cluster::nearest(draws, &cheap).0
 }
 
 impl Context {
-    /// Draws what is pending as a picture, or into one sample of each pixel.
+    /// Draws the pending draws as an image, or into one sample of each pixel.
     pub(crate) fn draw_effect_image(
         &mut self,
         pending: &[(Draw, Option<Arc<Image>>)],
@@ -140,7 +142,7 @@ impl Context {
 }
 
 impl Context {
-    /// Multiplies what the driver drew of these by how light they are.
+    /// Multiplies the driver's image of these draws by their visibility.
     pub(crate) fn darken_drawn(&mut self, draws: &[Draw], settings: &Settings) {
         let start = Instant::now();
         let settings = crate::classify::affine_probe::factor_settings(settings);
@@ -154,7 +156,7 @@ impl Context {
                     .filter_map(|i| Prepared::new(&draws[*i], None, &mut structures))
                     .collect();
                 let (mut layer, extra) = cluster::nearest(&ready, &settings);
-                // The driver's own depth may be some roundings nearer.
+                // The driver's own depth may be nearer by some rounding errors.
                 layer
                     .depth
                     .iter_mut()
@@ -179,7 +181,7 @@ impl Context {
     }
 }
 
-/// Sixteen steps of a depth buffer of 24 bits.
+/// Sixteen steps of a 24-bit depth buffer.
 const DEPTH_ROUNDINGS: f32 = 1e-6;
 
 fn make(
@@ -229,7 +231,7 @@ fn make(
     ViewImage::Over { colors, opaque, all }
 }
 
-/// Puts each draw's fog over a path-traced picture.
+/// Applies each draw's fog to a path-traced image.
 fn fogged(
     colors: &mut ColorImage,
     ready: &[Prepared<'_>],
@@ -262,7 +264,7 @@ fn fogged(
     }
 }
 
-/// The nearer depth at every pixel.
+/// Keeps the nearer depth at every pixel.
 fn merge(depth: &mut [f32], rect: Rect, one: &Layer) {
     for y in 0..one.rect.h {
         for x in 0..one.rect.w {
@@ -273,7 +275,8 @@ fn merge(depth: &mut [f32], rect: Rect, one: &Layer) {
     }
 }
 
-/// Pixels with an opaque surface at their centre, and those that have colour without one.
+/// Splits the image into pixels with an opaque surface at their centre, and pixels that have colour
+/// without one.
 fn split(colors: &ColorImage, opaque: &Layer, all: &Layer) -> [Layer; 2] {
     let rect = colors.rect;
     let n = colors.rgba.len();

@@ -1,4 +1,4 @@
-//! What is drawn but not in the framebuffer yet, and when it has to be there.
+//! Collects the draws of a frame and decides when they must be in the framebuffer.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::capture::primitives::QuadSplit;
@@ -17,27 +17,27 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
-/// A draw with the image of its texture.
+/// A draw and the image of its texture.
 pub(crate) type Pending = (Draw, Option<Arc<Image>>);
 
 /// Before what the driver draws of which nobody knows what it does to what is there.
 pub(crate) const ORDER_MATTERS: &str = "a draw of the driver's whose order matters";
 
-/// Draws that wait for the end of the frame.
+/// Draws that are deferred to the end of the frame.
 #[derive(Default)]
 pub(crate) struct Frame {
     pending: Vec<Pending>,
-    /// Pictures that may be asked for again.
+    /// Images that may be reused.
     reuse: FrameReuse,
-    /// What is shown one frame late.
+    /// The image that is shown one frame later.
     pub(crate) pipelined: PipelinedPresent,
     /// The driver drew something that commutes since the first of them.
     others: bool,
-    /// Something was traced since the last frame ended.
+    /// True when something was traced since the last frame ended.
     traced: bool,
-    /// Where: framebuffer and viewport.
+    /// The framebuffers and viewports of the traced draws.
     places: Vec<(u32, [i32; 4])>,
-    /// The highest row that viewports of the window reached in the frame before, and in this one.
+    /// The highest row that window viewports reached in the previous frame and in this one.
     tops: [i32; 2],
     /// Telemetry of the frame for the control panel and reports.
     telemetry: crate::host::panel_client::FrameTelemetry,
@@ -56,7 +56,7 @@ impl Frame {
         self.tops[0] = y.saturating_add(h);
     }
 
-    /// Rows of the window: no call asks for them, but some viewport reaches the top.
+    /// The height of the window in rows. No call returns it, but some viewport reaches the top.
     pub(crate) fn window_height(&mut self, s: &crate::state::snapshot::Snapshot) -> i32 {
         let top = s.viewport[1].saturating_add(s.viewport[3]);
         if s.framebuffer != 0 {
@@ -74,7 +74,7 @@ impl Frame {
 }
 
 impl Context {
-    /// The recorded immediate mode becomes a draw.
+    /// Converts the recorded immediate mode to a draw.
     pub(crate) fn end_batch(&mut self) {
         let start = Instant::now();
         self.recorder.flush_ring();
@@ -124,7 +124,7 @@ impl Context {
         );
     }
 
-    /// How the driver would split the quads of the batch.
+    /// How the driver would split the batch's quads into triangles.
     fn split_of_batch(&mut self) -> QuadSplit {
         let s = &self.state;
         // Lists end batches with quads before and after them.
@@ -149,7 +149,7 @@ impl Context {
         split
     }
 
-    /// Takes a draw into the frame, or traces it at once when its order matters.
+    /// Adds a draw to the frame, or traces it at once when its order matters.
     pub(crate) fn add(&mut self, mut draw: Draw, in_order: bool) {
         self.counters.report.traced_draws += draw.calls;
         self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
@@ -213,7 +213,7 @@ impl Context {
         draw.geometry = self.geometry_cache.of_indices(&positions, &indices);
     }
 
-    /// Draws what is pending into the framebuffer.
+    /// Draws the pending draws into the framebuffer.
     pub(crate) fn flush(&mut self, before: &str) {
         if !crate::interpose::panic_guard::happened() {
             self.flush_now(before);
@@ -248,7 +248,7 @@ impl Context {
             }
         }
         self.counters.count_flush(before);
-        // Also of contexts that never end a frame.
+        // Contexts that never end a frame need this count, too.
         self.counters.report.textures_read = self.presenter.images.read;
         self.frame
             .telemetry
@@ -288,7 +288,7 @@ impl Context {
         self.frame.reuse.keep(drawn, &self.config, layer);
     }
 
-    /// One ray stands for all samples of a pixel.
+    /// Warns that one ray stands for all samples of a pixel.
     fn warn_of_samples<'a>(&mut self, draws: impl Iterator<Item = &'a Draw>) {
         if let Some(n) = draws.map(|d| d.state.samples).find(|n| *n > 1) {
             self.counters.warn(format!(
@@ -298,7 +298,7 @@ impl Context {
         }
     }
 
-    /// Puts what was traced into the framebuffer, or into one sample of each of its pixels.
+    /// Presents a traced layer in the framebuffer, or in one sample of each of its pixels.
     pub(crate) fn present_traced(
         &mut self,
         traced: TracedFrame,
@@ -320,7 +320,7 @@ impl Context {
         traced.layer
     }
 
-    /// Shows the picture that the same draws came to before.
+    /// Presents the image that the same draws gave before.
     fn present_reused(&mut self, draws: Vec<Pending>, layer: Layer, func: u32) {
         self.counters.report.pictures_again += 1;
         self.counters.report.pixels += layer.covered as u64;
@@ -374,7 +374,7 @@ impl Context {
         }
     }
 
-    /// Draws the layers of a draw whose order matters, and keeps them for the next like it.
+    /// Draws the layers of a draw whose order matters, and keeps them for the next equal draw.
     fn present_ordered(
         &mut self,
         draw: &Draw,
@@ -391,7 +391,7 @@ impl Context {
         self.frame.reuse.keep_ordered(draw, image, &self.config, layers);
     }
 
-    /// Whoever looks at the screen sees a picture now.
+    /// Ends a frame: its image is now visible on the screen.
     pub(crate) fn frame_done(&mut self) {
         self.counters.report.frames += 1;
         self.frame.traced = false;
@@ -424,18 +424,18 @@ impl Context {
         self.counters.publish(false);
     }
 
-    /// Other settings hold from the next frame on.
+    /// Applies new settings. They hold from the next frame on.
     fn apply_new_settings(&mut self) {
         let config = crate::host::config::current();
         if !Arc::ptr_eq(&config, &self.config) {
             self.config = config;
-            // Verdicts depend on settings.
+            // Classifications depend on settings.
             self.dirty = crate::interpose::symbols::class::ALL;
             crate::interpose::symbols::arm();
         }
     }
 
-    /// The program reads what was drawn: a frame, too, when something was traced for it.
+    /// The program reads the framebuffer. This also ends a frame when something was traced for it.
     pub(crate) fn read_back(&mut self) {
         self.frame.pipelined.read();
         if self.frame.traced {

@@ -1,15 +1,15 @@
-//! Pictures that are asked for again: programs draw the same once more when a window is uncovered,
-//! when two events come for one change (geomview), or because they draw all the time. What was
-//! traced is kept until the frame after it is over.
+//! Reuses images of unchanged frames. Programs draw the same content again when a window is
+//! uncovered, when two events come for one change (geomview), or because they draw all the time. A
+//! traced image is kept until the end of the following frame.
 //!
-//! Two frames are the same when everything that rays and lighting read is: geometry by its key,
-//! attributes by their version or bit by bit, state, matrices, textures, settings. Nothing is taken
-//! for the same by samples.
+//! Two frames are equal when everything that rays and lighting read is equal: geometry by its key,
+//! attributes by their version or bit by bit, state, matrices, textures, settings. Equality is
+//! never inferred from samples.
 //!
-//! Draws whose order matters are kept one by one, with all their layers: programs that draw a
-//! stencil's values, shadows or user interfaces draw the same rectangle again and again, some in
-//! another colour. Where that colour is all there is to it (no light, texture or fog), the layers
-//! get the new one.
+//! Draws whose order matters are kept one by one, with all their layers. Programs that draw stencil
+//! values, shadows or user interfaces draw the same rectangle again and again, sometimes in another
+//! colour. Where the draw depends only on that colour (no light, texture or fog), the layers get
+//! the new one.
 
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
 use crate::capture::vertex_recorder::same_bits;
@@ -22,16 +22,16 @@ use crate::trace::texturing::Image;
 use crate::trace::{Layer, UNCOVERED};
 use std::sync::Arc;
 
-/// Bytes of attributes that are worth keeping for a comparison.
+/// Attributes of at most this many bytes are kept for a comparison.
 const MOST_BYTES: usize = 1 << 16;
-/// Pictures that are kept: a frame may have several parts.
+/// The number of images that are kept. A frame may have several parts.
 const MOST_PICTURES: usize = 4;
-/// Draws whose order matters that are kept: each is looked for among these.
+/// The number of kept draws whose order matters. Each new one is compared with all of them.
 const MOST_ORDERED: usize = 16;
-/// Pixels of all of them.
+/// The total number of their pixels.
 const MOST_PIXELS: usize = 1 << 24;
 
-/// What one draw was made of.
+/// Everything that the image of one draw depends on.
 pub(crate) struct DrawKey {
     geometry: u128,
     state: Arc<Snapshot>,
@@ -48,7 +48,7 @@ enum AttributesKey {
     Plain,
 }
 
-/// The colour of all fragments of a draw, where it depends on nothing else.
+/// The colour of all fragments of a draw, if it depends on nothing else.
 fn plain_color(d: &Draw) -> Option<[u8; 4]> {
     let s = &*d.state;
     let plain = matches!(d.shading, Shading::Fixed)
@@ -129,7 +129,7 @@ fn bytes(a: &Attributes) -> usize {
         + 4 * a.material_of.len()
 }
 
-/// Without a texture its coordinates are whatever was drawn last had.
+/// Without a texture, texture coordinates do not matter. They are leftovers of earlier draws.
 fn same(a: &Attributes, b: &Attributes, textured: bool) -> bool {
     fn values<const N: usize>(a: &Values<N>, b: &Values<N>) -> bool {
         match (a, b) {
@@ -152,7 +152,7 @@ struct ReusableImage {
     drawn: Vec<DrawKey>,
     config: Arc<Config>,
     layer: Layer,
-    /// Frames ago.
+    /// The age in frames.
     age: u32,
 }
 
@@ -161,21 +161,21 @@ struct ReusableLayers {
     drawn: DrawKey,
     config: Arc<Config>,
     layers: Vec<Layer>,
-    /// Frames ago.
+    /// The age in frames.
     age: u32,
 }
 
-/// The latest pictures.
+/// The latest images.
 #[derive(Default)]
 pub(crate) struct FrameReuse {
-    /// The latest come last.
+    /// In order of use, the latest last.
     pictures: Vec<ReusableImage>,
     /// Likewise.
     ordered: Vec<ReusableLayers>,
 }
 
 impl FrameReuse {
-    /// The picture of these draws, lent until [`FrameReuse::put_back`].
+    /// The image of these draws, lent until [`FrameReuse::put_back`].
     pub(crate) fn find(&mut self, draws: &[Pending], config: &Arc<Config>) -> Option<Layer> {
         let is = |p: &ReusableImage| {
             p.drawn.len() == draws.len()
@@ -190,14 +190,14 @@ impl FrameReuse {
         Some(layer)
     }
 
-    /// The picture that [`FrameReuse::find`] lent.
+    /// Takes back the image that [`FrameReuse::find`] lent.
     pub(crate) fn put_back(&mut self, layer: Layer) {
         if let Some(p) = self.pictures.last_mut() {
             p.layer = layer;
         }
     }
 
-    /// What draws came to.
+    /// Keeps the image of these draws.
     pub(crate) fn keep(&mut self, drawn: Option<Vec<DrawKey>>, config: &Arc<Config>, layer: Layer) {
         let Some(drawn) = drawn else { return };
         let new = ReusableImage { drawn, config: config.clone(), layer, age: 0 };
@@ -208,7 +208,7 @@ impl FrameReuse {
         }
     }
 
-    /// A frame is over: what the one before was made of does not come again.
+    /// Ends a frame and drops images that are too old.
     pub(crate) fn frame_done(&mut self) {
         self.pictures.iter_mut().for_each(|p| p.age += 1);
         self.pictures.retain(|p| p.age < 2);
@@ -234,7 +234,7 @@ impl FrameReuse {
         Some(layers)
     }
 
-    /// What a draw whose order matters came to.
+    /// Keeps the layers of a draw whose order matters.
     pub(crate) fn keep_ordered(
         &mut self,
         draw: &Draw,

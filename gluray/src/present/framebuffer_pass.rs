@@ -1,9 +1,9 @@
-//! Traced fragments into the program's framebuffer: one triangle-strip pass of the driver's whose
-//! shader takes colour and depth from textures.
+//! Writes traced fragments into the program's framebuffer. The driver draws one triangle strip,
+//! whose shader reads colour and depth from textures.
 //!
-//! The fragments meet the program's own depth test (and blending, stencil, logic operation, when it
-//! is that draw's turn), so whatever the driver drew before and after is composited by the driver,
-//! in any kind of framebuffer, without reading anything back.
+//! The fragments pass the program's own depth test (and blending, stencil and logic operation for
+//! draws whose order matters). The driver therefore composites them with everything that it drew
+//! before and after, in any kind of framebuffer, without reading anything back.
 
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
@@ -11,31 +11,31 @@ use crate::state::enums::*;
 use crate::trace::texturing::Images;
 use crate::trace::{Layer, Rect};
 
-/// What the fragments meet.
+/// How fragments are composited with the framebuffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CompositeMode {
-    /// The depth test with this function, nothing else: the nearest surfaces of a frame.
+    /// Only the depth test, with this function: the nearest surfaces of a frame.
     Surface(u32),
-    /// The same with premultiplied colours over what is there: several samples a pixel, or surfaces
-    /// that let light through.
+    /// The same, with premultiplied colours composited over the framebuffer: several samples per
+    /// pixel, or translucent surfaces.
     Over(u32),
-    /// What is there times the colours, where it has this depth or is behind: no depths are
-    /// written.
+    /// Multiplies the framebuffer by the colours, at fragments of this depth or behind it. No
+    /// depths are written.
     Multiply,
-    /// The same again without depths: pixels whose centre sees no opaque surface.
+    /// Like `Over`, but without writing depths: pixels whose centre shows no opaque surface.
     Fringe(u32),
-    /// Premultiplied colours over what is there, whatever the depths.
+    /// Premultiplied colours over the framebuffer, whatever the depths.
     OverIgnoringDepth,
-    /// Everything the program has set: a draw whose order matters.
+    /// The program's complete state, for a draw whose order matters.
     AsDrawn,
 }
 
-/// The objects of the pass.
+/// The OpenGL objects of the pass.
 #[derive(Default)]
 pub(crate) struct Presenter {
     pub(crate) images: Images,
     program: u32,
-    /// How much of the textures a layer takes up.
+    /// The part of the textures that a layer uses.
     part: i32,
     textures: [u32; 2],
     size: [i32; 2],
@@ -43,27 +43,27 @@ pub(crate) struct Presenter {
     support: PassSupport,
 }
 
-/// Of the textures of colours and depths: internal format, format and type.
+/// Internal format, format and type of the colour texture and the depth texture.
 const FORMATS: [(u32, u32, u32); 2] = [(RGBA8, RGBA, UNSIGNED_BYTE), (R32F, RED, FLOAT)];
 
-/// Whether the driver takes what the pass needs.
+/// Whether the driver supports what the pass needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum PassSupport {
     #[default]
     NotYet,
-    /// The shader is there; of all else there is nothing.
+    /// The shader is linked. No other object exists.
     Linked,
-    /// All objects are there.
+    /// All objects exist.
     Ready,
     Refused,
 }
 
-/// Why draws are left to a driver that refuses our pass.
+/// The reason for leaving draws to a driver that refuses this pass.
 pub(crate) const REFUSED: &str = "the driver refuses our shader or its textures";
 
-// Where a fragment lies in the layer comes from the corners, not from gl_FragCoord: for that Mesa
-// keeps a constant which says whether rows are turned over, and forgets to renew it when between a
-// pass into a framebuffer object and one into the window there was only a clear.
+// A fragment's position in the layer comes from the corners, not from gl_FragCoord. For
+// gl_FragCoord, Mesa keeps a constant that says whether rows are flipped. It does not update that
+// constant when only a clear lies between a pass into a framebuffer object and one into the window.
 const VERTEX_120: &str = "#version 120
 uniform vec4 part;
 varying vec2 at;

@@ -1,4 +1,4 @@
-//! One small program per case, natively and through us: colour and depth must agree.
+//! One small program per case, run natively and through gluray. Colour and depth must agree.
 
 use super::{Picture, Run, Xvfb, folder, metrics, peer};
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! How far a traced picture is from a rasterized one. One number alone misses some error (a shift
-//! by a pixel, a hole, a tint), so there are four, each with a bar that two valid rasterizers keep
-//! between them.
+//! Measures how far a traced image is from a rasterized one. A single number misses some errors (a
+//! shift by a pixel, a hole, a tint), so there are four, each with a bar that two valid rasterizers
+//! keep between them.
 
 use super::Picture;
 

@@ -1,5 +1,5 @@
-//! What tests of real programs share: an X server of their own, running a program natively and
-//! through us, comparing pictures.
+//! Shared by the tests of real programs: a private X server, running a program natively and through
+//! gluray, and comparing images.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 pub(crate) mod cases;

@@ -1,5 +1,5 @@
-//! A running `gluray panel`, HTTP over a plain socket, and a program that speaks the link with the
-//! library's own end of it.
+//! A running `gluray panel`, HTTP over a plain socket, and a program that uses the library's own
+//! end of the link.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use gluray::config::Settings;

@@ -1,4 +1,4 @@
-//! `path = value`: checked, and put where it belongs.
+//! Checks an assignment `path = value` and stores the value in the settings.
 
 use super::fields::{FIELDS, Field, Kind, find};
 use super::settings::Settings;

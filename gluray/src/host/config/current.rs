@@ -1,5 +1,5 @@
-//! The settings of this process: read once when they are first asked for, replaced when the panel
-//! says so.
+//! The settings of this process. They are read once, on first use, and replaced when the panel
+//! changes them.
 
 use super::fields::{FIELDS, Field};
 use super::load::Sources;

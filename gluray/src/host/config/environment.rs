@@ -1,6 +1,7 @@
-//! Settings from environment variables: `GLURAY_EFFECTS_SHADOWS=off` is `effects.shadows = false`.
+//! Reads settings from environment variables: `GLURAY_EFFECTS_SHADOWS=off` is `effects.shadows =
+//! false`.
 //!
-//! The command line of `gluray run` uses the same variables: they are how it reaches the library in
+//! The command line of `gluray run` sets the same variables to pass settings to the library inside
 //! the program.
 
 use super::assign::{Assignment, SettingError};

@@ -1,4 +1,4 @@
-//! The table of settings: names, kinds, ranges, and where they matter.
+//! The table of settings: names, kinds, ranges, and the modes in which they have an effect.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! The file: settings for all programs, and for each by name.
+//! Reads the settings file: settings for all programs, and for individual programs by name.
 //!
 //! ```toml
 //! mode = "rich"

@@ -1,4 +1,4 @@
-//! All layers together, as the library reads them when its first context is made current.
+//! Loads all layers of settings, when the library's first context is made current.
 
 use super::assign::{Assignment, SettingError, assign};
 use super::environment;

@@ -3,13 +3,13 @@
 //! ```text
 //!   defaults < file (all programs) < file ([program.NAME]) < environment = command line < control panel
 //! ```
-//! Every layer is a list of assignments `path = value` (`effects.shadows = true`); [`fields`] knows
-//! each path with its kind, its range and the modes in which it changes anything, and [`assign()`]
-//! is the only way in. So a wrong name, type or number is told in the same words wherever it comes
-//! from, and the panel draws its controls from the same table.
+//! Every layer is a list of assignments `path = value` (`effects.shadows = true`). [`fields`] lists
+//! each path with its kind, its range and the modes in which it has an effect. All assignments pass
+//! through [`assign()`]. A wrong name, type or number therefore gives the same message whatever its
+//! source, and the panel builds its controls from the same table.
 //!
-//! Nothing here knows OpenGL: plain data, read by the library in the program and by our own
-//! program.
+//! This module does not depend on OpenGL. It is plain data, read by the library inside the program
+//! and by the `gluray` command.
 
 pub mod assign;
 mod current;

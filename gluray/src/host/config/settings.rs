@@ -1,4 +1,4 @@
-//! The settings as the library reads them.
+//! The settings in the form that the library uses.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,4 +1,4 @@
-//! Scenes as the data that datasets' writers take.
+//! Converts scenes to the data types that the writers of `datasets` take.
 
 use super::format::{Object, Scene};
 use datasets::model::{DataArray, PolyData, Values};

@@ -1,4 +1,5 @@
-//! The file: a line that says what it is, a line of JSON that says what there is, then the arrays.
+//! The file format: an identifying line, a line of JSON that describes the content, then the
+//! arrays.
 //!
 //! ```text
 //! gluray-scene 1\n

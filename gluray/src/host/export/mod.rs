@@ -1,10 +1,10 @@
-//! The captured scene as a file: what the library saw, for other programs.
+//! Exports the captured scene to a file, so that other programs can read what the library captured.
 //!
 //! ```text
 //!   library ── [`write_scene`] ── .gluray file ([format]) ── `gluray export` ── [convert] ── PLY, GLB, VTP (datasets' writers)
 //! ```
-//! The library writes the plain file when asked by the panel or by `GLURAY_DUMP`: one pass over its
-//! arrays, without any conversion in somebody else's process.
+//! The library writes the plain file on request of the panel or of `GLURAY_DUMP`. It makes one pass
+//! over its arrays and converts nothing inside the program's process.
 
 pub mod convert;
 pub mod format;

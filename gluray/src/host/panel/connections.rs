@@ -1,4 +1,4 @@
-//! The panel's end of the links: programs that connect, say who they are, and are listened to.
+//! The panel's end of the links. It accepts programs, authenticates them and reads their messages.
 
 use super::endpoint::{Secret, same};
 use super::hub::Hub;

@@ -1,9 +1,9 @@
-//! How programs find the panel: an address and a secret, from the environment or from a file that
-//! only their user can read.
+//! Publishes and finds the panel's endpoint: an address and a secret, from the environment or from
+//! a file that only the user can read.
 //!
-//! The file is `panel.json` in `$XDG_RUNTIME_DIR/gluray`, with mode 0600, and goes when the panel
-//! ends. A file of another user, or one that others may read, is not believed. An address off
-//! loopback is not believed wherever it comes from.
+//! The file is `panel.json` in `$XDG_RUNTIME_DIR/gluray`, with mode 0600. It is removed when the
+//! panel ends. A file that belongs to another user, or that others may read, is rejected. An
+//! address off loopback is rejected whatever its source.
 
 use crate::host::folders;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! What the panel knows: the programs, their settings, numbers and objects.
+//! The panel's state: the programs with their settings, telemetry and objects.
 
 use super::protocol::{FrameStats, Hello, ObjectInfo, ToPanel, ToProgram};
 use crate::host::config::{Assignment, SettingError, Settings, assign};

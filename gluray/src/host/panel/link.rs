@@ -1,14 +1,15 @@
-//! The library's end of the link. It lives in somebody else's program, so it never waits, starts no
-//! thread and says nothing.
+//! The library's end of the link. It runs inside another program, so it never waits, starts no
+//! thread and prints nothing.
 //!
-//! Once a frame the library calls [`Link::poll`] and [`Link::frame`]: some microseconds when there
-//! is a panel, one look at the clock when there is none. A connection on loopback is made or
-//! refused at once by the kernel; should the panel's queue be full, `CONNECT_PATIENCE` is lost, and
-//! the next attempts come more and more rarely. What the panel does not read is dropped, the newest
-//! first: a slow panel costs no memory.
+//! Once per frame the library calls [`Link::poll`] and [`Link::frame`]. This takes some
+//! microseconds when there is a panel, and one clock read when there is none. The kernel accepts or
+//! refuses a loopback connection at once. When the panel's queue is full, `CONNECT_PATIENCE` is
+//! lost, and further attempts become less and less frequent. Data that the panel does not read is
+//! dropped, the newest first, so a slow panel costs no memory.
 //!
-//! A process that forked leaves the link to its parent. All settings that arrive go through
-//! [`crate::host::config::assign()`]: what is wrong is refused by name, and the rest is taken.
+//! A forked child leaves the link to its parent. All settings that arrive pass through
+//! [`crate::host::config::assign()`]. Invalid settings are refused by name, and the rest are
+//! applied.
 
 use super::endpoint::{PanelEndpoint, same};
 use super::protocol::{

@@ -1,4 +1,4 @@
-//! What the library and the panel say to each other: one JSON object a line, over TCP on loopback.
+//! The protocol between the library and the panel: one JSON object per line, over TCP on loopback.
 //!
 //! | from | message | |
 //! |---|---|---|
@@ -11,7 +11,7 @@
 //! | panel | `change` | all of the panel's assignments so far; they replace the ones before |
 //! | panel | `export` | asks for the scene as a file |
 //!
-//! A line that is too long, is no such object or comes before its time ends the connection and
+//! A line that is too long, is not such an object or arrives too early ends the connection and
 //! changes nothing else.
 
 use crate::host::config::Settings;

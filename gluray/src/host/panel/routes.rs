@@ -1,5 +1,5 @@
-//! The page's addresses. All lie below the token; whoever does not know it learns nothing, not even
-//! which addresses there are.
+//! The addresses of the panel's page. All of them lie below the token. A client without the token
+//! learns nothing, not even which addresses exist.
 //!
 //! | address | |
 //! |---|---|
@@ -11,8 +11,8 @@
 //! | `POST /change` | `{"id":1,"set":{"mode":"rich"},"reset":["samples"]}` |
 //! | `POST /export` | `{"id":1}` |
 //!
-//! The `Host` must be this server (a name of somebody else's that leads to 127.0.0.1 is refused),
-//! and so must the `Origin`, when a browser sends one.
+//! The `Host` must be this server. A foreign host name that resolves to 127.0.0.1 is refused. If a
+//! browser sends an `Origin`, it must be this server, too.
 
 use super::endpoint::same;
 use super::hub::{Hub, HubError};

@@ -1,4 +1,4 @@
-//! Both listeners, and their end.
+//! Starts and stops both listeners.
 
 use super::endpoint::{PanelEndpoint, PanelEndpointError, Secret};
 use super::hub::Hub;

@@ -1,5 +1,5 @@
-//! Chrome's trace event format ("Trace Event Format", Google, complete events), which Perfetto
-//! reads, too.
+//! Writes Chrome's trace event format ("Trace Event Format", Google, complete events). Perfetto
+//! also reads it.
 
 use super::{Span, in_order_of_appearance};
 use serde_json::{Value, json};

@@ -1,4 +1,4 @@
-//! A Gantt chart as SVG: a row for each thread, a box for each span, a line at the end of each
+//! Draws a Gantt chart as SVG: one row per thread, one box per span, one line at the end of each
 //! frame.
 
 use super::{Span, in_order_of_appearance};

@@ -1,8 +1,8 @@
-//! When each phase of each frame ran, and on which thread: the chart of figure 4.8, from a real
-//! run.
+//! The timeline of a real run: when each phase of each frame ran, and on which thread (the chart of
+//! figure 4.8).
 //!
-//! The library notes spans as they end ([`SpanRecorder`]); they are part of its report. [`gantt`]
-//! draws them, [`chrome`] writes them for `chrome://tracing` and Perfetto.
+//! The library records spans as they end ([`SpanRecorder`]). They are part of its report. [`gantt`]
+//! draws them. [`chrome`] writes them for `chrome://tracing` and Perfetto.
 
 pub mod chrome;
 pub mod gantt;

@@ -1,5 +1,5 @@
-//! Spans as they end. A fixed number is kept: the newest, because what a person asks about happened
-//! just now.
+//! Records spans as they end. It keeps a fixed number, the newest, because users ask about what
+//! happened last.
 
 use super::Span;
 use std::collections::VecDeque;
