@@ -1,8 +1,8 @@
-//! The first rank, in the program: it tells helpers what is new, makes its own share meanwhile, and
-//! puts theirs beside it.
+//! The first rank, inside the program. It sends updates to the helpers, renders its own share in
+//! the meantime, and assembles all shares.
 //!
-//! Who does not answer, or answers what cannot be, is left alone from then on, and its share is
-//! made here: a frame is never lost.
+//! A helper that does not reply, or whose reply is invalid, gets no further requests. The first
+//! rank then renders that share itself, so no frame is lost.
 
 use super::codec::{Reader, Wire};
 use super::draw_message::{DrawMessage, images_of, name_of_attributes, name_of_image};
@@ -21,14 +21,14 @@ use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
-/// Orders after which content that nobody asked for is forgotten.
+/// The number of requests after which unused content is dropped.
 const KEPT_ORDERS: u64 = 12;
-/// What a helper may take in addition to ten times our own share.
+/// The time that a helper may take in addition to ten times this rank's own share.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Bytes of an answer beside its rows.
+/// The size in bytes of a reply without its rows.
 const REPLY_HEADER: usize = 1 << 16;
 
-/// A helper as the first rank sees it.
+/// The state of a helper, as the first rank knows it.
 #[derive(Default)]
 struct HelperState {
     lost: bool,
@@ -41,22 +41,22 @@ pub(crate) struct Coordinator {
     /// By rank; the first is never used.
     helpers: Vec<HelperState>,
     number: u64,
-    /// Names of content, with the order that used it last.
+    /// Identifiers of content, with the last request that used each.
     used: HashMap<u128, u64>,
     attributes: ContentIds<Attributes>,
     images: ContentIds<Image>,
     pub(crate) rank_stats: RankStatsTable,
-    /// How much longer than ten times our own share a helper may take.
+    /// The time that a helper may take in addition to ten times this rank's own share.
     pub(crate) patience: Duration,
 }
 
-/// Names that were found out already.
+/// Identifiers that are already computed.
 struct ContentIds<T>(HashMap<usize, (Weak<T>, u128)>);
 
 impl<T> ContentIds<T> {
     fn of(&mut self, value: &Arc<T>, name: impl FnOnce(&T) -> u128) -> u128 {
         let place = Arc::as_ptr(value) as usize;
-        // What was there before may be gone, and something else in its place.
+        // The earlier object at this address may be gone, and another in its place.
         if let Some((known, name)) = self.0.get(&place)
             && known.upgrade().is_some_and(|k| Arc::ptr_eq(&k, value))
         {
@@ -69,7 +69,7 @@ impl<T> ContentIds<T> {
     }
 }
 
-/// Layers of a picture, as far as a share has been made.
+/// The layers of an image, as far as shares have arrived.
 pub(crate) struct PartialImage<A, B> {
     pub(crate) rect: Rect,
     pub(crate) first: Vec<A>,
@@ -97,12 +97,12 @@ impl Coordinator {
         (1..self.helpers.len()).filter(|r| !self.helpers[*r].lost).collect()
     }
 
-    /// True while somebody helps.
+    /// True while at least one helper is active.
     pub(crate) fn has_helpers(&self) -> bool {
         !self.alive().is_empty()
     }
 
-    /// A picture of `draws`, of which `own` makes a share here. `rect` is where the picture is.
+    /// The image of `draws` within `rect`. `own` renders a share in this process.
     pub(crate) fn make<A: bytemuck::Pod, B: bytemuck::Pod>(
         &mut self,
         draws: &[Prepared<'_>],
@@ -170,7 +170,7 @@ impl Coordinator {
         }
     }
 
-    /// The draws with the names of what they need.
+    /// The draws as messages, with the identifiers of the content that they need.
     fn draw_messages(&mut self, draws: &[Prepared<'_>]) -> Vec<DrawMessage> {
         let number = self.number;
         let mut draw_messages = Vec::new();
@@ -205,7 +205,7 @@ impl Coordinator {
         draw_messages
     }
 
-    /// Names that nobody asked for lately.
+    /// Identifiers that no recent request used.
     fn stale(&mut self) -> Vec<u128> {
         let now = self.number;
         let mut out: Vec<u128> = self
@@ -221,7 +221,7 @@ impl Coordinator {
         out
     }
 
-    /// What a helper does not have yet.
+    /// Writes the content that a helper does not have yet.
     fn put_update(
         &mut self,
         out: &mut Vec<u8>,
@@ -266,7 +266,7 @@ impl Coordinator {
         out.append(&mut images);
     }
 
-    /// Takes a helper's share into the picture.
+    /// Adds a helper's share to the image.
     fn gather<A: bytemuck::Pod, B: bytemuck::Pod>(
         &mut self,
         rank: usize,
@@ -310,7 +310,7 @@ impl Coordinator {
     }
 }
 
-/// A share that was made here into the picture.
+/// Adds a share that was rendered in this process to the image.
 fn put_in<A: Copy, B: Copy>(
     made: &mut PartialImage<A, B>,
     part: PartialImage<A, B>,
@@ -326,7 +326,7 @@ fn put_in<A: Copy, B: Copy>(
     made.warnings.extend(part.warnings);
 }
 
-/// How a view is told.
+/// The parameters of a view, as sent to helpers.
 pub(crate) fn view_parameters(view: &crate::trace::view::View, rect: Rect) -> ViewParameters {
     ViewParameters {
         projection: view.projection.to_cols_array(),

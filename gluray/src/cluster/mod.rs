@@ -1,10 +1,10 @@
 //! Ray-parallel mode with replicated data (dissertation, sections 4.1.3 and 6.2): several processes
-//! make one program's picture.
+//! render one program's image.
 //!
-//! The program is the first rank. Helpers (`gluray serve-rays`) have the whole scene, of which they
-//! are told what is new, and make every so many rows of each picture. They talk by composite's
-//! communicator. `group` does the same for helpers that are an MPI job. Every rank sends the
-//! packets of rays that one process would, so pictures are the same bit by bit whatever the number
+//! The program is the first rank. Helpers (`gluray serve-rays`) hold the whole scene. They receive
+//! its changes and render a fixed share of the rows of each image. All ranks use the communicator
+//! of `composite`. `mpi_group` does the same for helpers that run as an MPI job. Every rank traces
+//! the same ray packets that one process would, so images are identical bit by bit for any number
 //! of ranks.
 
 pub(crate) mod codec;
@@ -33,23 +33,24 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The variable with the helpers' sockets, one after the other with `:` between them.
+/// The variable that lists the helpers' sockets, separated by `:`.
 pub(crate) const SOCKETS: &str = "GLURAY_RANKS";
-/// Pixels below which asking costs more than it saves.
+/// The image size in pixels below which a request costs more than it saves.
 const LEAST_PIXELS: i64 = 128 * 128;
 
-/// What became of the helpers of this process.
+/// The state of this process's helpers.
 enum State {
-    /// Nothing was traced yet.
+    /// Nothing has been traced yet.
     Unknown,
     /// No helpers were given.
     Alone,
-    /// The process that made the connections, and the first rank.
+    /// The process that opened the connections, and the first rank.
     Together(u32, Box<Coordinator>),
 }
 
 static STATE: Mutex<State> = Mutex::new(State::Unknown);
-/// What each rank did; apart from the rest, so that nobody who reports waits for a picture.
+/// The statistics of each rank. They have a lock of their own, so that a report does not wait for
+/// an image.
 static ACCOUNTS: Mutex<Vec<RankStats>> = Mutex::new(Vec::new());
 /// Helpers that could not be reached.
 static PROBLEMS: Mutex<Vec<String>> = Mutex::new(Vec::new());
@@ -58,7 +59,7 @@ fn connect(place: &str) -> std::io::Result<UnixStream> {
     let end = Instant::now() + Duration::from_secs(5);
     loop {
         match UnixStream::connect(place) {
-            // It may be between its first two steps.
+            // The helper may be between creating its socket and listening on it.
             Err(e) if e.kind() == std::io::ErrorKind::ConnectionRefused && Instant::now() < end => {
                 std::thread::sleep(Duration::from_millis(10));
             }
@@ -86,7 +87,7 @@ fn begin() -> State {
     }
 }
 
-/// Runs `f` on the first rank where there are helpers that a picture of this size is worth asking.
+/// Runs `f` on the first rank when there are helpers and an image of this size is worth a request.
 fn with_coordinator<R>(rect: Rect, f: impl FnOnce(&mut Coordinator) -> R) -> Option<R> {
     if i64::from(rect.w) * i64::from(rect.h) < LEAST_PIXELS {
         return None;
@@ -110,12 +111,12 @@ fn with_coordinator<R>(rect: Rect, f: impl FnOnce(&mut Coordinator) -> R) -> Opt
     }
 }
 
-/// What each rank did so far; empty without helpers.
+/// The statistics of each rank so far. Empty without helpers.
 pub(crate) fn rank_stats() -> Vec<RankStats> {
     ACCOUNTS.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// What went wrong with helpers.
+/// The problems with helpers so far.
 pub(crate) fn problems() -> Vec<String> {
     let mut out = PROBLEMS.lock().unwrap_or_else(PoisonError::into_inner).clone();
     let lost = |a: &RankStats| {
@@ -126,7 +127,7 @@ pub(crate) fn problems() -> Vec<String> {
     out
 }
 
-/// [`trace::nearest`], by all ranks.
+/// [`trace::nearest`] on all ranks.
 pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u64; 2]) {
     let rect = draws.iter().fold(Rect::default(), |r, d| r.or(d.rect));
     let primary = || draws.iter().map(|d| d.rays.load(Relaxed)).sum::<u64>();
@@ -144,7 +145,7 @@ pub(crate) fn nearest(draws: &[Prepared<'_>], settings: &Settings) -> (Layer, [u
     let Some(made) = made else { return trace::nearest(draws, settings, RowShare::WHOLE) };
     let sum =
         |kind: &str| made.rays.iter().filter(|(k, _)| *k == kind).map(|(_, n)| n).sum::<u64>();
-    // Our own primary rays are counted already, draw by draw.
+    // This rank's primary rays are already counted, draw by draw.
     draws[0].rays.fetch_add(sum("primary"), Relaxed);
     let extra = [sum("shadow"), sum("ambient occlusion")];
     let covered = made.second.iter().filter(|d| **d < 1.5).count();
@@ -175,7 +176,7 @@ fn to_colors(made: PartialImage<[f32; 4], u8>) -> ColorImage {
     ColorImage { rect: made.rect, rgba: made.first, rays, warnings }
 }
 
-/// [`whitted::colors`], by all ranks.
+/// [`whitted::colors`] on all ranks.
 pub(crate) fn whitted(
     draws: &[Prepared<'_>],
     view: &View,
@@ -191,7 +192,7 @@ pub(crate) fn whitted(
     made.map_or_else(|| make(RowShare::WHOLE), to_colors)
 }
 
-/// [`PathTracer::picture`], by all ranks.
+/// [`PathTracer::picture`] on all ranks.
 pub(crate) fn paths(
     path_tracer: &mut PathTracer,
     draws: &[Prepared<'_>],

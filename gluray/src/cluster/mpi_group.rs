@@ -322,7 +322,7 @@ impl JobCoordinator<'_> {
         moved
     }
 
-    /// Removes closed connections.
+    /// Removes closed connections and tells their ranks.
     fn remove_closed(&mut self) -> Result<(), CommError> {
         let gone: Vec<(usize, u32)> =
             self.connections.iter().filter(|l| l.peer.lost).map(|l| (l.rank, l.program)).collect();

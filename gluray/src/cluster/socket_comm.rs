@@ -1,5 +1,5 @@
-//! Ranks as processes of one machine: composite's communicator over Unix sockets, between a first
-//! rank and its helpers. Helpers do not talk to each other.
+//! Connects ranks on one machine: the communicator of `composite` over Unix sockets, between a
+//! first rank and its helpers. Helpers do not talk to each other.
 
 use composite::comm::{Arrival, CommError, Communicator, Receive};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -8,15 +8,15 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-/// Bytes before each message: its tag and its length.
+/// The size in bytes of the header before each message: its tag and its length.
 const HEADER: usize = 16;
-/// How long a peer may take none of what is sent.
+/// The time after which a peer that accepts no data counts as stalled.
 const STALLED: Duration = Duration::from_secs(20);
-/// Bytes that are made room for at once: about what a socket holds, and a peer that announces more
-/// has to send it.
+/// The number of bytes reserved at once, about the capacity of a socket. A peer that announces a
+/// longer message has to send it first.
 const ROOM: usize = 1 << 18;
 
-/// What goes before a message of `length` bytes.
+/// The header of a message of `length` bytes.
 pub(super) fn header_of(tag: u32, length: usize) -> [u8; HEADER] {
     let mut header = [0; HEADER];
     header[..4].copy_from_slice(&tag.to_ne_bytes());
@@ -27,9 +27,9 @@ pub(super) fn header_of(tag: u32, length: usize) -> [u8; HEADER] {
 /// The other end of a socket.
 pub(super) struct Peer {
     pub(super) stream: UnixStream,
-    /// What has come of the next message.
+    /// The received part of the next message.
     part: Vec<u8>,
-    /// Messages that have come whole, with their tags.
+    /// Complete messages, with their tags.
     pub(super) mail: VecDeque<(u32, Vec<u8>)>,
     pub(super) lost: bool,
 }
@@ -40,13 +40,14 @@ impl Peer {
         Ok(Peer { stream, part: Vec::new(), mail: VecDeque::new(), lost: false })
     }
 
-    /// Bytes of the message that is coming, when its head has come.
+    /// The length of the incoming message, once its header has arrived.
     fn announced(&self) -> Option<u64> {
         let length = self.part.get(8..HEADER)?;
         Some(u64::from_ne_bytes(length.try_into().expect("eight bytes")))
     }
 
-    /// Reads what is there, up to messages of `capacity` bytes. False for a message that is longer.
+    /// Reads the available data, in messages of up to `capacity` bytes. Returns false for a longer
+    /// message.
     pub(super) fn read(&mut self, capacity: usize) -> bool {
         while !self.lost {
             let want = match self.announced() {
@@ -82,15 +83,15 @@ impl Peer {
     /// Waits until the socket can be read or written.
     fn wait(&self, what: PollFlags, timeout: Duration) {
         let time = Timespec::try_from(timeout).ok();
-        // Interrupted or not: whoever waits looks again.
+        // The result does not matter, even when interrupted: the caller checks again.
         let _ = poll(&mut [PollFd::new(&self.stream, what)], time.as_ref());
     }
 }
 
-/// One rank of such a group.
+/// One rank of a socket group.
 pub(crate) struct SocketComm {
     rank: usize,
-    /// By rank; `None` for oneself and for those one has no socket to.
+    /// Peers by rank. `None` for this rank, and for ranks without a socket to this one.
     peers: Vec<Option<Peer>>,
     begin: Instant,
     next_id: u64,
@@ -98,7 +99,7 @@ pub(crate) struct SocketComm {
 }
 
 impl SocketComm {
-    /// The first rank, with a socket to each helper in turn.
+    /// The first rank, with one socket per helper.
     pub(crate) fn first(helpers: Vec<UnixStream>) -> std::io::Result<SocketComm> {
         let mut peers = vec![None];
         for stream in helpers {
@@ -107,7 +108,7 @@ impl SocketComm {
         Ok(SocketComm::with(0, peers))
     }
 
-    /// A helper, which knows the first rank alone.
+    /// A helper, which is connected only to the first rank.
     pub(crate) fn helper(first: UnixStream) -> std::io::Result<SocketComm> {
         Ok(SocketComm::with(1, vec![Some(Peer::new(first)?), None]))
     }
@@ -156,7 +157,7 @@ impl Communicator for SocketComm {
                     Err(e) if e.kind() == ErrorKind::WouldBlock && moved.elapsed() < STALLED => {
                         peer.wait(PollFlags::OUT, STALLED);
                     }
-                    // What was begun and not finished cannot be followed by anything else.
+                    // No other message can follow a partly sent one.
                     Err(_) => {
                         peer.lost = true;
                         return Err(lost);
@@ -216,7 +217,7 @@ impl Communicator for SocketComm {
             let mut sockets: Vec<_> =
                 sources.map(|p| PollFd::new(&p.stream, PollFlags::IN)).collect();
             let time = Timespec::try_from(left).ok();
-            // Interrupted or not: what is there is looked at again.
+            // The result does not matter, even when interrupted: all sockets are checked again.
             let _ = poll(&mut sockets, time.as_ref());
         }
     }
@@ -250,7 +251,7 @@ mod tests {
         });
         let mut take =
             |tag| helper.recv(0, tag, 1 << 22, Duration::from_secs(20)).expect("a message");
-        // Another tag first: what came before it waits.
+        // Takes another tag first. Earlier messages stay queued.
         assert_eq!(take(8), [9]);
         assert_eq!(take(7), long);
         assert_eq!(take(7), [0_u8; 0]);

@@ -1,5 +1,5 @@
-//! What was traced goes into the program's framebuffer: pending draws, when they must be visible,
-//! and the pass that writes colours and depths.
+//! Presents traced fragments in the program's framebuffer: pending draws, the time at which they
+//! must be visible, and the pass that writes colours and depths.
 
 pub(crate) mod effect_image;
 pub(crate) mod frame;

@@ -1,10 +1,10 @@
-//! Framebuffers with several samples a pixel: each sample has rays of its own, and is written by
-//! itself through the sample mask; the driver resolves them as it resolves its own.
+//! Traces multisampled framebuffers. Each sample has its own rays and is written separately through
+//! the sample mask. The driver resolves the samples as usual.
 //!
-//! The samples' places are the driver's (`glGetMultisamplefv`). A scene that is moved so that a
-//! sample lies in the middle of its pixel is a scene like any other: rays, coverage by the fill
-//! rule and depths need not know. Colours are those of the middle of the pixel, as the driver
-//! shades once for all samples of a triangle.
+//! Sample positions are the driver's (`glGetMultisamplefv`). The scene is shifted so that the
+//! sample lies at the centre of its pixel. Rays, coverage by the fill rule and depths then work as
+//! usual. Colours are those of the pixel's centre, because the driver shades once for all samples
+//! of a triangle.
 
 use crate::capture::draw::{Draw, Shading};
 use crate::host::config::Settings;
@@ -16,10 +16,10 @@ use crate::present::pipelined;
 use crate::trace::thread_pool;
 use std::sync::Arc;
 
-/// More than any driver has.
+/// More samples than any driver supports.
 const MOST_SAMPLES: i32 = 32;
 
-/// The draw, moved by part of a pixel to the left and down.
+/// The draw, shifted by part of a pixel to the left and down.
 fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
     let mut draw = draw.clone();
     let [_, _, w, h] = draw.state.viewport.map(|v| v as f32);
@@ -42,9 +42,9 @@ fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
 }
 
 impl Context {
-    /// Where the samples of what `draws` are drawn into lie, from the middle of the pixel. `None`
-    /// for one sample, and where they cannot be written one by one: before OpenGL 3.2 there is no
-    /// sample mask.
+    /// The sample positions of the framebuffer of `draws`, relative to the pixel centre. `None` for
+    /// a single sample, and where samples cannot be written separately: before OpenGL 3.2 there is
+    /// no sample mask.
     pub(crate) fn sample_places<'a>(
         &mut self,
         draws: impl IntoIterator<Item = &'a Draw>,
@@ -64,9 +64,9 @@ impl Context {
         Some(places)
     }
 
-    /// Traces what is pending for each sample by itself.
+    /// Traces the pending draws for each sample separately.
     pub(crate) fn flush_samples(&mut self, pending: &[Pending], func: u32, places: &[[f32; 2]]) {
-        // The samples are as many rays as were asked for.
+        // The samples already provide the requested number of rays.
         let settings = &Settings { samples: 1, ..self.config.settings.clone() };
         for (i, place) in places.iter().enumerate() {
             let draws: Vec<Pending> =

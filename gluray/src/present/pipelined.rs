@@ -1,11 +1,11 @@
-//! One frame late (section 4.1.2): what the program drew last is shown while what it draws now is
-//! traced beside it.
+//! Presents images one frame late (section 4.1.2). The image of the last frame is shown while the
+//! current frame is traced in parallel.
 //!
-//! Each time pending draws have to be in the window, the layer that the same place of the frame
-//! before came to is put there, and the rays for these draws are sent by other threads until the
-//! program comes here again. Lines and text of the driver's are those of the new frame. Only
-//! windows are late: what is drawn into framebuffer objects is drawn to be used at once, and a
-//! program that reads its window is not made to read an old picture twice.
+//! Each time pending draws must be in the window, the layer that the previous frame traced at the
+//! same position is presented. Other threads trace the rays of the current draws until the program
+//! reaches this position again. The driver's lines and text belong to the new frame. Only windows
+//! are delayed. Content of framebuffer objects is needed at once, and a program that reads its
+//! window must not read an old image twice.
 
 use crate::capture::geometry_cache::BuildCounts;
 use crate::interpose::context::Context;
@@ -17,20 +17,20 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// What draws came to.
+/// The result of tracing draws.
 #[derive(Default)]
 pub(crate) struct TracedFrame {
     pub(crate) layer: Layer,
-    /// Shadow rays, ambient occlusion rays.
+    /// The numbers of shadow rays and ambient occlusion rays.
     pub(crate) extra: [u64; 2],
     pub(crate) primary: u64,
     pub(crate) structures: BuildCounts,
     pub(crate) took: Duration,
-    /// The draws, whose memory serves again.
+    /// The draws, whose memory is reused.
     pub(crate) draws: Vec<Pending>,
 }
 
-/// Traces draws on the threads of the pool, of which this is one.
+/// Traces draws on the threads of the pool. The caller is one of them.
 pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::host::config::Settings) -> TracedFrame {
     let start = Instant::now();
     let mut structures = BuildCounts::default();
@@ -45,29 +45,29 @@ pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::host::config::Setting
     TracedFrame { layer, extra, primary, structures, took: start.elapsed(), draws }
 }
 
-/// The layers that are on their way, by their place in the frame.
+/// The layers that are being traced, by their position in the frame.
 #[derive(Default)]
 pub(crate) struct PipelinedPresent {
     jobs: Vec<Receiver<TracedFrame>>,
-    /// The next place of this frame.
+    /// The next position in this frame.
     place: usize,
-    /// Frames for which nothing is late, because the program read its window.
+    /// The number of further frames without delay, because the program read its window.
     reads: u32,
 }
 
-/// Frames after a read-back in which the program may read again.
+/// The number of frames after a read-back in which the program may read again.
 const READING_FRAMES: u32 = 8;
 
 impl PipelinedPresent {
-    /// A frame is over.
+    /// Ends a frame.
     pub(crate) fn frame_done(&mut self) {
-        // Draws that this frame did not have show nothing in the next.
+        // Positions that this frame did not use show nothing in the next one.
         self.jobs.truncate(self.place);
         self.place = 0;
         self.reads = self.reads.saturating_sub(1);
     }
 
-    /// The program reads what it drew.
+    /// Records that the program reads its framebuffer.
     pub(crate) fn read(&mut self) {
         self.reads = READING_FRAMES;
         self.jobs.clear();
@@ -75,7 +75,7 @@ impl PipelinedPresent {
 }
 
 impl Context {
-    /// True when what is pending may be shown in the next frame.
+    /// True when the pending draws may be shown in the next frame.
     pub(crate) fn may_be_pipelined(&self, before: &str) -> bool {
         let reads = ["Read", "Copy", "Blit", "GetTex", "Accum", "Query"];
         self.config.settings.asynchronous
@@ -85,24 +85,24 @@ impl Context {
             && !thread_pool::forked()
     }
 
-    /// Sends `draws` off and shows what came of those of the last frame; without such, waits for
-    /// these.
+    /// Starts tracing `draws` and presents the result of the last frame. Without such a result, it
+    /// waits for these draws.
     pub(crate) fn flush_pipelined(&mut self, draws: Vec<Pending>, func: u32) {
         let (sender, receiver) = channel();
         let settings = self.config.settings.clone();
         let start = Instant::now();
-        // The one before first: two at a time would only take threads from each other.
+        // Waits for the previous job first. Two jobs at once would only compete for threads.
         let place = self.frame.pipelined.place;
         let before = self.frame.pipelined.jobs.get(place).and_then(|r| r.recv().ok());
         thread_pool::spawn(move || {
-            // Nobody waits for it when the context has gone.
+            // There is no receiver when the context is gone.
             sender.send(trace(draws, &settings)).ok();
         });
         let (shown, next) = match before {
             Some(shown) => (Some(shown), receiver),
             None => {
                 let first = receiver.recv().ok();
-                // The next frame shows it once more.
+                // The next frame shows it again.
                 let (sender, again) = channel();
                 if let Some(t) = &first {
                     let layer = t.layer.clone();
