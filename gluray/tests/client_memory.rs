@@ -1,5 +1,5 @@
-//! What safe code can do with the program's memory: the room for it is compiled by itself, with
-//! little that stands for the rest of the library, and with misuses that must not compile.
+//! What safe code can do with the program's memory. The module for it is compiled alone, with small
+//! stand-ins for the rest of the library, and with misuses that must not compile.
 
 use std::path::Path;
 use std::process::Command;
