@@ -12,12 +12,11 @@ use std::net::SocketAddr;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// Hexadecimal digits of each half of a secret: 128 bits.
+/// The number of hexadecimal digits in each half of a secret: 128 bits.
 const HALF: usize = 32;
 
-/// What both ends know: the library says the first half, the panel answers with the second. So
-/// neither a program that does not belong to the user nor one that took over the panel's port gets
-/// anywhere.
+/// The secret that both ends share. The library sends the first half, and the panel replies with
+/// the second. Neither a program of another user nor one that took over the panel's port can pass.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Secret(String);
@@ -45,38 +44,38 @@ impl From<Secret> for String {
 }
 
 impl Secret {
-    /// From random bytes.
+    /// Creates a secret from random bytes.
     pub fn of(bytes: [u8; HALF]) -> Secret {
         Secret(bytes.iter().map(|b| format!("{b:02x}")).collect())
     }
 
-    /// What the library says.
+    /// The half that the library sends.
     pub fn token(&self) -> &str {
         &self.0[..HALF]
     }
 
-    /// What the panel answers.
+    /// The half that the panel replies with.
     pub fn answer(&self) -> &str {
         &self.0[HALF..]
     }
 }
 
-/// Comparison whose time does not tell how much was right.
+/// Compares in a time that does not reveal how much of the input matched.
 pub fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |d, (x, y)| d | (x ^ y)) == 0
 }
 
-/// Where the panel is.
+/// The panel's address and secret.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PanelEndpoint {
-    /// Of the link, not of the page.
+    /// The address of the link, not of the page.
     pub address: SocketAddr,
-    /// What both ends know.
+    /// The shared secret.
     pub secret: Secret,
 }
 
-/// Why a file of the runtime folder is not believed, or cannot be made.
+/// The reason why a file in the runtime folder is rejected or cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum PanelEndpointError {
     /// Nothing names a runtime folder.
@@ -102,8 +101,8 @@ pub enum PanelEndpointError {
 }
 
 impl PanelEndpoint {
-    /// By `GLURAY_PANEL` and `GLURAY_PANEL_SECRET`, when both are set and make sense, else by the
-    /// file.
+    /// Finds the endpoint by `GLURAY_PANEL` and `GLURAY_PANEL_SECRET` when both are set and valid,
+    /// otherwise by the file.
     pub fn find(variable: impl Fn(&str) -> Option<String>) -> Option<PanelEndpoint> {
         let named = variable("GLURAY_PANEL").zip(variable("GLURAY_PANEL_SECRET"));
         let endpoint = match named {
@@ -116,7 +115,7 @@ impl PanelEndpoint {
         endpoint.address.ip().is_loopback().then_some(endpoint)
     }
 
-    /// Reads a file, if it is believable.
+    /// Reads a file if it can be trusted.
     pub fn read(path: &Path) -> Option<PanelEndpoint> {
         use std::io::Read;
         let (file, about) = folders::open_own(path)?;
@@ -128,8 +127,8 @@ impl PanelEndpoint {
         serde_json::from_str::<PanelEndpoint>(&text).ok().filter(|m| m.address.ip().is_loopback())
     }
 
-    /// Writes the file into a folder, which is made when it is not there. It is removed when the
-    /// guard goes.
+    /// Writes the file into a folder, which is created if it is missing. The file is removed when
+    /// the guard is dropped.
     pub fn publish(&self, folder: &Path) -> Result<EndpointFile, PanelEndpointError> {
         let io = |path: &Path| {
             let path = path.to_path_buf();
@@ -148,7 +147,7 @@ impl PanelEndpoint {
         let path = file_in(folder);
         let temporary = folder.join(format!("panel.{}.partial", std::process::id()));
         let write = || -> io::Result<()> {
-            // What an earlier process of this number left.
+            // Removes the leftover of an earlier process with the same id.
             let _ = std::fs::remove_file(&temporary);
             let mut file = std::fs::OpenOptions::new()
                 .write(true)
@@ -163,12 +162,12 @@ impl PanelEndpoint {
     }
 }
 
-/// The meeting's file in a folder.
+/// The endpoint file in a folder.
 pub fn file_in(folder: &Path) -> PathBuf {
     folder.join("panel.json")
 }
 
-/// A published meeting.
+/// A published endpoint.
 #[derive(Debug)]
 pub struct EndpointFile {
     path: PathBuf,

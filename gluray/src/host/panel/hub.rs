@@ -8,13 +8,13 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::sync::{mpsc, watch};
 
-/// Frames that are remembered of each program: a minute at ten a second.
+/// The number of frames kept per program: a minute at ten per second.
 pub const HISTORY: usize = 600;
 /// Frames in the state: what came while the page was drawing.
 const RECENT: usize = 20;
-/// Ended programs that stay on the list.
+/// The number of ended programs that stay on the list.
 const ENDED: usize = 8;
-/// Most assignments of the panel for one program.
+/// The largest number of the panel's assignments for one program.
 const MAX_ASSIGNMENTS: usize = 20_000;
 
 /// A program, as the page sees it.
@@ -24,23 +24,23 @@ pub struct Program {
     pub id: u64,
     /// Its name.
     pub program: String,
-    /// Its process.
+    /// Its process id.
     pub process: u32,
     /// False once it is gone.
     pub running: bool,
-    /// Settings it has now.
+    /// Its current settings.
     pub settings: Settings,
-    /// Settings it had before anybody touched the panel.
+    /// Its settings before any change in the panel.
     pub base: Settings,
-    /// What was changed here.
+    /// The changes made in the panel.
     pub assignments: BTreeMap<String, Value>,
-    /// What was wrong in its files and environment, and what it refused.
+    /// Errors in its files and environment, and refused settings.
     pub problems: Vec<String>,
     /// Paths of settings it obeys; empty for all.
     pub obeys: Vec<String>,
     /// Its objects, largest first.
     pub objects: Vec<ObjectInfo>,
-    /// How many there are in all.
+    /// The total number of its objects.
     pub objects_total: u64,
     /// The file that its scene was written to last, or why there is none.
     pub exported: Option<Result<String, String>>,
@@ -61,7 +61,7 @@ struct Inner {
     last_id: u64,
 }
 
-/// Why something cannot be done.
+/// The reason why an operation is impossible.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum HubError {
     /// No such program.
@@ -73,7 +73,7 @@ pub enum HubError {
     /// Too many changes.
     #[error("more than {MAX_ASSIGNMENTS} changes; save them in a file and start the program again")]
     TooMany,
-    /// Settings that make no sense.
+    /// Invalid settings.
     #[error("{0}")]
     Setting(String),
 }
@@ -81,7 +81,7 @@ pub enum HubError {
 /// All programs, shared between the link and the page.
 pub struct Hub {
     inner: Mutex<Inner>,
-    /// Counts changes; who waits for news waits here.
+    /// Counts changes. Clients that wait for an update wait on this channel.
     pub changes: watch::Sender<u64>,
 }
 
@@ -101,7 +101,7 @@ impl Hub {
         self.changes.send_modify(|n| *n += 1);
     }
 
-    /// A program has come. Its messages go through the receiver.
+    /// Adds a program. The receiver gets the messages to it.
     pub fn register(&self, hello: Hello) -> (u64, mpsc::Receiver<ToProgram>) {
         let (outgoing, receiver) = mpsc::channel(32);
         let mut inner = self.lock();
@@ -136,7 +136,7 @@ impl Hub {
         (id, receiver)
     }
 
-    /// A program said something.
+    /// Handles a message from a program.
     pub fn handle_message(&self, id: u64, message: ToPanel) {
         let mut inner = self.lock();
         let Some(e) = inner.programs.get_mut(&id) else { return };
@@ -164,7 +164,7 @@ impl Hub {
         self.notify();
     }
 
-    /// A program is gone. The last few stay on the list.
+    /// Marks a program as ended. The last few ended programs stay on the list.
     pub fn unregister(&self, id: u64) {
         let mut inner = self.lock();
         if let Some(e) = inner.programs.get_mut(&id) {
@@ -178,7 +178,7 @@ impl Hub {
         self.notify();
     }
 
-    /// Number of programs that run.
+    /// The number of running programs.
     pub fn running(&self) -> usize {
         self.lock().programs.values().filter(|e| e.shown.running).count()
     }
@@ -192,12 +192,13 @@ impl Hub {
         inner.programs.values().map(|e| Program { recent: recent(e), ..e.shown.clone() }).collect()
     }
 
-    /// The frames remembered of a program.
+    /// The frames kept of a program.
     pub fn history(&self, id: u64) -> Option<Vec<FrameStats>> {
         self.lock().programs.get(&id).map(|e| e.history.iter().cloned().collect())
     }
 
-    /// Sets some settings and takes changes of others back; all or nothing.
+    /// Sets some settings and reverts changes of others. Either all of it succeeds or nothing
+    /// changes.
     pub fn change(
         &self,
         id: u64,
@@ -233,7 +234,7 @@ impl Hub {
         Ok(())
     }
 
-    /// Asks a program for its scene.
+    /// Asks a program to export its scene.
     pub fn export(&self, id: u64) -> Result<(), HubError> {
         let mut inner = self.lock();
         let e =
@@ -243,7 +244,7 @@ impl Hub {
         Ok(())
     }
 
-    /// What was changed here, as a section of the settings' file.
+    /// The changes made in the panel, as a section of the settings file.
     pub fn toml(&self, id: u64) -> Result<String, HubError> {
         let inner = self.lock();
         let e = inner.programs.get(&id).ok_or(HubError::Gone(id))?;
