@@ -6,37 +6,49 @@ use std::process::Command;
 
 const REST: &str = r#"
 #![allow(dead_code)]
-mod arrays {
-    pub(crate) enum Which { Range { first: usize, count: usize } }
-    impl Which {
-        pub(crate) fn indexed(_: &[u8], _: usize, _: i32, _: Option<u32>) -> Result<Which, &'static str> {
-            Err("none")
-        }
-        pub(crate) fn span(&self) -> (usize, usize) {
-            let Which::Range { first, count } = self;
-            (*first, *count)
-        }
-    }
-}
 mod capture {
-    pub(crate) struct Packed {
-        pub(crate) bytes: Vec<u8>,
-        pub(crate) kind: u32,
-        pub(crate) size: usize,
-        pub(crate) normalized: bool,
+    pub(crate) mod draw {
+        pub(crate) struct PackedArray {
+            pub(crate) bytes: Vec<u8>,
+            pub(crate) kind: u32,
+            pub(crate) size: usize,
+            pub(crate) normalized: bool,
+        }
+        pub(crate) fn component_bytes(_: u32) -> usize { 4 }
     }
-    pub(crate) fn component_bytes(_: u32) -> usize { 4 }
+    pub(crate) mod vertex_arrays {
+        pub(crate) enum VertexSelection { Range { first: usize, count: usize } }
+        impl VertexSelection {
+            pub(crate) fn indexed(
+                _: &[u8], _: usize, _: i32, _: Option<u32>,
+            ) -> Result<VertexSelection, &'static str> {
+                Err("none")
+            }
+            pub(crate) fn span(&self) -> (usize, usize) {
+                let VertexSelection::Range { first, count } = self;
+                (*first, *count)
+            }
+        }
+    }
 }
-mod real {
-    pub(crate) mod gl {
-        pub(crate) fn int(_: u32) -> i32 { 0 }
-        pub(crate) fn word(_: u32) -> u32 { 0 }
-        pub(crate) fn pointer(_: u32) -> usize { 0 }
-        pub(crate) fn vertex_attrib_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
-        pub(crate) fn vertex_attrib_address(_: u32) -> usize { 0 }
-        pub(crate) fn bind_buffer(_: u32, _: u32) {}
-        pub(crate) fn buffer_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
-        pub(crate) fn buffer_bytes(_: u32, _: usize, bytes: usize) -> Vec<u8> { vec![0; bytes] }
+mod state {
+    #[path = ENUMS]
+    pub(crate) mod enums;
+}
+mod interpose {
+    #[path = CLIENT_MEMORY]
+    pub(crate) mod client_memory;
+    pub(crate) mod driver {
+        pub(crate) mod gl {
+            pub(crate) fn int(_: u32) -> i32 { 0 }
+            pub(crate) fn word(_: u32) -> u32 { 0 }
+            pub(crate) fn pointer(_: u32) -> usize { 0 }
+            pub(crate) fn vertex_attrib_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
+            pub(crate) fn vertex_attrib_address(_: u32) -> usize { 0 }
+            pub(crate) fn bind_buffer(_: u32, _: u32) {}
+            pub(crate) fn buffer_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
+            pub(crate) fn buffer_bytes(_: u32, _: usize, n: usize) -> Vec<u8> { vec![0; n] }
+        }
     }
 }
 "#;
@@ -46,13 +58,15 @@ fn said_of(code: &str) -> String {
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("lib.rs");
-    let module =
-        |name: &str| format!("#[path = {:?}]\nmod {name};\n", sources.join(format!("{name}.rs")));
+    let path = |name: &str| format!("{:?}", sources.join(name));
+    let rest = REST
+        .replace("ENUMS", &path("state/enums.rs"))
+        .replace("CLIENT_MEMORY", &path("interpose/client_memory.rs"));
     let safe = format!(
         "mod safe {{\n#![forbid(unsafe_code)]\nuse crate::interpose::client_memory::*;\nuse \
          std::borrow::Cow;\n{code}\n}}\n"
     );
-    let text = [REST, &module("enums"), &module("client_memory"), &safe].concat();
+    let text = rest + &safe;
     std::fs::write(&file, text).expect("written");
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut command = Command::new(rustc);
@@ -76,7 +90,7 @@ fn said_of(code: &str) -> String {
 #[test]
 fn safe_code_reads_what_a_call_names() {
     let said = said_of(
-        "fn read(call: &Call<'_>, source: &Source) -> Vec<u8> {
+        "fn read(call: &ActiveCall<'_>, source: &ArraySource) -> Vec<u8> {
             let elements = Elements::of(call, None).unwrap();
             source.view(&elements).unwrap().into_owned()
         }",
@@ -91,19 +105,19 @@ fn safe_code_cannot_read_an_address_of_its_own_or_longer_than_the_call_lasts() {
         ("E0133", "fn f() -> [f32; 4] { floats(16) }"),
         ("E0133", "fn f() -> [f64; 4] { doubles(16) }"),
         ("E0133", "fn f() -> [i32; 4] { ints(16) }"),
-        ("E0133", "fn f() -> Call<'static> { Call::new(Named::Element(0)) }"),
-        ("E0423", "fn f(layout: Layout) -> Source { Source(layout) }"),
-        ("E0594", "fn f(mut source: Source) { source.address = 16; }"),
+        ("E0133", "fn f() -> ActiveCall<'static> { ActiveCall::new(DrawArguments::Element(0)) }"),
+        ("E0423", "fn f(layout: ArrayLayout) -> ArraySource { ArraySource(layout) }"),
+        ("E0594", "fn f(mut source: ArraySource) { source.address = 16; }"),
         (
             "E0515",
-            "fn f(call: Call<'_>, source: &Source) -> Cow<'static, [u8]> {
+            "fn f(call: ActiveCall<'_>, source: &ArraySource) -> Cow<'static, [u8]> {
                 let elements = Elements::of(&call, None).unwrap();
                 source.view(&elements).unwrap()
             }",
         ),
         (
             "E0505",
-            "fn f(call: Call<'_>, source: &Source) -> usize {
+            "fn f(call: ActiveCall<'_>, source: &ArraySource) -> usize {
                 let bytes = source.view(&Elements::of(&call, None).unwrap()).unwrap();
                 drop(call);
                 bytes.len()
