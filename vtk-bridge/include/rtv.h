@@ -58,7 +58,7 @@ typedef struct RtvArray {
   /* One of RTV_U8 to RTV_I64, or RTV_NONE. */
   uint32_t kind;
 } RtvArray;
-/* Cell i is connectivityoffsetsi .. offsetsi + 1. */
+/* Cell i is connectivity[offsets[i] .. offsets[i + 1]]. */
 typedef struct RtvCells {
   /* One more than the number of cells. */
   RtvArray offsets;

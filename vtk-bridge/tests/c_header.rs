@@ -96,6 +96,12 @@ fn header(sources: &[&str]) -> String {
                     if let Some(text) = lines[i].trim().strip_prefix("/// ") {
                         comment.push(text);
                     } else if let Some(field) = lines[i].trim().strip_prefix("pub ") {
+                        // rustfmt breaks long fields.
+                        let mut field = field.to_owned();
+                        while !field.ends_with(',') {
+                            i += 1;
+                            field = field + " " + lines[i].trim();
+                        }
                         describe(&mut out, "  ", &comment);
                         writeln!(out, "  {};", declaration(field.trim_end_matches(',')))
                             .expect("to a string");
@@ -136,7 +142,8 @@ fn header(sources: &[&str]) -> String {
 
 fn describe(out: &mut String, indent: &str, comment: &[&str]) {
     if !comment.is_empty() {
-        let text = comment.join(" ").replace(['[', ']', '`'], "");
+        // Brackets of links go, those of formulas stay.
+        let text = comment.join(" ").replace("[`", "").replace("`]", "").replace('`', "");
         writeln!(out, "{indent}/* {text} */").expect("to a string");
     }
 }
