@@ -35,7 +35,7 @@ fn list_names_meshes_lines_and_flows_with_their_sizes() {
     let dir = tempfile::tempdir().unwrap();
     let list = json(dir.path(), &["list"]);
     let find = |name: &str| list.as_array().unwrap().iter().find(|e| e["name"] == name).cloned();
-    for (name, kind) in [("wavelet", "mesh"), ("star", "lines"), ("wedge", "flow")] {
+    for (name, kind) in [("wavelet", "mesh"), ("star-field-lines", "lines"), ("wedge", "flow")] {
         let entry = find(name).unwrap_or_else(|| panic!("{name} is missing from {list}"));
         assert_eq!(entry["kind"], kind, "{name}");
         assert!(entry["sizes"][0]["elements"].as_u64() > Some(0), "{name}");
@@ -83,7 +83,7 @@ fn a_flow_keeps_its_fields_and_has_an_isosurface() {
 #[test]
 fn lines_keep_their_radius() {
     let dir = tempfile::tempdir().unwrap();
-    json(dir.path(), &["make", "star"]);
+    json(dir.path(), &["make", "star-field-lines", "--size", "small"]);
     let file = std::fs::read_dir(dir.path()).unwrap().next().expect("a file").unwrap().path();
     let info = json(dir.path(), &["info", file.to_str().unwrap()]);
     assert_eq!(arrays(&info), ["scalars", "radius"]);
