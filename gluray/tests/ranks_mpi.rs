@@ -8,29 +8,29 @@ use gluray::report::Report;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Far beyond what any step needs, on a slow and busy machine too; a hang fails here.
 const BOUND: Duration = Duration::from_secs(100);
 
-fn wait(what: &str, mut done: impl FnMut() -> bool) {
-    let begin = Instant::now();
-    while !done() {
-        assert!(begin.elapsed() < BOUND, "{what}: not after {} s", BOUND.as_secs());
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
+/// The jobs take turns: ranks poll while they wait, and six of them leave two cores nothing.
+static ONE_JOB: Mutex<()> = Mutex::new(());
 
 /// `mpirun -n 3 gluray serve-rays --mpi`, which ends with this value.
 struct Job {
     launcher: Child,
     sockets: Vec<PathBuf>,
+    /// What the launcher and its ranks print.
+    log: PathBuf,
 }
 
 impl Job {
     fn start(mpirun: &Path, place: &Path) -> Job {
         let first = place.join("rays");
         let sockets = vec![first.clone(), place.join("rays.1"), place.join("rays.2")];
+        let log = place.join("job.log");
+        let output = std::fs::File::options().create(true).append(true).open(&log).expect("a log");
         let launcher = Command::new(mpirun)
             .args([
                 "-n",
@@ -50,16 +50,38 @@ impl Job {
             ])
             .envs([("OMPI_MCA_hwloc_base_binding_policy", "none"), ("OMPI_MCA_btl", "self,vader")])
             .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
+            .stdout(output.try_clone().expect("a log"))
+            .stderr(output)
             .spawn()
             .expect("mpirun starts");
-        let mut job = Job { launcher, sockets };
-        wait("the job is there", || {
-            assert!(job.launcher.try_wait().expect("a child").is_none(), "the job ended at once");
+        let mut job = Job { launcher, sockets, log };
+        job.wait("the job is there", |job| {
+            assert!(!job.has_ended(), "it ended at once: {}", job.state());
             job.sockets.iter().all(|s| UnixStream::connect(s).is_ok())
         });
         job
+    }
+
+    fn wait(&mut self, what: &str, done: impl Fn(&mut Job) -> bool) {
+        let begin = Instant::now();
+        while !done(self) {
+            let late = begin.elapsed() >= BOUND;
+            assert!(!late, "{what}: not after {} s: {}", BOUND.as_secs(), self.state());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    fn has_ended(&mut self) -> bool {
+        self.launcher.try_wait().expect("a child").is_some()
+    }
+
+    /// What a reader of a failure needs: which ranks run, which sockets answer, what was printed.
+    fn state(&self) -> String {
+        let ranks: Vec<String> = self.ranks().iter().map(|pid| status(*pid)).collect();
+        let answer = |s: &PathBuf| UnixStream::connect(s).map_err(|e| e.kind());
+        let sockets: Vec<_> = self.sockets.iter().map(answer).collect();
+        let printed = std::fs::read_to_string(&self.log).unwrap_or_default();
+        format!("ranks {ranks:?}, sockets {sockets:?}, printed:\n{printed}")
     }
 
     fn places(&self) -> String {
@@ -84,6 +106,14 @@ impl Job {
         }
         pids
     }
+}
+
+/// Name, state and the kernel function that a process waits in.
+fn status(pid: i32) -> String {
+    let read = |what: &str| std::fs::read_to_string(format!("/proc/{pid}/{what}"));
+    let lines = read("status").unwrap_or_default();
+    let state = lines.lines().find(|l| l.starts_with("State:")).unwrap_or("gone");
+    format!("{pid} {state} in {}", read("wchan").unwrap_or_default())
 }
 
 fn signal(pid: i32, name: &str) {
@@ -126,6 +156,7 @@ fn picture(x: &Xvfb, python: &Path, sockets: Option<&str>) -> (Picture, Report) 
 }
 
 fn a_job_helps(mpirun: &Path) {
+    let _turn = ONE_JOB.lock().unwrap_or_else(PoisonError::into_inner);
     let (Some(_), Some(x)) = (peer("RTSV_PVBATCH"), Xvfb::start()) else { return };
     let Some(python) = peer("RTSV_SYSTEM_PYTHON") else { return };
     let (one, _) = picture(&x, &python, None);
@@ -145,8 +176,8 @@ fn a_job_helps(mpirun: &Path) {
     let ranks = job.ranks();
     assert_eq!(ranks.len(), 3);
     signal(ranks[1], "KILL");
-    wait("the job ends", || job.launcher.try_wait().expect("a child").is_some());
-    wait("its ranks end", || job.ranks().is_empty());
+    job.wait("the job ends", Job::has_ended);
+    job.wait("its ranks end", |job| job.ranks().is_empty());
     let (alone, report) = picture(&x, &python, Some(&job.places()));
     assert!(one.pixels == alone.pixels, "{report:?}");
     assert_eq!(
@@ -160,8 +191,8 @@ fn a_job_helps(mpirun: &Path) {
     let (many, report) = picture(&x, &python, Some(&job.places()));
     assert!(one.pixels == many.pixels && report.problems.is_empty(), "{report:?}");
     signal(job.launcher.id() as i32, "INT");
-    wait("Ctrl-C ends the job", || job.launcher.try_wait().expect("a child").is_some());
-    wait("its ranks end", || job.ranks().is_empty());
+    job.wait("Ctrl-C ends the job", Job::has_ended);
+    job.wait("its ranks end", |job| job.ranks().is_empty());
 }
 
 #[test]
