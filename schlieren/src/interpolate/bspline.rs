@@ -1,4 +1,4 @@
-//! Prefiltered cubic B-spline: C2, 64 taps.
+//! Interpolation by a prefiltered cubic B-spline: C2, 64 taps.
 
 use super::{
     Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, prefilter_line,
@@ -9,8 +9,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 use rayon::prelude::*;
 
-/// The natural cubic spline through the nodes. Sigworth's rule of thumb holds: where the field is
-/// resolved at all, its error is hundreds of times smaller than that of trilinear gradients.
+/// The natural cubic spline through the nodes. Wherever the field is resolved, its error is
+/// hundreds of times smaller than that of trilinear gradients (Sigworth's rule of thumb).
 #[derive(Debug)]
 pub struct BSpline {
     /// Coefficients of nodes -1 ..= n along each axis.
@@ -25,14 +25,16 @@ impl BSpline {
         BSpline::in_jobs_of(field, 1)
     }
 
-    /// [`BSpline::new`] on the calling thread alone, bit for bit the same: for who holds a lock. A
-    /// worker that waits inside rayon may take any other job, one that waits for this lock as well.
+    /// [`BSpline::new`] on the calling thread alone, with the same result bit for bit. Callers that
+    /// hold a lock need this: a worker that waits inside rayon may take any other job, also one
+    /// that waits for the same lock.
     pub(crate) fn on_this_thread(field: &Field) -> BSpline {
-        // Rayon does not divide what is shorter, and what is not divided runs where it is called.
+        // Rayon does not divide ranges that are shorter than this minimum, and an undivided range
+        // runs on the calling thread.
         BSpline::in_jobs_of(field, usize::MAX)
     }
 
-    /// In jobs of at least so many layers or sheets.
+    /// [`BSpline::new`] in rayon jobs of at least `least` layers or sheets.
     fn in_jobs_of(field: &Field, least: usize) -> BSpline {
         let [nx, ny, nz] = field.dims();
         let row = padded_row(nx + 2);
@@ -59,8 +61,8 @@ impl BSpline {
         });
 
         // Along z, a sheet of rows with the same y at a time, again in f64: two roundings to f32 in
-        // all. (Eliminating layer by layer in place saves this copy, and puts a rounding into every
-        // step of the recursion: a uniform gas then had slopes of a last digit.)
+        // all. (Elimination layer by layer in place would save this copy, but it rounds in every
+        // step of the recursion, so that a uniform gas gets slopes of one unit in the last place.)
         let sheets: Vec<Vec<f32>> = (0..ny + 2)
             .into_par_iter()
             .with_min_len(least)
@@ -103,15 +105,14 @@ impl BSpline {
         }
     }
 
-    /// The coefficients, of nodes -1 ..= n along each axis, and the distances of neighbours along y
-    /// and z.
+    /// The coefficients of nodes -1 ..= n along each axis, and the strides along y and z.
     pub(crate) fn coefficients(&self) -> (&[f32], [usize; 2]) {
         (&self.coefficients, self.stride)
     }
 }
 
-/// [`prefilter_line`] along the second axis of a plane, all columns at once: the same elimination,
-/// row by row.
+/// [`prefilter_line`] along the second axis of a plane. It does the same elimination row by row,
+/// for all columns at once.
 fn prefilter_rows(plane: &mut [f64], row: usize) {
     let n = plane.len() / row - 2;
     let pass = |plane: &mut [f64], out: usize, other: usize, f: &dyn Fn(f64, f64) -> f64| {
@@ -125,7 +126,7 @@ fn prefilter_rows(plane: &mut [f64], row: usize) {
             *a = f(*a, *b);
         }
     };
-    // Values are in rows 1..=n; the first and the last stay.
+    // Values are in rows 1..=n; the first and the last of them stay unchanged.
     let mut ratio = vec![0.0; n + 1];
     let mut pivot = 4.0;
     for i in 2..n {
@@ -147,7 +148,7 @@ fn prefilter_rows(plane: &mut [f64], row: usize) {
     pass(plane, n + 1, n - 1, &|a, b| a - b);
 }
 
-/// Weights of the four coefficients around a cell at place `t` in it, and of their three
+/// Weights of the four coefficients around a cell at position `t` in 0..1, and of their three
 /// differences for the derivative.
 pub(crate) fn weights(t: f64) -> ([f64; 4], [f64; 3]) {
     let s = 1.0 - t;
@@ -168,7 +169,7 @@ impl Interpolate for BSpline {
         let [(i, x), (j, y), (k, z)] = [0, 1, 2].map(|c| cell(at[c], self.dims[c]));
         let [(wx, dx), (wy, dy), (wz, dz)] = [weights(x), weights(y), weights(z)];
         let [sy, sz] = self.stride;
-        // Along x: value and derivative of each of the sixteen rows.
+        // Along x: value and derivative in each of the sixteen rows.
         let mut rows = [[(0.0, 0.0); 4]; 4];
         for (dk, rows) in rows.iter_mut().enumerate() {
             for (dj, row) in rows.iter_mut().enumerate() {
@@ -233,7 +234,7 @@ pub(crate) fn weights16<S: Simd>(simd: S, t: f32x16<S>) -> ([f32x16<S>; 4], [f32
     (w, [s2 * half, t.mul_add(s, half), t2 * half])
 }
 
-/// The 4x4 taps of a layer, two rows a vector.
+/// The 4x4 taps of a layer, two rows per vector.
 #[inline(always)]
 fn layer<S: Simd>(simd: S, rows: &[&[f32]; 4], at: usize) -> [f32x8<S>; 2] {
     let r0 = f32x4::from_slice(simd, &rows[0][at..at + 4]);
@@ -261,12 +262,13 @@ impl Interpolate16 for BSplineRows<'_> {
         let dy: [Row; 3] = [dy[0].into(), dy[1].into(), dy[2].into()];
         let dz: [Row; 3] = [dz[0].into(), dz[1].into(), dz[2].into()];
 
-        // Along z and y, a ray at a time; what is left is four numbers along x, thrice.
+        // Along z and y, one ray at a time. Four numbers along x remain for each of value, y slope
+        // and z slope.
         let mut value = [0.0f32; 4 * LANES];
         let mut along_y = [0.0f32; 4 * LANES];
         let mut along_z = [0.0f32; 4 * LANES];
-        // Cut to one length here, where the compiler can see it: then one check is enough for a
-        // layer's four rows.
+        // The compiler sees here that the slices have one length, so one bounds check is enough for
+        // a layer's four rows.
         let len = self.rows[0].len();
         let rows = [self.rows[0], &self.rows[1][..len], &self.rows[2][..len], &self.rows[3][..len]];
         for l in 0..LANES {

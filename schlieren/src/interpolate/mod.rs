@@ -1,4 +1,4 @@
-//! eps and its gradient between the nodes.
+//! Evaluates eps and its gradient anywhere in a field, with one of three interpolants.
 //!
 //! | interpolant | smoothness | bytes/node | error of deflection, OPD for a Gaussian of 10 voxels' sigma (`interpolation_errors_are_those_on_record`) |
 //! |---|---|---|---|
@@ -6,7 +6,7 @@
 //! | [`Trilinear`] | C0 | 4 | 1e-2, 4e-4 |
 //! | [`TrilinearGradient`] | C0, gradient C0 | 16 | 2e-3, 4e-4 |
 //!
-//! All work in lattice coordinates: 0 at the first node along each axis, 1 at the next. Points
+//! All of them take lattice coordinates: 0 at the first node along each axis, 1 at the next. Points
 //! outside the lattice get the value and the gradient of the nearest point on its surface.
 
 mod bspline;
@@ -24,25 +24,25 @@ pub use trilinear_gradient::TrilinearGradient;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16};
 
-/// Which interpolant.
+/// How eps and its gradient are interpolated between the nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Interpolant {
     /// Prefiltered cubic B-spline: the default.
     #[default]
     BSpline,
-    /// Trilinear eps, and the gradient of that: for previews.
+    /// Trilinear eps and the exact gradient of that interpolant: for previews.
     Trilinear,
-    /// Trilinear interpolation of eps and of its central differences: the dissertation's.
+    /// Trilinear interpolation of eps and of its central differences, as in the dissertation.
     TrilinearGradient,
 }
 
-/// Rays of a packet.
+/// Number of rays in a packet.
 pub(crate) const LANES: usize = 16;
 
 /// One value for each ray of a packet.
 pub(crate) type Row = [f32; LANES];
 
-/// A point's eps, and its gradient per lattice step.
+/// The value of eps at a point, and its gradient per lattice step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// eps = n/n0 - 1.
@@ -51,35 +51,38 @@ pub struct Sample {
     pub gradient: [f64; 3],
 }
 
-/// The same for the sixteen rays of a packet.
+/// [`Sample`] for the sixteen rays of a packet.
 pub(crate) struct Samples<S: Simd> {
     pub(crate) eps: f32x16<S>,
     pub(crate) gradient: [f32x16<S>; 3],
 }
 
-/// The reference: one point in `f64`.
+/// Interpolation of one point in `f64`: the reference for the kernels.
 pub trait Interpolate: Sync {
-    /// At a point in lattice coordinates.
+    /// Value and gradient at a point in lattice coordinates.
     fn sample(&self, at: [f64; 3]) -> Sample;
 
-    /// Nodes along x, y and z.
+    /// Number of nodes along x, y and z.
     fn dims(&self) -> [usize; 3];
 
-    /// Bytes held beside the field's own.
+    /// Memory of the interpolant in bytes, without the field's own arrays.
     fn memory_bytes(&self) -> usize;
 }
 
-/// The kernels: sixteen points in `f32`. Implementors borrow an interpolant's arrays, so that
-/// bounds are checked once a point.
+/// Interpolation of sixteen points in `f32`, for the kernels. Implementors borrow an interpolant's
+/// arrays, so that bounds are checked once per point.
 pub(crate) trait Interpolate16: Copy + Sync {
-    /// Accurate enough for sums over hundreds of samples to be compensated.
+    /// Whether the samples are accurate enough that compensated (Kahan) summation over hundreds of
+    /// them is worth its cost.
     const EXACT: bool;
 
-    /// At points in lattice coordinates, which may lie outside (but are no NaNs).
+    /// Values and gradients at points in lattice coordinates. Points may lie outside the lattice;
+    /// NaN is not allowed.
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S>;
 }
 
-/// The cell of a coordinate, the lower one at 0 and the last one at n - 1, and the place in it.
+/// The cell that holds a coordinate, and the position in that cell in 0..1. Coordinates are clamped
+/// to the lattice; the last cell includes the coordinate n - 1.
 pub(crate) fn cell(at: f64, nodes: usize) -> (usize, f64) {
     let at = at.clamp(0.0, (nodes - 1) as f64);
     let i = (at as usize).min(nodes - 2);
@@ -87,7 +90,7 @@ pub(crate) fn cell(at: f64, nodes: usize) -> (usize, f64) {
 }
 
 /// [`cell`] along x, y and z for sixteen rays. `last` and `last_cell` are n - 1 and n - 2 along
-/// each.
+/// each axis.
 #[inline(always)]
 pub(crate) fn cells16<S: Simd>(
     simd: S,
@@ -105,14 +108,15 @@ pub(crate) fn cells16<S: Simd>(
     (cells, place)
 }
 
-/// Four numbers for each of sixteen rays, ray by ray, as four vectors over the rays.
+/// Transposes sixteen groups of four numbers, one group per ray, into four vectors with one lane
+/// per ray.
 #[inline(always)]
 pub(crate) fn transpose<S: Simd>(simd: S, rays: &[f32; 4 * LANES]) -> [f32x16<S>; 4] {
     let a = f32x16::from_slice(simd, &rays[..16]);
     let b = f32x16::from_slice(simd, &rays[16..32]);
     let c = f32x16::from_slice(simd, &rays[32..48]);
     let d = f32x16::from_slice(simd, &rays[48..]);
-    // Components 0, 2 and 1, 3 apart, then each other.
+    // First separates components 0, 2 from 1, 3, then each pair.
     let ((ab02, ab13), (cd02, cd13)) = (a.deinterleave(b), c.deinterleave(d));
     let ((q0, q2), (q1, q3)) = (ab02.deinterleave(cd02), ab13.deinterleave(cd13));
     [q0, q1, q2, q3]

@@ -1,10 +1,10 @@
-//! From values at the nodes to the coefficients of the cubic B-spline through them.
+//! Computes the coefficients of the cubic B-spline through given values at the nodes.
 
-/// Coefficients `c` with `(c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i]`, in place, for the natural spline:
-/// second derivatives vanish at both ends, so that straight lines stay straight. `line[0]` and
-/// `line[n+1]` are the coefficients outside; the values come in `line[1..=n]`.
+/// Replaces the values `v` in `line[1..=n]` by the coefficients `c` of the natural spline, with
+/// `(c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i]`. Its second derivative vanishes at both ends, so that
+/// straight lines stay straight. `line[0]` and `line[n+1]` receive the coefficients outside.
 ///
-/// (Mirrored ends, the usual choice for images, would force the gradient to zero at the field's
+/// (Mirrored ends, which are usual for images, would force the gradient to zero at the field's
 /// faces.)
 pub(crate) fn prefilter_line(line: &mut [f64]) {
     let n = line.len() - 2;

@@ -1,4 +1,4 @@
-//! Trilinear eps, and the gradient of that: eight taps.
+//! Trilinear interpolation of eps, with the exact gradient of the interpolant: eight taps.
 
 use super::{Interpolate, Interpolate16, LANES, Sample, Samples, cell, cells16};
 use crate::field::Field;
@@ -6,24 +6,25 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, u64x8};
 use std::borrow::Cow;
 
-/// Trilinear interpolation. Its gradient jumps from cell to cell, so shadowgraphs through it are
-/// wrong by most of their contrast; deflections are right within a few percent.
+/// Trilinear interpolation. Its gradient jumps between cells, so the contrast of shadowgraphs is
+/// mostly wrong; deflections are right within a few percent.
 #[derive(Debug)]
 pub struct Trilinear<'a> {
     values: Cow<'a, [f32]>,
     dims: [usize; 3],
-    /// Distance of neighbours along y and z in `values`.
+    /// Strides along y and z in `values`.
     stride: [usize; 2],
 }
 
 impl<'a> Trilinear<'a> {
-    /// Over a field, which is copied only when its rows would compete for the same lines of the
-    /// cache.
+    /// Interpolates a field. The field is copied only when its rows would map to the same cache
+    /// lines.
     pub fn new(field: &'a Field) -> Trilinear<'a> {
         Trilinear::of(Cow::Borrowed(field.eps()), field.dims())
     }
 
-    /// Over any values at the nodes of a lattice, x fastest, at least two nodes along each axis.
+    /// Interpolates any values at the nodes of a lattice, x fastest, with at least two nodes along
+    /// each axis.
     pub(crate) fn of(values: Cow<'a, [f32]>, [nx, ny, nz]: [usize; 3]) -> Trilinear<'a> {
         let (row, layer) = (padded_row(nx), ny);
         if row == nx {
@@ -60,7 +61,8 @@ impl<'a> Trilinear<'a> {
     }
 }
 
-/// Rows of a power of two in length put a column of the lattice into a few lines of the cache.
+/// Length of a row with padding. With rows of a power of two, a column of the lattice would map to
+/// a few cache sets.
 pub(super) fn padded_row(nx: usize) -> usize {
     if nx.is_multiple_of(64) { nx + 16 } else { nx }
 }
@@ -98,8 +100,8 @@ impl Interpolate for Trilinear<'_> {
     }
 }
 
-/// The lattice as four slices of one length, shifted by a row and a layer: one bounds check is good
-/// for all eight taps.
+/// The lattice as four slices of one length, shifted by a row and a layer, so that one bounds check
+/// serves all eight taps.
 #[derive(Clone, Copy)]
 pub(crate) struct TrilinearRows<'a> {
     corners: [&'a [f32]; 4],
@@ -113,7 +115,7 @@ impl Interpolate16 for TrilinearRows<'_> {
 
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
-        // Cells and places in them.
+        // Cells and positions in them.
         let (cells, place) = cells16(simd, at, self.last, self.last_cell);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
@@ -121,7 +123,8 @@ impl Interpolate16 for TrilinearRows<'_> {
         // Taps.
         let [[a0, a1], [b0, b1], [c0, c1], [d0, d1]] = taps(simd, &self.corners, &offsets);
 
-        // Differences first, so that the gradient is not a difference of interpolated values.
+        // Differences are taken first, so that the gradient is not a difference of interpolated
+        // values.
         let [x, y, z] = place;
         let [da, db, dc, dd] = [a1 - a0, b1 - b0, c1 - c0, d1 - d0];
         let [a, b, c, d] =
@@ -145,7 +148,8 @@ impl Interpolate16 for TrilinearRows<'_> {
 /// load of eight bytes.
 #[inline(always)]
 fn taps<S: Simd>(simd: S, corners: &[&[f32]; 4], offsets: &[i32; LANES]) -> [[f32x16<S>; 2]; 4] {
-    // Cut to one length here, where the compiler can see it: then one check is enough for all four.
+    // The compiler sees here that the slices have one length, so one bounds check is enough for all
+    // four.
     let len = corners[0].len();
     let corners = [corners[0], &corners[1][..len], &corners[2][..len], &corners[3][..len]];
     let mut halves = [[[0u64; 8]; 2]; 4];

@@ -1,5 +1,5 @@
-//! Trilinear interpolation of eps and of its central differences at the nodes: what the
-//! dissertation keeps in a texture of four floats a voxel.
+//! Trilinear interpolation of eps and of its central differences at the nodes, which the
+//! dissertation keeps in a texture of four floats per voxel.
 
 use super::{
     Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, transpose,
@@ -10,18 +10,19 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16};
 use rayon::prelude::*;
 
-/// Gradient and eps at each node, sixteen bytes.
+/// Trilinear interpolation of the gradient and of eps, which are stored at each node in sixteen
+/// bytes.
 #[derive(Debug)]
 pub struct TrilinearGradient {
-    /// d/dx, d/dy, d/dz per lattice step, eps.
+    /// Per node: d/dx, d/dy and d/dz per lattice step, then eps.
     nodes: Vec<f32>,
     dims: [usize; 3],
-    /// Distances of neighbours along y and z, in nodes.
+    /// Strides along y and z, in nodes.
     stride: [usize; 2],
 }
 
 impl TrilinearGradient {
-    /// Takes central differences, and one-sided ones of second order at the faces, in parallel.
+    /// Computes central differences, and one-sided ones of second order at the faces, in parallel.
     pub fn new(field: &Field) -> TrilinearGradient {
         let [nx, ny, nz] = field.dims();
         let row = padded_row(nx);
@@ -114,8 +115,8 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
         let place: [Row; 3] = place.map(Into::into);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
-        // Cut to one length here, where the compiler can see it: then one check is enough for all
-        // four.
+        // The compiler sees here that the slices have one length, so one bounds check is enough for
+        // all four.
         let len = self.corners[0].len();
         let corners = [
             self.corners[0],

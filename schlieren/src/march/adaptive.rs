@@ -1,27 +1,28 @@
-//! Dormand and Prince 1980: fifth order with an error estimate that chooses the step. The oracle.
+//! The reference integrator for smooth media: Dormand and Prince 1980, fifth order with an error
+//! estimate that chooses the step.
 
 use super::integrator::{Medium, Rate, Ray};
 
 /// DOPRI5 with steps chosen so that the estimated error of each stays below a tolerance.
 ///
-/// The estimate is blind to kinks of an interpolant that a step jumps over: give `longest_step_m`
-/// about a voxel for interpolated fields.
+/// The estimate does not see the kinks of an interpolant that a step jumps over. For interpolated
+/// fields, limit `longest_step_m` to about a voxel.
 #[derive(Debug, Clone, Copy)]
 pub struct DormandPrince {
-    /// Largest error a step may have: in metres for positions and path, and for w without unit.
+    /// Largest error of a step: in metres for positions and path, without unit for w.
     pub tolerance: f64,
-    /// Longest step.
+    /// Longest step, in metres.
     pub longest_step_m: f64,
 }
 
-/// Where an adaptive run ended and what it took.
+/// The end of an adaptive run and its cost.
 #[derive(Debug, Clone, Copy)]
 pub struct AdaptiveRay {
     /// The ray at the end.
     pub ray: Ray,
-    /// Samples of the medium.
+    /// Number of samples taken of the medium.
     pub samples: u32,
-    /// Sum of the steps' estimated errors.
+    /// Sum of the estimated errors of the steps.
     pub error: f64,
 }
 
@@ -33,7 +34,7 @@ const A: [[f64; 6]; 6] = [
     [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
-/// Fifth order minus fourth.
+/// Weights of the fifth-order formula minus those of the fourth-order one.
 const E: [f64; 7] = [
     71.0 / 57600.0,
     0.0,
@@ -45,8 +46,8 @@ const E: [f64; 7] = [
 ];
 
 impl DormandPrince {
-    /// The ray after `tau_m`. `None` when the steps become too short to move the ray: the medium is
-    /// singular there.
+    /// The ray after `tau_m`, or `None` when the steps become too short to move the ray because the
+    /// medium is singular.
     pub fn run(&self, medium: &impl Medium, ray: &Ray, tau_m: f64) -> Option<AdaptiveRay> {
         let mut r = *ray;
         let end = ray.tau_m + tau_m;
@@ -54,15 +55,15 @@ impl DormandPrince {
         let mut k = [r.rate(medium); 7];
         let mut out = AdaptiveRay { ray: r, samples: 1, error: 0.0 };
         while r.tau_m < end {
-            // A step that nearly reaches the end goes there.
+            // A step that nearly reaches the end is extended to it.
             let last = r.tau_m + 1.000_001 * h >= end;
             let step = if last { end - r.tau_m } else { h };
             let mut next = r;
             for s in 0..6 {
                 let terms: [(f64, &Rate); 6] = [0, 1, 2, 3, 4, 5].map(|i| (A[s][i], &k[i]));
                 next = r.after(step, &Rate::sum(&terms[..=s]));
-                // `after` moved tau by the whole step; the stages in between are at fractions of
-                // it, whose sum the row of A is.
+                // `after` moved tau by the whole step. An intermediate Runge-Kutta stage is at a
+                // fraction of it: the sum of the row of A.
                 let fraction: f64 = A[s][..=s].iter().sum();
                 next.tau_m = r.tau_m + fraction * step;
                 k[s + 1] = next.rate(medium);

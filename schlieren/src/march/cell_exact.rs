@@ -1,18 +1,18 @@
-//! Cell by cell: steps that end on the faces of the lattice's cells, Gauss's rule between them. The
-//! reference for interpolated fields.
+//! Integrates rays cell by cell: steps end on the faces of the lattice's cells, with Gauss's rule
+//! between them. The reference for interpolated fields.
 //!
-//! Between two faces an interpolant is one polynomial; across a face something of it jumps
+//! Within a cell an interpolant is one polynomial; across a face one of its derivatives jumps
 //! (trilinear: the gradient; trilinear gradients: their slope; the cubic spline: its third
-//! derivative). An integrator that steps over a face has no order there, and an adaptive one does
-//! not notice: its estimate compares two formulas that saw the same few points
-//! (`adaptive_estimates_are_fooled_by_kinks`). Here no formula ever sees both sides.
+//! derivative). An integrator that steps over a face loses its order there. An adaptive one does
+//! not notice, because its estimate compares two formulas that use the same few points
+//! (`adaptive_estimates_are_fooled_by_kinks`). Here no step uses samples from both sides of a face.
 //!
 //! Along a straight line a trilinear function is a cubic polynomial and its gradient a quadratic
 //! one, so Gauss's rule with two points integrates both without error; the cubic spline in three
-//! variables is of degree 9, which takes five points. Bent rays take the collocation method on
-//! three Gauss points (Kuntzmann and Butcher; Hairer, Nørsett, Wanner, *Solving Ordinary
-//! Differential Equations I*, table II.7.4): order 6, symmetric, symplectic, and on a ray that is
-//! not bent it is the three-point rule.
+//! variables is of degree 9, which needs five points. Bent rays use the collocation method on three
+//! Gauss points (Kuntzmann and Butcher; Hairer, Nørsett, Wanner, *Solving Ordinary Differential
+//! Equations I*, table II.7.4): order 6, symmetric and symplectic. On a straight ray it is the
+//! three-point rule.
 
 use super::integrator::{Integrator, Medium, Rate, Ray};
 use crate::field::Field;
@@ -20,10 +20,10 @@ use glam::DVec3;
 
 /// Splits steps at the faces of a field's cells.
 ///
-/// As an [`Integrator`] it takes steps of any (positive) length; each is split where it crosses
-/// faces. A ray in a face belongs to the upper cell, as for the interpolants. A ray that is drawn
-/// into a face from both sides (a ridge of a trilinear eps) zigzags along it in thousands of steps
-/// a cell.
+/// As an [`Integrator`] it takes steps of any positive length and splits each where it crosses
+/// faces. A ray in a face belongs to the upper cell, as for the interpolants. A ray that is bent
+/// towards a face from both sides (a ridge of a trilinear eps) zigzags along it in thousands of
+/// steps per cell.
 ///
 /// ```
 /// use glam::DVec3;
@@ -63,7 +63,7 @@ pub enum Points {
 }
 
 impl Points {
-    /// Places in 0..1 and weights, whose sum is 1.
+    /// Positions in 0..1 and weights, whose sum is 1.
     fn rule(self) -> &'static [(f64, f64)] {
         const TWO: [(f64, f64); 2] =
             [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
@@ -86,12 +86,12 @@ impl Points {
 /// Integrals along a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineIntegrals {
-    /// Integral of the gradient of eps: across the line it is the deflection to first order, in
-    /// rad.
+    /// Integral of the gradient of eps. Its part across the line is the deflection to first order,
+    /// in rad.
     pub slope: DVec3,
     /// Integral of eps: the optical path difference to first order, divided by n0.
     pub path_m: f64,
-    /// Pieces of the line, each in one cell.
+    /// Number of segments of the line, each in one cell.
     pub pieces: u32,
 }
 
@@ -105,14 +105,14 @@ const A: [[f64; 3]; 3] = [
     [5.0 / 36.0 + ROOT_15 / 30.0, 2.0 / 9.0 + ROOT_15 / 15.0, 5.0 / 36.0],
 ];
 
-/// A ray this close to a face, in cells, is on it. Rounding of coordinates in the thousands is a
-/// thousandth of it.
+/// A ray closer than this to a face, in cells, counts as on it. The rounding of coordinates in the
+/// thousands is a thousandth of this.
 const ON_FACE: f64 = 1e-10;
-/// How far a step may end beyond a face, in cells.
+/// Largest distance beyond a face, in cells, at which a step may end.
 const BEYOND: f64 = 1e-11;
 
 impl CellExact {
-    /// The cells of a field.
+    /// Splits steps at the cells of `field`.
     pub fn new(field: &Field) -> CellExact {
         let d = field.dims();
         CellExact {
@@ -136,7 +136,7 @@ impl CellExact {
         length_m: f64,
         points: Points,
     ) -> LineIntegrals {
-        // Distances to all faces, each from its own number: nothing is accumulated.
+        // The distance to each face is computed from the face's index, so no rounding accumulates.
         let (from, rate) = (self.lattice(start_m), direction / self.spacing_m);
         let mut ends = vec![0.0, length_m];
         for c in 0..3 {
@@ -167,8 +167,8 @@ impl CellExact {
         out
     }
 
-    /// The cell that a ray is in, or enters when it is on a face, as its lowest and highest
-    /// coordinates. Infinite outside the lattice, where values are continued.
+    /// Lowest and highest coordinates of the cell that a ray is in, or enters when it is on a face.
+    /// Infinite outside the lattice, where values are continued.
     fn cell(&self, at: DVec3, rate: DVec3) -> [DVec3; 2] {
         let (mut low, mut high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
         for c in 0..3 {
@@ -188,9 +188,9 @@ impl CellExact {
     }
 }
 
-/// A medium as one cell has it: beyond its faces the values on them. Without this the stages of a
-/// step that is still too long would see the next cell, and where the two pull apart the equations
-/// would have no solution at all.
+/// A medium restricted to one cell: outside the cell it has the values on the cell's faces. Without
+/// this the collocation points of a step that is still too long would sample the next cell, and
+/// where the two cells bend light in opposite directions the equations would have no solution.
 struct ClampedMedium<'a, M> {
     medium: &'a M,
     low_m: DVec3,
@@ -199,20 +199,20 @@ struct ClampedMedium<'a, M> {
 
 impl<M: Medium> Medium for ClampedMedium<'_, M> {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
-        // Not `clamp`, which panics where a bound is no number.
+        // Not `clamp`, which panics when a bound is NaN.
         self.medium.sample(at_m.max(self.low_m).min(self.high_m))
     }
 }
 
-/// How far a point is outside a cell, and along which axis. Negative inside.
+/// Distance of a point outside a cell (negative inside), and the axis along which it is measured.
 fn outside([low, high]: [DVec3; 2], at: DVec3) -> (f64, usize) {
     let by = (low - at).max(at - high);
     let axis = if by.x >= by.y && by.x >= by.z { 0 } else { 1 + usize::from(by.z > by.y) };
     (by[axis], axis)
 }
 
-/// One step of the collocation method, its three equations solved by iteration: the gas is so thin,
-/// or the cell so small, that each round gains digits.
+/// One step of the collocation method. Its three equations are solved by fixed-point iteration,
+/// which converges because the gas is thin or the cell small.
 fn collocation(medium: &impl Medium, ray: &Ray, step_m: f64) -> Ray {
     const ROUNDS: u32 = 16;
     let stage = |i: usize, k: &[Rate; 3]| {
@@ -237,17 +237,16 @@ fn collocation(medium: &impl Medium, ray: &Ray, step_m: f64) -> Ray {
 }
 
 impl Integrator for CellExact {
-    /// In a medium that is smooth within each cell.
+    /// Holds for a medium that is smooth within each cell.
     const ORDER: u32 = 6;
-    /// For each round of solving the collocation's equations, in each cell.
+    /// Per iteration of the collocation equations, in each cell.
     const SAMPLES: u32 = 3;
 
     fn step(&self, medium: &impl Medium, ray: &Ray, dtau_m: f64) -> Ray {
         let end_m = ray.tau_m + dtau_m;
         let least_m = 1e-9 * self.spacing_m.min_element();
         let mut r = *ray;
-        // The number of pieces is bounded by the least step; this bound is for media that are no
-        // numbers.
+        // The least step bounds the number of segments; this bound is for media that return NaN.
         for _ in 0..1_000_000 {
             let left_m = end_m - r.tau_m;
             if left_m.is_nan() || left_m <= 0.0 {
@@ -260,8 +259,8 @@ impl Integrator for CellExact {
                 low_m: self.origin_m + (cell[0] + BEYOND) * self.spacing_m,
                 high_m: self.origin_m + (cell[1] - BEYOND) * self.spacing_m,
             };
-            // Where a straight ray leaves the cell. A bent one may fall a little short of it, and
-            // the next step makes up for that.
+            // Distance to where a straight ray leaves the cell. A bent ray may end a little before
+            // the face; the next step then continues from there.
             let to_face = |c: usize| {
                 let face = if rate[c] > 0.0 { cell[1][c] } else { cell[0][c] };
                 if rate[c] == 0.0 { f64::INFINITY } else { (face - at[c]) / rate[c] }
@@ -269,7 +268,8 @@ impl Integrator for CellExact {
             let mut step_m =
                 to_face(0).min(to_face(1)).min(to_face(2)).clamp(least_m, left_m.max(least_m));
             let mut next = collocation(&inside, &r, step_m);
-            // Or go beyond it: shorter, by the rate at which it leaves.
+            // A bent ray may also end beyond the face: the step is then shortened by the rate at
+            // which the ray leaves.
             for _ in 0..60 {
                 let (by, axis) = outside(cell, self.lattice(next.position_m()));
                 if by.is_nan() || by <= BEYOND || step_m <= least_m {

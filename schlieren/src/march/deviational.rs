@@ -1,5 +1,5 @@
-//! Marching deviations in `f32`, sixteen rays at a time: Verlet for gases, Euler to compare with
-//! the dissertation.
+//! Traces light through gases by marching deviations in `f32`, sixteen rays at a time, with Verlet,
+//! or with Euler for comparison with the dissertation.
 
 use super::field_cache::FieldCache;
 use super::frame::{BlankCells, Frame};
@@ -19,36 +19,36 @@ use fearless_simd::{Level, Simd};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How deviations are stepped.
+/// The scheme that steps deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Scheme {
-    /// Position Verlet: second order, symplectic, one sample a step. The default.
+    /// Position Verlet: second order, symplectic, one sample per step. The default.
     #[default]
     Verlet,
-    /// Explicit Euler, first order: equations 5.7 and 5.8 of the dissertation, without its loss of
-    /// digits.
+    /// Explicit Euler, first order: equations 5.7 and 5.8 of the dissertation, but in deviations
+    /// and thus without its loss of digits.
     Euler,
 }
 
-/// How to march.
+/// Options of a march.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// How deviations are stepped.
+    /// The scheme that steps deviations.
     pub scheme: Scheme,
     /// Longest step, in lattice steps. 1 is right for nearly all fields: below it, the interpolant
     /// decides the error.
     pub step_voxels: f64,
-    /// What to compute beside deflection and displacement.
+    /// Quantities to compute besides deflection and displacement.
     pub wanted: PathQuantities,
-    /// What becomes of light in cells without data.
+    /// How light is treated in cells without data.
     pub blank: BlankCells,
-    /// Leave out bricks as long as the bounds of what that leaves out of a ray's deflection add up
-    /// to less than this. Zero: leave out nothing, and no ray's exit depends on any other ray. With
-    /// it, rays that are in flight together leave out the same, so that they agree with the same
-    /// rays traced in another order within twice this bound.
+    /// Skip bricks as long as the bounds on the lost deflection of a ray add up to less than this.
+    /// With zero, nothing is skipped and no ray's exit depends on any other ray. Otherwise rays
+    /// that are in flight together skip the same bricks, so that they agree with the same rays
+    /// traced in another order within twice this bound.
     pub skip_rad: f64,
-    /// The largest error of the optical path difference that leaving out one stretch of eight steps
-    /// may cost, when that is wanted.
+    /// The largest error of the optical path difference from skipping one stretch of eight steps.
+    /// Applies when that quantity is wanted.
     pub skip_opd_m: f64,
 }
 
@@ -65,19 +65,18 @@ impl Default for Options {
     }
 }
 
-/// What tracing did so far.
+/// Counts of the work of tracing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
     /// Rays traced.
     pub rays: u64,
-    /// Of them, rays that met the field.
+    /// Number of these that crossed the field.
     pub rays_in_field: u64,
-    /// Ray-steps that took a sample (of whole packets: unused lanes count).
+    /// Ray-steps that took a sample, counted in whole packets including unused lanes.
     pub ray_steps: u64,
-    /// Ray-steps that were left out.
+    /// Ray-steps that were skipped.
     pub ray_steps_skipped: u64,
-    /// The largest bound on what skipping left out of any ray's deflection, in 1e-15 rad, rounded
-    /// up.
+    /// The largest bound on the deflection that any ray lost by skipping, in 1e-15 rad, rounded up.
     pub skipped_femtorad: u64,
 }
 
@@ -87,7 +86,7 @@ enum FieldInterpolant<'a> {
     TrilinearGradient(TrilinearGradient),
 }
 
-/// Light paths through a field of weak index by deviations from straight rays.
+/// Light paths through a field of weak index, computed as deviations from straight rays.
 pub struct Deviational<'a> {
     field: &'a Field,
     frame: Frame,
@@ -124,7 +123,7 @@ impl<'a> Deviational<'a> {
         Self::build(field, view, interpolant, options, level, &|| Arc::new(BSpline::new(field)))
     }
 
-    /// [`Deviational::new`] with a spline through this field that is at hand.
+    /// [`Deviational::new`] with the spline through this field from a cache.
     pub fn with_cache(
         field: &'a Field,
         view: View,
@@ -135,7 +134,7 @@ impl<'a> Deviational<'a> {
         Self::build(field, view, interpolant, options, Level::new(), &|| cache.spline(field))
     }
 
-    /// [`Deviational::new`] on the calling thread alone: it waits for no other.
+    /// [`Deviational::new`] on the calling thread alone, which waits for no other thread.
     #[cfg(feature = "gpu")]
     pub(crate) fn on_this_thread(
         field: &'a Field,
@@ -186,7 +185,7 @@ impl<'a> Deviational<'a> {
         }
     }
 
-    /// What tracing did so far.
+    /// The work of all tracing so far.
     pub fn counters(&self) -> Counters {
         let read = |c: &AtomicU64| c.load(Ordering::Relaxed);
         Counters {
@@ -203,7 +202,7 @@ impl<'a> Deviational<'a> {
         self.bricks.as_ref()
     }
 
-    /// Bytes held beside the field.
+    /// Memory in bytes, without the field.
     pub fn memory_bytes(&self) -> usize {
         let interpolant = match &self.field_interpolant {
             FieldInterpolant::BSpline(s) => s.memory_bytes(),
@@ -213,7 +212,7 @@ impl<'a> Deviational<'a> {
         interpolant + self.bricks.as_ref().map_or(0, Bricks::memory_bytes)
     }
 
-    /// The interpolant as the reference sees it.
+    /// The interpolant in `f64`, for the reference integrators.
     pub fn interpolate(&self) -> &dyn Interpolate {
         match &self.field_interpolant {
             FieldInterpolant::BSpline(s) => &**s,
@@ -222,7 +221,7 @@ impl<'a> Deviational<'a> {
         }
     }
 
-    /// Picks the kernel with only the effects that this march needs.
+    /// Selects the kernel with only the features that this march needs.
     #[inline(always)]
     fn run<S: Simd, I: Interpolate16>(
         &self,
@@ -239,8 +238,8 @@ impl<'a> Deviational<'a> {
             (Scheme::Verlet, true) => {
                 self.all(simd, field, starts, exits, FeatureSet::<false, false, false, false>)
             }
-            // Three kernels an interpolant and instruction set, not twelve: each is a second of
-            // compiling. The path costs a tenth of a step.
+            // Three kernels per interpolant and instruction set, not twelve, because each takes a
+            // second to compile. Computing the path costs a tenth of a step.
             (Scheme::Verlet, false) => {
                 self.all(simd, field, starts, exits, FeatureSet::<true, true, true, false>)
             }
@@ -250,7 +249,7 @@ impl<'a> Deviational<'a> {
         }
     }
 
-    /// All rays, in groups of packets that are in flight together.
+    /// Traces all rays, in groups of packets that are in flight together.
     #[inline(always)]
     fn all<S: Simd, I: Interpolate16, E: KernelFeatures>(
         &self,

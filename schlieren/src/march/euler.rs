@@ -1,9 +1,9 @@
-//! Explicit Euler: the dissertation's equations 5.7 and 5.8.
+//! The explicit Euler integrator: equations 5.7 and 5.8 of the dissertation.
 
 use super::integrator::{Integrator, Medium, Ray};
 
-/// Position and rate both from the values at the step's start. First order; it gains energy, and
-/// blows up in a light guide.
+/// Explicit Euler: advances position and rate with the values at the start of the step. First
+/// order; it gains energy and diverges in a light guide.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Euler;
 

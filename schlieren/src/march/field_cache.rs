@@ -1,4 +1,4 @@
-//! What marches prepare of a field, kept for the next picture of the same field.
+//! Keeps what marches compute from a field, for the next image of the same field.
 
 use super::{BlankCells, LineOfSight};
 use crate::field::Field;
@@ -8,33 +8,35 @@ use crate::plan::DerivativeBounds;
 use crate::view::View;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Made at first need, for one field: whoever keeps it must give the same field to every call.
+/// Results for one field, each computed at first use. The owner must pass the same field to every
+/// call.
 ///
-/// What is made is made by all threads, so nothing is locked meanwhile: a worker that waits inside
-/// rayon may take another job that asks for the same. Who asks at the same time as another makes it
-/// twice, and all keep the first.
+/// All threads take part in computing a result, so no lock is held meanwhile: a worker that waits
+/// inside rayon may take another job that needs the same result. Two callers at the same time may
+/// therefore compute it twice; both then get the first one.
 #[derive(Default)]
 pub struct FieldCache {
     derivative_bounds: OnceLock<DerivativeBounds>,
     spline: OnceLock<Arc<BSpline>>,
-    /// The newest last.
+    /// Ordered by age, the newest last.
     projections: Mutex<Vec<(Projection, Arc<LineOfSight>)>>,
 }
 
-/// What a projection depends on, beside the field.
+/// The parameters of a projection, besides the field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
     /// The light's direction and frame.
     pub view: View,
-    /// For oblique views.
+    /// Used only for oblique views.
     pub interpolant: Interpolant,
-    /// What exits hold.
+    /// The quantities that exits contain.
     pub wanted: PathQuantities,
-    /// What becomes of light in cells without data.
+    /// How light is treated in cells without data.
     pub blank: BlankCells,
 }
 
-/// A picture and its map can differ in what they want, and in the direction of the rays.
+/// Number of projections kept. An image and its map can differ in the quantities they want and in
+/// the direction of the rays.
 const PROJECTIONS: usize = 2;
 
 impl FieldCache {
@@ -70,7 +72,7 @@ impl FieldCache {
     }
 }
 
-/// What is in the cell; made outside of it when nothing is.
+/// Returns the content of the cell. When it is empty, `make` runs outside of the cell's lock.
 fn get_or_make<T: Clone>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> T {
     if let Some(made) = cell.get() {
         return made.clone();
@@ -87,8 +89,8 @@ mod tests {
     use glam::DVec3;
     use std::time::Duration;
 
-    /// Several pictures of one field can be rayon jobs of one pool. A worker that waits inside
-    /// rayon for a part of what it makes may take another of them, which asks for the same.
+    /// Several images of one field can be rayon jobs of one pool. A worker that waits inside rayon
+    /// for a part of its result may take another of these jobs, which needs the same result.
     #[test]
     fn jobs_of_one_pool_that_ask_for_the_same_do_not_wait_for_themselves() {
         let eps = |p: DVec3| 1e-4 * (-p.length_squared() / 0.02).exp();

@@ -1,23 +1,23 @@
-//! Where undisturbed rays enter and leave the field.
+//! Finds where undisturbed rays enter and leave the field.
 
 use crate::field::{Field, Node};
 use crate::path::{Start, Status};
 use crate::view::View;
 use glam::DVec3;
 
-/// What becomes of light in cells without data ([`Node::Blank`]).
+/// How light is treated in cells without data ([`Node::Blank`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum BlankCells {
-    /// It stops: the picture is dark there.
+    /// Light stops: the image is dark there.
     #[default]
     Opaque,
-    /// It goes on through values continued from the gas around them. Exits still say
+    /// Light goes on through values continued from the gas around them. Exits still have
     /// [`Status::Masked`].
     Continued,
 }
 
 impl BlankCells {
-    /// Transmission and status of a ray by the worst node it met.
+    /// Transmission and status of a ray, from the worst node it encountered.
     pub(crate) fn outcome(self, met: u8) -> (f32, Status) {
         match (met, self) {
             (m, _) if m == Node::Gas as u8 => (1.0, Status::Free),
@@ -37,7 +37,7 @@ pub(crate) struct Frame {
     /// The view's centre in lattice coordinates.
     centre: DVec3,
     /// Length unit of the kernels: a power of two near the largest spacing, so that fields of any
-    /// size use the same numbers.
+    /// size use numbers of the same magnitude.
     pub(crate) unit_m: f64,
 }
 
@@ -50,7 +50,8 @@ pub(crate) struct UndisturbedRay {
     pub(crate) at: DVec3,
     /// Its direction in lattice steps per metre.
     pub(crate) direction: DVec3,
-    /// Distances in metres from `at` to where it enters and leaves; equal when it misses.
+    /// Distances in metres from `at` to where it enters and leaves the field; equal when it misses
+    /// it.
     pub(crate) range_m: [f64; 2],
 }
 
@@ -67,8 +68,8 @@ impl Frame {
         }
     }
 
-    /// The ray of a start. `known` is a beam computed before, with its tilt: neighbours mostly
-    /// share it.
+    /// The undisturbed ray of a start. `known` caches the last beam and its tilt, because
+    /// neighbours mostly share them.
     pub(crate) fn undisturbed(
         &self,
         start: &Start,
@@ -94,8 +95,8 @@ impl Frame {
     }
 }
 
-/// The part of the line `at + s direction` in the box from 0 to `last`, faces included: `[s, s]`
-/// when there is none. Directions may have zeros.
+/// The interval of `s` in which the line `at + s direction` is in the box from 0 to `last`, faces
+/// included: `[s, s]` when there is none. Directions may have zeros.
 pub(crate) fn clip(at: DVec3, direction: DVec3, last: DVec3) -> [f64; 2] {
     let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
     for c in 0..3 {

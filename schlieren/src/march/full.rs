@@ -1,4 +1,5 @@
-//! Strong index: any integrator in `f64`, rays that turn, total reflection.
+//! Traces light through a strong index with any integrator in `f64`, including rays that turn and
+//! total reflection.
 
 use super::frame::{BlankCells, Frame};
 use super::integrator::{Integrator, InterpolatedMedium, Ray};
@@ -8,17 +9,17 @@ use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use crate::view::View;
 use glam::DVec3;
 
-/// How to march through strong index.
+/// Options of a march through strong index.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FullOptions {
     /// Length of a step, in lattice steps of the undisturbed ray.
     pub step_voxels: f64,
-    /// What to compute beside deflection and displacement.
+    /// Quantities to compute besides deflection and displacement.
     pub wanted: PathQuantities,
-    /// What becomes of light in cells without data.
+    /// How light is treated in cells without data.
     pub blank: BlankCells,
-    /// A ray that is still inside after this many times the steps that the undisturbed ray needs is
-    /// given up as [`Status::Turned`].
+    /// Limit on a ray's steps, as a multiple of those of the undisturbed ray. A ray that is still
+    /// inside then is given up as [`Status::Turned`].
     pub patience: u32,
 }
 
@@ -35,9 +36,9 @@ impl Default for FullOptions {
 
 /// Light paths in `f64`, one ray at a time.
 ///
-/// Rays are marched until they pass the plane through the undisturbed ray's exit, or leave the
-/// field elsewhere; from there they go straight on to that plane. Those that never reach it (they
-/// left backwards, or stay inside) are [`Status::Turned`].
+/// Rays are marched until they pass the plane through the undisturbed ray's exit or leave the field
+/// elsewhere, and then continue straight to that plane. Rays that never reach it, because they left
+/// backwards or stay inside, are [`Status::Turned`].
 pub struct Full<'a, I: Interpolate, G: Integrator> {
     field: &'a Field,
     interpolate: &'a I,
@@ -47,7 +48,7 @@ pub struct Full<'a, I: Interpolate, G: Integrator> {
 }
 
 impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
-    /// Over an interpolant of `field`.
+    /// Marches through `field` with an interpolant of it.
     pub fn new(
         field: &'a Field,
         interpolate: &'a I,
@@ -77,8 +78,8 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let steps = (length_m * speed / self.options.step_voxels).ceil().max(1.0);
         let dtau_m = length_m / steps;
 
-        // Outside: beyond the exit plane, or a voxel beyond a face, so that rays along a face stay
-        // in.
+        // A ray is outside beyond the exit plane, or a voxel beyond a face: rays along a face thus
+        // stay inside.
         let mut met = 0;
         let margin = 1.0;
         let smallest_m = self.frame.spacing_m.min_element();
@@ -91,7 +92,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let end = match self.field.nodes() {
             None => self.integrator.run_until(&medium, &begin, dtau_m, patience, outside),
             Some(kinds) => {
-                // Step by step, looking at the nearest node.
+                // Checks the nearest node after each step.
                 let d = self.field.dims();
                 let stops = |kind: u8| {
                     kind == Node::Solid as u8
@@ -124,7 +125,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
             };
         };
 
-        // Straight on to the exit plane, at the speed |w| = 1 of the reference medium.
+        // Continues straight to the exit plane, with |w| = 1 of the reference medium.
         let mut depth_m = length_m;
         let w_z = 1.0 + r.u.dot(direction);
         if transmission > 0.0 && r.depth_m() < length_m - 1e-9 * dtau_m {

@@ -1,13 +1,14 @@
-//! The reference in `f64`: one ray at a time, any integrator, any medium.
+//! Integrates one ray in `f64` with any [`Integrator`] through any [`Medium`]: the reference for
+//! the kernels.
 //!
-//! As in the kernels, a ray is a deviation: position = start + direction tau + xi, rate =
-//! direction + u, both deviations zero at the start.
+//! As in the kernels, a ray is stored as its deviation: position = start + direction tau + xi, rate
+//! = direction + u. Both deviations are zero at the start.
 
 use crate::field::Field;
 use crate::interpolate::Interpolate;
 use glam::DVec3;
 
-/// Something with an index at every point.
+/// A medium with an index of refraction at every point.
 pub trait Medium: Sync {
     /// eps = n/n0 - 1, and its gradient per metre.
     fn sample(&self, at_m: DVec3) -> (f64, DVec3);
@@ -87,13 +88,13 @@ impl Ray {
         self.excess_m - self.xi_m.dot(self.direction)
     }
 
-    /// Moves on with w as it is.
+    /// Moves the ray with constant w.
     pub(crate) fn drift(&mut self, dtau_m: f64) {
         self.xi_m += self.u * dtau_m;
         self.tau_m += dtau_m;
     }
 
-    /// Changes w by what the medium does here over `dtau_m`.
+    /// Adds to w and to the path what the medium at this point contributes over `dtau_m`.
     pub(crate) fn kick(&mut self, medium: &impl Medium, dtau_m: f64) {
         let (eps, gradient) = medium.sample(self.position_m());
         self.u += gradient * ((1.0 + eps) * dtau_m);
@@ -139,11 +140,11 @@ impl Rate {
     }
 }
 
-/// A way to step a ray.
+/// A method that advances a ray by steps.
 pub trait Integrator: Sync {
     /// Order of convergence.
     const ORDER: u32;
-    /// Samples of the medium a step takes.
+    /// Samples of the medium per step.
     const SAMPLES: u32;
 
     /// The ray after `dtau_m`.
@@ -155,9 +156,9 @@ pub trait Integrator: Sync {
         (0..steps).fold(*ray, |r, _| self.step(medium, &r, dtau_m))
     }
 
-    /// Steps of `dtau_m` until `outside` of the ray is no longer negative, and the ray where it
-    /// becomes zero: the last step is shortened until it ends there. `None` when that does not
-    /// happen in `limit` steps.
+    /// Takes steps of `dtau_m` until `outside` of the ray is no longer negative, and returns the
+    /// ray where it becomes zero: the last step is shortened to end there. Returns `None` when this
+    /// does not happen within `limit` steps.
     fn run_until(
         &self,
         medium: &impl Medium,
@@ -171,7 +172,7 @@ pub trait Integrator: Sync {
         for _ in 0..limit {
             let after = self.step(medium, &before, dtau_m);
             let out_after = outside(&after);
-            // Not `>= 0`: NaN ends the march too, and is caught by the caller.
+            // Not `>= 0`: NaN also ends the march, and the caller handles it.
             if out_after < 0.0 {
                 (before, out_before) = (after, out_after);
                 continue;

@@ -1,44 +1,46 @@
-//! A ray's way into a kernel and out of it, in `f64`: the same for the kernels of the CPU and of
-//! the GPU.
+//! Converts a [`Start`] into the input of a kernel and the kernel's output into an [`Exit`], in
+//! `f64`. The kernels of the CPU and of the GPU share it.
 
 use super::frame::{BlankCells, Frame};
 use crate::path::{Exit, Start};
 use glam::DVec3;
 
-/// A ray on its way into a kernel.
+/// The undisturbed ray of a start, with the rounding errors of its kernel input.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct KernelRay {
     beam: [DVec3; 3],
     exit_depth_m: f64,
     length_m: f64,
-    /// The middle of its way in lattice coordinates.
+    /// The middle of its chord through the field, in lattice coordinates.
     middle: DVec3,
-    /// What rounding that to f32 left out.
+    /// Error of rounding `middle` to f32.
     rest: DVec3,
     /// From entry to exit in lattice coordinates.
     chord: DVec3,
-    /// What rounding the step to f32 did to it: every step of a ray is wrong by the same factor,
-    /// and that is put right at the end.
+    /// The exact step divided by its f32 value. Every step of a ray is wrong by this factor, which
+    /// is corrected at the end.
     scale: f64,
 }
 
-/// What a kernel gets of a ray. Lengths are in units of [`Frame::unit_m`].
+/// A kernel's input for one ray. Lengths are in units of [`Frame::unit_m`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct KernelInput {
-    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions
-    /// are counted from there because that halves the largest product, and with it the rounding.
+    /// The middle of the undisturbed ray's chord through the field, in lattice coordinates.
+    /// Positions are relative to it, because this halves the largest product and with it the
+    /// rounding.
     pub(crate) middle: [f32; 3],
-    /// What rounding `middle` to f32 left out: the deviation's start, taken off again at the end.
+    /// Error of rounding `middle` to f32. The deviation starts with it, and [`KernelRay::exit`]
+    /// subtracts it again.
     pub(crate) xi: [f32; 3],
     /// A step along the undisturbed ray, in lattice coordinates.
     pub(crate) stride: [f32; 3],
-    /// The direction times the spacing: projects lattice components of deviations on the ray.
+    /// The direction times the spacing: projects lattice components of deviations onto the ray.
     pub(crate) along: [f32; 3],
-    /// A step of path.
+    /// Length of a step along the path.
     pub(crate) dt: f32,
 }
 
-/// What a kernel gives back.
+/// A kernel's output for one ray.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct KernelOutput {
     /// Rate of the deviation along the lattice's axes.
@@ -47,7 +49,7 @@ pub(crate) struct KernelOutput {
     pub(crate) xi: [f32; 3],
     /// Optical path difference; `None` when it was not computed.
     pub(crate) opd: Option<f32>,
-    /// The worst [`crate::field::Node`] met.
+    /// The worst [`crate::field::Node`] that the ray encountered.
     pub(crate) met: u8,
 }
 
@@ -77,18 +79,18 @@ impl KernelRay {
         [self.exit_depth_m - self.length_m, self.exit_depth_m]
     }
 
-    /// Whether the ray meets the field.
+    /// Whether the ray crosses the field.
     pub(crate) fn meets_field(&self) -> bool {
         self.length_m > 0.0
     }
 
-    /// Steps that a ray needs; none when it misses the field. Of every ray by itself: its exit must
-    /// not depend on its neighbours.
+    /// Number of steps that the ray needs, 0 when it misses the field. Each ray has its own number,
+    /// because its exit must not depend on its neighbours.
     pub(crate) fn steps(&self, step_voxels: f64) -> u32 {
         if self.meets_field() { steps_of(self.chord.length() / step_voxels).max(1) } else { 0 }
     }
 
-    /// What the kernel gets of a ray that meets the field and takes this many steps.
+    /// The kernel input of a ray that crosses the field and takes this many steps.
     pub(crate) fn entry(&mut self, frame: &Frame, steps: u32) -> KernelInput {
         let h = frame.spacing_m / frame.unit_m;
         let mut e = KernelInput::default();
@@ -105,7 +107,7 @@ impl KernelRay {
         e
     }
 
-    /// What the kernel left, as an exit.
+    /// Converts the kernel's output into an exit.
     pub(crate) fn exit(
         &self,
         frame: &Frame,
@@ -136,7 +138,8 @@ impl KernelRay {
     }
 }
 
-/// Whole steps for a length in steps: a hair above a whole number is rounding, not a step.
+/// Number of whole steps for a length in steps. A tiny excess over a whole number is rounding and
+/// adds no step.
 fn steps_of(steps: f64) -> u32 {
     (steps * (1.0 - 1e-12)).ceil() as u32
 }

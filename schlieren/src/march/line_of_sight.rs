@@ -1,10 +1,10 @@
-//! Straight rays: the field is projected along the light once, and every photon reads deflection
-//! and path off a two-dimensional spline.
+//! Traces light along straight rays: the field is projected along the light once, and every photon
+//! samples its deflection and path from a two-dimensional spline.
 //!
-//! Linear in eps, and right as long as a ray stays within a small part of the field's finest
-//! structure: its relative error is of the order of eps times (size of the field / size of the
-//! structure). The light is taken as deflected in the plane through the view's centre, and the tilt
-//! of an extended source's beams shifts nothing.
+//! The result is linear in eps. It is valid as long as a ray's displacement is small against the
+//! field's finest structure: the relative error is of the order of eps times (size of the field /
+//! size of the structure). Light is deflected in the plane through the view's centre, and the tilt
+//! of an extended source's beams causes no shift.
 
 mod spline_derivatives;
 
@@ -31,11 +31,11 @@ pub struct LineOfSight {
     blank: BlankCells,
     n0: f64,
     level: Level,
-    /// Distance from the centre plane to the exit, where it is the same for all rays.
+    /// Distance from the centre plane to the exit, when it is the same for all rays.
     exit_depth_m: Option<f64>,
 }
 
-/// The projection: integral of eps along the light.
+/// The projection: the integral of eps along the light.
 struct Map {
     /// Spline coefficients in metres, of nodes -1 ..= n along both axes.
     coefficients: Vec<f32>,
@@ -46,18 +46,18 @@ struct Map {
     /// runs the other way).
     centre: [f64; 2],
     per_m: [f64; 2],
-    /// Coefficients of the deflection along right and up, where it is not the slope of the first.
-    /// Obliquely the way through the field's box changes from ray to ray, and that slope would be
-    /// the deflection of a prism of the box's shape.
+    /// Coefficients of the deflection along right and up, for oblique views. There the chord
+    /// through the field's box changes from ray to ray, so the slope of `coefficients` would
+    /// include the deflection of a prism of the box's shape.
     slopes: Option<[Vec<f32>; 2]>,
-    /// The worst [`Node`] on the way, by nearest map node.
+    /// The worst [`Node`] along the ray, by nearest map node.
     kinds: Option<Vec<u8>>,
 }
 
 impl LineOfSight {
     /// Projects a field along a view, in parallel. Along an axis of the field the projection is the
-    /// exact integral of the cubic B-spline through the nodes (and takes milliseconds); other
-    /// directions are integrated with the given interpolant, a step a voxel.
+    /// exact integral of the cubic B-spline through the nodes, and takes milliseconds. Other
+    /// directions are integrated with the given interpolant, one step per voxel.
     pub fn new(
         field: &Field,
         view: View,
@@ -96,8 +96,7 @@ impl LineOfSight {
                     let s = BSpline::new(field);
                     project_obliquely(field, &frame, s.rows(), level)
                 }
-                // Line of sight is linear in eps, so there is nothing that gradients at the nodes
-                // could add.
+                // Line of sight is linear in eps, so gradients at the nodes would add nothing.
                 Interpolant::Trilinear | Interpolant::TrilinearGradient => {
                     let s = Trilinear::new(field);
                     debug_assert_eq!(s.dims(), field.dims());
@@ -109,13 +108,13 @@ impl LineOfSight {
         LineOfSight { frame, map, wanted, blank, n0: field.n0(), level, exit_depth_m }
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&self.map.coefficients[..]) * if self.map.slopes.is_some() { 3 } else { 1 }
             + self.map.kinds.as_ref().map_or(0, Vec::len)
     }
 
-    /// Where a photon leaves the field; `None` when it misses it.
+    /// Distance at which a photon leaves the field; `None` when it misses the field.
     #[inline(always)]
     fn exit_depth_m(&self, start: &Start, map: [f32; 2]) -> Option<f64> {
         if let Some(depth_m) = self.exit_depth_m {
@@ -252,21 +251,21 @@ fn spline2<S: Simd>(
     ]
 }
 
-/// The lattice axis along which a direction points exactly, and its sign.
+/// The lattice axis along which a direction points exactly, with its sign.
 fn lattice_axis(d: DVec3) -> Option<(usize, f64)> {
     let a = d.to_array();
     let c = (0..3).find(|&c| a[c].abs() == 1.0)?;
     (0..3).all(|o| o == c || a[o] == 0.0).then_some((c, a[c]))
 }
 
-/// Weights of a line's values in the integral of the natural spline through them, in steps: 1
-/// inside, less near the ends.
+/// Weights of a line's values in the integral of the natural spline through them, in steps. They
+/// are 1 inside and less near the ends.
 fn integral_weights(n: usize) -> Vec<f64> {
     // Integrals of the coefficients' basis functions between the first and the last node.
     let basis = |i: usize| {
         let from_end = i.min(n + 1 - i);
         let one_sided = |d: usize| [1.0 / 24.0, 0.5, 23.0 / 24.0].get(d).copied().unwrap_or(1.0);
-        // With fewer than five nodes both ends cut a function.
+        // With fewer than five nodes a basis function is cut at both ends.
         let other = (n + 1) - from_end;
         one_sided(from_end) + one_sided(other) - 1.0
     };
@@ -293,7 +292,7 @@ fn project_along_axis(
     let step_m = field.spacing_m()[forward];
     let (eps, nodes) = (field.eps(), field.nodes());
 
-    // Rows of the projection, the faster of its two axes along them.
+    // Rows of the projection run along the faster of its two axes.
     let (fast, slow) = (right.0.min(up.0), right.0.max(up.0));
     let (nf, ns) = (dims3[fast], dims3[slow]);
     let mut sums = vec![0.0f64; nf * ns];
@@ -351,8 +350,8 @@ fn transposed<T: Copy>(a: &[T], row: usize) -> Vec<T> {
 
 fn project_obliquely<I: Interpolate16>(field: &Field, frame: &Frame, rows: I, level: Level) -> Map {
     let view = &frame.view;
-    // The smallest rectangle in the picture that holds the field, with nodes as close as the
-    // field's.
+    // The smallest rectangle in the image plane that holds the field, with the field's smallest
+    // node spacing.
     let step_m = frame.spacing_m.min_element();
     let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for corner in 0..8 {
@@ -446,8 +445,8 @@ fn integrate_row<S: Simd, I: Interpolate16>(
                 let mut total = [[0.0f64; LANES]; 4];
                 let mut k = 0;
                 while k < steps {
-                    // A few steps in f32, blocks of them in f64: the sum's rounding does not grow
-                    // with the path.
+                    // Sums blocks of 16 steps in f32 and the blocks in f64, so that rounding does
+                    // not grow with the path.
                     let mut some = [f32x16::splat(simd, 0.0); 4];
                     let end = (k + 16).min(steps);
                     while k < end {
@@ -496,7 +495,7 @@ fn integrate_row<S: Simd, I: Interpolate16>(
     );
 }
 
-/// Spline coefficients of a map, padded by one all round, and the length of their rows.
+/// Spline coefficients of a map, padded by one on each side, and the length of their rows.
 fn prefilter_map(values: &[f64], [nu, nv]: [usize; 2]) -> (Vec<f32>, usize) {
     let row = nu + 2;
     let mut plane = vec![0.0; row * (nv + 2)];
@@ -567,6 +566,7 @@ impl LightPaths for LineOfSight {
     }
 }
 
-/// Nodes are compared by how bad they are for light.
+/// The order of the kinds must be by how much they stop light, because the worst one is found by
+/// `max`.
 const _: () =
     assert!((Node::Gas as u8) < Node::Blank as u8 && (Node::Blank as u8) < Node::Solid as u8);

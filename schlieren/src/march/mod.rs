@@ -1,15 +1,16 @@
-//! Through the field: from starts to exits.
+//! Traces light through a field: each march turns [`crate::path::Start`]s into
+//! [`crate::path::Exit`]s.
 //!
-//! | march | where | cost |
+//! | march | use | cost |
 //! |---|---|---|
-//! | [`LineOfSight`] | deflections so small that rays stay within their voxel | one 2-D sample a photon |
-//! | [`Deviational`] (Verlet) | gases: the default | a sample a step, `f32`, sixteen rays at a time |
+//! | [`LineOfSight`] | rays that stay within their voxel | one 2-D sample per photon |
+//! | [`Deviational`] (Verlet) | gases: the default | one sample per step, `f32`, 16 rays at a time |
 //! | [`Deviational`] (Euler) | the dissertation's equations 5.7 and 5.8, for comparison | the same |
-//! | [`Full`] | strong index: lenses, liquids, turning rays | one to six samples a step, `f64` |
+//! | [`Full`] | lenses, liquids, turning rays | one to six samples per step, `f64` |
 //!
-//! Two are there to judge the others by: [`DormandPrince`], adaptive, for smooth media, and
-//! [`CellExact`], which ends its steps on the cells' faces, for interpolated fields, whose kinks no
-//! adaptive step sees.
+//! Two more integrators are references for measuring the errors of these. [`DormandPrince`] is
+//! adaptive and serves smooth media. [`CellExact`] ends its steps on the faces of cells and serves
+//! interpolated fields, whose kinks an adaptive step does not notice.
 
 mod adaptive;
 mod cell_exact;

@@ -1,21 +1,21 @@
-//! The kernels: sixteen rays a packet in `f32`, several packets in flight.
+//! The march kernels: trace packets of sixteen rays in `f32`, several packets in flight at once.
 //!
-//! State per ray, all zero at the start: the deviation of the position in lattice steps, `xi`, and
-//! of its rate, `v`, along the lattice's axes, and the optical path difference. The undisturbed ray
-//! is computed afresh for each step from the step's number. So rounding is relative to the
-//! deviation and not to the position, and a gas of eps = 1e-8 is traced as accurately as one of
-//! 1e-3.
+//! The state of a ray is the deviation of its position in lattice steps, `xi`, the deviation of its
+//! rate along the lattice's axes, `v`, and the optical path difference. All are zero at the start.
+//! The position on the undisturbed ray is computed anew for each step from the step's number.
+//! Rounding is thus relative to the deviation and not to the position, and a gas of eps = 1e-8 is
+//! traced as accurately as one of 1e-3.
 //!
 //! In the lattice's own axes a step needs no rotations: with lattice spacing h (in units of the
 //! longest) and gradient g per lattice step, `dv_i/dtau = (1 + eps) g_i / h_i^2` and `dxi_i/dtau =
 //! v_i`.
 //!
-//! A ray's exit does not depend on the rays beside it: each takes its own number of steps, and one
-//! that has arrived or was stopped *rests*: its step of tau is zero from then on, so that what the
-//! packet still does changes nothing of it. (In an earlier form all took the steps of the longest,
-//! and stopped rays went on until the last of them was stopped: whether a ray that met a blank cell
-//! first and a body later was masked or blocked was up to its neighbours.) The one exception is
-//! leaving out bricks, which rays in flight decide together.
+//! A ray's exit does not depend on the other rays of its packet. Each takes its own number of
+//! steps. A ray that has arrived or was stopped *rests*: its step of tau is zero from then on, so
+//! that further steps of the packet do not change it. (If stopped rays went on until all were
+//! stopped, the neighbours would decide whether a ray that crosses a blank cell first and a body
+//! later is masked or blocked.) The one exception is skipping bricks, which the rays in flight
+//! decide together.
 
 use crate::field::Node;
 use crate::interpolate::{Interpolate16, LANES, Row, Samples};
@@ -27,33 +27,35 @@ use fearless_simd::{Simd, f32x16, i32x16};
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Packet {
-    /// The middle of the undisturbed ray's way through the field, in lattice coordinates. Positions
-    /// are counted from there because that halves the largest product, and with it the rounding.
+    /// The middle of the undisturbed ray's chord through the field, in lattice coordinates.
+    /// Positions are relative to it, because this halves the largest product and with it the
+    /// rounding.
     pub(super) middle: [Row; 3],
     /// A step along the undisturbed ray, in lattice coordinates.
     pub(super) stride: [Row; 3],
-    /// The direction times the spacing: projects lattice components of `xi` and `v` on the ray.
+    /// The direction times the spacing: projects lattice components of `xi` and `v` onto the ray.
     pub(super) along: [Row; 3],
-    /// A step of tau. Before the march: of path. The ray enters with a rate of 1 + eps there, and
-    /// deviations are from a ray that keeps it. Zero for rays that miss the field, and for those at
-    /// rest.
+    /// A step of tau; before the march, a step of path. A ray enters with a rate of 1 + eps, and
+    /// deviations are relative to a ray that keeps this rate. Zero for rays that miss the field and
+    /// for rays at rest.
     pub(super) dt: Row,
     /// Steps from entry to exit. Zero for rays that miss the field.
     pub(super) steps: Row,
-    /// eps where the ray enters.
+    /// The value of eps where the ray enters.
     pub(super) eps_at_entry: Row,
-    /// Starts as what rounding `middle` to f32 left out, which [`super::Deviational`] takes off
+    /// Initially the error of rounding `middle` to f32, which [`super::Deviational`] subtracts
     /// again at the end.
     pub(super) xi: [Row; 3],
     pub(super) v: [Row; 3],
-    /// What rounding left out of `v` so far (Kahan 1965), for interpolants that are worth it.
+    /// Accumulated rounding error of `v` (Kahan 1965), for interpolants that are accurate enough
+    /// ([`Interpolate16::EXACT`]).
     pub(super) v_rest: [Row; 3],
     pub(super) opd: Row,
-    /// The same for `opd`.
+    /// Accumulated rounding error of `opd`.
     pub(super) opd_rest: Row,
-    /// Bound on the deflection that skipping left out.
+    /// Bound on the deflection that was lost by skipping.
     pub(super) skipped_rad: Row,
-    /// The worst [`Node`] met.
+    /// The worst [`Node`] encountered.
     pub(super) met: [u8; LANES],
 }
 
@@ -75,45 +77,45 @@ impl Packet {
     };
 }
 
-/// What is the same for all packets.
+/// Constants shared by all packets.
 #[derive(Clone, Copy)]
 pub(super) struct PacketConstants<'a> {
     /// Spacing squared, and its reciprocal.
     pub(super) h2: [f32; 3],
     pub(super) rcp_h2: [f32; 3],
-    /// What the nodes are, where not all are gas.
+    /// The kinds of the nodes, unless all are gas.
     pub(super) nodes: Option<Nodes<'a>>,
     pub(super) skip: Option<Skip<'a>>,
-    /// The worst kind a ray can survive; one that met something worse rests where it did.
+    /// The worst kind of node that a ray can pass. A ray that encounters a worse one rests there.
     pub(super) survives: u8,
 }
 
-/// Kinds of the nodes, for rays to look up the nearest.
+/// Kinds of the nodes, in which rays look up their nearest node.
 #[derive(Clone, Copy)]
 pub(super) struct Nodes<'a> {
     pub(super) kinds: &'a [Node],
     pub(super) dims: [usize; 3],
 }
 
-/// Bricks, and how much may be left out.
+/// Bricks, and the tolerances for skipping them.
 #[derive(Clone, Copy)]
 pub(super) struct Skip<'a> {
     pub(super) bricks: &'a Bricks,
-    /// Metres of a unit of length.
+    /// The kernel's unit of length in metres.
     pub(super) unit_m: f32,
-    /// In rad, over the whole ray.
+    /// Largest error of the deflection in rad, over the whole ray.
     pub(super) tolerance_rad: f32,
-    /// In metres, for each stretch that is left out.
+    /// Largest error of the path in metres, for each skipped stretch.
     pub(super) tolerance_opd_m: f32,
 }
 
-/// What a kernel is compiled for.
+/// The features that a kernel is compiled with.
 pub(super) trait KernelFeatures: Copy {
     /// The optical path difference.
     const OPD: bool;
     /// Blank or solid nodes.
     const NODES: bool;
-    /// Bricks that may be left out.
+    /// Skipping of bricks.
     const SKIP: bool;
     /// The dissertation's explicit Euler (equations 5.7 and 5.8) in place of Verlet.
     const EULER: bool;
@@ -137,17 +139,17 @@ impl<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool> Ke
     const EULER: bool = EULER;
 }
 
-/// Work done: packet-steps that took a sample, and those that were left out.
+/// Work done: packet-steps that took a sample, and those that were skipped.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Work {
     pub(super) sampled: u64,
     pub(super) skipped: u64,
 }
 
-/// Steps that are left out at once, where a brick allows it.
+/// Number of steps that are skipped at once where a brick allows it.
 const STRIDE: u32 = 8;
 
-/// Takes all packets from entry to exit, in flight together.
+/// Marches all packets from entry to exit, in flight together.
 #[inline(never)]
 pub(super) fn march<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     simd: S,
@@ -174,10 +176,10 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     let mut work = Work::default();
     let mut k = 0;
     let mut entering = true;
-    // Two iterations more than steps, to look at the entry and to end in the exit plane; in the
-    // same loop, so that there is one copy of the sampling code.
+    // There are two iterations more than steps: one samples the entry, one ends in the exit plane.
+    // They are in the same loop, so that there is one copy of the sampling code.
     while k <= steps.longest {
-        // Leaving out whole bricks, when all rays in flight may.
+        // Skips whole bricks when all rays in flight may.
         if E::SKIP
             && !entering
             && k % STRIDE == 0
@@ -191,7 +193,7 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
         for p in packets.iter_mut() {
             let dt = f32x16::from_slice(simd, &p.dt);
             let of_ray = f32x16::from_slice(simd, &p.steps);
-            // Step numbers are counted from the middle of the way: exact in f32.
+            // Step numbers are relative to the middle of the chord, where they are exact in f32.
             let middle = of_ray * 0.5;
             let number =
                 f32x16::splat(simd, if E::EULER { k as f32 } else { k as f32 + 0.5 }) - middle;
@@ -201,7 +203,7 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
                 let zero = dt * 0.0;
                 s = Step { number: zero - middle, move_by: zero, dt: zero };
             } else if k >= steps.shortest {
-                // Some rays arrive; for the others this is a step like any other.
+                // Some rays arrive in this step; the others take a regular one.
                 let now = of_ray.simd_eq(k as f32) & dt.simd_gt(0.0);
                 let last = last_step::<S, E>(simd, p, middle);
                 s.number = now.select(last.number, s.number);
@@ -214,11 +216,11 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
                 eps.store_slice(&mut p.eps_at_entry);
                 (dt / (eps + f32x16::splat(simd, 1.0))).store_slice(&mut p.dt);
                 if E::NODES {
-                    // The line above gave those that enter through a body a step again.
+                    // The line above set a nonzero step again for rays that enter through a body.
                     rest_where_stopped(constants, p);
                 }
             } else if let Some(now) = arriving {
-                // Not of rays that were stopped in this last step.
+                // Rays that were stopped in this last step do not drift.
                 let going = f32x16::from_slice(simd, &p.dt).simd_gt(0.0);
                 let half = going.select(s.dt * 0.5, dt * 0.0);
                 drift(simd, p, now.select(half, dt * 0.0));
@@ -248,8 +250,8 @@ pub(super) struct Steps {
     pub(super) longest: u32,
 }
 
-/// A ray has arrived or was stopped. What compensation still holds is below the last digit, and
-/// must not get into it with the steps of others.
+/// Puts a ray to rest that has arrived or was stopped. Its compensation terms are below the last
+/// digit and are cleared, so that later steps of the packet do not add them.
 #[inline(always)]
 fn rest(p: &mut Packet, l: usize) {
     p.dt[l] = 0.0;
@@ -278,14 +280,14 @@ fn drift<S: Simd>(simd: S, p: &mut Packet, dt: f32x16<S>) {
     }
 }
 
-/// What a step does.
+/// Parameters of a step.
 #[derive(Clone, Copy)]
 struct Step<S: Simd> {
     /// Steps along the undisturbed ray from its middle to where the sample is taken.
     number: f32x16<S>,
-    /// How far positions drift from where the last step left them to there.
+    /// Tau over which positions drift from the end of the last step to this sample.
     move_by: f32x16<S>,
-    /// For how long the sample pushes.
+    /// Tau over which the sample acts.
     dt: f32x16<S>,
 }
 
@@ -322,12 +324,13 @@ fn step<S: Simd, I: Interpolate16, E: KernelFeatures>(
     here.eps
 }
 
-/// tau is not depth: a ray that gained `zeta` in depth has passed its exit plane by as much. One
-/// step back brings it there; half of its drift is left to the caller.
+/// The step that ends in the exit plane. tau is not depth: a ray that gained `zeta` in depth has
+/// passed its exit plane by as much. One step back brings it there; the caller does the second half
+/// of its drift.
 #[inline(always)]
 fn last_step<S: Simd, E: KernelFeatures>(simd: S, p: &Packet, middle: f32x16<S>) -> Step<S> {
     let whole = f32x16::from_slice(simd, &p.dt);
-    // Verlet's positions still miss the second half of the last step.
+    // With Verlet, positions still lack the second half of the last step.
     let missing = if E::EULER { whole * 0.0 } else { whole * 0.5 };
     let mut zeta = f32x16::splat(simd, 0.0);
     let mut u_z = zeta;
@@ -348,7 +351,7 @@ fn last_step<S: Simd, E: KernelFeatures>(simd: S, p: &Packet, middle: f32x16<S>)
     }
 }
 
-/// v += dt (1 + eps) g / h^2, and the optical path with the mean of v before and after.
+/// v += dt (1 + eps) g / h^2. Also adds to the optical path, with the mean of v before and after.
 #[inline(always)]
 fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
     simd: S,
@@ -388,7 +391,7 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
         let twice =
             eps + u_z + f32x16::from_slice(simd, &p.eps_at_entry) + f32x16::splat(simd, 2.0);
         let more = eps.mul_add(eps, eps) + transverse / twice;
-        // A phase of thousands of radians wants more digits than a plain sum of hundreds of terms
+        // A phase of thousands of radians needs more digits than a plain sum of hundreds of terms
         // keeps.
         let sum = f32x16::from_slice(simd, &p.opd);
         let term = dt.mul_sub(more, f32x16::from_slice(simd, &p.opd_rest));
@@ -398,7 +401,7 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
     }
 }
 
-/// The nearest nodes' kinds, for the rays that are on their way; those that may not go on rest.
+/// Looks up the nearest node's kind for each moving ray, and puts to rest the rays that it stops.
 #[inline(always)]
 fn look_up_nodes<S: Simd>(
     simd: S,
@@ -424,8 +427,8 @@ fn look_up_nodes<S: Simd>(
     rest_where_stopped(constants, p);
 }
 
-/// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound what that
-/// leaves out.
+/// Moves all packets over [`STRIDE`] steps without a sample, if the bricks there bound the error of
+/// this. Returns whether it did.
 #[inline(always)]
 fn skip_steps<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     simd: S,
@@ -451,7 +454,7 @@ fn skip_steps<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
             let chord_m = p.dt[l] * (STRIDE as f32 * skip.unit_m);
             angle[l] = p.skipped_rad[l] + brick.max_gradient_per_m * chord_m;
             mean[l] = brick.mean_eps;
-            // A ray at rest is not in that brick any more.
+            // A ray at rest is no longer in that brick.
             let stops = E::NODES && brick.has_nodes && p.dt[l] > 0.0;
             let vague = E::OPD && brick.half_range_eps * chord_m > skip.tolerance_opd_m;
             if angle[l] > skip.tolerance_rad || stops || vague {

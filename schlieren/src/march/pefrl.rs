@@ -1,9 +1,9 @@
-//! Position-extended Forest-Ruth-like: fourth order and symplectic.
+//! The position-extended Forest-Ruth-like (PEFRL) integrator: fourth order and symplectic.
 
 use super::integrator::{Integrator, Medium, Ray};
 
-/// Omelyan, Mryglod and Folk 2002, equation 20 with the constants of equation 22: 26 times more
-/// accurate than Forest-Ruth for one more sample.
+/// PEFRL by Omelyan, Mryglod and Folk 2002, equation 20 with the constants of equation 22: 26 times
+/// more accurate than Forest-Ruth for one more sample.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pefrl;
 

@@ -1,8 +1,8 @@
-//! The classical Runge-Kutta method.
+//! The classical Runge-Kutta integrator.
 
 use super::integrator::{Integrator, Medium, Rate, Ray};
 
-/// Fourth order, four samples a step, not symplectic.
+/// The classical Runge-Kutta method: fourth order, four samples per step, not symplectic.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RungeKutta4;
 

@@ -1,9 +1,9 @@
-//! Sharma, Kumar and Ghatak 1982: Runge-Kutta-Nystroem for rays.
+//! The Runge-Kutta-Nystroem integrator for rays by Sharma, Kumar and Ghatak 1982.
 
 use super::integrator::{Integrator, Medium, Rate, Ray};
 
-/// Fourth order with three samples a step, because the force does not depend on the rate (Applied
-/// Optics 21, 984, equations 8 to 11).
+/// Runge-Kutta-Nystroem: fourth order with three samples per step, because the force does not
+/// depend on the rate (Applied Optics 21, 984, equations 8 to 11).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sharma;
 
@@ -13,7 +13,7 @@ impl Integrator for Sharma {
 
     fn step(&self, medium: &impl Medium, ray: &Ray, dtau_m: f64) -> Ray {
         let h = dtau_m;
-        // Positions ahead with a given mean acceleration.
+        // The ray after `h`, with a given mean acceleration.
         let ahead = |h: f64, acceleration| Ray {
             tau_m: ray.tau_m + h,
             xi_m: ray.xi_m + ray.u * h + acceleration * (0.5 * h * h),

@@ -1,9 +1,9 @@
-//! Position Verlet: half a drift, a kick, half a drift.
+//! The position Verlet integrator: half a drift, a kick, half a drift.
 
 use super::integrator::{Integrator, Medium, Ray};
 
-/// Second order with one sample a step; symplectic and reversible, and exact where n^2 is linear.
-/// The reference for the kernels in `packet.rs`.
+/// Position Verlet: second order with one sample per step, symplectic and reversible, and exact
+/// where n^2 is linear. The reference for the kernels in `packet.rs`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Verlet;
 

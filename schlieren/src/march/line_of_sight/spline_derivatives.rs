@@ -1,4 +1,4 @@
-//! Derivatives of the cubic spline of a projected map.
+//! Evaluates the derivatives of the cubic spline of a projected map.
 
 use crate::interpolate::bspline_weights;
 
@@ -22,7 +22,7 @@ pub(super) fn derivatives(
     [along_x * per_m[0], along_y * per_m[1]]
 }
 
-/// Second derivatives: linear weights of second differences.
+/// Second derivatives, per metre squared: second differences with linear weights.
 pub(super) fn second_derivatives(
     c: &[f32],
     row: usize,
