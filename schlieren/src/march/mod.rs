@@ -4,8 +4,8 @@
 //! | march | use | cost |
 //! |---|---|---|
 //! | [`LineOfSight`] | rays that stay within their voxel | one 2-D sample per photon |
-//! | [`Deviational`] (Verlet) | gases: the default | one sample per step, `f32`, 16 rays at a time |
-//! | [`Deviational`] (Euler) | the dissertation's equations 5.7 and 5.8, for comparison | the same |
+//! | [`Deviational`] (Verlet) | gases: the default | one sample per step, `f32`, 16 rays at once |
+//! | [`Deviational`] (Euler) | comparison with the dissertation (equations 5.7, 5.8) | the same |
 //! | [`Full`] | lenses, liquids, turning rays | one to six samples per step, `f64` |
 //!
 //! Two more integrators are references for measuring the errors of these. [`DormandPrince`] is

@@ -1,4 +1,5 @@
-//! Collects along rays, by the kernel for how they bend.
+//! Integrates the properties of media along many rays, with the kernel for the integrator's
+//! [`Bend`](super::Bend).
 use super::integrator::{BendField, MediaIntegrator};
 use super::paraxial::{Packet, SampledProperties, integrate16};
 use super::{MediaIntegrals, full};
@@ -8,9 +9,10 @@ use crate::march::KernelRay;
 use crate::path::Start;
 
 impl MediaIntegrator<'_> {
-    /// Walks from where each start's ray enters the field to where it leaves it, meets a solid or
-    /// opaque node, or has come as far as `ends_m` says: distances along the undisturbed ray from
-    /// the plane through the view's centre, such as those of bodies.
+    /// Integrates along each start's ray, from where it enters the field to where it leaves the
+    /// field, hits a solid or opaque node, or reaches its end in `ends_m`. The ends (for example,
+    /// of the bodies in the flow) are distances along the undisturbed ray from the plane through
+    /// the view's centre.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -64,7 +66,7 @@ impl MediaIntegrator<'_> {
     ) {
         use rayon::prelude::*;
         assert_eq!(starts.len(), out.len(), "one answer per start");
-        // A multiple of the packets' size; a few milliseconds of work.
+        // A multiple of the packet size, and a few milliseconds of work.
         const CHUNK: usize = 1024;
         starts.par_chunks(CHUNK).zip(out.par_chunks_mut(CHUNK)).enumerate().for_each(
             |(i, (s, o))| {

@@ -1,4 +1,4 @@
-//! One ray at a time in `f64`, bent as [`crate::march::Full`] bends it.
+//! Integrates along one ray at a time in `f64`, bent as by [`crate::march::Full`].
 
 use super::MediaIntegrals;
 use super::integrator::{MediaIntegrator, Sums};
@@ -7,9 +7,9 @@ use crate::march::{FullOptions, Integrator, InterpolatedMedium, Pefrl, Ray};
 use crate::path::Start;
 use glam::DVec3;
 
-/// Walks along one ray. Each step is a cubic through its ends (Hermite): its middle is where
-/// properties are sampled, and its length is Simpson's sum of |w|. Both are of fourth order, as the
-/// march is.
+/// Integrates along one ray. Each step is the cubic Hermite curve through its ends. Properties are
+/// sampled at its middle, and its length is the integral of |w| by Simpson's rule. Both are of
+/// fourth order, as the march is.
 pub(super) fn collect(
     integrator: &MediaIntegrator<'_>,
     spline: &BSpline,
@@ -21,7 +21,7 @@ pub(super) fn collect(
     let ray = frame.undisturbed(start, known);
     let [near_m, far_m] = ray.range_m;
     let length_m = far_m.min(end_m) - near_m;
-    // Written so that NaN is no way.
+    // Written so that NaN also returns here.
     if !(far_m > near_m && length_m > 0.0) {
         return MediaIntegrals::default();
     }
@@ -30,12 +30,12 @@ pub(super) fn collect(
     let lattice = |at_m: DVec3| (at_m - field.origin_m()) / frame.spacing_m;
     let at_m = field.origin_m() + ray.at * frame.spacing_m;
     let mut before = Ray::inside(&medium, at_m + direction * near_m, direction);
-    // The march's steps, wherever the walk ends.
+    // The march's steps, independent of where the integration ends.
     let speed = frame.lattice_speed_per_m(direction);
     let steps = ((far_m - near_m) * speed / integrator.step_voxels).ceil().max(1.0);
     let dtau_m = (far_m - near_m) / steps;
 
-    // As the march: to the end's plane, or a voxel beyond a face.
+    // As in the march: outside beyond the end plane, or a voxel beyond a face.
     let smallest_m = frame.spacing_m.min_element();
     let outside = |r: &Ray| {
         let p = lattice(r.position_m());

@@ -1,4 +1,4 @@
-//! A walk along rays that collects what the medium does to light on the way.
+//! Integrates absorption, emission and rotation along rays: [`MediaIntegrator`].
 
 use super::{Media, MediaIntegrals, Property, Volume};
 use crate::field::{Field, Node};
@@ -8,14 +8,14 @@ use crate::plan::Mode;
 use crate::view::View;
 use fearless_simd::Level;
 
-/// How the walk's rays bend.
+/// How the integrator's rays bend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Bend {
-    /// Not at all, as line of sight.
+    /// Straight rays, as in line of sight.
     Straight,
-    /// As light in gases: `f32`, sixteen rays at a time, by the trilinear gradient of eps.
+    /// Rays in gases: bent by the trilinear gradient of eps, in `f32`, sixteen at a time.
     Paraxial,
-    /// As light in lenses and liquids: `f64`, PEFRL, by the gradient of the spline.
+    /// Rays in lenses and liquids: bent by the gradient of the spline, in `f64` with PEFRL.
     Full,
 }
 
@@ -35,7 +35,7 @@ pub(super) enum BendField<'a> {
     Full(BSpline),
 }
 
-/// Collects [`MediaIntegrals`] along rays of a view.
+/// Computes [`MediaIntegrals`] along the rays of a view.
 pub struct MediaIntegrator<'a> {
     pub(super) field: &'a Field,
     pub(super) frame: Frame,
@@ -47,8 +47,8 @@ pub struct MediaIntegrator<'a> {
 }
 
 impl<'a> MediaIntegrator<'a> {
-    /// Through `field` with `media`, as far as they are `wanted`. `step_voxels` is the march's
-    /// step; it is shortened where a property's lattice is finer than the field's.
+    /// Integrates through `field` those properties of `media` that are `wanted`. `step_voxels` is
+    /// the march's step; it is shortened where a property's lattice is finer than the field's.
     pub fn new(
         field: &'a Field,
         view: View,
@@ -84,13 +84,13 @@ impl<'a> MediaIntegrator<'a> {
         &self.frame.view
     }
 
-    /// Whether a node of this kind is where the walk ends.
+    /// Whether a node of this kind ends a ray.
     pub(super) fn stops(&self, kind: u8) -> bool {
         kind == Node::Solid as u8 || (kind != Node::Gas as u8 && self.blank == BlankCells::Opaque)
     }
 }
 
-/// Sums of one ray, in `f64`: hundreds of small terms.
+/// Sums along one ray, in `f64` because hundreds of small terms are added.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sums {
     optical_depth: f64,
@@ -99,15 +99,15 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// A piece of path of `length_m` with even values of the properties, in the order of
+    /// Adds a path segment of `length_m` with constant values of the properties, in the order of
     /// [`Property::ALL`].
     #[inline(always)]
     pub(super) fn add(&mut self, values: [f32; 3], length_m: f64) {
         let [absorption, emission, rotation] = values.map(f64::from);
         let depth = absorption * length_m;
         if emission != 0.0 {
-            // Of the light that the piece emits, (1 - exp(-a))/a leaves it, and exp(-τ) of that
-            // reaches the eye.
+            // With a the segment's optical depth, (1 - exp(-a))/a of the light that it emits leaves
+            // it, and exp(-τ) of that reaches the eye.
             let leaves = if depth == 0.0 { 1.0 } else { -(-depth).exp_m1() / depth };
             self.emission += emission * length_m * leaves * (-self.optical_depth).exp();
         }

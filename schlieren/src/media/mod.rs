@@ -1,35 +1,35 @@
-//! What a medium does to light beside bending it: it absorbs, glows, and turns the plane of
-//! polarisation.
+//! Adds absorption, emission and rotation of the plane of polarisation to the light paths of a
+//! flow.
 //!
-//! Along the path of a ray, s its length in metres ([`MediaIntegrals`]):
+//! Integrals along the path of a ray, with s the path length in metres ([`MediaIntegrals`]):
 //!
-//! | property | given | collected | reference |
+//! | property | input | integral | reference |
 //! |---|---|---|---|
-//! | [`Property::Absorption`] | α(x), 1/m | optical depth τ = ∫ α ds; exp(-τ) of the light is left | Beer and Lambert |
+//! | [`Property::Absorption`] | α(x), 1/m | optical depth τ = ∫ α ds; exp(-τ) of the light remains | Beer and Lambert |
 //! | [`Property::Emission`] | j(x), 1/m, see below | L = ∫ j exp(-τ') ds, τ' the optical depth between x and the eye | Chandrasekhar, *Radiative Transfer* (1950), chapter I, without scattering |
 //! | [`Property::Rotation`] | ρ(x), rad/m | φ = ∫ ρ ds; an analyser at the angle θ to the polariser passes cos²(θ - φ) | Faraday, Malus |
 //!
-//! Nothing of it bends light, so it is collected in a walk of its own beside the march
-//! ([`MediaIntegrator`]), and a scene without such properties runs none of this code. The walk
-//! bends as the march does ([`Bend`]): straight for line of sight, in `f32` by the trilinear
-//! gradient of eps for gases (a displacement within some per cent, and the displacement itself is
-//! below a voxel there), in `f64` by the spline for strong index.
+//! None of these bends light, so [`MediaIntegrator`] integrates them in a pass separate from the
+//! march, and a scene without such properties runs none of this code. Its rays bend as those of the
+//! march ([`Bend`]): straight for line of sight; in `f32` by the trilinear gradient of eps for
+//! gases, where the displacement is below a voxel and right within a few per cent; in `f64` by the
+//! spline for strong index.
 //!
-//! Properties are sampled trilinearly: they are not differentiated, and trilinear never rings below
-//! zero. A smooth property of width σ on a lattice of spacing h is then off by about h²/(8σ²) of
-//! its largest value. A walk's steps are those of the march, but no longer than a voxel of any
-//! property's lattice; each takes the middle's value. A property without variation is integrated to
-//! rounding.
+//! Properties are sampled trilinearly, because they are not differentiated and trilinear
+//! interpolation never overshoots below zero. The error for a smooth property of width σ on a
+//! lattice of spacing h is about h²/(8σ²) of its largest value. Steps are those of the march, but
+//! no longer than a voxel of any property's lattice, and use the value at their middle. A uniform
+//! property is integrated to rounding.
 //!
 //! **Emission** is relative: 1 is the radiance that makes the film as bright as undisturbed light
 //! without a cut-off does. A flame of emission 0.2/m that is half a metre thick is a tenth as
-//! bright as the lamp. From W/(m³ sr) it is j / (B a/A): B the lamp's radiance, a and A the areas
-//! of its image and of the stop in the cut-off plane, because a flame fills the stop and the lamp's
-//! image does not.
+//! bright as the lamp. An emission in W/(m³ sr) is converted by j / (B a/A), with B the lamp's
+//! radiance and a and A the areas of its image and of the stop in the cut-off plane: a flame fills
+//! the stop and the lamp's image does not.
 //!
-//! **Rotation** is positive counter-clockwise in the picture, for the light of this view. Faraday's
-//! rotation depends on the field's component along the light: another view needs another array
-//! (`B:x` takes a component of a vector).
+//! **Rotation** is positive counter-clockwise in the image, for the light of this view. Faraday
+//! rotation depends on the component of the magnetic field along the light, so another view needs
+//! another array (`B:x` selects a component of a vector).
 //!
 //! ```
 //! use glam::DVec3;
@@ -64,10 +64,10 @@ pub use integrator::{Bend, MediaIntegrator};
 pub use paths::AttenuatedPaths;
 pub use volume::{Repairs, Volume};
 
-/// Something that a medium has at every point.
+/// A property that a medium has at every point, besides its index of refraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Property {
-    /// Part of the light that is lost per metre.
+    /// Fraction of the light that is lost per metre.
     Absorption,
     /// Light that is added per metre.
     Emission,
@@ -76,10 +76,10 @@ pub enum Property {
 }
 
 impl Property {
-    /// All of them.
+    /// All properties.
     pub const ALL: [Property; 3] = [Property::Absorption, Property::Emission, Property::Rotation];
 
-    /// As in scenes and reports.
+    /// The name in scenes and reports.
     pub fn name(self) -> &'static str {
         match self {
             Property::Absorption => "absorption",
@@ -88,7 +88,7 @@ impl Property {
         }
     }
 
-    /// Of its values.
+    /// The unit of the values.
     pub fn unit(self) -> &'static str {
         match self {
             Property::Absorption | Property::Emission => "1/m",
@@ -96,21 +96,21 @@ impl Property {
         }
     }
 
-    /// Whether values below zero mean something.
+    /// Whether values below zero are valid.
     pub fn is_signed(self) -> bool {
         self == Property::Rotation
     }
 }
 
-/// What a medium does to light beside bending it, as far as it is known.
+/// The known properties of a medium.
 #[derive(Debug, Default)]
 pub struct Media {
     volumes: [Option<Volume>; 3],
 }
 
 impl Media {
-    /// The same with a property. Values below zero that mean nothing are taken as zero and counted
-    /// in its [`Volume::repairs`].
+    /// Sets a property. Invalid values below zero are set to zero and counted in
+    /// [`Volume::repairs`].
     #[must_use]
     pub fn with(mut self, property: Property, volume: Volume) -> Media {
         let volume = if property.is_signed() { volume } else { volume.without_negatives() };
@@ -118,7 +118,7 @@ impl Media {
         self
     }
 
-    /// A property, when it is known.
+    /// The values of a property, or `None` when it is not known.
     pub fn get(&self, property: Property) -> Option<&Volume> {
         self.volumes[property as usize].as_ref()
     }
@@ -128,7 +128,7 @@ impl Media {
         self.volumes.iter().all(Option::is_none)
     }
 
-    /// What was repaired, a sentence for each property with repairs.
+    /// A sentence about repaired values for each property that has any.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         for property in Property::ALL {
@@ -150,26 +150,26 @@ impl Media {
         out
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.volumes.iter().flatten().map(Volume::memory_bytes).sum()
     }
 }
 
-/// What was collected along a ray. A property that is not known or was not wanted leaves its zero.
+/// The integrals along one ray. They are zero for properties that are not known or not wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MediaIntegrals {
-    /// τ.
+    /// Optical depth τ.
     pub optical_depth: f32,
-    /// L, as seen by an eye where the walk begins, looking along it.
+    /// Emission L, as seen by an eye at the start of the ray that looks along it.
     pub emission: f32,
-    /// φ in rad.
+    /// Rotation φ in rad.
     pub rotation_rad: f32,
 }
 
 impl MediaIntegrals {
-    /// The part of polarised light that is left, behind an analyser at an angle to the polariser
-    /// when there is one.
+    /// The fraction of polarised light that remains, behind an analyser at this angle to the
+    /// polariser if there is one.
     pub fn transmission(&self, analyser_rad: Option<f64>) -> f64 {
         let left = (-f64::from(self.optical_depth)).exp();
         left * analyser_rad.map_or(1.0, |a| (a - f64::from(self.rotation_rad)).cos().powi(2))

@@ -1,10 +1,10 @@
-//! Sixteen rays at a time, straight or bent as in gases.
+//! Integrates along sixteen rays at a time, straight or bent as in gases.
 //!
-//! Here the path's parameter is the depth z along the undisturbed ray, not tau: steps then end in
-//! the exit plane by themselves. With s the slope (transverse), primes for derivatives by z: `s' =
-//! (1 + s²) (∇ₜ eps - s ∂eps/∂z) / (1 + eps)`, the ray equation without approximation, and a step
-//! of path is `√(1 + s²) dz`. In the lattice's axes nothing has to be rotated: see
-//! [`crate::march`]'s packets, which this follows.
+//! The parameter of the path is the depth z along the undisturbed ray, not tau, so that the last
+//! step ends in the exit plane. With s the transverse slope and primes for derivatives by z, the
+//! exact ray equation is `s' = (1 + s²) (∇ₜ eps - s ∂eps/∂z) / (1 + eps)`, and a step of path is
+//! `√(1 + s²) dz`. As in the packets of [`crate::march`], the state is in the lattice's axes, which
+//! needs no rotations.
 
 use super::integrator::{MediaIntegrator, Sums};
 use crate::field::Node;
@@ -13,10 +13,11 @@ use crate::march::{Frame, KernelRay};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16};
 
-/// Rays with their state. Lengths are in units of [`Frame::unit_m`] unless the name says metres.
+/// Sixteen rays with their state. Lengths are in units of [`Frame::unit_m`], unless the name ends
+/// with `_m`.
 pub(super) struct Packet {
-    /// Steps from entry to exit. Each ray has its own: what it collects must not depend on the rays
-    /// beside it.
+    /// Steps from entry to exit. Each ray has its own number, because its integrals must not depend
+    /// on its neighbours.
     steps: Row,
     longest: u32,
     middle: [Row; 3],
@@ -25,7 +26,7 @@ pub(super) struct Packet {
     /// A step of depth.
     dz: Row,
     dz_m: [f64; LANES],
-    /// After how many steps a ray is at its end, where it leaves the field at the latest.
+    /// Number of steps, with a fraction, after which a ray reaches its end; at most `steps`.
     end: [f64; LANES],
     xi: [Row; 3],
     /// Slope, in lattice steps per unit of depth.
@@ -52,7 +53,7 @@ impl Packet {
         }
     }
 
-    /// A ray that meets the field.
+    /// Sets lane `l` to a ray that crosses the field.
     pub(super) fn set(
         &mut self,
         l: usize,
@@ -78,20 +79,20 @@ impl Packet {
     }
 }
 
-/// A property, and its lattice coordinates: those of the field times `scale` plus `offset`.
+/// A property. Its lattice coordinates are those of the field times `scale` plus `offset`.
 struct PropertyOnLattice<'a> {
     rows: TrilinearRows<'a>,
     scale: [f32; 3],
     offset: [f32; 3],
 }
 
-/// What is sampled on the way, the same for all packets.
+/// The volumes that are sampled along the rays, shared by all packets.
 pub(super) struct SampledProperties<'a> {
-    /// eps; `None` for straight rays.
+    /// The field eps; `None` for straight rays.
     eps: Option<TrilinearRows<'a>>,
     /// Absorption, emission, rotation.
     properties: [Option<PropertyOnLattice<'a>>; 3],
-    /// Kinds of the field's nodes, its dimensions, and which kinds end a walk.
+    /// Kinds of the field's nodes, its dimensions, and whether each kind ends a ray.
     nodes: Option<(&'a [Node], [usize; 3], [bool; 3])>,
     h2: [f32; 3],
     rcp_h2: [f32; 3],
@@ -123,7 +124,7 @@ impl<'a> SampledProperties<'a> {
     }
 }
 
-/// Takes a packet from entry to exit.
+/// Integrates along a packet's rays from entry to exit.
 #[inline(never)]
 pub(super) fn integrate16<S: Simd>(simd: S, sampled: &SampledProperties<'_>, p: &mut Packet) {
     simd.vectorize(
@@ -150,8 +151,8 @@ pub(super) fn integrate16<S: Simd>(simd: S, sampled: &SampledProperties<'_>, p: 
     );
 }
 
-/// One leapfrog step through the depth's middle: moves `at` there and the ray to the step's end.
-/// Returns path per depth.
+/// One leapfrog step: moves `at` to the middle of the step and the ray to its end. Returns the path
+/// length per depth.
 #[inline(always)]
 fn bend<S: Simd>(
     simd: S,
@@ -172,7 +173,7 @@ fn bend<S: Simd>(
     }
     let here = eps.sample16(simd, at);
 
-    // The gradient along the ray, and across it.
+    // The gradient along the ray and across it.
     let mut along = [dz; 3];
     let mut g_z = dz * 0.0;
     for c in 0..3 {

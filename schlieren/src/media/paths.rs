@@ -1,4 +1,4 @@
-//! Light paths of any march, and what the medium leaves of their light.
+//! Applies absorption and an analyser to the light paths of any march.
 
 use super::{MediaIntegrals, MediaIntegrator};
 use crate::path::{Exit, Jacobian, LightPaths, PathQuantities, SkipReport, Start};
@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Paths whose [`Exit::transmission`] has what absorption and an analyser leave. Whatever else is
-/// in the exits is left as the march computed it, bit by bit.
+/// Paths whose [`Exit::transmission`] includes absorption and an analyser. All other fields of the
+/// exits keep the march's values, bit for bit.
 pub struct AttenuatedPaths<'a> {
     paths: Box<dyn LightPaths + 'a>,
     integrator: MediaIntegrator<'a>,
@@ -17,8 +17,9 @@ pub struct AttenuatedPaths<'a> {
 }
 
 impl<'a> AttenuatedPaths<'a> {
-    /// `paths` and `integrator` must be of the same field and view. The angle of the analyser is to
-    /// the polariser, counter-clockwise in the picture; `rays` counts the rays that were walked.
+    /// `paths` and `integrator` must belong to the same field and view. `analyser_rad` is the angle
+    /// from the polariser to the analyser, counter-clockwise in the image. `rays` counts the
+    /// integrated rays.
     pub fn new(
         paths: Box<dyn LightPaths + 'a>,
         integrator: MediaIntegrator<'a>,
@@ -28,7 +29,7 @@ impl<'a> AttenuatedPaths<'a> {
         AttenuatedPaths { paths, integrator, analyser_rad, rays }
     }
 
-    /// Rays that were walked so far.
+    /// Number of rays integrated so far.
     pub fn rays(&self) -> u64 {
         self.rays.load(Ordering::Relaxed)
     }
@@ -37,8 +38,8 @@ impl<'a> AttenuatedPaths<'a> {
         let mut collected = vec![MediaIntegrals::default(); starts.len()];
         self.integrator.collect(starts, None, &mut collected);
         for (exit, c) in exits.iter_mut().zip(&collected) {
-            // 0 stays for what is blocked: light that is absorbed, however much, still tells where
-            // it went.
+            // Only blocked rays have 0. Absorbed light stays above 0, however weak, so that its
+            // exit remains valid.
             if exit.transmission > 0.0 {
                 let left = f64::from(exit.transmission) * c.transmission(self.analyser_rad);
                 exit.transmission = (left as f32).max(f32::MIN_POSITIVE);

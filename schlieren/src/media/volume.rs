@@ -1,12 +1,12 @@
-//! A property at the nodes of a lattice of its own.
+//! Stores a property of a medium at the nodes of a lattice of its own.
 
 use crate::field::{Field, FieldError, Node, check_lattice, fill};
 use crate::interpolate::{Interpolate, Trilinear};
 use glam::DVec3;
 use std::borrow::Cow;
 
-/// A property over a uniform lattice, trilinear between the nodes and constant beyond the
-/// outermost. Its lattice need not be that of the [`Field`].
+/// A property on a uniform lattice, trilinear between the nodes and constant beyond the outermost.
+/// The lattice may differ from that of the [`Field`].
 #[derive(Debug)]
 pub struct Volume {
     pub(super) values: Trilinear<'static>,
@@ -17,22 +17,22 @@ pub struct Volume {
     repairs: Repairs,
 }
 
-/// Values that could not be taken as they were.
+/// Counts of invalid values that were replaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repairs {
-    /// NaN or infinite: continued from the neighbours.
+    /// NaN or infinite values, which are continued from their neighbours.
     pub not_finite: usize,
-    /// Below zero where that means nothing: taken as zero.
+    /// Invalid values below zero, which are set to zero.
     pub negative: usize,
 }
 
 impl Volume {
-    /// A property from its values at the nodes, x fastest. Where `unknown` says so (outside the
-    /// flow, inside a body) values are continued from the nodes around, so that nothing fades
-    /// towards a wall; values that are not finite are treated alike, and counted.
+    /// Makes a property from its values at the nodes, x fastest. Nodes marked in `unknown` (outside
+    /// the flow, inside a body) are continued from the nodes around them, so that the property does
+    /// not fade towards a wall. Values that are not finite are treated in the same way and counted.
     ///
     /// # Errors
-    /// If sizes do not match, or no value is finite.
+    /// If sizes do not match, if the lattice is invalid, or if no value is finite.
     pub fn new(
         dims: [usize; 3],
         spacing_m: [f64; 3],
@@ -88,7 +88,7 @@ impl Volume {
         }
     }
 
-    /// The same value everywhere in a field.
+    /// Makes a property with the same value everywhere in a field.
     ///
     /// # Errors
     /// If the value is not finite.
@@ -102,7 +102,7 @@ impl Volume {
         )
     }
 
-    /// A property from a function of position in metres.
+    /// Makes a property from a function of the position in metres.
     ///
     /// # Errors
     /// As [`Volume::new`].
@@ -127,7 +127,7 @@ impl Volume {
         )
     }
 
-    /// With zero in place of everything below it.
+    /// Replaces values below zero by zero.
     pub(super) fn without_negatives(self) -> Volume {
         if self.range[0] >= 0.0 {
             return self;
@@ -139,7 +139,7 @@ impl Volume {
         Volume::of(self.dims, self.spacing_m, self.origin_m, values, repairs)
     }
 
-    /// Nodes along x, y and z.
+    /// Number of nodes along x, y and z.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
     }
@@ -149,7 +149,7 @@ impl Volume {
         self.range
     }
 
-    /// What was repaired.
+    /// Counts of the values that were replaced.
     pub fn repairs(&self) -> Repairs {
         self.repairs
     }
@@ -159,7 +159,7 @@ impl Volume {
         self.values.sample(((at_m - self.origin_m) / self.spacing_m).to_array()).eps
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.values.memory_bytes()
     }
@@ -188,7 +188,7 @@ mod tests {
         let warnings = media.warnings();
         assert!(warnings[0].contains("media.absorption: 2 of 27"), "{warnings:?}");
         assert!(warnings[1].contains("1 of 27 values are below 0"), "{warnings:?}");
-        // A rotation may go either way.
+        // A rotation may have either sign.
         let media = Media::default().with(Property::Rotation, volume(values, None).unwrap());
         assert_eq!(media.get(Property::Rotation).unwrap().range(), [-1.0, 2.0]);
     }

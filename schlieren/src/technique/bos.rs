@@ -1,14 +1,14 @@
-//! Background-oriented schlieren: a camera sees a pattern through the flow, and the pattern is
-//! displaced.
+//! Background-oriented schlieren: computes how the flow displaces a pattern that a camera sees
+//! through it.
 //!
-//! Rays are sent from the camera (far away: a parallel beam) through the flow to the background,
-//! which stands at `Optics::focus_m` behind the flow as the camera sees it; the camera is focused
-//! on it. A ray that leaves with the deflection ε at the depth z hits it displaced by `ξ + ε
-//! (focus - z)`: the displacement that correlating the picture with the undisturbed one yields. The
-//! paths must be traced against the light ([`ReversedPaths`]).
+//! Rays are traced from the camera through the flow to the background. The camera is far away, so
+//! they form a parallel beam. The background is at `Optics::focus_m` behind the flow as the camera
+//! sees it, and the camera is focused on it. A ray that leaves with the deflection ε at the depth z
+//! hits it displaced by `ξ + ε (focus - z)`, which is the displacement found by correlating the
+//! image with the undisturbed one. The paths must be traced against the light ([`ReversedPaths`]).
 //!
-//! The pattern is random dots: one dot per cell of a square lattice, jittered by a hash of the
-//! cell, the same at any resolution.
+//! The pattern consists of random dots: one dot per cell of a square lattice, jittered by a hash of
+//! the cell. It is the same at any resolution.
 
 use super::Photon;
 use crate::optics::{Across, Optics};
@@ -30,13 +30,12 @@ pub struct Dots {
     pub diameter_m: f64,
     /// Mean distance between dots: the side of the lattice's cells.
     pub spacing_m: f64,
-    /// Which pattern.
+    /// Seed that selects the pattern.
     pub seed: u32,
 }
 
 impl Bos {
-    /// The background stands at `optics.focus_m` behind the middle of the flow, seen from the
-    /// camera.
+    /// The background is at `optics.focus_m` behind the middle of the flow, seen from the camera.
     pub fn new(optics: Optics, dots: Dots) -> Bos {
         Bos { optics, dots }
     }
@@ -50,11 +49,11 @@ impl Bos {
 }
 
 impl Dots {
-    /// 0 on a dot, 1 beside it.
+    /// Brightness at a point: 0 on a dot, 1 elsewhere.
     pub fn brightness(&self, at_m: [f64; 2]) -> f32 {
         let cell = at_m.map(|c| (c / self.spacing_m).floor());
         let radius2 = 0.25 * self.diameter_m * self.diameter_m;
-        // A dot may reach into neighbouring cells, no further: its diameter is at most a cell.
+        // A dot reaches at most into neighbouring cells, because its diameter is at most a cell.
         for dj in -1..=1 {
             for di in -1..=1 {
                 let (i, j) = (cell[0] + f64::from(di), cell[1] + f64::from(dj));
@@ -69,7 +68,7 @@ impl Dots {
         1.0
     }
 
-    /// Where in its cell the dot lies, each 0..1.
+    /// Position of the dot in its cell, 0..1 along each axis.
     fn place(&self, i: i64, j: i64) -> [f64; 2] {
         let word = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
             ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f).rotate_left(32)
@@ -79,31 +78,32 @@ impl Dots {
     }
 }
 
-/// Paths traced against the light, in the frame of the picture.
+/// Paths traced against the light, in the frame of the image.
 ///
-/// `paths` look along the reversed view ([`ReversedPaths::view`]), whose right is the picture's
-/// left; this exchanges the signs on the way in and out. Light paths can be reversed, so rays from
-/// the camera are the light that reaches it.
+/// `paths` are traced along the reversed view ([`ReversedPaths::view`]), whose right is the image's
+/// left; this type mirrors starts and exits. Light paths are reversible, so rays from the camera
+/// follow the light that reaches it.
 pub struct ReversedPaths<'a> {
     paths: Box<dyn LightPaths + 'a>,
-    /// The frame of starts and exits: left-handed, because it is the picture's with the light's
-    /// direction turned round.
+    /// The frame of starts and exits. It is left-handed, because it is the image's frame with the
+    /// light's direction reversed.
     view: View,
 }
 
 impl<'a> ReversedPaths<'a> {
-    /// `paths` must have been made for [`ReversedPaths::view`] of the picture's view.
+    /// `paths` must have been made for [`ReversedPaths::view`] of the image's view.
     pub fn new(paths: Box<dyn LightPaths + 'a>) -> ReversedPaths<'a> {
         let inner = *paths.view();
         ReversedPaths { paths, view: View { right: -inner.right, ..inner } }
     }
 
-    /// The view against the light: right and forward negated, up kept, right-handed as before.
+    /// The view against the light: right and forward are negated, up is kept, and it stays
+    /// right-handed.
     pub fn view(view: &View) -> View {
         View { right: -view.right, forward: -view.forward, ..*view }
     }
 
-    /// Starts of the picture in the frame of [`ReversedPaths::view`].
+    /// The image's starts in the frame of [`ReversedPaths::view`].
     pub fn starts(starts: &[Start]) -> Vec<Start> {
         let mirror = |s: &Start| Start {
             position_m: mirrored(s.position_m),
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn a_prism_displaces_the_pattern_by_angle_times_distance() {
         let still = picture(&ClosedForm::prism([0.0; 2]), 2.0);
-        // 1 mm right and 0.5 mm up at 2 m: what pixel (x, y) sees, pixel (x+2, y-1) saw without
+        // 1 mm right and 0.5 mm up at 2 m: pixel (x, y) shows what pixel (x+2, y-1) shows without
         // flow.
         let moved = picture(&ClosedForm::prism([5e-4, 2.5e-4]), 2.0);
         let same = |dx: usize, dy: usize| {
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn dots_cover_the_area_they_should() {
-        // Dots whose places overlap cover a little less than their sum, π/16 of the area.
+        // Because dots overlap, they cover a little less than the sum of their areas, π/16.
         let n = 400;
         let dark = (0..n * n).filter(|k| {
             DOTS.brightness([f64::from(k % n), f64::from(k / n)].map(|v| v * 2.1e-4)) == 0.0
@@ -192,7 +192,7 @@ mod tests {
         let v = View::along(crate::view::Axis::Z, glam::DVec3::ZERO);
         let r = ReversedPaths::view(&v);
         assert_eq!((r.right.cross(r.up), r.forward), (-v.forward, -v.forward));
-        // A prism that deflects towards the reversed frame's right deflects to the picture's left.
+        // A prism that deflects towards the reversed frame's right deflects to the image's left.
         let reversed = ReversedPaths::new(Box::new(ClosedForm::prism([1e-3, 2e-3])));
         let mut exit = [Exit::UNDISTURBED];
         reversed.trace(&[Start::default()], &mut exit);

@@ -1,11 +1,13 @@
-//! Interferograms: the test beam and a reference beam of the same light on one film.
+//! Interferograms: superposes the test beam and a reference beam of the same light on one film.
 //!
-//! With the optical path difference δ the phase is φ = 2π δ/λ, and of two beams of equal strength
-//! the film gets `I = (1 + V cos φ)/2`: bright where nothing is disturbed, never negative, V ≤ 1
-//! the visibility. (Equation 5.17 of the thesis has `sin φ`: negative half the time and grey where
-//! nothing is.) *Infinite fringe*: the reference beam is parallel, lines are contours of δ. *Finite
-//! fringe*: it is inclined, and without flow there are straight fringes at the distance χ that the
-//! flow bends (equation 5.1): φ grows by 2π/χ along their direction.
+//! With the optical path difference δ the phase is φ = 2π δ/λ. Two beams of equal strength give the
+//! intensity `I = (1 + V cos φ)/2` with the visibility V ≤ 1: bright where nothing is disturbed,
+//! and never negative. (Equation 5.17 of the dissertation has `sin φ`, which is negative for half
+//! of the phases and grey where nothing is disturbed.)
+//!
+//! *Infinite fringe*: the reference beam is parallel, and fringes are contours of δ. *Finite
+//! fringe*: the reference beam is inclined. Without flow there are straight fringes at the distance
+//! χ, which the flow bends (equation 5.1): φ grows by 2π/χ along their direction.
 
 use super::Photon;
 use crate::optics::Optics;
@@ -21,18 +23,19 @@ pub struct Interferogram {
     n0: f32,
 }
 
-/// Straight fringes of an inclined reference beam.
+/// The straight fringes of an inclined reference beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fringes {
-    /// χ: from one bright line to the next, in object space.
+    /// χ: the distance from one bright line to the next, in object space.
     pub spacing_m: f64,
-    /// Direction across the lines, counter-clockwise from the picture's right.
+    /// Direction across the lines, counter-clockwise from the image's right.
     pub angle_deg: f64,
 }
 
 impl Interferogram {
-    /// Light of vacuum wavelength `wavelength_m`, fringes of visibility `visibility` (0..=1);
-    /// `fringes` is `None` for the infinite fringe. `n0` is the index outside the flow.
+    /// An interferometer with light of the vacuum wavelength `wavelength_m` and the visibility
+    /// `visibility` (0..=1). `fringes` is `None` for the infinite fringe. `n0` is the index outside
+    /// the flow.
     pub fn new(
         optics: Optics,
         wavelength_m: f64,
@@ -69,7 +72,8 @@ impl Interferogram {
         0.5 + 0.5 * self.visibility * self.cos_phase(photon)
     }
 
-    /// With a part `left` of the object beam: `I = (1 + T + 2 √T V cos φ)/4`.
+    /// The energy when the fraction T = `left` of the object beam remains: `I = (1 + T + 2 √T V cos
+    /// φ)/4`.
     #[inline]
     pub(super) fn dimmed(&self, photon: &Photon<'_>, left: f32) -> f32 {
         0.25 * (1.0 + left) + 0.5 * left.sqrt() * self.visibility * self.cos_phase(photon)
@@ -77,15 +81,16 @@ impl Interferogram {
 
     #[inline]
     fn cos_phase(&self, photon: &Photon<'_>) -> f32 {
-        // Whole waves are taken off in f64; what is left is exact enough in f32.
+        // Whole waves are subtracted in f64; the rest is accurate enough in f32.
         let waves = self.waves(photon);
         let rest = (waves - waves.round()) as f32;
         (std::f32::consts::TAU * rest).cos()
     }
 }
 
-/// Pairs of neighbouring pixels whose phases differ by more than half a wave: there the picture
-/// cannot show the fringes, and they turn grey. `waves` row by row.
+/// Number of pairs of neighbouring pixels whose phases differ by more than half a wave. The image
+/// cannot resolve the fringes there, and they turn grey. `waves` holds the phases in waves, row by
+/// row.
 pub fn unresolved_pairs(waves: &[f32], width: usize) -> usize {
     let steep = |a: f32, b: f32| usize::from((a - b).abs() > 0.5);
     let in_rows = waves.chunks_exact(width).flat_map(|r| r.windows(2)).map(|w| steep(w[0], w[1]));
@@ -108,14 +113,14 @@ mod tests {
         expose_grey(&Technique::Interferogram(i), paths, FRAMING, 16)
     }
 
-    /// Bright lines: upward passes of the mean level along the first row.
+    /// Number of bright lines: upward crossings of the mean level along the first row.
     fn fringes_in(film: &[f32]) -> usize {
         film[..200].windows(2).filter(|w| w[0] < 0.5 && w[1] >= 0.5).count()
     }
 
     #[test]
     fn a_phase_ramp_shows_its_number_of_fringes() {
-        // 0.2 m of picture over which the path grows by 12.5 waves.
+        // Over the 0.2 m of the image, the path grows by 12.5 waves.
         let wedge = ClosedForm::path_ramp(12.5 * WAVELENGTH / 0.2);
         let film = picture(&wedge, 1.0, None);
         assert!((12..=13).contains(&fringes_in(&film)), "{}", fringes_in(&film));
@@ -139,12 +144,12 @@ mod tests {
         let fringes = Some(Fringes { spacing_m: 0.02, angle_deg: 0.0 });
         let still = picture(&ClosedForm::prism([0.0; 2]), 1.0, fringes);
         assert!((9..=10).contains(&fringes_in(&still)), "0.2 m / 0.02 m");
-        // Half a wave everywhere exchanges bright and dark.
+        // A shift of half a wave everywhere exchanges bright and dark.
         let moved = picture(&ClosedForm::constant_path(0.5 * WAVELENGTH), 1.0, fringes);
         for (a, b) in still.iter().zip(&moved) {
             assert!((a + b - 1.0).abs() < 2e-3, "{a} {b}");
         }
-        // And across: constant along rows.
+        // Horizontal fringes are constant along rows.
         let across = picture(
             &ClosedForm::prism([0.0; 2]),
             1.0,
@@ -165,8 +170,8 @@ mod tests {
             let expected = 0.5 + 0.5 * (std::f64::consts::TAU * waves).cos();
             worst = worst.max((f64::from(film[k]) - expected).abs());
         }
-        // Steepest: 3.2 waves e^(-1/2)/σ · pixel = 0.16 waves over a pixel, whose mean of a cosine
-        // is down by (π 0.16)²/6 = 4 %, half of it in I.
+        // The steepest phase is 3.2 waves e^(-1/2)/σ · pixel = 0.16 waves over a pixel. The mean of
+        // a cosine over it is lower by (π 0.16)²/6 = 4 %, half of that in I.
         assert!(worst < 0.04, "{worst}");
     }
 
@@ -184,7 +189,7 @@ mod tests {
             image_point_m: [0.0; 2],
             shift_m: [0.0; 2],
         });
-        // The f32 path itself is worth 1e-4 waves there.
+        // The rounding of the f32 path itself is 1e-4 waves there.
         assert!((waves - 3000.25).abs() < 2e-4, "{waves}");
     }
 

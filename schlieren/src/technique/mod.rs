@@ -1,12 +1,12 @@
-//! How light becomes a picture: one technique a file.
+//! The techniques that turn deflected light into an image, one per file.
 //!
-//! | technique | a photon leaves on the film | thesis |
+//! | technique | energy that a photon leaves on the film | dissertation |
 //! |---|---|---|
 //! | [`shadowgraph`] | all its energy, where it lands | 5.3.3 |
 //! | [`schlieren`] | what the cut-off lets through | 5.3.4 |
-//! | [`interferogram`] | what interference with a reference beam leaves | 5.3.5 |
-//! | [`bos`] | the light of the background it came from | – |
-//! | [`volume`], [`mod@slice`] | nothing: pictures without optics, to compare with | 5.6 |
+//! | [`interferogram`] | its interference with a reference beam | 5.3.5 |
+//! | [`bos`] | the brightness of the background where it came from | – |
+//! | [`volume`], [`mod@slice`] | none: images without optics, for comparison | 5.6 |
 
 pub mod bos;
 pub mod interferogram;
@@ -24,30 +24,30 @@ use crate::path::{Exit, Start};
 pub struct Photon<'a> {
     /// Its undisturbed ray.
     pub start: &'a Start,
-    /// What the flow did to it.
+    /// Its deviation behind the flow.
     pub exit: &'a Exit,
-    /// The image of its source point in the cut-off plane; zero unless
-    /// [`Technique::needs_source_points`] or tilted beams.
+    /// The image of its source point in the cut-off plane. Zero unless the technique needs source
+    /// points ([`Technique::needs_source_points`]) or the beams are tilted.
     pub image_point_m: Across,
-    /// Where it lands in the plane of focus, from its start.
+    /// Shift from its start to where it lands, in the plane of focus.
     pub shift_m: Across,
 }
 
-/// A technique that follows light.
+/// A technique that simulates light, with its optics.
 #[derive(Debug, Clone)]
 pub enum Technique {
-    /// No cut-off.
+    /// A shadowgraph: no cut-off.
     Shadowgraph(Optics),
-    /// Light past a cut-off.
+    /// Schlieren: light is filtered by a cut-off.
     Schlieren(schlieren::Schlieren),
-    /// Two beams.
+    /// An interferogram: a test beam and a reference beam.
     Interferogram(interferogram::Interferogram),
-    /// A pattern seen through the flow.
+    /// Background-oriented schlieren: a pattern seen through the flow.
     Bos(bos::Bos),
 }
 
 impl Technique {
-    /// The optical bench it stands on.
+    /// The optical bench.
     #[inline]
     pub fn optics(&self) -> &Optics {
         match self {
@@ -58,29 +58,31 @@ impl Technique {
         }
     }
 
-    /// True when it reads [`Exit::opd_m`].
+    /// Whether the technique reads [`Exit::opd_m`].
     pub fn needs_opd(&self) -> bool {
         matches!(self, Technique::Interferogram(_))
     }
 
-    /// True when each photon needs a point of the source, because no closed form averages over it.
+    /// Whether each photon needs its own point of the source, because no closed form averages over
+    /// the source.
     pub fn needs_source_points(&self) -> bool {
         matches!(self, Technique::Schlieren(s) if s.samples_the_source())
     }
 
-    /// True when its three channels can differ.
+    /// Whether the three channels can differ.
     pub fn is_colored(&self) -> bool {
         matches!(self, Technique::Schlieren(s) if s.is_colored())
     }
 
-    /// True when rays are sent from the camera's pixels towards the light (and energy stays in the
-    /// pixel they were sent from), not from the light to the film.
+    /// Whether rays are traced from the camera's pixels towards the light, so that energy stays in
+    /// the pixel of the ray, and not from the light to the film.
     #[inline]
     pub fn looks_from_film(&self) -> bool {
         matches!(self, Technique::Bos(_))
     }
 
-    /// The energy a photon leaves, before absorption; 1 is an undisturbed photon without a cut-off.
+    /// The energy that a photon leaves on the film, before absorption. 1 is that of an undisturbed
+    /// photon without a cut-off.
     #[inline]
     pub fn energy(&self, photon: &Photon<'_>) -> Rgb {
         match self {
@@ -91,8 +93,8 @@ impl Technique {
         }
     }
 
-    /// The energy a photon leaves of what [`Exit::transmission`] says has come through. Absorption
-    /// dims the object beam, so an interferogram loses contrast before it gets dark.
+    /// The energy that a photon leaves on the film, with [`Exit::transmission`]. Absorption dims
+    /// only the object beam, so an interferogram loses contrast before it gets dark.
     #[inline]
     pub fn landed(&self, photon: &Photon<'_>) -> Rgb {
         let left = photon.exit.transmission;
@@ -102,9 +104,9 @@ impl Technique {
         }
     }
 
-    /// The part that reaches the film of light that fills a stop in the cut-off plane evenly: what
-    /// the flow itself emits. An interferometer's two beam splitters leave a quarter of the object
-    /// beam.
+    /// The fraction that reaches the film of light that fills a stop in the cut-off plane
+    /// uniformly, as light emitted by the flow does. The two beam splitters of an interferometer
+    /// pass a quarter of the object beam.
     pub fn passes_evenly(&self, stop_m: f64) -> Rgb {
         match self {
             Technique::Schlieren(s) => s.passes_evenly(stop_m),

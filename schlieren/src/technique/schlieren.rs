@@ -1,5 +1,4 @@
-//! Schlieren: light is let through, held back or coloured by where its deflection brings it in the
-//! cut-off plane.
+//! Schlieren: filters light in the cut-off plane, where its position depends on its deflection.
 
 use super::Photon;
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
@@ -12,23 +11,23 @@ pub struct Schlieren {
     plane: CutoffPlane,
     colored: bool,
     sampled: bool,
-    /// How much of each of the filter's channels this light's wavelength is; `None` for white light
-    /// whose dispersion does not matter.
+    /// Contribution of this light's wavelength to each channel of the filter; `None` for white
+    /// light without dispersion.
     band: Option<Rgb>,
 }
 
 impl Schlieren {
-    /// `cutoff` in the bench. With `sample_source` every photon takes its own point of the source
-    /// although a closed form for all of them is known; needed with tilted beams, where each source
-    /// point lights another way through the flow.
+    /// A set-up with `cutoff` in the bench. With `sample_source` every photon has its own point of
+    /// the source, even if a closed form averages over the source. Tilted beams need this, because
+    /// light of each source point takes another path through the flow.
     pub fn new(optics: Optics, cutoff: &Cutoff, sample_source: bool) -> Schlieren {
         let plane = CutoffPlane::new(cutoff, optics.source_image());
         let sampled = sample_source || !plane.has_closed_form();
         Schlieren { optics, plane, colored: cutoff.is_colored(), sampled, band: None }
     }
 
-    /// For light of one wavelength among several: a coloured filter then passes `band · rgb`, and
-    /// the picture of this wavelength is grey.
+    /// Restricts the light to one wavelength of several: a coloured filter then passes `band ·
+    /// rgb`, and the image at this wavelength is grey.
     pub fn with_band(self, band: Rgb) -> Schlieren {
         Schlieren { band: Some(band), ..self }
     }
@@ -48,7 +47,7 @@ impl Schlieren {
         self.seen(closed_form.unwrap_or_else(|| self.plane.transmission(at_m)))
     }
 
-    /// What this light's wavelength sees of the filter's colours.
+    /// Transmission of a filter colour for this light's wavelength.
     #[inline]
     fn seen(&self, rgb: Rgb) -> Rgb {
         match self.band {
@@ -57,7 +56,8 @@ impl Schlieren {
         }
     }
 
-    /// The cut-off's mean over a round stop in its plane, from the middles of a million squares.
+    /// The cut-off's mean transmission over a round stop in its plane, sampled at the centres of a
+    /// million squares.
     pub(super) fn passes_evenly(&self, stop_m: f64) -> Rgb {
         const SIDE: u32 = 1024;
         let place = |i: u32| ((f64::from(i) + 0.5) / f64::from(SIDE) - 0.5) * stop_m;
@@ -90,7 +90,7 @@ mod tests {
     fn a_prism_of_known_deflection_has_the_known_grey_level() {
         // f2 = 1.5 m, half of a 1 mm slit open: I = 1/2 + 1.5 ε / 1 mm.
         let prism = ClosedForm::prism([1e-4, 5e-5]);
-        // Along the 5 mm of the slit's length the same shift shows a fifth as much.
+        // Along the 5 mm of the slit's length the same shift changes the level by a fifth as much.
         for (angle_deg, expected) in [(0.0, 0.65), (90.0, 0.515), (180.0, 0.35), (-90.0, 0.485)] {
             let cutoff = Cutoff::Knife(Knife { angle_deg, position: HALF_OPEN });
             for sampled in [false, true] {
@@ -120,8 +120,8 @@ mod tests {
             worst = worst.max((film[i] - expected).abs());
             contrast = contrast.max((expected - 0.5).abs());
         }
-        // The pixel's mean against its centre, h²/24 of the second derivative (h = σ/4), is 0.3 %
-        // of the contrast.
+        // The pixel's mean differs from its centre by h²/24 of the second derivative (h = σ/4),
+        // which is 0.3 % of the contrast.
         assert!(contrast > 0.02 && worst < 0.01 * contrast, "{worst} of {contrast}");
     }
 

@@ -1,14 +1,14 @@
-//! Shadowgraph: no cut-off; light lands where it was deflected to, and where it crowds the film is
-//! bright.
+//! Shadowgraph: without a cut-off, light lands where it is deflected to, and the film is bright
+//! where light concentrates.
 //!
-//! Behind a thin flow with deflections u(x), a film at the distance D sees `I(x + D u) = 1/|det(1 +
-//! D ∇u)|`, summed over all x that land in the same place; for weak flows `I - 1 = -D ∇·u`, the
-//! Laplacian of the optical path. When D reaches the shortest focal length of the flow, the
-//! determinant vanishes: a caustic.
+//! Behind a thin flow with deflections u(x), a film at the distance D has the intensity `I(x + D u)
+//! = 1/|det(1 + D ∇u)|`, summed over all x that land at the same point. For weak flows `I - 1 = -D
+//! ∇·u`, the Laplacian of the optical path. When D reaches the shortest focal length of the flow,
+//! the determinant vanishes: a caustic.
 //!
-//! There is no code here but [`crate::technique::Technique::Shadowgraph`]'s energy of 1: the work
-//! is the film's, by [`crate::film::photons`] (as the thesis does it, with noise) or by
-//! [`crate::film::beams`] (without).
+//! This module only has tests. The energy of [`crate::technique::Technique::Shadowgraph`] is 1, and
+//! the film does the work: [`crate::film::photons`] as in the dissertation, with noise, or
+//! [`crate::film::beams`] without noise.
 
 #[cfg(test)]
 mod tests {
@@ -25,12 +25,13 @@ mod tests {
     }
 
     /// `I = 1/|det(1 + D ∇u)|` of a radial deflection u(r) = -(opd/σ²) r, opd = A exp(-r²/2σ²), at
-    /// the place r + D u(r).
+    /// r + D u(r).
     fn closed_form(amplitude_m: f64, distance_m: f64, landing_r: f64) -> f64 {
         let opd = |r: f64| amplitude_m * (-0.5 * (r / SIGMA).powi(2)).exp();
         let u = |r: f64| -r / (SIGMA * SIGMA) * opd(r);
         let du = |r: f64| (r * r / (SIGMA * SIGMA) - 1.0) / (SIGMA * SIGMA) * opd(r);
-        // No caustic: landing places are in order of their starts. Bisection.
+        // Without a caustic, landing points are in the order of their starts, so bisection finds
+        // the start.
         let (mut low, mut high) = (0.0, 2.0 * landing_r + 1e-6);
         for _ in 0..100 {
             let middle = 0.5 * (low + high);
@@ -53,8 +54,8 @@ mod tests {
                 worst = worst.max((f64::from(film[i]) - expected).abs());
                 contrast = contrast.max((expected - 1.0).abs());
             }
-            // Second order in pixel/σ = 1/12, on the picture and on the cell: 0.7 % each way, more
-            // where the middle contracts.
+            // The error is of second order in pixel/σ = 1/12, in the image and in the cell: 0.7 %
+            // each, and more where the middle contracts.
             assert!(worst < 0.02 * contrast, "{amplitude_m}: {worst} of {contrast}");
         }
     }
@@ -69,14 +70,14 @@ mod tests {
             (sum / film.len() as f64).sqrt()
         };
         let (few, many) = (rms(4), rms(64));
-        // Independent photons would go down by 4; a low-discrepancy sequence through a smooth map
-        // does better.
+        // The error of independent photons would fall by a factor of 4; a low-discrepancy sequence
+        // through a smooth map does better.
         assert!(many < few / 5.0 && many < 0.02, "{few} {many}");
     }
 
     #[test]
     fn energy_is_conserved_through_a_caustic() {
-        // Beyond the focal length the light has crossed over; all of it is still there.
+        // Beyond the focal length the rays have crossed, but no light is lost.
         let blob = ClosedForm::gaussian(1.2e-4, SIGMA / 2.0, 0.0);
         for film in
             [beams_grey(&at(1.0), &blob, FRAMING, 1), expose_grey(&at(1.0), &blob, FRAMING, 16)]

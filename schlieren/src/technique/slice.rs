@@ -1,6 +1,6 @@
-//! For comparison: the "numerical schlieren" that most CFD papers print, `exp(-strength |∇eps| /
-//! largest)` on one slice (Quirk and Karni, JFM 318, 1996, figure captions). It looks like a
-//! schlieren picture and is none: no light, no integral through the flow, no direction, no unit.
+//! Draws the "numerical schlieren" of most CFD papers for comparison: `exp(-strength |∇eps| /
+//! largest)` on one slice (Quirk and Karni, JFM 318, 1996, figure captions). It resembles a
+//! schlieren image but has no light, no integral through the flow, no direction and no unit.
 
 use super::volume::{ComparisonError, gradient_grid, index_of};
 use crate::field::Field;
@@ -8,8 +8,8 @@ use crate::film::Framing;
 use crate::view::View;
 use rayon::prelude::*;
 
-/// The picture of the slice across the view at `depth_m` along the light from the middle, row by
-/// row from the top; 1 outside the field.
+/// The image of the slice across the view, at `depth_m` along the light from the view's centre, row
+/// by row from the top. It is 1 outside the field.
 pub fn slice(
     field: &Field,
     view: &View,
@@ -34,7 +34,7 @@ mod tests {
 
     #[test]
     fn the_slice_is_dark_where_the_gradient_is_and_bright_outside() {
-        // A kink at x = 0: gradient only to the right.
+        // A kink at x = 0: there is a gradient only to the right of it.
         let field = Field::from_fn([17, 9, 9], [0.1; 3], DVec3::new(-0.8, 0.0, 0.0), 1.0, |p| {
             1e-4 * p.x.max(0.0)
         });

@@ -1,8 +1,8 @@
-//! For comparison: the size of the gradient of eps along straight rays, as smoke. What
-//! visualization programs draw as "volume rendered schlieren" (figure 5.12). There are no optics in
-//! it: directions of gradients are lost, opposite gradients do not cancel, and it has no unit.
+//! Draws the "volume rendered schlieren" of visualization programs for comparison: the magnitude of
+//! the gradient of eps along straight rays, as smoke (figure 5.12). It simulates no optics:
+//! directions of gradients are lost, opposite gradients do not cancel, and it has no unit.
 //!
-//! A ray's brightness is `exp(-strength ∫ |∇eps| ds / (g L))`, g being the largest gradient and L
+//! A ray's brightness is `exp(-strength ∫ |∇eps| ds / (g L))`, with g the largest gradient and L
 //! the field's depth along the view.
 
 use crate::field::Field;
@@ -16,21 +16,21 @@ use rt_core::ray::Ray;
 use rt_core::transfer_function::{TransferFunction, TransferFunctionError};
 use rt_core::volume::{Volume, VolumeError, VolumeOptions, VolumeQuality};
 
-/// Why a comparison cannot be drawn.
+/// Errors of drawing a comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum ComparisonError {
-    /// The field makes no grid.
+    /// No grid can be made of the field's gradient.
     #[error("the gradient of the field makes no grid")]
     Grid(#[from] GridError),
-    /// The grid makes no volume.
+    /// No volume can be made of the grid.
     #[error("the gradient of the field makes no volume")]
     Volume(#[from] VolumeError),
-    /// The strength makes no smoke.
+    /// No transfer function can be made of the strength.
     #[error("the strength of the comparison makes no transfer function; give a number above 0")]
     Transfer(#[from] TransferFunctionError),
 }
 
-/// |∇eps| at the nodes in 1/m, by central differences (one-sided at the border), and its largest value. Nodes that are not gas are 0.
+/// |∇eps| at the nodes in 1/m, by central differences (one-sided at the border), and its largest value. It is 0 at nodes that are not gas.
 pub fn gradient_size(field: &Field) -> (Vec<f32>, f32) {
     let dims = field.dims();
     let (eps, spacing) = (field.eps(), field.spacing_m());
@@ -63,7 +63,7 @@ pub(super) fn gradient_grid(field: &Field) -> Result<Grid, ComparisonError> {
     Ok(Grid::new(dims, field.origin_m(), DVec3::from(field.spacing_m()), sizes)?)
 }
 
-/// The picture, row by row from the top; 1 where there is no gradient.
+/// The image, row by row from the top. It is 1 where there is no gradient.
 pub fn volume(
     field: &Field,
     view: &View,
@@ -92,7 +92,8 @@ pub fn volume(
 pub(super) fn index_of(grid: &Grid, at: DVec3) -> Option<Vec3> {
     let index = (at - grid.origin) / grid.spacing;
     let last = (grid.dims - UVec3::ONE).as_dvec3();
-    // A thousandth of a cell: the frame's border pixels may lie on the border of the field.
+    // Tolerance of a thousandth of a cell, because the image's border pixels may lie on the border
+    // of the field.
     let inside = index.cmpge(DVec3::splat(-1e-3)).all() && index.cmple(last + 1e-3).all();
     inside.then(|| index.as_vec3())
 }
@@ -104,7 +105,7 @@ mod tests {
 
     #[test]
     fn an_even_gradient_darkens_by_the_length_of_the_way() {
-        // eps grows along x: |∇eps| is the same everywhere, so the picture is e^-strength inside
+        // eps grows along x, so |∇eps| is the same everywhere and the image is e^-strength inside
         // and 1 outside.
         let field = Field::from_fn([9, 9, 9], [0.1; 3], DVec3::ZERO, 1.0, |p| 1e-4 * p.x).unwrap();
         let view = View::along(Axis::Z, field.centre_m());
