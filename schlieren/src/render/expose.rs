@@ -1,5 +1,5 @@
-//! Sends light of every line of the spectrum through the test section onto a film, and takes the
-//! noise out.
+//! Exposes a film to the light of every spectral line through the test section, and filters the
+//! noise.
 
 use super::{
     Control, Layers, PlannedPaths, RenderError, RenderOutput, Report, TestSection, technique,
@@ -15,8 +15,8 @@ use crate::spectrum::film_colors;
 use rt_core::sampler::Sampling;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// How far the beams of an extended source part from the axial one, in pixels: within the flow, or
-/// on the way to the plane in focus.
+/// Largest distance between the beams of an extended source and the axial beam, in pixels, within
+/// the flow or up to the plane in focus.
 fn beam_spread_px(scene: &Scene, section: &TestSection, optics: &Optics, framing: &Framing) -> f64 {
     if !scene.technique.uses_source() {
         return 0.0;
@@ -31,7 +31,7 @@ fn beam_spread_px(scene: &Scene, section: &TestSection, optics: &Optics, framing
 }
 
 /// Exposes the film to every line of the spectrum and adds up their colours. Returns the paths of
-/// the first.
+/// the first line.
 pub(super) fn expose_lines<'a>(
     scene: &Scene,
     section: &'a TestSection,
@@ -127,7 +127,7 @@ pub(super) fn expose_lines<'a>(
     Ok(first)
 }
 
-/// The film of one line, filtered: energy per pixel.
+/// The filtered film of one line: energy per pixel.
 fn expose_line<const C: usize>(
     scene: &Scene,
     setup: &Exposure<'_>,
@@ -195,7 +195,7 @@ fn expose_line<const C: usize>(
     Ok(film)
 }
 
-/// Takes the noise out of a film.
+/// Filters the noise of a film.
 fn filtered<const C: usize>(
     film: &[[f32; C]],
     landed: &[LandedPhoton<C>],
@@ -214,8 +214,8 @@ fn filtered<const C: usize>(
     }
 }
 
-/// Half the difference between two halves of the photons, filtered like the picture (a cone's noise
-/// is told by its film's).
+/// Half the difference between two halves of the photons, filtered like the image. With a cone
+/// filter it is the noise of the unfiltered film.
 fn noise<const C: usize>(
     films: &[Film<C>],
     samples: u32,
@@ -241,9 +241,9 @@ fn noise<const C: usize>(
     difference.iter().map(|d| d.iter().fold(0.0f32, |m, v| m.max(v.abs()))).collect()
 }
 
-/// Pixels around the picture from which light can stray into it: the farthest stray of a coarse
-/// lattice of rays over the picture and half its size more, and a quarter of that for what the
-/// lattice missed.
+/// Width of the margin around the image, in pixels, from which light can be deflected into it. It
+/// is the largest shift found by a coarse lattice of rays over 1.5 times the image's size, plus a
+/// quarter for what the lattice misses.
 fn margin_px(
     paths: &dyn LightPaths,
     optics: &Optics,

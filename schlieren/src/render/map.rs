@@ -1,30 +1,30 @@
-//! The deflection map: one ray through the centre of every pixel. What measurements and other
-//! programs compare with.
+//! Traces the deflection map, with one ray through the centre of every pixel, for comparison with
+//! measurements and other programs.
 
 use crate::film::Framing;
 use crate::optics::Optics;
 use crate::path::{Exit, LightPaths, Status};
 
-/// What rays through the pixels' centres met, row by row from the top.
+/// Results of the rays through the pixels' centres, row by row from the top.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Map {
-    /// Deflection along right and up; 0 where no light came through.
+    /// Deflection along right and up; 0 where no light arrives.
     pub deflection_rad: Vec<[f32; 2]>,
-    /// Displacement in the plane of focus: what BOS measures when that is the background.
+    /// Displacement in the plane of focus, which BOS measures when that plane is the background.
     pub displacement_m: Vec<[f32; 2]>,
-    /// Optical path difference in the plane of focus, in waves; empty when it was not asked for.
+    /// Optical path difference in the plane of focus, in waves; empty unless wanted.
     pub waves: Vec<f32>,
-    /// 1 free, 0 blocked.
+    /// Transmission: 1 for free rays, 0 for blocked ones.
     pub transmission: Vec<f32>,
-    /// Largest deflection's size.
+    /// Magnitude of the largest deflection.
     pub largest_deflection_rad: f64,
-    /// Largest displacement where rays leave the field.
+    /// Magnitude of the largest displacement, where rays leave the field.
     pub largest_displacement_m: f64,
-    /// Pixels whose ray did not come through.
+    /// Number of pixels whose ray does not arrive.
     pub dark: usize,
 }
 
-/// Traces the map. `blocked` says which starts meet a body.
+/// Traces the map. `blocked` returns whether a body blocks a start's ray.
 pub(crate) fn map(
     paths: &dyn LightPaths,
     optics: &Optics,

@@ -1,12 +1,12 @@
-//! The medium in pictures: paths that lose light, the light that the medium adds, and layers of
-//! both.
+//! Renders absorption, emission and rotation of the medium: dims the light paths, adds the emitted
+//! light and makes the layers of both.
 //!
 //! Light from the source is dimmed photon by photon ([`crate::media::AttenuatedPaths`]). Light that
-//! the medium emits is no photon's: each pixel's camera ray, parallel to the axis, is walked back
-//! through the flow, and what was collected on it is added to the exposed film, after all filters,
-//! for it has no noise. On its way to the film it meets the same bench: it fills the stop in the
-//! cut-off plane evenly, so a cut-off passes its mean over the stop wherever the light came from
-//! ([`Technique::passes_evenly`]), and half of it gets through an analyser.
+//! the medium emits belongs to no photon. It is integrated along each pixel's camera ray, parallel
+//! to the axis and against the light, and added to the exposed film after all filters, because it
+//! has no noise. Emitted light passes the same bench. It fills the stop in the cut-off plane
+//! uniformly, so a cut-off passes its mean over the stop wherever the light comes from
+//! ([`Technique::passes_evenly`]). An analyser passes half of it.
 
 use super::planned::PlannedPaths;
 use super::{Layers, RenderError, RenderOutput, TestSection, technique};
@@ -20,21 +20,21 @@ use crate::technique::bos::ReversedPaths;
 use crate::view::View;
 use std::sync::Arc;
 
-/// What was collected through the pixels' centres, row by row from the top; empty for properties
-/// that are not in the scene.
+/// Integrals along the rays through the pixels' centres, row by row from the top. Empty for
+/// properties that are not in the scene.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MediaMap {
     /// Optical depth.
     pub optical_depth: Vec<f32>,
-    /// Emission as the film sees it, before cut-off and exposure: 1 is undisturbed light without a
-    /// cut-off.
+    /// Emission towards the film, before cut-off and exposure. 1 is that of undisturbed light
+    /// without a cut-off.
     pub emission: Vec<f32>,
     /// Rotation of the plane of polarisation in rad.
     pub rotation_rad: Vec<f32>,
 }
 
 impl TestSection {
-    /// The same with properties of the medium.
+    /// Adds properties of the medium.
     #[must_use]
     pub fn with_media(mut self, media: Media) -> TestSection {
         self.warnings.extend(media.warnings());
@@ -42,7 +42,7 @@ impl TestSection {
         self
     }
 
-    /// The media that the scene calls for; `None` when it calls for none.
+    /// The media that the scene needs; `None` when it needs none.
     fn media_of(&self, scene: &Scene) -> Result<Option<&Media>, RenderError> {
         let has = |p: Property| self.media.as_ref().is_some_and(|m| m.get(p).is_some());
         match scene.media.quantities().iter().find(|(p, _)| !has(*p)) {
@@ -51,7 +51,7 @@ impl TestSection {
         }
     }
 
-    /// Planned paths with what the medium leaves of their light.
+    /// Adds the attenuation by the medium to planned paths.
     pub(super) fn attenuated<'a>(
         &'a self,
         scene: &Scene,
@@ -89,9 +89,9 @@ impl TestSection {
         )
     }
 
-    /// What the picture's light collects from these starts: by the light's own way, or the camera's
-    /// with techniques that look from the film. Emission is left out: see [`TestSection::emitted`].
-    /// `None` when the scene has no media.
+    /// Absorption and rotation of the image's light from these starts, traced along the light, or
+    /// from the camera for techniques that trace from the film. Emission is not included: see
+    /// [`TestSection::emitted`]. `None` when the scene has no media.
     pub fn collected(
         &self,
         scene: &Scene,
@@ -113,8 +113,8 @@ impl TestSection {
         Ok(Some(out))
     }
 
-    /// What the medium emits towards the film along camera rays that end at these starts, bodies in
-    /// front of it hiding it. `None` when the scene has no emission.
+    /// The medium's emission towards the film along camera rays through these starts. Bodies hide
+    /// what is behind them. `None` when the scene has no emission.
     pub fn emitted(
         &self,
         scene: &Scene,
@@ -136,7 +136,7 @@ impl TestSection {
     }
 }
 
-/// Adds what the medium emits to the exposed film.
+/// Adds the light that the medium emits to the exposed film.
 pub(super) fn add_emission(
     scene: &Scene,
     section: &TestSection,
@@ -152,7 +152,7 @@ pub(super) fn add_emission(
     };
     r.report.counters.media_rays += emitted.len() as u64;
 
-    // The medium glows in the light's own spectrum.
+    // The medium emits with the spectrum of the light.
     let lines = scene.lines();
     let colors = film_colors(&lines);
     let mut gain = [0.0f32; 3];
@@ -173,7 +173,7 @@ pub(super) fn add_emission(
     Ok(())
 }
 
-/// The layers of absorption and rotation; pixels without light get zeros.
+/// Adds the layers of absorption and rotation; pixels without light get zeros.
 pub(super) fn add_map(
     scene: &Scene,
     section: &TestSection,
@@ -202,7 +202,7 @@ pub(super) fn add_map(
     Ok(())
 }
 
-/// A rotation that no analyser makes visible is an answer only where layers are asked for.
+/// Warns about a rotation that no analyser makes visible, unless it is written to layers.
 pub(super) fn warn(scene: &Scene, layers: Layers, warnings: &mut Vec<String>) {
     if scene.media.rotation.is_some() && scene.media.analyser_deg.is_none() && !layers.map {
         warnings.push(

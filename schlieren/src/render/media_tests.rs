@@ -28,7 +28,7 @@ fn section(s: &Scene, values: &[(Property, f64)], solids: Option<Solids>) -> Tes
     section.with_media(values.iter().fold(Media::default(), uniform))
 }
 
-/// A picture through even media; the scene names arrays for what is given.
+/// An image through uniform media; the scene names an array for each given property.
 fn drawn(rest: &str, media: &str, values: &[(Property, f64)], layers: Layers) -> RenderOutput {
     let media = if media.is_empty() { String::new() } else { format!("[media]\n{media}\n") };
     let s = scene(&format!("{media}{rest}"));
@@ -38,7 +38,8 @@ fn drawn(rest: &str, media: &str, values: &[(Property, f64)], layers: Layers) ->
 const SMOKE: (Property, f64) = (Property::Absorption, 8.0);
 const GLOW: (Property, f64) = (Property::Emission, 3.0);
 const TURN: (Property, f64) = (Property::Rotation, 5.0);
-/// Beside the blob and 2.4 mm or more inside the field, which fills the picture's height.
+/// First pixel of the middle row. Pixels 2 to 21 of it are 2.4 mm or more inside the field, which
+/// fills the image's height.
 const ROW: usize = 10 * 24;
 
 const TECHNIQUES: [&str; 6] = [
@@ -68,7 +69,7 @@ fn media_that_the_scene_does_not_call_for_change_no_bit_and_cost_no_ray() {
         assert_eq!(unused.report.counters.media_rays, 0);
         let effects = unused.report.effects;
         assert!(!effects.absorption && !effects.emission && !effects.polarisation);
-        // A rotation without an analyser shows in layers only.
+        // A rotation without an analyser is visible in layers only.
         let hidden = drawn(technique, "rotation = \"r\"", &[TURN], Layers::NONE);
         assert_eq!(bits(&plain), bits(&hidden), "{technique}");
         assert_eq!(hidden.report.counters.media_rays, 0);
@@ -117,7 +118,7 @@ fn an_interferogram_loses_contrast_before_light() {
     let [low, high] = of(drawn(fringes, "", &[], Layers::NONE));
     let [dim_low, dim_high] = of(drawn(fringes, "absorption = \"a\"", &[SMOKE], Layers::NONE));
     let left = (-SMOKE.1 * 2.0 * HALF).exp() as f32;
-    // (1 + T)/4 in the middle, and √T of the swing.
+    // The mean is (1 + T)/4 and the amplitude is scaled by √T.
     let middle = 0.25 * (1.0 + left) + left.sqrt() * (0.5 * (low + high) - 0.5);
     assert!((0.5 * (dim_low + dim_high) - middle).abs() < 1e-5, "{dim_low} {dim_high}");
     assert!(((dim_high - dim_low) - (high - low) * left.sqrt()).abs() < 1e-5);
@@ -134,30 +135,30 @@ fn glow_adds_what_the_cut_offs_mean_over_the_stop_lets_through() {
         (TECHNIQUES[0].to_string(), 0.5),
         (circle.replace("KIND", "circle"), small * small),
         (circle.replace("KIND", "complemented-circle"), 1.0 - small * small),
-        // Exposed by a half.
+        // The exposure is 1/2.
         (TECHNIQUES[2].to_string(), 0.5),
         (TECHNIQUES[3].to_string(), 1.0),
         ("[technique]\nkind = \"interferogram\"\nvisibility = 0.0\n".to_string(), 0.25),
     ] {
-        // Only smoke, and smoke that glows.
+        // Smoke that only absorbs, and smoke that also glows.
         let dark = drawn(&technique, "absorption = \"a\"", &[SMOKE], Layers::NONE);
         let lit =
             drawn(&technique, "absorption = \"a\"\nemission = \"j\"", &[SMOKE, GLOW], Layers::ALL);
         let i = ROW + 12;
         let added = f64::from(lit.pixels[i][0] - dark.pixels[i][0]);
-        // A circle of 41 squares' radius among a million: its area within 1 %.
+        // A circle with a radius of 41 of the million squares has its area within 1 %.
         let tolerance = if gain < 0.1 { 0.01 * gain } else { 2e-5 };
         assert!((added / glow - gain).abs() < tolerance, "{technique} {added} {gain}");
         assert!((f64::from(lit.media.unwrap().emission[i]) - glow).abs() < 1e-6);
         assert!(lit.report.effects.emission);
     }
-    // Nothing is added beside the field: the picture is wider than it.
+    // The image is wider than the field, and nothing is added outside the field.
     let glowing = drawn(TECHNIQUES[0], "emission = \"j\"", &[GLOW], Layers::NONE);
     let plain = drawn(TECHNIQUES[0], "", &[], Layers::NONE);
     assert_eq!(glowing.pixels[ROW].map(f32::to_bits), plain.pixels[ROW].map(f32::to_bits));
-    // One ray a pixel, and photons cost what they did.
+    // Emission takes one ray per pixel and adds none for photons.
     assert_eq!(glowing.report.counters.media_rays, 24 * 20);
-    // The glow has the light's own colour; red and green lines leave blue dark.
+    // Emission has the light's own colour: with red and green lines blue stays dark.
     let white = drawn(TECHNIQUES[4], "emission = \"j\"", &[GLOW], Layers::NONE);
     let several = drawn(TECHNIQUES[4], "", &[], Layers::NONE);
     for (c, part) in [(0, 1.0), (1, 1.0), (2, 0.0)] {
@@ -169,7 +170,7 @@ fn glow_adds_what_the_cut_offs_mean_over_the_stop_lets_through() {
 #[test]
 fn an_analyser_shows_the_rotation_by_malus() {
     let phi = TURN.1 * 2.0 * HALF;
-    // Without a filter, which would carry light from within the field to pixels beside it.
+    // Without a filter, which would spread light from within the field to pixels outside it.
     let technique = format!(
         "{}[sampling]\nmethod = \"photons\"\nsamples = 4\nfilter = {{ kind = \"none\" }}\n",
         TECHNIQUES[0]
@@ -181,13 +182,13 @@ fn an_analyser_shows_the_rotation_by_malus() {
         let i = ROW + 12;
         let expected = f64::from(plain.pixels[i][0]) * (deg.to_radians() - phi).cos().powi(2);
         assert!((f64::from(r.pixels[i][0]) - expected).abs() < 2e-6, "{deg}: {expected}");
-        // Beside the field nothing turns; a crossed analyser is dark there, but the map still knows
-        // where light went.
+        // Outside the field nothing is rotated. A crossed analyser is dark there, but the map still
+        // has the rays' deflections.
         let beside = f64::from(plain.pixels[ROW][0]) * deg.to_radians().cos().powi(2);
         assert!((f64::from(r.pixels[ROW][0]) - beside).abs() < 2e-6, "{deg}: {beside}");
         assert_eq!(r.map.as_ref().unwrap().dark, 0);
         assert!((f64::from(r.media.unwrap().rotation_rad[i]) - phi).abs() < 1e-6);
-        // What glows is not polarised: half of it passes.
+        // Emitted light is not polarised: half of it passes.
         let both =
             drawn(&technique, &format!("{media}\nemission = \"j\""), &[TURN, GLOW], Layers::NONE);
         let added = f64::from(both.pixels[i][0] - r.pixels[i][0]);
@@ -197,7 +198,7 @@ fn an_analyser_shows_the_rotation_by_malus() {
 
 #[test]
 fn bodies_hide_the_glow_behind_them_and_not_that_before() {
-    // A square of 40 mm in the plane z = 24 mm, three quarters of the way to the film.
+    // A square of 40 mm in the plane z = 24 mm, at three quarters of the field's depth.
     let corners = [(-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)];
     let corners = corners.map(|(x, y): (f32, f32)| Vec3::new(x, y, 24.0) * 1e-3);
     let mesh = || TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
@@ -215,7 +216,7 @@ fn bodies_hide_the_glow_behind_them_and_not_that_before() {
             emission[ROW + 12]
         );
         assert!((f64::from(emission[ROW + 5]) - GLOW.1 * 2.0 * HALF).abs() < 1e-6);
-        // The body's silhouette glows.
+        // The medium in front of the body glows in its silhouette.
         assert!((f64::from(r.pixels[ROW + 12][0]) / s.exposure() - GLOW.1 * 24e-3).abs() < 2e-5);
     }
 }

@@ -1,4 +1,4 @@
-//! Scene in, picture out.
+//! Renders the image of a scene, with its layers and a report.
 //!
 //! ```
 //! use glam::DVec3;
@@ -13,8 +13,8 @@
 //! })?;
 //! let section = TestSection::of_fields(&scene, vec![blob], None)?;
 //! let picture = render(&scene, &section, Layers::NONE, &Control::default())?;
-//! // Light is bent away from the warm middle: to the left of it darker, to the right brighter than
-//! // the background of 1/2.
+//! // Light is bent away from the warm middle: against the background of 1/2 the image is darker to
+//! // the left of it and brighter to the right.
 //! let [left, right] = [16 * 32 + 11, 16 * 32 + 20].map(|i: usize| picture.pixels[i][0]);
 //! assert!(left < 0.46 && right > 0.54, "{left} {right}");
 //! assert!((picture.pixels[0][0] - 0.5).abs() < 1e-3);
@@ -49,10 +49,10 @@ use crate::technique::volume::ComparisonError;
 use crate::technique::{Technique, bos, interferogram, schlieren, slice, volume};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Why there is no picture.
+/// Errors of rendering.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// The scene is none.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The flow cannot be read.
@@ -61,158 +61,158 @@ pub enum RenderError {
     /// The bodies cannot be read.
     #[error(transparent)]
     Solids(#[from] crate::solids::SolidsError),
-    /// The view is none.
+    /// The view is invalid.
     #[error(transparent)]
     View(#[from] crate::view::ViewError),
-    /// A comparison cannot be drawn.
+    /// An image for comparison cannot be drawn.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
-    /// Not one field per wavelength.
+    /// The number of fields differs from the number of wavelengths.
     #[error("the scene has {wanted} wavelengths and {found} fields; give one field for each")]
     Fields {
-        /// Wavelengths.
+        /// Number of wavelengths.
         wanted: usize,
-        /// Fields.
+        /// Number of fields.
         found: usize,
     },
-    /// The GPU march is not part of this program.
+    /// The program is built without the GPU march.
     #[error(
         "this program is built without the feature gpu; take --device cpu (march.device in a scene)"
     )]
     NoGpu,
-    /// The GPU was asked for and cannot do it.
+    /// The GPU was requested but cannot compute this.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] crate::gpu::GpuError),
-    /// The scene names a property of the medium, and the test section has none.
+    /// The scene names a property of the medium that the test section lacks.
     #[error(
         "the scene has media.{0} and the test section does not; read it from a file, or give it \
          with `TestSection::with_media`"
     )]
     NoMedia(&'static str),
-    /// A name that nothing has.
+    /// A name that does not exist.
     #[error("{key}: there is no `{name}`; there are: {names}")]
     Unknown {
         /// Path of the key in the scene.
         key: &'static str,
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// What there is.
+        /// The valid names.
         names: String,
     },
-    /// The photons for a cone filter do not fit.
+    /// A cone filter would have to keep too many photons.
     #[error(
         "the cone filter keeps every photon, and {photons} are more than the {limit} it may keep; \
          take fewer samples or another filter"
     )]
     TooManyPhotons {
-        /// Wanted.
+        /// Number of photons wanted.
         photons: u64,
-        /// Allowed.
+        /// Largest number allowed.
         limit: u64,
     },
-    /// Cancelled from outside.
+    /// Cancelled by the caller.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Cancels a picture and follows its progress.
+/// Cancels rendering and reports its progress.
 pub struct Control<'a> {
-    /// Set it to stop soon.
+    /// Set it to stop rendering soon.
     pub cancel: &'a AtomicBool,
-    /// Gets parts done, 0..=1, from any thread, in order.
+    /// Receives the fraction done, 0..=1, from any thread, in increasing order.
     pub progress: &'a (dyn Fn(f64) + Sync),
 }
 
 impl Default for Control<'_> {
-    /// Runs to the end in silence.
+    /// Runs to the end without reporting progress.
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Control { cancel: &NEVER, progress: &|_| {} }
     }
 }
 
-/// What is wanted beside the picture. What is not wanted is not computed.
+/// Layers to compute besides the image. Others are not computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "independent wishes")]
 pub struct Layers {
-    /// Deflection, displacement and transmission through the pixels' centres.
+    /// Deflection, displacement and transmission of rays through the pixels' centres.
     pub map: bool,
-    /// The phase there.
+    /// The phase of the same rays.
     pub phase: bool,
     /// Photons per pixel.
     pub counts: bool,
-    /// The picture's noise.
+    /// The image's noise.
     pub noise: bool,
 }
 
 impl Layers {
-    /// The picture alone.
+    /// The image alone.
     pub const NONE: Layers = Layers { map: false, phase: false, counts: false, noise: false };
-    /// Everything.
+    /// All layers.
     pub const ALL: Layers = Layers { map: true, phase: true, counts: true, noise: true };
 }
 
-/// A picture and what belongs to it. All are row by row from the top.
+/// An image with its layers and report. Images and layers are stored row by row from the top.
 #[derive(Debug, Clone)]
 pub struct RenderOutput {
-    /// Where its pixels lie in the test section.
+    /// Positions of the pixels in the test section.
     pub framing: Framing,
-    /// Linear brightness, 1 is white: energy times exposure. Grey pictures have three equal
+    /// Linear brightness, with 1 for white: energy times exposure. Grey images have three equal
     /// channels.
     pub pixels: Vec<Rgb>,
-    /// Whether channels can differ.
+    /// Whether the channels can differ.
     pub colored: bool,
-    /// With [`Layers::map`].
+    /// The deflection map, with [`Layers::map`].
     pub map: Option<Map>,
-    /// With [`Layers::map`], when the scene has media.
+    /// The media's layers, with [`Layers::map`] when the scene has media.
     pub media: Option<MediaMap>,
-    /// With [`Layers::counts`], when photons were sent.
+    /// Photons per pixel, with [`Layers::counts`] when the film was exposed by photons.
     pub counts: Option<Vec<u32>>,
-    /// With [`Layers::noise`]: estimated error of each pixel's brightness by too few photons: half
-    /// the difference between two halves of them, of the first wavelength, strongest channel.
-    /// `None` for pictures without noise.
+    /// Estimated error of each pixel's brightness from the limited number of photons, with
+    /// [`Layers::noise`]: half the difference between two halves of the photons, for the first
+    /// wavelength and the strongest channel. `None` for images without noise.
     pub noise: Option<Vec<f32>>,
-    /// What was done.
+    /// The report.
     pub report: Report,
 }
 
-/// What was done for a picture.
+/// Report of how an image was rendered.
 #[derive(Debug, Clone, Default, serde::Serialize)]
 pub struct Report {
-    /// Effects that the scene calls for.
+    /// Effects that the scene needs.
     pub effects: Effects,
-    /// Work by kind.
+    /// Counts of work by kind.
     pub counters: Counters,
-    /// Photons by fate, over all wavelengths.
+    /// Photons by outcome, over all wavelengths.
     pub tally: Tally,
-    /// The march, in words.
+    /// Description of the march.
     pub march: String,
-    /// Measured error of a deflection by march and interpolation, when there is a map.
+    /// Measured error of deflections due to march and interpolation, when there is a map.
     pub deflection_error_rad: Option<f64>,
-    /// Estimated error of a deflection by the flow's own lattice.
+    /// Estimated error of deflections due to the flow's own lattice.
     pub resolution_error_rad: Option<f64>,
     /// Largest deflection through a pixel's centre, when there is a map.
     pub largest_deflection_rad: Option<f64>,
-    /// By how much bodies' silhouettes can be off because bodies see straight rays, when there are
-    /// bodies and a map.
+    /// Largest error of the bodies' silhouettes, because they are computed with straight rays.
+    /// Present when there are bodies and a map.
     pub silhouette_error_px: Option<f64>,
-    /// What leaving out even gas came to (`march.skip_rad`), in the light of the first wavelength
-    /// or, without light, the map.
+    /// Effect of skipping uniform gas (`march.skip_rad`) on the light of the first wavelength, or
+    /// on the map for techniques without light.
     #[serde(rename = "left_out")]
     pub skip_report: Option<SkipReport>,
-    /// Darkest and brightest channel of the picture.
+    /// Lowest and highest channel value of the image.
     pub levels: [f32; 2],
-    /// Pixels around the picture that sent light as well.
+    /// Width of the margin around the image, in pixels, that also sent light.
     pub margin_px: u32,
     /// Side of a pixel in the test section.
     pub pixel_m: f64,
-    /// What should be known about the picture, a sentence each.
+    /// Warnings about the image, one sentence each.
     pub warnings: Vec<String>,
 }
 
 impl Report {
-    /// What tracing ran into.
+    /// Adds a warning about a device that failed while tracing.
     fn add_traced(&mut self, paths: &dyn LightPaths) {
         let new = paths.device_warning().filter(|t| !self.warnings.contains(t));
         self.warnings.extend(new);
@@ -226,7 +226,8 @@ impl Report {
     }
 }
 
-/// Draws the scene's picture of a test section. The same for any number of threads.
+/// Renders the scene's image of a test section. The result does not depend on the number of
+/// threads.
 pub fn render(
     scene: &Scene,
     section: &TestSection,
@@ -252,7 +253,7 @@ pub fn render(
         },
     };
 
-    // Comparisons have no light; the deflection map has.
+    // Techniques for comparison trace no light, but the deflection map does.
     let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
     let grey = |v: Vec<f32>| v.into_iter().map(|v| [v * exposure as f32; 3]).collect();
     let mut first = None;
@@ -281,8 +282,8 @@ pub fn render(
         ));
     }
     if layers.map {
-        // The picture's own paths serve when they tell what is wanted; the optical path is not
-        // computed for photons that do not need it.
+        // Reuses the image's own paths when they have the wanted quantities. The optical path is
+        // not computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
             Some(planned) => planned,
             None => section.paths(
@@ -307,7 +308,7 @@ pub fn render(
     Ok(r)
 }
 
-/// Where pixels lie: the field of view, or all of the field.
+/// Positions of the pixels: the scene's field of view, or the whole field.
 pub fn framing(scene: &Scene, section: &TestSection) -> Framing {
     let [width, height] = scene.film.size;
     let fitted = Framing::fitted(width, height, section.sides_m());
@@ -401,10 +402,10 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
     r.map = Some(m);
 }
 
-/// A picture that shows nothing is an answer, but mostly not the one that was wanted.
+/// Warns about images that show nothing: they are correct but rarely wanted.
 fn warn_about_picture(scene: &Scene, report: &mut Report) {
     let [low, high] = report.levels;
-    // One step of an 8-bit picture at half brightness, in linear light.
+    // One step of an 8-bit image at half brightness, in linear light.
     let visible = 0.004 * high.max(0.1);
     if high - low < visible && !matches!(scene.technique, TechniqueSpec::Bos { .. }) {
         let cure = match scene.technique {

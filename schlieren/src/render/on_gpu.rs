@@ -1,4 +1,4 @@
-//! What the GPU takes over, and why not when it does not.
+//! Plans light paths on the GPU, or gives the reason why the CPU computes them.
 
 use super::RenderError;
 use super::planned::{PlannedPaths, described};
@@ -8,11 +8,11 @@ use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
 
-/// Why a scene's march cannot be computed on a GPU here whatever the flow is, for who asked for
-/// one. Opens it.
+/// Checks whether a scene's march can be computed on this machine's GPU, whatever the flow is, if
+/// the scene requests a GPU. Opens the GPU.
 ///
 /// # Errors
-/// With the reason and the cure.
+/// The reason why not, with the cure.
 pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
     if march.device != Device::Gpu {
         return Ok(());
@@ -29,7 +29,7 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
 const CURE: &str =
     "Leave out --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
 
-/// What a scene asks for by name that has no kernel.
+/// The error for options that a scene names but that have no kernel.
 #[cfg(feature = "gpu")]
 fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
     let what = match (march.method.as_deref(), march.interpolant.as_deref()) {
@@ -41,8 +41,9 @@ fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
     Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
 }
 
-/// Why the CPU stands in for a GPU that cannot do it. Who asked for one gets an error for what can
-/// be known before anything is drawn; a device that is lost or out of memory spoils no picture.
+/// The reason why the CPU computes in place of the GPU. When a GPU was requested, causes that are
+/// known before rendering are errors. A device that is lost or out of memory is only a reason, so
+/// that the image is still rendered.
 #[cfg(feature = "gpu")]
 fn fallback_reason(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
     match error {
@@ -54,8 +55,8 @@ fn fallback_reason(asked: Device, error: crate::gpu::GpuError) -> Result<String,
     }
 }
 
-/// Paths on the GPU if the scene wants that and it can be, else in words why not; no words when the
-/// CPU was asked for, or is quicker by plan.
+/// Paths on the GPU if the scene wants it and it is possible. Otherwise the inner `Err` has the
+/// reason, or `None` when the CPU was requested or the plan finds it faster.
 #[cfg(feature = "gpu")]
 pub(super) fn on_gpu<'a>(
     march: &MarchSpec,
@@ -77,7 +78,8 @@ pub(super) fn on_gpu<'a>(
         if march.device == Device::Auto {
             return Ok(Err(None));
         }
-        // Asked for the GPU: what line of sight leaves out, Verlet has.
+        // The GPU was requested and has no line of sight, so Verlet is used, which is more
+        // accurate.
         plan = Plan::from_derivative_bounds(
             field,
             Request { mode: Some(Mode::Paraxial), ..request },
@@ -107,8 +109,8 @@ pub(super) fn on_gpu<'a>(
             wanted: request.wanted,
             blank: request.blank,
         };
-        // A device that fails while the field is copied to it is opened again, which gives up after
-        // a few times.
+        // A device that fails while the field is copied to it is reopened, up to a limited number
+        // of times.
         let mut told = None;
         let paths = loop {
             match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
@@ -126,7 +128,7 @@ pub(super) fn on_gpu<'a>(
     })();
     match made {
         Ok((paths, gpu, told)) => {
-            // The CPU's march stands in: the same within roundings.
+            // The error is measured with the CPU's march, which agrees within rounding.
             let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, cache));
             let description = described("verlet", plan.interpolant, plan.step_voxels);
             let mut planned = PlannedPaths::new(
@@ -143,7 +145,7 @@ pub(super) fn on_gpu<'a>(
     }
 }
 
-/// This program has no march for the GPU.
+/// Without the feature `gpu` there is no march on the GPU.
 #[cfg(not(feature = "gpu"))]
 pub(super) fn on_gpu<'a>(
     march: &MarchSpec,

@@ -1,6 +1,6 @@
-//! Which march takes the light through, and how exact it is: [`crate::plan`] picks what the scene
-//! leaves open by bounds from the tolerance, and measures what was achieved. Marches that no plan
-//! picks, because they are for comparison, are made here.
+//! Selects the march of a scene and measures its accuracy. [`crate::plan`] chooses from the
+//! tolerance what the scene leaves open, and measures the error. Marches for comparison, which no
+//! plan chooses, are made here.
 
 use super::on_gpu::on_gpu;
 use super::planned::{PlannedPaths, described};
@@ -23,16 +23,17 @@ pub const MARCHES: [&str; 6] = ["line-of-sight", "verlet", "euler", "pefrl", "sh
 /// Names of interpolants, the default first.
 pub const INTERPOLANTS: [&str; 3] = ["b-spline", "trilinear", "trilinear-gradient"];
 
-/// Rays that are traced twice to measure a plan's error.
+/// Number of rays that are traced twice to measure a plan's error.
 const MEASURED_RAYS: usize = 256;
 
-/// The error of the phase that leaving out eight steps may cost, in waves: a hundred of such
-/// stretches are a thousandth of a wave.
+/// Largest error of the phase from skipping eight steps, in waves: a hundred of such stretches add
+/// up to a thousandth of a wave.
 const SKIPPED_WAVES: f64 = 1e-5;
 
 impl TestSection {
-    /// Light paths through field `line` as the scene's march says. `against_light`: traced from the
-    /// camera. `measure` traces some rays with everything refined, to know the error.
+    /// Light paths through field `line` with the scene's march. With `against_light` they are
+    /// traced from the camera. With `measure` some rays are traced with everything refined, to
+    /// measure the error.
     pub fn paths(
         &self,
         scene: &Scene,
@@ -72,7 +73,7 @@ impl TestSection {
             skip_opd_m: SKIPPED_WAVES * scene.light.wavelengths_nm[line] * 1e-9,
         };
 
-        // On the GPU, if wanted and possible.
+        // Uses the GPU if wanted and possible.
         let mode = method.map(|name| match name {
             "line-of-sight" => Mode::LineOfSight,
             "verlet" => Mode::Paraxial,
@@ -93,7 +94,7 @@ impl TestSection {
         };
 
         let mut skip_warning = None;
-        // For comparison: by name only, never picked.
+        // Marches for comparison are selected by name only.
         let (paths, description, achieved, walked) =
             if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
                 let interpolant = interpolant.unwrap_or_default();
@@ -105,7 +106,7 @@ impl TestSection {
                 let plan =
                     Plan::from_derivative_bounds(field, with(mode), cache.derivative_bounds(field));
                 let walked = (Bend::from(plan.mode), plan.step_voxels);
-                // PEFRL is made with the spline only.
+                // A plan makes PEFRL with the spline only.
                 if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline)
                 {
                     let step = plan.step_voxels;
@@ -145,7 +146,7 @@ impl TestSection {
     }
 }
 
-/// Why skipping was asked for in vain.
+/// Warning that skipping has no effect, with the reason.
 fn skipping_has_no_effect(march: &str) -> String {
     let why = match march {
         "line-of-sight" => {
@@ -157,7 +158,7 @@ fn skipping_has_no_effect(march: &str) -> String {
     format!("march.skip_rad changes nothing: {why}")
 }
 
-/// A march that is there to compare with.
+/// A march for comparison.
 fn comparison_march<'a>(
     name: &str,
     field: &'a Field,

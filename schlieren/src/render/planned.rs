@@ -1,4 +1,4 @@
-//! Light paths with what is known of their accuracy.
+//! Light paths with their description and measured accuracy.
 use crate::interpolate::Interpolant;
 use crate::media::Bend;
 use crate::path::LightPaths;
@@ -7,23 +7,23 @@ use crate::technique::bos::ReversedPaths;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Paths of light through one of the fields, and what is known of their accuracy.
+/// Light paths through one of the fields, with their measured accuracy.
 pub struct PlannedPaths<'a> {
     /// The paths.
     pub paths: Box<dyn LightPaths + 'a>,
-    /// The march, the interpolant and the step, in words.
+    /// Description of the march, the interpolant and the step.
     pub description: String,
-    /// Measured error of a deflection by march, interpolant and step; `None` when it was not to be
-    /// measured, or the march is one for comparison.
+    /// Measured error of deflections due to march, interpolant and step. `None` when it was not
+    /// measured or the march is for comparison.
     pub error_rad: Option<f64>,
-    /// Estimate of what the flow's own lattice leaves open.
+    /// Estimated error of deflections due to the flow's own lattice.
     pub resolution_error_rad: Option<f64>,
-    /// What should be known, a sentence each.
+    /// Warnings, one sentence each.
     pub warnings: Vec<String>,
-    /// How the paths bend, and their step: for what goes the same way beside them.
+    /// How the paths bend and their step, for integrating media along them.
     pub(super) bend: Bend,
     pub(super) step_voxels: f64,
-    /// Rays that were walked for what the medium does to their light.
+    /// Number of rays along which media were integrated.
     pub(super) media_rays: Arc<AtomicU64>,
 }
 
@@ -67,12 +67,12 @@ impl<'a> PlannedPaths<'a> {
         }
     }
 
-    /// Rays that were walked through media since this was last asked.
+    /// Number of rays along which media were integrated since the last call.
     pub(super) fn take_media_rays(&self) -> u64 {
         self.media_rays.swap(0, Ordering::Relaxed)
     }
 
-    /// The same, seen from the film when `against_light`.
+    /// The same paths, converted to the image's frame when `against_light`.
     pub(super) fn seen(self, against_light: bool) -> PlannedPaths<'a> {
         let paths = self.paths;
         let paths = if against_light {

@@ -1,5 +1,5 @@
-//! The test section: fields for each wavelength, the view, the bodies, and the paths of light
-//! through them.
+//! The test section: reads or takes the fields of each wavelength, the view, the bodies and the
+//! media.
 
 use super::RenderError;
 use crate::field::Field;
@@ -10,26 +10,27 @@ use crate::scene::Scene;
 use crate::solids::Solids;
 use crate::view::View;
 
-/// What stands between the lenses.
+/// The contents of the test section, between the lenses.
 pub struct TestSection {
-    /// The gas for the light of each wavelength of the scene, in its order.
+    /// The gas for the light of each wavelength, in the scene's order.
     pub fields: Vec<Field>,
-    /// The view around the fields' middle.
+    /// The view, centred on the fields' middle.
     pub view: View,
     /// Bodies.
     pub solids: Option<Solids>,
-    /// What the gas does to light beside bending it.
+    /// Absorption, emission and rotation by the gas.
     pub media: Option<Media>,
-    /// How the field came about; `None` when it was not read from a file.
+    /// How the field was read; `None` when it does not come from a file.
     pub input: Option<input::Report>,
-    /// What was repaired or left out, a sentence each.
+    /// Warnings about what was repaired or left out, one sentence each.
     pub warnings: Vec<String>,
-    /// What marches prepared of each field, when that is to be kept.
+    /// Results that marches compute from each field, when they are kept.
     pub(super) caches: Vec<FieldCache>,
 }
 
 impl TestSection {
-    /// Reads what the scene names. `read` is told what is read, before it is.
+    /// Reads the files that the scene names. `read` is called with a description before each is
+    /// read.
     pub fn open(scene: &Scene, mut read: impl FnMut(&str)) -> Result<TestSection, RenderError> {
         let mut fields = Vec::new();
         let mut report: Option<input::Report> = None;
@@ -59,7 +60,7 @@ impl TestSection {
         Ok(section)
     }
 
-    /// A test section of fields that are at hand, one per wavelength of the scene.
+    /// A test section of given fields, one per wavelength of the scene.
     pub fn of_fields(
         scene: &Scene,
         fields: Vec<Field>,
@@ -74,16 +75,16 @@ impl TestSection {
         Ok(TestSection { fields, view, solids, media: None, input, warnings, caches })
     }
 
-    /// Keeps what marches prepare of the fields (splines, projections) for further pictures: takes
-    /// as much memory as the fields again, and the time of the second picture is that of its light
-    /// alone. Fields must not be replaced after this.
+    /// Keeps what marches compute from the fields (splines, projections) for further images. This
+    /// takes as much memory as the fields again, and a second image then takes only the time of its
+    /// light. Fields must not be replaced after this.
     #[must_use]
     pub fn with_caches(mut self) -> TestSection {
         self.caches = self.fields.iter().map(|_| FieldCache::default()).collect();
         self
     }
 
-    /// Sides of the field as the view sees them, in metres.
+    /// Extent of the field along the view's right and up, in metres.
     pub fn sides_m(&self) -> [f64; 2] {
         let size = self.fields[0].size_m();
         [self.view.right, self.view.up].map(|axis| axis.abs().dot(size))

@@ -96,14 +96,14 @@ fn the_map_is_the_closed_form_with_row_0_at_the_top() {
         }
         worst_phase = worst_phase.max((f64::from(m.waves[i]) - n0 * path / 633e-9).abs());
     }
-    // σ is four voxels: the B-spline's error is 7e-5 rms (notes' table at h/σ 0.2…0.4), several
-    // times that at most; deflections reach 3e-5.
+    // σ is four voxels, where the B-spline's error is 7e-5 rms (notes' table at h/σ 0.2…0.4) and
+    // several times that at most; deflections reach 3e-5.
     assert!(
         m.largest_deflection_rad > 2e-5 && worst < 3e-3 * m.largest_deflection_rad,
         "{worst:e}"
     );
     assert!(worst_phase < 2e-3, "{worst_phase:e} waves of {}", AMPLITUDE * SIGMA * 2.5 / 633e-9);
-    // Warm air bends light away from its middle: up in the upper row.
+    // Warm air bends light away from its middle, so upwards in the upper row.
     assert!(m.deflection_rad[10 * 48 + 24][1] > 0.0 && m.deflection_rad[30 * 48 + 24][1] < 0.0);
 }
 
@@ -153,8 +153,7 @@ fn a_plate_casts_its_shadow_and_only_there() {
     for sampling in
         ["method = \"photons\"\nsamples = 4\nfilter = { kind = \"none\" }", "method = \"beams\""]
     {
-        // The scene names a file so that its effects know of bodies; what is used is the plate
-        // above.
+        // The scene names a file so that its effects include bodies; the plate above is used.
         let s = scene(&format!(
             "{SMALL}[technique]\nkind = \"shadowgraph\"\n[solids]\nfiles = \
              [\"plate.stl\"]\n[sampling]\n{sampling}"
@@ -221,14 +220,14 @@ fn dots_are_displaced_as_the_map_says() {
         Layers { map: true, ..Layers::NONE },
     );
     let m = r.map.unwrap();
-    // Camera rays bend away from the warm middle; the background stands 0.5 m behind: at (x, 0) by
-    // about 0.5 m times the deflection.
+    // Camera rays bend away from the warm middle. The background is 0.5 m behind it, so at (x, 0)
+    // the displacement is about 0.5 m times the deflection.
     let i = 20 * 48 + 30;
     let ratio = f64::from(m.displacement_m[i][0]) / f64::from(m.deflection_rad[i][0]);
     assert!((ratio - 0.5).abs() < 0.01 && m.deflection_rad[i][0] > 0.0, "{ratio}");
 }
 
-/// Paths whose device failed on the way: right, and with something to tell.
+/// Paths whose device failed while tracing: the results are right, and there is a warning.
 struct Failed<'a>(Box<dyn LightPaths + 'a>);
 
 impl LightPaths for Failed<'_> {
@@ -270,7 +269,7 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
         assert_eq!(told.count(), 1, "{technique}: {:?}", r.report.warnings);
         assert!(r.map.is_some());
     }
-    // Paths that look against the light pass it on.
+    // Paths traced against the light pass the warning on.
     let s = scene(&format!("{SMALL}[technique]\nkind = \"bos\""));
     let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
     let planned = section.paths(&s, 0, PathQuantities::default(), false, false).unwrap();

@@ -1,11 +1,11 @@
-//! Values that no scene can have, and values that change no pixel.
+//! Checks scenes: refuses invalid values and values that change no pixel.
 
 use super::{
     BeamsSpec, CutoffSpec, FilterSpec, SamplingSpec, Scene, SceneError, SourceSpec, TechniqueSpec,
 };
 use std::fmt::Display;
 
-/// Largest side of a picture.
+/// Largest side of an image in pixels.
 const MAX_SIDE: u32 = 16384;
 /// Largest number of photons per pixel.
 const MAX_SAMPLES: u32 = 1 << 20;
@@ -36,8 +36,11 @@ fn within(key: &'static str, value: f64, low: f64, high: f64) -> Result<(), Scen
 }
 
 impl Scene {
-    /// Refuses values that no scene can have, and values that change no pixel. Scenes from files
-    /// are checked already.
+    /// Refuses invalid values and values that change no pixel. Scenes from files are already
+    /// checked.
+    ///
+    /// # Errors
+    /// [`SceneError`] with the key and the cure.
     pub fn check(&self) -> Result<(), SceneError> {
         self.check_light()?;
         self.check_technique()?;
@@ -50,7 +53,7 @@ impl Scene {
         self.check_media()
     }
 
-    /// Only one march can leave out gas.
+    /// Only one march can skip gas.
     fn check_skip(&self) -> Result<(), SceneError> {
         let skip = self.march.skip_rad;
         if !(skip >= 0.0 && skip.is_finite()) {
@@ -219,8 +222,8 @@ impl Scene {
         }
     }
 
-    /// Focal lengths that cancel or meet nothing. The customary ones are never refused: they stand
-    /// in every effective scene.
+    /// Refuses focal lengths that cancel or have no effect. Default values are never refused,
+    /// because every effective scene has them.
     fn check_lenses(&self) -> Result<(), SceneError> {
         let technique = self.technique.name();
         let customary = super::LensSpec::default();
@@ -252,7 +255,7 @@ impl Scene {
         Ok(())
     }
 
-    /// A key whose value cannot change a pixel is refused.
+    /// Refuses keys whose value cannot change a pixel.
     fn check_effect(&self) -> Result<(), SceneError> {
         let technique = self.technique.name();
         let in_vain = |key, hint| Err(SceneError::NoEffect { key, technique, hint });

@@ -1,4 +1,4 @@
-//! Directions of view as users write them.
+//! Parses and writes directions of view.
 
 use crate::view::{Axis, View, ViewError};
 use glam::DVec3;
@@ -10,13 +10,13 @@ use std::str::FromStr;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Direction {
-    /// Along an axis.
+    /// Light along an axis.
     Axis(Axis),
-    /// Oblique.
+    /// Light in an oblique direction.
     Angles {
-        /// From +x towards +y.
+        /// Angle from +x towards +y.
         azimuth_deg: f64,
-        /// Above the x-y plane.
+        /// Angle above the x-y plane.
         elevation_deg: f64,
     },
 }
@@ -28,7 +28,7 @@ impl Default for Direction {
 }
 
 impl Direction {
-    /// The view around `centre_m`.
+    /// The view in this direction, centred on `centre_m`.
     pub fn view(self, centre_m: DVec3) -> Result<View, ViewError> {
         match self {
             Direction::Axis(axis) => Ok(View::along(axis, centre_m)),

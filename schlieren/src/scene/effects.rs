@@ -1,4 +1,4 @@
-//! What a scene calls for; what it does not call for is not computed, and counters show it.
+//! The effects that a scene needs. Others are not computed, which counters verify.
 
 use super::{BeamsSpec, SamplingSpec, Scene, TechniqueSpec};
 
@@ -6,27 +6,27 @@ use super::{BeamsSpec, SamplingSpec, Scene, TechniqueSpec};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[allow(clippy::struct_excessive_bools, reason = "a set of flags that serialises with its names")]
 pub struct Effects {
-    /// Optical paths along the rays.
+    /// Computes optical paths along the rays.
     pub phase: bool,
-    /// A trace per wavelength.
+    /// Traces each wavelength separately.
     pub dispersion: bool,
-    /// Meshes that block light.
+    /// Has meshes that block light.
     pub solids: bool,
-    /// A tilt for every photon.
+    /// Gives every photon its own tilt.
     pub tilted_beams: bool,
-    /// Differences between neighbouring rays.
+    /// Uses differences between neighbouring rays.
     pub differentials: bool,
-    /// Light lost in the medium.
+    /// The medium absorbs light.
     pub absorption: bool,
-    /// Light added by the medium.
+    /// The medium emits light.
     pub emission: bool,
-    /// A plane of polarisation that the medium turns.
+    /// The medium rotates the plane of polarisation.
     pub polarisation: bool,
 }
 
 impl Effects {
-    /// Read from the scene. Tilted beams with [`BeamsSpec::Auto`] are decided when the field's
-    /// depth is known; here they count as absent.
+    /// The effects of a scene. Tilted beams with [`BeamsSpec::Auto`] are decided later, when the
+    /// field's depth is known, and are false here.
     pub fn required_by(scene: &Scene) -> Effects {
         let follows_light = scene.technique.follows_light();
         Effects {
@@ -42,23 +42,23 @@ impl Effects {
     }
 }
 
-/// Work done, by kind. An effect that is not in the scene leaves its counter at 0.
+/// Counts of work by kind. The counter of an effect that is not in the scene stays 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counters {
-    /// Rays taken through the field for the picture.
+    /// Rays traced through the field for the image.
     pub rays: u64,
     /// Rays through the pixels' centres, for layers and maps.
     pub map_rays: u64,
-    /// Of all rays, those whose optical path was computed.
+    /// Rays whose optical path was computed.
     pub phase_rays: u64,
     /// Rays of wavelengths after the first.
     pub dispersion_rays: u64,
-    /// Questions to the bodies' acceleration structure.
+    /// Queries of the bodies' acceleration structure.
     pub solid_queries: u64,
-    /// Rays off the axis.
+    /// Rays of tilted beams.
     pub tilted_rays: u64,
     /// Rays that are corners of cells.
     pub differential_rays: u64,
-    /// Rays along which absorption, emission or rotation were collected.
+    /// Rays along which absorption, emission or rotation were integrated.
     pub media_rays: u64,
 }

@@ -1,4 +1,4 @@
-//! The gas as it is written in scenes: a file, and which array means what.
+//! The gas in scenes: a file and the meaning of its arrays.
 
 use super::SceneError;
 use crate::index::Gas;
@@ -10,17 +10,18 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// The file and what its arrays are: a density, or temperature and pressure, or an index, or
-/// electrons. Where an array is named, a number can stand that holds for all of the field.
+/// The file and the meaning of its arrays: a density, or temperature and pressure, or an index, or
+/// electrons. In place of an array's name, a number gives a uniform value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlowSpec {
-    /// VTI, VTR, VTS, VTU, PLOT3D, NRRD, raw…
+    /// Path of the file (VTI, VTR, VTS, VTU, PLOT3D, NRRD, raw…).
     pub file: PathBuf,
     /// Density.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<String>,
-    /// kg/m³ per unit of the density: of a solver's free stream where densities are relative to it.
+    /// kg/m³ per unit of the density. Where densities are relative to a solver's free stream, this
+    /// is the free stream's density.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density_unit_kg_m3: Option<f64>,
     /// Temperature in K (see `temperature_zero_k`).
@@ -41,16 +42,17 @@ pub struct FlowSpec {
     /// CO2 in ppm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub co2_ppm: Option<String>,
-    /// n - 1 itself.
+    /// The refractivity n - 1 itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub n_minus_1: Option<String>,
     /// Free electrons per m³.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub electrons: Option<String>,
-    /// Any arrays, each through a curve to n - 1 (thesis, section 5.7): illustration, not physics.
+    /// Any arrays, each mapped to n - 1 by a curve (dissertation, section 5.7): an illustration,
+    /// not physics.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub multifield: Option<MultifieldSpec>,
-    /// Arrays with mass fractions, and the gas of each; the rest is air.
+    /// Arrays of mass fractions with the gas of each; the rest is air.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub species: BTreeMap<String, String>,
     /// Formula for air by temperature and pressure.
@@ -59,35 +61,36 @@ pub struct FlowSpec {
     /// Metres per unit of the file's coordinates.
     #[serde(default = "one")]
     pub length_unit_m: f64,
-    /// Depth of two-dimensional data, in units of the file.
+    /// Depth to which two-dimensional data are extruded, in units of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub span: Option<f64>,
-    /// Two-dimensional data are half of an axisymmetric flow, revolved about its axis.
+    /// Whether two-dimensional data are half of an axisymmetric flow, to be revolved about its
+    /// axis.
     #[serde(default)]
     pub revolve: bool,
-    /// Nodes along the longest axis when the data have to be resampled; chosen from the cells when
-    /// absent.
+    /// Number of nodes along the longest axis when the data have to be resampled; chosen from the
+    /// cells when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resample_nodes: Option<usize>,
-    /// Standard deviation in nodes of the smoothing of shocks; 0 for none.
+    /// Standard deviation of the smoothing of shocks, in nodes; 0 for none.
     #[serde(default)]
     pub smoothing_nodes: f64,
-    /// What lies outside the mesh.
+    /// What the region outside the mesh is.
     #[serde(default = "blank")]
     pub outside: Role,
-    /// What lies in cells that the solver hid.
+    /// What cells hidden by the solver are.
     #[serde(default = "solid")]
     pub hidden: Role,
-    /// n0 - 1 of the medium around the field; that of the field's border when absent.
+    /// n0 - 1 of the medium around the field; taken from the field's border when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_n_minus_1: Option<f64>,
 }
 
-/// Arrays with their curves.
+/// Arrays with the curves that map them to n - 1.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MultifieldSpec {
-    /// How their contributions combine.
+    /// How the contributions of the arrays combine.
     #[serde(default)]
     pub rule: Rule,
     /// Curves by the names of arrays.
@@ -98,9 +101,10 @@ pub struct MultifieldSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CurveSpec {
-    /// Pairs of a value and its n - 1, values increasing; straight between them, constant beyond.
+    /// Pairs of a value and its n - 1, with increasing values. Linear between them, constant
+    /// beyond.
     pub knots: Vec<[f64; 2]>,
-    /// Factor; 0 leaves the array out.
+    /// Factor on the contribution; 0 leaves the array out.
     #[serde(default = "one")]
     pub weight: f64,
 }
@@ -146,14 +150,14 @@ impl Default for FlowSpec {
     }
 }
 
-/// An array's name or a number.
+/// Parses an array's name or a number.
 fn quantity(text: &str) -> Quantity {
     let Ok(q) = text.parse::<Quantity>();
     q
 }
 
 impl FlowSpec {
-    /// The same file and lattice, without what its arrays mean.
+    /// The same file and lattice, without the meaning of its arrays.
     #[must_use]
     pub fn without_medium(&self) -> FlowSpec {
         FlowSpec {
@@ -169,7 +173,10 @@ impl FlowSpec {
         }
     }
 
-    /// What the index depends on; refuses arrays that do not go together.
+    /// The quantities that determine the index.
+    ///
+    /// # Errors
+    /// If the arrays do not belong together, or one is missing.
     pub fn medium(&self) -> Result<Medium, SceneError> {
         let wrong = |reason: String| SceneError::Flow { reason };
         let species = || -> Result<Vec<(Quantity, Gas)>, SceneError> {
@@ -199,7 +206,7 @@ impl FlowSpec {
             }));
         };
 
-        // What belongs to another alternative changes nothing, so it is refused.
+        // Keys of another alternative have no effect, so they are refused.
         let by_state = only == "temperature";
         let by_gas = by_state || only == "density";
         for (key, present, belongs) in [
@@ -262,7 +269,7 @@ impl FlowSpec {
             if !curve.weight.is_finite() {
                 return Err(wrong(format!("weight {} is not a finite number", curve.weight)));
             }
-            // An array without weight need not even be read.
+            // An array with zero weight is not read.
             if curve.weight != 0.0 {
                 let knots = curve.knots.iter().map(|k| (k[0], k[1])).collect();
                 let function = TransferFunction::new(knots).map_err(|e| wrong(e.to_string()))?;
@@ -277,7 +284,7 @@ impl FlowSpec {
         Ok(Medium::Multifield { parts, rule: spec.rule })
     }
 
-    /// How the file becomes a field for light of this wavelength.
+    /// Options for reading the file as a field for light of this wavelength.
     pub fn options(&self, wavelength_nm: f64) -> Result<Options, SceneError> {
         let border = Reference::Border;
         Ok(Options {

@@ -1,45 +1,45 @@
-//! What the medium does to light beside bending it, as it is written in scenes.
+//! Absorption, emission and rotation by the medium in scenes.
 
 use super::{Scene, SceneError, TechniqueSpec};
 use crate::input::{Quantity, Source};
 use crate::media::Property;
 use serde::{Deserialize, Serialize};
 
-/// Diameter of the stop in the cut-off plane when none is given: a camera lens.
+/// Default diameter of the stop in the cut-off plane: that of a camera lens.
 const STOP_M: f64 = 0.025;
 
-/// Arrays of the flow's file, each with its property ([`crate::media`]); a number holds for all of
-/// the field. The same for all wavelengths.
+/// Arrays of the flow's file for the properties of the medium ([`crate::media`]). A number in place
+/// of a name gives a uniform value. Properties are the same for all wavelengths.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MediaSpec {
     /// Absorption in 1/m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub absorption: Option<String>,
-    /// Emission in 1/m: radiance per metre, relative to that which exposes the film as undisturbed
-    /// light without a cut-off does.
+    /// Emission in 1/m: radiance per metre, relative to the radiance that exposes the film as
+    /// undisturbed light without a cut-off does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub emission: Option<String>,
-    /// Rotation of the plane of polarisation in rad/m, counter-clockwise in the picture.
+    /// Rotation of the plane of polarisation in rad/m, counter-clockwise in the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<String>,
-    /// Angle of an analyser behind the flow to the polariser before it, counter-clockwise in the
-    /// picture. No analyser when absent.
+    /// Angle from the polariser before the flow to an analyser behind it, counter-clockwise in the
+    /// image. No analyser when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub analyser_deg: Option<f64>,
     /// Diameter of the stop in the cut-off plane, 25 mm when absent. Light that the medium emits
-    /// fills it evenly, and the cut-off passes its mean over it.
+    /// fills the stop uniformly, and the cut-off passes its mean over the stop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop_m: Option<f64>,
 }
 
 impl MediaSpec {
-    /// Whether nothing is given.
+    /// Whether no key is given.
     pub fn is_empty(&self) -> bool {
         *self == MediaSpec::default()
     }
 
-    /// What is given of a property.
+    /// The array's name or number of a property.
     pub fn get(&self, property: Property) -> Option<&str> {
         let text = match property {
             Property::Absorption => &self.absorption,
@@ -49,7 +49,7 @@ impl MediaSpec {
         text.as_deref()
     }
 
-    /// The properties with what they are read from.
+    /// The given properties with their sources.
     pub fn quantities(&self) -> Vec<(Property, Quantity)> {
         let quantity = |text: &str| {
             let Ok(q) = text.parse::<Quantity>();
@@ -59,8 +59,7 @@ impl MediaSpec {
         Property::ALL.into_iter().filter_map(given).collect()
     }
 
-    /// Properties that change the light that comes through: none for emission, and rotation only
-    /// with an analyser.
+    /// Properties that change the transmitted light: absorption, and rotation with an analyser.
     pub fn dims_light(&self) -> Vec<Property> {
         let counts = |p: &Property| match p {
             Property::Absorption => self.absorption.is_some(),
@@ -70,7 +69,7 @@ impl MediaSpec {
         Property::ALL.into_iter().filter(counts).collect()
     }
 
-    /// The analyser's angle.
+    /// The analyser's angle in rad.
     pub fn analyser_rad(&self) -> Option<f64> {
         self.analyser_deg.map(f64::to_radians)
     }
@@ -82,7 +81,7 @@ impl MediaSpec {
 }
 
 impl Scene {
-    /// Refuses what cannot be honoured, and what changes nothing.
+    /// Refuses invalid values and keys that have no effect.
     pub(super) fn check_media(&self) -> Result<(), SceneError> {
         let m = &self.media;
         if m.is_empty() {

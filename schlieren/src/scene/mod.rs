@@ -1,9 +1,10 @@
-//! A picture's recipe as a TOML file: flow, view, light, bench, technique, film, march.
+//! Reads and writes scenes: TOML files that describe an image by flow, view, light, bench,
+//! technique, film and march.
 //!
-//! Unknown keys are refused, keys that belong to another technique are unknown, and
-//! [`Scene::to_toml`] writes every value in effect, so a picture can be made again from what is
-//! written with it. Lengths are metres, angles degrees where people set them and radians where
-//! light is bent.
+//! Unknown keys are refused, and so are keys that belong to another technique. [`Scene::effective`]
+//! makes every default explicit, so an image can be reproduced from the TOML that
+//! [`Scene::to_toml`] then writes. Lengths are in metres. Angles of the set-up are in degrees, and
+//! deflections of light in radians.
 //!
 //! ```
 //! use schlieren::scene::Scene;
@@ -43,13 +44,13 @@ use crate::spectrum::Line;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Everything a picture is made of.
+/// Everything that determines an image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The gas.
     pub flow: FlowSpec,
-    /// From where.
+    /// The direction of view.
     #[serde(default)]
     pub view: ViewSpec,
     /// Colour and extent of the light.
@@ -58,22 +59,22 @@ pub struct Scene {
     /// Lenses.
     #[serde(default)]
     pub lenses: LensSpec,
-    /// What is made of the light.
+    /// The technique that turns light into an image.
     #[serde(default)]
     pub technique: TechniqueSpec,
-    /// Size and focus of the picture.
+    /// Size and focus of the image.
     #[serde(default)]
     pub film: FilmSpec,
-    /// How the film is exposed; each technique has a customary way.
+    /// How the film is exposed. The default depends on the technique.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<SamplingSpec>,
-    /// How light is taken through the flow.
+    /// How light is traced through the flow.
     #[serde(default)]
     pub march: MarchSpec,
     /// Bodies in the test section.
     #[serde(default)]
     pub solids: SolidsSpec,
-    /// What the medium does to light beside bending it.
+    /// Absorption, emission and rotation by the medium.
     #[serde(default, skip_serializing_if = "MediaSpec::is_empty")]
     pub media: MediaSpec,
 }
@@ -91,17 +92,17 @@ pub struct ViewSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightSpec {
-    /// Vacuum wavelengths. The index is that of the first for one; several are traced each by
-    /// itself and added up in their colours.
+    /// Vacuum wavelengths. Each is traced separately with its own index, and several are added up
+    /// in their colours.
     #[serde(default = "helium_neon")]
     pub wavelengths_nm: Vec<f64>,
-    /// Parts of the light per wavelength; even when absent.
+    /// Fractions of the light per wavelength; equal when absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weights: Vec<f64>,
-    /// Shape of the source; each technique has a customary one.
+    /// Shape of the source. The default depends on the technique.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<SourceSpec>,
-    /// Whether beams of different points of the source are traced each by itself.
+    /// Whether the beams of different points of the source are traced separately.
     #[serde(default)]
     pub beams: BeamsSpec,
 }
@@ -121,7 +122,7 @@ impl Default for LightSpec {
     }
 }
 
-/// The source's shape.
+/// The shape of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SourceSpec {
@@ -129,9 +130,9 @@ pub enum SourceSpec {
     Point {},
     /// A rectangle.
     Slit {
-        /// Along `angle_deg`.
+        /// Size along `angle_deg`.
         width_m: f64,
-        /// Across it.
+        /// Size across `angle_deg`.
         length_m: f64,
         /// Direction of the width; that of the knife when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -139,18 +140,18 @@ pub enum SourceSpec {
     },
     /// A disc.
     Circle {
-        /// Of the disc.
+        /// Diameter of the disc.
         diameter_m: f64,
     },
 }
 
-/// How the extent of the source is treated on the way through the flow. (In the cut-off plane it
-/// always counts.)
+/// How the extent of the source is treated within the flow. (In the cut-off plane it is always
+/// included.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BeamsSpec {
-    /// Tilted when the source's tilts move anything by more than half a pixel, within the flow or
-    /// in the plane of focus.
+    /// Tilted when the tilts of the source's beams shift light by more than half a pixel, within
+    /// the flow or in the plane of focus.
     #[default]
     Auto,
     /// All light travels along the axis.
@@ -188,19 +189,19 @@ pub struct FilmSpec {
     /// Pixels per row, and rows.
     #[serde(default = "film_size")]
     pub size: [u32; 2],
-    /// Width of what the picture shows, in the test section; all of the field when absent.
+    /// Width of the image in the test section; the whole field when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_m: Option<f64>,
-    /// Where the picture's middle is, from the middle of the field along right and up.
+    /// Middle of the image, from the middle of the field along right and up.
     #[serde(default)]
     pub center_m: [f64; 2],
-    /// The plane in focus, from the middle of the field along the light: the film's distance of a
-    /// shadowgraph, the background's distance of a BOS set-up (towards the light). Each technique
-    /// has a customary one.
+    /// The plane in focus, from the middle of the field along the light. It is the distance of the
+    /// film of a shadowgraph, or of the background of a BOS set-up (towards the light). The default
+    /// depends on the technique.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_m: Option<f64>,
-    /// Factor from energy to the picture's brightness (1 is white); each technique has a customary
-    /// one.
+    /// Factor from energy to the image's brightness (1 is white). The default depends on the
+    /// technique.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<f64>,
 }
@@ -227,16 +228,16 @@ impl Default for FilmSpec {
 pub enum SamplingSpec {
     /// By jittered photons ([`crate::film::photons`]).
     Photons {
-        /// Per pixel.
+        /// Photons per pixel.
         #[serde(default = "samples")]
         samples: u32,
-        /// How they are spread.
+        /// Distribution of the photons.
         #[serde(default)]
         jitter: Jitter,
-        /// Of the jitter.
+        /// Seed of the jitter.
         #[serde(default)]
         seed: u64,
-        /// Against noise.
+        /// Filter against noise.
         #[serde(default)]
         filter: FilterSpec,
     },
@@ -267,14 +268,14 @@ impl Default for SamplingSpec {
     }
 }
 
-/// How photons are spread over a pixel.
+/// Distribution of the photons over a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Jitter {
     /// A scrambled Sobol sequence.
     #[default]
     Sobol,
-    /// Independent, as in the thesis; to compare with.
+    /// Independent random positions as in the dissertation, for comparison.
     Random,
 }
 
@@ -291,19 +292,19 @@ pub enum FilterSpec {
     },
     /// A mean over a square.
     Mean {
-        /// Reach to every side.
+        /// Half the side of the square.
         radius_px: f64,
     },
     /// A cone over the nearest photons.
     Cone {
-        /// How many.
+        /// Number of photons.
         nearest: u32,
     },
 }
 
 impl Default for FilterSpec {
     fn default() -> Self {
-        // Half a pixel at the customary 16 photons.
+        // Half a pixel at the default of 16 photons.
         FilterSpec::Gaussian { sigma_px: 0.8 }
     }
 }
@@ -320,28 +321,28 @@ impl FilterSpec {
     }
 }
 
-/// How light is taken through the flow.
+/// How light is traced through the flow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MarchSpec {
-    /// Largest error of a deflection; it picks what is not named below.
+    /// Largest error of a deflection. It determines what is absent below.
     #[serde(default = "tolerance")]
     pub tolerance_rad: f64,
-    /// Name of the march; picked by the tolerance when absent.
+    /// Name of the march; chosen from the tolerance when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
-    /// Name of the interpolant; picked by the tolerance when absent.
+    /// Name of the interpolant; chosen from the tolerance when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolant: Option<String>,
-    /// Step in voxels; picked by the tolerance when absent.
+    /// Step in voxels; chosen from the tolerance when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_voxels: Option<f64>,
-    /// Gas is left out as long as that changes no ray's deflection by more than this in all; 0
-    /// leaves out nothing. Where the phase is computed, its error is kept below 1e-5 waves for each
-    /// eight steps that are left out.
+    /// Uniform gas is skipped as long as this changes no ray's deflection by more than this angle
+    /// in all; 0 skips nothing. Where the phase is computed, its error is kept below 1e-5 waves per
+    /// eight skipped steps.
     #[serde(default)]
     pub skip_rad: f64,
-    /// Where it is computed.
+    /// The device that computes the paths.
     #[serde(default)]
     pub device: Device,
 }
@@ -376,16 +377,16 @@ pub enum Device {
     Auto,
 }
 
-/// Bodies.
+/// Bodies in the test section.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidsSpec {
-    /// OBJ, STL, PLY, glTF, VTP…, in metres in the flow's coordinates.
+    /// Files (OBJ, STL, PLY, glTF, VTP…) in metres, in the flow's coordinates.
     #[serde(default)]
     pub files: Vec<PathBuf>,
 }
 
-/// Why a scene is none.
+/// Errors of reading, checking and writing scenes.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file cannot be read.
@@ -393,28 +394,29 @@ pub enum SceneError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// It is no TOML, or a key is unknown or has the wrong type. The message shows the line.
+    /// The text is not valid TOML, or a key is unknown or has the wrong type. The message shows the
+    /// line.
     #[error("{name}: not a scene")]
     Toml {
         /// The file, or "scene".
         name: String,
-        /// Where and why.
+        /// The position and the cause.
         source: toml::de::Error,
     },
     /// A scene that cannot be written.
     #[error("the scene cannot be written as TOML")]
     Write(#[from] toml::ser::Error),
-    /// A value that no scene can have.
+    /// An invalid value.
     #[error("{key} is {value}; {cure}")]
     Value {
         /// Path of the key in the TOML file.
         key: &'static str,
-        /// What it is.
+        /// The value.
         value: String,
-        /// What it can be.
+        /// What the value can be.
         cure: String,
     },
     /// A value that changes no pixel.
@@ -424,27 +426,27 @@ pub enum SceneError {
         key: &'static str,
         /// The technique.
         technique: &'static str,
-        /// Where it would have an effect.
+        /// Continuation of the message: where the key would have an effect.
         hint: &'static str,
     },
-    /// The arrays of the flow make no medium.
+    /// The arrays of the flow do not define a medium.
     #[error("[flow]: {reason}")]
     Flow {
-        /// What is missing or too much, with the cure.
+        /// What is missing or superfluous, with the cure.
         reason: String,
     },
-    /// The filter's picture.
+    /// The image of the filter is invalid.
     #[error("technique.cutoff")]
     Filter(#[from] crate::cutoff::FilterError),
 }
 
 impl Scene {
-    /// A scene from TOML, checked.
+    /// Reads a scene from TOML and checks it.
     pub fn from_toml(text: &str) -> Result<Scene, SceneError> {
         Scene::parse(text, "scene")
     }
 
-    /// A scene from a file, checked. Files it names are taken relative to it.
+    /// Reads a scene from a file and checks it. Paths in the scene are relative to the file.
     pub fn open(path: &Path) -> Result<Scene, SceneError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.into(), source })?;
@@ -471,12 +473,12 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The scene as TOML, with the values in effect where some were left to the technique.
+    /// The scene as TOML.
     pub fn to_toml(&self) -> Result<String, SceneError> {
         Ok(toml::to_string(self)?)
     }
 
-    /// The same with every choice that was left to the technique made explicit (`--print-scene`).
+    /// The scene with all defaults that depend on the technique made explicit (`--print-scene`).
     #[must_use]
     pub fn effective(&self) -> Scene {
         let mut s = self.clone();
@@ -504,9 +506,9 @@ impl Scene {
         s
     }
 
-    /// How the film is exposed: as given, or by the technique. A shadowgraph is nothing but the
-    /// density of light, which photons tell slowly (16 of them by 25 %), so it is made of beams;
-    /// others are made of photons.
+    /// How the film is exposed: the given sampling or the technique's default. A shadowgraph shows
+    /// the density of light itself, which photons sample with much noise (25 % with 16 of them), so
+    /// its default is beams. The default of the others is photons.
     pub fn sampling(&self) -> SamplingSpec {
         let beams = matches!(self.technique, TechniqueSpec::Shadowgraph {});
         let customary = if beams {
@@ -517,7 +519,7 @@ impl Scene {
         self.sampling.unwrap_or(customary)
     }
 
-    /// The plane in focus: as given, or the technique's.
+    /// The plane in focus: the given one or the technique's default.
     pub fn focus_m(&self) -> f64 {
         self.film.focus_m.unwrap_or(match self.technique {
             TechniqueSpec::Shadowgraph {} | TechniqueSpec::Bos { .. } => 0.5,
@@ -525,8 +527,8 @@ impl Scene {
         })
     }
 
-    /// From energy to brightness: as given, or the technique's. A shadowgraph's undisturbed light
-    /// is set to the middle, so that there is room above it.
+    /// Factor from energy to brightness: the given one or the technique's default. The undisturbed
+    /// light of a shadowgraph has half brightness, so that brighter light is not clipped.
     pub fn exposure(&self) -> f64 {
         self.film.exposure.unwrap_or(if matches!(self.technique, TechniqueSpec::Shadowgraph {}) {
             0.5
@@ -535,7 +537,7 @@ impl Scene {
         })
     }
 
-    /// The bench.
+    /// The optical bench.
     pub fn optics(&self) -> Optics {
         let along_knife = match &self.technique {
             TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { angle_deg, .. } } => *angle_deg,
@@ -563,7 +565,7 @@ impl Scene {
         }
     }
 
-    /// The lines of the spectrum; weights add up to 1.
+    /// The lines of the spectrum, with weights that add up to 1.
     pub fn lines(&self) -> Vec<Line> {
         let light = &self.light;
         let weight = |i: usize| light.weights.get(i).copied().unwrap_or(1.0);

@@ -1,4 +1,4 @@
-//! Techniques and cut-offs as they are written in scenes.
+//! Techniques and cut-offs in scenes.
 
 use super::SceneError;
 use crate::cutoff::painted::Painting;
@@ -6,31 +6,31 @@ use crate::cutoff::{Aperture, ColorWheel, Cutoff, FilterImage, Knife, KnifePosit
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// What is made of the light.
+/// The technique that turns light into an image, with its parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum TechniqueSpec {
-    /// [`crate::technique::shadowgraph`].
+    /// A shadowgraph ([`crate::technique::shadowgraph`]).
     Shadowgraph {},
-    /// [`crate::technique::schlieren`].
+    /// Schlieren ([`crate::technique::schlieren`]).
     Schlieren {
         /// What stands in the cut-off plane.
         #[serde(default)]
         cutoff: CutoffSpec,
     },
-    /// [`crate::technique::interferogram`].
+    /// An interferogram ([`crate::technique::interferogram`]).
     Interferogram {
-        /// V: contrast of the fringes.
+        /// Visibility V: the contrast of the fringes.
         #[serde(default = "one")]
         visibility: f64,
-        /// χ of the finite fringe; the infinite fringe when absent.
+        /// Distance χ of the fringes; infinite fringe when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         fringe_spacing_m: Option<f64>,
         /// Direction across the fringes.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         fringe_angle_deg: Option<f64>,
     },
-    /// [`crate::technique::bos`].
+    /// Background-oriented schlieren ([`crate::technique::bos`]).
     Bos {
         /// Diameter of a dot; three pixels when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -38,22 +38,22 @@ pub enum TechniqueSpec {
         /// Mean distance of dots; twice their diameter when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dot_spacing_m: Option<f64>,
-        /// Which pattern.
+        /// Seed that selects the pattern of dots.
         #[serde(default)]
         seed: u32,
     },
-    /// [`crate::technique::volume`].
+    /// Volume rendering of the gradient, for comparison ([`crate::technique::volume`]).
     Volume {
-        /// Of the smoke.
+        /// Strength of the smoke.
         #[serde(default = "ten")]
         strength: f64,
     },
-    /// [`crate::technique::slice`].
+    /// The gradient on a slice, for comparison ([`crate::technique::slice`]).
     Slice {
-        /// In the exponent.
+        /// Strength in the exponent.
         #[serde(default = "ten")]
         strength: f64,
-        /// Of the slice, from the middle along the light.
+        /// Depth of the slice, from the field's middle along the light.
         #[serde(default)]
         depth_m: f64,
     },
@@ -78,11 +78,11 @@ impl Default for TechniqueSpec {
 }
 
 impl TechniqueSpec {
-    /// All names.
+    /// The names of all techniques.
     pub const NAMES: [&str; 6] =
         ["shadowgraph", "schlieren", "interferogram", "bos", "volume", "slice"];
 
-    /// The technique of that name with its customary values.
+    /// The technique of that name with default values.
     pub fn by_name(name: &str) -> Option<TechniqueSpec> {
         Some(match name {
             "shadowgraph" => TechniqueSpec::Shadowgraph {},
@@ -111,12 +111,12 @@ impl TechniqueSpec {
         }
     }
 
-    /// False for the comparisons that know no optics.
+    /// Whether the technique traces light. False for the comparisons without optics.
     pub fn follows_light(&self) -> bool {
         !matches!(self, TechniqueSpec::Volume { .. } | TechniqueSpec::Slice { .. })
     }
 
-    /// True when the extent of the source can change the picture.
+    /// Whether the extent of the source can change the image.
     pub fn uses_source(&self) -> bool {
         matches!(self, TechniqueSpec::Schlieren { .. } | TechniqueSpec::Shadowgraph {})
     }
@@ -126,21 +126,21 @@ impl TechniqueSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum CutoffSpec {
-    /// A knife's edge.
+    /// A knife edge.
     Knife {
-        /// Direction from the blade to the opening, counter-clockwise from the picture's right.
+        /// Direction from the blade to the opening, counter-clockwise from the image's right.
         #[serde(default)]
         angle_deg: f64,
-        /// Part of the source's image that it leaves open.
+        /// Fraction of the source's image that the knife leaves open.
         #[serde(default = "half")]
         open: f64,
-        /// The same as a height in the cut-off plane, in place of `open`.
+        /// Height that the knife leaves open in the cut-off plane, in place of `open`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         open_m: Option<f64>,
     },
     /// An iris.
     Circle {
-        /// Of the iris.
+        /// Radius of the iris.
         radius_m: f64,
         /// From the axis.
         #[serde(default)]
@@ -148,28 +148,28 @@ pub enum CutoffSpec {
     },
     /// An opaque spot.
     ComplementedCircle {
-        /// Of the spot.
+        /// Radius of the spot.
         radius_m: f64,
         /// From the axis.
         #[serde(default)]
         center_m: [f64; 2],
     },
-    /// A wheel of hues.
+    /// A colour wheel.
     Color {
-        /// Where colours are saturated.
+        /// Radius at which colours are saturated.
         radius_m: f64,
         /// Direction of red.
         #[serde(default)]
         red_deg: f64,
     },
-    /// A picture.
+    /// An image as filter.
     Image {
-        /// PNG.
+        /// Path of a PNG file.
         file: PathBuf,
-        /// Its width in the cut-off plane.
+        /// Width of the image in the cut-off plane.
         width_m: f64,
     },
-    /// Painted by hand.
+    /// A filter painted by hand.
     Painted(Painting),
 }
 
@@ -180,7 +180,7 @@ impl Default for CutoffSpec {
 }
 
 impl CutoffSpec {
-    /// The cut-off; reads the picture of a filter.
+    /// The cut-off. Reads the image of a filter from its file.
     pub fn cutoff(&self) -> Result<Cutoff, SceneError> {
         Ok(match self {
             CutoffSpec::Knife { angle_deg, open, open_m } => {

@@ -1,5 +1,5 @@
-//! The filter as the page shows it: what it lets through, where the light is on it, and how light
-//! is followed from a pixel to the filter.
+//! Computes what the page shows of the filter: its transmission, the distribution of light on it,
+//! and the point where a pixel's light crosses it.
 
 use crate::cutoff::painted::{Painting, Stroke};
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
@@ -10,31 +10,32 @@ use crate::scene::{CutoffSpec, Scene, SceneError, TechniqueSpec};
 use rt_core::colormap::linear_to_srgb;
 use rt_core::sampler::{Sampler, Sampling};
 
-/// Raster of what is shown, along each side.
+/// Pixels along each side of the shown filter plane.
 pub(super) const PIXELS: usize = 160;
-/// Points of the source's image that light of one pixel is spread over.
+/// Number of points of the source's image over which the light of one pixel is distributed.
 const SOURCE_POINTS: u32 = 8;
 
 /// The cut-off plane around the axis, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FilterPlane {
-    /// Half the side of the square that is shown.
+    /// Half the side of the shown square.
     pub(super) half_m: f64,
-    /// Transmission, 8 bits, sRGB.
+    /// Transmission, 8-bit sRGB.
     pub(super) rgb: Vec<u8>,
-    /// Share of the light that crosses each pixel; all of it adds up to at most 1.
+    /// Fraction of the light that crosses each pixel. The sum is at most 1.
     pub(super) light: Vec<f32>,
-    /// Share of the light that crosses the plane beyond.
+    /// Fraction of the light that crosses the plane outside the shown square.
     pub(super) outside: f32,
 }
 
-/// Half the side of the plane that is worth showing: the light and the cut-off, rounded up to a
-/// number with one digit so that it does not flicker. The size of a painting stays.
+/// Half the side of the square to show. It contains the light and the cut-off, and is rounded up to
+/// one digit so that it does not flicker. A painting keeps its size.
 pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
     let optics = scene.optics();
     let image = optics.source_image();
     let source_m = image.half_extent_m([1.0, 0.0]).max(image.half_extent_m([0.0, 1.0]));
-    // A few rays through a shock go far; the rest would be a dot beside them.
+    // Ignores the few rays that a shock deflects far: with them the rest of the light would shrink
+    // to a dot.
     let mut sizes: Vec<f32> =
         map.map_or(Vec::new(), |m| m.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect());
     let mut deflection_rad = 0.0;
@@ -61,7 +62,7 @@ pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
     (wanted / digit).ceil() * digit
 }
 
-/// The cut-off in the light of the scene's source; open for techniques without one.
+/// The cut-off plane with the scene's source; open for techniques without a cut-off.
 fn plane(scene: &Scene) -> Result<CutoffPlane, SceneError> {
     let cutoff = match &scene.technique {
         TechniqueSpec::Schlieren { cutoff } => cutoff.cutoff()?,
@@ -71,7 +72,7 @@ fn plane(scene: &Scene) -> Result<CutoffPlane, SceneError> {
 }
 
 impl FilterPlane {
-    /// What is in the plane. Without a map, where the light is is not known and left dark.
+    /// Renders the plane. Without a map the distribution of light is unknown and left dark.
     pub(super) fn new(scene: &Scene, map: Option<&Map>) -> Result<FilterPlane, SceneError> {
         let half_m = half_side_m(scene, map);
         let plane = plane(scene)?;
@@ -89,7 +90,8 @@ impl FilterPlane {
     }
 }
 
-/// Where light crosses the plane: each pixel's ray, spread over the image of the source.
+/// Histogram of where light crosses the plane, with each pixel's ray distributed over the image of
+/// the source, and the fraction outside.
 fn histogram(scene: &Scene, map: &Map, half_m: f64) -> (Vec<f32>, f32) {
     let optics = scene.optics();
     let (f2, image) = (optics.schlieren_focal_length_m as f32, optics.source_image());
@@ -118,12 +120,12 @@ fn histogram(scene: &Scene, map: &Map, half_m: f64) -> (Vec<f32>, f32) {
     (sums.into_iter().map(|s| (s / all) as f32).collect(), (outside / all) as f32)
 }
 
-/// Where the light of a place of the picture crosses the filter: deflection and point, for the
-/// middle of the source. `at` is 0..=1 from the picture's upper left corner. `None` where no light
-/// comes from.
+/// Deflection, and point on the filter, of the light that lands at a point of the image, for the
+/// middle of the source. `at` is 0..=1 from the image's upper left corner. `None` where no light
+/// lands.
 ///
-/// The map is by where rays start, the picture by where they land; out of focus that is not the
-/// same. A few steps of a fixed-point iteration find the start.
+/// The map is indexed by where rays start, and the image by where they land, which differs out of
+/// focus. A few steps of a fixed-point iteration find the start.
 pub(super) fn traced(
     map: &Map,
     framing: &Framing,
@@ -155,9 +157,9 @@ pub(super) fn traced(
     Some((d, d.map(|c| (f2_m * f64::from(c)) as f32)))
 }
 
-/// A cut-off as a painting, to be painted on. Knives and circles become dabs of the same shape; a
-/// wheel of colours or a picture cannot, so they give way to `ground` and the second value is
-/// false.
+/// Converts a cut-off to a painting that can be painted on. Knives and circles become dabs of the
+/// same shape. A colour wheel or an image cannot be converted: `ground` replaces it, and the second
+/// value is false.
 pub(super) fn as_painting(
     scene: &Scene,
     cutoff: &CutoffSpec,
@@ -181,7 +183,7 @@ pub(super) fn as_painting(
             (painting(white, vec![dab(*center_m, *radius_m, black)]), true)
         }
         CutoffSpec::Knife { angle_deg, .. } => {
-            // The edge, found where the transmission changes along its normal.
+            // Finds the edge by bisection, where the transmission changes along its normal.
             let plane = plane(scene)?;
             let (sin, cos) = angle_deg.to_radians().sin_cos();
             let open = |t: f64| plane.transmission([(t * cos) as f32, (t * sin) as f32])[0] >= 0.5;
@@ -190,8 +192,8 @@ pub(super) fn as_painting(
                 let middle = 0.5 * (closed_m + open_m);
                 *if open(middle) { &mut open_m } else { &mut closed_m } = middle;
             }
-            // A dab so large that its rim is straight: over the filter it sags by less than a
-            // thousandth of its half side.
+            // A dab so large that its rim is almost straight: over the filter it deviates from a
+            // line by less than a thousandth of the half side.
             let radius_m = 1000.0 * half_m;
             let at = [cos, sin].map(|c| c * (open_m + radius_m));
             (painting(black, vec![dab(at, radius_m, white)]), true)
@@ -246,14 +248,14 @@ mod tests {
             let half_m = half_side_m(&s, None);
             let (painting, same) = as_painting(&s, cutoff, half_m, [0.0; 3]).unwrap();
             assert!(same);
-            // With the same source: only then the knife's edge is where it was.
+            // The source must be the same, because the position of the knife's edge depends on it.
             let mut painted = s.clone();
             painted.light.source = s.effective().light.source;
             painted.technique = TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(painting) };
             let [a, b] = [&s, &painted].map(|s| FilterPlane::new(s, None).unwrap());
             assert_eq!(a.half_m, b.half_m);
             let differ = a.rgb.iter().zip(&b.rgb).filter(|(a, b)| a.abs_diff(**b) > 128).count();
-            // Only along the edge, and there by less than a pixel.
+            // They differ only along the edge, by less than a pixel.
             assert!(differ < 3 * 2 * PIXELS, "{cutoff:?}: {differ}");
             assert!(a.rgb.contains(&255) && a.rgb.contains(&0));
         }
@@ -264,8 +266,8 @@ mod tests {
         let framing = Framing { width: 4, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
         let mut map = prism([1e-4, 0.0]);
         assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
-        // All light lands a pixel to the right of where it started: what is seen in column 2 has
-        // started in column 1.
+        // All light lands a pixel to the right of where it starts, so light in column 2 starts in
+        // column 1.
         map.displacement_m = vec![[1e-3, 0.0]; 16];
         map.deflection_rad[2 * 4 + 1] = [0.0, 3e-4];
         assert_eq!(traced(&map, &framing, 2.0, [0.6, 0.6]).unwrap().1, [0.0, 6e-4]);

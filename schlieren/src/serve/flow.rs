@@ -1,5 +1,5 @@
-//! The flow in memory: read once, made into fields again whenever wavelengths or transfer functions
-//! change.
+//! Keeps the data of a flow in memory, and makes fields from it whenever wavelengths or transfer
+//! functions change.
 
 use crate::field::{Field, Node};
 use crate::input::{InputError, from_dataset};
@@ -14,22 +14,22 @@ use std::path::{Path, PathBuf};
 /// An array of the file that can have a transfer function.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArrayInfo {
-    /// Its name.
+    /// Name of the array.
     pub name: String,
-    /// Smallest and largest finite value; of vectors, of their magnitude.
+    /// Smallest and largest finite value, of the magnitude for vectors.
     pub range: [f64; 2],
 }
 
-/// A file's data.
+/// The data of a file.
 pub(super) struct Flow {
-    /// Where it is from.
+    /// Path of the file.
     pub(super) file: PathBuf,
     data: Dataset,
     warnings: Vec<String>,
 }
 
 impl Flow {
-    /// Reads a file. Of a collection this is the first time.
+    /// Reads a file; of a collection, the first time.
     pub(super) fn open(path: &Path) -> Result<Flow, InputError> {
         let file = path.to_path_buf();
         let in_file =
@@ -43,13 +43,13 @@ impl Flow {
         Ok(Flow { data, warnings: opened.warnings, file })
     }
 
-    /// Arrays of points and cells whose values differ, by name.
+    /// Arrays of points and cells that are not constant, sorted by name.
     pub(super) fn arrays(&self) -> Vec<ArrayInfo> {
         let mut found: BTreeMap<String, [f64; 2]> = BTreeMap::new();
         let leaves = self.data.leaves();
         for a in leaves.iter().filter_map(|l| l.attributes()) {
             for array in a.point.iter().chain(&a.cell).filter(|a| !a.name.starts_with("vtk")) {
-                // As an array of the medium is read: components of a vector by its magnitude.
+                // Vectors count by their magnitude, as when an array of the medium is read.
                 let range = if array.components == 1 {
                     array.range().map(|r| [r.0, r.1])
                 } else {
@@ -67,8 +67,8 @@ impl Flow {
         found.into_iter().map(|(name, range)| ArrayInfo { name, range }).collect()
     }
 
-    /// n0 - 1 around this flow, in the light of the scene's first wavelength: what all times of a
-    /// series are relative to.
+    /// n0 - 1 around this flow for the scene's first wavelength, to which all times of a series are
+    /// relative.
     pub(super) fn reference_n_minus_1(&self, scene: &Scene) -> Result<f64, RenderError> {
         let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
         let loaded = from_dataset(&self.data, &options)
@@ -76,8 +76,8 @@ impl Flow {
         Ok(loaded.report.reference_n_minus_1)
     }
 
-    /// The test section for a scene. `solids` are taken over from the one before: a page cannot
-    /// change them.
+    /// The test section for a scene. `solids` are those of the previous test section, because a
+    /// page cannot change them.
     pub(super) fn section(
         &self,
         scene: &Scene,
@@ -100,17 +100,17 @@ impl Flow {
     }
 }
 
-/// Nodes of a field that is drawn while something moves.
+/// Largest number of nodes of a field that is rendered during an interaction.
 const COARSE_NODES: usize = 1 << 18;
 
-/// Every so many nodes of a field, few enough to be drawn while something moves; `None` when the
-/// field is as small as that already.
+/// The field with every n-th node along each axis, small enough to be rendered during an
+/// interaction. `None` when the field is already that small or would become too thin.
 pub(super) fn coarse(field: &Field) -> Option<Field> {
     let d = field.dims();
     let kept = |every: usize| d.map(|n| (n - 1) / every + 1);
     let every = (1..).find(|e| kept(*e).iter().product::<usize>() <= COARSE_NODES)?;
     let dims = kept(every);
-    // Interpolants need a few nodes to each side.
+    // Interpolants need a few nodes along each axis.
     if every == 1 || dims.iter().any(|n| *n < 4) {
         return None;
     }
@@ -122,8 +122,8 @@ pub(super) fn coarse(field: &Field) -> Option<Field> {
     };
     let eps = (0..count).map(|i| field.eps()[from(i)]).collect();
     let nodes = field.nodes().map(|n: &[Node]| (0..count).map(|i| n[from(i)]).collect());
-    // Stretched so that the last node is where the whole field's last node is: the picture must not
-    // jump when it gets sharp.
+    // Stretched so that its last node coincides with the full field's: the image must not jump when
+    // it is refined.
     let spacing_m =
         [0, 1, 2].map(|c| field.spacing_m()[c] * (d[c] - 1) as f64 / (dims[c] - 1) as f64);
     Field::new(dims, spacing_m, field.origin_m(), eps, field.n0(), nodes).ok()

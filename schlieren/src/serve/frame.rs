@@ -1,4 +1,4 @@
-//! A picture on its way to the page: numbers as JSON, then pixels.
+//! Packs a rendered image for the page: numbers as JSON, then pixels.
 
 use super::filter_plane::{FilterPlane, PIXELS};
 use crate::film::Framing;
@@ -8,78 +8,77 @@ use rt_core::colormap::linear_to_srgb;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// What a frame is, in numbers.
+/// The numbers of a frame.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct FrameInfo {
-    /// Counts frames.
+    /// Number of the frame.
     pub serial: u64,
-    /// Of the scene that it shows.
+    /// Generation of the scene that it shows.
     pub generation: u64,
-    /// True when nothing finer will come.
+    /// Whether this is the final frame of the scene.
     pub finished: bool,
-    /// Why there is no picture; the pixels are then none.
+    /// Why rendering failed; the frame then has no pixels.
     pub error: Option<String>,
-    /// Pixels per row.
+    /// Number of pixels per row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
     /// Side of a pixel in the test section.
     pub pixel_m: f64,
-    /// Photons per pixel; absent for pictures without noise.
+    /// Photons per pixel; absent for images without noise.
     pub samples: Option<u32>,
-    /// Photons per pixel that the finished picture will have.
+    /// Photons per pixel of the final image.
     pub samples_wanted: Option<u32>,
-    /// Rays that were traced for it.
+    /// Number of rays traced for the image.
     pub rays: u64,
-    /// Time they took.
+    /// Time to render the image.
     pub elapsed_secs: f64,
-    /// Root mean square of the estimated noise, of white.
+    /// Root mean square of the estimated noise, relative to white.
     pub noise_rms: Option<f64>,
-    /// Its largest.
+    /// Largest estimated noise, relative to white.
     pub noise_max: Option<f64>,
-    /// Measured error of a deflection by march and interpolation.
+    /// Measured error of deflections due to march and interpolation.
     pub deflection_error_rad: Option<f64>,
-    /// Estimated error of a deflection by the flow's own lattice.
+    /// Estimated error of deflections due to the flow's own lattice.
     pub resolution_error_rad: Option<f64>,
     /// Largest deflection through a pixel's centre.
     pub largest_deflection_rad: Option<f64>,
-    /// The march, in words.
+    /// Description of the march.
     pub march: String,
-    /// Whether it was drawn with a coarse tolerance, and maybe through every so many nodes of the
-    /// field.
+    /// Whether it was rendered with a coarse tolerance, and possibly through a coarse field.
     pub draft: bool,
-    /// Darkest and brightest channel.
+    /// Lowest and highest channel value.
     pub levels: [f32; 2],
-    /// What should be known.
+    /// Warnings about the image.
     pub warnings: Vec<String>,
-    /// Half the side of the filter plane that is shown.
+    /// Half the side of the shown filter plane.
     pub filter_half_m: f64,
-    /// Pixels along its side.
+    /// Pixels along the side of the shown filter plane.
     pub filter_pixels: usize,
-    /// f2, from radians to metres in the plane.
+    /// f2: the factor from radians to metres in the filter plane.
     pub focal_length_m: f64,
-    /// Part of the light beyond what is shown of the filter.
+    /// Fraction of the light outside the shown filter plane.
     pub light_outside: f32,
 }
 
-/// The deflections that belong to a view, for following pixels to the filter.
+/// The deflections of a view, for tracing pixels to the filter.
 pub(super) struct DeflectionMap {
     pub(super) map: Map,
     pub(super) framing: Framing,
 }
 
-/// A frame as it is kept and sent.
+/// A frame as it is stored and sent.
 pub struct Frame {
-    /// In numbers.
+    /// Numbers of the frame.
     pub info: FrameInfo,
-    /// Head and pixels, as sent: length of the JSON as u32, the JSON, the picture's sRGB bytes, the
-    /// filter's, the light on the filter as f32; little-endian.
+    /// Head and pixels as sent, little-endian: length of the JSON as u32, the JSON, the image's
+    /// sRGB bytes, the filter's sRGB bytes, the light on the filter as f32.
     pub bytes: Vec<u8>,
     pub(super) traced: Option<Arc<DeflectionMap>>,
 }
 
 impl Frame {
-    /// Packs a frame; `None` for what could not be drawn.
+    /// Packs a frame, with `None` for what could not be rendered.
     pub(super) fn new(
         mut info: FrameInfo,
         rendered: Option<&RenderOutput>,
@@ -91,7 +90,7 @@ impl Frame {
             (info.width, info.height, info.pixel_m) =
                 (r.framing.width, r.framing.height, r.framing.pixel_m);
             pixels.resize(3 * r.pixels.len(), 0);
-            // NaN becomes 0 in the cast; there is a warning for it in the report.
+            // The cast turns NaN into 0; the report has a warning about it.
             let byte = |v: f32| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8;
             pixels
                 .par_chunks_exact_mut(3)

@@ -1,9 +1,9 @@
-//! Changes that the page sends, as JSON merge patches (RFC 7396).
+//! Applies changes that the page sends as JSON merge patches (RFC 7396).
 
 use serde_json::Value;
 
-/// RFC 7396, but for objects that choose one of several kinds: merged, keys of the old kind would
-/// remain.
+/// Merges as in RFC 7396, but replaces objects that select one of several kinds, because keys of
+/// the old kind would remain.
 pub(super) fn merge(target: &mut Value, patch: Value) {
     let Value::Object(patch) = patch else {
         *target = patch;

@@ -1,11 +1,11 @@
-//! `schlieren serve`: the laboratory as a page in a browser.
+//! Serves a scene as an interactive page in a browser (`schlieren serve`).
 //!
 //! ```text
-//!   browser ── HTTP on loopback, token in every address ── [routes] ── [session] ── [worker]: one thread that draws
+//!   browser ── HTTP on loopback, token in every address ── [routes] ── [session] ── [worker]: the thread that renders
 //! ```
-//! One thread answers requests and never computes; another draws with all cores, and stops when the
-//! scene changes. All pages that are open show the same scene. Files cannot be opened or written
-//! from the page: it changes how the flow is looked at, and downloads what it sees.
+//! One thread answers requests and never computes. Another renders with all cores, and stops when
+//! the scene changes. All open pages show the same scene. The page cannot open or write files: it
+//! changes how the flow is viewed, and downloads images.
 
 mod filter_plane;
 mod flow;
@@ -31,24 +31,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Why there is no page.
+/// Errors of starting the server.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The flow or the bodies cannot be read, or make no test section.
+    /// The flow or the bodies cannot be read, or are no valid test section.
     #[error(transparent)]
     Render(Box<RenderError>),
-    /// The page does not draw such scenes.
+    /// The page does not accept the scene.
     #[error(transparent)]
     Refused(#[from] RefusedChange),
-    /// Nothing can listen there.
+    /// The server cannot listen on the address.
     #[error("cannot listen on {address}; give another address or port (port 0 takes a free one)")]
     Listen {
-        /// Where.
+        /// The address.
         address: SocketAddr,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The system gives no randomness, thread or event loop.
+    /// The system provides no random bits, thread or event loop.
     #[error("the server cannot start: {0}")]
     Start(String),
 }
@@ -59,14 +59,14 @@ impl From<RenderError> for ServeError {
     }
 }
 
-/// How often the end of the program is looked for.
+/// Interval at which `cancel` is polled.
 const TICK: Duration = Duration::from_millis(50);
-/// How long connections may take to finish at the end.
+/// Time that connections get to finish at shutdown.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Serves the scene until `cancel` is set. With several `steps` the page has a choice of time, and
-/// the first is shown first; with fewer the scene's own file is. `ready` gets the address of the
-/// page once it can be opened, and notes on the way.
+/// Serves the scene until `cancel` is set. With several `steps` the page offers a choice of time
+/// and shows the first step first; otherwise it shows the scene's own file. `ready` is called with
+/// the address of the page once it can be opened.
 pub fn serve(
     mut scene: Scene,
     steps: Vec<Step>,
@@ -81,7 +81,7 @@ pub fn serve(
         .build()
         .map_err(|e| start(&e))?;
     let listen = |source| ServeError::Listen { address, source };
-    // Before the flow is read: a port that is taken should be known at once.
+    // Binds before the flow is read, so that a port in use is reported at once.
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(listen)?;
     let url = format!("http://{}/{token}/", listener.local_addr().map_err(listen)?);
 
@@ -114,16 +114,16 @@ pub fn serve(
         }
         session.stop();
         ending.notify_one();
-        // Who is still waiting for a frame or reads slowly is left behind.
+        // Clients that still wait for a frame or read slowly are disconnected.
         let _ = tokio::time::timeout(FAREWELL, server).await;
     });
     drop(runtime);
-    // A panic there was reported where it happened.
+    // A panic of the thread was already reported.
     let _ = thread.join();
     Ok(())
 }
 
-/// 128 random bits as text.
+/// 128 random bits as hexadecimal text.
 fn token() -> Result<String, getrandom::Error> {
     let mut bits = [0u8; 16];
     getrandom::fill(&mut bits)?;

@@ -1,15 +1,15 @@
-//! The page's addresses. All lie below the token: `/TOKEN/`, `/TOKEN/frame`…; whoever does not know
-//! it learns nothing, not even which addresses there are.
+//! HTTP routes of the page. All are below the token: `/TOKEN/`, `/TOKEN/frame`…. A client without
+//! the token learns nothing, not even which routes exist.
 //!
-//! | address | |
+//! | route | |
 //! |---|---|
-//! | `GET /` and `GET /NAME` | the page and its parts |
+//! | `GET /` and `GET /NAME` | the page and its files |
 //! | `GET /state` | scene, arrays, limits (JSON) |
-//! | `GET /frame?after=N` | the newest frame when its number is not N; waits for one, 204 when none comes for a while |
-//! | `POST /scene` | a change as JSON merge patch; `step` chooses the time of a series |
+//! | `GET /frame?after=N` | the newest frame when its number is not N; waits, 204 on timeout |
+//! | `POST /scene` | a change as JSON merge patch; `step` selects the time of a series |
 //! | `POST /paint` | [`Paint`] |
-//! | `POST /trace` | where a place of the picture lies on the filter |
-//! | `GET /save/png`, `/save/exr`, `/save/toml` | files |
+//! | `POST /trace` | where the light of a point of the image crosses the filter |
+//! | `GET /save/png`, `/save/exr`, `/save/toml` | downloads |
 
 use super::session::{Paint, RefusedChange, SaveKind, Session};
 use axum::Router;
@@ -25,12 +25,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Largest body of a request.
+/// Largest size of a request's body.
 const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 /// How long a request waits for a frame.
 const PATIENCE: Duration = Duration::from_secs(15);
 
-/// The page's parts, embedded in the program.
+/// The page's files, embedded in the program.
 const PARTS: [(&str, &str, &str); 8] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
@@ -50,7 +50,7 @@ struct App {
     token: Arc<str>,
 }
 
-/// Everything below `/{token}/`.
+/// The router of everything below `/{token}/`.
 pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
     let app = App { session, token: token.into() };
     Router::new()
@@ -68,8 +68,8 @@ pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
         .with_state(app)
 }
 
-/// Lets through what knows the token, and says to browsers what the page may do: nothing but talk
-/// to this server.
+/// Passes requests with the token, and sets headers that allow the page to contact only this
+/// server.
 async fn guarded(State(app): State<App>, request: Request, next: Next) -> Response {
     let given = request.uri().path().split('/').nth(1).unwrap_or_default();
     let mut response = if same(given, &app.token) {
@@ -94,7 +94,7 @@ async fn guarded(State(app): State<App>, request: Request, next: Next) -> Respon
     response
 }
 
-/// Comparison whose time does not tell how much was right.
+/// Comparison in constant time, which does not reveal how many characters were right.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |d, (x, y)| d | (x ^ y)) == 0
 }
@@ -109,7 +109,7 @@ fn error(status: StatusCode, text: &str) -> Response {
     (status, axum::Json(serde_json::json!({ "error": text }))).into_response()
 }
 
-/// JSON of a body, whatever content type it claims.
+/// Parses a body as JSON, whatever its content type.
 fn json<T: DeserializeOwned>(body: &Bytes) -> Result<T, Box<Response>> {
     serde_json::from_slice(body).map_err(|e| {
         Box::new(error(StatusCode::BAD_REQUEST, &format!("the request makes no sense: {e}")))
@@ -142,11 +142,11 @@ async fn frame(State(app): State<App>, Query(FrameQuery { after }): Query<FrameQ
     let other = frames.wait_for(|serial| *serial != after && *serial > 0);
     match tokio::time::timeout(PATIENCE, other).await {
         Ok(Ok(_)) => {}
-        // Nothing new, or the program ends.
+        // There is no new frame, or the program ends.
         _ => return StatusCode::NO_CONTENT.into_response(),
     }
     match app.session.frame() {
-        // A clone of some 100 kB to megabytes; sharing it would need another body type.
+        // Clones some 100 kB to megabytes; sharing the bytes would need another body type.
         Some(frame) => ([(header::CONTENT_TYPE, "application/octet-stream")], frame.bytes.clone())
             .into_response(),
         None => StatusCode::NO_CONTENT.into_response(),
@@ -196,7 +196,7 @@ async fn trace(State(app): State<App>, body: Bytes) -> Response {
     }
 }
 
-/// Stops the drawing of a file when nobody waits for it any more.
+/// Stops the rendering of a file when the request for it has ended.
 struct StopsWhenDropped(Arc<AtomicBool>);
 
 impl Drop for StopsWhenDropped {

@@ -1,8 +1,8 @@
-//! What the page's requests and the drawing thread share: the scene, the newest frame, and what is
-//! wanted next.
+//! The state that requests and the rendering thread share: the scene, the newest frame and the
+//! pending work.
 //!
-//! Requests only change values under a lock that nobody holds for long; everything that takes time
-//! is done by [`super::worker`].
+//! Requests only change values under a lock that is never held for long. [`super::worker`] does
+//! everything that takes time.
 
 use super::filter_plane::{as_painting, half_side_m, traced};
 use super::flow::ArrayInfo;
@@ -22,20 +22,20 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Longest side of a picture on the page; larger ones are for `schlieren render`.
+/// Longest side of an image on the page; larger ones need `schlieren render`.
 pub const MAX_SIDE: u32 = 2048;
-/// Most photons per pixel on the page.
+/// Largest number of photons per pixel on the page.
 pub const MAX_SAMPLES: u32 = 4096;
-/// Most strokes of a painting.
+/// Largest number of strokes of a painting.
 pub const MAX_STROKES: usize = 5000;
-/// Most points of one request to paint.
+/// Largest number of points of one request to paint.
 pub const MAX_POINTS: usize = 4096;
-/// Sections of the scene that a page may change; of the flow only its transfer functions (and its
-/// time, by `step`).
+/// Sections of the scene that a page may change. Of the flow, these are only the transfer functions
+/// (and the time, by `step`).
 const PAGE_SECTIONS: [&str; 8] =
     ["view", "light", "lenses", "technique", "film", "sampling", "march", "flow"];
 
-/// Why a request was refused; the text goes to the page.
+/// The reason why a request was refused, which the page shows.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct RefusedChange(pub String);
@@ -44,25 +44,25 @@ fn refused(text: impl Into<String>) -> RefusedChange {
     RefusedChange(text.into())
 }
 
-/// A file to make.
+/// A request for a file.
 pub(super) struct Save {
     pub(super) scene: Scene,
     pub(super) kind: SaveKind,
-    /// Set when nobody waits for it any more.
+    /// Set when the request has ended.
     pub(super) cancel: Arc<AtomicBool>,
     pub(super) reply: tokio::sync::oneshot::Sender<Result<Vec<u8>, String>>,
 }
 
-/// Which file.
+/// The kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SaveKind {
-    /// For eyes.
+    /// The image for viewing.
     Png,
-    /// All layers.
+    /// The image with all layers.
     Exr,
 }
 
-/// Values that belong to a technique, kept for when it is chosen again.
+/// Settings that belong to a technique, kept until it is selected again.
 #[derive(Clone)]
 struct TechniqueSettings {
     technique: TechniqueSpec,
@@ -74,29 +74,29 @@ struct TechniqueSettings {
 
 pub(super) struct Shared {
     pub(super) scene: Scene,
-    /// Counts changes of the scene.
+    /// Number of changes of the scene.
     pub(super) generation: u64,
     pub(super) saves: VecDeque<Save>,
     pub(super) frame: Option<Arc<Frame>>,
     pub(super) stop: bool,
     settings: BTreeMap<&'static str, TechniqueSettings>,
-    /// n0 - 1 that all steps are drawn with, and the scene's flow for which that was found.
+    /// The scene's flow, and the n0 - 1 of the series that was found for it.
     pub(super) reference: Option<(FlowSpec, f64)>,
 }
 
-/// The state that requests and the drawing thread share.
+/// The state that requests and the rendering thread share.
 pub struct Session {
     shared: Mutex<Shared>,
     pub(super) wake: Condvar,
-    /// Set to stop what is being drawn.
+    /// Set to stop the current rendering.
     pub(super) cancel: AtomicBool,
     pub(super) frames: tokio::sync::watch::Sender<u64>,
-    /// Times of a series, at least two; none of one flow.
+    /// Steps of a time series, at least two; empty for a single flow.
     pub(super) steps: Vec<Step>,
-    /// Arrays for transfer functions, of the first step.
+    /// Arrays of the first step, for transfer functions.
     arrays: Vec<ArrayInfo>,
-    /// As it was when the program started: a page may change neither files nor what the arrays
-    /// mean, only curves.
+    /// The flow as the program started with it. A page may change neither files nor the meaning of
+    /// arrays, only curves.
     flow: FlowSpec,
     image: Option<CutoffSpec>,
 }
@@ -105,37 +105,37 @@ pub struct Session {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paint {
-    /// Where the points are.
+    /// What the points refer to.
     pub on: Canvas,
-    /// Along the stroke: on the filter metres from the axis, on the picture 0..=1 from its upper
-    /// left corner.
+    /// Points along the stroke: on the filter in metres from the axis, on the image 0..=1 from its
+    /// upper left corner.
     pub points: Vec<[f64; 2]>,
-    /// Of the brush, on the filter.
+    /// Radius of the brush on the filter.
     pub radius_m: f64,
-    /// Linear transmission.
+    /// Linear transmission of the paint.
     pub rgb: Rgb,
 }
 
-/// What is painted on.
+/// The surface that is painted on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Canvas {
     /// The filter itself.
     Filter,
-    /// The picture; each point is followed back to the filter.
+    /// The image; each point is traced to the filter.
     Picture,
 }
 
-/// What painting did.
+/// The result of painting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PaintOutcome {
-    /// The scene's number now.
+    /// The scene's new generation.
     pub generation: u64,
-    /// Strokes that were added.
+    /// Number of strokes added.
     pub added: usize,
-    /// Points without light, which have no place on the filter.
+    /// Number of points without light, which have no position on the filter.
     pub dark: usize,
-    /// What the user should know.
+    /// A note for the user.
     pub note: Option<String>,
 }
 
@@ -175,11 +175,12 @@ impl Session {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
-        // Values are replaced whole, so they are sound even after a panic elsewhere.
+        // Values are always replaced as a whole, so they are consistent even after a panic of
+        // another thread.
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the page needs to know about the scene.
+    /// The state of the scene as JSON for the page.
     pub fn state(&self) -> Value {
         let shared = self.lock();
         let scene = &shared.scene;
@@ -202,8 +203,8 @@ impl Session {
         let shared = self.lock();
         let mut scene = shared.scene.effective();
         if self.is_later(&scene) {
-            // Without the series around it, the file would be relative to its own surroundings and
-            // make another picture.
+            // Outside of the series, the file would be relative to its own surroundings and give
+            // another image.
             match &shared.reference {
                 Some((flow, n_minus_1)) if *flow == shared.scene.flow => {
                     scene.flow.reference_n_minus_1 = Some(*n_minus_1);
@@ -224,16 +225,19 @@ impl Session {
         self.lock().frame.clone()
     }
 
-    /// Changes the scene by a JSON merge patch (RFC 7396); objects with a `kind` or `method` are
-    /// replaced whole, `null` is the technique's custom. A technique of another kind brings its own
-    /// bench back. Returns the new generation.
+    /// Changes the scene by a JSON merge patch (RFC 7396). Objects with a `kind` or `method` are
+    /// replaced as a whole, and `null` selects the technique's default. A technique of another kind
+    /// restores its own bench. Returns the new generation.
+    ///
+    /// # Errors
+    /// The reason why the change is refused; the scene is then unchanged.
     pub fn edit(&self, patch: &Value) -> Result<u64, RefusedChange> {
         let mut shared = self.lock();
         let before = shared.scene.clone();
         let mut previous = None;
         let mut base = before.clone();
 
-        // Another technique: the bench as it was with it, or its custom.
+        // Another technique restores its last bench, or its defaults.
         let wanted = patch.pointer("/technique/kind").and_then(Value::as_str);
         if let Some(name) = wanted.filter(|n| *n != before.technique.name()) {
             let Some(custom) = TechniqueSpec::by_name(name) else {
@@ -256,15 +260,15 @@ impl Session {
         }
         self.check_patch(&patch)?;
 
-        // The flow: only its transfer functions.
+        // Of the flow, only transfer functions can be changed.
         if let Some(curves) = patch.pointer("/flow/multifield").cloned() {
             base.flow = match curves {
                 Value::Null => self.flow.clone(),
                 curves => self.with_curves(curves)?,
             };
         }
-        // The time: one of those there are. Transfer functions start from the first file, so the
-        // one shown is named again.
+        // The time must be a step of the series. Transfer functions start from the first file, so
+        // the path of the current one is set again.
         base.flow.file = match step {
             Some(step) => self.step(&step)?.path.clone(),
             None => before.flow.file.clone(),
@@ -298,7 +302,7 @@ impl Session {
         })
     }
 
-    /// Whether a scene shows a step that the first one's surroundings belong to.
+    /// Whether a scene shows a later step, which uses the surroundings of the first one.
     pub(super) fn is_later(&self, scene: &Scene) -> bool {
         scene.flow.reference_n_minus_1.is_none()
             && self.steps.first().is_some_and(|s| s.path != scene.flow.file)
@@ -349,7 +353,7 @@ impl Session {
 
     fn check_scene(&self, scene: &Scene) -> Result<(), RefusedChange> {
         check_limits(scene)?;
-        // Pages must not make the program read any file.
+        // A page must not make the program read an arbitrary file.
         if let TechniqueSpec::Schlieren { cutoff: cutoff @ CutoffSpec::Image { file, .. } } =
             &scene.technique
         {
@@ -390,7 +394,7 @@ impl Session {
             return Err(refused("only schlieren has a filter; take technique schlieren to paint"));
         };
 
-        // Where on the filter.
+        // The points on the filter.
         let traced_view = shared.frame.as_ref().and_then(|f| f.traced.clone());
         let (places, dark) = match paint.on {
             Canvas::Filter => (paint.points.clone(), 0),
@@ -410,7 +414,7 @@ impl Session {
             }
         };
 
-        // Onto a painting.
+        // Adds the strokes to a painting.
         let half_m = half_side_m(&shared.scene, traced_view.as_ref().map(|t| &t.map));
         let (mut painting, same) = as_painting(&shared.scene, &cutoff, half_m, [0.0; 3])
             .map_err(|e| refused(chain(&e)))?;
@@ -423,8 +427,8 @@ impl Session {
             )));
         }
         let mut scene = shared.scene.clone();
-        // The source stays as it was: a knife's customary slit would otherwise become a painting's
-        // customary disc.
+        // Keeps the source: otherwise the default slit of a knife would become the default disc of
+        // a painting.
         scene.light.source = scene.effective().light.source;
         scene.technique = TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(painting) };
         self.check_scene(&scene)?;
@@ -441,8 +445,8 @@ impl Session {
         Ok(PaintOutcome { generation: shared.generation, added, dark, note })
     }
 
-    /// Where the light of a place of the picture goes: deflection, and point on the filter; `None`
-    /// without light.
+    /// Deflection, and point on the filter, of the light at a point of the image; `None` without
+    /// light.
     pub fn trace(&self, at: [f64; 2]) -> Result<Option<(Across, Across)>, RefusedChange> {
         if !at.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(refused("places of the picture are 0 to 1 from its upper left corner"));
@@ -454,7 +458,7 @@ impl Session {
         Ok(traced(&view.map, &view.framing, f2, at))
     }
 
-    /// Asks for a file; the receiver gets it or why there is none.
+    /// Requests a file. The receiver gets its bytes or the reason why there is none.
     pub(super) fn save(
         &self,
         kind: SaveKind,
@@ -476,11 +480,11 @@ impl Session {
         Ok(receiver)
     }
 
-    /// Ends the drawing thread.
+    /// Ends the rendering thread.
     pub(super) fn stop(&self) {
         let mut shared = self.lock();
         shared.stop = true;
-        // Dropping the senders tells those who wait.
+        // Dropping the senders notifies the waiting requests.
         for save in shared.saves.drain(..) {
             save.cancel.store(true, Ordering::Relaxed);
         }
@@ -489,7 +493,7 @@ impl Session {
         self.wake.notify_all();
     }
 
-    /// Shows a frame to everyone who waits for one.
+    /// Makes a frame the newest one and notifies all waiting requests.
     pub(super) fn publish(&self, frame: Frame) {
         let serial = frame.info.serial;
         self.lock().frame = Some(Arc::new(frame));
@@ -503,9 +507,9 @@ impl Session {
     }
 }
 
-/// Strokes through places on the filter. Neighbouring places farther apart than the brush is wide
-/// are not joined on the picture's behalf: across a shock they have nothing between them. Places
-/// that a dab already covers add nothing.
+/// Strokes through points on the filter. Points of a stroke on the image that are farther apart on
+/// the filter than the brush is wide are not joined, because across a shock there is nothing
+/// between them. Points that almost repeat the last one add nothing.
 fn strokes(places: &[[f64; 2]], paint: &Paint) -> Vec<Stroke> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let mut strokes: Vec<Stroke> = Vec::new();
@@ -534,7 +538,8 @@ impl TechniqueSettings {
         }
     }
 
-    /// What belongs to a technique as it was, or its custom. Framing and colours belong to all.
+    /// Restores the settings of a technique, or its defaults. All techniques share framing and
+    /// colours.
     fn restore(previous: Option<TechniqueSettings>, custom: TechniqueSpec, scene: &mut Scene) {
         let light = LightSpec {
             wavelengths_nm: scene.light.wavelengths_nm.clone(),
@@ -556,7 +561,7 @@ impl TechniqueSettings {
         scene.film.exposure = previous.film.exposure;
         scene.sampling = previous.sampling;
         if !previous.technique.follows_light() {
-            // They take one wavelength.
+            // Techniques without light use one wavelength.
             scene.light.wavelengths_nm.truncate(1);
             scene.light.weights.clear();
         }
@@ -581,7 +586,7 @@ fn check_limits(scene: &Scene) -> Result<(), RefusedChange> {
     }
 }
 
-/// An error with its causes.
+/// The message of an error with those of its causes.
 pub(super) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

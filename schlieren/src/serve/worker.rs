@@ -1,14 +1,16 @@
-//! The thread that draws: coarse at once, finer while nothing changes, then the error of the march.
+//! The thread that renders: first a coarse image, then finer ones while nothing changes, then the
+//! error of the march.
 //!
 //! ```text
 //!            change                 change during 2…                 nothing changes
 //!  requests ───┐                         ┐
 //!  thread      └─ 1 coarse, never stopped └─ (stopped) 1 coarse ─ 2 … ─ samples × 4 … ─ finished ─ error measured
 //! ```
-//! The first picture after a change is never stopped by the next change: whoever drags without
-//! pause sees every picture that this machine can draw. All others are stopped at once. Each is
-//! drawn from scratch, so the finished one is bit for bit what `schlieren render` makes of the same
-//! scene; since photons grow by fours, that costs a third more than adding them up would.
+//! The first image after a change is never stopped by the next change, so that continuous dragging
+//! shows as many images as the machine can render. All others are stopped at once. Each image is
+//! rendered from scratch, so the final one equals bit for bit what `schlieren render` makes of the
+//! same scene. Because the number of photons grows by factors of four, this costs a third more than
+//! accumulation would.
 
 use super::filter_plane::FilterPlane;
 use super::flow::{Flow, coarse};
@@ -24,19 +26,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// What the first picture after a change may take.
+/// Time that the first image after a change may take.
 const MOVING_SECS: f64 = 0.06;
-/// Longest side of that picture, at most and at least.
+/// Upper and lower limit of the longest side of that image.
 const MOVING_SIDES: [u32; 2] = [320, 64];
-/// Photons per pixel of it.
+/// Photons per pixel of that image.
 const MOVING_SAMPLES: u32 = 4;
-/// Tolerance of the first two pictures: straight rays through all but the strongest flows, which
-/// shows as much as an eye sees.
+/// Tolerance of the first two images. It gives straight rays through all but the strongest flows,
+/// without a visible difference.
 const DRAFT_TOLERANCE_RAD: f64 = 1e-2;
-/// How long nothing has to change before the error is measured: that cannot be stopped.
+/// Time without a change before the error is measured, because measuring cannot be stopped.
 const STILL: Duration = Duration::from_millis(500);
 
-/// What deflections depend on.
+/// The parts of a scene that determine deflections.
 #[derive(Clone, PartialEq)]
 struct Geometry {
     flow: FlowSpec,
@@ -67,7 +69,7 @@ impl Geometry {
     }
 }
 
-/// Measured once for each geometry.
+/// Errors of deflections, measured once for each geometry.
 #[derive(Clone, Copy, Default)]
 struct Errors {
     march_rad: Option<f64>,
@@ -76,12 +78,11 @@ struct Errors {
 
 pub(super) struct Worker {
     session: Arc<Session>,
-    /// The file that was read last.
+    /// The file read last.
     flow: Flow,
-    /// n0 - 1 of a series' first step, for the flow (as of that step) and wavelength it was made
-    /// with.
+    /// The flow of a series' first step, the wavelength, and n0 - 1 for both.
     reference: Option<(FlowSpec, f64, f64)>,
-    /// The section for a flow and wavelengths, and a thinned one.
+    /// The test section for a flow and wavelengths, with a coarse one.
     section: Option<Section>,
     solids: Option<Solids>,
     traced: Option<(Geometry, Arc<DeflectionMap>)>,
@@ -97,11 +98,11 @@ struct Section {
     thin: Option<TestSection>,
 }
 
-/// One of the pictures on the way to the finished one.
+/// One step of the progressive refinement.
 #[derive(Debug, Clone, PartialEq)]
 struct Level {
     scene: Scene,
-    /// Drawn with a coarse tolerance.
+    /// Whether it is rendered with a coarse tolerance.
     draft: bool,
     thin: bool,
     stoppable: bool,
@@ -123,11 +124,11 @@ impl Worker {
         }
     }
 
-    /// Draws until the session stops.
+    /// Renders until the session stops.
     pub(super) fn run(mut self) {
         let mut finished = 0;
         loop {
-            // What is wanted.
+            // Waits for work.
             let session = self.session.clone();
             let mut shared = session.lock();
             while !shared.stop && shared.saves.is_empty() && shared.generation == finished {
@@ -153,10 +154,10 @@ impl Worker {
         }
     }
 
-    /// Draws all pictures of a scene; false when stopped before the last.
+    /// Renders all images of a scene. False when stopped before the last.
     fn draw(&mut self, scene: &Scene, generation: u64) -> bool {
         let session = self.session.clone();
-        // A panic must not leave a page that waits for ever.
+        // A panic must not leave the page waiting forever.
         let outcome = catch_unwind(AssertUnwindSafe(|| self.draw_levels(scene, generation)));
         let error = match outcome {
             Ok(Ok(done)) => return done,
@@ -222,7 +223,7 @@ impl Worker {
             }
         }
 
-        // The error of the march, when it stands still.
+        // Measures the error of the march once nothing changes any more.
         if self.errors_known(&geometry).is_some() {
             return Ok(true);
         }
@@ -240,7 +241,7 @@ impl Worker {
         Ok(true)
     }
 
-    /// The test section for a scene.
+    /// Prepares the test section of a scene.
     fn prepare(&mut self, scene: &Scene) -> Result<(), RenderError> {
         let fits =
             |s: &Section| s.flow == scene.flow && s.wavelengths_nm == scene.light.wavelengths_nm;
@@ -253,7 +254,7 @@ impl Worker {
             }
             let mut of_series = scene.clone();
             of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
-            // Bodies are kept where a failure cannot lose them.
+            // Bodies stay in `self.solids` until nothing can fail any more.
             let mut full = self.flow.section(&of_series, None)?.with_caches();
             let thin_fields: Option<Vec<_>> = full.fields.iter().map(coarse).collect();
             let thin = match thin_fields {
@@ -274,8 +275,8 @@ impl Worker {
         Ok(())
     }
 
-    /// What a scene's times are relative to: the surroundings of the first, or pictures could not
-    /// be compared.
+    /// The n0 - 1 that all times of a scene are relative to: that around the first step, so that
+    /// images can be compared.
     fn reference_n_minus_1(&mut self, scene: &Scene) -> Result<Option<f64>, RenderError> {
         if !self.session.is_later(scene) {
             return Ok(scene.flow.reference_n_minus_1);
@@ -293,7 +294,8 @@ impl Worker {
         Ok(Some(n_minus_1))
     }
 
-    /// Bodies belong to the whole section; the thinned one borrows them for the time of `with`.
+    /// Calls `with` with the full or the coarse section. The full section owns the bodies, and the
+    /// coarse one borrows them during the call.
     fn with_section<T>(
         &mut self,
         thin: bool,
@@ -322,7 +324,7 @@ impl Worker {
         self.with_section(level.thin, |s| render::render(&level.scene, s, layers, &control))?
     }
 
-    /// Deflections of the scene itself where they are known, else of this level.
+    /// Deflections of the scene itself where they are known, otherwise of this level.
     fn traced(
         &mut self,
         level: &Level,
@@ -406,7 +408,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Sides of moving pictures follow this machine's speed.
+    /// Adapts the size of the first image to the speed of the machine.
     fn adapt(&mut self, elapsed_secs: f64, scene: &Scene) {
         let factor = (MOVING_SECS / elapsed_secs.max(1e-4)).sqrt().clamp(0.5, 1.3);
         let largest = scene.film.size[0].max(scene.film.size[1]).min(MOVING_SIDES[0]);
@@ -419,7 +421,7 @@ impl Worker {
         let result = outcome.unwrap_or_else(|_| {
             Err("drawing this scene panicked; please report it with the saved scene".into())
         });
-        // Nobody may wait any more.
+        // The request may have ended.
         let _ = save.reply.send(result);
     }
 
@@ -431,8 +433,8 @@ impl Worker {
             SaveKind::Png => Layers::NONE,
             SaveKind::Exr => Layers::ALL,
         };
-        // Changes of the scene do not stop a file that was asked for; its request's end and the
-        // program's do.
+        // A change of the scene does not stop a requested file; the end of its request or of the
+        // program does.
         let control = Control { cancel: &save.cancel, progress: &|_| {} };
         let rendered = self
             .with_section(false, |s| render::render(&save.scene, s, layers, &control))
@@ -451,13 +453,13 @@ impl Worker {
     }
 }
 
-/// The background's dots in metres, where the scene leaves them to the pixels: coarse pictures have
-/// other pixels, and the same dots.
+/// The background's dots in metres, where the scene leaves their size to the pixels: images with
+/// coarser pixels must have the same dots.
 fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
     let TechniqueSpec::Bos { dot_diameter_m: None, dot_spacing_m, seed } = scene.technique else {
         return None;
     };
-    // As [`render::technique`] chooses them.
+    // The same choice as in [`render::technique`].
     let diameter_m =
         (3.0 * framing(scene, section).pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
     Some(TechniqueSpec::Bos {
@@ -469,7 +471,7 @@ fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
 
 impl Level {
     fn with_dots(mut self, dots: &Option<TechniqueSpec>) -> Level {
-        // The finished picture stays the scene's own.
+        // The final image uses the scene unchanged.
         if let Some(dots) = dots.as_ref().filter(|_| self.thin) {
             self.scene.technique = dots.clone();
         }
@@ -484,7 +486,7 @@ fn wanted_samples(scene: &Scene) -> Option<u32> {
     }
 }
 
-/// The pictures on the way to the scene's own, which is the last.
+/// The steps of the progressive refinement; the last is the scene itself.
 fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
     let wanted = wanted_samples(scene);
     let whole = |samples: Option<u32>| {
@@ -507,12 +509,12 @@ fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
         levels.push(whole(Some(samples)));
         samples *= 4;
     }
-    // The scene itself, untouched.
+    // The scene itself, unchanged.
     levels.push(Level { scene: scene.clone(), ..whole(wanted) });
     levels
 }
 
-/// The same picture with fewer pixels.
+/// Reduces the pixels of a scene.
 fn shrink(scene: &mut Scene, side: u32) {
     let [w, h] = scene.film.size;
     let longest = w.max(h);

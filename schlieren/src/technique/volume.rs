@@ -30,7 +30,8 @@ pub enum ComparisonError {
     Transfer(#[from] TransferFunctionError),
 }
 
-/// |∇eps| at the nodes in 1/m, by central differences (one-sided at the border), and its largest value. It is 0 at nodes that are not gas.
+/// The magnitude |∇eps| at the nodes in 1/m, by central differences (one-sided at the border), and
+/// its largest value. It is 0 at nodes that are not gas.
 pub fn gradient_size(field: &Field) -> (Vec<f32>, f32) {
     let dims = field.dims();
     let (eps, spacing) = (field.eps(), field.spacing_m());

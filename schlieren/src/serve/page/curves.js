@@ -1,4 +1,4 @@
-// Transfer functions (section 5.7): for each array of the flow a curve from its value to n - 1, drawn with the pointer.
+// Editor of transfer functions (section 5.7): for each array of the flow, a curve from its value to n - 1.
 
 import { quantity, short } from "./units.js";
 

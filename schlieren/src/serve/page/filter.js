@@ -1,4 +1,4 @@
-// The filter plane: what it lets through, where the light is, and painting on it.
+// The filter plane: shows its transmission and the light on it, and lets the user paint on it.
 
 import { quantity, percent, round125 } from "./units.js";
 
@@ -21,11 +21,11 @@ function draw() {
   if (!last) return;
   const { info, filter, light } = last, n = info.filter_pixels;
   const image = new ImageData(n, n);
-  // The brightest pixel is full, 4 decades below nothing: light is much denser where the flow does not bend it.
+  // Logarithmic over 4 decades, because light is much denser where the flow does not bend it.
   const most = light.reduce((m, v) => Math.max(m, v), 0);
   for (let i = 0; i < n * n; i++) {
     const glow = showLight.checked && light[i] > 0 ? Math.max(0, 1 + Math.log10(light[i] / most) / 4) : 0;
-    // What is let through is shown dimmed, so that light (yellow) stands out on white as well as on black.
+    // The transmission is dimmed, so that light (yellow) stands out on white as well as on black.
     for (let c = 0; c < 3; c++) {
       const ground = filter[3 * i + c] * (showLight.checked ? 0.62 : 1) + (showLight.checked ? 14 : 0);
       image.data[4 * i + c] = ground * (1 - 0.65 * glow) + [255, 190, 40][c] * 0.65 * glow;
@@ -37,7 +37,7 @@ function draw() {
   context.imageSmoothingEnabled = false;
   context.drawImage(small, 0, 0, canvas.width, canvas.height);
 
-  // Axes, a bar with its length, and where the pointer's pixel lies.
+  // Axes, a bar with its length, and the point to which the pointer's pixel is traced.
   context.lineWidth = 1;
   context.strokeStyle = "rgba(128,150,190,0.6)";
   context.beginPath();
@@ -64,7 +64,7 @@ function ring(at, radius, color) {
   }
 }
 
-// `actions`: paints() whether there is a filter; radius() in m; paint(points in m).
+// `actions`: paints() returns whether the filter can be painted on; radius() in m; paint(points in m).
 export function interact(actions) {
   brush = () => actions.paints() ? actions.radius() : 0;
   let points = null;

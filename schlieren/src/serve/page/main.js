@@ -1,4 +1,4 @@
-// The page: what happens where becomes a change of the scene; states and frames from the program become what is seen.
+// The page: turns the user's actions into changes of the scene, and shows the program's states and frames.
 
 import * as server from "./server.js";
 import * as picture from "./picture.js";
@@ -65,7 +65,7 @@ function onFrame(frame) {
     ["march", info.march || "–"],
   ]);
   $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: w })));
-  // For scripts that wait.
+  // For scripts that wait for a frame.
   document.body.dataset.serial = info.serial;
   document.body.dataset.generation = info.generation;
   document.body.dataset.finished = info.finished;
@@ -121,7 +121,7 @@ for (const button of document.querySelectorAll("[data-view]")) button.addEventLi
 $("step").addEventListener("input", () => server.change({ step: Number($("step").value) }));
 $("radius").addEventListener("input", () => { $("radius").dataset.touched = "1"; });
 
-// A cleared filter keeps its size and the source that it was painted for.
+// A cleared filter keeps its size and the source that it was painted with.
 const ground = rgb => server.change({
   light: { source: state.effective.light.source },
   technique: { kind: "schlieren", cutoff: { kind: "painted", size_m: [2 * filter.half(), 2 * filter.half()], ground_rgb: rgb } },

@@ -1,4 +1,4 @@
-// The picture: shows frames, orbits, paints, and tells what is under the pointer.
+// The image: shows frames, orbits, paints, and shows the deflection under the pointer.
 
 import { quantity, round125 } from "./units.js";
 
@@ -8,7 +8,7 @@ const scale = document.getElementById("scale"), here = document.getElementById("
 
 export function show(frame, wanted) {
   const { width, height } = frame.info;
-  // The canvas keeps the finished picture's size, so that nothing on the page jumps while coarse pictures come.
+  // The canvas keeps the final image's size, so that the layout does not jump while coarse images arrive.
   const [w, h] = wanted || [width, height];
   if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
   const image = new ImageData(width, height);
@@ -40,7 +40,7 @@ const place = e => {
   return [clamp((e.clientX - box.left) / box.width), clamp((e.clientY - box.top) / box.height)];
 };
 
-// `actions`: angles() and orbit(azimuth, elevation); paints() and paint(points); trace(at) for the read-out; mark(point on the filter or null).
+// `actions`: angles() and orbit(azimuth, elevation); paints() and paint(points); trace(at) for the deflection; mark(point on the filter or null).
 export function interact(actions) {
   let drag = null, points = [], tracing = false, next = null;
 
@@ -59,7 +59,7 @@ export function interact(actions) {
       if (points.length > 12) flush(true);
       return;
     }
-    // Half a turn across the picture. What is near the camera follows the pointer.
+    // Dragging across the whole image is half a turn. The side near the camera follows the pointer.
     const turn = 180 / canvas.getBoundingClientRect().width;
     actions.orbit(drag.angles[0] - (e.clientX - drag.x) * turn, drag.angles[1] + (e.clientY - drag.y) * turn);
   });
@@ -75,7 +75,7 @@ export function interact(actions) {
     actions.orbit(a + step[0], b + step[1]);
   });
 
-  // The pointer jumps between events; the stroke is followed pixel by pixel, because every pixel has its own place on the filter.
+  // Fills the gaps between pointer events pixel by pixel, because every pixel has its own point on the filter.
   function flush(goesOn) {
     const all = [];
     for (let i = 0; i < points.length; i++) {

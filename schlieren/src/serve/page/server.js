@@ -1,11 +1,11 @@
-// Talking to the program: one change on its way at a time, later ones merged meanwhile; frames as they come.
+// Communicates with the program: sends one change at a time and merges later ones meanwhile; receives frames.
 
 let onState = () => {}, onError = () => {};
 let waiting = null, busy = false;
 
 export function listen(state, error) { onState = state; onError = error; }
 
-// Objects that choose a kind, and all transfer functions together, are replaced whole, as the program does it.
+// Replaces objects that select a kind, and the transfer functions together, as a whole, as the program does.
 function merge(into, patch) {
   for (const [key, value] of Object.entries(patch)) {
     const nested = value && typeof value === "object" && !Array.isArray(value);
@@ -30,7 +30,7 @@ export async function change(patch) {
     const next = waiting;
     waiting = null;
     try { onState(await call("scene", next)); onError(null); }
-    catch (e) { onError(e.message); try { onState(await call("state")); } catch { /* said below by the frames */ } }
+    catch (e) { onError(e.message); try { onState(await call("state")); } catch { /* `frames` reports a lost connection */ } }
   }
   busy = false;
 }
@@ -38,7 +38,7 @@ export async function change(patch) {
 export const refresh = async () => onState(await call("state"));
 export const trace = at => call("trace", { at });
 
-// Strokes go one after the other, so that later ones cover earlier ones.
+// Strokes are sent one after the other, so that later ones cover earlier ones.
 let strokes = Promise.resolve();
 export function paint(request) {
   strokes = strokes.then(() => call("paint", request)).then(async answer => {
@@ -69,7 +69,7 @@ export async function frames(show, lost) {
       const frame = decode(await response.arrayBuffer());
       after = frame.info.serial;
       show(frame);
-      // Between two frames the browser must have time to draw.
+      // Gives the browser time to draw between two frames.
       await new Promise(r => setTimeout(r, 0));
     } catch (e) {
       failures += 1;

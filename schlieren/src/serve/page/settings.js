@@ -1,4 +1,4 @@
-// The bench's settings. Every row says what it reads from the scene in effect and which change it makes.
+// The settings of the bench. Each row defines what it reads from the effective scene and which change it sends.
 
 const host = document.getElementById("technique");
 let built = "", rows = [], send = () => {};
@@ -10,7 +10,7 @@ const range = (label, unit, low, high, step, get, set) => ({ kind: "range", labe
 const choice = (label, options, get, set) => ({ kind: "choice", label, options, get, set });
 const text = (label, unit, get, set, more = {}) => ({ kind: "text", label, unit, get, set, ...more });
 
-// ---- What rows there are ----------------------------------------------------------------------------------------
+// ---- Definitions of rows ----------------------------------------------------------------------------------------
 
 function cutoffRows(state) {
   const kinds = ["knife", "circle", "complemented-circle", "color", "painted"];
@@ -27,7 +27,7 @@ function cutoffRows(state) {
   };
   const change = (kind, s) => ({
     technique: { kind: "schlieren", cutoff: fresh[kind](s) },
-    // Focal lengths and sources belong to the cut-off they were chosen for.
+    // Focal lengths and sources belong to a cut-off, so another cut-off resets them.
     lenses: { schlieren_m: null, collimator_m: null }, light: { source: null },
   });
   const rows = [choice("cut-off", kinds, s => of(s).kind, change)];
@@ -91,7 +91,7 @@ function lightRows(state) {
     rows.push(choice("light source", Object.keys(fresh), s => light(s).source.kind, v => ({ light: { source: fresh[v] }, ...(v === "point" ? { lenses: { collimator_m: null } } : {}) })));
     const part = (key, label) => number(label, "mm", 1e3, s => light(s).source[key], (v, s) => {
       const next = { ...light(s).source, [key]: v };
-      // Left to the scene, the slit turns with the knife.
+      // Without an angle of its own, the slit turns with the knife.
       if (!s.scene.light.source || s.scene.light.source.angle_deg === undefined) delete next.angle_deg;
       return { light: { source: next } };
     });
@@ -132,7 +132,7 @@ function filmRows(state) {
   return rows;
 }
 
-// ---- Rows on the page -------------------------------------------------------------------------------------------
+// ---- Elements of rows -------------------------------------------------------------------------------------------
 
 function element(row, state) {
   if (row.kind === "hint") {

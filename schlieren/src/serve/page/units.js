@@ -1,4 +1,4 @@
-// Numbers with units as people read them.
+// Formats numbers with units and SI prefixes.
 
 const PREFIXES = [[1e-12, "p"], [1e-9, "n"], [1e-6, "µ"], [1e-3, "m"], [1, ""], [1e3, "k"], [1e6, "M"], [1e9, "G"]];
 
@@ -14,7 +14,7 @@ export function quantity(value, unit, digits = 3) {
 export const percent = (v, digits = 2) => v === null || v === undefined ? "–" : `${Number((100 * v).toPrecision(digits))} %`;
 export const short = (v, digits = 4) => String(Number(v.toPrecision(digits)));
 
-// 1, 2 or 5 times a power of ten, at most the value.
+// The largest 1, 2 or 5 times a power of ten that is not above the value.
 export function round125(value) {
   const power = 10 ** Math.floor(Math.log10(value));
   for (const step of [5, 2, 1]) if (step * power <= value) return step * power;

@@ -104,7 +104,7 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
     let stroke = |points, rgb| Paint { on: Canvas::Filter, points, radius_m: 1e-4, rgb };
     let painted =
         s.paint(&stroke(vec![[0.0, 0.0], [1e-4, 0.0], [1e-4, 0.0]], [1.0, 0.0, 0.0])).unwrap();
-    // The second point repeats itself.
+    // The second point is repeated.
     assert_eq!((painted.added, painted.generation), (2, 2));
     let TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(p) } = scene(&s).technique else {
         panic!()
