@@ -1,8 +1,8 @@
-//! Ray-steps and photons per second of one core, in CPU time of the thread: other programs on the
-//! machine disturb it least.
+//! Measures ray-steps and photons per second of one core, in CPU time of the thread, which other
+//! programs on the machine disturb least.
 //!
-//! `cargo bench -p schlieren`: elements are ray-steps (march) or photons (line of sight); two cores
-//! do twice as much.
+//! Run with `cargo bench -p schlieren`. Elements are ray-steps (march) or photons (line of sight).
+//! Two cores do twice as much.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
@@ -18,8 +18,7 @@ fn thread_cpu() -> Duration {
     Duration::new(t.tv_sec as u64, t.tv_nsec as u32)
 }
 
-/// Rays over the middle of the picture in tiles of 4x4: a packet each, as a renderer would send
-/// them.
+/// Rays over the middle of the image in tiles of 4x4, one packet each, as the renderer sends them.
 fn starts(width: usize, rows: usize) -> Vec<Start> {
     let mut out = Vec::with_capacity(width * rows);
     for tile in 0..width * rows / 16 {

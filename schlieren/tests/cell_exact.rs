@@ -1,5 +1,5 @@
-//! The march from face to face: against closed forms, against itself, and against the adaptive one,
-//! which sees no kinks.
+//! Tests the cell-exact march against closed forms, against itself, and against the adaptive march,
+//! which does not notice kinks.
 
 mod common;
 
@@ -13,13 +13,13 @@ use schlieren::march::{
 };
 use std::f64::consts::FRAC_PI_2;
 
-/// A lattice for steps to be split on; what it holds does not matter.
+/// A lattice on which steps are split; its values do not matter.
 fn lattice(n: usize, half_m: f64) -> CellExact {
     let h = 2.0 * half_m / (n - 1) as f64;
     CellExact::new(&Field::from_fn([n; 3], [h; 3], DVec3::splat(-half_m), 1.0, |_| 0.0).unwrap())
 }
 
-/// Noise: neighbouring nodes have nothing in common, so every face is a kink.
+/// Noise: neighbouring nodes are uncorrelated, so every face is a kink.
 fn noise(dims: [usize; 3]) -> Field {
     let spacing = dims.map(|n| 1.0 / (n - 1) as f64);
     Field::from_fn(dims, spacing, DVec3::splat(-0.5), 1.0, |p| {
@@ -28,8 +28,7 @@ fn noise(dims: [usize; 3]) -> Field {
     .unwrap()
 }
 
-/// Lines from side to side of the cube: oblique, along an axis, in a plane of nodes, along the
-/// diagonal.
+/// Lines through the cube: oblique, along an axis, in a plane of nodes, and along the diagonal.
 fn lines() -> Vec<(DVec3, DVec3, f64)> {
     let through = |from: DVec3, to: DVec3| (from, (to - from).normalize(), (to - from).length());
     vec![
@@ -64,8 +63,9 @@ fn two_points_integrate_trilinear_cells_to_rounding() {
             assert!((two.slope - other.slope).length() < 1e-14 * scale, "{two:?} {other:?}");
             assert!((two.path_m - other.path_m).abs() < 1e-15 * 1e-5 * 10.0);
         }
-        // eps is continuous: the integral of its derivative along the line is what it gained. Rays
-        // in a plane of nodes have no slope across it, but one along it.
+        // eps is continuous, so the integral of its derivative along the line is its difference
+        // between the ends. Rays in a plane of nodes have no defined slope across it, but one along
+        // it.
         let end = line.0 + line.1 * line.2;
         let gained = medium.sample(end).0 - medium.sample(line.0).0;
         assert!(
@@ -80,7 +80,7 @@ fn two_points_integrate_trilinear_cells_to_rounding() {
     }
 }
 
-/// Its degree along an oblique line is 9.
+/// The degree of the spline along an oblique line is 9.
 #[test]
 fn five_points_integrate_splines_to_rounding() {
     let field = noise([13, 9, 11]);
@@ -91,7 +91,7 @@ fn five_points_integrate_splines_to_rounding() {
         let gained = medium.sample(line.0 + line.1 * line.2).0 - medium.sample(line.0).0;
         let off = |s: &LineIntegrals| (s.slope.dot(line.1) - gained).abs() / (13.0 * 1e-5);
         assert!(off(&five) < 1e-14, "{:e}", off(&five));
-        // Along an axis it is a cubic polynomial, along other lines not.
+        // Only along an axis is it a cubic polynomial.
         if line.1.abs().max_element() < 0.99 {
             assert!(
                 off(&two) > off(&three) && off(&three) > off(&five),
@@ -103,8 +103,8 @@ fn five_points_integrate_splines_to_rounding() {
     }
 }
 
-/// Of the blob itself: OPD = A s √(2π) erf(h/(s√2)) exp(-b²/2s²), and its slope. Halving the cells
-/// divides the error by 2⁶.
+/// Closed form for the blob: OPD = A s √(2π) erf(h/(s√2)) exp(-b²/2s²), and its slope. Halving the
+/// cells divides the error by 2⁶.
 #[test]
 fn straight_lines_through_a_gaussian_are_the_closed_form() {
     let g = Gaussian { amplitude: 1e-4, sigma_m: 0.12 };
@@ -116,14 +116,15 @@ fn straight_lines_through_a_gaussian_are_the_closed_form() {
         assert_eq!(s.pieces as usize, n - 1);
         ((s.slope - slope).length() / slope.length()).max((s.path_m - path_m).abs() / path_m)
     };
-    // Errors of the rule cancel but for those at the ends, where the blob has nearly vanished: at
+    // The errors of the rule cancel except at the ends, where the blob has nearly vanished, so at
     // first they fall even faster.
     let errors = [5, 9, 17, 33].map(error);
     assert!(errors[0] / errors[1] > 64.0, "{errors:?}");
     assert!(errors[1..].windows(2).all(|e| e[0] / e[1] > 48.0), "{errors:?}");
     assert!(error(65) < 1e-12);
-    // Through the spline of it the interpolant's own error is left
-    // (`interpolation_errors_are_those_on_record`: 7.5e-6 for ten voxels' sigma, and 14 here).
+    // Through the spline of the blob, the interpolant's own error remains
+    // (`interpolation_errors_are_those_on_record`: 7.5e-6 for a sigma of ten voxels; here it is
+    // 14).
     let field = blob(121, g.amplitude, g.sigma_m);
     let (cells, spline) = (CellExact::new(&field), BSpline::new(&field));
     let s = cells.line_of_sight(
@@ -140,8 +141,7 @@ fn straight_lines_through_a_gaussian_are_the_closed_form() {
     );
 }
 
-/// The whole integral of motion, bent: a quarter turn of a Luneburg lens ends in one point;
-/// order 6.
+/// Bent rays: a quarter turn of a Luneburg lens ends in one point. The order is 6.
 #[test]
 fn bent_rays_are_the_closed_form_at_order_six() {
     let error = |n: usize| {
@@ -164,12 +164,12 @@ fn relative(a: DVec3, b: DVec3, scale: f64) -> f64 {
     (a - b).length() / scale
 }
 
-/// What a march from face to face gives a ray of an oblique view through the unit cube, and what an
-/// adaptive one does.
+/// Results of the cell-exact and of the adaptive march for a ray of an oblique view through the
+/// unit cube.
 struct Both {
     u: DVec3,
     adaptive: DVec3,
-    /// The adaptive one's own estimate of its error.
+    /// The adaptive march's own estimate of its error.
     estimate: f64,
 }
 
@@ -200,7 +200,7 @@ fn both<I: Interpolate>(
 
 #[test]
 fn agrees_with_the_adaptive_march_where_the_interpolant_is_smooth() {
-    // Sigma of four voxels and more. (Of 2.7 voxels three points in a cell leave 2e-9.)
+    // Sigma is four voxels and more. (With 2.7 voxels, the error of three points per cell is 2e-9.)
     let field = cube(49, |p| 30.0 * lopsided(p));
     let spline = BSpline::new(&field);
     let rays = both(&field, &spline, 1e-15, 0.25 / 48.0, 1);
@@ -208,14 +208,15 @@ fn agrees_with_the_adaptive_march_where_the_interpolant_is_smooth() {
     assert!(scale > 1e-3, "{scale}");
     let worst = rays.iter().map(|r| relative(r.adaptive, r.u, scale)).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst:e}");
-    // However the way is cut: pieces of cells are integrated better than whole ones.
+    // The result does not depend on where steps end: parts of cells are integrated more accurately
+    // than whole ones.
     let cut = both(&field, &spline, 1e-9, 1.0, 17);
     let worst = rays.iter().zip(&cut).map(|(a, b)| relative(a.u, b.u, scale)).fold(0.0, f64::max);
     assert!(worst < 2e-10, "{worst:e}");
 }
 
-/// Steps of four voxels over a trilinear field: the adaptive march is content, its estimate small,
-/// and it is wrong by many times that.
+/// With steps of four voxels over a trilinear field, the adaptive march accepts its steps with a
+/// small estimate, but its error is many times larger.
 #[test]
 fn adaptive_estimates_are_fooled_by_kinks() {
     let field = cube(33, lopsided);
@@ -226,16 +227,16 @@ fn adaptive_estimates_are_fooled_by_kinks() {
         let fooled = rays.iter().filter(|r| (r.adaptive - r.u).length() > 2.0 * r.estimate).count();
         assert!(2 * fooled >= rays.len(), "tolerance {tolerance:e}: {fooled} of {}", rays.len());
     }
-    // What settles who is right: the adaptive march with steps of a hundredth of a voxel comes to
-    // the same.
+    // The adaptive march with steps of a hundredth of a voxel agrees with the cell-exact one, which
+    // confirms the latter.
     let rays = both(&field, &trilinear, 1e-15, 0.01 * voxel_m, 1);
     let scale = rays.iter().map(|r| r.u.length()).fold(0.0, f64::max);
     let worst = rays.iter().map(|r| relative(r.adaptive, r.u, scale)).fold(0.0, f64::max);
     assert!(worst < 2e-4, "{worst:e}");
 }
 
-/// A ridge of a trilinear eps along the ray draws it in from both sides: the march must come to its
-/// end there too.
+/// A ridge of a trilinear eps along the ray bends it inwards from both sides. The march must reach
+/// its end there too.
 #[test]
 fn a_ray_on_a_ridge_does_not_stand_still() {
     for strength in [1e-5, 0.05] {
@@ -260,7 +261,7 @@ fn steps_that_are_no_steps_do_no_harm() {
     }
     let nan = Ray { u: DVec3::NAN, ..begin };
     assert!(!CellExact::new(&field).step(&medium, &nan, 1.0).u.is_finite());
-    // Far beyond the lattice values go on as on its surface.
+    // Far outside the lattice, values are continued from its surface.
     let beside = Ray::new(DVec3::new(9.0, 9.0, 9.0), DVec3::X);
     assert!((CellExact::new(&field).step(&medium, &beside, 5.0).depth_m() - 5.0).abs() < 1e-3);
 }

@@ -1,4 +1,4 @@
-//! Integrators against rays that are known in closed form.
+//! Tests integrators against rays with a closed form.
 
 use glam::DVec3;
 use schlieren::analytic::{FishEye, Kepler, Linear, LinearSquare, Luneburg, Selfoc};
@@ -7,7 +7,8 @@ use schlieren::march::{
 };
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Enters the Luneburg lens along z at height b. On its surface n = 1, so nothing jumps.
+/// A ray that enters the Luneburg lens along z at height b. On its surface n = 1, so the index does
+/// not jump.
 fn luneburg_start(b: f64) -> Ray {
     Ray::new(DVec3::new(b, 0.0, -(1.0 - b * b).sqrt()), DVec3::Z)
 }
@@ -44,12 +45,12 @@ fn luneburg_brings_all_parallel_rays_to_one_point_with_one_path() {
         let end = Pefrl.run(&Luneburg, &start, FRAC_PI_2, 1000);
         assert!((end.position_m() - DVec3::Z).length() < 1e-11, "b = {b}");
         assert!((end.w() - DVec3::new(-b, 0.0, (1.0 - b * b).sqrt())).length() < 1e-11, "b = {b}");
-        // From the plane z = -1 the optical path is 1 + pi/2 for every b: the free part before the
+        // From the plane z = -1 the optical path is 1 + pi/2 for every b: the free path before the
         // lens plus the path inside.
         let free = 1.0 + start.start_m.z;
         let path = free + end.tau_m + end.excess_m;
         assert!((path - (1.0 + FRAC_PI_2)).abs() < 1e-11, "b = {b}: {path}");
-        // And the path difference is the path minus the depth.
+        // The path difference is the path minus the depth.
         let difference = end.path_difference_m();
         assert!((difference - (path - free - end.depth_m())).abs() < 1e-13, "b = {b}");
     }
@@ -62,7 +63,7 @@ fn fish_eye_images_every_point_opposite_and_closes_its_circles() {
         let direction = DVec3::new(f64::cos(angle), 0.2, f64::sin(angle)).normalize();
         let start = Ray::inside(&FishEye, p, direction);
         let image = p * (-1.0 / p.length_squared());
-        // The image is where the distance is smallest; the optical path there is pi n0 a / 2 = pi.
+        // The optical path to the image is pi n0 a / 2 = pi.
         let path = |r: &Ray| r.tau_m + r.excess_m;
         let end = Pefrl.run_until(&FishEye, &start, 1e-3, 100_000, |r| path(r) - PI).unwrap();
         assert!((end.position_m() - image).length() < 1e-9, "{angle}: {}", end.position_m());
@@ -114,7 +115,7 @@ fn mirages_are_catenaries() {
     let a = 0.2;
     let medium = Linear { slope_per_m: a };
     let end = Pefrl.run(&medium, &Ray::new(DVec3::ZERO, DVec3::Z), 3.0, 400);
-    // Horizontal at the start with n = 1: C = 1, y = (cosh(a z) - 1) / a.
+    // The ray is horizontal at the start with n = 1, so C = 1 and y = (cosh(a z) - 1) / a.
     let (y, z) = (end.position_m().y, end.position_m().z);
     assert!((y - ((a * z).cosh() - 1.0) / a).abs() < 1e-11, "{y}");
 }
@@ -124,7 +125,7 @@ fn kepler_hyperbolas_turn_by_two_arctangents() {
     let medium = Kepler { strength_m: 0.05 };
     let b = 0.2;
     let far = 1e4;
-    // |w| = 1 at infinity; from far away the bend outside is k / far.
+    // |w| = 1 at infinity. Starting from far away omits a deflection of k / far.
     let start = Ray::new(DVec3::new(b, 0.0, -far), DVec3::Z);
     let start = Ray { u: DVec3::Z * medium.sample(start.start_m).0, ..start };
     let run = DormandPrince { tolerance: 1e-13, longest_step_m: far }
@@ -132,20 +133,20 @@ fn kepler_hyperbolas_turn_by_two_arctangents() {
         .unwrap();
     let w = run.ray.w();
     let turned = f64::atan2(-w.x, w.z);
-    // Half of sin(angle) k/far on each side is still to come.
+    // On each side, half of sin(angle) k/far of the deflection is missing.
     assert!(
         (turned - medium.deflection_rad(b)).abs() < 3.0 * 0.05 / far,
         "{turned} {}",
         medium.deflection_rad(b)
     );
-    // Nothing of Bouguer's invariant is lost on the way.
+    // Bouguer's invariant is conserved.
     let l = run.ray.position_m().cross(w);
     let l0 = start.start_m.cross(start.w());
     assert!((l - l0).length() < 1e-8 * l0.length().max(1.0), "{l} {l0}");
 }
 
-/// n(r): |x cross w| is constant, and the symplectic integrators keep it to rounding however long
-/// their steps are.
+/// In n(r), |x cross w| is constant. The symplectic integrators conserve it to rounding however
+/// long their steps are.
 #[test]
 fn bouguer_is_kept_by_symplectic_integrators_at_any_step() {
     let start =
@@ -162,8 +163,8 @@ fn bouguer_is_kept_by_symplectic_integrators_at_any_step() {
     assert!((invariant(&rk) - invariant(&start)).length() > 1e-9);
 }
 
-/// n(y): the components of w along the layers are constant (Snell), also through a jump that a step
-/// cannot resolve.
+/// In n(y), the components of w along the layers are constant (Snell), also through a jump that a
+/// step cannot resolve.
 #[test]
 fn snell_invariants_are_exact_in_layers() {
     struct Layers;
@@ -179,14 +180,14 @@ fn snell_invariants_are_exact_in_layers() {
     let end = Pefrl.run(&Layers, &start, 1.5, 20_000);
     assert!(end.position_m().y > 0.1);
     assert!((end.w().x - start.w().x).abs() < 1e-14 && (end.w().z - start.w().z).abs() < 1e-14);
-    // And the component across follows from |w| = n.
+    // The component across the layers follows from |w| = n.
     let across = (1.2f64.powi(2) - end.w().x.powi(2) - end.w().z.powi(2)).sqrt();
     assert!((end.w().y - across).abs() < 1e-5, "{} {across}", end.w().y);
 }
 
 #[test]
 fn total_reflection_turns_back_at_the_angle_of_incidence() {
-    // n falls from 1 to sqrt(1 - 0.8) over 1 m: a ray at 60 degrees from the normal cannot reach
+    // n falls from 1 to sqrt(1 - 0.8) over 1 m, so a ray at 60 degrees from the normal cannot reach
     // the end.
     let medium = LinearSquare { slope_per_m: -0.4 };
     let start = Ray::new(DVec3::ZERO, DVec3::new(f64::sin(PI / 3.0), f64::cos(PI / 3.0), 0.0));
@@ -202,7 +203,8 @@ fn total_reflection_turns_back_at_the_angle_of_incidence() {
     );
 }
 
-/// Turn around and go the same number of steps: symplectic schemes return to rounding, at any step.
+/// Reversed and marched for the same number of steps, symplectic schemes return to the start within
+/// rounding, at any step.
 #[test]
 fn trace_back_returns_to_the_start() {
     let start = luneburg_start(0.7);

@@ -1,4 +1,4 @@
-//! The program `schlieren` as its users and their scripts start it.
+//! Tests the program `schlieren` as users and their scripts run it.
 
 use datasets::image_io::{MetadataValue, read_exr, read_png};
 use datasets::model::{DataArray, Dataset, ImageData, Values};
@@ -16,12 +16,13 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Air of 1.2 kg/m³ with a light blob right of and above the middle, in a box of 0.2 x 0.1 x 0.1 m.
+/// Writes a flow: air of 1.2 kg/m³ with a light blob right of and above the middle, in a box of 0.2
+/// x 0.1 x 0.1 m.
 fn flow(path: &Path) {
     flow_of(path, [41, 21]);
 }
 
-/// The same with so many nodes.
+/// [`flow`] with this number of nodes along x, and along y and z.
 fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
     let spacing_m = 0.1 / f64::from(n - 1);
     let mut image =
@@ -38,7 +39,7 @@ fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
     image.attributes.point.push(DataArray::new("T", 1, Values::F32(temperature)));
     image.attributes.point.push(DataArray::new("p", 1, constant(101_325.0)));
     image.attributes.point.push(DataArray::new("Y", 1, constant(0.0)));
-    // Smoke of 6 per metre, with a hole in the data and a value that cannot be.
+    // Smoke of 6 per metre, with a NaN and an invalid negative value.
     let mut soot = vec![6.0; values.len()];
     (soot[0], soot[1]) = (f32::NAN, -1.0);
     image.attributes.point.push(DataArray::new("soot", 1, Values::F32(soot)));
@@ -99,8 +100,8 @@ fn the_contract_png_exr_npy_and_json() {
     assert_eq!(object["size"], serde_json::json!([80, 40]));
     assert!(object["deflection_error_rad"].as_f64().is_some_and(|e| e < 1e-7), "{object}");
 
-    // The map: (height, width, 2), row 0 at the top, centred; the larger side, 0.2 m, fills the 80
-    // pixels.
+    // The map has the shape (height, width, 2) with row 0 at the top. It is centred, and the larger
+    // side, 0.2 m, fills the 80 pixels.
     let (shape, values) = npy(Path::new(&map));
     assert_eq!(shape, "(40, 80, 2)");
     assert_eq!(values.len(), 40 * 80 * 2);
@@ -160,8 +161,8 @@ fn temperature_pressure_and_species_are_the_same_air() {
     let differ = |a: &[f32], b: &[f32]| {
         a.iter().zip(b).fold(0.0f32, |m, (a, b)| m.max((a - b).abs())) / largest
     };
-    // The density at 293.15 K and 101325 Pa is 1.204, not the 1.2 that T was made from; and
-    // Ciddor's air is not ideal.
+    // They differ because the density at 293.15 K and 101325 Pa is 1.204, not the 1.2 that T was
+    // computed from, and because Ciddor's air is not ideal.
     assert!(differ(&density, &state) < 0.01, "{}", differ(&density, &state));
     assert!(differ(&density, &species) < 1e-5, "no helium changes nothing");
 }
@@ -283,7 +284,7 @@ fn sweeps_number_their_pictures_and_probes_print_numbers() {
     assert!(p["deflection_rad"][0].as_f64().unwrap() > 1e-5, "{p}");
 }
 
-/// The same options on the command line and in a scene, in every command that draws or traces.
+/// The option works on the command line and in a scene, in every command that renders or traces.
 #[test]
 fn gas_is_left_out_within_a_bound_that_is_reported() {
     let dir = tempfile::tempdir().unwrap();
@@ -331,14 +332,14 @@ fn gas_is_left_out_within_a_bound_that_is_reported() {
         );
         assert!(object["march"].as_str().is_some_and(|m| m.contains("leaving out")), "{object}");
     }
-    // Where the probe looks, the gas is even to the last digit; over the picture it is not.
+    // At the probe's pixel the gas is uniform to the last digit, but over the image it is not.
     assert!(by_option[0]["left_out"]["bound_rad"].as_f64().unwrap() > 0.0);
-    // What the bound says is what happens to the deflections.
+    // The change of the deflections is within the bound.
     let change = by_option[0]["largest_deflection_rad"].as_f64().unwrap()
         - plain[0]["largest_deflection_rad"].as_f64().unwrap();
     assert!(change.abs() <= 1e-5, "{change}");
 
-    // Straight rays take no steps that could be left out.
+    // Straight rays take no steps that could be skipped.
     let o = schlieren(&[
         "render",
         &file,
@@ -409,7 +410,7 @@ fn transfer_functions_from_options_and_from_a_scene_are_the_same() {
     let by_scene = map("scene.npy", &["--scene", &scene]);
     assert!(by_scene.iter().any(|v| v.abs() > 1e-6), "the curves bend light");
     assert_eq!(map("options.npy", &[&[file.as_str()], &curves[..]].concat()), by_scene);
-    // A curve on the command line replaces that of the scene and keeps the others.
+    // A curve on the command line replaces that of the scene; the others are kept.
     let without = map("without.npy", &["--scene", &scene, "--curve-weight", "T=0"]);
     assert_ne!(without, by_scene);
     assert_eq!(map("again.npy", &["--scene", &scene, "--curve", "rho=0.9:2e-5,1.2:0"]), by_scene);
@@ -466,7 +467,7 @@ fn smoke_glow_and_rotation_reach_pictures_layers_probes_and_sweeps() {
     assert_eq!(meta("media.analyser_deg"), Some(MetadataValue::Number(-20.0)));
     assert_eq!(meta("media.stop_m"), Some(MetadataValue::Number(0.025)));
 
-    // Without them there are no such layers, and no ray is spent.
+    // Without media there are no such layers, and no rays are traced for them.
     let plain: Value = serde_json::from_str(&run("render", &["--exr", &exr], &[])).unwrap();
     assert_eq!(plain["counters"]["media_rays"], 0);
     let picture = read_exr(Path::new(&exr)).unwrap();
@@ -542,8 +543,8 @@ fn completions_know_the_commands() {
     assert!(text(&o.stdout).contains("sweep"));
 }
 
-/// Without a Vulkan device, as on most machines that have no display: --device gpu is an error that
-/// names the cure, auto draws on the CPU and says why.
+/// Without a Vulkan device, as on most machines without a display, --device gpu is an error with
+/// the cure, and auto renders on the CPU and prints the reason.
 #[test]
 fn a_gpu_that_is_not_there() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The f32 kernels against the f64 reference and closed forms.
+//! Tests the f32 kernels against the f64 reference and closed forms.
 
 mod common;
 
@@ -18,7 +18,7 @@ const OPD: PathQuantities = PathQuantities { opd: true };
 const INTERPOLANTS: [Interpolant; 3] =
     [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
 
-/// The same steps in f64 through the same interpolant.
+/// The reference: the same steps in f64 through the same interpolant.
 fn reference<'a, I: Interpolate, G: Integrator>(
     field: &'a Field,
     interpolate: &'a I,
@@ -35,9 +35,9 @@ fn reference<'a, I: Interpolate, G: Integrator>(
     )
 }
 
-/// Direct f32 marching loses 35 % of the deflection at 1e-6 in an oblique view, and all of it below
-/// (notes: the code this replaces). The tolerance is eight roundings of f32; what is left comes
-/// from weights and positions, not from sums.
+/// Direct f32 marching loses 35 % of the deflection at 1e-6 in an oblique view, and all of it
+/// below. The tolerance is eight roundings of f32; the remaining error comes from weights and
+/// positions, not from sums.
 #[test]
 fn f32_keeps_its_digits_at_any_amplitude_in_an_oblique_view() {
     let starts = grid(16, 0.8);
@@ -69,7 +69,7 @@ fn many_steps_do_not_eat_digits() {
         &trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, options), &starts),
         &wanted,
     );
-    // Two thousand additions.
+    // Tolerance for two thousand additions.
     assert!(rms < 5e-7 && max < 2e-6, "rms {rms:.1e}, max {max:.1e}");
 }
 
@@ -107,7 +107,7 @@ fn every_interpolant_and_scheme_agrees_with_its_f64_reference() {
     ) {
         for scheme in [Scheme::Verlet, Scheme::Euler] {
             let options = Options { scheme, wanted: OPD, ..Default::default() };
-            // Along an axis all rays have the same steps in both.
+            // Along an axis all rays have the same steps in kernel and reference.
             let view = View::along(Axis::Y, DVec3::ZERO);
             let got = trace(&Deviational::new(field, view, interpolant, options), starts);
             let wanted = match scheme {
@@ -130,8 +130,8 @@ fn every_interpolant_and_scheme_agrees_with_its_f64_reference() {
         }
     }
     check(&field, &spline, Interpolant::BSpline, &starts, 5e-7);
-    // The gradient of trilinear eps jumps between cells: a point rounded into the next cell takes
-    // the other value.
+    // The gradient of trilinear eps jumps between cells, so a point rounded into the next cell has
+    // another gradient.
     check(&field, &line, Interpolant::Trilinear, &starts, 5e-4);
     check(&field, &gradient, Interpolant::TrilinearGradient, &starts, 1e-6);
 }
@@ -154,7 +154,7 @@ fn all_instruction_sets_agree() {
                 &Deviational::with_level(&field, oblique(), interpolant, options, level),
                 &starts,
             );
-            // Levels without fused multiply-add round once more.
+            // Levels without fused multiply-add have an additional rounding.
             let tolerance = if interpolant == Interpolant::Trilinear { 5e-4 } else { 1e-6 };
             let (_, max) = difference(&got, &wanted);
             assert!(max < tolerance, "{interpolant:?} {level:?}: {max:.1e}");
@@ -162,16 +162,16 @@ fn all_instruction_sets_agree() {
     }
 }
 
-/// The same gas with its axes exchanged, seen along the exchanged axes, makes the same picture.
+/// The same gas with exchanged axes, seen along the exchanged axes, gives the same exits.
 #[test]
 fn views_along_all_axes_agree() {
     let starts = grid(16, 0.9);
     let straight = cube(48, lopsided);
     let along_z = View::along(Axis::Z, DVec3::ZERO);
-    // x' = y, y' = z, z' = x: what was right (x), up (y), forward (z) is now z', x', y'.
+    // x' = y, y' = z, z' = x: right (x), up (y) and forward (z) become z', x' and y'.
     let turned = cube(48, |p| lopsided(DVec3::new(p.z, p.x, p.y)));
     let along = View { right: DVec3::Z, up: DVec3::X, forward: DVec3::Y, centre_m: DVec3::ZERO };
-    // And turned by half a turn about the light: right and up change sign.
+    // A view rotated by half a turn about the light: right and up change sign.
     let half = View { right: -DVec3::X, up: -DVec3::Y, forward: DVec3::Z, centre_m: DVec3::ZERO };
     for interpolant in INTERPOLANTS {
         let options = Options { wanted: OPD, ..Default::default() };
@@ -188,7 +188,7 @@ fn views_along_all_axes_agree() {
         }
         assert!(difference(&got, &wanted).1 < 1e-6, "{interpolant:?}");
     }
-    // From behind: light the other way is deflected the same way in space, for weak gas.
+    // From behind: in weak gas, light in the opposite direction has the same deflection in space.
     let behind = View { right: -DVec3::X, up: DVec3::Y, forward: -DVec3::Z, centre_m: DVec3::ZERO };
     let weak = cube(48, |p| 1e-4 * lopsided(p));
     let wanted =
@@ -205,7 +205,8 @@ fn views_along_all_axes_agree() {
     assert!(difference(&got, &wanted).1 < 1e-6);
 }
 
-/// Denser gas at the right attracts the light to the right in the picture; one above, upwards.
+/// Denser gas on the right deflects light to the right in the image, and denser gas above deflects
+/// it upwards.
 #[test]
 fn light_bends_towards_dense_gas_in_the_picture() {
     for axis in [Axis::X, Axis::Y, Axis::Z] {
@@ -218,7 +219,7 @@ fn light_bends_towards_dense_gas_in_the_picture() {
             )[0];
             assert!((e.deflection_rad[c] - 1e-4).abs() < 1e-9, "{axis:?}: {:?}", e.deflection_rad);
             assert!(e.deflection_rad[1 - c].abs() < 1e-10);
-            // Half of u times the length, over a metre.
+            // Half of u times the length of 1 m.
             assert!((e.displacement_m[c] - 0.5e-4).abs() < 1e-9);
         }
     }
@@ -242,18 +243,18 @@ fn gaussian_blob_is_the_closed_form_to_first_order() {
         let [x, y] = s.position_m.map(f64::from);
         let u = g.deflection_rad(x, y, 0.5);
         for c in 0..2 {
-            // Interpolation 4e-5, bending eps sigma/L.
+            // Errors: 4e-5 from interpolation, eps sigma/L from bending.
             assert!((f64::from(e.deflection_rad[c]) - u[c]).abs() < 1e-4 * scale, "{s:?}");
         }
         let path = g.path_difference_m(x, y, 0.5);
         let off = (f64::from(e.opd_m) - path).abs() / g.path_difference_m(0.0, 0.0, 0.5);
-        // Interpolation 1e-6; of second order in eps the squares of eps and of the deflection: a
-        // few times 1e-5.
+        // Errors: 1e-6 from interpolation, and a few times 1e-5 from the terms of second order, the
+        // squares of eps and of the deflection.
         assert!(off < 5e-5, "{off:.1e}");
     }
 }
 
-/// Errors of the interpolants for a blob, as in the table of `interpolate`.
+/// The errors of the interpolants for a blob are those in the table of `interpolate`.
 #[test]
 fn interpolation_errors_are_those_on_record() {
     // sigma = 10 voxels.
@@ -323,7 +324,7 @@ fn cylinders_are_abel_pairs() {
     }
 }
 
-/// A plane layer of any profile: weak light turns by d(eps) tan(angle of incidence), whatever the
+/// A weak plane layer of any profile deflects light by d(eps) tan(angle of incidence), whatever its
 /// thickness.
 #[test]
 fn planar_jump_turns_light_like_a_prism() {
@@ -366,7 +367,7 @@ fn spacing_may_differ_along_the_axes() {
             &starts,
         );
         let (_, max) = difference(&got, &wanted);
-        // Interpolation at sigma = 4 voxels.
+        // Error of interpolation at sigma = 4 voxels.
         assert!(max < 2e-3, "{dims:?}: {max:.1e}");
     }
 }
@@ -409,7 +410,7 @@ fn fields_of_a_nanometre_and_of_a_thousand_kilometres_bend_light_alike() {
     }
 }
 
-/// Far from its own origin a field in f64 coordinates is the same field.
+/// A field far from the origin of coordinates gives the same result, because coordinates are f64.
 #[test]
 fn huge_offset_origin() {
     let n = 40;
@@ -448,7 +449,7 @@ fn tilted_beams_are_seen_from_their_own_direction() {
         ),
         &starts,
     );
-    // The same rays as the axis of another view, one view a ray.
+    // Compares each ray with the axial ray of a view in its own direction.
     for (s, e) in starts.iter().zip(&got) {
         let beam = View::along(Axis::Z, DVec3::ZERO).beam(s.tilt_rad);
         let at = DVec3::new(s.position_m[0].into(), s.position_m[1].into(), 0.0);

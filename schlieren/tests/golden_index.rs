@@ -1,4 +1,4 @@
-//! The refractive index against published and independently computed tables (`tests/data`).
+//! Tests the refractive index against published and independently computed tables (`tests/data`).
 //!
 //! `nist_table1.csv`: NIST Engineering Metrology Toolbox, documentation, table 1.
 //! `ciddor_grid.csv`: Ciddor 1996 by two other implementations. `gladstone_dale.csv`: from the
@@ -9,14 +9,14 @@ use schlieren::index::Gas;
 use schlieren::index::ciddor::{Ciddor, MoistAir};
 use std::path::Path;
 
-/// NIST prints nine decimals of n, so half a unit is rounding and the rest is theirs.
+/// NIST prints nine decimals of n: half a unit is rounding, and the rest is their error.
 const NIST_TOLERANCE: f64 = 1e-9;
 /// The two implementations behind the grid differ by 3.3e-10.
 const GRID_TOLERANCE: f64 = 1e-9;
-/// The first of the two has the same constants as ours and 13 digits are printed.
+/// The first of the two has the same constants as this crate, and 13 digits are printed.
 const SAME_FORMULA_TOLERANCE: f64 = 1e-12;
-/// Measurements of one gas by two laboratories differ by up to 0.3 %; the same source must agree to
-/// this.
+/// Measurements of one gas by two laboratories differ by up to 0.3 %. Values from the same source
+/// must agree within this tolerance.
 const GLADSTONE_DALE_TOLERANCE: f64 = 1e-3;
 
 fn table(name: &str) -> CsvTable {
@@ -72,7 +72,7 @@ fn gladstone_dale_constants_of_every_gas() {
         let name = t.cell(i, gas);
         let k = name.parse::<Gas>().unwrap().k_m3_per_kg(wavelength[i]).unwrap() * 1000.0;
         let error = (k / expected[i] - 1.0).abs();
-        // Helium is listed by two laboratories, which differ by 0.27 %; ours is the first.
+        // Helium is listed by two laboratories, which differ by 0.27 %; this crate uses the first.
         let other_laboratory = name == "He" && t.cell(i, source).contains("Borzsonyi");
         let allowed = if other_laboratory { 3e-3 } else { GLADSTONE_DALE_TOLERANCE };
         assert!(error <= allowed, "{name}, {} um: {k} instead of {}", wavelength[i], expected[i]);

@@ -1,7 +1,8 @@
-//! The GPU against the CPU: the same march, so the same numbers within roundings.
+//! Tests the GPU against the CPU, which has the same march and thus the same numbers within
+//! rounding.
 //!
-//! Any Vulkan device serves, Mesa's lavapipe too. Without one these tests say so and pass, unless
-//! RTSV_REQUIRE_PEERS=1.
+//! Any Vulkan device will do, also Mesa's lavapipe. Without one these tests print that they are
+//! skipped and pass, unless RTSV_REQUIRE_PEERS=1.
 #![cfg(feature = "gpu")]
 
 mod common;
@@ -19,18 +20,18 @@ use schlieren::view::{Axis, View};
 use std::io::Write as _;
 use std::sync::Arc;
 
-/// Largest difference of deflections, of the largest deflection. Both sum up a hundred terms in
-/// f32, compensated, from positions that are one rounding (1e-7 of 30 voxels) apart, because
+/// Largest difference of deflections, relative to the largest deflection. Both sum a hundred terms
+/// in f32, compensated, from positions that differ by one rounding (1e-7 of 30 voxels), because
 /// devices need not fuse multiplication and addition.
 const TOLERANCE: f64 = 1e-6;
 
-/// The device, or why the test is skipped.
+/// The device. Without one, prints why the test is skipped.
 fn gpu() -> Option<Arc<Gpu>> {
     match Gpu::shared() {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{e}");
-            // The test harness swallows eprintln! of tests that pass.
+            // The test harness captures eprintln! of tests that pass.
             let _ = writeln!(std::io::stderr(), "skipped: {e}");
             None
         }
@@ -48,7 +49,7 @@ fn cpu<'a>(
     Deviational::new(field, view, interpolant, options)
 }
 
-/// Exits of both.
+/// Exits of the GPU and of the CPU.
 fn both(
     gpu: Arc<Gpu>,
     field: &Field,
@@ -64,7 +65,7 @@ fn both(
     [exits, trace(&cpu(field, view, interpolant, options), starts)]
 }
 
-/// Largest difference of `value`, of its largest value.
+/// Largest difference of `value`, relative to its largest value.
 fn relative(a: &[Exit], b: &[Exit], value: impl Fn(&Exit) -> f32) -> f64 {
     let largest = b.iter().map(|e| f64::from(value(e)).abs()).fold(0.0, f64::max);
     let differences =
@@ -96,8 +97,8 @@ fn deflection_displacement_and_opd_agree_with_the_cpu() {
     }
 }
 
-/// Its gradient jumps from cell to cell: a sample within a rounding of a cell's face may take the
-/// other cell's. That is one step's push, changed by the jump; all other rays agree.
+/// The trilinear gradient jumps between cells, so a sample within a rounding of a face may use the
+/// other cell. This changes the contribution of one step by the jump; all other rays agree.
 #[test]
 fn trilinear_agrees_but_for_samples_on_a_face() {
     let Some(gpu) = gpu() else { return };
@@ -122,8 +123,8 @@ fn trilinear_agrees_but_for_samples_on_a_face() {
     }
 }
 
-/// Not a multiple of a work group, of a group of rays or of anything; a lattice of 3 x 2 x 29
-/// nodes; rays beside the field; a single ray; none.
+/// Numbers of rays that are no multiple of a work group or of a group of rays, a single ray, no
+/// ray, rays outside the field, and a lattice of 3 x 2 x 29 nodes.
 #[test]
 fn odd_sizes() {
     let Some(gpu) = gpu() else { return };
@@ -153,8 +154,8 @@ fn odd_sizes() {
     }
 }
 
-/// The paraxial form keeps its digits for gases of any strength: as tests/deviational.rs has it for
-/// the CPU.
+/// The paraxial form keeps its digits for gases of any strength. tests/deviational.rs has the same
+/// test for the CPU.
 #[test]
 fn weak_gases_keep_their_digits_at_oblique_views() {
     let Some(gpu) = gpu() else { return };
@@ -175,8 +176,8 @@ fn weak_gases_keep_their_digits_at_oblique_views() {
     }
 }
 
-/// Thousands of terms: a compiler that takes the compensation of the sums for nothing, as Vulkan
-/// lets it, fails here.
+/// Sums of thousands of terms: a compiler that removes the compensation of the sums, as Vulkan
+/// permits, fails here.
 #[test]
 fn compilers_keep_the_compensation_of_sums() {
     let Some(gpu) = gpu() else { return };
@@ -260,7 +261,7 @@ fn masks_stop_the_rays_that_they_stop_on_the_cpu() {
     }
 }
 
-/// Cut into slabs the field is the same field: bit for bit, because the arithmetic is.
+/// A field divided into slabs gives the same exits bit for bit, because the arithmetic is the same.
 #[test]
 fn a_field_larger_than_a_binding_is_the_same_field() {
     let Some(whole) = gpu() else { return };
@@ -272,7 +273,7 @@ fn a_field_larger_than_a_binding_is_the_same_field() {
         let one = GpuPaths::new(whole.clone(), &field, view, interpolant, options).unwrap();
         assert_eq!(one.slabs(), 1);
         let expected = trace(&one, &starts);
-        // 20 layers of cells: room for 8, then 4 of them with what their neighbours share.
+        // The field has 20 layers of cells. A binding holds 8, then 4 of them with their halo.
         for (layers, slabs) in [(8, 3), (4, 5)] {
             let (row, halo) = if interpolant == Interpolant::BSpline { (23, 3) } else { (21, 1) };
             let small =
@@ -306,8 +307,8 @@ fn an_interpolant_without_a_kernel_is_refused_by_name() {
     assert!(e.to_string().contains("trilinear-gradient"), "{e}");
 }
 
-/// The exits of a batch do not depend on the batch: with one being prepared while the device works
-/// on the one before, buffers in use again, and a last batch that is short.
+/// Exits do not depend on the batches: a batch is prepared while the device works on the previous
+/// one, buffers are reused, and the last batch is shorter.
 #[test]
 fn several_batches_have_the_bits_of_one() {
     let Some(gpu) = gpu() else { return };
@@ -336,7 +337,7 @@ fn several_batches_have_the_bits_of_one() {
     }
 }
 
-/// As programs have it: more rays than one dispatch takes, against the CPU.
+/// More rays than one dispatch takes, as in the program, against the CPU.
 #[test]
 fn pictures_larger_than_a_dispatch_agree_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
@@ -355,7 +356,8 @@ fn pictures_larger_than_a_dispatch_agree_with_the_cpu() {
     assert!(max < TOLERANCE, "{max:e}");
 }
 
-/// Threads that share the paths get what one gets: buffers of batches are not mixed up.
+/// Threads that share the paths get the same exits as one thread: buffers of batches are not mixed
+/// up.
 #[test]
 fn batches_of_several_threads_do_not_mix() {
     let Some(gpu) = gpu() else { return };
@@ -381,9 +383,10 @@ fn batches_of_several_threads_do_not_mix() {
     });
 }
 
-/// A scene of `field` drawn on a device.
+/// Renders a scene of `field` on a device.
 fn drawn(field: &Field, device: &str, rest: &str) -> Result<RenderOutput, Box<RenderError>> {
-    // Shadowgraphs are seen far behind the flow: contrast needs a lever.
+    // The film of the shadowgraph is far behind the flow, because its contrast grows with the
+    // distance.
     let focus = if rest.contains("shadowgraph") { "focus_m = 30.0\n" } else { "" };
     let toml = format!(
         "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n{focus}[march]\ndevice \
@@ -396,7 +399,7 @@ fn drawn(field: &Field, device: &str, rest: &str) -> Result<RenderOutput, Box<Re
 }
 
 /// Schlieren by photons, a noise-free shadowgraph, an interferogram (which reads the phase), and
-/// BOS, which is traced from the film.
+/// BOS (which is traced from the film).
 #[test]
 fn films_agree_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
@@ -444,8 +447,8 @@ fn marches_without_a_kernel_are_refused_by_name_or_left_to_the_cpu() {
             r.report
         );
     }
-    // What the plan would do by line of sight, because the tolerance is wide, is traced when the
-    // GPU is asked for.
+    // With a large tolerance the plan would choose line of sight; when the GPU is requested, the
+    // rays are marched.
     let r = drawn(&field, "gpu", "tolerance_rad = 1e-3").unwrap();
     assert!(r.report.march.starts_with("verlet"), "{}", r.report.march);
     let r = drawn(&field, "auto", "tolerance_rad = 1e-3").unwrap();

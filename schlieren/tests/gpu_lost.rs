@@ -1,5 +1,5 @@
-//! GPUs that are lost on the way, as by a driver's reset. In a process of their own: the program's
-//! GPU is lost here too, and is that of all other tests.
+//! Tests GPUs that are lost while tracing, as by a driver's reset. These tests have a process of
+//! their own, because they also lose the program's GPU, which all other tests share.
 #![cfg(feature = "gpu")]
 
 mod common;
@@ -15,23 +15,23 @@ use schlieren::scene::Scene;
 use std::io::Write as _;
 use std::sync::Arc;
 
-/// As tests/gpu.rs has it.
+/// The same as in tests/gpu.rs.
 const TOLERANCE: f64 = 1e-6;
 
-/// The program's device, or why the test is skipped.
+/// The program's device. Without one, prints why the test is skipped.
 fn gpu() -> Option<Arc<Gpu>> {
     match Gpu::shared() {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{e}");
-            // The test harness swallows eprintln! of tests that pass.
+            // The test harness captures eprintln! of tests that pass.
             let _ = writeln!(std::io::stderr(), "skipped: {e}");
             None
         }
     }
 }
 
-/// A scene of `field` drawn on the GPU.
+/// Renders a scene of `field` on the GPU.
 fn drawn(field: &Field) -> RenderOutput {
     let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice \
                 = \"gpu\"\nmethod = \"verlet\"";
@@ -40,8 +40,7 @@ fn drawn(field: &Field) -> RenderOutput {
     render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
 }
 
-/// The device is taken away as a driver's reset does: between two pictures, and under way while
-/// others trace.
+/// The device is lost as by a driver's reset: between two traces, and while other threads trace.
 #[test]
 fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
     let Some(_) = gpu() else { return };
@@ -70,7 +69,7 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
             "{told}"
         );
 
-        // Under way, with the work of four threads on it.
+        // While four threads trace with it.
         let lost = paths.gpu();
         std::thread::scope(|s| {
             for _ in 0..4 {
@@ -90,8 +89,7 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
     }
 }
 
-/// The program's device is lost: the next picture has another, and the page need not be started
-/// again.
+/// The program's device is lost: the next image uses a new one, and the page need not be restarted.
 #[test]
 fn the_program_s_gpu_comes_back_after_it_was_lost() {
     let Some(before) = gpu() else { return };
@@ -112,8 +110,8 @@ fn the_program_s_gpu_comes_back_after_it_was_lost() {
     assert!(after.failure().is_none() && !Arc::ptr_eq(&before, &after));
 }
 
-/// A device that is lost whenever it is opened is opened a few times, then left alone, and the
-/// picture is the CPU's.
+/// A device that is lost whenever it is opened is reopened a few times and then given up, and the
+/// CPU traces the rays.
 #[test]
 fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
     let Some(_) = gpu() else { return };

@@ -1,4 +1,4 @@
-//! Rays and fields that break careless code, by name.
+//! Rays and fields that break careless code, one test for each kind. (Lattices: hard_lattices.rs.)
 
 mod common;
 
@@ -22,8 +22,8 @@ fn start(x: f64, y: f64) -> Start {
     Start { position_m: [x as f32, y as f32], tilt_rad: [0.0; 2] }
 }
 
-/// In a uniform gradient every ray that is in the field, be it in a face or an edge of it or of a
-/// cell, is deflected alike.
+/// In a uniform gradient every ray in the field has the same deflection, also in a face or an edge
+/// of the field or of a cell.
 #[test]
 fn rays_in_faces_and_edges_are_in_the_field() {
     let field =
@@ -55,7 +55,7 @@ fn rays_in_faces_and_edges_are_in_the_field() {
                 assert!((f64::from(e.opd_m) - 1e-5 * (x + 2.0 * y)).abs() < 1e-9);
             }
         }
-        // A hair outside.
+        // Just outside the field.
         let e = trace(&paths(interpolant), &[start(0.5000001, 0.0), start(0.0, -0.51)]);
         assert!(e.iter().all(|e| e.deflection_rad == [0.0; 2] && e.opd_m == 0.0));
     }
@@ -77,7 +77,7 @@ fn directions_with_zeros_and_the_long_diagonal() {
             ),
             &[start(0.0, 0.0)],
         )[0];
-        // Uniform gas: path is eps times the chord.
+        // In uniform gas the path is eps times the chord.
         let d = d.normalize();
         let chord = 1.0 / d.abs().max_element();
         assert!((f64::from(e.opd_m) / (1e-4 * chord) - 1.0).abs() < 1e-6, "{d}: {}", e.opd_m);
@@ -168,8 +168,8 @@ fn two_nodes_are_a_field() {
     );
 }
 
-/// A gas of eps = 2.7e-4 everywhere and a disturbance a thousand times smaller: the constant must
-/// not eat the digits of the rest.
+/// With a gas of eps = 2.7e-4 everywhere and a disturbance a thousand times smaller, the constant
+/// must not cost the disturbance its digits.
 #[test]
 fn a_large_constant_does_not_drown_a_small_signal() {
     let starts = grid(12, 0.8);
@@ -181,8 +181,9 @@ fn a_large_constant_does_not_drown_a_small_signal() {
         trace(&Deviational::new(f, oblique(), Interpolant::BSpline, Options::default()), &starts)
     };
     let (rms, max) = difference(&trace(&drowned), &trace(&alone));
-    // Storing eps in f32 costs 6e-8 of 1000 signals a node, and a slope of it is a tenth of it:
-    // 6e-4, averaged over a hundred nodes and more.
+    // Storing eps in f32 has an error of 6e-8 of 1000 times the signal at each node. A slope of the
+    // signal per node is a tenth of it, so the error is 6e-4, averaged over a hundred nodes and
+    // more.
     assert!(rms < 5e-4 && max < 3e-3, "rms {rms:.1e}, max {max:.1e}");
 }
 
@@ -222,7 +223,7 @@ fn nan_cells_are_dark_or_continued_as_told() {
 
 #[test]
 fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
-    // A small blob in a large empty box.
+    // A small blob in a large box of uniform gas.
     let field = blob(97, 1e-4, 0.04);
     let starts = grid(40, 0.95);
     let view = View::along(Axis::Z, DVec3::ZERO);
@@ -249,15 +250,15 @@ fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
         let opd =
             got.iter().zip(&wanted).map(|(a, b)| (a.opd_m - b.opd_m).abs()).fold(0.0, f32::max);
         assert!(opd < 13.0 * 1e-10, "{opd:.1e}");
-        // Four numbers in a brick of 512 voxels.
+        // A brick of 512 voxels stores four numbers.
         assert!(paths.bricks().unwrap().memory_bytes() * 16 < field.memory_bytes());
     }
 }
 
 #[test]
 fn full_march_focuses_a_luneburg_lens_on_a_lattice() {
-    // The lens in a box; outside of it n = 1. The slope of n jumps at its surface, and the spline
-    // rounds that off.
+    // The lens in a box, with n = 1 outside the lens. The slope of n jumps at its surface, and the
+    // spline smooths this.
     let n = 96;
     let h = 2.4 / (n - 1) as f64;
     let lens = |p: DVec3| if p.length() < 1.0 { Luneburg.sample(p).0 } else { 0.0 };
@@ -271,7 +272,7 @@ fn full_march_focuses_a_luneburg_lens_on_a_lattice() {
         let b = f64::from(s.position_m[0]);
         assert_eq!(e.status, Status::Free);
         assert!((f64::from(e.deflection_rad[0]) + b).abs() < 5e-3, "{b}: {:?}", e.deflection_rad);
-        // Back from the exit plane at 1.2 to the focus at 1.
+        // From the exit plane at 1.2 back to the focus at 1.
         let slope = -b / (1.0 - b * b).sqrt();
         let x = b + f64::from(e.displacement_m[0]) - 0.2 * slope;
         assert!(x.abs() < 1e-2, "{b}: {x}");
@@ -280,7 +281,7 @@ fn full_march_focuses_a_luneburg_lens_on_a_lattice() {
 
 #[test]
 fn rays_that_turn_back_are_turned() {
-    // n^2 falls so fast along the light that it cannot reach the far side.
+    // n^2 falls so fast along the light that the light cannot reach the far side.
     let field = Field::from_fn([33; 3], [1.0 / 32.0; 3], DVec3::splat(-0.5), 1.0, |p| {
         (1.0 - 0.7 * (p.z + 0.5) - 0.7 * (p.x + 0.5)).max(0.04).sqrt() - 1.0
     })
@@ -314,8 +315,8 @@ fn full_and_deviational_agree_where_both_hold() {
     );
     assert!(difference(&got, &wanted).1 < 1e-5);
     for (s, e) in starts.iter().zip(&got) {
-        // x = x0 cos(g t) with the path parameter t = z / w_z: w_z is the index where the ray
-        // entered.
+        // x = x0 cos(g t) with the path parameter t = z / w_z, where w_z is the index at the entry
+        // of the ray.
         let [x, y] = s.position_m.map(f64::from);
         let w_z = (1.0 - 0.0025 * (x * x + y * y)).sqrt();
         let u = -x * 0.05 * (0.05 / w_z).sin();

@@ -1,5 +1,5 @@
-//! Lattices that break careless code, by name: sizes, spacings, views, borders, masks, shocks
-//! thinner than a voxel. (Rays that do: hard_cases.rs.)
+//! Lattices that break careless code, one test for each kind: sizes, spacings, views, borders,
+//! masks, shocks thinner than a voxel. (Rays: hard_cases.rs.)
 
 mod common;
 
@@ -29,8 +29,8 @@ fn weak(field: &Field, view: View, interpolant: Interpolant) -> Deviational<'_> 
     Deviational::new(field, view, interpolant, Options::default())
 }
 
-/// Rows of 256 nodes put a column of the lattice into a few lines of the cache, and are stored with
-/// a gap: an index that forgets the gap is wrong from the second row on.
+/// Rows of 256 nodes are stored with padding, because otherwise a column of the lattice would map
+/// to a few cache sets. An index that ignores the padding is wrong from the second row on.
 #[test]
 fn sizes_255_256_and_260_along_every_axis_agree() {
     let view = oblique();
@@ -43,7 +43,7 @@ fn sizes_255_256_and_260_along_every_axis_agree() {
             let spacing = dims.map(|n| 1.0 / (n - 1) as f64);
             let field = Field::from_fn(dims, spacing, DVec3::splat(-0.5), 1.0, lopsided).unwrap();
             for (interpolant, tolerance) in
-                // Of 48 nodes: sigma is 4 voxels.
+                // With 48 nodes, sigma is 4 voxels.
                 [
                     (Interpolant::BSpline, 3e-3),
                     (Interpolant::TrilinearGradient, 0.04),
@@ -58,9 +58,8 @@ fn sizes_255_256_and_260_along_every_axis_agree() {
     }
 }
 
-/// A blob stretched by the spacing's factors is, in lattice coordinates, round: the lattice of
-/// unequal spacing must give what an equal one gives for the stretched blob, and the same picture
-/// when everything is turned by 90 degrees.
+/// A lattice of unequal spacing must give the same result as one of equal spacing, and the same
+/// result again when everything is rotated so that the axes are exchanged.
 #[test]
 fn anisotropic_spacing_is_the_rotated_isotropic_answer() {
     let starts = grid(12, 0.7);
@@ -87,8 +86,8 @@ fn anisotropic_spacing_is_the_rotated_isotropic_answer() {
             trace(&weak(&coarse, view, interpolant), &starts),
             trace(&weak(&turned, other, interpolant), &starts),
         ];
-        // The same numbers in another order: rounding, and for the trilinear gradient samples that
-        // fall to either side of a face.
+        // The same numbers in another order differ by rounding. With trilinear interpolation,
+        // samples may also fall on the other side of a face, where the gradient jumps.
         let tolerance = if interpolant == Interpolant::Trilinear { 2e-4 } else { 1e-6 };
         let (_, max) = difference(&b, &a);
         assert!(max < tolerance, "{interpolant:?}: {max:.1e}");
@@ -97,8 +96,8 @@ fn anisotropic_spacing_is_the_rotated_isotropic_answer() {
     assert!(difference(&a, &b).1 < 2e-3);
 }
 
-/// Turned about the light by 0.6 rad, the picture is turned and nothing else; and a round blob
-/// looks alike 0.6 rad off an axis of the lattice.
+/// A view rotated about the light by 0.6 rad only rotates the result. A round blob has the same
+/// result 0.6 rad off an axis of the lattice.
 #[test]
 fn a_view_turned_by_0_6_rad_sees_the_same_within_a_millionth() {
     let field = cube(64, lopsided);
@@ -122,9 +121,9 @@ fn a_view_turned_by_0_6_rad_sees_the_same_within_a_millionth() {
         let (_, max) = difference(&got, &wanted);
         assert!(max < 1e-6, "rolled: {max:.1e}");
     }
-    // Sigma of 22 voxels: the spline's own error is 7.5e-6 at ten and falls with the third power
-    // and more. The lattice ends at 5 sigma, where eps is 3.7e-6 of its largest value, and the two
-    // views see its border differently: hence the largest error.
+    // Sigma is 22 voxels: the spline's own error is 7.5e-6 at ten and falls at least with the third
+    // power. The lattice ends at 5 sigma, where eps is 3.7e-6 of its largest value. The two views
+    // cross its border differently, which causes the largest error.
     let g = Gaussian { amplitude: 1e-5, sigma_m: 0.1 };
     let field = blob(221, g.amplitude, g.sigma_m);
     let starts = grid(12, 0.4);
@@ -137,7 +136,7 @@ fn a_view_turned_by_0_6_rad_sees_the_same_within_a_millionth() {
     assert!(rms < 1e-6 && max < 5e-6, "rms {rms:.1e}, max {max:.1e}");
 }
 
-/// The same march back through the same lattice comes home, kinks and all.
+/// The same march back through the same lattice returns to the start, in spite of kinks.
 #[test]
 fn trace_back_returns_to_the_start_through_a_lattice() {
     let field = cube(33, |p| 300.0 * lopsided(p));
@@ -153,13 +152,13 @@ fn trace_back_returns_to_the_start_through_a_lattice() {
         let back = march.run(&medium, &Ray { u: -there.w() + direction, ..turned }, 0.8, steps);
         (back.position_m() - begin.start_m).length()
     }
-    // Symmetric schemes: to rounding, at any step.
+    // Symmetric schemes return within rounding, at any step.
     assert!(
         home(&field, &spline, &Verlet, 40) < 1e-12 && home(&field, &spline, &Pefrl, 40) < 1e-12
     );
     assert!(home(&field, &trilinear, &Verlet, 40) < 1e-12);
-    // From face to face the steps are the same both ways but for where the way ends, and each is
-    // symmetric.
+    // The cell-exact march takes the same steps in both directions, except at the ends, and each
+    // step is symmetric.
     assert!(home(&field, &spline, &CellExact::new(&field), 1) < 1e-11);
     assert!(home(&field, &trilinear, &CellExact::new(&field), 1) < 1e-11);
     // Others return within their error.
@@ -174,13 +173,13 @@ fn image(n: [u32; 3], values: Vec<f64>) -> Dataset {
 }
 
 /// A shock much thinner than a voxel, 20 degrees off the lattice. Sampled at points it is a
-/// staircase, and light sees the steps: every march is wrong by a quarter and more, the cell-exact
-/// one too, so it is not the march. As means over cells, or smoothed on reading, it is a prism
-/// again: deps tan(phi).
+/// staircase, and the light is deflected by its steps: every march is wrong by a quarter and more.
+/// The cell-exact march is too, so the march is not the cause. With means over cells, or smoothed
+/// on reading, the shock deflects like a prism: deps tan(phi).
 #[test]
 fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     let (jump, n) = (8e-4, 65u32);
-    // The shock's normal is 60 degrees off the light, and in a plane 20 degrees off the lattice's.
+    // The shock's normal is 60 degrees off the light, in a plane 20 degrees off the lattice's.
     let (phi, twist) = (60f64.to_radians(), 20f64.to_radians());
     let normal = DMat3::from_rotation_z(twist) * DVec3::new(phi.sin(), 0.0, phi.cos());
     let h = 1.0 / f64::from(n - 1);
@@ -189,7 +188,7 @@ fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
         DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) * h - 0.5
     };
     let sampled = |i: usize| if at(i).dot(normal) > 0.0 { jump } else { 0.0 };
-    // 6³ points of each cell around a node.
+    // Mean over 6³ points of the cell around each node.
     let averaged = |i: usize| {
         let one = |s: usize| {
             let o =
@@ -206,7 +205,8 @@ fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     };
     let view = View::along(Axis::Z, DVec3::ZERO);
     let starts = grid(12, 0.2);
-    // Weak jump: the change of direction is deps times the tangent of incidence, across the shock.
+    // At a weak jump the change of direction across the shock is deps times the tangent of the
+    // angle of incidence.
     let prism = jump * phi.tan();
     let across = [twist.cos(), twist.sin()];
     let error = |u: [f64; 2]| (u[0] - prism * across[0]).hypot(u[1] - prism * across[1]) / prism;
@@ -229,17 +229,16 @@ fn sub_voxel_shocks_are_staircases_unless_averaged_or_smoothed() {
     let [by_points, by_points_exact] = [marched(&staircase), exact(&staircase)];
     let by_means = marched(&field(values(&averaged), 0.0));
     let smoothed = marched(&field(values(&sampled), 1.2));
-    // Found: 0.40 and 0.25 by points, 0.004 by means, 0.019 smoothed.
+    // Measured: 0.40 and 0.25 by points, 0.004 by means, 0.019 smoothed.
     assert!(by_points > 0.2 && by_points_exact > 0.15, "{by_points} {by_points_exact}");
     assert!(by_means < 0.01 && smoothed < 0.04, "{by_means} {smoothed}");
 }
 
-/// What a brick says of itself holds on its border, where the spline's 64 taps reach two nodes into
-/// the next one.
+/// The bounds of a brick also hold on its border, where the spline's 64 taps reach two nodes into
+/// the next brick.
 #[test]
 fn brick_borders_have_their_halo() {
-    // A slope on one side of the border between bricks, at 8 nodes from each other; nothing on the
-    // other.
+    // A slope on one side of a border between bricks (every 8 nodes), and none on the other side.
     for border in [8.0, 16.0] {
         let n = 33;
         let field = cube(n, |p| 1e-4 * ((p.x + 0.5) * 32.0 - border).max(0.0));
@@ -261,7 +260,7 @@ fn brick_borders_have_their_halo() {
             );
         }
     }
-    // And rays along a border, with bricks left out on its empty side.
+    // Rays along a border, with bricks skipped on its uniform side.
     let field = blob(65, 1e-4, 0.05);
     let view = View::along(Axis::Z, DVec3::ZERO);
     let starts: Vec<Start> = (-4..=4)
@@ -276,8 +275,8 @@ fn brick_borders_have_their_halo() {
     assert!(difference(&got, &plain).1 * largest(&plain) <= 1e-8);
 }
 
-/// A ball in the stream, by any march: what is behind it is dark and says why, what passes it is
-/// free, and nothing is bent by what the ball's cells hold.
+/// A ball in the stream, with every march: rays behind it are dark with the status
+/// [`Status::Blocked`], rays that pass it are free, and the values in the ball's cells bend no ray.
 #[test]
 fn solid_bodies_stop_rays_in_every_march() {
     let n = 41;
@@ -345,7 +344,7 @@ fn solid_bodies_stop_rays_in_every_march() {
     }
 }
 
-/// PLOT3D with iblank: points of value 0 are none of the gas, and are counted.
+/// PLOT3D with iblank: points of value 0 do not belong to the gas and are counted.
 #[test]
 fn iblank_cells_are_masked_and_counted() {
     let n = 11usize;
@@ -363,7 +362,7 @@ fn iblank_cells_are_masked_and_counted() {
     places.iter().for_each(|p| grid.extend(i32::from(!blanked(p[0], p[1], p[2])).to_be_bytes()));
     [2.0f32, 0.0, 1e6, 0.0].iter().for_each(|v| q.extend(v.to_be_bytes()));
     for c in 0..5 {
-        // Rubbish where it is blanked.
+        // Invalid values at blanked points.
         let value = |p: &[usize; 3]| {
             if blanked(p[0], p[1], p[2]) {
                 1e30
@@ -388,7 +387,7 @@ fn iblank_cells_are_masked_and_counted() {
         let (field, report) = (loaded.field, loaded.report);
         let masked = report.resampling.unwrap().hidden;
         assert!(masked >= 27 && field.count(node) == masked, "{masked} {}", field.count(node));
-        // Nothing of the rubbish is left.
+        // No invalid values remain.
         assert!(field.eps().iter().all(|e| e.abs() < 1e-6));
         let view = View::along(Axis::Z, field.centre_m());
         let e = trace(
@@ -399,7 +398,7 @@ fn iblank_cells_are_masked_and_counted() {
     }
 }
 
-/// The spline's gradient and a medium's are of one kind: per metre, whatever the spacing.
+/// Gradients of all interpolated media are per metre, whatever the spacing.
 #[test]
 fn gradients_are_per_metre_at_any_spacing() {
     let field = Field::from_fn([9, 7, 5], [0.1, 0.02, 3.0], DVec3::new(1.0, 2.0, 3.0), 1.0, |p| {
@@ -415,7 +414,7 @@ fn gradients_are_per_metre_at_any_spacing() {
         gradient(&field, &TrilinearGradient::new(&field)),
     ];
     for g in [a, b, c] {
-        // eps is stored in f32: 5e-13 of 5e-6, over spacings of 2 cm.
+        // eps is stored in f32, with an error of 5e-13 at 5e-6, over spacings of 2 cm.
         assert!((g - 1e-6 * DVec3::new(1.0, -2.0, 0.5)).length() < 1e-10, "{g}");
     }
 }

@@ -1,4 +1,4 @@
-//! The projection against the march and closed forms.
+//! Tests the projection along the line of sight against the march and closed forms.
 
 mod common;
 
@@ -26,7 +26,7 @@ fn marched(field: &Field, view: View) -> Deviational<'_> {
     )
 }
 
-/// For gas so thin that light does not leave its line, both are the same integral.
+/// In gas so thin that rays stay straight, both are the same integral.
 #[test]
 fn very_weak_gas_looks_as_marched_from_any_side() {
     let field = cube(64, |p| 1e-5 * lopsided(p));
@@ -40,7 +40,7 @@ fn very_weak_gas_looks_as_marched_from_any_side() {
         assert!(got.iter().zip(&wanted).all(|(a, b)| (a.opd_m - b.opd_m).abs() < 2e-6 * scale));
         assert!(got.iter().zip(&wanted).all(|(a, b)| a.exit_depth_m == b.exit_depth_m));
     }
-    // Obliquely the projection is sampled once more: the second spline's error.
+    // Oblique projections are sampled a second time, which adds the second spline's error.
     let (got, wanted) =
         (trace(&sight(&field, oblique()), &starts), trace(&marched(&field, oblique()), &starts));
     let (rms, max) = difference(&got, &wanted);
@@ -60,8 +60,8 @@ fn straight_rays_are_off_by_an_amount_of_order_eps() {
     assert!((large / small - 10.0).abs() < 1.0, "{large:.1e} {small:.1e}");
 }
 
-/// Twice the gas, twice the deflection: to the last bit for powers of two, because nothing but
-/// products and sums is done.
+/// The deflection is proportional to eps: to the last bit for powers of two, because the
+/// computation has only products and sums.
 #[test]
 fn linearity_bit_exact() {
     let starts = grid(20, 0.9);
@@ -107,8 +107,8 @@ fn blob_and_its_second_derivatives_are_the_closed_form() {
     }
 }
 
-/// Seen obliquely the box is a prism in projection, but light enters and leaves through windows
-/// normal to it.
+/// In an oblique projection the box has the shape of a prism, but light enters and leaves through
+/// windows normal to it.
 #[test]
 fn uniform_gas_in_an_oblique_box_is_no_prism() {
     let field = cube(32, |_| 1e-4);
@@ -154,7 +154,7 @@ fn solids_throw_shadows_from_every_side() {
         let (mut dark, mut differ) = (0, 0);
         for ((s, a), b) in starts.iter().zip(&a).zip(&b) {
             let r = f64::from(s.position_m[0].hypot(s.position_m[1]));
-            // The body's surface is known to a voxel.
+            // The body's surface is known within a voxel.
             if r < 0.2 - 1.5 * h {
                 assert_eq!((a.status, a.transmission), (Status::Blocked, 0.0), "{s:?}");
                 assert_eq!((b.status, b.transmission), (Status::Blocked, 0.0), "{s:?}");

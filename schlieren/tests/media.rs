@@ -1,4 +1,4 @@
-//! Absorption, emission and rotation along rays, against closed forms.
+//! Tests absorption, emission and rotation along rays against closed forms.
 
 use glam::DVec3;
 use schlieren::analytic::erf;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 const EVERY_BEND: [Bend; 3] = [Bend::Straight, Bend::Paraxial, Bend::Full];
 
-/// A box of 0.4 x 0.3 x 0.2 m without structure.
+/// A box of uniform gas, 0.4 x 0.3 x 0.2 m.
 fn even() -> Field {
     let at = DVec3::new(0.1, -0.2, 0.3);
     Field::from_fn([33, 25, 17], [0.0125; 3], at, 1.0003, |_| 1e-4).unwrap()
@@ -66,7 +66,7 @@ fn an_even_slab_absorbs_emits_and_turns_by_its_closed_forms() {
                     "{bend:?} {c:?}"
                 );
             }
-            // Beside the field there is nothing.
+            // Outside the field the integrals are zero.
             assert_eq!(along(&w, &[start(0.5, 0.0)]), [MediaIntegrals::default()]);
         }
     }
@@ -78,7 +78,7 @@ fn malus_passes_half_at_45_degrees_and_nothing_crossed() {
     let at = |c: MediaIntegrals, deg: f64| c.transmission(Some(deg.to_radians()));
     assert!((at(c(0.0), 45.0) - 0.5).abs() < 1e-15);
     assert!(at(c(0.0), 90.0) < 1e-30 && (at(c(0.0), 180.0) - 1.0).abs() < 1e-15);
-    // Turned towards the analyser, and away from it.
+    // Rotated towards the analyser, and away from it.
     assert!(
         (at(c(0.3), 45.0) - (45f64.to_radians() - f64::from(0.3f32)).cos().powi(2)).abs() < 1e-15
     );
@@ -95,7 +95,7 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
     let h = 2.0 * half / f64::from(n - 1);
     let field = Field::from_fn([n as usize; 3], [h; 3], DVec3::splat(-half), 1.0, |_| 0.0).unwrap();
     let smoke = |p: DVec3| alpha0 * (-p.length_squared() / (2.0 * sigma * sigma)).exp();
-    // On a lattice of its own, finer and not aligned.
+    // On a lattice of its own, which is finer and not aligned.
     let volume = Volume::from_fn([101; 3], [1.05e-3; 3], DVec3::splat(-0.0525), smoke).unwrap();
     let media = Media::default().with(Property::Absorption, volume);
     let closed = |b: f64, half: f64| {
@@ -109,8 +109,8 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
             for (s, c) in starts.iter().zip(along(&walk(&field, view, &media, bend), &starts)) {
                 let [x, y] = s.position_m.map(f64::from);
                 let expected = closed(x.hypot(y), half);
-                // Trilinear, h²/8σ² = 3.4e-4 of the largest value along each of the two axes across
-                // the light.
+                // The trilinear error is h²/8σ² = 3.4e-4 of the largest value for each of the two
+                // axes across the light.
                 let largest = closed(0.0, half);
                 assert!(
                     (f64::from(c.optical_depth) - expected).abs() < 7e-4 * largest,
@@ -118,8 +118,8 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
                 );
             }
         }
-        // Oblique views see the same ball. The box is cut elsewhere, at 2.5 σ or farther: 1 % of
-        // the middle's value is outside.
+        // Oblique views have the same integrals, but rays leave the box elsewhere, at 2.5 σ or
+        // farther: 1 % of the middle's value is outside.
         let view = View::from_angles_deg(34.0, 21.0, DVec3::ZERO).unwrap();
         for (s, c) in starts.iter().zip(along(&walk(&field, view, &media, bend), &starts)) {
             let b = f64::from(s.position_m[0]).hypot(f64::from(s.position_m[1]));
@@ -131,7 +131,7 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
 
 #[test]
 fn views_turned_with_the_smoke_agree() {
-    // The same smoke with axes exchanged, seen along the exchanged axis.
+    // The same smoke with exchanged axes, seen along the exchanged axis.
     let half = DVec3::new(0.04, 0.05, 0.06);
     let smoke = |p: DVec3| 5.0 + 40.0 * p.x + 300.0 * p.y * p.z + 90.0 * p.z;
     let make = |turn: fn(DVec3) -> DVec3, back: fn(DVec3) -> DVec3| {
@@ -162,7 +162,7 @@ fn views_turned_with_the_smoke_agree() {
     }
 }
 
-/// A wall of smoke before a glowing slab hides it from one side, and from the other it does not.
+/// A wall of smoke hides a glowing slab behind it from one side, but not from the other.
 #[test]
 fn emission_is_dimmed_by_what_lies_between_it_and_the_eye() {
     let field = even();
@@ -180,7 +180,8 @@ fn emission_is_dimmed_by_what_lies_between_it_and_the_eye() {
     let backward = View { right: -forward.right, forward: -forward.forward, ..forward };
     for bend in EVERY_BEND {
         let seen = |v| along(&walk(&field, v, &media, bend), &[start(0.01, 0.02)])[0];
-        // Five steps of smoke and the ramp's half; nodes 11 to 16 glow, and half a step.
+        // Smoke is 4.5 steps deep, with half of the ramp at its end. Nodes 11 to 16 glow: five
+        // steps and half of the ramp.
         let (depth, glow) = (40.0 * h * 4.5, 3.0 * h * 5.5);
         let (through, free) = (seen(forward), seen(backward));
         assert!((f64::from(free.optical_depth) - depth).abs() < 1e-5 * depth, "{bend:?} {free:?}");
@@ -208,7 +209,8 @@ fn walks_end_at_bodies_and_where_they_are_told() {
     let media = Media::default().with(Property::Absorption, Volume::uniform(2.0, &open).unwrap());
     let view = View::along(Axis::Z, open.centre_m());
     for bend in EVERY_BEND {
-        // The body's nearest nodes begin half a step before node 10; a step is all or nothing.
+        // The nearest node is in the body from half a step before node 10 on. A step counts as a
+        // whole or not at all.
         let c = along(&walk(&walled, view, &media, bend), &[start(0.0, 0.0)])[0];
         assert!((c.optical_depth - 2.0 * 0.095).abs() < 2.0 * 0.0051, "{bend:?} {c:?}");
         let mut out = [MediaIntegrals::default(); 2];
@@ -222,11 +224,10 @@ fn walks_end_at_bodies_and_where_they_are_told() {
     }
 }
 
-/// SELFOC, n² = n0² (1 - g² r²): x = x0 cos(g τ), z = w_z τ, ds = (n/n0) dτ, so the path is longer
-/// than the rod by a closed integral.
 #[test]
 fn what_a_ray_collects_does_not_depend_on_the_rays_beside_it() {
-    // Long ways, short ones across a corner, and rays that miss, in one packet and alone.
+    // Rays with long chords, with short ones across a corner, and rays that miss, in one packet and
+    // alone.
     let field = Field::from_fn([33, 25, 17], [0.0125; 3], DVec3::ZERO, 1.0003, |x| {
         1e-4 * (9.0 * x.x * x.y).sin()
     })
@@ -248,6 +249,8 @@ fn what_a_ray_collects_does_not_depend_on_the_rays_beside_it() {
     }
 }
 
+/// SELFOC, n² = n0² (1 - g² r²): x = x0 cos(g τ), z = w_z τ, ds = (n/n0) dτ, so the path is longer
+/// than the rod by a closed integral.
 #[test]
 fn in_strong_index_the_way_is_the_bent_one() {
     let (g, x0, length): (f64, f64, f64) = (3.0, 0.12, 1.0);
@@ -257,14 +260,14 @@ fn in_strong_index_the_way_is_the_bent_one() {
     let rod = Field::from_fn(n, h, DVec3::new(-0.2, -0.2, 0.0), 1.5, eps).unwrap();
     let media = Media::default()
         .with(Property::Absorption, Volume::uniform(1.0, &rod).unwrap())
-        // A ramp across: what is met depends on where the ray is.
+        // A ramp across the light: the integral depends on the position of the ray.
         .with(
             Property::Rotation,
             Volume::from_fn([33, 2, 2], [0.0125, 0.4, length], rod.origin_m(), |p| p.x).unwrap(),
         );
     let view = View::along(Axis::Z, rod.centre_m());
 
-    // Enters along z, so w_z = n(x0)/n0 for ever.
+    // The ray enters along z, so w_z = n(x0)/n0 is constant.
     let w_z = (1.0 - g * g * x0 * x0).sqrt();
     let tau = length / w_z;
     let steps = 20_000;
@@ -282,10 +285,11 @@ fn in_strong_index_the_way_is_the_bent_one() {
         along(&w, &[start(x0, 0.0)])[0]
     };
     let full = collect(Bend::Full);
-    // The spline's rod: relative errors of the position of 1e-5.
+    // The spline of the rod gives relative errors of the position of 1e-5.
     assert!((f64::from(full.optical_depth) - path).abs() < 3e-5 * path, "{full:?} {path}");
     assert!((f64::from(full.rotation_rad) - ramp).abs() < 1e-4 * x0, "{full:?} {ramp}");
-    // Trilinear gradients and leapfrog: still the bent way, half a per cent of the excursion off.
+    // With trilinear gradients and leapfrog the ray is also bent, with an error of half a per cent
+    // of the excursion.
     let paraxial = collect(Bend::Paraxial);
     assert!((f64::from(paraxial.optical_depth) - path).abs() < 1e-3 * path, "{paraxial:?} {path}");
     assert!((f64::from(paraxial.rotation_rad) - ramp).abs() < 5e-3 * x0, "{paraxial:?} {ramp}");
@@ -293,8 +297,8 @@ fn in_strong_index_the_way_is_the_bent_one() {
     assert!((f64::from(straight.optical_depth) - length).abs() < 1e-6);
 }
 
-/// The walk's own rays end where the march's do: x weighs the place of the ray, so that the
-/// integral of its step function is the displacement.
+/// The integrator's rays end where the march's rays do. The rotation is x near the exit, so that
+/// its integral gives the position of the ray there.
 #[test]
 fn the_walk_goes_where_the_march_goes() {
     let (n, half, sigma) = (65, 0.05, 0.015);
@@ -308,7 +312,7 @@ fn the_walk_goes_where_the_march_goes() {
     let spline = BSpline::new(&field);
     let mut exit = [Exit::UNDISTURBED];
     Full::new(&field, &spline, Pefrl, view, fine).trace(&[s], &mut exit);
-    // Rotation that begins in the last millimetres and grows with x: its integral tells x there.
+    // A rotation only in the last 5 mm, proportional to x: its integral gives x there.
     let last = 5e-3;
     let at_end = |p: DVec3| if p.z > half - last { p.x } else { 0.0 };
     let v =
@@ -337,14 +341,15 @@ fn the_walk_goes_where_the_march_goes() {
         let [bent, straight] = [&w, &reference].map(|w| f64::from(along(w, &[s])[0].rotation_rad));
         0.015 * bent / straight
     };
-    // Where the ray is on the average of its last 5 mm, by the deflection that it then has.
+    // Mean position of the ray over the last 5 mm, from its displacement and deflection at the
+    // exit.
     let expected = 0.015 + f64::from(exit[0].displacement_m[0])
         - 0.5 * last * f64::from(exit[0].deflection_rad[0]);
     let moved = expected - 0.015;
     assert!(moved > 1e-4, "{moved}");
     for bend in [Bend::Paraxial, Bend::Full] {
         let off = (place(bend) - expected).abs();
-        // Trilinear gradients at h/σ = 0.1: a few per cent of the displacement.
+        // Trilinear gradients at h/σ = 0.1 have an error of a few per cent of the displacement.
         assert!(off < 0.03 * moved, "{bend:?}: {off:e} of {moved:e}");
     }
 }
@@ -377,7 +382,8 @@ fn paths_keep_all_but_the_transmission_bit_by_bit() {
             (d.deflection_rad, d.displacement_m, d.exit_depth_m)
         );
         assert_eq!(d.status, Status::Free);
-        // However thick, light that is not stopped keeps a trace: 0 means blocked.
+        // However thick the smoke, light that is not blocked stays above 0, because 0 means
+        // blocked.
         assert!(d.transmission > 0.0 && d.transmission <= 1.0);
         dark += usize::from(d.transmission < 1e-30);
     }

@@ -1,4 +1,4 @@
-//! Tolerances asked for, and errors got.
+//! Tests that plans keep the requested tolerance, or warn.
 
 mod common;
 
@@ -47,10 +47,9 @@ fn what_is_forced_is_kept() {
     }
 }
 
-/// What is bounded is met by what is measured, and what is asked for is got, where the bound of the
-/// lattice's own error leaves room for it. (Where no bound is within the tolerance, the plan says
-/// so by its bounds.) `the_tolerance_asked_for_is_got_or_a_warning_names_why_not` has the errors
-/// against the truth.
+/// Measured errors are within the bounds, and within the tolerance where the bound of the lattice's
+/// own error permits it. (Where it does not, the plan's bounds show this.)
+/// `the_tolerance_asked_for_is_got_or_a_warning_names_why_not` tests the errors against the truth.
 #[test]
 fn errors_are_within_bounds_and_bounds_within_tolerance_where_possible() {
     let fields =
@@ -84,9 +83,10 @@ fn errors_are_within_bounds_and_bounds_within_tolerance_where_possible() {
 
 type Eps = fn(DVec3) -> f64;
 
-/// Flows in a metre cube of 49 nodes a side. Only the shock is steeper than its lattice can hold.
+/// Flows in a cube of 1 m with 49 nodes per side. Only the shock is steeper than the lattice can
+/// resolve.
 const FLOWS: [(&str, Eps); 6] = [
-    // No second differences along the lattice's axes at all, and a gradient on all faces.
+    // Has no second differences along the lattice's axes, and a gradient on all faces.
     ("saddle", |p| 1e-3 * p.x * p.y),
     ("oblique saddle", |p| 1e-3 * (p.x + 0.5 * p.z) * (p.y - 0.25 * p.x)),
     ("ring", |p| {
@@ -99,8 +99,8 @@ const FLOWS: [(&str, Eps); 6] = [
 
 const NODES: usize = 49;
 
-/// eps and its gradient at the nearest place in the cube: gas beyond a face is that of the face, as
-/// in all marches.
+/// eps and its gradient at the nearest point of the cube: outside, values are continued from the
+/// faces, as in all marches.
 fn sample(eps: Eps, at: DVec3) -> (f64, DVec3) {
     let at = at.clamp(DVec3::splat(-0.5), DVec3::splat(0.5));
     // Central differences of fourth order: 1e-12 of the gradient, far below all tolerances.
@@ -112,9 +112,9 @@ fn sample(eps: Eps, at: DVec3) -> (f64, DVec3) {
     (eps(at), DVec3::from(DVec3::AXES.map(along)))
 }
 
-/// Deflection and optical path difference of the undisturbed ray of a start, by RK4 in `f64` on the
-/// flow's own formula, no lattice: position and optical momentum p = n t over dtau = ds / n, from
-/// the entry to the plane of the exit.
+/// Deflection and optical path difference of the ray of a start, by RK4 in `f64` with the flow's
+/// own formula and without a lattice: position and optical momentum p = n t over dtau = ds / n,
+/// from the entry to the exit plane.
 fn truth(eps: Eps, view: &View, start: &Start) -> Option<([f64; 2], f64)> {
     const STEPS: usize = 800;
     let [x, y] = start.position_m.map(f64::from);
@@ -132,13 +132,13 @@ fn truth(eps: Eps, view: &View, start: &Start) -> Option<([f64; 2], f64)> {
     if near >= far {
         return None;
     }
-    // As deviations: the ray's place is at + tau w + xi, its momentum w + u.
+    // In deviations: the ray's position is at + tau w + xi, its momentum w + u.
     let (entry, w) = (at + near * view.forward, view.forward);
     let (mut xi, mut u) = (DVec3::ZERO, sample(eps, entry).0 * w);
     let mut path = 0.0;
     let rate = |tau: f64, xi: DVec3, u: DVec3| {
         let (e, g) = sample(eps, entry + tau * w + xi);
-        // n² - w_z, the optical path less what light in the reference needs for the way along w.
+        // n² - w_z: the optical path minus that of light in the reference medium along w.
         (u, (1.0 + e) * g, e * (2.0 + e) - u.dot(w))
     };
     let step = |tau: f64, dt: f64, xi: &mut DVec3, u: &mut DVec3, path: &mut f64| {
@@ -155,7 +155,7 @@ fn truth(eps: Eps, view: &View, start: &Start) -> Option<([f64; 2], f64)> {
     for k in 0..STEPS {
         step(k as f64 * dt, dt, &mut xi, &mut u, &mut path);
     }
-    // Back to the plane of the exit.
+    // Back to the exit plane.
     let rest = -xi.dot(w) / (1.0 + u.dot(w));
     step(far - near, rest, &mut xi, &mut u, &mut path);
     Some(([u.dot(view.right), u.dot(view.up)], path))
@@ -197,7 +197,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
             let truths: Vec<_> = starts.iter().map(|s| truth(eps, &view, s)).collect();
             let longest_m = (field.size_m() / view.forward.abs()).min_element();
             for opd in [false, true] {
-                // What the lattice can: everything refined, in f64.
+                // The best result with this lattice: everything refined, in f64.
                 let finest = Request {
                     mode: Some(Mode::Full),
                     interpolant: Some(Interpolant::BSpline),
@@ -227,10 +227,11 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     } else {
                         bent += 1;
                     }
-                    // An optical path off by the tolerance times the way has slopes off by the
-                    // tolerance.
+                    // An error of the optical path of the tolerance times the path length has
+                    // slopes of the tolerance.
                     let kept = angle <= tolerance && path <= tolerance * longest_m;
-                    // f32 holds deflections to 1e-6 of the largest: 1e-3 rad in these flows.
+                    // f32 keeps deflections within 1e-6 of the largest, which is 1e-3 rad in these
+                    // flows.
                     let can = of_lattice[0] <= 0.5 * tolerance
                         && of_lattice[1] <= 0.5 * tolerance * longest_m
                         && tolerance > 1e-9;
@@ -247,7 +248,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
             }
         }
     }
-    // The table has all cases in it, and warnings are not given for nothing.
+    // All cases occur, and no warning is unnecessary.
     assert!(
         straight >= 30 && bent >= 60 && got >= 120 && warned >= 20,
         "{straight} {bent} {got} {warned}"
@@ -255,8 +256,8 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
     assert!(for_nothing == 0, "{for_nothing} of {warned} warnings for nothing");
 }
 
-/// The plan of old looked at differences along the lattice's axes, of which a saddle has none:
-/// light went straight at any tolerance.
+/// A plan that used only differences along the lattice's axes, which are zero for a saddle, would
+/// choose straight rays at any tolerance.
 #[test]
 fn a_saddle_is_not_free_of_curvature() {
     let field = cube(NODES, FLOWS[0].1);
@@ -269,7 +270,7 @@ fn a_saddle_is_not_free_of_curvature() {
     );
 }
 
-/// Steps shorter than what the lattice can tell are wasted.
+/// Steps much shorter than the lattice's resolution are wasted.
 #[test]
 fn coarse_lattices_do_not_ask_for_short_steps() {
     let field = blob(16, 1e-3, 0.08);

@@ -1,5 +1,5 @@
-//! A ray's exit is its own: bit for bit the same alone, among any neighbours, in any order, on any
-//! number of threads.
+//! Tests that a ray's exit is bit for bit the same alone, among any neighbours, in any order, and
+//! on any number of threads.
 
 mod common;
 
@@ -16,8 +16,8 @@ use schlieren::view::{Axis, View};
 const INTERPOLANTS: [Interpolant; 3] =
     [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
 
-/// A body in the first corner (the node that lanes without a ray look at), another behind a layer
-/// without data, and gas.
+/// A body in the first corner (whose node unused lanes look up), another behind a layer without
+/// data, and gas.
 fn with_bodies() -> Field {
     let n = 24;
     let mut eps = vec![];
@@ -47,7 +47,7 @@ fn bits(e: &Exit) -> ([u32; 7], Status) {
     ([a, b, c, d, e.exit_depth_m, e.opd_m, e.transmission].map(f32::to_bits), e.status)
 }
 
-/// A permutation that scatters neighbours: steps of a number that shares no factor with the length.
+/// A permutation that separates neighbours, with a stride that is coprime to the length.
 fn scattered(count: usize) -> Vec<usize> {
     let gcd = |mut a: usize, mut b: usize| {
         while b > 0 {
@@ -88,7 +88,7 @@ fn assert_independent(paths: &impl LightPaths, starts: &[Start], what: &str) {
     }
 }
 
-/// Rays through the field, its edges, and far beside it; more than a thread takes at once.
+/// Rays through the field, through its edges, and far outside it; more than a thread takes at once.
 fn rays() -> Vec<Start> {
     let mut starts = grid(33, 1.9);
     let odd = [f32::NAN, f32::INFINITY, 1e30];
@@ -157,8 +157,8 @@ fn straight_and_full_marches_are_independent_of_neighbours_and_threads() {
     }
 }
 
-/// The layer without data lies before the body: what stops the ray there is the layer, however long
-/// its neighbours go on.
+/// The layer without data is before the body, so the layer stops the ray, however long its
+/// neighbours continue.
 #[test]
 fn a_ray_keeps_the_name_of_what_stopped_it() {
     let field = with_bodies();
@@ -169,20 +169,20 @@ fn a_ray_keeps_the_name_of_what_stopped_it() {
     let full = Full::new(&field, &spline, Verlet, view, FullOptions::default());
     let (fast, full) = (trace(&fast, &starts), trace(&full, &starts));
     let count = |exits: &[Exit], s: Status| exits.iter().filter(|e| e.status == s).count();
-    // Both kinds are met, and the two marches tell them apart alike but for rays along the edge of
-    // a node's cell.
+    // Each status occurs, and the two marches agree except for rays along the edge of a node's
+    // cell.
     for status in [Status::Free, Status::Masked, Status::Blocked] {
         let [a, b] = [count(&fast, status), count(&full, status)];
         assert!(a > 15 && 10 * a.abs_diff(b) <= a, "{status:?}: {a} {b}");
     }
-    // Through the layer, and the body behind it.
+    // A ray through the layer and the body behind it.
     let behind = Start { position_m: [0.01, 0.03], tilt_rad: [0.0; 2] };
     let paths = Deviational::new(&field, view, Interpolant::BSpline, Options::default());
     assert_eq!(trace(&paths, &[behind])[0].status, Status::Masked);
     assert_eq!(trace(&paths, &[behind; 40])[39].status, Status::Masked);
 }
 
-/// The lattice's first node is in a body. Rays that pass beside the field meet nothing.
+/// The lattice's first node is in a body. Rays outside the field are not stopped by it.
 #[test]
 fn rays_beside_the_field_do_not_meet_its_first_node() {
     let field = with_bodies();

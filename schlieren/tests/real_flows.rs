@@ -1,6 +1,6 @@
-//! Flows of others, from file to field. They are not part of this repository: the folder is
-//! `RTSV_FLOWS`, or `shared/data/flow` beside the workspace; without it these tests say that they
-//! are skipped.
+//! Tests published flows from file to field. Their files are not part of this repository: the
+//! folder is `RTSV_FLOWS`, or `shared/data/flow` next to the workspace. Without it these tests
+//! print that they are skipped.
 
 use datasets::resample::Resolution;
 use glam::DVec3;
@@ -24,7 +24,7 @@ fn flow(name: &str) -> Option<PathBuf> {
 }
 
 /// NASA Ames (Hung and Buning): Mach 2.95 past a blunt fin on a plate. The leading edge has radius
-/// R = 0.5 and its stagnation line lies at x = 0 in the plane y = 0. Billig (1967) for a cylinder:
+/// R = 0.5, and its stagnation line is at x = 0 in the plane y = 0. Billig (1967) for a cylinder:
 /// stand-off d/R = 0.386 exp(4.67/M²) = 0.660.
 #[test]
 fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
@@ -38,8 +38,8 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         "{:?}",
         whole.report.warnings
     );
-    // The stretched mesh is finer than any lattice over all of it at the fin; even so the error is
-    // small.
+    // At the fin the stretched mesh is finer than any lattice over the whole mesh, but the error is
+    // still small.
     assert!(r.back.compared > 20_000 && r.back.rms < 0.03 * r.back.range, "{r:?}");
     let [low, high] = whole.report.density_range_kg_m3.unwrap();
     assert!(
@@ -47,7 +47,7 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         "{low} {high}"
     );
 
-    // The nose, where the light of the picture goes.
+    // The nose, which the light of the image crosses.
     let options = Options {
         bounds: Some([DVec3::new(-1.5, 0.0, 1.0), DVec3::new(0.5, 1.0, 5.5)]),
         resolution: Resolution::Spacing(0.025),
@@ -66,7 +66,7 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         let row = nx * ny * k..nx * ny * k + nx;
         let (eps, kinds) = (&field.eps()[row.clone()], &nodes[row]);
         let fin = kinds.iter().position(|n| *n == Node::Solid).unwrap();
-        // Centre of the rise: where most of the density is gained, by first moment.
+        // Position of the shock: the first moment of the density's rise around its steepest step.
         let steps: Vec<f64> =
             eps[..fin].windows(2).map(|w| f64::from(w[1] - w[0]).max(0.0)).collect();
         let steepest = (0..steps.len()).max_by(|&a, &b| steps[a].total_cmp(&steps[b])).unwrap();
@@ -79,22 +79,22 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
     }
 }
 
-/// The same flow as a photograph: light along the span, the knife upright. Every row of the picture
-/// away from the plate shows the bow shock ahead of the fin's dark edge, and the distance between
-/// the two is the stand-off.
+/// The same flow as a photograph, with light along the span and an upright knife. Every row of the
+/// image away from the plate shows the bow shock ahead of the fin's dark edge. The distance between
+/// them is the stand-off.
 ///
-/// The shock is curved around the fin, so that along the light only its foremost part is met
-/// edge-on, and the mesh, 0.15 R coarse there, draws it over three cells: hence the tolerance. The
-/// stream has 0.1 kg/m³, as in a tunnel at Mach 3 that draws air from the room, and the picture
-/// reaches from grey to nearly white without being saturated.
+/// The tolerance has two causes: the shock is curved around the fin, so that the light crosses only
+/// its foremost part edge-on, and the mesh, 0.15 R coarse there, smears it over three cells. The
+/// stream has 0.1 kg/m³, as in a tunnel at Mach 3 that draws air from the room. The image reaches
+/// from grey to nearly white without saturation.
 #[test]
 fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     let Some(path) = flow("bluntfinxyz.bin") else { return };
     let (stream, radius) = (0.1, 0.5);
     let options = Options {
         wavelength_nm: 633.0,
-        // Fin and shock, and the light's way past them; from the plate's influence to the mesh's
-        // upper end.
+        // The fin, the shock and the light's path past them, from above the plate's influence to
+        // the mesh's upper end.
         bounds: Some([DVec3::new(-1.5, 0.0, 1.0), DVec3::new(0.3, 1.5, 5.7)]),
         resolution: Resolution::Spacing(0.03),
         length_unit_m: 0.02,
@@ -117,7 +117,7 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     let photograph = Photograph::of(&picture).unwrap();
     let framing = photograph.framing;
 
-    // The fin's silhouette: from the right, the last dark pixel of the row.
+    // The edge of the fin's silhouette: the last dark pixel of the row, from the right.
     let width = framing.width as usize;
     let edge_m = |z_m: f64| {
         let row = (0.5 * f64::from(framing.height) - (z_m - framing.center_m[1]) / framing.pixel_m)
@@ -131,7 +131,7 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
         let z = (centre_m.z + up_m) / unit_m;
         if (2.0..5.5).contains(&z) {
             let edge_m = edge_m(up_m).expect("a row of the fin");
-            // The leading edge is at x = 0: found within a node of the lattice.
+            // The leading edge is found at x = 0 within a node of the lattice.
             assert!(
                 ((centre_m.x + edge_m) / unit_m).abs() < 0.06,
                 "{}",
@@ -151,14 +151,14 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     assert!((low - 0.66).abs() <= 0.15 && (high - 0.66).abs() <= 0.15, "{low} {median} {high}");
 }
 
-/// Only the density of this one is physical (0.198 to 0.710 of its reference).
+/// Only the density of this flow is physical (0.198 to 0.710 of its reference).
 #[test]
 fn combustor_is_read_and_resampled() {
     let Some(path) = flow("combxyz.bin") else { return };
     let LoadedField { field, report } =
         load(&path, &Options::new(Medium::density("Density"))).unwrap();
     let r = report.resampling.unwrap();
-    // Two of its cells are folded indeed.
+    // Two of its cells are really folded.
     assert_eq!((r.cells, r.folded_cells), (56 * 32 * 24, 2));
     assert!(
         r.inside > 100_000 && r.back.compared > 20_000 && r.back.rms < 0.02 * r.back.range,
@@ -178,7 +178,7 @@ fn ladenburgs_jet_is_revolved() {
     let options = Options { depth: Some(Depth::Revolve), ..Options::new(medium) };
     let LoadedField { field, report } = load(&path, &options).unwrap();
     let r = report.resampling.unwrap();
-    // The jet is as cold as 130 K: beyond Ciddor's range, which is said.
+    // The jet is as cold as 130 K, outside Ciddor's range, so there is a warning.
     assert_eq!(report.formula, "gladstone-dale");
     assert!(
         report.warnings.iter().any(|w| w.contains("leave -40..100 C")),
@@ -186,7 +186,7 @@ fn ladenburgs_jet_is_revolved() {
         report.warnings
     );
     assert!(r.back.rms < 0.02 * r.back.range, "{r:?}");
-    // Round: eps on the four points at a right angle around the axis is the same.
+    // The field is round: eps is the same at points a quarter turn apart around the axis.
     let [nx, ny, nz] = field.dims();
     assert_eq!(ny, nz);
     let eps = |i: usize, j: usize, k: usize| field.eps()[i + nx * (j + ny * k)];
@@ -199,7 +199,7 @@ fn ladenburgs_jet_is_revolved() {
     ];
     let spread = around.iter().fold(0.0f32, |s, e| s.max((e - around[0]).abs()));
     assert!(spread < 1e-3 * 1e-3, "{around:?}");
-    // Nozzle exit: 2.7 bar and 247 K, so n − 1 is about three times that of the room.
+    // The nozzle exit has 2.7 bar and 247 K, so n − 1 is about three times that of the room.
     let exit = f64::from(eps(0, middle, middle)) + report.reference_n_minus_1;
     assert!((exit / (0.227e-3 * 269.4e3 / (287.05 * 246.5)) - 1.0).abs() < 0.03, "{exit}");
 }

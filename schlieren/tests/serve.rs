@@ -1,4 +1,4 @@
-//! `schlieren serve` as the page and as strangers talk to it.
+//! Tests the requests to `schlieren serve`, from the page and from clients without the token.
 #![cfg(feature = "serve")]
 
 mod serving;
@@ -78,7 +78,7 @@ fn the_finished_picture_is_that_of_render() {
             && shown.info["rays"].as_u64().unwrap() > 96 * 48 * 16
     );
 
-    // The saved picture has the same pixels, and the saved scene makes the same picture again.
+    // The saved image has the same pixels, and the saved scene gives the same image again.
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let save = |kind: &str| {
@@ -142,7 +142,7 @@ fn every_technique_and_cutoff_draws() {
 #[test]
 fn painting_changes_the_picture_where_its_light_is() {
     let s = Served::start(&SMALL);
-    // A clear filter and a small source: the picture is white until something is painted.
+    // With a clear filter and a small source, the image is white until something is painted.
     s.change(&json!({
         "light": {"source": {"kind": "circle", "diameter_m": 5e-5}},
         "technique": {"kind": "schlieren", "cutoff": {"kind": "painted", "size_m": [2e-3, 2e-3], "ground_rgb": [1, 1, 1]}},
@@ -151,7 +151,7 @@ fn painting_changes_the_picture_where_its_light_is() {
     assert!(white.rgb.iter().all(|v| *v > 250));
     assert!((white.light.iter().sum::<f32>() - 1.0).abs() < 0.05, "the light is on the filter");
 
-    // Left of the blob's middle: its own place on the filter, away from the axis.
+    // Light left of the blob's middle crosses the filter at a point of its own, away from the axis.
     let at = [0.60, 0.40];
     let traced = s.ask("POST", "trace", &json!({ "at": at }).to_string()).json();
     let place = [0, 1].map(|i| traced["filter_m"][i].as_f64().unwrap());
@@ -175,8 +175,8 @@ fn painting_changes_the_picture_where_its_light_is() {
     );
     assert!(changed(&white.filter, &by_picture.filter) > 0.0);
 
-    // The same by its place on the filter changes nothing any more; the axis turns the background
-    // red.
+    // Painting at the same point on the filter changes nothing more; painting on the axis makes the
+    // background red.
     let by_filter = red("filter", json!([place]));
     assert!(changed(&by_picture.rgb, &by_filter.rgb) < 0.01);
     let axis = red("filter", json!([[0.0, 0.0]]));
@@ -208,8 +208,8 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     let first = s.finished();
     assert_eq!(first.info["error"], serde_json::Value::Null);
 
-    // The last: another picture, and the saved scene makes the same, relative to the first step's
-    // surroundings.
+    // The last step has another image. The saved scene gives the same image, relative to the first
+    // step's surroundings.
     assert_eq!(s.change(&json!({"step": 3}))["step"], 3);
     let last = s.finished();
     assert_eq!(last.info["error"], serde_json::Value::Null);
@@ -219,7 +219,7 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     let toml = s.get("save/toml").text();
     let reference =
         toml.lines().find_map(|l| l.strip_prefix("reference_n_minus_1 = ")).expect(&toml);
-    // 1.2 kg/m3 of air in red light; that step's own surroundings would be 2.48e-4.
+    // n - 1 of air of 1.2 kg/m3 in red light; for that step's own surroundings it would be 2.48e-4.
     assert!((reference.parse::<f64>().unwrap() - 2.71e-4).abs() < 2e-6, "{reference}");
     assert!(toml.contains("flow-3.vti"), "{toml}");
     std::fs::write(path("saved.toml"), toml).unwrap();
@@ -236,7 +236,7 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
         again.rgba().unwrap().iter().flat_map(|p| [p[0], p[1], p[2]]).map(srgb).collect();
     assert_eq!(bytes, last.rgb);
 
-    // Transfer functions stay with the step, and other changes with both.
+    // Setting and removing transfer functions keeps the step.
     let knots = json!([[290.0, 0.0], [400.0, 3e-4]]);
     let state = s.change(&json!({"flow": {"multifield": {"fields": {"T": {"knots": knots}}}}}));
     assert_eq!(state["step"], 3);
@@ -244,7 +244,7 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     assert_eq!(s.change(&json!({"flow": {"multifield": null}}))["step"], 3);
     assert_eq!(s.finished().rgb, last.rgb);
 
-    // A file that is missing is an error of its step only.
+    // A missing file is an error of its step only.
     s.change(&json!({"step": 2}));
     assert!(s.finished().info["error"].as_str().is_some_and(|e| e.contains("flow-2.vti")));
     s.change(&json!({"step": 0}));
@@ -288,7 +288,7 @@ fn bad_requests_get_a_reason_and_harm_nothing() {
     assert_eq!(s.ask("POST", "scene", &deep).status, 400);
     let huge = " ".repeat(3 << 20);
     assert_eq!(s.ask("POST", "scene", &huge).status, 413);
-    // Not HTTP at all; a header without end; a length that is a lie.
+    // Bytes that are not HTTP, a header without end, and a wrong length.
     for bytes in [
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03".to_vec(),
         b"GET / HTTP/1.1\r\nX: "
@@ -334,7 +334,7 @@ fn dropped_and_idle_connections_are_left_behind() {
             .unwrap();
         let _ = reads_a_little.read(&mut [0; 10]);
     }
-    // A file that takes long and that nobody waits for.
+    // A request for a file that takes long, dropped by the client.
     s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
     let mut gone = s.connect();
     gone.write_all(format!("GET {}save/exr HTTP/1.1\r\nHost: x\r\n\r\n", s.base).as_bytes())
@@ -342,11 +342,11 @@ fn dropped_and_idle_connections_are_left_behind() {
     std::thread::sleep(Duration::from_millis(300));
     drop(gone);
 
-    // Requests are answered at once while the drawing thread is at work…
+    // Requests are answered at once while the rendering thread works…
     let start = Instant::now();
     assert!(s.is_healthy());
     assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
-    // …and it takes up the next scene.
+    // …and that thread continues with the next scene.
     s.change(&json!({"film": {"size": [96, 48]}, "sampling": null}));
     assert_eq!(s.finished().info["width"], 96);
 }

@@ -1,8 +1,8 @@
-//! The page in a real browser, by hand: look, orbit, paint, switch. What the window shows must
-//! change where it should.
+//! Drives the page in a real browser: looks, orbits, paints and switches techniques. The window
+//! must change where it should.
 //!
-//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes,
-//! unless RTSV_REQUIRE_PEERS is set.
+//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test prints that it is
+//! skipped and passes, unless RTSV_REQUIRE_PEERS is set.
 #![cfg(feature = "serve")]
 
 #[path = "serving/browser.rs"]
@@ -14,7 +14,7 @@ use datasets::image_io::{Picture, read_png};
 use serving::Served;
 use std::io::Write as _;
 
-/// The window's picture, and where on it the page's parts are.
+/// A screenshot of the window.
 struct Window {
     picture: Picture,
     rgba: Vec<[f32; 4]>,
@@ -33,7 +33,7 @@ fn rect(b: &mut Browser, id: &str) -> Rect {
 
 fn look(b: &mut Browser, name: &str) -> Window {
     let dir = tempfile::tempdir().unwrap();
-    // Kept where the person who runs the test wants to look at it.
+    // Screenshots are kept when RTSV_SCREENSHOTS names a folder.
     let keep = std::env::var_os("RTSV_SCREENSHOTS").map(std::path::PathBuf::from);
     let path = keep.unwrap_or_else(|| dir.path().to_path_buf()).join(format!("serve-{name}.png"));
     std::fs::write(&path, b.screenshot()).unwrap();
@@ -41,8 +41,8 @@ fn look(b: &mut Browser, name: &str) -> Window {
     Window { rgba: picture.rgba().unwrap(), picture }
 }
 
-/// Part of the pixels in a part of a rectangle (`[left, top, right, bottom]` as fractions) that
-/// differ visibly.
+/// Fraction of the pixels that differ visibly in the part `[left, top, right, bottom]` (as
+/// fractions) of a rectangle.
 fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
     let x = [0, 2].map(|i| (r[0] + part[i] * r[2]) as usize);
     let y = [1, 3].map(|i| (r[1] + part[i] * r[3]) as usize);
@@ -58,7 +58,7 @@ fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
     f64::from(changed as u32) / f64::from(all.max(1))
 }
 
-/// Waits until the page shows the finished picture of the scene that the program has now.
+/// Waits until the page shows the final image of the program's current scene.
 fn settled(b: &mut Browser) {
     b.wait_for(
         "fetch('state').then(r => r.json()).then(s => document.body.dataset.finished === 'true' && \
@@ -79,7 +79,7 @@ fn looking_orbiting_painting_and_switching() {
                 std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
                 "Chromium is required: {why}"
             );
-            // Not `eprintln!`: libtest swallows that.
+            // Not `eprintln!`, whose output libtest captures.
             let _ = writeln!(std::io::stderr(), "skipped: {why}");
             return;
         }
@@ -111,7 +111,7 @@ fn looking_orbiting_painting_and_switching() {
         assert!(text.contains(word), "the page lacks `{word}`: {text}");
     }
 
-    // Orbit: the blob wanders, the empty corner does not change.
+    // Orbit: the blob moves.
     b.drag(&[
         inside(picture, 0.4, 0.5),
         inside(picture, 0.45, 0.5),
@@ -131,8 +131,8 @@ fn looking_orbiting_painting_and_switching() {
         "the same view is the same picture"
     );
 
-    // Paint on the filter: a red dab in the middle colours undisturbed light, on the picture and on
-    // the filter.
+    // Paint on the filter: a red dab in the middle colours undisturbed light in the image, and the
+    // middle of the filter.
     b.evaluate("document.getElementById('clear-white').click()");
     settled(&mut b);
     let clear = look(&mut b, "clear");
@@ -155,8 +155,7 @@ fn looking_orbiting_painting_and_switching() {
         "the rest of the filter is as it was"
     );
 
-    // Paint on the picture: what is under the brush changes; undisturbed light goes elsewhere on
-    // the filter.
+    // Paint on the image: the pixels under the brush change.
     b.evaluate("document.getElementById('clear-white').click()");
     settled(&mut b);
     b.evaluate(
@@ -175,7 +174,7 @@ fn looking_orbiting_painting_and_switching() {
         "under the brush"
     );
 
-    // Switch: another picture, other settings.
+    // Switch the technique: the image and the settings change.
     b.evaluate(
         "const t = document.querySelector('select[name=technique]'); t.value = \
                 'interferogram'; t.dispatchEvent(new Event('change'))",
@@ -189,7 +188,7 @@ fn looking_orbiting_painting_and_switching() {
         "no filter to paint on"
     );
 
-    // Another time: the blob is elsewhere.
+    // Another time: the blob has moved.
     b.evaluate(
         "const step = document.getElementById('step'); step.value = 3; \
                 step.dispatchEvent(new Event('input'))",
@@ -199,7 +198,7 @@ fn looking_orbiting_painting_and_switching() {
     let later = look(&mut b, "later");
     assert!(differs(&switched, &later, picture, [0.1, 0.1, 0.9, 0.9]) > 0.1);
 
-    // Nonsense is answered on the page, and the page goes on.
+    // An invalid value gives a message on the page, and the page continues.
     b.evaluate(
         "const w = document.querySelector('input[name=wavelengths]'); w.value = '0.5'; \
                 w.dispatchEvent(new Event('change'))",

@@ -1,8 +1,8 @@
-//! Angles of shocks, measured in schlieren pictures as one would on a photograph, against
-//! theta-beta-M and Taylor and Maccoll; and the phase across a shock.
+//! Compares angles of shocks, measured in schlieren images as on a photograph, with theta-beta-M
+//! and with Taylor and Maccoll. Also tests the phase across a shock.
 //!
-//! Flow, field, march, optics and film: all of it stands between the gas dynamics and the number
-//! that is compared.
+//! The compared number depends on the whole chain: gas dynamics, flow, field, march, optics and
+//! film.
 
 use datasets::generate::cone_shock::Cone;
 use datasets::generate::flow::{Fields, Flow};
@@ -15,10 +15,10 @@ use schlieren::measure::{From, Line, Mark, Photograph, fitted_line};
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 
-/// What a fit may be off, in degrees.
+/// Largest error of a fitted angle, in degrees.
 const TOLERANCE_DEG: f64 = 0.3;
 
-/// A picture 300 pixels wide of a flow, by the customary bench at the customary tolerance.
+/// An image of a flow, 300 pixels wide, with the default bench and tolerance.
 fn photographed(flow: Flow, toml: &str, layers: Layers) -> RenderOutput {
     let (w, h) = (flow.high_m().x - flow.origin_m.x, flow.high_m().y - flow.origin_m.y);
     let rows = (300.0 * h / w).round();
@@ -31,8 +31,8 @@ fn photographed(flow: Flow, toml: &str, layers: Layers) -> RenderOutput {
     render(&scene, &section, layers, &Control::default()).unwrap()
 }
 
-/// The angle of the shock above the body. `part` of the picture's columns is looked at, from 0 at
-/// the left to 1.
+/// The line fitted to the shock above the body, in the columns `part` of the image, from 0 at the
+/// left to 1.
 fn shock(flow: Flow, knife_deg: f64, part: [f64; 2]) -> Line {
     let toml = format!(
         "[technique]\nkind = \"schlieren\"\ncutoff = {{ kind = \"knife\", angle_deg = \
@@ -45,7 +45,7 @@ fn shock(flow: Flow, knife_deg: f64, part: [f64; 2]) -> Line {
     let points = photograph.fronts_m(From::Top, Mark::Edge, 0.05, 4);
     let points: Vec<_> = points.into_iter().filter(|p| (left..right).contains(&p[0])).collect();
     let line = fitted_line(&points).unwrap();
-    // It is a line, not a cloud.
+    // The points lie on a line.
     assert!(
         line.points > 100 && line.rms_m < 2.0 * framing.pixel_m,
         "{line:?}, pixels of {}",
@@ -65,7 +65,7 @@ fn assert_angle(what: &str, line: &Line, exact_rad: f64, golden_deg: f64) {
         "{what}: {got:.4} degrees in the picture, exact {exact:.4}, rms {:.1e} m over {} points",
         line.rms_m, line.points
     );
-    // The generator's own solution against the table that another program computed.
+    // Compares the generator's own solution with the table that another program computed.
     assert!((exact - golden_deg).abs() < 1e-4, "{what}: {exact} {golden_deg}");
     assert!((got - exact).abs() < TOLERANCE_DEG, "{what}: {got} {exact} {line:?}");
 }
@@ -95,7 +95,7 @@ fn cone_shocks_stand_at_taylor_maccoll() {
         let cone = Cone { stream, ..Cone::default() };
         let exact = cone.solution().unwrap().shock_rad;
         let flow = cone.flow(UVec3::new(91, 97, 97), Fields::Density).unwrap();
-        // Not the apex, whose shock is a few voxels across.
+        // Excludes the apex, where the shock is a few voxels across.
         let line = shock(flow, 90.0, [0.35, 0.98]);
         assert_angle(&format!("cone 20, M {mach}"), &line, exact, golden_deg);
     }
@@ -109,7 +109,7 @@ fn the_phase_steps_by_the_density_across_a_shock() {
     let rho = wedge.stream.density();
     let k = "air".parse::<Gas>().unwrap().k_m3_per_kg(0.633).unwrap();
     let waves = k * rho * (shock.jump.density - 1.0) * wedge.span_m / 633e-9;
-    // A few fringes: not a fraction of one, where a step of a whole one would go unseen.
+    // The step must be several fringes, so that it is tested beyond a fraction of one.
     assert!((3.0..30.0).contains(&waves), "{waves}");
 
     let flow = wedge.flow(UVec3::new(121, 121, 17), Fields::Density).unwrap();
@@ -117,7 +117,8 @@ fn the_phase_steps_by_the_density_across_a_shock() {
     let r = photographed(flow, toml, Layers { map: true, phase: true, ..Layers::NONE });
     let map = r.map.unwrap();
     let (width, pixel_m) = (r.framing.width as usize, r.framing.pixel_m);
-    // Lengths count from the wedge's edge, a fifth of its length before which the picture begins.
+    // Lengths are measured from the wedge's edge. The image begins a fifth of the wedge's length
+    // before it.
     let at = |x_m: f64, y_m: f64| {
         let i = ((x_m + 0.2 * wedge.length_m) / pixel_m) as usize;
         let j = (0.5 * f64::from(r.framing.height) - y_m / pixel_m) as usize;
@@ -125,8 +126,8 @@ fn the_phase_steps_by_the_density_across_a_shock() {
     };
     let (mut checked, mut worst, mut worst_brightness) = (0, 0.0f64, 0.0f64);
     for x_m in [0.02, 0.03, 0.04, 0.05] {
-        // Between body and shock, and above it, well away from both; upwards, the same place of the
-        // picture mirrored downwards.
+        // Samples between body and shock, and outside the shock, well away from both, above the
+        // wedge and mirrored below it.
         let (surface, front) = (x_m * wedge.half_angle_rad.tan(), x_m * shock.shock_rad.tan());
         for share in [0.35, 0.5, 0.65] {
             for side in [1.0, -1.0] {
@@ -143,8 +144,8 @@ fn the_phase_steps_by_the_density_across_a_shock() {
         }
     }
     println!("{waves:.4} waves, off by {worst:.1e}; brightness by {worst_brightness:.1e}");
-    // The spline rings for a few voxels beside the jump, 1/14 a voxel; places are 4 voxels and more
-    // from it. 2e-3 of the step and of a fringe's brightness.
+    // The spline overshoots within a few voxels of the jump (1/14 per voxel), and samples are 4
+    // voxels and more from it. Tolerance: 2e-3 of the step and of a fringe's brightness.
     assert!(
         checked == 24 && worst < 2e-3 * waves && worst_brightness < 0.05,
         "{worst} of {waves}; {worst_brightness}"

@@ -1,5 +1,4 @@
-//! Adds absorption, emission and rotation of the plane of polarisation to the light paths of a
-//! flow.
+//! Integrates absorption, emission and rotation of the plane of polarisation along light paths.
 //!
 //! Integrals along the path of a ray, with s the path length in metres ([`MediaIntegrals`]):
 //!

@@ -39,7 +39,7 @@ impl MediaSpec {
         *self == MediaSpec::default()
     }
 
-    /// The array's name or number of a property.
+    /// The array's name, or the number, that is given for a property.
     pub fn get(&self, property: Property) -> Option<&str> {
         let text = match property {
             Property::Absorption => &self.absorption,

@@ -34,7 +34,7 @@ use std::time::Duration;
 /// Errors of starting the server.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The flow or the bodies cannot be read, or are no valid test section.
+    /// The flow or the bodies cannot be read, or do not form a valid test section.
     #[error(transparent)]
     Render(Box<RenderError>),
     /// The page does not accept the scene.

@@ -1,4 +1,4 @@
-//! Fields and rays that several tests use.
+//! Fields, views and rays shared by several tests.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use glam::DVec3;
@@ -8,7 +8,7 @@ use schlieren::march::Medium;
 use schlieren::path::{Exit, LightPaths, Start};
 use schlieren::view::View;
 
-/// A metre cube of `n` nodes a side around the origin, holding a blob.
+/// A blob in a cube of 1 m around the origin, with `n` nodes per side.
 pub(crate) fn blob(n: usize, amplitude: f64, sigma_m: f64) -> Field {
     let g = Gaussian { amplitude, sigma_m };
     cube(n, |p| g.sample(p).0)
@@ -18,7 +18,7 @@ pub(crate) fn cube(n: usize, eps: impl Fn(DVec3) -> f64 + Sync) -> Field {
     Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, eps).unwrap()
 }
 
-/// Three blobs of different size and sign: no symmetry at all.
+/// Three blobs of different size and sign, without any symmetry.
 pub(crate) fn lopsided(p: DVec3) -> f64 {
     let blob = |x: f64, y: f64, z: f64, s: f64| {
         (-(p - DVec3::new(x, y, z)).length_squared() / (2.0 * s * s)).exp()
@@ -27,7 +27,7 @@ pub(crate) fn lopsided(p: DVec3) -> f64 {
         + 0.3 * blob(0.02, -0.14, 0.13, 0.08))
 }
 
-/// A view turned by 0.6 rad about y, and a little about x, so that no direction cosine is zero.
+/// A view rotated by 0.6 rad about y, and a little about x, so that no direction cosine is zero.
 pub(crate) fn oblique() -> View {
     View::new(DVec3::new(0.6f64.sin(), 0.1, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).unwrap()
 }
@@ -58,7 +58,7 @@ pub(crate) fn difference(a: &[Exit], b: &[Exit]) -> (f64, f64) {
         for c in 0..2 {
             let d = (f64::from(x.deflection_rad[c]) - f64::from(y.deflection_rad[c])) / scale;
             sum += d * d;
-            // Not `max`: a NaN must not vanish.
+            // Not `max`, which would ignore NaN.
             if d.is_nan() || d.abs() > max {
                 max = d.abs();
             }

@@ -1,5 +1,5 @@
-//! Headless Chromium by its DevTools protocol: JSON over a WebSocket, with no more of either than a
-//! test needs.
+//! Drives a headless Chromium by its DevTools protocol: JSON over a WebSocket, with only the parts
+//! that the test needs.
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The Chromium to test with: the one that the set-up found, or one of the usual names. `Err` says
-/// why there is none.
+/// The Chromium to test with: the one in RTSV_CHROMIUM, or one of the usual names in PATH. `Err`
+/// has the reason why there is none.
 pub(crate) fn chromium() -> Result<PathBuf, String> {
     if let Some(path) = std::env::var_os("RTSV_CHROMIUM") {
         return Ok(path.into());
@@ -61,14 +61,14 @@ impl Browser {
             .spawn()
             .expect("chromium starts");
 
-        // It prints where it listens.
+        // Chromium prints the address that it listens on.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let host = lines
             .by_ref()
             .map_while(Result::ok)
             .find_map(|l| Some(l.split_once("ws://")?.1.split_once('/')?.0.to_string()))
             .expect("chromium says where it listens");
-        // Its pipe must not fill up.
+        // Drains the pipe, so that Chromium does not block on it.
         std::thread::spawn(move || lines.for_each(drop));
         let page = page_of(&host);
         let mut browser = Browser {
@@ -85,7 +85,7 @@ impl Browser {
         browser
     }
 
-    /// Calls a method of the protocol and waits for its answer.
+    /// Calls a method of the protocol and waits for its result.
     pub(crate) fn call(&mut self, method: &str, params: Value) -> Value {
         self.last_id += 1;
         let id = self.last_id;
@@ -108,7 +108,7 @@ impl Browser {
         }
     }
 
-    /// Evaluates JavaScript; promises are waited for.
+    /// Evaluates JavaScript and awaits promises.
     pub(crate) fn evaluate(&mut self, expression: &str) -> Value {
         let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
         let result = self.call("Runtime.evaluate", params);
@@ -131,7 +131,7 @@ impl Browser {
         }
     }
 
-    /// Presses at the first point, moves through the others, and lets go.
+    /// Presses the mouse button at the first point, moves through the others, and releases it.
     pub(crate) fn drag(&mut self, points: &[[f64; 2]]) {
         let mut event = |kind: &str, at: [f64; 2], buttons: u32| {
             let params = json!({"type": kind, "x": at[0], "y": at[1], "button": "left", "buttons": buttons, "clickCount": 1});
@@ -142,7 +142,7 @@ impl Browser {
         event("mouseReleased", points[points.len() - 1], 0);
     }
 
-    /// The window's picture as PNG.
+    /// A screenshot of the window as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
         base64::decode(result["data"].as_str().expect("a picture")).expect("base64")
@@ -162,13 +162,13 @@ impl Browser {
                 frame.extend((n as u64).to_be_bytes());
             }
         }
-        // Clients must mask; a mask of zeros leaves the text as it is.
+        // Clients must mask their frames; a mask of zeros leaves the text unchanged.
         frame.extend([0; 4]);
         frame.extend(text.as_bytes());
         self.socket.write_all(&frame).expect("chromium listens");
     }
 
-    /// A whole message; pings are none.
+    /// Receives a whole message, without control frames such as pings.
     fn receive(&mut self) -> String {
         let mut message = Vec::new();
         loop {
@@ -207,7 +207,7 @@ fn http(host: &str, request: &str) -> TcpStream {
     stream
 }
 
-/// Address of the first page's socket.
+/// Path of the first page's WebSocket.
 fn page_of(host: &str) -> String {
     for _ in 0..100 {
         let stream = http(
@@ -242,7 +242,7 @@ fn upgrade(host: &str, path: &str) -> TcpStream {
              AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
         ),
     );
-    // Byte by byte: what follows the head are frames.
+    // Reads byte by byte, because frames follow the head.
     let (mut head, mut byte) = (Vec::new(), [0]);
     while !head.ends_with(b"\r\n\r\n") {
         stream.read_exact(&mut byte).unwrap();

@@ -1,5 +1,5 @@
-//! A running `schlieren serve`, and HTTP over a plain socket: what a test sends is what the program
-//! gets, right or wrong.
+//! Starts `schlieren serve`, and sends HTTP over a plain socket, so that the program receives
+//! exactly the bytes of the test, valid or not.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use datasets::model::{DataArray, Dataset, ImageData, Values};
@@ -12,13 +12,13 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Air with a light blob right of and above the middle, in a box of 0.2 x 0.1 x 0.1 m, and a
-/// temperature beside it.
+/// Writes a flow with density and temperature: air with a light blob right of and above the middle,
+/// in a box of 0.2 x 0.1 x 0.1 m.
 pub(crate) fn flow(path: &Path) {
     flow_at(path, 0.03, 1.2);
 }
 
-/// The same with the blob elsewhere, in other surroundings.
+/// [`flow`] with another position of the blob and another density around it.
 fn flow_at(path: &Path, blob_x_m: f64, around_kg_m3: f64) {
     let (nx, n) = (41u32, 21u32);
     let mut image = ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(5e-3));
@@ -39,7 +39,7 @@ fn flow_at(path: &Path, blob_x_m: f64, around_kg_m3: f64) {
         .expect("the flow is written");
 }
 
-/// The program, ended when dropped.
+/// The running program, which is killed on drop.
 pub(crate) struct Served {
     pub(crate) child: Child,
     /// `127.0.0.1:PORT`.
@@ -49,7 +49,7 @@ pub(crate) struct Served {
     _dir: tempfile::TempDir,
 }
 
-/// An answer.
+/// An HTTP response.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -76,7 +76,8 @@ impl Served {
         Served::of(&path, dir, options)
     }
 
-    /// A series of four times: the blob wanders to the left. The file of the third is missing.
+    /// A series of four times in which the blob moves to the left. The file of the third is
+    /// missing.
     pub(crate) fn start_series(options: &[&str]) -> Served {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
@@ -122,7 +123,7 @@ impl Served {
         stream
     }
 
-    /// Sends bytes as they are and reads until the server closes or the answer is whole.
+    /// Sends bytes unchanged and reads until the server closes the connection.
     pub(crate) fn raw(&self, bytes: &[u8]) -> Option<Answer> {
         let mut stream = self.connect();
         // The server may refuse and close before all is sent.
@@ -135,7 +136,7 @@ impl Served {
         Some(Answer { status, head, body: all[end + 4..].to_vec() })
     }
 
-    /// A request below the token.
+    /// Sends a request below the token.
     pub(crate) fn ask(&self, method: &str, path: &str, body: &str) -> Answer {
         let (base, length) = (&self.base, body.len());
         let request = format!(
@@ -149,14 +150,14 @@ impl Served {
         self.ask("GET", path, "")
     }
 
-    /// Changes the scene; must succeed.
+    /// Changes the scene, which must succeed.
     pub(crate) fn change(&self, patch: &Value) -> Value {
         let answer = self.ask("POST", "scene", &patch.to_string());
         assert_eq!(answer.status, 200, "{patch}: {}", answer.text());
         answer.json()
     }
 
-    /// The finished frame of the newest scene.
+    /// Waits for the final frame of the newest scene.
     pub(crate) fn finished(&self) -> Shown {
         let generation = self.get("state").json()["generation"].as_u64().unwrap();
         let (end, mut after) = (Instant::now() + Duration::from_secs(120), 0);
@@ -188,7 +189,7 @@ impl Drop for Served {
     }
 }
 
-/// A frame, taken apart.
+/// A decoded frame.
 pub(crate) struct Shown {
     pub(crate) info: Value,
     pub(crate) rgb: Vec<u8>,
@@ -212,7 +213,7 @@ impl Shown {
     }
 }
 
-/// Part of the bytes that differ by more than a step or two.
+/// Fraction of the bytes that differ by more than 3.
 pub(crate) fn changed(a: &[u8], b: &[u8]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| a.abs_diff(**b) > 3).count() as f64 / a.len() as f64
