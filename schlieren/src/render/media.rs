@@ -92,6 +92,9 @@ impl TestSection {
     /// Absorption and rotation of the image's light from these starts, traced along the light, or
     /// from the camera for techniques that trace from the film. Emission is not included: see
     /// [`TestSection::emitted`]. `None` when the scene has no media.
+    ///
+    /// # Errors
+    /// If the scene needs a property that the test section lacks.
     pub fn collected(
         &self,
         scene: &Scene,
@@ -115,6 +118,9 @@ impl TestSection {
 
     /// The medium's emission towards the film along camera rays through these starts. Bodies hide
     /// what is behind them. `None` when the scene has no emission.
+    ///
+    /// # Errors
+    /// If the scene needs a property that the test section lacks.
     pub fn emitted(
         &self,
         scene: &Scene,

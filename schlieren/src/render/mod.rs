@@ -228,6 +228,10 @@ impl Report {
 
 /// Renders the scene's image of a test section. The result does not depend on the number of
 /// threads.
+///
+/// # Errors
+/// If the scene is invalid, does not fit the test section, or needs a GPU that is not available, or
+/// if rendering is cancelled.
 pub fn render(
     scene: &Scene,
     section: &TestSection,
@@ -317,6 +321,9 @@ pub fn framing(scene: &Scene, section: &TestSection) -> Framing {
 }
 
 /// The technique for line `line` of the spectrum.
+///
+/// # Errors
+/// If the image of a filter cannot be read.
 pub fn technique(
     scene: &Scene,
     line: usize,

@@ -34,6 +34,10 @@ impl TestSection {
     /// Light paths through field `line` with the scene's march. With `against_light` they are
     /// traced from the camera. With `measure` some rays are traced with everything refined, to
     /// measure the error.
+    ///
+    /// # Errors
+    /// If the scene names a march or an interpolant that does not exist, requests a GPU that is not
+    /// available, or needs a property of the medium that the test section lacks.
     pub fn paths(
         &self,
         scene: &Scene,

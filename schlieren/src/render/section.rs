@@ -31,6 +31,9 @@ pub struct TestSection {
 impl TestSection {
     /// Reads the files that the scene names. `read` is called with a description before each is
     /// read.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or does not define a field for each wavelength.
     pub fn open(scene: &Scene, mut read: impl FnMut(&str)) -> Result<TestSection, RenderError> {
         let mut fields = Vec::new();
         let mut report: Option<input::Report> = None;
@@ -61,6 +64,9 @@ impl TestSection {
     }
 
     /// A test section of given fields, one per wavelength of the scene.
+    ///
+    /// # Errors
+    /// If the number of fields is not that of wavelengths, or the view is invalid.
     pub fn of_fields(
         scene: &Scene,
         fields: Vec<Field>,

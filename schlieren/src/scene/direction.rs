@@ -29,6 +29,9 @@ impl Default for Direction {
 
 impl Direction {
     /// The view in this direction, centred on `centre_m`.
+    ///
+    /// # Errors
+    /// As [`View::from_angles_deg`].
     pub fn view(self, centre_m: DVec3) -> Result<View, ViewError> {
         match self {
             Direction::Axis(axis) => Ok(View::along(axis, centre_m)),

@@ -285,6 +285,9 @@ impl FlowSpec {
     }
 
     /// Options for reading the file as a field for light of this wavelength.
+    ///
+    /// # Errors
+    /// As [`FlowSpec::medium`].
     pub fn options(&self, wavelength_nm: f64) -> Result<Options, SceneError> {
         let border = Reference::Border;
         Ok(Options {

@@ -442,11 +442,17 @@ pub enum SceneError {
 
 impl Scene {
     /// Reads a scene from TOML and checks it.
+    ///
+    /// # Errors
+    /// If the text is not TOML, or a key or value is refused ([`Scene::check`]).
     pub fn from_toml(text: &str) -> Result<Scene, SceneError> {
         Scene::parse(text, "scene")
     }
 
     /// Reads a scene from a file and checks it. Paths in the scene are relative to the file.
+    ///
+    /// # Errors
+    /// If the file cannot be read; otherwise as [`Scene::from_toml`].
     pub fn open(path: &Path) -> Result<Scene, SceneError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.into(), source })?;
@@ -474,6 +480,9 @@ impl Scene {
     }
 
     /// The scene as TOML.
+    ///
+    /// # Errors
+    /// If a value cannot be written as TOML.
     pub fn to_toml(&self) -> Result<String, SceneError> {
         Ok(toml::to_string(self)?)
     }

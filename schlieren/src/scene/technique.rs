@@ -181,6 +181,9 @@ impl Default for CutoffSpec {
 
 impl CutoffSpec {
     /// The cut-off. Reads the image of a filter from its file.
+    ///
+    /// # Errors
+    /// If the image of a filter cannot be read, or a painting is invalid.
     pub fn cutoff(&self) -> Result<Cutoff, SceneError> {
         Ok(match self {
             CutoffSpec::Knife { angle_deg, open, open_m } => {

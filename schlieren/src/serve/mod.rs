@@ -67,6 +67,10 @@ const FAREWELL: Duration = Duration::from_secs(1);
 /// Serves the scene until `cancel` is set. With several `steps` the page offers a choice of time
 /// and shows the first step first; otherwise it shows the scene's own file. `ready` is called with
 /// the address of the page once it can be opened.
+///
+/// # Errors
+/// If the flow or bodies cannot be read, the page does not accept the scene, or the server cannot
+/// listen on the address or start.
 pub fn serve(
     mut scene: Scene,
     steps: Vec<Step>,

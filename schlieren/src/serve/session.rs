@@ -175,8 +175,7 @@ impl Session {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
-        // Values are always replaced as a whole, so they are consistent even after a panic of
-        // another thread.
+        // Values are replaced as a whole, so they stay consistent even if another thread panics.
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -198,13 +197,12 @@ impl Session {
         })
     }
 
-    /// The scene in effect as TOML.
+    /// The effective scene as TOML. Refused while a later step is not yet read.
     pub fn toml(&self) -> Result<String, RefusedChange> {
         let shared = self.lock();
         let mut scene = shared.scene.effective();
         if self.is_later(&scene) {
-            // Outside of the series, the file would be relative to its own surroundings and give
-            // another image.
+            // Outside of the series, the file would be relative to its own surroundings.
             match &shared.reference {
                 Some((flow, n_minus_1)) if *flow == shared.scene.flow => {
                     scene.flow.reference_n_minus_1 = Some(*n_minus_1);
@@ -427,8 +425,7 @@ impl Session {
             )));
         }
         let mut scene = shared.scene.clone();
-        // Keeps the source: otherwise the default slit of a knife would become the default disc of
-        // a painting.
+        // Keeps the source: the default slit of a knife must not become a painting's default disc.
         scene.light.source = scene.effective().light.source;
         scene.technique = TechniqueSpec::Schlieren { cutoff: CutoffSpec::Painted(painting) };
         self.check_scene(&scene)?;

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 
 /// The image of the slice across the view, at `depth_m` along the light from the view's centre, row
 /// by row from the top. It is 1 outside the field.
+///
+/// # Errors
+/// If no grid can be made of the field's gradient.
 pub fn slice(
     field: &Field,
     view: &View,

@@ -65,6 +65,9 @@ pub(super) fn gradient_grid(field: &Field) -> Result<Grid, ComparisonError> {
 }
 
 /// The image, row by row from the top. It is 1 where there is no gradient.
+///
+/// # Errors
+/// If no volume can be made of the field's gradient, or `strength` is not above 0.
 pub fn volume(
     field: &Field,
     view: &View,
