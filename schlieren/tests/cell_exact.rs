@@ -48,7 +48,7 @@ fn all_points(
         .map(|p| cells.line_of_sight(medium, line.0, line.1, line.2, p))
 }
 
-/// A trilinear function is a cubic polynomial along a line, and its gradient a quadratic one: two
+/// Along a line a trilinear function is a cubic polynomial and its gradient a quadratic one, so two
 /// points are exact.
 #[test]
 fn two_points_integrate_trilinear_cells_to_rounding() {

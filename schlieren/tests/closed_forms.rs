@@ -170,7 +170,7 @@ fn snell_invariants_are_exact_in_layers() {
     struct Layers;
     impl Medium for Layers {
         fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
-            // A tanh of 1 mm thickness.
+            // A tanh profile of 1 mm thickness.
             let t = (at_m.y / 1e-3).tanh();
             (0.2 * t, DVec3::Y * (0.2 * (1.0 - t * t) / 1e-3))
         }

@@ -289,7 +289,7 @@ fn sweeps_number_their_pictures_and_probes_print_numbers() {
 fn gas_is_left_out_within_a_bound_that_is_reported() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
-    // Fine enough that some bricks of 8 voxels are far from the blob.
+    // The lattice is so fine that some bricks of 8 voxels are far from the blob.
     flow_of(&dir.path().join("flow.vti"), [129, 65]);
     let (file, png, scene) = (path("flow.vti"), path("a.png"), path("scene.toml"));
     std::fs::write(

@@ -161,7 +161,7 @@ fn trace_back_returns_to_the_start_through_a_lattice() {
     // step is symmetric.
     assert!(home(&field, &spline, &CellExact::new(&field), 1) < 1e-11);
     assert!(home(&field, &trilinear, &CellExact::new(&field), 1) < 1e-11);
-    // Others return within their error.
+    // Other schemes return only within their error.
     assert!(home(&field, &spline, &RungeKutta4, 40) > 1e-11);
 }
 

@@ -20,7 +20,7 @@ struct Window {
     rgba: Vec<[f32; 4]>,
 }
 
-/// Left, top, width, height in pixels of the window.
+/// Left, top, width and height, in pixels of the window.
 type Rect = [f64; 4];
 
 fn rect(b: &mut Browser, id: &str) -> Rect {

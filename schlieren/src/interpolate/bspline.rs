@@ -20,7 +20,7 @@ pub struct BSpline {
 }
 
 impl BSpline {
-    /// Filters a field's values into coefficients, in parallel.
+    /// Computes the coefficients from a field's values, in parallel.
     pub fn new(field: &Field) -> BSpline {
         BSpline::in_jobs_of(field, 1)
     }
@@ -208,8 +208,8 @@ impl Interpolate for BSpline {
     }
 }
 
-/// The coefficients as four slices of one length, shifted by rows: one bounds check for the four
-/// rows of a layer.
+/// The coefficients as four slices of one length, shifted by rows, so that one bounds check serves
+/// the four rows of a layer.
 #[derive(Clone, Copy)]
 pub(crate) struct BSplineRows<'a> {
     rows: [&'a [f32]; 4],
@@ -256,7 +256,7 @@ impl Interpolate16 for BSplineRows<'_> {
         let (wx, dx) = weights16(simd, place[0]);
         let (wy, dy) = weights16(simd, place[1]);
         let (wz, dz) = weights16(simd, place[2]);
-        // Along y and z each ray's weights are scalars against its four taps along x.
+        // Along y and z, each ray's weights are scalars that multiply its four taps along x.
         let wy: [Row; 4] = [wy[0].into(), wy[1].into(), wy[2].into(), wy[3].into()];
         let wz: [Row; 4] = [wz[0].into(), wz[1].into(), wz[2].into(), wz[3].into()];
         let dy: [Row; 3] = [dy[0].into(), dy[1].into(), dy[2].into()];

@@ -45,7 +45,7 @@ pub(crate) type Row = [f32; LANES];
 /// The value of eps at a point, and its gradient per lattice step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// eps = n/n0 - 1.
+    /// The value of eps = n/n0 - 1.
     pub eps: f64,
     /// Change of eps per lattice step along x, y and z.
     pub gradient: [f64; 3],

@@ -120,7 +120,7 @@ impl Interpolate16 for TrilinearRows<'_> {
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
 
-        // Taps.
+        // The eight taps of each cell.
         let [[a0, a1], [b0, b1], [c0, c1], [d0, d1]] = taps(simd, &self.corners, &offsets);
 
         // Differences are taken first, so that the gradient is not a difference of interpolated

@@ -58,7 +58,8 @@ impl TrilinearGradient {
     }
 }
 
-/// Derivative per lattice step at node `i` of `n` along a line.
+/// Derivative per lattice step at node `i` of the `n` nodes of a line. The node's index in `eps` is
+/// `o`.
 fn difference(eps: &[f32], o: usize, stride: usize, i: usize, n: usize) -> f32 {
     let v = |o: usize| f64::from(eps[o]);
     let d = match (i, n) {

@@ -3,7 +3,7 @@
 
 use super::integrator::{Medium, Rate, Ray};
 
-/// DOPRI5 with steps chosen so that the estimated error of each stays below a tolerance.
+/// DOPRI5 with steps chosen so that the estimated error of each step stays below a tolerance.
 ///
 /// The estimate does not see the kinks of an interpolant that a step jumps over. For interpolated
 /// fields, limit `longest_step_m` to about a voxel.

@@ -35,8 +35,8 @@ pub enum Scheme {
 pub struct Options {
     /// The scheme that steps deviations.
     pub scheme: Scheme,
-    /// Longest step, in lattice steps. 1 is right for nearly all fields: below it, the interpolant
-    /// decides the error.
+    /// Longest step, in lattice steps. 1 is right for nearly all fields: with shorter steps, the
+    /// interpolant dominates the error.
     pub step_voxels: f64,
     /// Quantities to compute besides deflection and displacement.
     pub wanted: PathQuantities,
@@ -102,7 +102,7 @@ pub struct Deviational<'a> {
 }
 
 impl<'a> Deviational<'a> {
-    /// Prepares the interpolant, and bricks if some may be skipped.
+    /// Computes the interpolant, and bricks if they may be skipped.
     pub fn new(
         field: &'a Field,
         view: View,
@@ -197,7 +197,7 @@ impl<'a> Deviational<'a> {
         }
     }
 
-    /// The bricks, when some may be skipped.
+    /// The bricks, when they may be skipped.
     pub fn bricks(&self) -> Option<&Bricks> {
         self.bricks.as_ref()
     }

@@ -28,7 +28,7 @@ impl BlankCells {
     }
 }
 
-/// Lattice coordinates of a view's rays.
+/// Converts a view's rays to lattice coordinates.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {
     pub(crate) view: View,
@@ -101,7 +101,8 @@ pub(crate) fn clip(at: DVec3, direction: DVec3, last: DVec3) -> [f64; 2] {
     let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
     for c in 0..3 {
         if direction[c] == 0.0 {
-            // Parallel to the faces: inside them or not. Written so that NaN is outside.
+            // Parallel to these faces, the line is between them or not. Written so that NaN is
+            // outside.
             if !(at[c] >= 0.0 && at[c] <= last[c]) {
                 return [0.0; 2];
             }

@@ -23,7 +23,7 @@ pub struct InterpolatedMedium<'a, I: Interpolate + ?Sized> {
 }
 
 impl<'a, I: Interpolate + ?Sized> InterpolatedMedium<'a, I> {
-    /// The interpolant of `field`.
+    /// The medium of `field` with an interpolant of it.
     pub fn new(field: &Field, interpolate: &'a I) -> Self {
         InterpolatedMedium {
             interpolate,
@@ -43,7 +43,7 @@ impl<I: Interpolate + ?Sized> Medium for InterpolatedMedium<'_, I> {
 /// The state of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where tau is zero.
+    /// Position at tau = 0.
     pub start_m: DVec3,
     /// Direction of the undisturbed ray, of length one.
     pub direction: DVec3,
@@ -58,7 +58,7 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// A ray that has not been disturbed yet. `direction` has length one.
+    /// An undisturbed ray. `direction` has length one.
     pub fn new(start_m: DVec3, direction: DVec3) -> Ray {
         Ray { start_m, direction, tau_m: 0.0, xi_m: DVec3::ZERO, u: DVec3::ZERO, excess_m: 0.0 }
     }
@@ -68,7 +68,7 @@ impl Ray {
         Ray { u: direction * medium.sample(start_m).0, ..Ray::new(start_m, direction) }
     }
 
-    /// Where the ray is.
+    /// The ray's position.
     pub fn position_m(&self) -> DVec3 {
         self.start_m + self.direction * self.tau_m + self.xi_m
     }
@@ -128,7 +128,7 @@ pub(crate) struct Rate {
 }
 
 impl Rate {
-    /// A weighted sum.
+    /// The weighted sum of rates.
     pub(crate) fn sum(terms: &[(f64, &Rate)]) -> Rate {
         let mut out = Rate { xi: DVec3::ZERO, u: DVec3::ZERO, excess: 0.0 };
         for (weight, r) in terms {

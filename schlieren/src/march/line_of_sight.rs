@@ -212,7 +212,7 @@ fn spline2<S: Simd>(
     let mut place = [f32x16::splat(simd, 0.0); 2];
     for c in 0..2 {
         let last = f32x16::splat(simd, (dims[c] - 1) as f32);
-        // NaN becomes 0 here: a comparison with it is false.
+        // NaN becomes 0 here, because comparisons with it are false.
         let a = f32x16::from_slice(simd, &at[c]);
         let inside = a.simd_ge(0.0).select(a, f32x16::splat(simd, 0.0)).min(last);
         cells[c] = inside.min(f32x16::splat(simd, (dims[c] - 2) as f32)).to_int::<i32x16<S>>();
@@ -536,7 +536,7 @@ impl LightPaths for LineOfSight {
         0.5 * self.frame.spacing_m.min_element()
     }
 
-    /// From the spline's second derivatives.
+    /// Computes the Jacobians from the spline's second derivatives.
     fn trace_with_jacobians(
         &self,
         starts: &[Start],

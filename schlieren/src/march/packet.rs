@@ -241,12 +241,12 @@ fn march_body<S: Simd, I: Interpolate16, E: KernelFeatures, const P: usize>(
     work
 }
 
-/// Steps from entry to exit of those rays in flight that meet the field.
+/// Numbers of steps from entry to exit of the rays in flight that cross the field.
 #[derive(Clone, Copy)]
 pub(super) struct Steps {
-    /// The fewest of any ray.
+    /// The smallest number of any ray.
     pub(super) shortest: u32,
-    /// The most of any ray.
+    /// The largest number of any ray.
     pub(super) longest: u32,
 }
 
@@ -291,8 +291,8 @@ struct Step<S: Simd> {
     dt: f32x16<S>,
 }
 
-/// One step. Verlet's positions arrive at the middle of the last step and drift to the middle of
-/// this one (in the first step there is nothing to drift yet); Euler's arrive at the start of the
+/// One step. With Verlet, positions are at the middle of the last step and drift to the middle of
+/// this one (in the first step the rate is still zero). With Euler, they are at the start of the
 /// step and drift to its end after the sample.
 #[inline(always)]
 fn step<S: Simd, I: Interpolate16, E: KernelFeatures>(
@@ -379,8 +379,8 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
         }
     }
     if E::OPD {
-        // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z): all terms small, none a
-        // difference.
+        // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z): all terms are small, and none
+        // is a difference.
         let mut square = middle[0] * 0.0;
         let mut u_z = square;
         for c in 0..3 {

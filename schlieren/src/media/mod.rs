@@ -68,9 +68,9 @@ pub use volume::{Repairs, Volume};
 pub enum Property {
     /// Fraction of the light that is lost per metre.
     Absorption,
-    /// Light that is added per metre.
+    /// Light that is added per metre, relative to undisturbed light (see the [module](self)).
     Emission,
-    /// Angle by which the plane of polarisation turns per metre.
+    /// Angle by which the plane of polarisation is rotated per metre.
     Rotation,
 }
 

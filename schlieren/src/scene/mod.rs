@@ -126,7 +126,7 @@ impl Default for LightSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SourceSpec {
-    /// No extent.
+    /// A point without extent.
     Point {},
     /// A rectangle.
     Slit {
@@ -226,7 +226,7 @@ impl Default for FilmSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SamplingSpec {
-    /// By jittered photons ([`crate::film::photons`]).
+    /// Exposed by jittered photons ([`crate::film::photons`]).
     Photons {
         /// Photons per pixel.
         #[serde(default = "samples")]
@@ -241,7 +241,7 @@ pub enum SamplingSpec {
         #[serde(default)]
         filter: FilterSpec,
     },
-    /// By cells of a lattice of rays, without noise ([`crate::film::beams`]).
+    /// Exposed by cells of a lattice of rays, without noise ([`crate::film::beams`]).
     Beams {
         /// Cells along a pixel's side.
         #[serde(default = "cells")]
@@ -279,7 +279,7 @@ pub enum Jitter {
     Random,
 }
 
-/// [`Filter`], for one photon per pixel.
+/// [`Filter`], with parameters for one photon per pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FilterSpec {
@@ -406,7 +406,7 @@ pub enum SceneError {
         /// The position and the cause.
         source: toml::de::Error,
     },
-    /// A scene that cannot be written.
+    /// The scene cannot be written.
     #[error("the scene cannot be written as TOML")]
     Write(#[from] toml::ser::Error),
     /// An invalid value.

@@ -14,7 +14,7 @@ pub enum TechniqueSpec {
     Shadowgraph {},
     /// Schlieren ([`crate::technique::schlieren`]).
     Schlieren {
-        /// What stands in the cut-off plane.
+        /// The cut-off in the cut-off plane.
         #[serde(default)]
         cutoff: CutoffSpec,
     },
@@ -122,7 +122,7 @@ impl TechniqueSpec {
     }
 }
 
-/// What stands in the cut-off plane.
+/// The cut-off in the cut-off plane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum CutoffSpec {

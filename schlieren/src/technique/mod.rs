@@ -22,7 +22,7 @@ use crate::path::{Exit, Start};
 /// A photon behind the test section.
 #[derive(Debug, Clone, Copy)]
 pub struct Photon<'a> {
-    /// Its undisturbed ray.
+    /// The undisturbed ray.
     pub start: &'a Start,
     /// Its deviation behind the flow.
     pub exit: &'a Exit,
