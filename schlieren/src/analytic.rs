@@ -1,4 +1,4 @@
-//! Closed forms to test against: media whose rays are known.
+//! Media with known rays, to validate marches against closed forms.
 
 use crate::march::Medium;
 use glam::DVec3;
@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 pub struct Gaussian {
     /// eps at the centre.
     pub amplitude: f64,
-    /// Standard deviation.
+    /// Standard deviation of the blob.
     pub sigma_m: f64,
 }
 
@@ -31,7 +31,7 @@ impl Gaussian {
         [-x / self.sigma_m.powi(2) * path, -y / self.sigma_m.powi(2) * path]
     }
 
-    /// Change of the deflection with the ray's place, along and across x: d u_x/dx, d u_x/dy, d
+    /// Derivatives of the deflection with respect to the ray's position: d u_x/dx, d u_x/dy, d
     /// u_y/dy.
     pub fn jacobian_per_m(&self, x: f64, y: f64, half_m: f64) -> [f64; 3] {
         let path = self.path_difference_m(x, y, half_m);
@@ -48,7 +48,8 @@ impl Medium for Gaussian {
     }
 }
 
-/// A Luneburg lens of radius 1 m: n^2 = 2 - r^2. Parallel light meets in one point on the far side.
+/// A Luneburg lens of radius 1 m: n^2 = 2 - r^2. It focuses parallel light into one point on the
+/// far side.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Luneburg;
 
@@ -59,7 +60,8 @@ impl Medium for Luneburg {
 }
 
 impl Luneburg {
-    /// Position and w after `tau_m` of the ray that enters along z at (b, 0, -sqrt(1 - b^2)).
+    /// Position and w, at path parameter `tau_m`, of the ray that enters along z at (b, 0,
+    /// -sqrt(1 - b^2)).
     pub fn ray(b: f64, tau_m: f64) -> (DVec3, DVec3) {
         let (s, c) = tau_m.sin_cos();
         let z = -(1.0 - b * b).sqrt();
@@ -67,8 +69,8 @@ impl Luneburg {
     }
 }
 
-/// Maxwell's fish-eye, n = 2 / (1 + r^2): rays are circles, and light from any point meets at the
-/// opposite one. eps is n - 1.
+/// Maxwell's fish-eye, n = 2 / (1 + r^2), with eps = n - 1. Rays are circles, and light from any
+/// point is focused into the opposite one.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FishEye;
 
@@ -143,8 +145,8 @@ impl Kepler {
     }
 }
 
-/// eps and its gradient from n^2 and half the gradient of n^2, without the cancellation of sqrt(1 +
-/// x) - 1.
+/// Computes eps and its gradient from n^2 and half the gradient of n^2. Avoids the cancellation in
+/// sqrt(1 + x) - 1.
 fn squared(n2: f64, half_gradient: DVec3) -> (f64, DVec3) {
     let n = n2.sqrt();
     ((n2 - 1.0) / (n + 1.0), half_gradient / n)
@@ -154,15 +156,15 @@ fn squared(n2: f64, half_gradient: DVec3) -> (f64, DVec3) {
 pub mod abel {
     use super::PI;
 
-    /// Integral of exp(-r^2/s^2) along a line at distance `y` from the axis.
+    /// Line integral of exp(-r^2/s^2) at distance `y` from the axis.
     pub fn gaussian(y: f64, s: f64) -> f64 {
         s * PI.sqrt() * (-(y / s).powi(2)).exp()
     }
 
-    /// Integral of (1 - r^2/R^2)^m, zero outside R, for m = 0 (cylinder), 1, 2 or 3.
+    /// Line integral of (1 - r^2/R^2)^m, which is zero outside R, for m = 0 (cylinder), 1, 2 or 3.
     ///
     /// # Panics
-    /// For other m.
+    /// If m is above 3.
     pub fn power(y: f64, radius: f64, m: u32) -> f64 {
         // sqrt(pi) Gamma(m + 1) / Gamma(m + 3/2) = 2, 4/3, 16/15, 32/35.
         let factor = [2.0, 4.0 / 3.0, 16.0 / 15.0, 32.0 / 35.0][m as usize];
@@ -170,10 +172,11 @@ pub mod abel {
         factor * radius * inside.powf(f64::from(m) + 0.5)
     }
 
-    /// Derivative of [`power`] with y: the deflection of a weak cylinder of that profile.
+    /// Derivative of [`power`] with respect to y: the deflection by a weak cylinder of that
+    /// profile.
     ///
     /// # Panics
-    /// For m above 3.
+    /// If m is above 3.
     pub fn power_slope(y: f64, radius: f64, m: u32) -> f64 {
         let factor = [2.0, 4.0 / 3.0, 16.0 / 15.0, 32.0 / 35.0][m as usize];
         let inside = (1.0 - (y / radius).powi(2)).max(0.0);
@@ -182,7 +185,7 @@ pub mod abel {
     }
 }
 
-/// The error function to 1e-15: its series near zero, its continued fraction far away.
+/// The error function to 1e-15, by its series near zero and its continued fraction elsewhere.
 pub fn erf(x: f64) -> f64 {
     let a = x.abs();
     let value = if a < 2.5 {

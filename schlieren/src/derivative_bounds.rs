@@ -1,45 +1,44 @@
-//! The largest derivatives of a field, from differences on its lattice: one pass over it, in
-//! parallel.
+//! Finds the largest derivatives of a field from finite differences on its lattice.
 //!
-//! A derivative is a tensor, and its size at a node is its Frobenius norm: that of the Hessian is
-//! `sqrt(xx² + yy² + zz² + 2 xy² + 2 xz² + 2 yz²)`, at least as large as the second derivative
-//! along any direction and the bend of any ray's neighbours. Pure differences are not enough: `eps
-//! = a x y` has none of second order, and takes light apart along its diagonals all the same.
+//! A derivative is a tensor, and its size at a node is its Frobenius norm. For the Hessian this is
+//! `sqrt(xx² + yy² + zz² + 2 xy² + 2 xz² + 2 yz²)`. It is at least as large as the second
+//! derivative along any direction, and it bounds how neighbouring rays diverge. Pure differences
+//! are not enough: `eps = a x y` has no pure second derivative, but it spreads light along its
+//! diagonals.
 
 use crate::field::Field;
 use rayon::prelude::*;
 
-/// Largest values in a field, per metre.
+/// Largest absolute values in a field, per metre to the power of the order.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DerivativeBounds {
     /// |grad eps|.
     pub gradient: f64,
-    /// The same on the field's faces, where oblique views see edges.
+    /// |grad eps| on the field's faces, where oblique views have edges.
     pub gradient_on_faces: f64,
-    /// Second derivatives, mixed ones too.
+    /// Second derivatives, including mixed ones.
     pub second: f64,
-    /// Second derivatives along the lattice's axes alone, which is what trilinear cells leave out
-    /// first.
+    /// Second derivatives along the lattice's axes alone: the leading error of trilinear cells.
     pub second_along_axes: f64,
-    /// Third derivatives, mixed ones too.
+    /// Third derivatives, including mixed ones.
     pub third: f64,
     /// Fourth derivatives along the lattice's axes. Splines are products of splines along the axes,
-    /// so their errors come of these.
+    /// so these determine their errors.
     pub fourth: f64,
     /// |eps|.
     pub eps: f64,
 }
 
-/// What a difference counts for.
+/// Contribution of a difference to the norm of a derivative tensor.
 #[derive(Clone, Copy)]
 struct Part {
-    /// Order along x, beside those along y and z.
+    /// Order along x, in addition to the orders along y and z.
     along_x: usize,
-    /// How often the derivative stands in its tensor.
+    /// How often the derivative occurs in its tensor.
     times: f64,
 }
 
-/// Differences by their orders along y and z, and what to make of them along x.
+/// Differences by their orders along y and z, with their orders along x.
 const DIFFERENCES: [(usize, usize, &[Part]); 12] = {
     const fn p(along_x: usize, times: u32) -> Part {
         Part { along_x, times: times as f64 }
@@ -60,7 +59,7 @@ const DIFFERENCES: [(usize, usize, &[Part]); 12] = {
     ]
 };
 
-/// Coefficients of the difference of an order.
+/// Coefficients of finite differences, by order.
 const COEFFICIENTS: [&[f64]; 5] = [
     &[1.0],
     &[-1.0, 1.0],
@@ -69,8 +68,7 @@ const COEFFICIENTS: [&[f64]; 5] = [
     &[1.0, -4.0, 6.0, -4.0, 1.0],
 ];
 
-/// Squares of derivatives along a row of nodes: of order 1 to 4, and those of order 2 along the
-/// axes.
+/// Squares of derivatives along a row of nodes: orders 1 to 4, and order 2 along the axes.
 #[derive(Default)]
 struct Row {
     squares: [Vec<f64>; 5],
@@ -80,7 +78,7 @@ struct Row {
 const ALONG_AXES: usize = 4;
 
 impl DerivativeBounds {
-    /// One pass over the lattice, in parallel.
+    /// Computes the bounds in one parallel pass over the lattice.
     pub fn of(field: &Field) -> DerivativeBounds {
         let [nx, ny, nz] = field.dims();
         (0..ny * nz)
@@ -103,9 +101,9 @@ impl DerivativeBounds {
 }
 
 impl Row {
-    /// The largest values of the row of nodes at (j, k). Differences that would reach beyond the
-    /// last node are those of the last nodes, so that every node has all that the lattice has room
-    /// for.
+    /// The largest values in the row of nodes at (j, k). Nodes whose difference would reach beyond
+    /// the last node use the difference of the last nodes. Every node then has all differences that
+    /// fit into the lattice.
     fn of(&mut self, field: &Field, j: usize, k: usize, nx: usize) -> DerivativeBounds {
         let (eps, dims) = (field.eps(), field.dims());
         let per_m = field.spacing_m().map(|h| 1.0 / h);
@@ -161,10 +159,10 @@ impl Row {
     }
 }
 
-/// Adds `factor` times the squares of the differences of an order along a row.
+/// Adds `factor` times the squared differences of an order along a row.
 fn add_squares(to: &mut [f64], values: &[f64], order: usize, factor: f64) {
     let count = values.len() - order;
-    // The frequent ones are written out, so that compilers see the whole sum.
+    // The frequent orders are unrolled by hand so that the compiler sees the whole sum.
     match order {
         0 => to.iter_mut().zip(values).for_each(|(t, v)| *t += factor * v * v),
         1 => {
@@ -185,7 +183,7 @@ fn add_squares(to: &mut [f64], values: &[f64], order: usize, factor: f64) {
             }
         }
     }
-    // The last nodes have no room for a difference of their own.
+    // The last nodes use the last difference that fits into the row.
     let last: f64 = values[count - 1..].iter().zip(COEFFICIENTS[order]).map(|(v, c)| v * c).sum();
     for t in &mut to[count..] {
         *t += factor * last * last;
@@ -224,13 +222,13 @@ mod tests {
         }
         let r = of(|p| p.z.powi(4));
         assert!(near(r.fourth, 24.0), "{r:?}");
-        // At the last node of all: |grad| of (x, 2 y, 3 z).
+        // eps = x + 2 y + 3 z has the gradient (1, 2, 3) everywhere.
         let r = of(|p| p.x + 2.0 * p.y + 3.0 * p.z);
         assert!(near(r.gradient, 14f64.sqrt()) && near(r.gradient_on_faces, 14f64.sqrt()), "{r:?}");
         assert!(near(r.second, 0.0) && near(r.eps, 2.0 + 2.0 * 3.5 + 3.0 * 0.75), "{r:?}");
     }
 
-    /// Planes and rods of nodes have the differences that they have room for.
+    /// Planes and rods of nodes have only the differences that fit into them.
     #[test]
     fn lattices_of_two_nodes_along_an_axis_have_no_more_than_a_slope_there() {
         for dims in [[2, 9, 9], [9, 2, 9], [9, 9, 2], [2, 2, 2]] {

@@ -1,8 +1,8 @@
-//! The gas: eps = n/n0 - 1 at the nodes of a uniform lattice.
+//! Describes the gas by eps = n/n0 - 1 at the nodes of a uniform lattice.
 
 use glam::DVec3;
 
-/// What a node of the lattice stands for.
+/// What a node of the lattice represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[repr(u8)]
 pub enum Node {
@@ -11,12 +11,12 @@ pub enum Node {
     Gas = 0,
     /// No data: blanked by the solver, outside the mesh that was resampled, or not a number.
     Blank = 1,
-    /// Inside a body. Stops light.
+    /// Inside a solid body; blocks light.
     Solid = 2,
 }
 
-/// A uniform lattice of eps, x fastest. Nodes are points: the field reaches from the first to the
-/// last of them and no further.
+/// A uniform lattice of eps, x fastest. Values belong to points, so the field extends from the
+/// first node to the last.
 #[derive(Debug, Clone)]
 pub struct Field {
     dims: [usize; 3],
@@ -28,10 +28,10 @@ pub struct Field {
     not_finite: usize,
 }
 
-/// A lattice that cannot be a field.
+/// Why a lattice cannot be a field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FieldError {
-    /// Fewer than two nodes along an axis: light would have no way through.
+    /// Fewer than two nodes along an axis: the field has no depth there.
     #[error(
         "the field has {nodes} node(s) along {axis}; it needs at least 2. Repeat a two-dimensional \
          flow over its span to give it depth"
@@ -39,7 +39,7 @@ pub enum FieldError {
     TooFew {
         /// x, y or z.
         axis: char,
-        /// As given.
+        /// Number of nodes given.
         nodes: usize,
     },
     /// More nodes than can be addressed.
@@ -66,22 +66,22 @@ pub enum FieldError {
     Spacing {
         /// x, y or z.
         axis: char,
-        /// As given.
+        /// Spacing given.
         spacing_m: f64,
     },
     /// The origin is not finite.
     #[error("origin ({0}, {1}, {2}) m is not finite")]
     Origin(f64, f64, f64),
-    /// The reference index is not possible.
+    /// The reference index is not a positive number.
     #[error("reference index n0 is {0}; it must be a positive number, about 1 for gases")]
     Reference(f64),
-    /// An eps of -1 or less: no medium has an index of zero or below.
+    /// An eps of -1 or less, which means an index of refraction of zero or below.
     #[error("eps is {eps} at node ({0}, {1}, {2}); eps = n/n0 - 1 is above -1. Check the units of \
              the density", at[0], at[1], at[2])]
     Impossible {
         /// The value.
         eps: f32,
-        /// Where.
+        /// Indices of the node.
         at: [usize; 3],
     },
     /// No node has data.
@@ -90,15 +90,15 @@ pub enum FieldError {
 }
 
 impl Field {
-    /// A field from eps = n/n0 - 1 at the nodes, x fastest, and what the nodes are (all gas when
-    /// `None`).
+    /// Creates a field from eps = n/n0 - 1 at the nodes, x fastest, and the kinds of the nodes (all
+    /// gas when `None`).
     ///
     /// Values that are not finite become [`Node::Blank`] and are counted ([`Field::not_finite`]).
-    /// Nodes that are not gas get values continued smoothly from the gas around them, so that no
-    /// interpolant rings at their edge; what they were does not matter.
+    /// The values of nodes that are not gas are replaced by smooth continuations of the gas around
+    /// them, so that interpolants do not ring at their edge.
     ///
     /// # Errors
-    /// If sizes do not match, or a number is impossible.
+    /// If sizes do not match or a number is out of range.
     pub fn new(
         dims: [usize; 3],
         spacing_m: [f64; 3],
@@ -118,7 +118,7 @@ impl Field {
             return Err(FieldError::Reference(n0));
         }
 
-        // What is not a number has no data.
+        // Nodes without a finite value have no data.
         let not_gas_is_marked =
             |nodes: &Option<Vec<Node>>, i: usize| nodes.as_ref().is_some_and(|n| n[i] != Node::Gas);
         let mut not_finite = 0;
@@ -146,7 +146,7 @@ impl Field {
         Ok(Field { dims, spacing_m, origin_m, eps, n0, nodes, not_finite })
     }
 
-    /// A field from a function of position in metres.
+    /// Creates a field from a function of position in metres.
     ///
     /// # Errors
     /// As [`Field::new`].
@@ -173,7 +173,7 @@ impl Field {
         Field::new(dims, spacing_m, origin_m, values, n0, None)
     }
 
-    /// Nodes along x, y and z.
+    /// Number of nodes along x, y and z.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
     }
@@ -183,12 +183,12 @@ impl Field {
         self.spacing_m
     }
 
-    /// The first node.
+    /// Position of the first node.
     pub fn origin_m(&self) -> DVec3 {
         self.origin_m
     }
 
-    /// From the first to the last node.
+    /// Size from the first to the last node.
     pub fn size_m(&self) -> DVec3 {
         let cells = DVec3::new(
             (self.dims[0] - 1) as f64,
@@ -198,28 +198,28 @@ impl Field {
         cells * DVec3::from(self.spacing_m)
     }
 
-    /// The middle of the field.
+    /// Centre of the field.
     pub fn centre_m(&self) -> DVec3 {
         self.origin_m + 0.5 * self.size_m()
     }
 
-    /// eps = n/n0 - 1 at the nodes, x fastest. Finite everywhere: nodes that are not gas hold
+    /// eps = n/n0 - 1 at the nodes, x fastest. All values are finite: nodes that are not gas hold
     /// continued values.
     pub fn eps(&self) -> &[f32] {
         &self.eps
     }
 
-    /// Index of the reference medium, outside the field.
+    /// Index of refraction of the reference medium outside the field.
     pub fn n0(&self) -> f64 {
         self.n0
     }
 
-    /// What the nodes are; `None` when all are gas.
+    /// Kinds of the nodes; `None` when all are gas.
     pub fn nodes(&self) -> Option<&[Node]> {
         self.nodes.as_deref()
     }
 
-    /// How many nodes are of a kind.
+    /// Number of nodes of a kind.
     pub fn count(&self, kind: Node) -> usize {
         match &self.nodes {
             Some(n) => n.iter().filter(|k| **k == kind).count(),
@@ -228,18 +228,18 @@ impl Field {
         }
     }
 
-    /// How many values were NaN or infinite and became [`Node::Blank`].
+    /// Number of values that were NaN or infinite and became [`Node::Blank`].
     pub fn not_finite(&self) -> usize {
         self.not_finite
     }
 
-    /// Bytes held.
+    /// Memory of the arrays in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.eps.len() * size_of::<f32>() + self.nodes.as_ref().map_or(0, Vec::len)
     }
 }
 
-/// The number of nodes of a lattice that light can be taken through.
+/// Checks a lattice and returns its number of nodes.
 pub(crate) fn check_lattice(
     dims: [usize; 3],
     spacing_m: [f64; 3],
@@ -256,7 +256,7 @@ pub(crate) fn check_lattice(
     if !origin_m.is_finite() {
         return Err(FieldError::Origin(origin_m.x, origin_m.y, origin_m.z));
     }
-    // Interpolants add a border of up to three nodes and address with i32.
+    // Interpolants add a border of up to three nodes and use i32 addresses.
     let nodes = dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
     let padded = dims.iter().try_fold(1usize, |n, d| n.checked_mul(d.checked_add(4)?));
     match (nodes, padded) {
@@ -265,8 +265,8 @@ pub(crate) fn check_lattice(
     }
 }
 
-/// Gives nodes that are not gas the mean of their known neighbours, from the gas inwards layer by
-/// layer.
+/// Fills nodes that are not gas with the mean of their known neighbours, layer by layer from the
+/// gas inwards.
 pub(crate) fn fill(dims: [usize; 3], eps: &mut [f32], nodes: &[Node]) {
     let [nx, ny, nz] = dims;
     let stride = [1, nx, nx * ny];
@@ -283,7 +283,7 @@ pub(crate) fn fill(dims: [usize; 3], eps: &mut [f32], nodes: &[Node]) {
     let mut layer: Vec<usize> =
         (0..eps.len()).filter(|&i| !known[i] && neighbours(i).any(|j| known[j])).collect();
     while !layer.is_empty() {
-        // All of a layer are computed from the layers before, so their order does not matter.
+        // A layer depends only on earlier layers, so the order within it does not matter.
         let values: Vec<f32> = layer
             .iter()
             .map(|&i| {

@@ -1,10 +1,11 @@
-//! Which instruction sets the kernels are compiled for.
+//! Selects the instruction set that a kernel runs with.
 
-/// Calls a kernel with the token of a level. Kernels open the instruction set themselves
+/// Calls a kernel with the SIMD token of a level. Kernels enable the instruction set themselves
 /// (`Simd::vectorize`).
 ///
-/// Unlike fearless_simd's own `dispatch!`, machines with SSE4.2 but no AVX2 use the SSE2 kernels:
-/// they are a quarter of what there is to compile, for processors from before 2013.
+/// Unlike fearless_simd's own `dispatch!`, this macro has no SSE4.2 kernels. Machines with SSE4.2
+/// but without AVX2 date from before 2013 and use the SSE2 kernels. SSE4.2 kernels would be a
+/// quarter of all kernels to compile.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! at_level {

@@ -1,21 +1,4 @@
-//! Physically based schlieren, shadowgraph and interferometry from flow data.
-//!
-//! Lengths are in metres and angles in radians, all in `f64` in the public interface. The gas is
-//! stored not as its index of refraction n but as the small number eps = n/n0 - 1
-//! ([`field::Field`]). A ray's result is not its position but its deviation from the straight ray
-//! through the reference medium ([`path::Exit`]). Both keep their relative accuracy in `f32`
-//! however weak the gas is.
-//!
-//! | symbol | meaning | unit |
-//! |---|---|---|
-//! | n0 | index of the reference medium, outside the field | - |
-//! | eps | n/n0 - 1 | - |
-//! | tau | path parameter: dx/dtau = w, dw/dtau = (1+eps) grad eps, so that the length of w is 1+eps | m |
-//! | u | w minus the undisturbed ray's direction; behind the field its transverse part is the deflection | rad |
-//! | xi | transverse displacement from the undisturbed ray | m |
-//! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
-//!
-//! Light through a warm spot, seen along z:
+//! Renders physically based schlieren images, shadowgraphs and interferograms of flow data.
 //!
 //! ```
 //! use glam::DVec3;
@@ -24,24 +7,38 @@
 //! use schlieren::plan::{Plan, Request};
 //! use schlieren::view::{Axis, View};
 //!
-//! // A cube of 10 cm with 48 nodes a side: air that is 1e-5 thinner in the middle.
+//! // A cube of air, 10 cm and 48 nodes a side. In its centre eps is -1e-5, as in a warm spot.
 //! let (n, size_m) = (48, 0.1);
 //! let h = size_m / (n - 1) as f64;
 //! let warm = |p: DVec3| -1e-5 * (-p.length_squared() / (2.0 * 0.015f64.powi(2))).exp();
 //! let field = Field::from_fn([n; 3], [h; 3], DVec3::splat(-0.05), 1.000_27, warm)?;
 //!
-//! // The march that keeps deflections right within 1e-7 rad, and what it does to a ray 1.5 cm
-//! // right of the middle.
+//! // A plan whose deflections are accurate to 1e-7 rad, seen along z. It traces one ray, which
+//! // enters 1.5 cm to the right of the centre.
 //! let plan = Plan::new(&field, Request { tolerance_rad: 1e-7, ..Request::default() });
 //! let paths = plan.paths(&field, View::along(Axis::Z, field.centre_m()));
 //! let mut exit = [Exit::UNDISTURBED];
 //! paths.trace(&[Start { position_m: [0.015, 0.0], tilt_rad: [0.0; 2] }], &mut exit);
 //!
-//! // Light turns to the dense gas outside: eps sqrt(2 pi) exp(-1/2).
+//! // Light bends towards the denser gas outside, by eps sqrt(2 pi) exp(-1/2).
 //! let expected_rad = 1e-5 * 2.5066 * (-0.5f64).exp();
 //! assert!((f64::from(exit[0].deflection_rad[0]) / expected_rad - 1.0).abs() < 5e-3);
 //! # Ok::<(), schlieren::field::FieldError>(())
 //! ```
+//!
+//! The public interface uses metres, radians and `f64`. A [`field::Field`] stores the gas as the
+//! small number eps = n/n0 - 1 instead of its index of refraction n. A traced ray returns its
+//! deviation from the straight ray through the reference medium instead of its position
+//! ([`path::Exit`]). Both keep their relative accuracy in `f32` however weak the gas is.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | n0 | index of refraction of the reference medium outside the field | - |
+//! | eps | n/n0 - 1 | - |
+//! | tau | path parameter: dx/dtau = w, dw/dtau = (1+eps) grad eps, so that the length of w is 1+eps | m |
+//! | u | w minus the direction of the undisturbed ray; behind the field, its transverse part is the deflection | rad |
+//! | xi | transverse displacement from the undisturbed ray | m |
+//! | OPD | optical path minus that of the undisturbed ray, between the same planes | m |
 #![forbid(unsafe_code)]
 
 pub mod analytic;

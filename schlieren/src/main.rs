@@ -1,4 +1,4 @@
-//! The program `schlieren`; see [`schlieren::cli`].
+//! Runs the program `schlieren`; see [`schlieren::cli`].
 #![forbid(unsafe_code)]
 
 use std::process::ExitCode;

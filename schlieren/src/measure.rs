@@ -1,32 +1,33 @@
-//! Measuring in pictures: where the outermost shock stands and at which angle, as with a ruler on a
+//! Measures the position and angle of the outermost shock in an image, like a ruler on a
 //! photograph.
 //!
-//! A shock is a thin line in a schlieren picture, saturated more often than not: behind a customary
-//! slit of 1 mm a shock of a tenth of a bar over a span of 10 cm bends light ten times farther than
-//! from black to white. Then there is no brightest or darkest pixel but a band of them, as wide as
-//! the shock is strong, and the place to look at is its outer edge, where brightness changes most
-//! ([`Mark::Edge`]). A shock that is drawn over several pixels and does not saturate stands where
-//! its band is strongest ([`Mark::Band`]). Either way the search goes along rows or columns from
-//! the undisturbed stream inwards, takes the first place whose mark is at least half the largest of
-//! its line (four fifths for bands, whose flanks are long), and in it the centre, to parts of a
-//! pixel.
+//! A shock is a thin line in a schlieren image, and it is usually saturated. With the default slit
+//! of 1 mm, a shock of a tenth of a bar over a span of 10 cm bends light ten times farther than the
+//! range from black to white. A saturated shock has a band of brightest or darkest pixels, and the
+//! stronger the shock the wider the band. Its position is the outer edge of the band, where the
+//! brightness changes most ([`Mark::Edge`]). A shock that covers several pixels without saturating
+//! is located where its band is strongest ([`Mark::Band`]).
+//!
+//! The search follows rows or columns from the undisturbed stream inwards. It takes the first run
+//! of pixels whose mark is at least half the largest on the line (four fifths for bands, whose
+//! flanks are long), and returns the centre of that run with subpixel accuracy.
 
 use crate::film::Framing;
 use crate::render::RenderOutput;
 use rt_core::math::median_high;
 
-/// A picture to measure in.
+/// An image to measure in.
 #[derive(Debug, Clone)]
 pub struct Photograph {
-    /// Where its pixels lie in the test section.
+    /// The pixels' positions in the test section.
     pub framing: Framing,
-    /// Row by row from the top.
+    /// Brightness of the pixels, row by row from the top.
     pub brightness: Vec<f32>,
-    /// Whether light comes through at all there: edges of bodies are no shocks.
+    /// Whether light reaches a pixel. This distinguishes the edges of bodies from shocks.
     pub lit: Vec<bool>,
 }
 
-/// Where lines of search begin. They run to the opposite side, a row or column of pixels each.
+/// Where search lines begin. Each runs along a row or column of pixels to the opposite side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum From {
     /// Along rows, to the right.
@@ -35,36 +36,36 @@ pub enum From {
     Top,
 }
 
-/// What of a line in the picture counts as its place.
+/// The feature that defines the position of a line in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark {
-    /// Where brightness changes most from pixel to pixel.
+    /// The position where brightness changes most from pixel to pixel.
     Edge,
-    /// Where brightness is farthest from that of the undisturbed stream.
+    /// The position where brightness differs most from that of the undisturbed stream.
     Band {
-        /// The undisturbed stream's: 0.5 behind a half-open knife.
+        /// Brightness of the undisturbed stream: 0.5 behind a half-open knife.
         undisturbed: f32,
     },
 }
 
-/// A straight line through points, fitted against outliers.
+/// A straight line through points, by a fit that is robust against outliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// From the picture's right, counter-clockwise, -90 to 90 degrees.
+    /// Angle counter-clockwise from the image's right, from -90 to 90 degrees.
     pub angle_rad: f64,
-    /// The middle of the points that it was fitted to, along right and up.
+    /// Mean of the fitted points, along right and up.
     pub through_m: [f64; 2],
-    /// Root mean square distance of those points.
+    /// Root mean square distance of the fitted points from the line.
     pub rms_m: f64,
-    /// Points that it was fitted to.
+    /// Number of fitted points.
     pub points: usize,
-    /// Points that were left out.
+    /// Number of points that the fit rejected.
     pub outliers: usize,
 }
 
 impl Photograph {
-    /// Of a picture that was rendered with [`crate::render::Layers::map`], which tells bodies from
-    /// dark shocks. `None` without.
+    /// Converts an image rendered with [`crate::render::Layers::map`], which distinguishes bodies
+    /// from dark shocks. `None` if the map was not rendered.
     pub fn of(rendered: &RenderOutput) -> Option<Photograph> {
         let map = rendered.map.as_ref()?;
         Some(Photograph {
@@ -74,9 +75,9 @@ impl Photograph {
         })
     }
 
-    /// The outermost strong mark on each line of search, at most one point a line, along right and
-    /// up in metres. Pixels that are `margin_px` or less from a dark one along that line do not
-    /// count, nor do lines whose largest mark is below `least`.
+    /// The outermost strong mark on each search line, at most one point per line, along right and
+    /// up in metres. Pixels within `margin_px` of a dark pixel on the line are ignored. So are
+    /// lines whose largest mark is below `least`.
     pub fn fronts_m(&self, from: From, mark: Mark, least: f32, margin_px: usize) -> Vec<[f64; 2]> {
         let [width, height] = [self.framing.width as usize, self.framing.height as usize];
         let [lines, length] = if from == From::Left { [height, width] } else { [width, height] };
@@ -87,7 +88,7 @@ impl Photograph {
             (i.saturating_sub(margin_px)..(i + margin_px + 1).min(length))
                 .any(|k| !self.lit[pixel(line, k)])
         };
-        // Edges lie between pixels, bands in their centres.
+        // Edges lie between pixels, bands at pixel centres.
         let (count, offset, share) = if mark == Mark::Edge {
             (length.saturating_sub(1), 1.0, 0.5)
         } else {
@@ -122,15 +123,15 @@ impl Photograph {
     }
 }
 
-/// The line through points of which up to a quarter or so may be anything: the median of all pairs'
-/// slopes (Theil 1950, Sen 1968), then least squares of distances over the points within three
-/// robust standard deviations of that. `None` for fewer than three points.
+/// Fits a line to points of which about a quarter may be outliers. The slope is the median over all
+/// pairs (Theil 1950, Sen 1968). A least-squares fit of distances then uses the points within three
+/// robust standard deviations of that line. `None` for fewer than three points.
 pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
     if points_m.len() < 3 {
         return None;
     }
-    // Slopes against the axis along which the points are spread: between their quartiles, which no
-    // outliers reach.
+    // Slopes are relative to the axis along which the points spread most. The spread is the
+    // interquartile range, which outliers do not affect.
     let spread = |c: usize| {
         let mut v: Vec<f64> = points_m.iter().map(|p| p[c]).collect();
         v.sort_unstable_by(f64::total_cmp);
@@ -148,7 +149,8 @@ pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
     let offset = |p: &[f64; 2]| p[b] - slope * p[a];
     let middle = median_high(&mut points_m.iter().map(offset).collect::<Vec<_>>())?;
     let off = |p: &[f64; 2]| (offset(p) - middle).abs();
-    // 1.4826: standard deviation of a normal distribution over its median deviation.
+    // 1.4826 is the ratio of standard deviation to median absolute deviation of a normal
+    // distribution.
     let reach = 3.0 * 1.4826 * median_high(&mut points_m.iter().map(off).collect::<Vec<_>>())?;
     let kept: Vec<&[f64; 2]> = points_m.iter().filter(|p| off(p) <= reach).collect();
     let n = kept.len() as f64;
@@ -157,7 +159,7 @@ pub fn fitted_line(points_m: &[[f64; 2]]) -> Option<Line> {
         kept.iter().map(|p| (p[c] - mean[c]) * (p[d] - mean[d])).sum::<f64>() / n
     };
     let [xx, xy, yy] = [moment(0, 0), moment(0, 1), moment(1, 1)];
-    // The direction of the larger principal axis, and the variance along the smaller.
+    // The direction of the major principal axis, and the variance along the minor one.
     let angle_rad = 0.5 * (2.0 * xy).atan2(xx - yy);
     let across = 0.5 * (xx + yy) - (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
     Some(Line {
@@ -217,14 +219,14 @@ mod tests {
             let [x0, y0] = framing.plane_from_pixel(i as f64 + 0.5, edge(i));
             assert!((x - x0).abs() < 1e-12 && (y - y0).abs() < 0.5e-3, "{i}: {y} {y0}");
         }
-        // Its middle is two and a half pixels further in.
+        // The middle of the band is two and a half pixels further in.
         let band = p.fronts_m(From::Top, Mark::Band { undisturbed: 0.5 }, 0.1, 2);
         for (edge, middle) in points.iter().zip(&band) {
             assert!((edge[1] - middle[1] - 2.5e-3).abs() < 0.6e-3, "{edge:?} {middle:?}");
         }
-        // Nothing to see.
+        // No mark is strong enough.
         assert!(p.fronts_m(From::Top, Mark::Edge, 0.4, 2).is_empty());
-        // From the left the band is met as well where it comes in from there.
+        // Search lines from the left find the band as well.
         assert!(p.fronts_m(From::Left, Mark::Edge, 0.1, 2).len() > 25);
     }
 }

@@ -1,5 +1,5 @@
-//! The optical bench: light source, collimator, test section, schlieren lens, cut-off plane, lens
-//! onto the film.
+//! Describes the optical bench: light source, collimator, test section, schlieren lens, cut-off
+//! plane and film lens.
 //!
 //! ```text
 //!  source      collimator     test section      schlieren lens     cut-off plane      film
@@ -7,85 +7,87 @@
 //!    size w                  z = 0                                 image w f2/f1      focused on z = focus_m
 //! ```
 //!
-//! A point of the source makes one parallel beam: its *tilt* is its distance from the axis over the
-//! collimator's focal length. The schlieren lens collects every direction in one point of the
-//! cut-off plane, at `f2 (tilt + deflection)`; so a deflection ε shifts the whole image of the
-//! source by `f2 ε` (Settles, *Schlieren and Shadowgraph Techniques*, 2001, chapter 3). The thesis'
-//! free factor k of equation 5.12 is not free: it is [`Optics::sensitivity_per_rad`], `f2/a` with a
-//! the height of the source image above the cut-off.
+//! A point of the source makes one parallel beam. Its *tilt* is the point's distance from the axis
+//! divided by the collimator's focal length. The schlieren lens focuses every direction into one
+//! point of the cut-off plane, at `f2 (tilt + deflection)`. A deflection ε therefore shifts the
+//! whole image of the source by `f2 ε` (Settles, *Schlieren and Shadowgraph Techniques*, 2001,
+//! chapter 3). The factor k of the dissertation's equation 5.12 is not a free parameter: it is
+//! [`Optics::sensitivity_per_rad`], `f2/a`, with a the height of the source image above the
+//! cut-off.
 //!
-//! A film that is focused on the plane z = `focus_m` (along the direction of light, 0 through the
-//! middle of the field) sees each ray where its last straight piece, prolonged in both directions,
-//! crosses that plane. Focused into the middle, the displacement is nearly zero and the picture is
-//! a schlieren picture; focused away from it, it becomes a shadowgraph as well. All film
+//! The film is focused on the plane z = `focus_m`, measured along the direction of light from the
+//! centre of the field. It records each ray where the ray's last straight segment, extended in both
+//! directions, crosses that plane. Focused on the centre, the displacement is nearly zero and the
+//! result is a schlieren image. Focused elsewhere, the image is a shadowgraph as well. All film
 //! coordinates are in object space: metres in the test section.
 
 use crate::path::{Exit, Start};
 
-/// A point or vector in a plane across the light: along `right`, `up`.
+/// A point or vector in a plane perpendicular to the light: components along `right` and `up`.
 pub type Across = [f32; 2];
 
-/// The light source, as its shape in the collimator's focal plane.
+/// The shape of the light source in the collimator's focal plane.
 ///
-/// Coordinates are those of its image in the cut-off plane: a point of the source at +x makes the
-/// beam that travels towards +x.
+/// Coordinates are those of the source's image in the cut-off plane: a point of the source at +x
+/// makes the beam that travels towards +x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SourceShape {
-    /// No extent.
+    /// A point without extent.
     Point,
-    /// A rectangle, the customary slit, whose width lies along `angle_deg` (counter-clockwise from
-    /// the picture's right).
+    /// A rectangle, usually a slit. Its width lies along `angle_deg`, counter-clockwise from the
+    /// image's right.
     Slit {
-        /// Along `angle_deg`: across the knife's edge when the knife has the same angle.
+        /// Width along `angle_deg`; this is across the knife's edge when the knife has the same
+        /// angle.
         width_m: f64,
-        /// Along the knife's edge.
+        /// Length across the width; along the knife's edge when the knife has the same angle.
         length_m: f64,
         /// Direction of the width.
         angle_deg: f64,
     },
     /// A disc: a lamp behind a pinhole.
     Circle {
-        /// Of the pinhole.
+        /// Diameter of the pinhole.
         diameter_m: f64,
     },
 }
 
-/// The bench, in metres. See the [module](self) for what the symbols mean.
+/// The dimensions of the bench, in metres. The [module](self) explains the symbols.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Optics {
     /// Shape and size of the source.
     pub source: SourceShape,
-    /// f1: from the source to the collimating lens.
+    /// f1: distance from the source to the collimating lens.
     pub collimator_focal_length_m: f64,
-    /// f2: from the schlieren lens to the cut-off plane.
+    /// f2: distance from the schlieren lens to the cut-off plane.
     pub schlieren_focal_length_m: f64,
-    /// Plane that the film is focused on: distance from the middle of the field along the light.
-    /// Positive is behind the flow.
+    /// The plane in focus, as its distance from the centre of the field along the light. Positive
+    /// is behind the flow, on the film's side.
     pub focus_m: f64,
 }
 
-/// The image of the source in the cut-off plane, undisturbed, centred on the axis.
+/// The undisturbed image of the source in the cut-off plane, centred on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SourceImage {
-    /// All light in one point.
+    /// All light falls on one point.
     Point,
-    /// Half the rectangle's sides, along `axis` and across it.
+    /// A rectangle with sides along `axis` and across it.
     Rectangle {
-        /// Half the sides in metres.
+        /// Half the side lengths in metres.
         half_m: [f64; 2],
         /// Unit vector of the first side.
         axis: [f64; 2],
     },
     /// A disc.
     Disc {
-        /// Its radius in metres.
+        /// Radius in metres.
         radius_m: f64,
     },
 }
 
 impl Optics {
-    /// What is drawn when nothing else is said: a slit of 1 mm by 5 mm, mirrors of 1.5 m, focused
-    /// into the middle.
+    /// The default bench: a slit of 1 mm by 5 mm, mirrors of 1.5 m focal length, focused on the
+    /// centre of the field.
     pub const CUSTOMARY: Optics = Optics {
         source: SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 0.0 },
         collimator_focal_length_m: 1.5,
@@ -93,7 +95,7 @@ impl Optics {
         focus_m: 0.0,
     };
 
-    /// The source's undisturbed image: magnified by f2/f1.
+    /// The undisturbed image of the source, magnified by f2/f1.
     pub fn source_image(&self) -> SourceImage {
         let magnification = self.schlieren_focal_length_m / self.collimator_focal_length_m;
         match self.source {
@@ -111,9 +113,9 @@ impl Optics {
         }
     }
 
-    /// How much the relative intensity changes per radian of deflection across a knife: k = f2/a of
-    /// equation 5.12, with `a` the height of the source image that the knife leaves open. The
-    /// thesis divides by e there; Settles' equation 3.7 has a.
+    /// Change of relative intensity per radian of deflection across a knife: k = f2/a of equation
+    /// 5.12, with `a` the height of the source image that the knife leaves open. The dissertation
+    /// divides by e there; Settles' equation 3.7 divides by a.
     pub fn sensitivity_per_rad(&self, open_height_m: f64) -> f64 {
         self.schlieren_focal_length_m / open_height_m
     }
@@ -123,20 +125,21 @@ impl Optics {
         image_point_m.map(|c| (f64::from(c) / self.schlieren_focal_length_m) as f32)
     }
 
-    /// Where a photon crosses the cut-off plane: its source point's image, shifted by its
-    /// deflection.
+    /// The point where a photon crosses the cut-off plane: the image of its source point, shifted
+    /// by its deflection.
     #[inline]
     pub fn cutoff_point_m(&self, image_point_m: Across, exit: &Exit) -> Across {
         let f2 = self.schlieren_focal_length_m as f32;
         [0, 1].map(|i| f2 * exit.deflection_rad[i] + image_point_m[i])
     }
 
-    /// How far from its start the film sees the photon, in metres in the plane of focus.
+    /// Distance in the plane of focus, in metres, between a photon's start and the point where the
+    /// film records it.
     ///
-    /// The last straight piece passes `displacement` beside the undisturbed ray at depth
-    /// `exit_depth`, at the angle `deflection` to it; prolonged to the plane of focus it is off by
-    /// the lever times the tangent. A tilted beam's undisturbed ray crosses that plane at `tilt
-    /// focus` from the start.
+    /// At depth `exit_depth`, the last straight segment is `displacement` away from the undisturbed
+    /// ray, at the angle `deflection` to it. Extending it to the plane of focus adds the distance
+    /// to that plane times the tangent of the angle. The undisturbed ray of a tilted beam crosses
+    /// the plane of focus at `tilt focus` from the start.
     #[inline]
     pub fn film_shift_m(&self, start: &Start, exit: &Exit) -> Across {
         let focus = self.focus_m as f32;
@@ -150,12 +153,12 @@ impl Optics {
         })
     }
 
-    /// Optical path difference that the film sees: between this ray and the undisturbed one *of the
-    /// same beam that ends in the same point of the film*. `n0` is the reference index.
+    /// Optical path difference on the film, between this ray and the undisturbed ray *of the same
+    /// beam that ends in the same point of the film*. `n0` is the reference index.
     ///
-    /// The undisturbed wave front is a plane across the beam, so where in it the ray ends does not
-    /// matter. The straight piece from the exit to the plane of focus is longer by the factor `sec
-    /// θ - 1 = s²/(c (1 + c))`, s and c the sine and cosine of the deflection.
+    /// The undisturbed wave front is a plane across the beam, so the ray's end point within that
+    /// plane does not matter. The straight segment from the exit to the plane of focus is longer by
+    /// the factor `sec θ - 1 = s²/(c (1 + c))`, with s and c the sine and cosine of the deflection.
     #[inline]
     pub fn film_path_difference_m(&self, exit: &Exit, n0: f32) -> f32 {
         let lever = self.focus_m as f32 - exit.exit_depth_m;
@@ -167,7 +170,7 @@ impl Optics {
 }
 
 impl SourceImage {
-    /// A point of the image from a point of the unit square, uniform over its area.
+    /// Maps the unit square to the source image, uniformly by area.
     #[inline]
     pub fn point_m(&self, square: Across) -> Across {
         match *self {
@@ -182,7 +185,7 @@ impl SourceImage {
         }
     }
 
-    /// How far the image reaches to either side along a unit direction.
+    /// Half the extent of the source image along a unit direction.
     pub fn half_extent_m(&self, direction: [f64; 2]) -> f64 {
         match *self {
             SourceImage::Point => 0.0,
@@ -191,13 +194,14 @@ impl SourceImage {
         }
     }
 
-    /// Half the lengths of a rectangle's two sides as seen along a direction; zero for the others.
+    /// Half the lengths of a rectangle's two sides, projected onto a direction; zero for other
+    /// shapes.
     pub(crate) fn half_sides_along(&self, direction: [f64; 2]) -> [f64; 2] {
         let SourceImage::Rectangle { half_m, axis } = *self else { return [0.0; 2] };
         let along = (axis[0] * direction[0] + axis[1] * direction[1]).abs();
         let across = (axis[0] * direction[1] - axis[1] * direction[0]).abs();
-        // sin and cos of 90° are not exactly 0 and 1 in floating point; a side seen end on has no
-        // length.
+        // In floating point, cos 90° is not exactly 0. A side perpendicular to the direction must
+        // project to exactly zero.
         let clean = |v: f64| if v < 1e-12 { 0.0 } else { v };
         [half_m[0] * clean(along), half_m[1] * clean(across)]
     }
@@ -225,14 +229,14 @@ mod tests {
 
     #[test]
     fn a_prism_focused_into_its_middle_moves_nothing() {
-        // A kink at depth 0, left at depth 0.5: displaced there by 0.5 θ, but the prolonged ray
-        // comes from the start's place.
+        // The ray bends at depth 0 and leaves at depth 0.5. It is displaced by 0.5 θ there, but its
+        // extension passes through the start.
         let e = exit([1e-3, -2e-3], [0.5e-3, -1e-3], 0.5, 0.0);
         let s = Start { position_m: [0.1, 0.2], tilt_rad: [0.0; 2] };
         let at = |focus| bench(focus).film_shift_m(&s, &e);
-        // Tangent against sine: 0.5 θ³/2.
+        // The tangent differs from the sine by 0.5 θ³/2.
         assert!(at(0.0)[0].abs() < 2e-9 && at(0.0)[1].abs() < 4e-9, "{:?}", at(0.0));
-        // Film 2 m behind: moved by 2 θ.
+        // In focus 2 m behind the flow, the ray has moved by 2 θ.
         assert!((at(2.0)[0] - 0.002).abs() < 1e-8 && (at(2.0)[1] + 0.004).abs() < 2e-8);
     }
 
@@ -249,14 +253,14 @@ mod tests {
         let b = Optics { schlieren_focal_length_m: 2.0, ..bench(0.0) };
         let c = b.cutoff_point_m([1e-3, 0.0], &exit([1e-4, -3e-4], [0.0; 2], 0.0, 0.0));
         assert!((c[0] - 1.2e-3).abs() < 1e-9 && (c[1] + 6e-4).abs() < 1e-9);
-        // The image point's tilt, through the lens again, is the image point.
+        // The lens maps the tilt of an image point back to that point.
         let back = b.tilt_rad([1e-3, 2e-3]).map(|t| t * 2.0);
         assert!((back[0] - 1e-3).abs() < 1e-9 && (back[1] - 2e-3).abs() < 1e-9);
     }
 
     #[test]
     fn path_beyond_the_flow_is_that_of_a_triangle() {
-        // θ = 1e-2 over 3 m: 3 (sec θ - 1).
+        // θ = 1e-2 over 3 m adds 3 (sec θ - 1).
         let b = bench(3.0);
         let got = b.film_path_difference_m(&exit([1e-2f32.sin(), 0.0], [0.0; 2], 0.0, 2e-6), 1.0);
         let exact = 2e-6 + 3.0 * (1.0 / 1e-2f64.cos() - 1.0);
@@ -282,7 +286,7 @@ mod tests {
             .map(|p| disc.point_m(p))
             .filter(|p| p[0].hypot(p[1]) < 1e-3)
             .count();
-        // Half the radius of 2 mm holds a quarter of the area.
+        // The inner half of the 2 mm radius has a quarter of the area.
         assert!((inside as f64 / f64::from(n) - 0.25).abs() < 0.01, "{inside}");
     }
 }

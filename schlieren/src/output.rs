@@ -1,5 +1,5 @@
-//! Pictures into files: PNG for eyes, OpenEXR with every layer and every parameter, NumPy for the
-//! deflection map.
+//! Writes images to files: PNG for viewing, OpenEXR with every layer and parameter, and NumPy for
+//! the deflection map.
 
 use crate::render::RenderOutput;
 use crate::scene::{Scene, SceneError};
@@ -7,16 +7,16 @@ use datasets::image_io::{self, ImageError, Metadata, Picture, PngDepth, PngRepor
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Why a picture cannot be written.
+/// Why an image cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// The image format says no.
+    /// The image format cannot hold it, or the image file cannot be written.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The scene cannot be written into the metadata.
+    /// The scene cannot be converted to metadata.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The file system says no.
+    /// The file cannot be written.
     #[error("{path}: cannot write")]
     Io {
         /// The file.
@@ -24,12 +24,12 @@ pub enum OutputError {
         /// Why.
         source: std::io::Error,
     },
-    /// No map was made.
+    /// The deflection map was not rendered.
     #[error("the deflection map was not rendered; ask for Layers::map")]
     NoMap,
 }
 
-/// Writes the picture, 8 bits a channel, sRGB.
+/// Writes the image as sRGB with 8 bits per channel.
 pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, OutputError> {
     let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
     add_pixels(&mut p, rendered)?;
@@ -52,8 +52,8 @@ pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, Outp
 /// | `emission.Y` | | of the camera's way, 1 is undisturbed light without a cut-off, when it has `media.emission` |
 /// | `rotation.Y` | rad | of the plane of polarisation, when it has `media.rotation` |
 ///
-/// and as metadata every value of the effective scene under its TOML path, the scene as a whole,
-/// and what was done.
+/// The metadata holds every value of the effective scene under its TOML path, the whole scene as
+/// text, and a report of the run.
 pub fn write_exr(
     path: &Path,
     rendered: &RenderOutput,
@@ -65,7 +65,7 @@ pub fn write_exr(
     Ok(image_io::write_exr(path, &p)?)
 }
 
-/// All layers as planes.
+/// Collects all rendered layers as planes.
 pub fn picture(rendered: &RenderOutput) -> Result<Picture, OutputError> {
     let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
     add_pixels(&mut p, rendered)?;
@@ -115,14 +115,14 @@ fn add_pixels(p: &mut Picture, rendered: &RenderOutput) -> Result<(), OutputErro
     Ok(())
 }
 
-/// Every parameter and what was done.
+/// Collects every parameter and a report of the run.
 pub fn metadata(
     rendered: &RenderOutput,
     scene: &Scene,
     elapsed_secs: f64,
 ) -> Result<Metadata, OutputError> {
     let mut m = image_io::metadata_of_this_run("schlieren", env!("CARGO_PKG_VERSION"));
-    // OpenEXR's own attribute of that name is not for free use.
+    // OpenEXR reserves the attribute of that name.
     if let Some(program) = m.remove(keys::SOFTWARE) {
         m.insert("program".into(), program);
     }
@@ -145,7 +145,7 @@ pub fn metadata(
     Ok(m)
 }
 
-/// Values of a TOML tree under their paths: `film.focus_m`. Lists are texts.
+/// Inserts the values of a TOML tree under their paths, such as `film.focus_m`. Lists become text.
 fn flatten(path: &str, value: &toml::Value, out: &mut Metadata) {
     match value {
         toml::Value::Table(table) => {
@@ -170,7 +170,7 @@ fn flatten(path: &str, value: &toml::Value, out: &mut Metadata) {
 }
 
 /// Writes the deflection map as a NumPy array of shape (height, width, 2), little-endian f32, in
-/// rad along the picture's right and up; row 0 is the top.
+/// rad along the image's right and up. Row 0 is the top.
 pub fn write_npy(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError> {
     let map = rendered.map.as_ref().ok_or(OutputError::NoMap)?;
     let shape = format!("({}, {}, 2)", rendered.framing.height, rendered.framing.width);
@@ -178,8 +178,8 @@ pub fn write_npy(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError
     write_whole(path, &bytes).map_err(|source| OutputError::Io { path: path.into(), source })
 }
 
-/// NumPy's format, version 1.0: magic, length, a Python dictionary padded so that the data begin at
-/// a multiple of 64, the data.
+/// Encodes NumPy's format, version 1.0: magic number, header length, a Python dictionary padded so
+/// that the data begin at a multiple of 64 bytes, then the data.
 fn npy(shape: &str, values: &[f32]) -> Vec<u8> {
     const PREAMBLE: usize = 10;
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
@@ -193,7 +193,7 @@ fn npy(shape: &str, values: &[f32]) -> Vec<u8> {
     bytes
 }
 
-/// A file that appears whole or not at all.
+/// Writes a file atomically: it appears complete or not at all.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.partial", std::process::id()));

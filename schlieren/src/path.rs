@@ -1,17 +1,17 @@
-//! The boundary between optics and field: a photon goes in undisturbed and comes out with its
-//! deviation.
+//! Traces light through the test section: [`LightPaths`] turns undisturbed rays into exits.
 //!
-//! Optics makes [`Start`]s, one of the implementations of [`LightPaths`] (line of sight, a march on
-//! the CPU, the GPU) turns them into [`Exit`]s, and optics takes them on to the cut-off and the
-//! film. Nothing here is the difference of two large numbers.
+//! This module is the interface between the optics and the field. The optics creates [`Start`]s. An
+//! implementation of [`LightPaths`] (line of sight, a march on the CPU, the GPU) turns them into
+//! [`Exit`]s. The optics then follows each exit to the cut-off and the film. An exit stores
+//! deviations from the undisturbed ray, so no value is the difference of two large numbers.
 
 use crate::view::View;
 
 /// The undisturbed ray of one photon.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Start {
-    /// Where the undisturbed ray crosses the plane through the view's centre perpendicular to
-    /// `forward`: along `right` and `up`, from the centre.
+    /// The point where the undisturbed ray crosses the plane through the view's centre
+    /// perpendicular to `forward`. Components along `right` and `up`, relative to the centre.
     pub position_m: [f32; 2],
     /// Slopes of the photon's parallel beam: its direction is `forward + tilt[0] right + tilt[1]
     /// up`, normalised. Zero on the optical axis; other values come from the extent of the light
@@ -19,33 +19,35 @@ pub struct Start {
     pub tilt_rad: [f32; 2],
 }
 
-/// The same photon behind the test section, as deviations from its undisturbed ray.
+/// A photon behind the test section, as deviations from its undisturbed ray.
 ///
 /// Directions are given in the photon's own frame: the view's frame turned by the smallest rotation
 /// that takes `forward` to the photon's direction. For tilts below 1e-3 rad its `right` and `up`
 /// equal the view's within 5e-7.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exit {
-    /// Deflection along right and up: the components of the unit direction in the reference medium
-    /// (sines; they equal the angles within 2e-5 relative below 0.01 rad). The light leaves through
-    /// a surface normal to the undisturbed ray, as through the window of a test section.
+    /// Deflection along right and up: components of the unit direction in the reference medium.
+    /// These are sines; below 0.01 rad they equal the angles within a relative error of 2e-5. The
+    /// light leaves through a surface normal to the undisturbed ray, as through the window of a
+    /// test section.
     pub deflection_rad: [f32; 2],
     /// Displacement along right and up in the plane at `exit_depth_m`.
     pub displacement_m: [f32; 2],
-    /// Distance along the undisturbed ray, from where it crosses the centre plane to where it left
-    /// the field.
+    /// Distance along the undisturbed ray, from the centre plane to where the photon left the
+    /// field.
     pub exit_depth_m: f32,
     /// Optical path minus that of the undisturbed ray in the reference medium, between the same
-    /// planes. NaN when it was not asked for.
+    /// planes. NaN when it was not requested.
     pub opd_m: f32,
-    /// 1 free; 0 blocked; between when absorption or an analyser dims the light ([`crate::media`]).
+    /// Transmitted fraction of the light: 1 if free, 0 if blocked, and between when absorption or
+    /// an analyser dims the light ([`crate::media`]).
     pub transmission: f32,
     /// What happened to the ray.
     pub status: Status,
 }
 
 impl Exit {
-    /// A ray that met nothing at all.
+    /// A ray that nothing has deflected or dimmed.
     pub const UNDISTURBED: Exit = Exit {
         deflection_rad: [0.0; 2],
         displacement_m: [0.0; 2],
@@ -64,46 +66,47 @@ pub enum Status {
     Free,
     /// Stopped by a solid body.
     Blocked,
-    /// Went through cells without data (and was stopped there, or not, as the march was told; see
-    /// `transmission`).
+    /// Passed through cells without data. The march's options decide whether it was stopped there;
+    /// see `transmission`.
     Masked,
-    /// Was bent so far that it left sideways or backwards; its deflection and displacement are
-    /// those where it left, and it does not reach the film.
+    /// Left sideways or backwards because it was bent too far. Deflection and displacement are
+    /// those where it left; it does not reach the film.
     Turned,
 }
 
-/// How a photon's exit changes with its starting position: what a shadowgraph without noise needs.
+/// Derivatives of a photon's exit with respect to its starting position. Noise-free shadowgraphs
+/// need them.
 ///
-/// Row i, column j: change of component i per metre of the start along j.
+/// Row i, column j is the change of component i per metre of the start along j.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Jacobian {
-    /// Of the deflection, in rad/m.
+    /// Derivative of the deflection, in rad/m.
     pub deflection_per_m: [[f32; 2]; 2],
-    /// Of the displacement, in m/m.
+    /// Derivative of the displacement, in m/m.
     pub displacement_per_m: [[f32; 2]; 2],
 }
 
-/// What the caller wants to be computed along the paths. Deflection and displacement always are.
+/// Quantities to compute along the paths. Deflection and displacement are always computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct PathQuantities {
     /// The optical path difference ([`Exit::opd_m`]).
     pub opd: bool,
 }
 
-/// What leaving out even gas came to; see [`crate::skip`].
+/// The effect of skipping uniform gas; see [`crate::skip`].
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SkipReport {
-    /// Part of the steps that took no sample, 0 to 1.
+    /// Fraction of the steps that took no sample, 0 to 1.
     pub steps_part: f64,
-    /// Bound on what that changed any ray's deflection by.
+    /// Bound on the change of any ray's deflection.
     pub bound_rad: f64,
-    /// Bytes that the bricks take.
+    /// Size of the bricks in bytes.
     pub bricks_bytes: usize,
-    /// Time it took to build them.
+    /// Time to build the bricks, in seconds.
     pub bricks_secs: f64,
 }
 
-/// Paths that several pictures share.
+/// Paths that several images share.
 impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         (**self).trace(starts, exits);
@@ -143,11 +146,11 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
     }
 }
 
-/// Something that takes light through the test section.
+/// Traces light through the test section.
 pub trait LightPaths: Sync {
-    /// Traces each start to the exit of the same number, on the calling thread. Neighbouring starts
-    /// should be neighbours in the picture: rays are taken in packets, and those that look at the
-    /// same nodes are faster. No exit depends on it.
+    /// Traces each start to the exit with the same index, on the calling thread. Successive starts
+    /// should be neighbours in the image: rays are traced in packets, and packets that read the
+    /// same nodes are faster. The exits do not depend on the order.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -156,25 +159,26 @@ pub trait LightPaths: Sync {
     /// The view in whose frame starts and exits are given.
     fn view(&self) -> &View;
 
-    /// What [`Exit`] will hold.
+    /// The quantities that [`Exit`] will hold.
     fn wanted(&self) -> PathQuantities;
 
-    /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences: half a
-    /// voxel or so.
+    /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences, about
+    /// half a voxel.
     fn difference_step_m(&self) -> f64;
 
-    /// What failed on the way and was made up for, with its cause, for who looks at the result.
+    /// A warning for the user when the device failed and the CPU traced the rest, with the cause.
     fn device_warning(&self) -> Option<String> {
         None
     }
 
-    /// What leaving out even gas came to so far; `None` where nothing is to be left out.
+    /// The effect of skipping uniform gas so far; `None` if skipping is off.
     fn skip_report(&self) -> Option<SkipReport> {
         None
     }
 
-    /// [`LightPaths::trace`], and how each exit changes with its start. This implementation takes
-    /// central differences of four more rays each; implementations with smooth fields do better.
+    /// As [`LightPaths::trace`], with the derivatives of each exit with respect to its start. This
+    /// implementation takes central differences of four more rays per start. Implementations with
+    /// smooth fields can do better.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -199,7 +203,7 @@ pub trait LightPaths: Sync {
                 self.trace(&moved, side);
             }
             for (i, j) in jacobians.iter_mut().enumerate() {
-                // The distance that was really taken, after rounding.
+                // The actual distance between the two rays, after rounding.
                 let p = starts[i].position_m[axis];
                 let scale = 1.0 / ((p + step_m) - (p - step_m));
                 for row in 0..2 {
@@ -213,15 +217,15 @@ pub trait LightPaths: Sync {
         }
     }
 
-    /// [`LightPaths::trace`] on all threads of the current rayon pool. The result does not depend
-    /// on their number.
+    /// As [`LightPaths::trace`], on all threads of the current rayon pool. The result does not
+    /// depend on the number of threads.
     ///
     /// # Panics
     /// If the slices differ in length.
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
         use rayon::prelude::*;
         assert_eq!(starts.len(), exits.len(), "one exit per start");
-        // A multiple of every packet size; a few milliseconds of work.
+        // A multiple of every packet size, and a few milliseconds of work.
         const CHUNK: usize = 1024;
         starts
             .par_chunks(CHUNK)

@@ -1,31 +1,33 @@
-//! From a tolerance in radians to a march: mode, interpolant and step, with the bound that chose
-//! them and the error that was measured.
+//! Chooses mode, interpolant and step of a march from a tolerance in radians, with error bounds and
+//! the measured error.
 //!
-//! The errors add up. What follows bounds each from the lattice alone, in one pass over it
-//! ([`DerivativeBounds`]), with G the largest gradient, H the largest second derivative, T the
-//! largest third and F the largest fourth along an axis (all per metre, mixed ones too), L the
-//! longest way through the field, h the spacing, theta = G L the largest deflection:
+//! The errors add up. Each has a bound that follows from the lattice alone, in one pass over it
+//! ([`DerivativeBounds`]). G is the largest gradient, H the largest second and T the largest third
+//! derivative (mixed ones included), and F the largest fourth derivative along an axis, all per
+//! metre. L is the longest path through the field, h the spacing, and theta = G L the largest
+//! deflection.
 //!
-//! * **Bending** (line of sight leaves it out): a ray strays by at most G s²/2 after a way s, so
-//!   its gradient is off by H times that: `H G L³ / 6`. The way itself is longer by theta²/2 at
-//!   most, which adds `theta³ / 2`. The optical path is off by `G² L³ / 3`.
-//! * **Step** (Verlet): a step of length k samples the gradient at its middle, which is off by
-//!   `k²/24` times the gradient's second derivative along the ray, `T + H G` (the ray bends by G),
-//!   so over L it is `L k² / 24 (T + H G)`; Euler's is not offered. Line of sight in an oblique
-//!   view has steps of one voxel.
-//! * **Interpolation**: the spline's derivative is off by about `h³/24 F` (de Boor's bound for the
-//!   derivative of the complete cubic spline), trilinear gradients' by `h²/6 T`, trilinear eps' by
-//!   `h/2` times the second derivatives along the axes and `h²/8 T`; over L.
-//! * **Edges**: seen obliquely, deflections have a kink where rays pass an edge of the field,
-//!   unless there is no gradient. Line of sight interpolates across.
+//! * **Bending**, which line of sight neglects: after a path s, a ray has moved by at most G s²/2.
+//!   The error of its gradient is H times that, in total `H G L³ / 6`. The path is longer by at
+//!   most a fraction theta²/2, which adds `theta³ / 2`. The error of the optical path is `G² L³ /
+//!   3`.
+//! * **Step** (Verlet): a step of length k samples the gradient at its midpoint. Its error is
+//!   `k²/24` times the gradient's second derivative along the ray, `T + H G` (the ray bends by G).
+//!   Over L this is `L k² / 24 (T + H G)`. Line of sight in an oblique view takes steps of one
+//!   voxel.
+//! * **Interpolation**, over L: the error of the spline's derivative is about `h³/24 F` (de Boor's
+//!   bound for the derivative of the complete cubic spline). For trilinear gradients it is `h²/6
+//!   T`. For trilinear eps it is `h/2` times the second derivatives along the axes, plus `h²/8 T`.
+//! * **Edges**: in an oblique view, deflections have a kink where rays pass an edge of the field,
+//!   unless the gradient there is zero. Line of sight interpolates across the kink.
 //!
-//! An error of the gradient moves the ray, and from there on its gradient is another: errors of
-//! steps and interpolants grow by at most `cosh(√H L)` (Gronwall).
+//! An error of the gradient displaces the ray, which changes the gradient along the rest of its
+//! path. Errors of steps and interpolants therefore grow by at most `cosh(√H L)` (Gronwall).
 //!
-//! All are worst cases of worst points added up along the whole path: real errors are ten to a
-//! thousand times smaller. So the plan then traces a few hundred rays twice, as planned and with
-//! everything refined, and reports that difference as the achieved error; and once more through
-//! coarser lattices, to know what the field's own lattice leaves open.
+//! These bounds assume the worst point along the whole path. Real errors are ten to a thousand
+//! times smaller. [`Plan::measure`] therefore traces a few hundred rays twice, as planned and with
+//! everything refined, and reports the difference as the achieved error. It also traces them
+//! through coarser lattices to estimate how well the field's own lattice resolves the flow.
 
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate};
@@ -40,36 +42,38 @@ use std::sync::Arc;
 
 pub use crate::derivative_bounds::DerivativeBounds;
 
-/// How light is taken through the field.
+/// How light is traced through the field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// Straight, projected once.
+    /// Straight rays; the field is projected once.
     LineOfSight,
-    /// Deviations from straight, Verlet in f32.
+    /// Deviations from the straight ray, by Verlet steps in f32.
     Paraxial,
-    /// PEFRL in f64.
+    /// Bent rays, by PEFRL steps in f64.
     Full,
 }
 
-/// What a user asks for. What is `None` is chosen.
+/// The user's requirements. The plan chooses whatever is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Request {
-    /// Largest error of the deflection that is fine. Zero and below: as accurate as can be. A
-    /// lattice that is itself coarser than this sets the steps instead.
+    /// Largest acceptable error of the deflection. Zero or below means as accurate as possible. If
+    /// the interpolation error of the lattice is larger than this, that error sets the steps
+    /// instead.
     pub tolerance_rad: f64,
-    /// Direction of the light, which sets the longest way through the field. `None`: any.
+    /// Direction of the light, which sets the longest path through the field. `None` means any
+    /// direction.
     pub direction: Option<DVec3>,
-    /// Forces a mode.
+    /// Mode to use.
     pub mode: Option<Mode>,
-    /// Forces an interpolant.
+    /// Interpolant to use.
     pub interpolant: Option<Interpolant>,
-    /// Forces a step.
+    /// Step to use, in lattice steps.
     pub step_voxels: Option<f64>,
-    /// What to compute beside deflection and displacement. The optical path, if wanted, may be off
-    /// by the tolerance times the longest way through the field: where its slope is a deflection,
-    /// that is the same.
+    /// Quantities to compute besides deflection and displacement. The optical path, if requested,
+    /// may have an error of up to the tolerance times the longest path through the field. This is
+    /// consistent with the tolerance, because the slope of the optical path is a deflection.
     pub wanted: PathQuantities,
-    /// What becomes of light in cells without data.
+    /// How cells without data treat light.
     pub blank: BlankCells,
     /// [`Options::skip_rad`], for [`Mode::Paraxial`].
     pub skip_rad: f64,
@@ -77,34 +81,34 @@ pub struct Request {
     pub skip_opd_m: f64,
 }
 
-/// A bound for each kind of error, in radians.
+/// A bound for each kind of error. Angles are in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// Of leaving out that rays bend.
+    /// Error of neglecting that rays bend.
     pub bending_rad: f64,
-    /// Of the interpolant.
+    /// Error of the interpolant.
     pub interpolation_rad: f64,
-    /// Of the step.
+    /// Error of the step.
     pub step_rad: f64,
-    /// Of edges that are interpolated across.
+    /// Error of interpolating across edges.
     pub edges_rad: f64,
-    /// Of the optical path, as far as leaving out that rays bend and steps make it.
+    /// Error of the optical path from steps and from neglecting that rays bend, in metres.
     pub path_m: f64,
-    /// Largest deflection that is possible.
+    /// Largest possible deflection.
     pub deflection_rad: f64,
 }
 
 impl Bounds {
-    /// All errors of a deflection together.
+    /// Sum of all errors of a deflection.
     pub fn total_rad(&self) -> f64 {
         self.bending_rad + self.interpolation_rad + self.step_rad + self.edges_rad
     }
 }
 
-/// The choice, and why.
+/// The chosen march, with the bounds of its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
-    /// As asked.
+    /// The request that this plan answers.
     pub request: Request,
     /// The mode.
     pub mode: Mode,
@@ -112,40 +116,40 @@ pub struct Plan {
     pub interpolant: Interpolant,
     /// The longest step, in lattice steps.
     pub step_voxels: f64,
-    /// Bounds of its errors, before anything was traced.
+    /// Bounds of its errors, known before any ray is traced.
     pub bounds: Bounds,
-    /// What was found in the field.
+    /// The largest derivatives of the field.
     pub derivative_bounds: DerivativeBounds,
 }
 
-/// Error of a plan, measured by tracing some rays with everything refined.
+/// Error of a plan, measured by comparing some rays with a refined march.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredError {
-    /// Largest error of deflection: the step, the mode and the arithmetic.
+    /// Largest error of the deflection, from the step, the mode and the arithmetic.
     pub max_rad: f64,
-    /// Its root mean square.
+    /// Root mean square of the same error.
     pub rms_rad: f64,
-    /// How well the field itself is resolved: the error that its lattice leaves open, estimated
-    /// from the largest changes of deflection when half the nodes along each axis are left out, and
-    /// half of those (Richardson's extrapolation). Infinite when the field has too few nodes to
-    /// tell.
+    /// Error of the deflection due to the field's finite lattice. It is estimated by Richardson
+    /// extrapolation, from the largest changes of deflection when the lattice is halved along each
+    /// axis and halved again. Infinite when the field has too few nodes for an estimate.
     pub resolution_rad: f64,
-    /// Rays compared.
+    /// Number of rays compared.
     pub rays: usize,
 }
 
-/// Shortest step that is chosen: below it nothing gets better on interpolated fields.
+/// Shortest step that a plan chooses. Shorter steps do not improve the result on interpolated
+/// fields.
 const SHORTEST_STEP: f64 = 0.125;
 
 impl Plan {
-    /// Chooses the cheapest march whose bounds are within the tolerance; if none is, the most
-    /// accurate.
+    /// Chooses the cheapest march whose bounds are within the tolerance, or the most accurate march
+    /// if none is.
     pub fn new(field: &Field, request: Request) -> Plan {
         let derivative_bounds = DerivativeBounds::of(field);
         Self::from_derivative_bounds(field, request, derivative_bounds)
     }
 
-    /// [`Plan::new`] for a field whose roughness is known.
+    /// [`Plan::new`] for a field whose derivative bounds are known.
     pub fn from_derivative_bounds(
         field: &Field,
         request: Request,
@@ -156,7 +160,7 @@ impl Plan {
         let r = derivative_bounds;
         let tolerance = request.tolerance_rad.max(0.0);
         let deflection_rad = r.gradient * length_m;
-        // Beyond e^50 it is infinite for all purposes, and still a number.
+        // Limited to about e^50, which exceeds any tolerance but is still finite.
         let growth = (r.second.sqrt() * length_m).min(50.0).cosh();
 
         let bending_rad =
@@ -176,16 +180,17 @@ impl Plan {
             };
             growth * length_m * per_m
         };
-        // A quarter of the tolerance while the interpolant's bound leaves it; where the lattice
-        // itself is off by more, a third of that bound, which is the same number where the two
-        // cases meet. Shorter steps would only cost time. Zero asks for all there is.
+        // The share of steps is a quarter of the tolerance. Where the interpolant's bound is more
+        // than three quarters of it, the share is a third of that bound, because shorter steps
+        // would only cost time. The two cases agree where they meet. Tolerance zero requests the
+        // highest accuracy.
         let share =
             |i| if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(i) / 3.0) } else { 0.0 };
 
-        // Strong index: deflections for which "paraxial" is a courtesy, or an index far from the
-        // reference's.
+        // Strong index: deflections too large for the paraxial mode, or an index far from the
+        // reference index.
         let strong = r.eps > 0.05 || deflection_rad > 0.5 && r.eps > 0.01;
-        // What projections have instead of steps.
+        // Error of projections, which take the place of steps.
         let projected_rad = if box_path.oblique { steps_rad(1.0) } else { 0.0 };
         let spline = request.interpolant.unwrap_or(Interpolant::BSpline);
         let straight_is_enough = bending_rad + edges_rad <= 0.5 * tolerance
@@ -199,8 +204,8 @@ impl Plan {
             Mode::Paraxial
         });
 
-        // The cheapest interpolant that is good enough. Line of sight is as fast with the spline as
-        // without.
+        // The cheapest interpolant within the tolerance. Line of sight is as fast with the spline
+        // as with the trilinear interpolants.
         let interpolant = request.interpolant.unwrap_or(
             if mode == Mode::Paraxial && of_interpolant(Interpolant::Trilinear) <= 0.5 * tolerance {
                 Interpolant::Trilinear
@@ -209,16 +214,16 @@ impl Plan {
             },
         );
 
-        // The longest step that is good enough, in powers of two from one voxel.
+        // The longest step within the tolerance, found by halving from one voxel.
         let of_step = |voxels: f64| match mode {
             Mode::LineOfSight => projected_rad,
             Mode::Paraxial => steps_rad(voxels),
-            // Fourth order: the constant of PEFRL is about 1/5000 (Omelyan 2002, table 2), times a
-            // fifth derivative that a spline does not have.
+            // PEFRL is of fourth order with a constant of about 1/5000 (Omelyan 2002, table 2),
+            // times a fifth derivative. A spline does not have that derivative.
             Mode::Full => growth * length_m * (voxels * h_m).powi(3) / 200.0 * r.fourth,
         };
-        // Paths are summed up at the same places: eps there is off by its second derivative along
-        // the ray.
+        // Optical paths are summed at the same positions. The error of eps there comes from its
+        // second derivative along the ray.
         let path_of_step_m = |voxels: f64| match mode {
             Mode::LineOfSight => {
                 if box_path.oblique {
@@ -248,7 +253,7 @@ impl Plan {
         let straight = mode == Mode::LineOfSight;
         let bounds = Bounds {
             bending_rad: if straight { bending_rad } else { 0.0 },
-            // Oblique projections are interpolated once more, as maps.
+            // Oblique projections are interpolated a second time, as maps.
             interpolation_rad: of_interpolant(interpolant)
                 * if straight && box_path.oblique { 2.0 } else { 1.0 },
             step_rad: of_step(step_voxels),
@@ -259,12 +264,12 @@ impl Plan {
         Plan { request, mode, interpolant, step_voxels, bounds, derivative_bounds }
     }
 
-    /// The march as planned.
+    /// The planned march through a field.
     pub fn paths<'a>(&self, field: &'a Field, view: View) -> Box<dyn LightPaths + 'a> {
         self.paths_with(field, view, &FieldCache::default())
     }
 
-    /// [`Plan::paths`] with what was prepared for this field before.
+    /// [`Plan::paths`] that reuses what `cache` holds for this field.
     pub fn paths_with<'a>(
         &self,
         field: &'a Field,
@@ -300,13 +305,13 @@ impl Plan {
         }
     }
 
-    /// Traces about `rays` rays of a view as planned and once more with everything refined (quarter
-    /// steps, splines, bending, nothing left out), and compares.
+    /// Measures the error: traces about `rays` rays of a view as planned and with everything
+    /// refined (quarter steps, splines, bending, no skipping), and compares them.
     pub fn measure(&self, field: &Field, view: View, rays: usize) -> MeasuredError {
         self.measure_with(field, view, rays, &FieldCache::default())
     }
 
-    /// [`Plan::measure`] with what was prepared for this field before.
+    /// [`Plan::measure`] that reuses what `cache` holds for this field.
     pub fn measure_with(
         &self,
         field: &Field,
@@ -344,7 +349,8 @@ impl Plan {
     }
 }
 
-/// Largest and root mean square difference of the deflections of rays that got through in both.
+/// Largest and root mean square difference of deflection, and the number of rays compared: those
+/// that are free in both.
 fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
     let (mut max, mut sum, mut rays) = (0.0f64, 0.0, 0);
     for (a, b) in a.iter().zip(b) {
@@ -360,8 +366,8 @@ fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
     (max, if rays > 0 { (sum / rays as f64).sqrt() } else { 0.0 }, rays)
 }
 
-/// Starts spread evenly over the picture of the field (the R2 sequence of Roberts 2018: the plane's
-/// golden ratio).
+/// Starts spread evenly over the image of the field, by the R2 sequence of Roberts 2018, the
+/// two-dimensional analogue of the golden ratio sequence.
 fn sample_starts(field: &Field, view: &View, rays: usize) -> Vec<Start> {
     let half = [view.right, view.up].map(|axis| 0.5 * (field.size_m() * axis.abs()).element_sum());
     let offset = [view.right, view.up].map(|axis| (field.centre_m() - view.centre_m).dot(axis));
@@ -375,25 +381,26 @@ fn sample_starts(field: &Field, view: &View, rays: usize) -> Vec<Start> {
         .collect()
 }
 
-/// The error of a lattice by Richardson's extrapolation: `change` is what leaving out half the
-/// nodes did, `before` what leaving out half of those did. Of order p the two have a ratio of 2^p.
-/// Splines' derivatives are of third order where the field is resolved; where it is not, errors do
-/// not shrink as fast.
+/// Error of a lattice by Richardson extrapolation. `change` is the effect of removing half the
+/// nodes, `before` that of removing half of the rest. For order p their ratio is 2^p. Spline
+/// derivatives are of third order where the lattice resolves the field. Elsewhere errors shrink
+/// more slowly.
 fn extrapolated_error(change: f64, before: Option<f64>) -> f64 {
     const RESOLVED: f64 = 8.0;
-    // Structures at the limit: half the change of a halving is left.
+    // Structures at the limit of resolution: the error halves with the spacing.
     const UNRESOLVED: f64 = 2.0;
     let ratio = match before {
         Some(before) if change > 0.0 => (before / change).clamp(UNRESOLVED, RESOLVED),
-        // Too few nodes to tell, or nothing changed.
+        // Too few nodes for an estimate, or nothing changed.
         _ => RESOLVED,
     };
     change / (ratio - 1.0)
 }
 
 /// The field on a lattice of half the nodes along each axis that has at least seven. `None` when
-/// there is no such axis. Where every other node does not end with the last, nodes lie between, on
-/// the spline: a lattice that ends before the last node would be another field, with less gas.
+/// there is no such axis. If every other node does not include the last, the coarse nodes lie
+/// between the original ones and sample the spline. Ending before the last node would give a
+/// different field with less gas.
 fn coarsened(field: &Field, spline: &dyn Fn() -> Arc<BSpline>) -> Option<Field> {
     let d = field.dims();
     let half = d.map(|n| if n < 7 { n } else { n.div_ceil(2) });
@@ -425,14 +432,14 @@ fn coarsened(field: &Field, spline: &dyn Fn() -> Arc<BSpline>) -> Option<Field> 
     Field::new(half, spacing_m, field.origin_m(), eps, field.n0(), nodes).ok()
 }
 
-/// The way of light through a field's box.
+/// The path of light through a field's box.
 struct BoxPath {
-    /// The longest.
+    /// Length of the longest path.
     longest_m: f64,
-    /// Not along an axis of the lattice, or not known.
+    /// Whether the direction is unknown or not along an axis of the lattice.
     oblique: bool,
-    /// How fast ways get shorter towards an edge: metres per metre across the light. Infinite when
-    /// the direction is not known.
+    /// How fast paths get shorter towards an edge, in metres per metre across the light. Infinite
+    /// when the direction is unknown.
     slope: f64,
 }
 
@@ -444,21 +451,21 @@ impl BoxPath {
             return BoxPath { longest_m: size.length(), oblique: true, slope: f64::INFINITY };
         };
         let oblique = d.max_element() < 1.0;
-        // Between faces that the light meets under the angle with cosine c, ways change by √(1 -
-        // c²)/c per metre; those along the light have no edge.
+        // At a face whose normal makes an angle of cosine c with the light, path lengths change by
+        // √(1 - c²)/c per metre. Faces parallel to the light have no edge.
         let slope = d.to_array().into_iter().filter(|c| *c > 0.0).map(|c| (1.0 - c * c).sqrt() / c);
         let slope = if oblique { slope.sum() } else { 0.0 };
         BoxPath { longest_m: (size / d).min_element().min(size.length()), oblique, slope }
     }
 
-    /// Metres of gas by which a cubic spline over nodes `h_m` apart is off at an edge: a quarter of
-    /// a step times the change of slope, and no more than there are.
+    /// Error of a cubic spline over nodes `h_m` apart at an edge, in metres of gas: a quarter of a
+    /// step times the change of slope, at most the longest path.
     fn edges_m(&self, h_m: f64) -> f64 {
         (0.25 * h_m * self.slope).min(self.longest_m)
     }
 }
 
-/// [`Full`] that owns its spline.
+/// A [`Full`] march that owns its spline.
 struct FullSpline<'a> {
     field: &'a Field,
     spline: Arc<BSpline>,

@@ -1,10 +1,10 @@
-//! Where the gas is so even that light goes straight: bricks with a bound on the deflection that
-//! leaving them out can cost.
+//! Skips bricks of nearly uniform gas, with a bound on the deflection that this neglects.
 //!
-//! Replaces the dissertation's octree of step lengths (section 5.3.2), whose threshold had no unit.
-//! A brick knows the largest |grad eps| of the interpolant in and around it; times the chord that
-//! is the largest angle, in radians, by which a ray can be deflected there. Rays add up what they
-//! leave out, and stop leaving out when the sum would pass the tolerance.
+//! Bricks replace the dissertation's octree of step lengths (section 5.3.2), whose threshold had no
+//! unit. A brick stores the largest |grad eps| of the interpolant in and around it. This times the
+//! length of the ray's chord is the largest angle, in radians, by which the brick can deflect the
+//! ray. Rays sum these angles over the bricks that they skip, and stop skipping when the sum would
+//! exceed the tolerance.
 
 use crate::field::Field;
 use crate::interpolate::BSpline;
@@ -14,20 +14,20 @@ use std::time::{Duration, Instant};
 /// Lattice steps along a brick's edge.
 pub const EDGE: usize = 8;
 
-/// What is known of a brick and its 26 neighbours together.
+/// Bounds over a brick and its 26 neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Brick {
     /// Bound on |grad eps|.
     pub max_gradient_per_m: f32,
-    /// Middle of the range of eps.
+    /// Centre of the range of eps.
     pub mean_eps: f32,
-    /// Half the range of eps: no value is further from `mean_eps`.
+    /// Half the range of eps: the largest distance of any value from `mean_eps`.
     pub half_range_eps: f32,
-    /// Some nodes are not gas.
+    /// Whether some nodes are not gas.
     pub has_nodes: bool,
 }
 
-/// Bricks over a field.
+/// The bricks of a field.
 #[derive(Debug)]
 pub struct Bricks {
     bricks: Vec<Brick>,
@@ -36,17 +36,18 @@ pub struct Bricks {
 }
 
 impl Bricks {
-    /// Bounds for the B-spline through a field. They hold for the trilinear interpolants too: those
-    /// stay between the nodes' values and differences.
+    /// Computes bounds for the B-spline through a field. They also hold for the trilinear
+    /// interpolants, which stay between the values and differences of the nodes.
     pub fn new(field: &Field, spline: &BSpline) -> Bricks {
         let start = Instant::now();
         let [nx, ny, nz] = field.dims();
         let dims = field.dims().map(|n| (n - 1).div_ceil(EDGE));
         let (coefficients, [sy, sz]) = spline.coefficients();
         let rcp_h = field.spacing_m().map(|h| 1.0 / h);
-        // The B-spline is a convex combination of coefficients, and its derivative along an axis
-        // one of their differences: bounds on those are bounds on it. A brick's cells i..i+8 use
-        // coefficients i-1..=i+10, the same numbers plus one in the padded array.
+        // The B-spline is a convex combination of coefficients, and its derivative along an axis is
+        // a convex combination of their differences. Bounds on these are therefore bounds on the
+        // spline. A brick's cells i..i+8 use coefficients i-1..=i+10; in the padded array the
+        // indices are larger by one.
         let own: Vec<Brick> = (0..dims[0] * dims[1] * dims[2])
             .into_par_iter()
             .map(|b| {
@@ -101,8 +102,8 @@ impl Bricks {
             })
             .collect();
 
-        // A ray looks up the brick in the middle of a stride, which is at most a brick long: its
-        // neighbours bound the rest.
+        // A ray looks up the brick at the midpoint of a stride, which is at most a brick long. The
+        // neighbours bound the rest of the stride.
         let bricks = (0..own.len())
             .into_par_iter()
             .map(|b| {
@@ -132,27 +133,27 @@ impl Bricks {
         Bricks { bricks, dims, build: start.elapsed() }
     }
 
-    /// The brick of a point in lattice coordinates; points outside belong to the nearest.
+    /// The bounds at a point in lattice coordinates. Points outside use the nearest brick.
     #[inline(always)]
     pub fn around(&self, at: [f32; 3]) -> Brick {
-        // Conversions saturate: negative numbers (and NaN) go to brick 0.
+        // Conversions saturate: negative numbers and NaN map to brick 0.
         let [x, y, z] = at;
         let b = [x as usize / EDGE, y as usize / EDGE, z as usize / EDGE];
         let [nx, ny, nz] = self.dims;
         self.bricks[b[0].min(nx - 1) + (b[1].min(ny - 1) + b[2].min(nz - 1) * ny) * nx]
     }
 
-    /// The largest |grad eps| anywhere.
+    /// The largest |grad eps| of all bricks.
     pub fn max_gradient_per_m(&self) -> f64 {
         self.bricks.iter().map(|b| f64::from(b.max_gradient_per_m)).fold(0.0, f64::max)
     }
 
-    /// Bytes held.
+    /// Memory of the bricks in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&self.bricks[..])
     }
 
-    /// How long building took.
+    /// Time to build the bricks.
     pub fn build_time(&self) -> Duration {
         self.build
     }

@@ -1,14 +1,16 @@
-//! Models in the test section: triangle meshes that block light, as in every photograph from a wind
-//! tunnel.
+//! Adds opaque bodies to the test section: triangle meshes that block light, such as wind-tunnel
+//! models.
 //!
-//! Whether a photon is blocked is asked once, along its undisturbed straight ray, before it is
-//! traced: blocked photons cost no march, and the meshes need not know how light bends. Where light
-//! is bent one way on its way through, as by most flows, the true ray is farthest from the straight
-//! one where it leaves, so a silhouette is off by no more than the displacement there:
-//! [`crate::render::Report::silhouette_error_px`] is the largest one seen, in pixels, and there is
-//! a warning when it is above half a pixel. In gases it is far below. Testing every step of a march
-//! against the meshes would cost a BVH query per step and gain nothing visible; where bodies stand
-//! in strongly bending media, mark their cells in the field, which stops the bent ray itself.
+//! Each photon is tested once before it is traced, along its undisturbed straight ray. Blocked
+//! photons need no march, and the meshes do not depend on how light bends.
+//!
+//! The test neglects the displacement of the bent ray. In most flows, light bends in one direction
+//! on its path, so the displacement is largest where the ray leaves the field. That displacement
+//! bounds the error of a silhouette. [`crate::render::Report::silhouette_error_px`] is the largest
+//! one, in pixels, and a warning reports it above half a pixel. In gases it is far smaller. Testing
+//! every step of a march against the meshes would cost a BVH query per step without visible
+//! benefit. For bodies in strongly refracting media, mark their cells in the field as solid: this
+//! stops the bent ray itself.
 
 use crate::path::Start;
 use crate::view::View;
@@ -31,7 +33,7 @@ pub enum SolidsError {
     /// The file cannot be read.
     #[error("the body cannot be read")]
     Read(#[from] ReadError),
-    /// The file holds no surface.
+    /// The file cannot be converted to a surface.
     #[error("{path}: no surface can be made of it")]
     Surface {
         /// The file.
@@ -39,7 +41,7 @@ pub enum SolidsError {
         /// Why.
         source: ModelError,
     },
-    /// Nothing to block light.
+    /// The file has no triangles.
     #[error("{path}: it holds no triangles; a body needs a surface (OBJ, STL, PLY, glTF, VTP)")]
     Empty {
         /// The file.
@@ -51,8 +53,8 @@ pub enum SolidsError {
 }
 
 impl Solids {
-    /// Bodies from files, in metres in the flow's coordinates. Also what readers repaired or left
-    /// out.
+    /// Reads bodies from files, in metres in the flow's coordinates. Also returns warnings about
+    /// what the readers repaired or ignored.
     pub fn open<P: AsRef<Path>>(paths: &[P]) -> Result<(Solids, Vec<String>), SolidsError> {
         let (mut geometries, mut instances, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         let mut triangles = 0;
@@ -82,12 +84,12 @@ impl Solids {
         Ok((Solids { world, triangles }, warnings))
     }
 
-    /// Bodies that are at hand already.
+    /// Uses bodies that are already in memory.
     pub fn from_world(world: World) -> Solids {
         Solids { triangles: world.report().primitives, world }
     }
 
-    /// How many triangles there are.
+    /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.triangles
     }
@@ -97,14 +99,15 @@ impl Solids {
         self.world.occluded(&self.ray(view, start).0)
     }
 
-    /// How far along the photon's straight ray the first body is, from the plane through the view's
-    /// centre; `None` when there is none.
+    /// Distance along the photon's straight ray from the plane through the view's centre to the
+    /// first body; `None` when the ray hits no body.
     pub fn depth_m(&self, view: &View, start: &Start) -> Option<f64> {
         let (ray, before_m) = self.ray(view, start);
         self.world.closest(&ray).map(|hit| before_m + f64::from(hit.t))
     }
 
-    /// A photon's straight ray, and where on it that begins.
+    /// A photon's straight ray, and the distance of its origin from the plane through the view's
+    /// centre.
     fn ray(&self, view: &View, start: &Start) -> (Ray, f64) {
         let [right, up, direction] = [view.right, view.up, view.beam(start.tilt_rad)[2]];
         let at = view.centre_m
@@ -113,7 +116,8 @@ impl Solids {
         let bounds = self.world.bounds();
         let radius = f64::from((bounds.max - bounds.min).length());
         let middle = self.world.origin() + ((bounds.max + bounds.min) * 0.5).as_dvec3();
-        // From before all bodies: one radius in front of their bounding sphere, wherever that is.
+        // The ray begins in front of all bodies, at the front of a sphere around them that is
+        // larger than their bounding sphere.
         let back = (middle - at).dot(direction) - radius;
         let (ray, moved) = self.world.ray_from_world(at + direction * back, direction);
         (ray, back + moved)

@@ -1,9 +1,9 @@
-//! Colours of light: what a film sees of several wavelengths.
+//! Computes the colours that a film records for light of several wavelengths.
 //!
-//! With one wavelength (or white light whose dispersion does not matter) pictures are grey, or have
-//! the colours of the filter. With several, each is traced by itself through its own indices, and
-//! the film adds up the wavelengths' colours; dispersion appears as coloured edges, and
-//! interference as Newton's colours.
+//! With one wavelength (or white light whose dispersion does not matter), images are grey or have
+//! the colours of the filter. With several, each wavelength is traced separately through its own
+//! indices, and the film adds their colours. Dispersion appears as coloured edges, interference as
+//! Newton's colours.
 
 use crate::cutoff::Rgb;
 
@@ -12,7 +12,7 @@ use crate::cutoff::Rgb;
 pub struct Line {
     /// Vacuum wavelength.
     pub wavelength_nm: f64,
-    /// Its part of the light; parts add up to 1.
+    /// Fraction of the light; all fractions add up to 1.
     pub weight: f64,
 }
 
@@ -32,11 +32,11 @@ pub fn xyz(wavelength_nm: f64) -> [f64; 3] {
     ]
 }
 
-/// The colours (linear sRGB) that the lines leave on the film, such that all together are white,
-/// (1, 1, 1). A pure spectral colour lies outside what sRGB can show; its negative parts are cut
-/// off before balancing.
+/// The colours (linear sRGB) of the lines on the film, balanced so that their sum is white, (1, 1,
+/// 1). Pure spectral colours lie outside the sRGB gamut; negative components are clipped before
+/// balancing.
 ///
-/// Where the lines together have nothing of a channel (two red lasers) no balance can make them
+/// If the lines do not contribute to a channel (as with two red lasers), no balance can make them
 /// white, and that channel stays dark.
 pub fn film_colors(lines: &[Line]) -> Vec<Rgb> {
     let rgb = |line: &Line| {
@@ -51,14 +51,15 @@ pub fn film_colors(lines: &[Line]) -> Vec<Rgb> {
     };
     let colors: Vec<[f64; 3]> = lines.iter().map(rgb).collect();
     let total = [0, 1, 2].map(|c| colors.iter().map(|v| v[c]).sum::<f64>());
-    // A channel below a thousandth of the strongest would be noise blown up.
+    // Balancing a channel below a thousandth of the strongest would only amplify noise.
     let strongest = total.iter().copied().fold(0.0, f64::max);
     let balance = total.map(|t| if t > 1e-3 * strongest { 1.0 / t } else { 0.0 });
     colors.iter().map(|v| [0, 1, 2].map(|c| (v[c] * balance[c]) as f32)).collect()
 }
 
-/// How much of a filter's red, green and blue a wavelength meets: adds up to 1, so a grey filter is
-/// grey to all. Blue below 450 nm, green at 540, red above 620, linear between.
+/// Weights of a filter's red, green and blue for a wavelength. They add up to 1, so a grey filter
+/// is grey for every wavelength. Blue below 450 nm, green at 540 nm, red above 620 nm, linear
+/// between.
 pub fn filter_band(wavelength_nm: f64) -> Rgb {
     let ramp = |from: f64, to: f64| ((wavelength_nm - from) / (to - from)).clamp(0.0, 1.0);
     let (green_up, red_up) = (ramp(450.0, 540.0), ramp(540.0, 620.0));

@@ -1,4 +1,5 @@
-//! Flows whose exits are known in closed form, and short ways to expose a film to them. For tests.
+//! Helps tests: flows whose exits are known in closed form, and functions that expose a film to
+//! them.
 
 use crate::film::beams::expose_beams;
 use crate::film::photons::{Exposure, expose};
@@ -29,7 +30,7 @@ impl ClosedForm {
         ClosedForm { kind, view: View::along(Axis::Z, glam::DVec3::ZERO) }
     }
 
-    /// The same deflection everywhere, by a kink at depth 0: focused there, nothing moves.
+    /// The same deflection everywhere, at depth 0. In focus there, no ray is displaced.
     pub(crate) fn prism(deflection_rad: [f32; 2]) -> ClosedForm {
         ClosedForm::of(Kind::Prism(deflection_rad))
     }
@@ -39,7 +40,7 @@ impl ClosedForm {
         ClosedForm::of(Kind::ConstantPath(opd_m))
     }
 
-    /// A path difference that grows to the right.
+    /// A path difference that increases to the right.
     pub(crate) fn path_ramp(per_m: f64) -> ClosedForm {
         ClosedForm::of(Kind::PathRamp(per_m))
     }
@@ -111,7 +112,7 @@ fn photons<const C: usize>(
     films[0].developed(f64::from(samples))
 }
 
-/// Grey levels by photons.
+/// Exposes a grey film by photons.
 pub(crate) fn expose_grey(
     t: &Technique,
     p: &ClosedForm,
@@ -121,7 +122,7 @@ pub(crate) fn expose_grey(
     photons::<1>(t, p, framing, samples).into_iter().flatten().collect()
 }
 
-/// Colours by photons.
+/// Exposes a colour film by photons.
 pub(crate) fn expose_rgb(
     t: &Technique,
     p: &ClosedForm,
@@ -131,7 +132,7 @@ pub(crate) fn expose_rgb(
     photons::<3>(t, p, framing, samples)
 }
 
-/// Grey levels by beams.
+/// Exposes a grey film by beams.
 pub(crate) fn beams_grey(
     t: &Technique,
     p: &ClosedForm,
@@ -144,8 +145,8 @@ pub(crate) fn beams_grey(
     film.developed(1.0).into_iter().flatten().collect()
 }
 
-/// What `work` returns, on a thread of its own; a failed test instead of a hang when it takes
-/// longer than `limit`.
+/// Runs `work` on a thread of its own and returns its result. Fails the test instead of hanging
+/// when it takes longer than `limit`.
 pub(crate) fn within<T: Send + 'static>(
     limit: Duration,
     what: &str,
@@ -153,7 +154,7 @@ pub(crate) fn within<T: Send + 'static>(
 ) -> T {
     let (tell, told) = std::sync::mpsc::channel();
     let worker = std::thread::spawn(move || {
-        // Nobody listens any more when the limit has passed.
+        // The receiver is gone when the limit has passed.
         let _ = tell.send(work());
     });
     match told.recv_timeout(limit) {
@@ -167,9 +168,9 @@ pub(crate) fn within<T: Send + 'static>(
     }
 }
 
-/// Does `job` 0 on a pool, and while that is under way 48 more, which come from outside as those of
-/// another picture do; with as many fresh `jobs` as there are delays between. A worker that waits
-/// inside rayon takes what comes late before it goes on.
+/// Runs job 0 on a pool and spawns 48 more jobs from outside while it runs, as another image would.
+/// This repeats with fresh `jobs` for each of several delays. A worker that waits inside rayon
+/// takes these late jobs before it continues.
 pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(
     threads: usize,
     jobs: impl Fn() -> J,
@@ -183,7 +184,7 @@ pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(
             let (job, tell) = (job.clone(), tell.clone());
             pool.spawn(move || {
                 job(i);
-                // Nobody listens any more when the test has failed.
+                // The receiver is gone when the test has failed.
                 let _ = tell.send(());
             });
             if i == 0 {

@@ -1,27 +1,27 @@
-//! From where the test section is photographed.
+//! Sets the direction from which the test section is photographed.
 
 use glam::DVec3;
 
 /// An orthonormal, right-handed frame: `right x up = forward`.
 ///
 /// `forward` is the direction in which the light travels, from the source towards the film. The
-/// picture is what a camera on the film's side sees when it looks at the test section, against the
-/// light: `right` and `up` are right and up in the picture, and nothing is mirrored. (Someone at
-/// the light source would see left and right exchanged.)
+/// image is what a camera on the film's side sees when it looks at the test section, against the
+/// light. `right` and `up` are right and up in the image, which is not mirrored. (Seen from the
+/// light source, left and right would be exchanged.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Right in the picture.
+    /// Right in the image.
     pub right: DVec3,
-    /// Up in the picture.
+    /// Up in the image.
     pub up: DVec3,
     /// The direction of the light.
     pub forward: DVec3,
-    /// The middle of the picture; starts are given in the plane through it.
+    /// Centre of the image. Starts lie in the plane through it.
     pub centre_m: DVec3,
 }
 
-/// A view along a coordinate axis in which the picture's axes are the field's, increasing to the
-/// right and upwards.
+/// A view along a coordinate axis. The image's axes are the field's, increasing to the right and
+/// upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axis {
     /// y to the right, z up; light travels along +x.
@@ -32,7 +32,7 @@ pub enum Axis {
     Z,
 }
 
-/// A direction of view that makes no frame.
+/// Why a direction of view does not define a frame.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ViewError {
     /// The light's direction is zero or not finite.
@@ -41,21 +41,21 @@ pub enum ViewError {
          zero"
     )]
     Direction(f64, f64, f64),
-    /// An angle is not finite, or an elevation beyond the poles.
+    /// An angle is not finite, or the elevation is beyond the poles.
     #[error(
         "azimuth {azimuth_deg} and elevation {elevation_deg} degrees do not make a view; \
          elevations are between -90 and 90"
     )]
     Angles {
-        /// As given.
+        /// Azimuth given.
         azimuth_deg: f64,
-        /// As given.
+        /// Elevation given.
         elevation_deg: f64,
     },
 }
 
 impl View {
-    /// A view along an axis.
+    /// A view along a coordinate axis.
     pub fn along(axis: Axis, centre_m: DVec3) -> View {
         let (right, up) = match axis {
             Axis::X => (DVec3::Y, DVec3::Z),
@@ -65,15 +65,15 @@ impl View {
         View { right, up, forward: right.cross(up), centre_m }
     }
 
-    /// Light travelling in direction `forward`, with the picture turned so that `up_hint` points up
-    /// in it. Where `up_hint` is (nearly) along the light, y is up.
+    /// A view with light along `forward`, rotated so that `up_hint` points up in the image. If
+    /// `up_hint` is (nearly) parallel to the light, y is up.
     ///
     /// # Errors
     /// If `forward` is zero or not finite.
     pub fn new(forward: DVec3, up_hint: DVec3, centre_m: DVec3) -> Result<View, ViewError> {
         let wrong = ViewError::Direction(forward.x, forward.y, forward.z);
-        // Divided by the largest component first: directions of any length, 1e-200 or 1e200, are
-        // fine.
+        // Dividing by the largest component first allows directions of any length, such as 1e-200
+        // or 1e200.
         let largest = forward.abs().max_element();
         if !forward.is_finite() || largest == 0.0 {
             return Err(wrong);
@@ -91,10 +91,10 @@ impl View {
         Ok(View { right, up: forward.cross(right), forward, centre_m })
     }
 
-    /// Light travelling towards an azimuth (from +x towards +y) and an elevation (above the x-y
-    /// plane), with z up in the picture. (0, 0) is [`Axis::X`], (-90, 0) is [`Axis::Y`], and at the
-    /// poles (`elevation_deg` = 90 and azimuth -90: [`Axis::Z`]) the picture is the limit of the
-    /// ones below.
+    /// A view with light towards an azimuth (from +x towards +y) and an elevation (above the x-y
+    /// plane), with z up in the image. (0, 0) is [`Axis::X`] and (-90, 0) is [`Axis::Y`]. At a pole
+    /// the view is the limit for elevations approaching it: azimuth -90 and elevation 90 is
+    /// [`Axis::Z`].
     ///
     /// # Errors
     /// If an angle is not finite or the elevation is beyond the poles.
@@ -113,9 +113,8 @@ impl View {
         Ok(View { right, up: forward.cross(right), forward, centre_m })
     }
 
-    /// The direction and the transverse axes of a beam with the given slopes: the view's frame
-    /// turned by the smallest rotation that takes `forward` to the beam. Returned as right, up,
-    /// direction.
+    /// The frame of a beam with the given slopes, as right, up and direction. It is the view's
+    /// frame turned by the smallest rotation that takes `forward` to the beam.
     pub fn beam(&self, tilt_rad: [f32; 2]) -> [DVec3; 3] {
         if tilt_rad == [0.0; 2] {
             return [self.right, self.up, self.forward];
@@ -153,8 +152,8 @@ mod tests {
         }
     }
 
-    /// A camera on the film's side looks along -forward. Something at its right hand must be at the
-    /// picture's right.
+    /// A camera on the film's side looks along -forward. An object on its right must be on the
+    /// image's right.
     #[test]
     fn pictures_are_not_mirrored_seen_from_the_film() {
         for axis in [Axis::X, Axis::Y, Axis::Z] {
