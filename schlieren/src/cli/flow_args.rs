@@ -1,4 +1,4 @@
-//! Options that say what the flow's arrays mean, and how they change the scene.
+//! Parses the options that give the flow's arrays their meaning, and applies them to the scene.
 
 use super::units;
 use crate::index::conditions::Model;
@@ -76,13 +76,13 @@ pub(super) struct FlowArgs {
 }
 
 impl FlowArgs {
-    /// Changes the scene's flow and bodies. What arrays mean is checked with the scene.
+    /// Changes the scene's flow and bodies. The meaning of arrays is validated with the scene.
     pub(super) fn apply(&self, s: &mut Scene) -> Result<(), UsageError> {
         let a = self;
         s.solids.files.extend(a.solid.iter().cloned());
         let f = &mut s.flow;
-        // Another alternative on the command line replaces that of the file; transfer functions are
-        // added to those it has.
+        // A medium on the command line replaces that of the file. Transfer functions are added to
+        // those of the file.
         let by_curves = !a.curve.is_empty() && f.multifield.is_none();
         let by_state = a.density.is_some() || a.temperature.is_some();
         if by_curves || by_state || a.n_minus_1.is_some() || a.electrons.is_some() {
@@ -135,7 +135,7 @@ impl FlowArgs {
                     "--curve {name} is given twice; an array has one transfer function"
                 )));
             }
-            // A curve of the scene's file keeps its weight.
+            // A curve that replaces one of the scene file keeps its weight.
             let weight = multifield.fields.get(name).map_or(1.0, |c| c.weight);
             multifield.fields.insert(name.clone(), CurveSpec { knots: knots.clone(), weight });
         }

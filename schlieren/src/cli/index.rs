@@ -1,5 +1,5 @@
-//! `schlieren index`: the index of refraction for conditions on the command line, or for a table of
-//! them.
+//! Implements `schlieren index`: computes the index of refraction for conditions on the command
+//! line or in a table.
 
 use super::units;
 use crate::index::Gas;

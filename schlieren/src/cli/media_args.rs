@@ -1,4 +1,4 @@
-//! Options for what the medium does to light beside bending it.
+//! Parses the options for absorption, emission and rotation of polarisation in the medium.
 
 use super::units;
 use crate::scene::MediaSpec;

@@ -1,4 +1,4 @@
-//! The command line: what was typed becomes a call of the library.
+//! Runs the program `schlieren`: parses the command line and calls the library.
 
 mod flow_args;
 mod index;

@@ -1,4 +1,4 @@
-//! `schlieren probe`: what one pixel sees, in numbers.
+//! Implements `schlieren probe`: prints the path of one pixel's ray in numbers.
 
 use super::scene_args::SceneArgs;
 use super::units;

@@ -1,4 +1,4 @@
-//! `schlieren render`.
+//! Implements `schlieren render`: renders one image of a flow.
 
 use super::scene_args::SceneArgs;
 use crate::output;
@@ -53,7 +53,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     common.result(&drawn.json, || &drawn.text)
 }
 
-/// Files to write.
+/// The files to write.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outputs<'a> {
     png: Option<&'a Path>,
@@ -62,7 +62,7 @@ pub(super) struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    /// Checks the names before time is spent on a picture that cannot be written.
+    /// Checks the file names before time is spent on an image that cannot be written.
     pub(super) fn new(
         png: Option<&'a Path>,
         exr: Option<&'a Path>,
@@ -96,13 +96,13 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// A picture that was written, in words and as JSON.
+/// Summary of a written image, as text and as JSON.
 pub(super) struct RenderSummary {
     pub(super) json: Value,
     pub(super) text: String,
 }
 
-/// Reads, draws and writes.
+/// Reads the flow, renders it and writes the files.
 pub(super) fn draw(
     common: CommonArgs,
     cancel: Cancel,

@@ -1,5 +1,5 @@
-//! Options that describe the scene, and how they change the one from a file. An option that changes
-//! nothing is refused by name.
+//! Parses the options that describe the scene and applies them to the scene of a file. An option
+//! without effect is an error that names the option.
 
 use super::flow_args::FlowArgs;
 use super::media_args::MediaArgs;
@@ -179,7 +179,7 @@ fn no_effect(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
 }
 
 impl SceneArgs {
-    /// The scene in effect, checked.
+    /// The effective scene after validation.
     pub(super) fn scene(&self, file: Option<&std::path::Path>) -> anyhow::Result<Scene> {
         let mut s = match &self.scene {
             Some(path) => Scene::open(path)?,
@@ -195,7 +195,8 @@ impl SceneArgs {
         self.optics.apply(&mut s)?;
         self.media.apply(&mut s.media);
         self.film.apply(&mut s)?;
-        // What a scene refuses is wrong usage here: the values come from the command line.
+        // Without a scene file, the values come from the command line, so an invalid scene is wrong
+        // usage.
         if let Err(e) = s.check() {
             return Err(match self.scene {
                 None => UsageError(e.to_string()).into(),
@@ -261,7 +262,7 @@ impl OpticsArgs {
                 None => Ok(()),
             };
         };
-        // Light deflected by 0.3 mrad reaches the rim at the customary focal length.
+        // Light deflected by 0.3 mrad reaches the rim at the default focal length.
         let customary = 0.5e-3;
         match self.cutoff.as_deref() {
             None => {}
@@ -376,7 +377,7 @@ impl FilmArgs {
         let wants_photons =
             a.samples.is_some() || a.filter.is_some() || a.jitter.is_some() || a.seed.is_some();
         if wants_photons {
-            // Options of photons ask for photons, whatever the technique's custom is.
+            // Options of photon sampling select photons, whatever the technique's default is.
             let mut photons = s.sampling();
             if matches!(photons, SamplingSpec::Beams { .. }) {
                 photons = SamplingSpec::default();

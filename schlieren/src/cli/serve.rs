@@ -1,4 +1,4 @@
-//! `schlieren serve`.
+//! Implements `schlieren serve`: opens the interactive page.
 
 use super::scene_args::SceneArgs;
 use crate::serve;
@@ -32,7 +32,7 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
         )
         .into());
     }
-    // Saved scenes go to another folder.
+    // Scenes may be saved in another folder, so paths must be absolute.
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     scene.flow.file = whole(&scene.flow.file);
     scene.solids.files.iter_mut().for_each(|f| *f = whole(f));
@@ -45,7 +45,8 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     let mut steps = match &args.files[..] {
         [] | [_] => match crate::input::series(std::slice::from_ref(&scene.flow.file)) {
             Ok(steps) => steps,
-            // Times in parts are no steps that can be chosen; the first is read whole.
+            // A time series whose steps have several parts cannot be shown step by step. The first
+            // step is read as a whole.
             Err(e @ crate::input::InputError::InFile { .. }) => {
                 common.warn(format_args!(
                     "only the first time is shown: {}",

@@ -1,4 +1,5 @@
-//! `schlieren sweep`: a time series, or one flow for several values of a key of its scene.
+//! Implements `schlieren sweep`: renders a time series, or one flow for several values of a key of
+//! its scene.
 
 use super::render::{Outputs, draw};
 use super::scene_args::SceneArgs;
@@ -30,14 +31,14 @@ pub(super) struct SweepArgs {
     scene: SceneArgs,
 }
 
-/// A key and its values.
+/// A key of the scene and its values.
 #[derive(Debug, Clone)]
 struct Setting {
     key: Vec<String>,
     values: Vec<toml::Value>,
 }
 
-/// `film.focus_m=0.1,0.2`. Values are TOML; what is none is a text.
+/// Parses a setting such as `film.focus_m=0.1,0.2`. A value that is not TOML is text.
 fn setting(text: &str) -> Result<Setting, String> {
     let wrong =
         || format!("`{text}` is not KEY=V1,V2,...; write for example film.focus_m=0.1,0.2,0.4");
@@ -55,7 +56,7 @@ fn setting(text: &str) -> Result<Setting, String> {
     })
 }
 
-/// The scene with a key set to a value.
+/// Returns the scene with a key set to a value.
 fn with(scene: &Scene, key: &[String], value: &toml::Value) -> anyhow::Result<Scene> {
     let mut tree = toml::Value::Table(scene.to_toml()?.parse()?);
     let mut at = &mut tree;
@@ -79,7 +80,7 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
         return Err(UsageError("no output: give -o PNG, --exr EXR or --npy NPY".into()).into());
     }
 
-    // What is drawn: scenes with the value that tells them apart.
+    // The scenes to render, each with the value that distinguishes it.
     let mut runs: Vec<(serde_json::Value, Scene)> = Vec::new();
     match &args.set {
         Some(set) => {
@@ -103,8 +104,8 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
     let mut reference: Option<f64> = None;
     for (i, (label, mut scene)) in runs.into_iter().enumerate() {
         cancel.check()?;
-        // All times are relative to the first one's surroundings, or pictures could not be
-        // compared.
+        // All times are relative to the surroundings of the first one, so that the images are
+        // comparable.
         if args.set.is_none() && scene.flow.reference_n_minus_1.is_none() {
             scene.flow.reference_n_minus_1 = reference;
         }
@@ -123,7 +124,7 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// `out.png` as `out-0003.png`.
+/// Numbers a file name: `out.png` becomes `out-0003.png`.
 fn number(path: &std::path::Path, i: usize) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let extension = path.extension().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,4 +1,4 @@
-//! Values of options with their units.
+//! Parses the values of options, with their units.
 
 use crate::index::multifield::Rule;
 use crate::input::Role;
@@ -7,7 +7,7 @@ use crate::scene::SourceSpec;
 /// Units of lengths.
 const LENGTHS: [(&str, f64); 6] =
     [("nm", 1e-9), ("um", 1e-6), ("µm", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
-/// Units of angles of light.
+/// Units of angles.
 const ANGLES: [(&str, f64); 6] = [
     ("urad", 1e-6),
     ("µrad", 1e-6),
@@ -17,11 +17,11 @@ const ANGLES: [(&str, f64); 6] = [
     ("rad", 1.0),
 ];
 
-/// A number with one of the units, or bare in `units`' last.
+/// Parses a number with one of the units; without a unit, the last of `units` applies.
 fn with_unit(text: &str, units: &[(&str, f64)], example: &str) -> Result<f64, String> {
     let wrong = || format!("`{text}` is no such quantity; write for example {example}");
     let text_trimmed = text.trim();
-    // The longest unit that fits: "mm" ends with "m", too.
+    // Take the longest matching unit, because "mm" also ends with "m".
     let unit = units.iter().filter(|u| text_trimmed.ends_with(u.0)).max_by_key(|u| u.0.len());
     let (number, scale) = unit
         .map_or((text_trimmed, 1.0), |u| (&text_trimmed[..text_trimmed.len() - u.0.len()], u.1));
@@ -29,17 +29,17 @@ fn with_unit(text: &str, units: &[(&str, f64)], example: &str) -> Result<f64, St
     if value.is_finite() { Ok(value * scale) } else { Err(wrong()) }
 }
 
-/// `0.5`, `500mm`, `0.5m`: metres.
+/// Parses a length such as `0.5`, `500mm` or `0.5m`; returns metres.
 pub(super) fn length(text: &str) -> Result<f64, String> {
     with_unit(text, &LENGTHS, "0.5m, 20mm or 500um")
 }
 
-/// `1e-7rad`, `0.1urad`, `1e-7`: radians.
+/// Parses an angle such as `1e-7rad`, `0.1urad` or `1e-7`; returns radians.
 pub(super) fn angle_rad(text: &str) -> Result<f64, String> {
     with_unit(text, &ANGLES, "1e-7rad, 0.1urad or 0.02arcsec")
 }
 
-/// `1024x768`.
+/// Parses a size in pixels such as `1024x768`.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let wrong =
         || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
@@ -48,7 +48,7 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([pixels(w).ok_or_else(wrong)?, pixels(h).ok_or_else(wrong)?])
 }
 
-/// `point`, `slit:1mm,5mm`, `circle:0.5mm`.
+/// Parses a light source: `point`, `slit:1mm,5mm` or `circle:0.5mm`.
 pub(super) fn source(text: &str) -> Result<SourceSpec, String> {
     let wrong = || {
         format!(
@@ -70,7 +70,7 @@ pub(super) fn source(text: &str) -> Result<SourceSpec, String> {
     }
 }
 
-/// `NAME=GAS`.
+/// Parses a species, `NAME=GAS`.
 pub(super) fn species(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').filter(|(name, gas)| !name.is_empty() && !gas.is_empty());
     let (name, gas) = parts.ok_or_else(|| {
@@ -79,7 +79,7 @@ pub(super) fn species(text: &str) -> Result<(String, String), String> {
     Ok((name.to_string(), gas.to_string()))
 }
 
-/// `NAME=VALUE:N,VALUE:N`: a transfer function's points.
+/// Parses the points of a transfer function, `NAME=VALUE:N,VALUE:N`.
 pub(super) fn curve(text: &str) -> Result<(String, Vec<[f64; 2]>), String> {
     let wrong = || {
         format!(
@@ -94,7 +94,7 @@ pub(super) fn curve(text: &str) -> Result<(String, Vec<[f64; 2]>), String> {
     Ok((name.to_string(), knots))
 }
 
-/// `NAME=NUMBER`.
+/// Parses a weight, `NAME=NUMBER`.
 pub(super) fn weight(text: &str) -> Result<(String, f64), String> {
     let parts = text.rsplit_once('=').filter(|p| !p.0.is_empty());
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite());
@@ -102,7 +102,7 @@ pub(super) fn weight(text: &str) -> Result<(String, f64), String> {
     parsed.ok_or_else(|| format!("`{text}` is not NAME=NUMBER; write for example T=0.5"))
 }
 
-/// How transfer functions combine.
+/// Parses how transfer functions combine.
 pub(super) fn rule(text: &str) -> Result<Rule, String> {
     match text {
         "sum" => Ok(Rule::Sum),
@@ -111,7 +111,7 @@ pub(super) fn rule(text: &str) -> Result<Rule, String> {
     }
 }
 
-/// What a node without gas is to light.
+/// Parses how a node without gas affects light.
 pub(super) fn role(text: &str) -> Result<Role, String> {
     match text {
         "blank" => Ok(Role::Blank),
@@ -121,7 +121,7 @@ pub(super) fn role(text: &str) -> Result<Role, String> {
     }
 }
 
-/// Two numbers, `320,200`.
+/// Parses two numbers, `320,200`.
 pub(super) fn pair(text: &str) -> Result<[f64; 2], String> {
     let wrong = || format!("`{text}` is not two numbers; write for example 320,200");
     let (a, b) = text.split_once(',').ok_or_else(wrong)?;

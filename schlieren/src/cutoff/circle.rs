@@ -1,6 +1,8 @@
-//! Circular cut-offs: an iris passes what is deflected little (bright field, deflections darken),
-//! its complement, an opaque spot, passes what is deflected much (dark field, deflections of any
-//! direction brighten). The thesis' "circular" and "complemented circular" (section 5.3.4).
+//! Circular cut-offs: an iris and its complement, an opaque spot.
+//!
+//! An iris passes weakly deflected light: in this bright field, deflections darken. An opaque spot
+//! passes strongly deflected light: in this dark field, deflections in any direction brighten. The
+//! dissertation calls them "circular" and "complemented circular" (section 5.3.4).
 
 use crate::optics::{Across, SourceImage};
 
@@ -9,23 +11,23 @@ use crate::optics::{Across, SourceImage};
 pub struct Aperture {
     /// Radius in metres.
     pub radius_m: f64,
-    /// Its centre, from the axis, in metres.
+    /// Centre relative to the axis, in metres.
     pub center_m: [f64; 2],
-    /// Which side is open.
+    /// The open side.
     pub passes: Passes,
 }
 
 /// The open side of a circle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Passes {
-    /// An iris.
+    /// The inside: an iris.
     Inside,
-    /// An opaque spot.
+    /// The outside: an opaque spot.
     Outside,
 }
 
 impl Passes {
-    /// The name on command lines.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Passes::Inside => "circle",
@@ -42,13 +44,13 @@ impl Passes {
 }
 
 impl Aperture {
-    /// For one point: the rim belongs to the inside.
+    /// Transmission at one point. The rim belongs to the inside.
     #[inline]
     pub(super) fn transmission(&self, at_m: Across) -> f32 {
         self.passes.of(f64::from(self.distance(at_m) <= self.radius_m))
     }
 
-    /// The open part of a disc's area; rectangles have to be sampled.
+    /// The open fraction of a disc's area. Rectangles have to be sampled.
     #[inline]
     pub(super) fn averaged(&self, image: &SourceImage, shift_m: Across) -> Option<f32> {
         let SourceImage::Disc { radius_m } = *image else { return None };
@@ -61,7 +63,8 @@ impl Aperture {
     }
 }
 
-/// Area common to two discs of radii r and s whose centres are d apart: two circular segments.
+/// Area common to two discs of radii r and s with centres d apart: the sum of two circular
+/// segments.
 fn common_area(r: f64, s: f64, d: f64) -> f64 {
     if d >= r + s {
         return 0.0;
@@ -70,7 +73,7 @@ fn common_area(r: f64, s: f64, d: f64) -> f64 {
     if d <= (r - s).abs() {
         return std::f64::consts::PI * small * small;
     }
-    // Distance from each centre to the chord, then sector minus triangle, on either side.
+    // On either side of the common chord, the segment is a sector minus a triangle.
     let segment = |r: f64, to_chord: f64| {
         let x = (to_chord / r).clamp(-1.0, 1.0);
         r * r * (x.acos() - x * (1.0 - x * x).sqrt())

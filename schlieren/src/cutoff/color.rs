@@ -1,25 +1,26 @@
-//! The colour filter: hue says the direction of a deflection, saturation its size.
+//! The colour filter: hue shows the direction of a deflection, saturation its size.
 //!
-//! Equation 5.16 takes the hue from the cosine between deflected and undeflected direction. In f32
-//! that cosine is exactly 1 for every deflection below 2.44e-4 rad, so all of a typical flow gets
-//! one hue; here the hue is `atan2(y, x)` of the place in the cut-off plane, as on a real filter.
+//! Equation 5.16 of the dissertation takes the hue from the cosine between the deflected and the
+//! undeflected direction. In f32 that cosine is exactly 1 for every deflection below 2.44e-4 rad,
+//! so most flows would have a single hue. Here the hue is `atan2(y, x)` of the position in the
+//! cut-off plane, as on a real filter.
 
 use super::Rgb;
 use crate::optics::Across;
 
-/// A wheel of hues: white on the axis, saturated from `radius_m` outwards.
+/// A colour wheel: white on the axis, saturated from `radius_m` outwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColorWheel {
-    /// Where colours are fully saturated, in metres.
+    /// Distance from the axis, in metres, at which colours are fully saturated.
     pub radius_m: f64,
-    /// Direction of red, counter-clockwise from the picture's right. Green and blue follow at 120
+    /// Direction of red, counter-clockwise from the image's right. Green and blue follow at 120
     /// degrees each.
     pub red_deg: f64,
 }
 
 impl ColorWheel {
-    /// Transmission: hue by angle, saturation by distance, the strongest channel always 1 (a filter
-    /// cannot add light).
+    /// Transmission at a point: hue by angle, saturation by distance. The strongest channel is
+    /// always 1, because a filter cannot add light.
     #[inline]
     pub(super) fn transmission(&self, [x, y]: Across) -> Rgb {
         let saturation = (f64::from(x).hypot(f64::from(y)) / self.radius_m).min(1.0) as f32;
@@ -47,7 +48,7 @@ mod tests {
 
     #[test]
     fn tiny_deflections_have_the_hue_of_their_direction() {
-        // 1e-7 rad at f2 = 1 m, where the thesis' cosine is exactly 1.
+        // 1e-7 rad at f2 = 1 m, where the cosine of equation 5.16 is exactly 1.
         for (degrees, strongest) in [(0.0f32, 0), (120.0, 1), (240.0, 2), (355.0, 0), (-120.0, 2)] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let c = WHEEL.transmission([1e-7 * cos, 1e-7 * sin]);

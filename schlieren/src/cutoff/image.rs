@@ -1,5 +1,5 @@
-//! Any picture as a filter: each photon is multiplied by the colour of the place where it crosses
-//! the cut-off plane.
+//! Uses any image as a filter: each photon is multiplied by the colour at the point where it
+//! crosses the cut-off plane.
 
 use super::Rgb;
 use crate::optics::Across;
@@ -7,8 +7,8 @@ use datasets::image_io::{ImageError, read_png};
 use std::path::Path;
 
 /// A raster of linear transmissions that covers a rectangle of the cut-off plane, centred on the
-/// axis; the picture's top is up. Bilinear between pixel centres. Beyond the rectangle the filter
-/// is what its edge pixels are.
+/// axis. The image's top is up. Values are interpolated bilinearly between pixel centres. Outside
+/// the rectangle, the edge pixels continue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterImage {
     width: u32,
@@ -17,32 +17,32 @@ pub struct FilterImage {
     pixels: Vec<Rgb>,
 }
 
-/// Why a picture is no filter.
+/// Why an image cannot be used as a filter.
 #[derive(Debug, thiserror::Error)]
 pub enum FilterError {
     /// The file cannot be read.
     #[error("the filter's picture cannot be used")]
     File(#[from] ImageError),
-    /// Numbers that make no filter.
+    /// The dimensions or values do not describe a filter.
     #[error("a filter of {width}x{height} pixels and {} x {} m with {found} values: \
              {reason}", size_m[0], size_m[1])]
     Shape {
         /// Pixels per row.
         width: u32,
-        /// Rows.
+        /// Number of rows.
         height: u32,
-        /// In the cut-off plane.
+        /// Sides in the cut-off plane.
         size_m: [f64; 2],
-        /// Values given.
+        /// Number of values given.
         found: usize,
-        /// What is wrong, and the cure.
+        /// What is wrong and how to correct it.
         reason: &'static str,
     },
 }
 
 impl FilterImage {
-    /// A filter from `width * height` transmissions, top row first. Each must be in 0..=1: a filter
-    /// cannot add light.
+    /// Creates a filter from `width * height` transmissions, top row first. Each must be in 0..=1,
+    /// because a filter cannot add light.
     pub fn new(
         width: u32,
         height: u32,
@@ -63,8 +63,8 @@ impl FilterImage {
         Ok(FilterImage { width, height, size_m, pixels })
     }
 
-    /// A PNG as a filter of `width_m` across; the height follows from the pixels. Transparent
-    /// pixels are dark (glass on nothing).
+    /// Reads a PNG as a filter of width `width_m`. The height follows from the aspect ratio.
+    /// Colours are multiplied by alpha, so transparent pixels are dark.
     pub fn from_png(path: &Path, width_m: f64) -> Result<Self, FilterError> {
         let picture = read_png(path)?;
         let (width, height) = (picture.width, picture.height);
@@ -73,12 +73,12 @@ impl FilterImage {
         FilterImage::new(width, height, size_m, pixels)
     }
 
-    /// Its sides in the cut-off plane in metres.
+    /// Sides in the cut-off plane, in metres.
     pub fn size_m(&self) -> [f64; 2] {
         self.size_m
     }
 
-    /// Pixels per row, and rows.
+    /// Number of pixels per row and of rows.
     pub fn size_px(&self) -> [u32; 2] {
         [self.width, self.height]
     }
@@ -92,7 +92,7 @@ impl FilterImage {
         &mut self.pixels
     }
 
-    /// Place in pixels (0,0 the upper left corner) of a point of the plane.
+    /// Position of a point of the plane in pixels; (0, 0) is the upper left corner.
     pub fn pixel_from_plane(&self, at_m: Across) -> [f64; 2] {
         let [w, h] = [f64::from(self.width), f64::from(self.height)];
         [
@@ -101,7 +101,7 @@ impl FilterImage {
         ]
     }
 
-    /// True when a pixel is not grey.
+    /// Whether any pixel is not grey.
     pub fn is_colored(&self) -> bool {
         self.pixels.iter().any(|p| p[0] != p[1] || p[1] != p[2])
     }

@@ -1,34 +1,35 @@
-//! The knife's edge: the classic cut-off of Toepler.
+//! The knife edge: Toepler's classic cut-off.
 //!
-//! With a slit parallel to the edge the intensity is *linear and then clipped*: of the image's
-//! height h the height a is open, a deflection ε along the knife's direction shifts the image by f2
-//! ε, and `I/I₀ = clamp((a + f2 ε)/h, 0, 1)`; relative to the background a/h the contrast is `f2
-//! ε/a` (Settles 2001, equation 3.7). The range before clipping is `-a/f2 … (h-a)/f2`. Slits at
-//! other angles and round sources have their own closed forms.
+//! With a slit parallel to the edge, the intensity is *linear and then clipped*. Of the height h of
+//! the source image, the height a is open. A deflection ε along the knife's direction shifts the
+//! image by f2 ε, so `I/I₀ = clamp((a + f2 ε)/h, 0, 1)`. Relative to the background a/h, the
+//! contrast is `f2 ε/a` (Settles 2001, equation 3.7). The range before clipping is `-a/f2 …
+//! (h-a)/f2`. Slits at other angles and round sources have closed forms of their own.
 
 use crate::optics::{Across, SourceImage};
 
-/// A straight edge.
+/// A straight knife edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knife {
-    /// Direction in the picture, counter-clockwise from its right, in which a deflection brightens:
-    /// it points from the blade to the opening. 0 is a vertical knife that shows horizontal
-    /// gradients, 90 a horizontal one.
+    /// Direction in the image, counter-clockwise from its right, in which a deflection brightens.
+    /// It points from the blade to the opening. 0 is a vertical knife, which shows horizontal
+    /// gradients; 90 is a horizontal one.
     pub angle_deg: f64,
-    /// Where the edge stands.
+    /// Position of the edge.
     pub position: KnifePosition,
 }
 
-/// Where the edge stands along the knife's direction.
+/// Position of the edge along the knife's direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum KnifePosition {
-    /// a/h: the part of the undisturbed source image's height that stays open. 0.5 is the customary
-    /// half cut-off.
+    /// a/h: the open fraction of the height of the undisturbed source image. 0.5 is the usual half
+    /// cut-off.
     OpenFraction(f64),
-    /// a itself, in metres. (As a fraction, the schlieren lens' focal length cancels: image and
-    /// shift grow alike. With a given height it counts.)
+    /// The open height a in metres. With a given height, the sensitivity depends on the focal
+    /// length of the schlieren lens. With a fraction it does not, because the source image and its
+    /// shift scale alike.
     OpenM(f64),
-    /// Metres from the axis; light beyond it passes.
+    /// Signed distance of the edge from the axis, in metres. Light beyond it passes.
     EdgeM(f64),
 }
 
@@ -39,7 +40,7 @@ impl Knife {
         [cos, sin]
     }
 
-    /// The edge in metres from the axis.
+    /// Signed distance of the edge from the axis, in metres.
     pub fn edge_m(&self, image: &SourceImage) -> f64 {
         match self.position {
             KnifePosition::OpenFraction(open) => {
@@ -50,7 +51,7 @@ impl Knife {
         }
     }
 
-    /// a: the height of the undisturbed source image that is open, in metres.
+    /// a: the open height of the undisturbed source image, in metres.
     pub fn open_height_m(&self, image: &SourceImage) -> f64 {
         let half = image.half_extent_m(self.direction());
         (half - self.edge_m(image)).clamp(0.0, 2.0 * half)
@@ -64,7 +65,7 @@ impl Knife {
             SourceImage::Rectangle { .. } => {
                 let [a, b] = image.half_sides_along(direction);
                 let (p, q) = (a.max(b), a.min(b));
-                // Corners below the rounding of f32 are none.
+                // Corners smaller than f32 rounding are ignored.
                 if q <= 1e-7 * p {
                     Open::Linear { half_m: p as f32 }
                 } else {
@@ -76,7 +77,7 @@ impl Knife {
     }
 }
 
-/// A knife's edge in front of a known source image.
+/// A knife edge with a known source image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Edge {
     direction: [f32; 2],
@@ -84,29 +85,29 @@ pub(super) struct Edge {
     open: Open,
 }
 
-/// How much of the image is open, as a function of its centre's distance from the edge.
+/// The open fraction of the source image, as a function of its centre's distance from the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Open {
-    /// All or nothing.
+    /// A point: all or nothing.
     Step,
     /// A slit parallel to the edge.
     Linear { half_m: f32 },
-    /// Half-lengths of a rectangle's sides on the edge's normal, the longer first.
+    /// A rectangle: half-lengths of its sides projected onto the edge's normal, the longer first.
     Trapezoid { p: f64, q: f64 },
     /// A disc.
     Disc { radius_m: f64 },
 }
 
 impl Edge {
-    /// For one point: 1 beyond the edge. On the edge, 1/2: a point source cut by an edge on the
-    /// axis has a defined background.
+    /// Transmission at one point: 1 beyond the edge, and 1/2 on it, so that a point source with the
+    /// edge on the axis has a defined background.
     #[inline]
     pub(super) fn transmission(&self, at_m: Across) -> f32 {
         let d = self.beyond(at_m);
         if d == 0.0 { 0.5 } else { f32::from(d > 0.0) }
     }
 
-    /// The open part of the image's area.
+    /// The open fraction of the source image's area.
     #[inline]
     pub(super) fn averaged(&self, shift_m: Across) -> f32 {
         match self.open {
@@ -125,21 +126,22 @@ impl Edge {
     }
 }
 
-/// Part of a rectangle on the positive side of a line at distance -t from its centre. Its sides,
-/// projected on the line's normal, have half-lengths p and q ≤ p; the area's density along the
-/// normal is the convolution of two boxes, a trapezoid, and this is its integral.
+/// Fraction of a rectangle on the positive side of a line at distance -t from its centre. The
+/// rectangle's sides, projected onto the line's normal, have half-lengths p and q ≤ p. Its area
+/// density along the normal is the convolution of two boxes, a trapezoid. The result is the
+/// integral of that density.
 fn open_rectangle(p: f64, q: f64, t: f64) -> f64 {
     let t = t.clamp(-p - q, p + q);
     let (outer, inner) = (p + q, p - q);
     if t.abs() <= inner {
         return 0.5 + 0.5 * t / p;
     }
-    // In a corner: a triangle is missing (or is all there is).
+    // The line cuts off a corner: a triangle, which is either missing or the only part.
     let corner = (outer - t.abs()).powi(2) / (8.0 * p * q);
     if t > 0.0 { 1.0 - corner } else { corner }
 }
 
-/// Part of a disc beyond a line at distance -t from its centre: a circular segment.
+/// Fraction of a disc beyond a line at distance -t from its centre: a circular segment.
 fn open_disc(radius: f64, t: f64) -> f64 {
     let x = (t / radius).clamp(-1.0, 1.0);
     0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI
@@ -187,7 +189,7 @@ mod tests {
             assert!((contrast / expected - 1.0).abs() < 1e-3, "{contrast} {expected}");
             contrast
         };
-        // a = 0.5 mm: 3000 and 6000 per radian. A half: 3000 whatever f2.
+        // With a = 0.5 mm: 3000 and 6000 per radian. With half open: 3000 for any f2.
         let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-3;
         assert!(near(slope(1.5, KnifePosition::OpenM(0.5e-3)), 3000.0));
         assert!(near(slope(3.0, KnifePosition::OpenM(0.5e-3)), 6000.0));

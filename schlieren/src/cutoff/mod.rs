@@ -1,5 +1,4 @@
-//! What stands in the cut-off plane: the part of the light that passes, by where it crosses the
-//! plane.
+//! Describes the cut-off: the transmission of the cut-off plane at each of its points.
 //!
 //! | kind | passes | thesis |
 //! |---|---|---|
@@ -8,8 +7,8 @@
 //! | [`ColorWheel`] | all of it, coloured by direction and size | equation 5.16 |
 //! | [`FilterImage`] | what a picture in the plane lets through: a file, or one [painted] by hand | 5.6 |
 //!
-//! Coordinates are metres in the plane, along the picture's right and up. Transmission is linear
-//! and at most 1 in each channel.
+//! Coordinates are metres in the plane, along the image's right and up. Transmission is linear and
+//! at most 1 in each channel.
 
 mod circle;
 mod color;
@@ -30,20 +29,20 @@ pub type Rgb = [f32; 3];
 /// Transmission of the cut-off plane.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cutoff {
-    /// Nothing stands there.
+    /// No cut-off.
     Open,
     /// A knife's edge.
     Knife(Knife),
     /// A circle or its complement.
     Aperture(Aperture),
-    /// A wheel of hues.
+    /// A colour wheel.
     Color(ColorWheel),
-    /// A picture.
+    /// A filter given as an image.
     Image(FilterImage),
 }
 
 impl Cutoff {
-    /// True when its three channels can differ.
+    /// Whether the three channels can differ.
     pub fn is_colored(&self) -> bool {
         match self {
             Cutoff::Color(_) => true,
@@ -64,14 +63,14 @@ impl Cutoff {
     }
 }
 
-/// A cut-off with the source's image on it, ready for photons.
+/// A cut-off together with the source image that falls on it, prepared for evaluation per photon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutoffPlane {
     kind: Kind,
     image: SourceImage,
 }
 
-/// What photons meet; knives have their trigonometry done.
+/// The prepared cut-off. The trigonometry of knives is precomputed.
 #[derive(Debug, Clone, PartialEq)]
 enum Kind {
     Knife(knife::Edge),
@@ -79,7 +78,7 @@ enum Kind {
 }
 
 impl CutoffPlane {
-    /// `cutoff` under the light of a source whose undisturbed image is `image`.
+    /// Prepares `cutoff` for a source whose undisturbed image is `image`.
     pub fn new(cutoff: &Cutoff, image: SourceImage) -> CutoffPlane {
         let kind = match cutoff {
             Cutoff::Knife(k) => Kind::Knife(k.edge(&image)),
@@ -88,12 +87,12 @@ impl CutoffPlane {
         CutoffPlane { kind, image }
     }
 
-    /// The source's undisturbed image.
+    /// The undisturbed image of the source.
     pub fn image(&self) -> &SourceImage {
         &self.image
     }
 
-    /// For light that crosses the plane in one point.
+    /// Transmission of light that crosses the plane in one point.
     #[inline]
     pub fn transmission(&self, at_m: Across) -> Rgb {
         match &self.kind {
@@ -105,9 +104,9 @@ impl CutoffPlane {
         }
     }
 
-    /// The mean over the source's image, shifted by `shift_m` as a deflection does, where a closed
-    /// form is known; `None` where the image has to be sampled. A closed form takes one photon
-    /// where sampling takes many.
+    /// Mean transmission over the source image, shifted by `shift_m` (the effect of a deflection),
+    /// if it has a closed form. `None` if the source image has to be sampled. A closed form needs
+    /// one photon where sampling needs many.
     #[inline]
     pub fn averaged(&self, shift_m: Across) -> Option<Rgb> {
         match &self.kind {
@@ -119,7 +118,7 @@ impl CutoffPlane {
         }
     }
 
-    /// True when [`CutoffPlane::averaged`] has an answer.
+    /// Whether [`CutoffPlane::averaged`] has a closed form.
     pub fn has_closed_form(&self) -> bool {
         self.averaged([0.0; 2]).is_some()
     }
@@ -130,7 +129,7 @@ pub(crate) mod testing {
     use super::*;
     use rt_core::sampler::{Sampler, Sampling};
 
-    /// The mean over the source's image by brute force: the reference for closed forms.
+    /// Mean transmission over the source image by sampling: the reference for closed forms.
     pub(crate) fn sampled(cutoff: &CutoffPlane, shift_m: Across, samples: u32) -> f64 {
         let one = |i: u32| {
             let p = cutoff.image().point_m(Sampler::new(Sampling::Sobol, 1, 0, 0, i).square(0));
@@ -170,8 +169,8 @@ pub(crate) mod testing {
                 for shift in [[0.0, 0.0], [2e-4, -1e-4], [-6e-4, 3e-4], [1e-3, 1e-3], [9e-3, 0.0]] {
                     let Some(closed) = cutoff.averaged(shift) else { continue };
                     let reference = sampled(&cutoff, shift, 1 << 14);
-                    // 2^14 points of a (0,2)-sequence cut by one smooth edge: the error seen is
-                    // below 1e-3.
+                    // With 2^14 points of a (0,2)-sequence and one smooth edge, the observed error
+                    // is below 1e-3.
                     let (error, t) = ((f64::from(closed[0]) - reference).abs(), closed[0]);
                     assert!(error < 2e-3, "{cutoff:?} {shift:?}: {t} {reference}");
                     compared += 1;

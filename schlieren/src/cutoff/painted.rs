@@ -1,37 +1,38 @@
-//! Filters painted by hand (section 5.6): strokes of a round brush on a ground colour.
+//! Filters painted by hand: strokes of a round brush on a ground colour (dissertation, section
+//! 5.6).
 //!
-//! Strokes are kept in metres of the cut-off plane, so a painted filter is a few lines of a scene
-//! file and can be drawn at any resolution.
+//! Strokes are stored in metres of the cut-off plane. A painted filter is therefore a few lines of
+//! a scene file, and it can be rasterized at any resolution.
 
 use super::{FilterError, FilterImage, Rgb};
 use serde::{Deserialize, Serialize};
 
-/// A straight stroke of a round brush; of length 0 it is a dab.
+/// A straight stroke of a round brush. A stroke of length 0 is a dab.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stroke {
-    /// Beginning, in metres along right and up.
+    /// Start, in metres along right and up.
     pub from_m: [f64; 2],
-    /// End.
+    /// End, in metres along right and up.
     pub to_m: [f64; 2],
-    /// Of the brush.
+    /// Radius of the brush.
     pub radius_m: f64,
     /// Linear transmission, each 0..=1.
     pub rgb: Rgb,
 }
 
-/// A ground colour and strokes, later over earlier ones.
+/// A ground colour and strokes. Later strokes cover earlier ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Painting {
     /// Sides in the cut-off plane.
     pub size_m: [f64; 2],
-    /// Raster along the longer side.
+    /// Number of pixels along the longer side.
     #[serde(default = "default_pixels")]
     pub pixels: u32,
-    /// What is not painted over; linear.
+    /// Linear transmission where nothing is painted.
     pub ground_rgb: Rgb,
-    /// In the order they were painted.
+    /// Strokes in the order of painting.
     #[serde(default)]
     pub strokes: Vec<Stroke>,
 }
@@ -40,12 +41,11 @@ fn default_pixels() -> u32 {
     512
 }
 
-/// Largest raster of a painting along a side.
+/// Largest number of pixels along a side.
 const MAX_PIXELS: u32 = 8192;
 
 impl Painting {
-    /// The filter as a raster. A pixel takes a stroke's colour by how much of the brush's rim
-    /// covers it, over one pixel.
+    /// Rasterizes the filter. The rim of a brush is antialiased over one pixel.
     pub fn to_filter(&self) -> Result<FilterImage, FilterError> {
         let longest = self.size_m[0].max(self.size_m[1]);
         let pixels = f64::from(self.pixels.min(MAX_PIXELS));
@@ -55,7 +55,7 @@ impl Painting {
         for stroke in &self.strokes {
             paint(&mut filter, stroke);
         }
-        // Strokes come from files and from other people's mice.
+        // Validate again, because strokes come from files and from the interactive page.
         FilterImage::new(width, height, self.size_m, filter.pixels().to_vec())
     }
 }
@@ -69,20 +69,21 @@ fn paint(filter: &mut FilterImage, stroke: &Stroke) {
     let along = [b[0] - a[0], b[1] - a[1]];
     let length2 = along[0] * along[0] + along[1] * along[1];
 
-    // Only where the brush and its soft rim can be: paintings have thousands of small strokes.
+    // Visit only the pixels that the brush and its rim can reach, because paintings have thousands
+    // of small strokes.
     let reach = stroke.radius_m + pixel_m;
     let rows = [a[1].max(b[1]) + reach, a[1].min(b[1]) - reach]
         .map(|y| (0.5 - y / size[1]) * f64::from(height));
     let columns = [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach]
         .map(|x| (0.5 + x / size[0]) * f64::from(width));
-    // Casts saturate: what lies beside the filter ends at its border.
+    // Casts saturate, so coordinates outside the filter become its border.
     let [top, left] = [rows[0], columns[0]].map(|v| v.floor() as u32);
     let [bottom, right] = [rows[1], columns[1]].map(|v| v.ceil() as u32);
     for j in top..bottom.min(height) {
         let y = (0.5 - (f64::from(j) + 0.5) / f64::from(height)) * size[1];
         for i in left..right.min(width) {
             let x = ((f64::from(i) + 0.5) / f64::from(width) - 0.5) * size[0];
-            // Distance to the segment; a dab has no direction.
+            // Distance to the stroke's segment. A dab has no direction.
             let t = ((x - a[0]) * along[0] + (y - a[1]) * along[1]) / length2;
             let t = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 };
             let distance = (x - a[0] - t * along[0]).hypot(y - a[1] - t * along[1]);

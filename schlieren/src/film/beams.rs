@@ -1,14 +1,15 @@
-//! Exposure without noise: the beam is cut into square cells by a lattice of rays, and each cell's
-//! energy goes to where its corners land.
+//! Exposes a film without noise: a lattice of rays divides the beam into square cells, and the
+//! energy of each cell goes to the area where its corners land.
 //!
-//! Where the corners of a cell enclose half the area they started with, the film is twice as
-//! bright: the picture is `I = Σ 1/|det J|` over all sheets of light, J being the derivative of the
-//! landing place, with J taken as differences over a cell and the result averaged over pixels.
-//! Energy is conserved exactly, folded cells (caustics) add up, and nothing has to be inverted. A
-//! shadowgraph takes one ray per pixel instead of hundreds.
+//! If the corners of a cell land on half of its original area, the film is twice as bright there.
+//! The image is `I = Σ 1/|det J|` over all sheets of light, where J is the derivative of the
+//! landing position. Here J is a finite difference over a cell, and the result is averaged over
+//! pixels. Energy is conserved exactly, folded cells (caustics) add up, and no mapping has to be
+//! inverted. A shadowgraph takes one ray per pixel instead of hundreds.
 //!
-//! Cells are split into two triangles, which are distributed to pixels by exact areas. A triangle
-//! with a corner that does not arrive is dropped: the shadow of a body is up to one cell too large.
+//! Each cell is split into two triangles, whose energy is distributed to pixels by exact areas. A
+//! triangle is dropped if one of its corners does not arrive, so the shadow of a body is up to one
+//! cell too large.
 
 use super::photons::Exposure;
 use super::{Film, Tally, quantize};
@@ -19,22 +20,22 @@ use rayon::prelude::*;
 use rt_core::sampler::Sampler;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Points of the source that stand for it where no closed form is known.
+/// Number of points that sample the source when there is no closed form.
 const SOURCE_POINTS: u32 = 64;
 
-/// Where the corner of a cell landed.
+/// The landing point of a cell's corner.
 #[derive(Clone, Copy)]
 struct Corner {
-    /// In pixels; NaN when it did not arrive.
+    /// Position in pixels; NaN if the ray did not arrive.
     at_px: [f64; 2],
     energy: [f32; 3],
 }
 
 const LOST: Corner = Corner { at_px: [f64::NAN; 2], energy: [0.0; 3] };
 
-/// Exposes `film` with `per_side` × `per_side` cells per pixel. `progress` gets numbers of rays.
-/// Returns `None` when `cancel` was set. The developed film is `film.developed(1.0)`. [`Tally`]
-/// counts triangles.
+/// Exposes `film` with `per_side` × `per_side` cells per pixel and returns counts of triangles.
+/// `progress` receives numbers of traced rays. Returns `None` when `cancel` was set.
+/// `film.developed(1.0)` is the image.
 pub fn expose_beams<const C: usize>(
     exposure: &Exposure<'_>,
     film: &Film<C>,
@@ -49,8 +50,8 @@ pub fn expose_beams<const C: usize>(
     let place = |i: usize| i as f64 / k - f64::from(margin);
     let source_points = source_points(exposure);
 
-    // Two rows of corners at a time are enough, but rows are traced in parallel: bands of cells,
-    // each with its own corners.
+    // A row of cells needs only two rows of corners. To trace in parallel, the cells are divided
+    // into bands, each with its own corners.
     const BAND: usize = 16;
     let bands: Vec<usize> = (0..rows - 1).step_by(BAND).collect();
     let tallies: Vec<Tally> = bands
@@ -67,7 +68,7 @@ pub fn expose_beams<const C: usize>(
                     corners(exposure, film, &source_points, columns, place(row + 1), &place);
                 for c in 0..columns - 1 {
                     let [a, b, d, e] = [above[c], above[c + 1], below[c], below[c + 1]];
-                    // The diagonal alternates, so that no direction of the picture is preferred.
+                    // The diagonal alternates so that no direction is preferred.
                     let halves = if (row + c) % 2 == 0 {
                         [[a, b, d], [b, e, d]]
                     } else {
@@ -95,7 +96,7 @@ pub fn expose_beams<const C: usize>(
     Some(all)
 }
 
-/// Points that stand for the source; none when a closed form does.
+/// Points that sample the source; none when there is a closed form.
 fn source_points(exposure: &Exposure<'_>) -> Vec<Across> {
     if !exposure.technique.needs_source_points() {
         return Vec::new();
@@ -139,15 +140,16 @@ fn corners<const C: usize>(
             }),
         }
         let shift = if technique.looks_from_film() { [0.0; 2] } else { shift_m.map(f64::from) };
-        // The lattice is exact and the shift small: areas keep the shift's relative accuracy.
+        // The lattice is exact and the shift is small, so areas keep the relative accuracy of the
+        // shift.
         let at_px = [place(i) + shift[0] / framing.pixel_m, y - shift[1] / framing.pixel_m];
         Corner { at_px, energy }
     };
     starts.iter().zip(&exits).enumerate().map(corner).collect()
 }
 
-/// Distributes a triangle that started with `area_px` and the mean of its corners' energy per
-/// pixel. True when any of it falls on the film.
+/// Distributes the energy of a triangle: `area_px` is its original area, and its energy per pixel
+/// is the mean of its corners'. Returns whether any part falls on the film.
 fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool {
     let framing = film.framing();
     let energy: [f64; C] = std::array::from_fn(|c| {
@@ -165,7 +167,7 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
         let shared = energy.map(|e| quantize((e * share) as f32));
         film.add(y as usize * framing.width as usize + x as usize, shared, 0);
     };
-    // A triangle in a focus has no area left: all of it goes to one pixel.
+    // A triangle in a focus has no area, so all of its energy goes to one pixel.
     if area < 1e-9 {
         let center = [0, 1].map(|i| ((points[0][i] + points[1][i] + points[2][i]) / 3.0).floor());
         let inside = (0.0..f64::from(framing.width)).contains(&center[0])
@@ -190,7 +192,7 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
     any
 }
 
-/// A convex polygon: a triangle cut by four lines has at most seven corners.
+/// A convex polygon. A triangle clipped by four lines has at most seven corners.
 #[derive(Clone, Copy)]
 struct Polygon {
     corners: [[f64; 2]; 8],
@@ -217,8 +219,8 @@ impl Polygon {
     }
 }
 
-/// The part of a polygon on one side of a line across `axis`: above `limit` for `side` = 1, below
-/// for -1 (Sutherland and Hodgman 1974).
+/// Clips a polygon by a line across `axis` (Sutherland and Hodgman 1974): keeps the part above
+/// `limit` for `side` = 1, the part below for -1.
 fn clip(polygon: Polygon, axis: usize, limit: f64, side: f64) -> Polygon {
     let mut out = Polygon { corners: [[0.0; 2]; 8], len: 0 };
     let points = polygon.points();
@@ -238,8 +240,8 @@ fn clip(polygon: Polygon, axis: usize, limit: f64, side: f64) -> Polygon {
     out
 }
 
-/// Area of a polygon, whichever way round. Coordinates are taken relative to the first corner, so
-/// that far from zero nothing is lost.
+/// Area of a polygon of either orientation. Coordinates are relative to the first corner to avoid
+/// cancellation far from the origin.
 fn polygon_area(points: &[[f64; 2]]) -> f64 {
     let Some((o, rest)) = points.split_first() else { return 0.0 };
     let twice =
@@ -259,7 +261,7 @@ mod tests {
     #[test]
     fn a_triangle_over_many_pixels_gives_each_its_area() {
         let film = Film::<1>::new(Framing::fitted(4, 4, [1.0, 1.0]), false);
-        // Half of the square 0..3 x 0..3, clockwise and then back: both ways round count alike.
+        // The two halves of the square 0..3 x 0..3, with opposite orientations, which count alike.
         assert!(deposit(&film, [corner(0.0, 0.0), corner(3.0, 0.0), corner(0.0, 3.0)], 4.5));
         assert!(deposit(&film, [corner(3.0, 3.0), corner(3.0, 0.0), corner(0.0, 3.0)], 4.5));
         let f = film.developed(1.0);

@@ -1,12 +1,12 @@
-//! The film: energy per pixel, summed as integers, so that the picture has the same bits for any
-//! number of threads.
+//! Collects light on a film: energy per pixel, summed as integers. The image has the same bits for
+//! any number of threads.
 //!
-//! Light arrives in one of two ways. [`photons`] start at jittered places and land somewhere: a
-//! picture with noise, correct for any source and any cut-off. [`beams`] are the cells of a lattice
-//! of rays, each carrying its energy to the area that its corners enclose: no noise at all, one ray
-//! per pixel.
+//! There are two methods of exposure. [`photons`] start at jittered positions. The image has noise
+//! but is correct for any source and cut-off. [`beams`] are the cells of a lattice of rays. Each
+//! carries its energy to the area that its corners enclose. The image has no noise and needs one
+//! ray per pixel.
 //!
-//! Energy 1 per pixel is what the undisturbed beam without a cut-off leaves there.
+//! The undisturbed beam without a cut-off leaves energy 1 in each pixel.
 
 pub mod beams;
 pub mod photons;
@@ -16,39 +16,39 @@ pub(crate) use tile::{PhotonTile, TILE};
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// Fixed point: an energy of 1 as an integer. A pixel holds 2³² photons of energy 1 before it
-/// overflows; quantisation, 2⁻³³ a photon, is far below the rounding of the f32 energy itself.
+/// Energy 1 in fixed point. A pixel holds 2³² photons of energy 1 before it overflows. The
+/// quantisation error, 2⁻³³ per photon, is far below the rounding of the f32 energy.
 const ONE: f64 = 4_294_967_296.0;
 
-/// Energy as an integer. Energies are never negative, and NaN (a march gone wrong) leaves no light;
-/// it is counted where it is seen.
+/// Converts energy to an integer. Energies are never negative. NaN, which only a faulty march
+/// produces, becomes zero; the exposure counts it.
 #[inline]
 pub(crate) fn quantize(energy: f32) -> u64 {
     (f64::from(energy) * ONE) as u64
 }
 
-/// What part of the plane of focus the film shows.
+/// The part of the plane of focus that the film shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Framing {
     /// Pixels per row.
     pub width: u32,
-    /// Rows; row 0 is the uppermost.
+    /// Number of rows; row 0 is the top.
     pub height: u32,
-    /// Side of a pixel, in object space.
+    /// Side of a pixel in object space.
     pub pixel_m: f64,
-    /// Middle of the picture along the view's right and up.
+    /// Centre of the image along the view's right and up.
     pub center_m: [f64; 2],
 }
 
 impl Framing {
-    /// A picture centred on something of the given sides that shows all of it and as little else as
-    /// its shape allows.
+    /// The smallest image of `width` by `height` square pixels, centred on the origin, that shows a
+    /// whole rectangle of the given sides.
     pub fn fitted(width: u32, height: u32, sides_m: [f64; 2]) -> Framing {
         let pixel_m = (sides_m[0] / f64::from(width)).max(sides_m[1] / f64::from(height));
         Framing { width, height, pixel_m, center_m: [0.0; 2] }
     }
 
-    /// Pixels in the picture.
+    /// Number of pixels in the image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -75,23 +75,22 @@ impl Framing {
     }
 }
 
-/// What became of the light, in photons (of [`photons`]) or triangles (of [`beams`]).
+/// Counts of the light by outcome, in photons (of [`photons`]) or triangles (of [`beams`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Tally {
     /// Sent from the source.
     pub sent: u64,
-    /// Reached the plane of the film, inside the picture or beside it.
+    /// Reached the plane of the film, inside or outside the image.
     pub landed: u64,
-    /// Of those, on the picture.
+    /// Of those, inside the image.
     pub on_film: u64,
-    /// Stopped by triangle meshes.
+    /// Blocked by triangle meshes.
     pub blocked_by_solids: u64,
-    /// Stopped inside the field: solid or blank cells.
+    /// Blocked inside the field by solid or blank cells.
     pub blocked_in_field: u64,
-    /// Bent so far that they left sideways or backwards.
+    /// Left sideways or backwards because they were bent too far.
     pub turned: u64,
-    /// Came back from the march with a position or energy that is not a number. 0 unless something
-    /// is broken.
+    /// Left the march with a position or energy that is not finite. Always 0 unless there is a bug.
     pub not_a_number: u64,
 }
 
@@ -107,7 +106,7 @@ impl Tally {
     }
 }
 
-/// Sums of energy and photons. `C` channels: 1, or 3 for colours.
+/// Sums of energy and photons per pixel. `C` is the number of channels: 1, or 3 for colours.
 #[derive(Debug)]
 pub struct Film<const C: usize> {
     framing: Framing,
@@ -116,19 +115,19 @@ pub struct Film<const C: usize> {
 }
 
 impl<const C: usize> Film<C> {
-    /// An unexposed film; with `counts` it also counts the photons of each pixel.
+    /// Creates an unexposed film. With `counts` it also counts the photons of each pixel.
     pub fn new(framing: Framing, counts: bool) -> Film<C> {
         let energy = (0..framing.pixels() * C).map(|_| AtomicU64::new(0)).collect();
         let count = counts.then(|| (0..framing.pixels()).map(|_| AtomicU32::new(0)).collect());
         Film { framing, energy, count }
     }
 
-    /// What it shows.
+    /// The part of the plane of focus that it shows.
     pub fn framing(&self) -> &Framing {
         &self.framing
     }
 
-    /// Adds integer energy to a pixel. Integers add up to the same in any order.
+    /// Adds integer energy to a pixel. The sum of integers does not depend on their order.
     #[inline]
     pub(crate) fn add(&self, pixel: usize, energy: [u64; C], photons: u32) {
         for (c, e) in energy.into_iter().enumerate().filter(|(_, e)| *e > 0) {
@@ -149,8 +148,8 @@ impl<const C: usize> Film<C> {
         }
     }
 
-    /// The energy of each pixel over `per_pixel`, the number of photons that the undisturbed beam
-    /// leaves in one.
+    /// The energy of each pixel divided by `per_pixel`, the number of photons that the undisturbed
+    /// beam leaves in a pixel.
     pub fn developed(&self, per_pixel: f64) -> Vec<[f32; C]> {
         let scale = 1.0 / (ONE * per_pixel);
         self.energy
@@ -159,7 +158,7 @@ impl<const C: usize> Film<C> {
             .collect()
     }
 
-    /// Photons of each pixel, when they were counted.
+    /// Number of photons of each pixel, if they were counted.
     pub fn counts(&self) -> Option<Vec<u32>> {
         self.count.as_ref().map(|c| c.iter().map(|n| n.load(Ordering::Relaxed)).collect())
     }

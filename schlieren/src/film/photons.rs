@@ -1,9 +1,9 @@
-//! Exposure by photons: every pixel's share of the beam is sent as jittered rays that land where
-//! the flow takes them.
+//! Exposes a film by photons: sends the beam as jittered rays from every pixel and records where
+//! the flow deflects them to.
 //!
-//! Starts form a low-discrepancy sequence in each pixel, a function of pixel, pass and seed alone;
-//! passes can be added at any time. Pixels beside the picture send photons too, as far as light
-//! strays (`margin_px`), so the picture's edge is as bright as it should be.
+//! The starts form a low-discrepancy sequence in each pixel. They depend on pixel, pass and seed
+//! alone, so passes can be added at any time. Pixels outside the image, up to `margin_px` away,
+//! also send photons, because light from there reaches the image's edge.
 
 use super::{Film, PhotonTile, TILE, Tally};
 use crate::optics::Across;
@@ -15,51 +15,52 @@ use rt_core::sampler::{Sampler, Sampling};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Dimensions of the sampler.
+/// Dimensions of the sampler, for the position in a pixel and the point of the source.
 const JITTER: u32 = 0;
 const SOURCE: u32 = 1;
 
-/// What light is sent, and how it is read.
+/// What light is sent, and how its exits become energy.
 #[derive(Clone, Copy)]
 pub struct Exposure<'a> {
-    /// Takes photons through the flow.
+    /// Traces photons through the flow.
     pub paths: &'a dyn LightPaths,
     /// Turns exits into energy.
     pub technique: &'a Technique,
     /// Bodies in the test section.
     pub solids: Option<&'a Solids>,
-    /// Jitter: low-discrepancy, or random for comparison.
+    /// Sequence of the jitter: low-discrepancy, or random for comparison.
     pub sampling: Sampling,
-    /// Of the jitter.
+    /// Seed of the jitter.
     pub seed: u64,
-    /// Pixels around the picture that send light as well.
+    /// Width of the margin around the image that also sends light, in pixels.
     pub margin_px: u32,
-    /// Whether every photon travels in the beam of its own source point (an extended source blurs
-    /// what is out of focus), or all in the axial one.
+    /// Whether every photon travels in the beam of its own source point, so that an extended source
+    /// blurs what is out of focus. Otherwise all photons travel in the axial beam.
     pub tilted_beams: bool,
 }
 
-/// A photon on the film, kept for filters that look for neighbours.
+/// A photon on the film, stored for filters that search for neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LandedPhoton<const C: usize> {
-    /// In pixels from the picture's upper left corner; may lie beside the picture.
+    /// Position in pixels from the image's upper left corner; may lie outside the image.
     pub at_px: [f32; 2],
-    /// 1 for an undisturbed photon without a cut-off.
+    /// Energy: 1 for an undisturbed photon without a cut-off.
     pub energy: [f32; C],
 }
 
-/// What [`expose`] did.
+/// Result of [`expose`].
 #[derive(Debug, Default)]
 pub struct ExposedFilm<const C: usize> {
-    /// Photons by fate.
+    /// Counts of photons by outcome.
     pub tally: Tally,
-    /// All landed photons, when they were to be kept, in an order that does not depend on threads.
+    /// All landed photons if `keep` was set, in an order that does not depend on threads.
     pub landed: Vec<LandedPhoton<C>>,
 }
 
-/// Sends passes `passes`, one photon per pixel and pass; pass i goes to film `i % films.len()` (two
-/// films tell the noise: their difference). Every tile reports its photons to `progress`. Returns
-/// `None` when `cancel` was set; the films are then half exposed and worthless.
+/// Sends the passes `passes`, with one photon per pixel and pass. Pass i exposes film `i %
+/// films.len()`; the difference of two films estimates the noise. `progress` receives the number of
+/// photons of each tile. Returns `None` when `cancel` was set; the films are then partly exposed
+/// and must be discarded.
 pub fn expose<const C: usize>(
     exposure: &Exposure<'_>,
     films: &[Film<C>],
@@ -117,14 +118,14 @@ fn expose_tile<const C: usize>(
     let to_pixels = (1.0 / framing.pixel_m) as f32;
 
     for pass in passes {
-        // Starts: a jittered place in every pixel.
+        // Start at a jittered position in every pixel.
         starts.clear();
         places.clear();
         image_points.clear();
         for y in corner[1]..end[1] {
             for x in corner[0]..end[0] {
-                // The margin's pixels have negative numbers; as u32 they are other numbers, no
-                // worse.
+                // Pixels of the margin have negative coordinates. They wrap to other u32 values,
+                // which are as good for the sampler.
                 let sampler =
                     Sampler::new(exposure.sampling, exposure.seed, x as u32, y as u32, pass);
                 let jitter = sampler.square(JITTER);
@@ -152,11 +153,11 @@ fn expose_tile<const C: usize>(
             }
         }
 
-        // Through the flow.
+        // Trace through the flow.
         let exits = &mut exits[..starts.len()];
         exposure.paths.trace(&starts, exits);
 
-        // Onto the film.
+        // Deposit on the film.
         let tile = &mut tiles[pass as usize % films.len()];
         for i in 0..starts.len() {
             let (start, exit) = (&starts[i], &exits[i]);

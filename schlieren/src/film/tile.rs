@@ -1,17 +1,18 @@
-//! A piece of the film that one thread fills without atomics.
+//! Sums photons over a tile of the film, on one thread and without atomics.
 
 use super::{Film, quantize};
 
 /// Side of a tile of starts, in pixels.
 pub(crate) const TILE: u32 = 32;
 
-/// Pixels around it that its photons may reach before they go to the film one by one.
+/// Width of the border around a tile, in pixels. Photons that land farther out go to the film
+/// individually.
 const HALO: i64 = 8;
 
-/// Side of the local sums.
+/// Side of the local sums in pixels.
 const SIDE: usize = TILE as usize + 2 * HALO as usize;
 
-/// Sums over a tile of the film and its surroundings; [`PhotonTile::flush`] adds them to the film.
+/// Sums over a tile of the film and its border. [`PhotonTile::flush`] adds them to the film.
 pub(crate) struct PhotonTile<'a, const C: usize> {
     film: &'a Film<C>,
     counts: bool,
@@ -22,7 +23,7 @@ pub(crate) struct PhotonTile<'a, const C: usize> {
 }
 
 impl<'a, const C: usize> PhotonTile<'a, C> {
-    /// For photons that start around pixel (`x`, `y`), the tile's upper left corner.
+    /// Creates a tile for photons that start in the tile with the upper left pixel (`x`, `y`).
     pub(crate) fn new(film: &'a Film<C>, [x, y]: [i64; 2]) -> Self {
         let counts = film.count.is_some();
         let count = if counts { vec![0; SIDE * SIDE] } else { Vec::new() };
@@ -35,7 +36,7 @@ impl<'a, const C: usize> PhotonTile<'a, C> {
         }
     }
 
-    /// A photon at a place in pixels. True when the film was hit.
+    /// Adds a photon at a position in pixels. Returns whether it lands on the film.
     #[inline]
     pub(crate) fn deposit(&mut self, [x, y]: [f32; 2], energy: [f32; C]) -> bool {
         let (i, j) = (x.floor() as i64, y.floor() as i64);
@@ -59,7 +60,7 @@ impl<'a, const C: usize> PhotonTile<'a, C> {
         true
     }
 
-    /// Hands the sums over.
+    /// Adds the sums to the film.
     pub(crate) fn flush(self) {
         let framing = self.film.framing();
         for b in 0..SIDE {
@@ -67,7 +68,7 @@ impl<'a, const C: usize> PhotonTile<'a, C> {
                 let (i, j) = (self.corner[0] + a as i64, self.corner[1] + b as i64);
                 let at = b * SIDE + a;
                 let photons = if self.counts { self.count[at] } else { 0 };
-                // Outside the film nothing was deposited.
+                // Pixels outside the film have no deposit.
                 if self.energy[at] != [0; C] || photons > 0 {
                     self.film.add(
                         j as usize * framing.width as usize + i as usize,

@@ -1,20 +1,20 @@
-//! The cone filter: the energy at a pixel from the k photons nearest to its centre, with weights
-//! that fall linearly to the k-th (section 5.5; Jensen's photon map, "Realistic Image Synthesis
-//! Using Photon Mapping", 2001, section 7.2, with his k = 1).
+//! The cone filter: estimates the energy at a pixel from the k photons nearest to its centre, with
+//! weights that decrease linearly to zero at the k-th (dissertation, section 5.5; Jensen,
+//! "Realistic Image Synthesis Using Photon Mapping", 2001, section 7.2, with his k = 1).
 //!
-//! With r the distance of the k-th photon, `E = Σ e_i (1 - d_i/r) / (π r²/3)`. The k-th itself has
-//! weight 0, which makes the estimate free of bias for photons that are spread evenly: of the k - 1
-//! inside, each has the mean weight 1/3, and (k-1)/(π r²) is unbiased for their density.
+//! With r the distance of the k-th photon, `E = Σ e_i (1 - d_i/r) / (π r²/3)`. The k-th photon has
+//! weight 0, which makes the estimate unbiased for uniformly distributed photons: each of the k - 1
+//! inside has the mean weight 1/3, and (k-1)/(π r²) is an unbiased estimate of their density.
 
 use crate::film::Framing;
 use crate::film::photons::LandedPhoton;
 use rayon::prelude::*;
 
-/// Largest number of photons that are kept for this filter: about 2 GB of them.
+/// Largest number of photons stored for this filter, about 2 GB.
 pub const MAX_PHOTONS: u64 = 1 << 27;
 
-/// Energy at each pixel's centre, in photons per pixel over `per_pixel`. With fewer than two
-/// photons in all, the picture is black.
+/// Energy at each pixel's centre, in photons per pixel divided by `per_pixel`. With fewer than two
+/// photons in total, the image is black.
 pub fn cone<const C: usize>(
     photons: &[LandedPhoton<C>],
     framing: &Framing,
@@ -49,12 +49,12 @@ pub fn cone<const C: usize>(
     out
 }
 
-/// Photons sorted into squares of one pixel, over the pixels and some of their surroundings.
-/// Photons farther out are in the squares of the border.
+/// Photons sorted into squares of one pixel, over the image and a border. Photons farther out are
+/// in the squares of the border.
 struct Buckets {
     low: [i64; 2],
     size: [i64; 2],
-    /// First entry of each square in `order`, and one more.
+    /// First entry of each square in `order`, followed by the total number.
     first: Vec<u32>,
     order: Vec<u32>,
 }
@@ -65,7 +65,7 @@ impl Buckets {
         let low = [-BORDER, -BORDER];
         let size = [i64::from(framing.width) + 2 * BORDER, i64::from(framing.height) + 2 * BORDER];
         let mut buckets = Buckets { low, size, first: Vec::new(), order: vec![0; photons.len()] };
-        // Counting sort: stable, so the order within a square is the order of photons.
+        // Counting sort. It is stable, so each square keeps the order of the photons.
         let mut first = vec![0u32; (size[0] * size[1]) as usize + 1];
         for p in photons {
             first[buckets.square(p.at_px) + 1] += 1;
@@ -89,8 +89,8 @@ impl Buckets {
         (j * self.size[0] + i) as usize
     }
 
-    /// The k photons nearest to `at` as squared distances and numbers, nearest first; ties by
-    /// number. Returns the k-th squared distance.
+    /// Finds the k photons nearest to `at`, as squared distances and indices, nearest first and
+    /// ties by index. Returns the k-th squared distance.
     fn nearest<const C: usize>(
         &self,
         photons: &[LandedPhoton<C>],
@@ -123,7 +123,7 @@ impl Buckets {
                 add(here[0] - ring, j);
                 add(here[0] + ring, j);
             }
-            // Everything within `ring` + 1/2 of the centre has been seen.
+            // All photons within `ring` + 1/2 of the centre have been visited.
             let seen = (ring as f32 + 0.5).powi(2);
             if found.len() >= k && found.iter().filter(|f| f.0 <= seen).count() >= k {
                 break;
@@ -142,7 +142,7 @@ mod tests {
 
     const FRAMING: Framing = Framing { width: 24, height: 16, pixel_m: 1.0, center_m: [0.0; 2] };
 
-    /// Random photons, a few pixels beyond the picture as well.
+    /// Random photons, also up to a few pixels outside the image.
     fn photons(per_pixel: u32) -> Vec<LandedPhoton<1>> {
         let area = (24 + 16) * (16 + 16) * per_pixel;
         let at = |i| Sampler::new(Sampling::Random, 3, 0, 0, i).square(0);
@@ -177,8 +177,8 @@ mod tests {
         for k in [5, 30, 200] {
             let film = cone(&all, &FRAMING, k, 20.0);
             let mean = film.iter().map(|p| f64::from(p[0])).sum::<f64>() / film.len() as f64;
-            // 24*16*20 photons: 1.2 % standard error of their number, and the filter reaches
-            // beyond.
+            // 24*16*20 photons have a standard error of 1.2 %; the filter also reaches photons
+            // outside the image.
             assert!((mean - 1.0).abs() < 0.03, "{k}: {mean}");
         }
     }

@@ -1,7 +1,7 @@
-//! The mean filter: every pixel becomes the mean of the square around it.
+//! The mean filter: replaces every pixel by the mean of the square around it.
 
-/// Weights at distances 0, 1, 2… pixels of a window that reaches `radius_px` to either side of a
-/// pixel's edge; the outermost pixel counts by the part of it that is covered.
+/// Weights at distances 0, 1, 2… pixels for a window that extends `radius_px` beyond either edge of
+/// a pixel. The outermost pixel is weighted by its covered fraction.
 pub fn weights(radius_px: f64) -> Vec<f64> {
     let radius = radius_px.max(0.0);
     let whole = radius.floor() as usize;
@@ -12,7 +12,7 @@ pub fn weights(radius_px: f64) -> Vec<f64> {
     w
 }
 
-/// Filters a picture of rows of `width` pixels.
+/// Filters an image with rows of `width` pixels.
 pub fn mean<const C: usize>(pixels: &[[f32; C]], width: usize, radius_px: f64) -> Vec<[f32; C]> {
     super::separable(pixels, width, &weights(radius_px))
 }

@@ -1,41 +1,41 @@
-//! Filters that take the noise of photons out of a picture (section 5.5): one a file.
+//! Filters that reduce the photon noise of an image (dissertation, section 5.5).
 //!
 //! [`gaussian`] and [`mean`] average over neighbouring pixels, [`cone`] over the k photons nearest
-//! to a pixel. Each blurs as well, so each has to become narrower as photons are added, or the
-//! picture would never become sharp. A filter of radius r over N photons per pixel has an error of
-//! r² from blur and 1/(r √N) from noise; both fall together when r ∝ N^(-1/6) (the same rule that
-//! Knaus and Zwicker, "Progressive photon mapping", ACM TOG 2011, reach with their α = 2/3). Sizes
-//! are therefore given for one photon per pixel, and [`Filter::shrunk`] gives them for N.
+//! to a pixel. Filters also blur, so a filter must become narrower as photons are added; otherwise
+//! the image would never become sharp. With N photons per pixel, a filter of radius r has an error
+//! of r² from blur and 1/(r √N) from noise. Both decrease at the same rate for r ∝ N^(-1/6), the
+//! rule of Knaus and Zwicker ("Progressive photon mapping", ACM TOG 2011) with α = 2/3. Sizes are
+//! therefore given for one photon per pixel, and [`Filter::shrunk`] converts them to N.
 
 pub mod cone;
 pub mod gaussian;
 pub mod mean;
 
-/// What is done to the film's noise. Sizes are for one photon per pixel.
+/// A noise filter. Sizes are for one photon per pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Filter {
-    /// Nothing: each pixel shows its own photons.
+    /// No filter: each pixel shows its own photons.
     None,
     /// A Gaussian of standard deviation `sigma_px`.
     Gaussian {
-        /// In pixels.
+        /// Standard deviation in pixels.
         sigma_px: f64,
     },
     /// The mean over a square that reaches `radius_px` to every side.
     Mean {
-        /// In pixels.
+        /// Radius in pixels.
         radius_px: f64,
     },
     /// A cone over the nearest photons.
     Cone {
-        /// k.
+        /// Number of photons, k.
         nearest: u32,
     },
 }
 
 impl Filter {
-    /// The filter for `samples` photons per pixel: radii shrink as N^(-1/6); k grows as N^(2/3), so
-    /// that the radius of the k nearest, which goes as √(k/N), shrinks the same.
+    /// The filter for `samples` photons per pixel. Radii shrink as N^(-1/6). k grows as N^(2/3), so
+    /// that the radius of the k nearest, which is proportional to √(k/N), shrinks at the same rate.
     #[must_use]
     pub fn shrunk(self, samples: u32) -> Filter {
         let n = f64::from(samples.max(1));
@@ -50,7 +50,7 @@ impl Filter {
         }
     }
 
-    /// The name on command lines.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Filter::None => "none",
@@ -61,9 +61,9 @@ impl Filter {
     }
 }
 
-/// Convolves rows and then columns with the symmetric kernel `weights[|distance|]`. At the
-/// picture's edge the weights that lie outside are left out and the rest is scaled up, so that an
-/// even picture stays even.
+/// Convolves rows and then columns with the symmetric kernel `weights[|distance|]`. At the image's
+/// edge, weights outside the image are dropped and the rest are scaled up, so that a uniform image
+/// stays uniform.
 pub(crate) fn separable<const C: usize>(
     pixels: &[[f32; C]],
     width: usize,
