@@ -1,6 +1,7 @@
 // Prefiltered cubic B-spline from slab SLAB. `o` is the first of the 4x4x4 coefficients there.
 fn sample_SLAB(o: u32, place: vec3f) -> vec4f {
-    // Weights of the four coefficients along each axis, and of their three differences for the derivative.
+    // Weights of the four coefficients along each axis, and of their three differences for the
+    // derivative.
     let s = vec3f(1.0) - place;
     let t2 = place * place;
     let s2 = s * s;
@@ -14,7 +15,8 @@ fn sample_SLAB(o: u32, place: vec3f) -> vec4f {
     let wy = vec4f(w0.y, w1.y, w2.y, w3.y);
     let dy = vec4f(0.0, d0.y, d1.y, d2.y);
 
-    // Along z and y, row by row; what is left is four numbers along x, thrice.
+    // Sum along z and y, row by row. This leaves four numbers along x for each of value, y and z
+    // derivative.
     var value = vec4f(0.0);
     var along_y = vec4f(0.0);
     var along_z = vec4f(0.0);
@@ -38,7 +40,7 @@ fn sample_SLAB(o: u32, place: vec3f) -> vec4f {
         before = on_z;
     }
 
-    // Along x.
+    // Sum along x.
     let wx = vec4f(w0.x, w1.x, w2.x, w3.x);
     let dx = value.yzw - value.xyz;
     return vec4f(

@@ -1,6 +1,6 @@
-//! When the device fails on the way: what it lost is traced once more on the device opened again,
-//! and what that does not finish by the same march on the CPU. Pictures take longer then, and are
-//! as right.
+//! Recovers from device failures: lost batches are traced again on the reopened device, and the
+//! same march on the CPU traces what that does not finish. The image takes longer but is as
+//! accurate.
 
 use super::GpuError;
 use crate::field::Field;
@@ -11,23 +11,23 @@ use crate::view::View;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A batch that was not finished.
+/// Failure of a batch.
 pub(super) struct Failure {
-    /// Number of the device that had it: how many were there before.
+    /// Number of the device that had the batch: how many devices preceded it.
     pub(super) device: u32,
     /// Why.
     pub(super) error: GpuError,
 }
 
-/// Something that traces batches of rays while its caller prepares the next, and may fail.
+/// Traces batches of rays asynchronously: the caller prepares the next batch meanwhile. May fail.
 pub(super) trait BatchTracer {
-    /// A batch on its way.
+    /// A submitted batch.
     type Pending;
 
-    /// Sends a batch on its way.
+    /// Submits a batch.
     fn submit(&self, starts: &[Start], parallel: bool) -> Result<Self::Pending, Failure>;
 
-    /// Waits for a batch and reads it out.
+    /// Waits for a batch and reads its exits.
     fn finish(
         &self,
         pending: Self::Pending,
@@ -35,30 +35,30 @@ pub(super) trait BatchTracer {
         parallel: bool,
     ) -> Result<(), Failure>;
 
-    /// Puts another device in the place of the one that failed, unless some thread did. It must
-    /// succeed a bounded number of times, and may be called with rayon's workers waiting for it: it
-    /// must not wait for rayon.
+    /// Replaces the failed device, unless another thread has done so. The number of replacements
+    /// must be bounded. Rayon's workers may be waiting for this call, so it must not wait for
+    /// rayon.
     ///
     /// # Errors
-    /// If there is none, or the failure was not the device's.
+    /// If there is no other device, or the batch failed but not the device.
     fn replace(&self, failed: &Failure) -> Result<(), GpuError>;
 }
 
-/// The march that stands in, and why it had to.
+/// The march on the CPU that replaces a failed device, and the cause of the failure.
 pub(super) struct CpuFallback<'a> {
     make: Box<dyn Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a>,
     made: OnceLock<Box<dyn LightPaths + Send + 'a>>,
     /// The first failure.
     cause: OnceLock<GpuError>,
-    /// Why no other device took its place.
+    /// Why no other device replaced it.
     reopen_error: OnceLock<GpuError>,
     repeated: AtomicU64,
     rays: AtomicU64,
 }
 
 impl<'a> CpuFallback<'a> {
-    /// `make` is called once, if ever, with rayon's workers waiting for it: it must not wait for
-    /// rayon, where a worker that waits takes other jobs, whose batches fail as well.
+    /// `make` is called at most once. Rayon's workers may be waiting for it, so it must not wait
+    /// for rayon: a waiting worker takes other jobs, whose batches fail as well.
     fn new(
         make: impl Fn() -> Box<dyn LightPaths + Send + 'a> + Send + Sync + 'a,
     ) -> CpuFallback<'a> {
@@ -72,7 +72,7 @@ impl<'a> CpuFallback<'a> {
         }
     }
 
-    /// The deviational march of the CPU through the same field.
+    /// The deviational march on the CPU through the same field.
     pub(super) fn of_march(
         field: &'a Field,
         view: View,
@@ -84,17 +84,17 @@ impl<'a> CpuFallback<'a> {
         })
     }
 
-    /// Rays that it traced.
+    /// Number of rays that the CPU traced.
     pub(super) fn rays(&self) -> u64 {
         self.rays.load(Ordering::Relaxed)
     }
 
-    /// Rays that a device that took another's place traced once more.
+    /// Number of rays that a replacement device traced again.
     pub(super) fn repeated(&self) -> u64 {
         self.repeated.load(Ordering::Relaxed)
     }
 
-    /// The first failure and what was done, for who looks at the result.
+    /// A warning with the first failure and the remedy.
     pub(super) fn device_warning(&self) -> Option<String> {
         let cause = self.cause.get()?;
         let again = self.repeated() > 0;
@@ -119,7 +119,8 @@ impl<'a> CpuFallback<'a> {
         })
     }
 
-    /// Traces all rays in batches, one being prepared while the device works on the one before.
+    /// Traces all rays in batches. Each batch is prepared while the device works on the previous
+    /// one.
     pub(super) fn trace(
         &self,
         device: &impl BatchTracer,
@@ -158,8 +159,7 @@ impl<'a> CpuFallback<'a> {
         }
     }
 
-    /// On the device that takes the place of the one that failed, as long as there is one; then on
-    /// the CPU.
+    /// Traces a failed batch on replacement devices while there are any, then on the CPU.
     fn repeat(
         &self,
         device: &impl BatchTracer,
@@ -168,7 +168,7 @@ impl<'a> CpuFallback<'a> {
         exits: &mut [Exit],
         parallel: bool,
     ) {
-        // The first is the cause; what follows are its consequences.
+        // The first failure is the cause; later ones are consequences.
         let _ = self.cause.set(failure.error.clone());
         loop {
             if let Err(why) = device.replace(&failure) {
@@ -207,8 +207,8 @@ mod tests {
     use std::sync::atomic::AtomicU32;
     use std::time::Duration;
 
-    /// Bends each ray by its own place. Traced twice as far where the device did it, so that it
-    /// shows who did.
+    /// Deflects each ray in proportion to its position. The factor distinguishes the device (2)
+    /// from the CPU (1).
     struct Bends(View, f32);
 
     impl LightPaths for Bends {
@@ -236,15 +236,15 @@ mod tests {
         GpuError::Failed { adapter: "Lamp 9".into(), reason }
     }
 
-    /// A device that fails at a call, and ever after; those that take its place too, each after as
-    /// many calls.
+    /// A device that fails from a certain call on. Its replacements fail after the same number of
+    /// calls.
     struct Fails {
         at: u64,
         calls: AtomicU64,
         in_submit: bool,
-        /// How many take its place.
+        /// Number of replacements.
         others: u32,
-        /// Number of the present one.
+        /// Number of the present device.
         present: AtomicU32,
     }
 
@@ -292,7 +292,7 @@ mod tests {
     fn what_a_failing_device_leaves_is_traced_on_the_cpu_and_the_first_cause_is_told() {
         let starts: Vec<Start> =
             (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
-        // Ten batches, the last one short.
+        // There are ten batches, the last of which is short.
         for (in_submit, at) in
             [(true, 0), (true, 4), (true, 9), (false, 0), (false, 4), (false, 9), (true, 99)]
         {
@@ -357,7 +357,7 @@ mod tests {
         }
     }
 
-    /// The attempts are bounded, and what they were is told.
+    /// The number of attempts is bounded and reported.
     #[test]
     fn a_device_that_fails_again_and_again_is_left_to_the_cpu_by_name() {
         let starts: Vec<Start> =
@@ -381,10 +381,10 @@ mod tests {
         }
     }
 
-    /// A film's tiles are rayon jobs. The spline of the march that stands in is made by the first
-    /// job whose batch fails; a worker that waits inside rayon for parts of it takes another tile,
-    /// whose batch fails as well, and which must not wait for the spline that its own worker is
-    /// making.
+    /// A film's tiles are rayon jobs. The first job whose batch fails builds the spline of the CPU
+    /// fallback. If its worker waited inside rayon for parts of the spline, it would take another
+    /// tile. That tile's batch would fail as well and would wait for the spline that its own worker
+    /// is building.
     #[test]
     fn a_device_that_fails_inside_rayon_jobs_hangs_no_picture() {
         let starts: Vec<Start> = (0..49 * 64)
@@ -424,7 +424,7 @@ mod tests {
                             &mut exits,
                             false,
                         );
-                        // By words: optical paths that were not asked for are NaN.
+                        // Compare as text, because optical paths that were not requested are NaN.
                         assert_eq!(format!("{exits:?}"), format!("{:?}", &shared.1[of_tile]));
                     }
                 });

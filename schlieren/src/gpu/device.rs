@@ -1,4 +1,4 @@
-//! Finding a GPU and opening it.
+//! Finds a GPU, opens it, and reopens it after a failure.
 
 use super::GpuError;
 use super::kernel::{FIRST_SLAB, Kernel};
@@ -7,29 +7,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use wgpu::{DeviceType, ErrorFilter};
 
-/// How often in a row a GPU is opened again after it failed. A batch that is finished between two
-/// failures begins a new row: then the device works, and what took it away (a driver that was
-/// reset, a laptop that slept) may pass.
+/// How often in a row a GPU is reopened after a failure. A batch that finishes between two failures
+/// restarts the count. It shows that the device works, and the cause (such as a driver reset or a
+/// suspended laptop) may be temporary.
 pub(super) const MAX_REOPENINGS: u32 = 3;
 
-/// An open GPU. One is enough for a program; see [`Gpu::shared`].
+/// An open GPU. A program needs only one; see [`Gpu::shared`].
 pub struct Gpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
     binding_bytes: u64,
     storage_buffers: u32,
-    /// The first error that nobody was there to catch.
+    /// The first error outside an error scope.
     failure: Arc<OnceLock<String>>,
     pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
-    /// Whether a batch was finished here.
+    /// Whether this device has finished a batch.
     proven: AtomicBool,
-    /// How often the GPU was opened again before this, in a row.
+    /// How often in a row the GPU was reopened before this device.
     reopened: u32,
     replacement: Mutex<Replacement>,
 }
 
-/// What took the place of a device that failed.
+/// The device that replaces a failed one.
 #[derive(Default)]
 struct Replacement {
     attempts: u32,
@@ -37,15 +37,16 @@ struct Replacement {
 }
 
 impl Gpu {
-    /// Opens the fastest kind of adapter there is: a discrete GPU before an integrated one before a
-    /// virtual one before a driver that runs on the CPU.
+    /// Opens the fastest kind of adapter: a discrete GPU is preferred to an integrated one, then a
+    /// virtual one, then a driver that runs on the CPU.
     ///
     /// # Errors
-    /// If there is none, or it cannot be opened.
+    /// If there is no adapter, or it cannot be opened.
     pub fn open() -> Result<Gpu, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
-        // Neither validation layers nor debug labels: errors are caught where they are made.
+        // No validation layers and no debug labels, because error scopes catch errors where they
+        // occur.
         descriptor.flags = wgpu::InstanceFlags::empty();
         let instance = wgpu::Instance::new(descriptor);
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
@@ -69,7 +70,7 @@ impl Gpu {
         }));
         let (device, queue) = opened
             .map_err(|e| GpuError::Open { adapter: info.name.clone(), reason: e.to_string() })?;
-        // Without a handler of ours wgpu panics.
+        // Without a handler, wgpu panics.
         let failure = Arc::new(OnceLock::new());
         let seen = Arc::clone(&failure);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
@@ -83,7 +84,7 @@ impl Gpu {
             device,
             queue,
             info,
-            // Whole vectors of four numbers, and offsets that fit 32 bits.
+            // Rounded to whole vectors of four numbers, and limited so that offsets fit 32 bits.
             binding_bytes: limits
                 .max_storage_buffer_binding_size
                 .min(limits.max_buffer_size)
@@ -98,11 +99,11 @@ impl Gpu {
         })
     }
 
-    /// The program's GPU, opened at the first call, and again after it failed.
+    /// The program's shared GPU. The first call opens it; later calls reopen it after a failure.
     ///
     /// # Errors
-    /// As [`Gpu::open`]; [`GpuError::GivenUp`] once it failed several times in a row. That a
-    /// machine has none is found once.
+    /// As [`Gpu::open`], and [`GpuError::GivenUp`] after several failures in a row. The absence of
+    /// a GPU is determined only once.
     pub fn shared() -> Result<Arc<Gpu>, GpuError> {
         static SHARED: Mutex<Option<Result<Arc<Gpu>, GpuError>>> = Mutex::new(None);
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -113,16 +114,16 @@ impl Gpu {
         };
         match &gpu {
             Ok(_) | Err(GpuError::NoAdapter(_)) => *shared = Some(gpu.clone()),
-            // The next call tries again.
+            // The next call retries.
             Err(_) => {}
         }
         gpu
     }
 
-    /// This GPU, or what took its place after it failed; it is opened again if nothing did.
+    /// This GPU, or its replacement if it failed. Reopens the GPU if there is no replacement yet.
     ///
     /// # Errors
-    /// If it cannot be opened again, or has failed too often.
+    /// If the GPU cannot be reopened, or has failed too often.
     pub(super) fn working(self: &Arc<Gpu>) -> Result<Arc<Gpu>, GpuError> {
         let mut gpu = Arc::clone(self);
         while let Some(reason) = gpu.failure() {
@@ -148,30 +149,30 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// The same with smaller bindings, for tests of what large fields meet.
+    /// Limits the size of bindings, to test large fields.
     #[must_use]
     pub fn with_binding_limit(mut self, bytes: u64) -> Gpu {
         self.binding_bytes = self.binding_bytes.min(bytes) & !15;
         self
     }
 
-    /// Takes the device away as a driver's reset does, for tests of what follows.
+    /// Destroys the device, as a driver reset does, to test recovery.
     pub fn lose(&self) {
         self.device.destroy();
     }
 
-    /// No more batches for this device.
+    /// Marks the device as failed: it gets no more batches.
     pub(super) fn mark_failed(&self, reason: impl Into<String>) {
-        // The first is the cause.
+        // The first reason is the cause.
         let _ = self.failure.set(reason.into());
     }
 
-    /// A batch was finished.
+    /// Records that a batch was finished.
     pub(super) fn mark_working(&self) {
         self.proven.store(true, Ordering::Relaxed);
     }
 
-    /// Name of the device, and of its driver.
+    /// Name of the device and its driver.
     pub fn name(&self) -> String {
         match self.info.driver_info.as_str() {
             "" => self.info.name.clone(),
@@ -179,24 +180,24 @@ impl Gpu {
         }
     }
 
-    /// Whether it is a driver that runs on the CPU: right, and slower than this program's own
-    /// kernels there.
+    /// Whether the driver runs on the CPU. Its results are correct, but it is slower than this
+    /// library's CPU kernels.
     pub fn is_software(&self) -> bool {
         self.info.device_type == DeviceType::Cpu
     }
 
-    /// The largest binding.
+    /// Size of the largest binding in bytes.
     pub fn binding_bytes(&self) -> u64 {
         self.binding_bytes
     }
 
-    /// Bindings that a kernel has for the field.
+    /// Number of bindings that a kernel has for the field.
     pub(super) fn slabs(&self) -> u32 {
-        // Parameters are no storage buffer.
+        // The parameters are not a storage buffer.
         self.storage_buffers.saturating_sub(FIRST_SLAB - 1)
     }
 
-    /// What failed so far, if anything did.
+    /// The failure of the device, if any.
     pub fn failure(&self) -> Option<&str> {
         self.failure.get().map(String::as_str)
     }
@@ -209,7 +210,7 @@ impl Gpu {
         GpuError::Failed { adapter: self.info.name.clone(), reason: reason.into() }
     }
 
-    /// Does what may fail on the device, and says if it did.
+    /// Runs work that may fail on the device, and returns the error if it did.
     pub(super) fn checked<T>(&self, work: impl FnOnce() -> T) -> Result<T, GpuError> {
         let memory = self.device.push_error_scope(ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(ErrorFilter::Validation);
@@ -217,8 +218,8 @@ impl Gpu {
         let done = work();
         let errors = [internal, validation, memory].map(|scope| pollster::block_on(scope.pop()));
         if errors.iter().any(Option::is_some) {
-            // A device that is lost says so when it is asked; what was caught may be no more than a
-            // consequence.
+            // A lost device reports the loss when it is polled. The caught error may only be a
+            // consequence of it.
             let _ = self.device.poll(wgpu::PollType::Poll);
         }
         match errors.into_iter().flatten().next() {
@@ -227,7 +228,7 @@ impl Gpu {
         }
     }
 
-    /// The compiled kernel, made at its first use.
+    /// The compiled kernel. The first use compiles it.
     pub(super) fn pipeline(&self, kernel: &Kernel) -> Result<wgpu::ComputePipeline, GpuError> {
         let wgsl = kernel.wgsl();
         let mut made = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,28 +1,28 @@
-//! The shader for what a scene calls for, put together from the pieces beside this file. What is
-//! not wanted is not in it.
+//! Assembles the shader for a scene from the WGSL files in this folder. It contains only what the
+//! scene needs.
 
 use crate::interpolate::Interpolant;
 use std::fmt::Write as _;
 
-/// First binding of the field's slabs. Before it: parameters, rays, what is left of rays, kinds of
-/// nodes.
+/// First binding of the field's slabs. The bindings before it are parameters, rays, kernel outputs
+/// and kinds of nodes.
 pub(super) const FIRST_SLAB: u32 = 4;
 
-/// What a kernel is compiled for.
+/// The features of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Kernel {
     /// [`Interpolant::BSpline`] or [`Interpolant::Trilinear`].
     pub(super) interpolant: Interpolant,
-    /// The optical path difference.
+    /// Whether it computes the optical path difference.
     pub(super) opd: bool,
-    /// Blank or solid nodes.
+    /// Whether the field has blank or solid nodes.
     pub(super) nodes: bool,
-    /// Bindings over which the field is spread.
+    /// Number of bindings over which the field is divided.
     pub(super) slabs: u32,
 }
 
 impl Kernel {
-    /// Layers of nodes beyond its cells that a slab holds.
+    /// Number of layers of nodes that a slab holds beyond its cells.
     pub(super) fn halo(interpolant: Interpolant) -> usize {
         match interpolant {
             Interpolant::BSpline => 3,
@@ -30,9 +30,9 @@ impl Kernel {
         }
     }
 
-    /// The shader.
+    /// The source text of the shader.
     pub(super) fn wgsl(&self) -> String {
-        // B-splines are worth compensated sums, as on the CPU.
+        // Only the B-spline is accurate enough to need compensated sums, as on the CPU.
         let spline = self.interpolant == Interpolant::BSpline;
         let mut text = format!("const OPD = {};\nconst COMPENSATED = {spline};\n", self.opd);
         text += include_str!("march.wgsl");
@@ -60,7 +60,8 @@ impl Kernel {
         text
     }
 
-    /// eps (w) and its gradient per lattice step (xyz), from the slab that holds the point.
+    /// The function that samples eps (w) and its gradient per lattice step (xyz) in the slab that
+    /// holds the point.
     fn sample(&self) -> String {
         let mut text = "fn sample(at: vec3f) -> vec4f {\n    let p = place_of(at);\n".to_string();
         let offset = |z: &str| format!("p.cell.x + p.cell.y * params.row + ({z}) * params.layer");
@@ -103,8 +104,9 @@ mod tests {
         naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)))
     }
 
-    /// Needs no device. Without capabilities: nothing that only some devices have, f64 least of all
-    /// (naga accepts its exp(), drivers return garbage).
+    /// Needs no device. The validator has no capabilities, so the shader uses nothing that only
+    /// some devices have. This excludes f64 in particular: naga accepts its exp(), but drivers
+    /// return wrong values.
     #[test]
     fn every_shader_is_valid_wgsl_for_every_device() {
         use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -117,7 +119,7 @@ mod tests {
         }
     }
 
-    /// The parameters that Rust writes are those that the shader reads.
+    /// The structures that Rust writes have the layout that the shader reads.
     #[test]
     fn structures_have_the_sizes_that_are_written() {
         for kernel in all() {

@@ -1,20 +1,22 @@
-// Deviations from straight rays by position Verlet, one ray an invocation: the kernel of march/packet.rs in WGSL, with the same order of operations.
+// Integrates deviations from straight rays by position Verlet, one ray per invocation. This is the
+// kernel of march/packet.rs in WGSL, with the same order of operations.
 //
-// In front of this stand `const OPD`, `meet` (nodes.wgsl or nothing) and `sample` (trilinear.wgsl or bspline.wgsl).
+// The host adds `const OPD`, `meet` (from nodes.wgsl, or a constant) and `sample` (from
+// trilinear.wgsl or bspline.wgsl).
 
 struct Ray {
-    // Middle of the undisturbed way through the field, in lattice coordinates.
+    // Midpoint of the undisturbed path through the field, in lattice coordinates.
     middle: vec3f,
-    // A step of path.
+    // A step of the path parameter.
     dt: f32,
     // A step along the undisturbed ray, in lattice coordinates.
     stride: vec3f,
-    // 0: the ray misses the field.
+    // Number of steps; 0 if the ray misses the field.
     steps: u32,
     // Direction times spacing.
     along: vec3f,
     unused_0: u32,
-    // The deviation's start: what rounding left out of `middle`.
+    // Initial deviation: the rounding error of `middle`.
     xi: vec3f,
     unused_1: u32,
 }
@@ -33,14 +35,14 @@ struct Params {
     // The worst kind of node that a ray can survive.
     survives: u32,
     last: vec3f,
-    // Distances of neighbours along y and z.
+    // `row` and `layer` are the strides of neighbours along y and z.
     row: u32,
     last_cell: vec3f,
     layer: u32,
     dims: vec3u,
     // Layers of cells in a slab of the field; the last may have fewer.
     slab: u32,
-    // Always 0, which compilers do not know.
+    // Always 0, but unknown to the compiler.
     zero: u32,
     unused_0: u32,
     unused_1: u32,
@@ -56,14 +58,15 @@ struct Place {
     place: vec3f,
 }
 
-// The cell of a point, the lower one at 0 and the last one at n - 1, and the place in it.
+// The cell of a point, clamped to the first and last cell, and the position in it.
 fn place_of(at: vec3f) -> Place {
     let inside = min(max(at, vec3f(0.0)), params.last);
     let cell = vec3u(min(inside, params.last_cell));
     return Place(cell, inside - vec3f(cell));
 }
 
-// The same number. Vulkan lets compilers take (a + b) - a for b, and Mesa's do; no compiler sees through this.
+// Returns the same number. Vulkan allows compilers to replace (a + b) - a by b, and Mesa's do. No
+// compiler can see through this function.
 fn rounded(a: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(a) ^ params.zero);
 }
@@ -89,13 +92,13 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         outputs[i] = KernelOutput(v, opd, vec3f(0.0), met);
         return;
     }
-    // Step numbers are counted from the middle of the way: exact in f32.
+    // Step numbers are relative to the midpoint of the path, which makes them exact in f32.
     let middle = 0.5 * f32(ray.steps);
     var dt_whole = ray.dt;
     var eps_at_entry = 0.0;
 
-    // Two iterations more than steps, to look at the entry and to end in the exit plane; in the same loop, so that there is one copy of the
-    // sampling code.
+    // Two more iterations than steps: one samples the entry, one ends in the exit plane. They are
+    // in the same loop so that there is one copy of the sampling code.
     for (var n = 0u; n < ray.steps + 2u; n++) {
         var number = f32(n) - 0.5 - middle;
         var move_by = dt_whole;
@@ -107,8 +110,9 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
             move_by = 0.0;
             dt = 0.0;
         } else if leaving {
-            // tau is not depth: a ray that gained zeta in depth has passed its exit plane by as much. One step back brings it there.
-            // Positions still miss the second half of the last step.
+            // tau is not depth: a ray that gained zeta in depth has passed its exit plane by zeta.
+            // One step back returns it there. Positions still lack the second half of the last
+            // step.
             let missing = 0.5 * dt_whole;
             let u_z = dot(ray.along, v);
             let zeta = fma(missing, u_z, dot(ray.along, xi));
@@ -137,7 +141,8 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
             v = fma(push, here.xyz, v);
         }
         if OPD {
-            // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z), with the mean of v before and after: all terms small, none a difference.
+            // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z), with the mean of v before
+            // and after. All terms are small, and none is a difference.
             let square = dot(middle_v * params.h2, middle_v);
             let u_z = dot(middle_v, ray.along);
             let transverse = square - u_z * u_z;
@@ -149,7 +154,7 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         }
         if entering {
             eps_at_entry = eps;
-            // dt / (1 + eps), with the division's error on the small part only.
+            // dt / (1 + eps), with the error of the division only on the small part.
             dt_whole = dt_whole - dt_whole * (eps / (1.0 + eps));
         } else if leaving {
             xi = fma(vec3f(0.5 * dt), v, xi);

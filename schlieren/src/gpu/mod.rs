@@ -1,23 +1,22 @@
-//! Light paths on a GPU: the deviational Verlet march of [`crate::march::Deviational`] as a Vulkan
-//! compute shader.
+//! Traces light paths on a GPU: the deviational Verlet march of [`crate::march::Deviational`] as a
+//! Vulkan compute shader.
 //!
-//! The same numbers as on the CPU, within a few roundings: rays are prepared and read out in `f64`
-//! by the same code, take the same steps, and the kernel does the same operations in `f32` in the
-//! same order. The field lies in storage buffers and is interpolated with explicit weights, because
-//! texture units round theirs to 8 bits. A field larger than one binding of the device is cut into
-//! slabs, one a binding.
+//! The results equal those of the CPU within a few roundings. The same code prepares the rays and
+//! converts the results in `f64`. The rays take the same steps, and the kernel does the same
+//! operations in `f32` in the same order. The field is stored in buffers and interpolated with
+//! explicit weights, because texture units round weights to 8 bits. A field larger than one binding
+//! of the device is divided into slabs, one per binding.
 //!
-//! | file | holds |
+//! | file | contents |
 //! |---|---|
-//! | device.rs | finding an adapter, opening it, what it can hold |
-//! | kernel.rs, *.wgsl | the shader, put together from what a scene calls for |
+//! | device.rs | [`Gpu`]: finds an adapter, opens it, knows its limits |
+//! | kernel.rs, *.wgsl | the shader, assembled from what a scene needs |
 //! | volume.rs | the field on the device |
-//! | paths.rs | [`GpuPaths`]: starts in, exits out, in batches |
-//! | fall_back.rs | what happens to batches that the device does not finish: the device is opened
-//! again, and then the CPU stands in |
+//! | paths.rs | [`GpuPaths`]: traces starts to exits in batches |
+//! | cpu_fallback.rs | recovery of batches that the device does not finish, on a reopened device or on the CPU |
 //!
-//! What has no kernel here is refused by name ([`GpuError::Unsupported`]): line of sight and full
-//! marches, and gradients that are interpolated themselves.
+//! Line of sight, full marches and interpolated gradients have no kernel. They are refused by name
+//! ([`GpuError::Unsupported`]).
 
 mod cpu_fallback;
 mod device;
@@ -28,27 +27,27 @@ mod volume;
 pub use device::Gpu;
 pub use paths::{GpuCounters, GpuOptions, GpuPaths};
 
-/// Why the GPU does not do it.
+/// Why the GPU cannot trace.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GpuError {
-    /// There is none.
+    /// No GPU was found.
     #[error(
         "no GPU: {0}; install its Vulkan driver (on Debian mesa-vulkan-drivers, which also has one \
          that runs on the CPU), or compute on the CPU (--device cpu)"
     )]
     NoAdapter(String),
-    /// It cannot be opened.
+    /// The GPU cannot be opened.
     #[error("the GPU `{adapter}` cannot be opened: {reason}")]
     Open {
-        /// Its name.
+        /// Name of the GPU.
         adapter: String,
         /// What its driver says.
         reason: String,
     },
-    /// There is no kernel for it.
+    /// There is no kernel for the request.
     #[error("the GPU has no kernel for {what}; it has verlet with b-spline or trilinear. {cure}")]
     Unsupported {
-        /// What was asked for.
+        /// What was requested.
         what: String,
         /// What to do instead.
         cure: &'static str,
@@ -59,18 +58,18 @@ pub enum GpuError {
          CPU (--device cpu), or resample the flow coarser"
     )]
     TooLarge {
-        /// Part of the field.
+        /// The part of the field that does not fit.
         what: &'static str,
-        /// Of the field.
+        /// Dimensions of the field in nodes.
         dims: [usize; 3],
-        /// What it would take.
+        /// Memory that it needs.
         need: String,
-        /// What there is.
+        /// Memory that is available.
         room: String,
         /// The device.
         adapter: String,
     },
-    /// Its driver refused or failed.
+    /// The driver reported an error, or the device was lost.
     #[error("`{adapter}` failed: {reason}; compute on the CPU (--device cpu)")]
     Failed {
         /// The device.
@@ -78,7 +77,7 @@ pub enum GpuError {
         /// What its driver says.
         reason: String,
     },
-    /// It failed again and again.
+    /// The GPU failed too often.
     #[error(
         "`{adapter}` failed ({reason}) after it was opened again {times} times, and is left alone; \
          look into its driver's log, or compute on the CPU (--device cpu)"
@@ -86,14 +85,14 @@ pub enum GpuError {
     GivenUp {
         /// The device.
         adapter: String,
-        /// How often it was opened again.
+        /// How often it was reopened.
         times: u32,
-        /// What its driver said last.
+        /// The driver's last message.
         reason: String,
     },
 }
 
-/// A failure, told with the picture that was drawn all the same.
+/// The warning for an image that the CPU finished after the GPU failed.
 pub(crate) fn fallback_message(failure: &GpuError) -> String {
     match failure {
         GpuError::Failed { .. } => {
@@ -103,7 +102,7 @@ pub(crate) fn fallback_message(failure: &GpuError) -> String {
     }
 }
 
-/// A failure, without what can be done about it.
+/// Describes a failure without advice.
 pub(crate) fn failure_message(failure: &GpuError) -> String {
     match failure {
         GpuError::Failed { adapter, reason } => format!("the GPU `{adapter}` failed ({reason})"),

@@ -1,7 +1,7 @@
-// What the nodes are, sixteen a word, two bits each: 0 gas, 1 blank, 2 solid.
+// Kinds of the nodes, sixteen per word, two bits each: 0 gas, 1 blank, 2 solid.
 @group(0) @binding(3) var<storage, read> kinds: array<u32>;
 
-// The nearest node's kind.
+// The kind of the nearest node.
 fn meet(at: vec3f) -> u32 {
     let inside = min(max(at, vec3f(0.0)), params.last);
     let near = vec3u(inside + vec3f(0.5));

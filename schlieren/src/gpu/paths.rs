@@ -1,4 +1,4 @@
-//! Starts in, exits out, in batches.
+//! Traces rays on the GPU in batches: [`GpuPaths`].
 
 use super::cpu_fallback::{BatchTracer, CpuFallback, Failure};
 use super::device::MAX_REOPENINGS;
@@ -18,20 +18,20 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 use wgpu::{BufferDescriptor, BufferUsages};
 
-/// Rays of one dispatch: enough to fill any device, few enough that two batches take little memory
-/// and no driver thinks that the device hangs.
+/// Number of rays per dispatch. This is enough to fill any device. It is small enough that two
+/// batches take little memory and no driver assumes that the device hangs.
 const BATCH: usize = 1 << 18;
-/// As in march.wgsl.
+/// Workgroup size of march.wgsl.
 const WORKGROUP: usize = 64;
 
-/// How to march; the fields of [`Options`] that the GPU has a kernel for.
+/// Options of the march: the fields of [`Options`] that the GPU supports.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GpuOptions {
     /// Longest step, in lattice steps.
     pub step_voxels: f64,
-    /// What to compute beside deflection and displacement.
+    /// Quantities to compute besides deflection and displacement.
     pub wanted: PathQuantities,
-    /// What becomes of light in cells without data.
+    /// How cells without data treat light.
     pub blank: BlankCells,
 }
 
@@ -45,40 +45,39 @@ impl Default for GpuOptions {
     }
 }
 
-/// What tracing did so far.
+/// Counts of the work so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GpuCounters {
-    /// Rays traced.
+    /// Number of rays traced.
     pub rays: u64,
-    /// Steps they were to take on the device.
+    /// Number of steps submitted to the device for them.
     pub ray_steps: u64,
-    /// Kernels started.
+    /// Number of kernels started.
     pub dispatches: u64,
-    /// Rays that were traced once more on a device that was opened again after it failed.
+    /// Number of rays that were traced again on a reopened device.
     pub rays_repeated: u64,
-    /// Rays that the CPU had to trace because the device failed.
+    /// Number of rays that the CPU traced because the device failed.
     pub rays_on_cpu: u64,
 }
 
-/// Light paths through a field of weak index, traced on a GPU. [`LightPaths::trace_parallel`] on
-/// many starts is the fast way; every call costs a round trip to the device.
+/// Traces light on a GPU through a field of weak index. Every call costs a round trip to the
+/// device, so [`LightPaths::trace_parallel`] with many starts is fastest.
 ///
-/// When the device fails on the way, it is opened again, a few times at most, and what it lost is
-/// traced once more ([`GpuCounters::rays_repeated`]). What is left then is traced on the CPU
-/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::device_warning`] names the cause and what was
-/// done.
+/// If the device fails during a call, it is reopened, at most a few times, and the lost rays are
+/// traced again ([`GpuCounters::rays_repeated`]). The CPU traces the rest
+/// ([`GpuCounters::rays_on_cpu`]). [`LightPaths::device_warning`] names the cause and the remedy.
 ///
-/// Of a ray that is stopped, `status` tells what stopped it, and deflection and displacement are
-/// those where it was stopped.
+/// If a ray is stopped, its `status` is the cause, and deflection and displacement are those at the
+/// point where it stopped.
 pub struct GpuPaths<'a> {
     field: &'a Field,
     frame: Frame,
     interpolant: Interpolant,
     options: GpuOptions,
-    /// Rays of one dispatch.
+    /// Number of rays per dispatch.
     batch: usize,
     current: Mutex<CurrentDevice>,
-    /// Takes over when the device fails.
+    /// Traces on the CPU when the device fails.
     cpu_fallback_paths: CpuFallback<'a>,
     rays: AtomicU64,
     ray_steps: AtomicU64,
@@ -88,18 +87,18 @@ pub struct GpuPaths<'a> {
 /// The field and the kernel on one device.
 struct DeviceState {
     gpu: Arc<Gpu>,
-    /// How many were there before.
+    /// Number of devices that preceded this one.
     number: u32,
     pipeline: wgpu::ComputePipeline,
     volume: Volume,
-    /// Buffers that no batch uses at the moment.
+    /// Buffers that no batch is using.
     idle: Mutex<Vec<Scratch>>,
 }
 
-/// Who traces now.
+/// The device in use.
 struct CurrentDevice {
     on_device: Arc<DeviceState>,
-    /// How often another was looked for.
+    /// How often a replacement was requested.
     attempts: u32,
 }
 
@@ -126,7 +125,7 @@ impl DeviceState {
         Failure { device: self.number, error }
     }
 
-    /// Takes buffers for this many rays, or makes them.
+    /// Reuses or creates buffers for this number of rays.
     fn scratch(&self, rays: usize) -> Result<Scratch, GpuError> {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(i) = idle.iter().position(|s| s.capacity >= rays) {
@@ -222,7 +221,7 @@ struct Scratch {
     bindings: wgpu::BindGroup,
 }
 
-/// A batch on its way.
+/// A submitted batch.
 pub(super) struct Pending {
     on_device: Arc<DeviceState>,
     scratch: Scratch,
@@ -267,7 +266,7 @@ impl<'a> GpuPaths<'a> {
         })
     }
 
-    /// What tracing did so far.
+    /// Counts of the work so far.
     pub fn counters(&self) -> GpuCounters {
         let read = |c: &AtomicU64| c.load(Ordering::Relaxed);
         GpuCounters {
@@ -279,14 +278,13 @@ impl<'a> GpuPaths<'a> {
         }
     }
 
-    /// The same in batches of so many rays, at most those of a dispatch, for tests of what several
-    /// batches meet.
+    /// Limits the number of rays per batch, to test several batches.
     #[must_use]
     pub fn with_batch(self, rays: usize) -> GpuPaths<'a> {
         GpuPaths { batch: rays.clamp(1, BATCH), ..self }
     }
 
-    /// The device that traces now.
+    /// The device in use.
     pub fn gpu(&self) -> Arc<Gpu> {
         Arc::clone(&self.on_device().gpu)
     }
@@ -295,12 +293,12 @@ impl<'a> GpuPaths<'a> {
         Arc::clone(&self.current.lock().unwrap_or_else(PoisonError::into_inner).on_device)
     }
 
-    /// Memory that the field takes on the device, without batches.
+    /// Memory of the field on the device in bytes, without batches.
     pub fn device_bytes(&self) -> u64 {
         self.on_device().volume.bytes
     }
 
-    /// Bindings over which the field is spread.
+    /// Number of bindings over which the field is divided.
     pub fn slabs(&self) -> usize {
         self.on_device().volume.slabs.len()
     }
@@ -327,7 +325,7 @@ impl<'a> GpuPaths<'a> {
         }
     }
 
-    /// Rays as the kernel gets them; those that miss the field stay zero.
+    /// Converts starts to the kernel's rays. Rays that miss the field stay zero.
     fn prepare(&self, starts: &[Start], prepared: &mut [KernelRay], rays: &mut [Ray]) {
         let mut known = None;
         for ((start, p), ray) in starts.iter().zip(prepared).zip(rays) {
@@ -391,7 +389,7 @@ impl BatchTracer for GpuPaths<'_> {
         let index = queue.submit([commands.finish()]);
         let (tell, mapped) = mpsc::channel();
         scratch.readback.map_async(wgpu::MapMode::Read, ..bytes, move |r| {
-            // Nobody listens any more when the batch was given up.
+            // The receiver is gone if the batch was abandoned.
             let _ = tell.send(r);
         });
         let steps: u64 = rays.iter().map(|r| u64::from(r.steps)).sum();
@@ -410,8 +408,8 @@ impl BatchTracer for GpuPaths<'_> {
         };
         let wait = wgpu::PollType::Wait { submission_index: Some(pending.index), timeout: None };
         gpu.device.poll(wait).map_err(|e| failed(&e))?;
-        // Another thread's poll may have taken this batch's completion and be about to tell; so
-        // this waits as well. A device that is lost may never tell.
+        // Another thread's poll may have seen this batch complete and may not have run its callback
+        // yet, so wait for the callback as well. A lost device may never run it.
         const LOOK: Duration = Duration::from_millis(100);
         let mapped = loop {
             match pending.mapped.recv_timeout(LOOK) {
@@ -448,15 +446,15 @@ impl BatchTracer for GpuPaths<'_> {
     }
 
     fn replace(&self, failed: &Failure) -> Result<(), GpuError> {
-        // Who waits here for another thread takes no other job meanwhile, so nothing below may wait
-        // for a job: the spline is made by this thread alone.
+        // A thread that waits for this lock takes no other jobs. Nothing below may therefore wait
+        // for a job, so the spline is built on this thread alone.
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if current.on_device.number != failed.device {
             return Ok(());
         }
         let gpu = &current.on_device.gpu;
         let Some(reason) = gpu.failure() else {
-            // This batch failed, not the device.
+            // The batch failed, but not the device.
             return Err(failed.error.clone());
         };
         if current.attempts >= MAX_REOPENINGS {

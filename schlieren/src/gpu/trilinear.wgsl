@@ -1,12 +1,12 @@
-// Trilinear eps and the gradient of that, from slab SLAB. `o` is the cell's first node there.
+// Trilinear eps and its gradient from slab SLAB. `o` is the cell's first node there.
 fn sample_SLAB(o: u32, place: vec3f) -> vec4f {
     let r = o + params.row;
     let l = o + params.layer;
     let lr = l + params.row;
-    // The edges along x: at (y, z) = (0, 0), (1, 0), (0, 1), (1, 1).
+    // The cell's edges along x, at (y, z) = (0, 0), (1, 0), (0, 1), (1, 1).
     let near = vec4f(values_SLAB[o], values_SLAB[r], values_SLAB[l], values_SLAB[lr]);
     let far = vec4f(values_SLAB[o + 1u], values_SLAB[r + 1u], values_SLAB[l + 1u], values_SLAB[lr + 1u]);
-    // Differences first, so that the gradient is not a difference of interpolated values.
+    // Differences come first, so that the gradient is not a difference of interpolated values.
     let d = far - near;
     let e = fma(vec4f(place.x), d, near);
     let dy = e.yw - e.xz;

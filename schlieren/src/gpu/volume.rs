@@ -1,5 +1,5 @@
-//! The field on the device: its nodes, or its spline's coefficients, in slabs of layers no larger
-//! than a binding.
+//! Copies the field to the device: its nodes or the coefficients of its spline, in slabs of layers
+//! that fit a binding.
 
 use super::kernel::Kernel;
 use super::{Gpu, GpuError};
@@ -7,26 +7,26 @@ use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
 use wgpu::{BufferDescriptor, BufferUsages};
 
-/// Bytes handed to the driver at once; more would all be copied into staging memory before the
-/// first of them leaves it.
+/// Bytes per upload. A larger upload would be copied to staging memory as a whole before its
+/// transfer begins.
 const UPLOAD_BYTES: usize = 64 << 20;
 
 /// A field on the device.
 pub(super) struct Volume {
-    /// Slabs along z. Neighbours share the layers that cells at their border need.
+    /// Slabs along z. Neighbouring slabs share the layers that cells at their border need.
     pub(super) slabs: Vec<wgpu::Buffer>,
-    /// What nodes are, two bits each, when not all are gas.
+    /// Kinds of the nodes, two bits each, if not all are gas.
     pub(super) kinds: Option<wgpu::Buffer>,
-    /// Distances of neighbours along y and z.
+    /// Strides of neighbours along y and z.
     pub(super) stride: [usize; 2],
-    /// Layers of cells in a slab.
+    /// Number of layers of cells in a slab.
     pub(super) layers: usize,
-    /// Memory on the device.
+    /// Memory on the device in bytes.
     pub(super) bytes: u64,
 }
 
 impl Volume {
-    /// The field, or the spline through it.
+    /// Uploads the field, or the spline through it.
     pub(super) fn new(
         gpu: &Gpu,
         field: &Field,
@@ -74,8 +74,8 @@ impl Volume {
     }
 }
 
-/// Number of slabs, and layers of cells in each (the last may have fewer), so that no slab is
-/// larger than a binding. `None` when that takes more than `most` slabs.
+/// Number of slabs and layers of cells in each, so that every slab fits a binding. The last slab
+/// may have fewer layers. `None` if this needs more than `most` slabs.
 fn cut(
     cells: usize,
     halo: usize,
@@ -91,7 +91,7 @@ fn cut(
     (count <= most as usize).then_some((count, layers))
 }
 
-/// Two bits a node, sixteen a word.
+/// Packs two bits per node, sixteen nodes per word.
 fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
     let word = |w: &[crate::field::Node]| {
         w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i))
