@@ -1,11 +1,11 @@
 //! Describes the cut-off: the transmission of the cut-off plane at each of its points.
 //!
-//! | kind | passes | thesis |
+//! | kind | passes | dissertation |
 //! |---|---|---|
 //! | [`Knife`] | one side of an edge at any angle | 5.3.4, equation 5.12 |
-//! | [`Aperture`] | the inside of a circle (bright field), or the outside: the complemented circle (dark field) | 5.3.4 |
-//! | [`ColorWheel`] | all of it, coloured by direction and size | equation 5.16 |
-//! | [`FilterImage`] | what a picture in the plane lets through: a file, or one [painted] by hand | 5.6 |
+//! | [`Aperture`] | the inside of a circle (bright field), or the outside, the complemented circle (dark field) | 5.3.4 |
+//! | [`ColorWheel`] | all light, coloured by direction and size of the deflection | equation 5.16 |
+//! | [`FilterImage`] | what an image in the plane transmits: a file, or one [painted] by hand | 5.6 |
 //!
 //! Coordinates are metres in the plane, along the image's right and up. Transmission is linear and
 //! at most 1 in each channel.

@@ -1,24 +1,24 @@
-//! Refractive index of moist air after P. E. Ciddor, "Refractive index of air: new equations for
-//! the visible and near infrared", Applied Optics 35, 1566 (1996), with all terms. Numbers of
-//! equations and appendices are those of the paper.
+//! Computes the refractive index of moist air by Ciddor's equation, with all terms: P. E. Ciddor,
+//! "Refractive index of air: new equations for the visible and near infrared", Applied Optics 35,
+//! 1566 (1996). Numbers of equations and appendices are those of the paper.
 //!
-//! Outside −40…100 °C its compressibility is an extrapolation: at 2000 K it gives 1.4 % more than
-//! an ideal gas would have. Flames need [`super::mixture`].
+//! Outside −40…100 °C the compressibility is an extrapolation: at 2000 K the result is 1.4 % above
+//! that of an ideal gas. Use [`super::mixture`] for flames.
 
 use super::{IndexError, OutOfRange};
 
-/// Molar gas constant the paper uses, J/(mol K).
+/// Molar gas constant of the paper, J/(mol K).
 const R: f64 = 8.314510;
 /// Molar mass of water, kg/mol.
 const MOLAR_MASS_WATER: f64 = 0.018015;
-/// Where the density of standard air is meant: 15 °C, 101325 Pa, dry.
+/// Temperature (°C) and pressure (Pa) of standard air, which is dry.
 const STANDARD_AIR: (f64, f64) = (15.0, 101_325.0);
-/// Where the density of standard water vapour is meant: 20 °C, 1333 Pa, pure.
+/// Temperature (°C) and pressure (Pa) of standard water vapour, which is pure.
 const STANDARD_VAPOUR: (f64, f64) = (20.0, 1333.0);
 /// 0 °C in K.
 pub const ZERO_CELSIUS_K: f64 = 273.15;
 
-/// Where Ciddor compared his equation with measurements.
+/// The range in which Ciddor compared his equation with measurements.
 pub const TEMPERATURE_RANGE_C: [f64; 2] = [-40.0, 100.0];
 /// See [`TEMPERATURE_RANGE_C`].
 pub const WAVELENGTH_RANGE_UM: [f64; 2] = [0.3, 1.69];
@@ -26,11 +26,11 @@ pub const WAVELENGTH_RANGE_UM: [f64; 2] = [0.3, 1.69];
 pub const PRESSURE_RANGE_PA: [f64; 2] = [10_000.0, 140_000.0];
 /// See [`TEMPERATURE_RANGE_C`].
 pub const CO2_RANGE_PPM: [f64; 2] = [0.0, 2000.0];
-/// Shorter waves come near the poles of the dispersion formula (132 and 65 nm), where oxygen
-/// absorbs.
+/// Shortest wavelength. Below it oxygen absorbs, and the dispersion formula has poles (132 and 65
+/// nm).
 const SHORTEST_UM: f64 = 0.185;
 
-/// State of a parcel of air.
+/// The state of moist air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MoistAir {
     /// Temperature, °C.
@@ -55,7 +55,7 @@ impl Default for MoistAir {
     }
 }
 
-/// Ciddor's equation at one wavelength: what depends on the wavelength only is computed once.
+/// Ciddor's equation at one wavelength. Terms that depend only on the wavelength are computed once.
 ///
 /// ```
 /// use schlieren::index::ciddor::{Ciddor, MoistAir};
@@ -76,7 +76,7 @@ pub struct Ciddor {
 }
 
 impl Ciddor {
-    /// For light of this wavelength in vacuum. Refused below 185 nm, where air absorbs and the
+    /// Prepares the equation for a vacuum wavelength. Fails below 185 nm, where air absorbs and the
     /// formula has its poles.
     pub fn new(wavelength_um: f64) -> Result<Self, IndexError> {
         if !(wavelength_um >= SHORTEST_UM && wavelength_um.is_finite()) {
@@ -89,8 +89,8 @@ impl Ciddor {
             });
         }
         let s = wavelength_um.powi(-2);
-        // Eq. 1: standard dry air. Eq. 3: water vapour, with the factor 1.022 that fits the
-        // infrared.
+        // Eq. 1: standard dry air. Eq. 3: water vapour, with the factor 1.022 that fits it to
+        // infrared data.
         let n_as = 1e-8 * (5_792_105.0 / (238.0185 - s) + 167_917.0 / (57.362 - s));
         let n_ws = 1.022e-8 * (295.235 + 2.6422 * s - 0.032380 * s * s + 0.004028 * s * s * s);
         let (t, p) = STANDARD_VAPOUR;
@@ -98,11 +98,11 @@ impl Ciddor {
         Ok(Ciddor { wavelength_um, n_as, n_ws, rho_ws })
     }
 
-    /// n − 1. Errors where no such air exists; see [`Self::out_of_range`] for where the formula is
-    /// not to be trusted.
+    /// n − 1 of air. Fails if no such air can exist. [`Self::out_of_range`] reports where the
+    /// formula is not validated.
     pub fn n_minus_1(&self, air: &MoistAir) -> Result<f64, IndexError> {
         let vapour_fraction = vapour_mole_fraction(air)?;
-        // Eq. 2, and the molar mass of dry air with that much CO2.
+        // Eq. 2, and the molar mass of dry air with this amount of CO2.
         let n_axs = self.n_as * (1.0 + 0.534e-6 * (air.co2_ppm - 450.0));
         let molar_mass_air = molar_mass_of_dry_air(air.co2_ppm);
 
@@ -121,7 +121,7 @@ impl Ciddor {
         Ok(rho_a / rho_axs * n_axs + rho_w / self.rho_ws * self.n_ws)
     }
 
-    /// Which of the conditions lie outside the range in which the equation was compared with
+    /// The conditions that lie outside the range in which the equation was compared with
     /// measurements.
     pub fn out_of_range(&self, air: &MoistAir) -> Vec<OutOfRange> {
         let checks = [
@@ -168,7 +168,7 @@ impl Ciddor {
             .collect()
     }
 
-    /// Gladstone-Dale constants in m³/kg at this wavelength: of dry air with 450 ppm CO2, and of
+    /// Gladstone-Dale constants in m³/kg at this wavelength, of dry air with 450 ppm CO2 and of
     /// water vapour.
     pub fn gladstone_dale_m3_per_kg(&self) -> [f64; 2] {
         let (t, p) = STANDARD_AIR;
@@ -178,13 +178,13 @@ impl Ciddor {
     }
 }
 
-/// kg/mol, from CO2 in ppm (the paper, below eq. 4).
+/// Molar mass of dry air in kg/mol, from CO2 in ppm (the paper, below eq. 4).
 pub(crate) fn molar_mass_of_dry_air(co2_ppm: f64) -> f64 {
     1e-3 * (28.9635 + 12.011e-6 * (co2_ppm - 400.0))
 }
 
-/// Saturation pressure of water vapour in Pa, over water from 0 °C on and over ice below (the
-/// paper's appendix A).
+/// Saturation pressure of water vapour in Pa: over water at 0 °C and above, over ice below
+/// (appendix A).
 pub fn saturation_pressure_pa(temperature_c: f64) -> f64 {
     let kelvin = temperature_c + ZERO_CELSIUS_K;
     if temperature_c >= 0.0 {
@@ -196,7 +196,7 @@ pub fn saturation_pressure_pa(temperature_c: f64) -> f64 {
     }
 }
 
-/// Mole fraction of water vapour (appendix A), after checking that there can be such air.
+/// Mole fraction of water vapour (appendix A). Fails if no such air can exist.
 fn vapour_mole_fraction(air: &MoistAir) -> Result<f64, IndexError> {
     let MoistAir { temperature_c: t, pressure_pa: p, relative_humidity, co2_ppm } = *air;
     let impossible = |quantity, value, unit, reason, cure| {
@@ -311,8 +311,8 @@ mod tests {
             text.contains("temperature 1726.85 C") && text.contains("Gladstone-Dale"),
             "{text}"
         );
-        // The reason: against an ideal gas with the same K the extrapolated compressibility is off
-        // by more than 1 %.
+        // Reason: the extrapolated compressibility makes the result differ by more than 1 % from an
+        // ideal gas with the same K.
         let k = c.gladstone_dale_m3_per_kg()[0];
         let ideal = k * 101_325.0 * molar_mass_of_dry_air(450.0) / (R * 2000.0);
         let ratio = c.n_minus_1(&flame).unwrap() / ideal;

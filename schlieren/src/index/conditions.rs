@@ -1,4 +1,4 @@
-//! The index for one set of conditions: what `schlieren index --wavelength-nm 633 …` answers.
+//! Computes the index for one set of conditions, as `schlieren index --wavelength-nm 633 …` does.
 
 use super::ciddor::{Ciddor, MoistAir, ZERO_CELSIUS_K};
 use super::{Gas, IndexError, Mixture};
@@ -8,7 +8,8 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Model {
-    /// Ciddor for air in its range of temperatures, Gladstone-Dale for species and beyond.
+    /// Ciddor for air within its temperature range, Gladstone-Dale for species and other
+    /// temperatures.
     #[default]
     Auto,
     /// [`super::ciddor`], with a warning outside its range.
@@ -44,7 +45,7 @@ pub struct Conditions {
     pub co2_ppm: f64,
     /// Gases by mass fraction; the rest is air. Empty for air.
     pub species: Vec<(Gas, f64)>,
-    /// Density in kg/m³ instead of what follows from temperature and pressure.
+    /// Density in kg/m³, which replaces the density that follows from temperature and pressure.
     pub density_kg_m3: Option<f64>,
     /// Which formula.
     pub model: Model,
@@ -67,14 +68,14 @@ impl Default for Conditions {
     }
 }
 
-/// The answer; its fields are the keys of `--json`.
+/// The result. Its fields are the keys of `--json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
     /// n − 1.
     pub n_minus_1: f64,
-    /// n, for people; it has fewer digits.
+    /// n, for readers; it has fewer digits than n − 1.
     pub n: f64,
-    /// The formula that was used: `ciddor` or `gladstone-dale`.
+    /// The formula used: `ciddor` or `gladstone-dale`.
     pub model: Model,
     /// Density, for Gladstone-Dale.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,7 +83,7 @@ pub struct Answer {
     /// Gladstone-Dale constant of the mixture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gladstone_dale_m3_per_kg: Option<f64>,
-    /// The conditions.
+    /// See [`Conditions`].
     pub wavelength_nm: f64,
     /// See [`Conditions`].
     pub temperature_c: f64,
@@ -92,11 +93,11 @@ pub struct Answer {
     pub humidity: f64,
     /// See [`Conditions`].
     pub co2_ppm: f64,
-    /// What the user should know; empty when all is well.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// n − 1 for `conditions`.
+/// Computes n − 1 for `conditions`.
 ///
 /// ```
 /// use schlieren::index::conditions::{Conditions, answer};
@@ -143,8 +144,8 @@ pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {
             (ciddor.n_minus_1(&air)?, None, None)
         }
         _ => {
-            // Checks the ranges of temperature and pressure; humidity has no place in a mixture
-            // given by mass.
+            // Checks the ranges of temperature and pressure. Humidity does not apply to a mixture
+            // given by mass fractions.
             let dry = MoistAir { relative_humidity: 0.0, ..air };
             ciddor.n_minus_1(&dry)?;
             if c.humidity != 0.0 {
@@ -216,7 +217,7 @@ mod tests {
             answer(&forced).unwrap().warnings[0]
                 .contains("temperature 1500 C is outside -40..100 C")
         );
-        // Both agree for dry air at room temperature but for the compressibility, 4e-4.
+        // For dry air at room temperature, both agree except for the compressibility, 4e-4.
         let gd = answer(&Conditions { model: Model::GladstoneDale, ..Default::default() }).unwrap();
         let ratio = gd.n_minus_1 / cold.n_minus_1;
         assert!((ratio - 1.0).abs() < 6e-4 && ratio != 1.0, "{ratio}");

@@ -1,4 +1,4 @@
-//! Tables of conditions: what `schlieren index --csv FILE` answers.
+//! Computes the index for tables of conditions, as `schlieren index --csv FILE` does.
 
 use super::IndexError;
 use super::ciddor::{Ciddor, MoistAir};
@@ -7,12 +7,12 @@ use datasets::read::csv::{self, CsvTable};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// The columns a table must have, in any order. Others are kept.
+/// The columns that a table must have, in any order. Other columns are kept.
 pub const COLUMNS: [&str; 5] = ["lambda_um", "T_C", "p_Pa", "RH_frac", "CO2_ppm"];
-/// The column that is added.
+/// The column that is added to the table.
 pub const RESULT: &str = "n_minus_1";
 
-/// A table with its answers.
+/// A table with its results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answers {
     table: CsvTable,
@@ -20,12 +20,12 @@ pub struct Answers {
     warnings: Vec<String>,
 }
 
-/// n − 1 after Ciddor for every row of the file.
+/// Computes n − 1 by Ciddor's equation for every row of the file.
 pub fn answer(path: &Path) -> Result<Answers, ReadError> {
     answer_table(csv::read(path)?)
 }
 
-/// n − 1 after Ciddor for every row.
+/// Computes n − 1 by Ciddor's equation for every row of the table.
 ///
 /// ```
 /// use schlieren::index::csv::answer_table;
@@ -51,7 +51,7 @@ pub fn answer_table(table: CsvTable) -> Result<Answers, ReadError> {
     let (humidity, co2) = (humidity?, co2?);
 
     let mut n_minus_1 = Vec::with_capacity(table.len());
-    // Per quantity: how many rows are out of range, and the first.
+    // Per quantity: the number of rows out of range, and a warning for the first.
     let mut outside: Vec<(&'static str, usize, String)> = Vec::new();
     for row in 0..table.len() {
         let air = MoistAir {
@@ -79,7 +79,7 @@ pub fn answer_table(table: CsvTable) -> Result<Answers, ReadError> {
     Ok(Answers { table, n_minus_1, warnings })
 }
 
-/// A refusal of the formula as an error about the cell it is about.
+/// Converts an error of the formula to an error of the cell that causes it.
 fn refused(table: &CsvTable, row: usize, error: &IndexError) -> ReadError {
     let IndexError::Impossible { quantity, reason, cure, .. } = error else {
         return table.cell_error(row, COLUMNS[0], &error.to_string(), "check the row");
@@ -99,12 +99,12 @@ impl Answers {
     pub fn n_minus_1(&self) -> &[f64] {
         &self.n_minus_1
     }
-    /// Rows outside the range of the formula, one line per quantity.
+    /// Warnings about rows outside the range of the formula, one line per quantity.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
-    /// Writes the table with the result in a last column, with 12 significant digits. Comments of
-    /// the file are left out.
+    /// Writes the table with the result as the last column, to 12 significant digits. Comments of
+    /// the file are dropped.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let separator = self.table.separator();
         writeln!(out, "{}{separator}{RESULT}", self.table.header_text().trim_end())?;

@@ -1,13 +1,15 @@
-//! Gladstone and Dale's law, n − 1 = K ρ, with K from published dispersion formulas.
+//! Computes the index of gases by the Gladstone-Dale law, n − 1 = K ρ, with K from published
+//! dispersion formulas.
 //!
-//! K depends on the wavelength and hardly on the temperature: what the thesis (section 5.2) calls a
-//! dependence on temperature is that of the density. A formula gives n − 1 at a reference state; K
-//! divides it by the density there, which is that of a gas with second virial coefficient B: ρ = p
-//! M / (R T Z), Z = 1 + B p / (R T). Without B, K of SF6 would be 1.3 % too large.
+//! K depends on the wavelength and hardly on the temperature. The dependence on temperature that
+//! the dissertation describes (section 5.2) is that of the density. A formula gives n − 1 at a
+//! reference state, and K is that value divided by the density there. The density is that of a gas
+//! with second virial coefficient B: ρ = p M / (R T Z), Z = 1 + B p / (R T). Without B, K of SF6
+//! would be 1.3 % too large.
 //!
-//! Coefficients are from the papers named at each gas, as collected in refractiveindex.info (CC0).
-//! Virial coefficients: J. H. Dymond and E. B. Smith, "The Virial Coefficients of Pure Gases and
-//! Mixtures" (1980), to about 3 cm³/mol, which is 0.01 % of K.
+//! The coefficients are from the papers named for each gas, as collected in refractiveindex.info
+//! (CC0). The virial coefficients are from J. H. Dymond and E. B. Smith, "The Virial Coefficients
+//! of Pure Gases and Mixtures" (1980), with an accuracy of about 3 cm³/mol, which is 0.01 % of K.
 
 use super::ciddor::Ciddor;
 use super::{IndexError, OutOfRange};
@@ -17,13 +19,13 @@ use std::str::FromStr;
 /// Molar gas constant (SI 2019), J/(mol K).
 pub(crate) const R: f64 = 8.314_462_618;
 
-/// A gas that takes part in a mixture.
+/// A component of a mixture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Gas {
     /// One of [`KNOWN`], by its index.
     Known(usize),
-    /// A gas given by numbers: Gladstone-Dale constant at the wavelength in use, and molar mass if
-    /// density has to follow from temperature and pressure.
+    /// A gas given by numbers: its Gladstone-Dale constant at the wavelength in use, and its molar
+    /// mass if density follows from temperature and pressure.
     Given {
         /// Gladstone-Dale constant, m³/kg.
         k_m3_per_kg: f64,
@@ -41,38 +43,30 @@ pub struct KnownGas {
     pub aliases: &'static [&'static str],
     /// Molar mass, g/mol.
     pub molar_mass_g: f64,
-    /// Wavelengths that were measured, µm.
+    /// Measured range of wavelengths, µm.
     pub range_um: [f64; 2],
-    /// Where the formula is from.
+    /// Source of the formula.
     pub source: &'static str,
     dispersion: Dispersion,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Dispersion {
-    /// n − 1 = c + Σ b/(a − 1/λ²) at temperature (K), pressure (Pa), with virial coefficient
-    /// (cm³/mol).
-    Sellmeier {
-        constant: f64,
-        terms: &'static [(f64, f64)],
-        state: State,
-    },
-    /// n − 1 = a + b/λ².
-    Cauchy {
-        a: f64,
-        b: f64,
-        state: State,
-    },
-    /// From the liquid through Lorentz and Lorenz: n = a + b/λ + c/λ², density in kg/m³.
-    Liquid {
-        n: [f64; 3],
-        density: f64,
-    },
-    /// Dry air and water vapour of Ciddor's equation.
+    /// n − 1 = c + Σ b/(a − 1/λ²), with terms (b, a), at a reference state.
+    Sellmeier { constant: f64, terms: &'static [(f64, f64)], state: State },
+    /// n − 1 = a + b/λ² at a reference state.
+    Cauchy { a: f64, b: f64, state: State },
+    /// From the index of the liquid, n = a + b/λ + c/λ², and its density in kg/m³, by the
+    /// Lorentz-Lorenz relation.
+    Liquid { n: [f64; 3], density: f64 },
+    /// Dry air of Ciddor's equation.
     CiddorAir,
+    /// Water vapour of Ciddor's equation.
     CiddorVapour,
 }
 
+/// Reference state of a formula: temperature (K), pressure (Pa), second virial coefficient
+/// (cm³/mol).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct State {
     kelvin: f64,
@@ -80,12 +74,12 @@ struct State {
     virial_cm3: f64,
 }
 
-/// 0 °C and one atmosphere.
+/// The reference state of 0 °C and one atmosphere.
 const fn normal(virial_cm3: f64) -> State {
     State { kelvin: 273.15, pascal: 101_325.0, virial_cm3 }
 }
 
-/// Every gas with a formula.
+/// All gases with a formula.
 pub const KNOWN: &[KnownGas] = &[
     KnownGas {
         name: "air",
@@ -194,8 +188,8 @@ pub const KNOWN: &[KnownGas] = &[
         molar_mass_g: 39.948,
         range_um: [0.4, 1.0],
         source: "A. Boerzsoenyi et al., Appl. Opt. 47, 4856 (2008)",
-        // Its formula is n² − 1 = Σ B λ²/(λ² − C) = Σ (B/C)/(1/C − 1/λ²), and n − 1 = (n² − 1)/2 to
-        // 1e-4 of itself.
+        // The formula of the paper is n² − 1 = Σ B λ²/(λ² − C) = Σ (B/C)/(1/C − 1/λ²). The
+        // approximation n − 1 = (n² − 1)/2 has a relative error of 1e-4.
         dispersion: Dispersion::Sellmeier {
             constant: 0.0,
             terms: &[
@@ -269,8 +263,8 @@ pub const KNOWN: &[KnownGas] = &[
 ];
 
 impl KnownGas {
-    /// Gladstone-Dale constant in m³/kg (1000 times smaller than in cm³/g). NaN below 185 nm and
-    /// where a formula has a pole.
+    /// Gladstone-Dale constant in m³/kg (1000 times smaller than in cm³/g). NaN below 185 nm and at
+    /// the poles of a formula.
     pub fn k_m3_per_kg(&self, wavelength_um: f64) -> f64 {
         if wavelength_um.is_nan() || wavelength_um < 0.185 {
             return f64::NAN;
@@ -285,7 +279,7 @@ impl KnownGas {
             }
             Dispersion::Cauchy { a, b, state } => per_density(a + b * s, state),
             Dispersion::Liquid { n: [a, b, c], density } => {
-                // (n² − 1)/(n² + 2) = r ρ; thin gas: n − 1 = 3/2 r ρ.
+                // Lorentz-Lorenz: (n² − 1)/(n² + 2) = r ρ. For a thin gas, n − 1 = 3/2 r ρ.
                 let n2 = (a + b / wavelength_um + c * s).powi(2);
                 1.5 * (n2 - 1.0) / (n2 + 2.0) / density
             }
@@ -314,7 +308,7 @@ impl Gas {
     /// Water vapour.
     pub const WATER: Gas = Gas::Known(1);
 
-    /// Gladstone-Dale constant in m³/kg at a vacuum wavelength from 0.185 µm.
+    /// Gladstone-Dale constant in m³/kg at a vacuum wavelength of at least 0.185 µm.
     pub fn k_m3_per_kg(&self, wavelength_um: f64) -> Result<f64, IndexError> {
         let k = match self {
             Gas::Known(i) => KNOWN[*i].k_m3_per_kg(wavelength_um),
@@ -340,7 +334,7 @@ impl Gas {
         }
     }
 
-    /// A warning when the formula was not measured at this wavelength.
+    /// A warning if the formula was not measured at this wavelength.
     pub fn out_of_range(&self, wavelength_um: f64) -> Option<OutOfRange> {
         let Gas::Known(i) = self else { return None };
         let gas = &KNOWN[*i];
@@ -374,8 +368,8 @@ impl fmt::Display for Gas {
 impl FromStr for Gas {
     type Err = IndexError;
 
-    /// A name (`N2`, `nitrogen`; capitals do not matter), or a Gladstone-Dale constant in cm³/g
-    /// (`0.42`), or that with a molar mass in g/mol (`0.42@77.9`).
+    /// Parses a name (`N2`, `nitrogen`; case-insensitive), a Gladstone-Dale constant in cm³/g
+    /// (`0.42`), or that constant with a molar mass in g/mol (`0.42@77.9`).
     fn from_str(text: &str) -> Result<Gas, IndexError> {
         let word = text.trim();
         let lower = word.to_ascii_lowercase();
@@ -424,7 +418,8 @@ mod tests {
 
     #[test]
     fn vapours_of_the_notes_without_golden_rows() {
-        // cm³/g at 633 nm: water vapour by Ciddor, heptane by Lorentz and Lorenz from the liquid.
+        // K in cm³/g at 633 nm: water vapour by Ciddor's equation, heptane from the liquid by
+        // Lorentz-Lorenz.
         for (name, expected, allowed) in [("H2O", 0.3127, 0.0001), ("heptane", 0.517, 0.001)] {
             let k = name.parse::<Gas>().unwrap().k_m3_per_kg(0.633).unwrap() * 1000.0;
             assert!((k - expected).abs() <= allowed, "{name}: {k}");

@@ -1,23 +1,23 @@
-//! Mixtures of gases by mass fraction: n − 1 = ρ Σ Yᵢ Kᵢ.
+//! Computes the index of mixtures of gases given by mass fractions: n − 1 = ρ Σ Yᵢ Kᵢ.
 //!
-//! The thesis (eq. 5.5) weights K by volume fractions, which gives helium in air 12 % too little
-//! contrast at a mole fraction of 0.1. Mass fractions are right: ρ Yᵢ is the density of species i,
-//! and each contributes Kᵢ times its own density.
+//! The dissertation (eq. 5.5) weights K by volume fractions, which makes the contrast of helium in
+//! air wrong by 12 % at a mole fraction of 0.1. Mass fractions are the correct weights: ρ Yᵢ is the
+//! density of species i, and each species contributes Kᵢ times its own density.
 
 use super::gladstone_dale::{Gas, R};
 use super::{IndexError, OutOfRange};
 
-/// Mass fractions whose sum is off by no more than this are scaled to 1 without a word: single
-/// precision and the transport equations of solvers leave that much.
+/// Mass fractions whose sum differs from 1 by at most this are scaled to 1 without a warning.
+/// Single precision and the transport equations of solvers cause such errors.
 pub const SUM_TOLERANCE: f64 = 1e-3;
 
-/// Gases at one wavelength, ready to be evaluated at many points.
+/// A mixture of gases at one wavelength, prepared for evaluation at many points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mixture {
     names: Vec<String>,
     gases: Vec<Gas>,
     k_m3_per_kg: Vec<f64>,
-    /// 1/M in mol/kg; NaN when not known.
+    /// 1/M in mol/kg; NaN if unknown.
     inverse_molar_mass: Vec<f64>,
     balance_k: f64,
     balance_inverse_molar_mass: f64,
@@ -29,15 +29,16 @@ pub struct Mixture {
 pub struct Blend {
     /// Gladstone-Dale constant, m³/kg.
     pub k_m3_per_kg: f64,
-    /// Molar mass, kg/mol; NaN when that of a species is not known.
+    /// Molar mass, kg/mol; NaN if that of a species is unknown.
     pub molar_mass_kg: f64,
-    /// What the fractions that were given sum to.
+    /// Sum of the given fractions.
     pub sum: f64,
 }
 
 impl Mixture {
-    /// Species with the names of their fields; `balance` is what the rest consists of (usually
-    /// [`Gas::AIR`]). No species at all is a pure gas, the balance.
+    /// Creates a mixture from species with the names of their fields. `balance` is the gas of the
+    /// remaining fraction (usually [`Gas::AIR`]). Without species, the mixture is the pure balance
+    /// gas.
     pub fn new(
         species: &[(String, Gas)],
         balance: &Gas,
@@ -60,7 +61,7 @@ impl Mixture {
         })
     }
 
-    /// Formulas used outside the wavelengths that were measured.
+    /// Formulas that are used outside their measured wavelengths.
     pub fn warnings(&self) -> &[OutOfRange] {
         &self.warnings
     }
@@ -69,13 +70,13 @@ impl Mixture {
     pub fn len(&self) -> usize {
         self.gases.len()
     }
-    /// True for a pure gas.
+    /// Whether there are no species besides the balance.
     pub fn is_empty(&self) -> bool {
         self.gases.is_empty()
     }
 
-    /// The first species without molar mass, an error where density has to follow from temperature
-    /// and pressure.
+    /// Checks that every species has a molar mass, which the density from temperature and pressure
+    /// needs. The error names the first one without.
     pub fn check_molar_masses(&self) -> Result<(), IndexError> {
         match self.inverse_molar_mass.iter().position(|m| m.is_nan()) {
             Some(i) => Err(IndexError::NoMolarMass { name: self.names[i].clone() }),
@@ -83,14 +84,14 @@ impl Mixture {
         }
     }
 
-    /// The constants where the species have these mass fractions. The balance takes what is missing
-    /// to 1. Fractions that sum to more are scaled down; negative ones (overshoots of a solver)
-    /// count as 0. See [`Blend::sum`] to tell.
+    /// The constants of the mixture for these mass fractions. The balance gas fills the sum up
+    /// to 1. Fractions with a larger sum are scaled down, and negative ones (overshoots of a
+    /// solver) count as 0; [`Blend::sum`] shows whether that happened.
     pub fn blend(&self, mass_fractions: &[f64]) -> Blend {
         debug_assert_eq!(mass_fractions.len(), self.len());
         let (mut k, mut inverse, mut sum) = (0.0, 0.0, 0.0);
         for (i, &y) in mass_fractions.iter().enumerate() {
-            // `y < 0` and not `y.max(0)`: NaN stays NaN, and the point is masked.
+            // `y < 0` instead of `y.max(0)`, so that NaN stays NaN and the point is masked.
             let y = if y < 0.0 { 0.0 } else { y };
             sum += y;
             k += y * self.k_m3_per_kg[i];
@@ -98,7 +99,7 @@ impl Mixture {
                 inverse += y * self.inverse_molar_mass[i];
             }
         }
-        // A rest within the tolerance is an error of the fractions, not a trace of air.
+        // A remainder within the tolerance is an error of the fractions, not a trace of air.
         let scale = if sum > 1.0 - SUM_TOLERANCE { 1.0 / sum } else { 1.0 };
         let rest = if sum > 1.0 - SUM_TOLERANCE { 0.0 } else { 1.0 - sum };
         let inverse =
@@ -106,8 +107,8 @@ impl Mixture {
         Blend { k_m3_per_kg: k * scale + rest * self.balance_k, molar_mass_kg: 1.0 / inverse, sum }
     }
 
-    /// [`Self::blend`] of fractions that have to make sense by themselves (from a command line):
-    /// each from 0 to 1, and in sum no more than 1.
+    /// [`Self::blend`] for user input: fails unless each fraction is from 0 to 1 and their sum is
+    /// at most 1.
     pub fn blend_strictly(&self, mass_fractions: &[f64]) -> Result<Blend, IndexError> {
         let sum: f64 = mass_fractions.iter().sum();
         let bad = mass_fractions.iter().any(|y| !(0.0..=1.0).contains(y));
@@ -133,7 +134,7 @@ impl Blend {
     }
 }
 
-/// Mass fractions of gases given by mole (volume) fractions, which must sum to 1 to
+/// Converts mole (volume) fractions to mass fractions. The mole fractions must sum to 1 within
 /// [`SUM_TOLERANCE`].
 pub fn mass_from_mole_fractions(gases: &[(f64, Gas)]) -> Result<Vec<f64>, IndexError> {
     let sum: f64 = gases.iter().map(|g| g.0).sum();
@@ -162,7 +163,7 @@ mod tests {
 
     #[test]
     fn refractivities_of_moles_add_at_equal_temperature_and_pressure() {
-        // The independent check: n − 1 = Σ X (n − 1) of the pure gases at the same T, p.
+        // Independent check: n − 1 = Σ X (n − 1) of the pure gases at the same T and p.
         let m = helium_in_air();
         for x in [0.0, 0.1, 0.5, 0.9, 1.0] {
             let he: Gas = "He".parse().unwrap();
@@ -172,8 +173,8 @@ mod tests {
                 b.n_minus_1(b.density_kg_m3(293.15, 101_325.0))
             };
             let (got, expected) = (at(y[0]), x * at(1.0) + (1.0 - x) * at(0.0));
-            // Fractions within SUM_TOLERANCE of 1 are pure gas by definition; these are farther
-            // from it.
+            // Fractions within SUM_TOLERANCE of 1 are treated as a pure gas; these are farther
+            // from 1.
             assert!((got / expected - 1.0).abs() < 1e-12, "X = {x}: {got} {expected}");
         }
     }

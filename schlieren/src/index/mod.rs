@@ -1,17 +1,18 @@
-//! Refractive index of gases: always as n − 1, because n itself has no digits left for air.
+//! Computes the refractive index of gases as n − 1, because n itself would lose most digits for
+//! air.
 //!
-//! | module | what | valid for |
+//! | module | index of | valid for |
 //! |---|---|---|
 //! | [`ciddor`] | moist air from temperature, pressure, humidity and CO2 | −40…100 °C, 300…1690 nm |
 //! | [`gladstone_dale`] | any gas from its density, with dispersion | gases far from their absorption lines |
-//! | [`mixture`] | gases by mass fraction, and their density from temperature and pressure | ideal gases, flames too |
+//! | [`mixture`] | gases by mass fraction, and their density from temperature and pressure | ideal gases, including flames |
 //! | [`plasma`] | free electrons | below the critical density |
-//! | [`multifield`] | any fields through transfer functions (thesis, section 5.7) | pictures, not physics |
-//! | [`conditions`], [`csv`] | what the program `schlieren index` answers | |
+//! | [`multifield`] | any fields through transfer functions (dissertation, section 5.7) | illustration, not physics |
+//! | [`conditions`], [`csv`] | one set or a table of conditions, as `schlieren index` computes | |
 //!
-//! Units: wavelengths in micrometres of vacuum where a formula is evaluated (`wavelength_um`; what
-//! users type is nm), temperatures in °C in Ciddor's equation and in K elsewhere, pressures in Pa,
-//! densities in kg/m³, humidity and fractions from 0 to 1, CO2 in µmol/mol (ppm).
+//! Units: formulas take vacuum wavelengths in micrometres (`wavelength_um`; user input is in nm).
+//! Temperatures are in °C in Ciddor's equation and in K elsewhere, pressures in Pa, densities in
+//! kg/m³, humidity and fractions from 0 to 1, CO2 in µmol/mol (ppm).
 
 pub mod ciddor;
 pub mod conditions;
@@ -29,35 +30,35 @@ use std::fmt;
 /// Why an index cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IndexError {
-    /// A value that no gas has, or at which the formula has no meaning.
+    /// A value that no gas can have, or at which the formula is undefined.
     #[error("{quantity} {value} {unit} {reason}; {cure}")]
     Impossible {
-        /// What it is, as its option or column is called.
+        /// The quantity, by the name of its option or column.
         quantity: &'static str,
         /// The value.
         value: f64,
         /// Its unit; empty for fractions.
         unit: &'static str,
-        /// What is wrong with it.
+        /// What is wrong with the value.
         reason: &'static str,
         /// What to do.
         cure: &'static str,
     },
-    /// No gas of this name.
+    /// No gas has this name.
     #[error(
         "no gas `{name}`; known gases: {known}; or give its Gladstone-Dale constant in cm^3/g as a \
          number, such as NAME=0.42"
     )]
     UnknownGas {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// All names.
+        /// All known names.
         known: String,
     },
-    /// The mass fractions make no mixture.
+    /// The fractions do not define a mixture.
     #[error("the mass fractions of {species} sum to {sum}; {cure}")]
     Fractions {
-        /// The names.
+        /// The names of the species.
         species: String,
         /// Their sum.
         sum: f64,
@@ -76,17 +77,17 @@ pub enum IndexError {
     },
 }
 
-/// A value outside the range in which a formula was measured. The result is still computed: warn,
-/// and let the user decide.
+/// A value outside the measured range of a formula. The result is still computed; callers should
+/// warn the user.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct OutOfRange {
-    /// The formula, by its author.
+    /// The formula, by its author or gas.
     pub formula: &'static str,
-    /// What is out of range.
+    /// The quantity that is out of range.
     pub quantity: &'static str,
     /// The value that lies farthest outside.
     pub value: f64,
-    /// The range.
+    /// The measured range.
     pub range: [f64; 2],
     /// Unit of value and range.
     pub unit: &'static str,

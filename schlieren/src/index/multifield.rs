@@ -1,23 +1,24 @@
-//! Several fields combined into one index through one-dimensional transfer functions (thesis,
+//! Combines several fields into one index through one-dimensional transfer functions (dissertation,
 //! section 5.7).
 //!
-//! This shows fields that have no refractive index of their own (temperature, a mixture fraction,
-//! vorticity) as if they had: each value is mapped to an n − 1 by a curve the user draws, and the
-//! curves' results are combined. It is illustration and not physics, and pictures made so should
-//! say it.
+//! This visualizes fields that have no refractive index of their own (temperature, a mixture
+//! fraction, vorticity) as if they had one. A user-defined curve maps each value to an n − 1, and
+//! the results of the curves are combined. This is illustration, not physics. Images made with it
+//! should say so.
 
 use super::IndexError;
 
-/// A piecewise linear curve from a field's value to a contribution to n − 1. Constant beyond its
-/// ends.
+/// A piecewise linear curve from a field's value to a contribution to n − 1. It is constant beyond
+/// its ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
-    /// (value, n − 1), values strictly increasing.
+    /// Pairs (value, n − 1), with strictly increasing values.
     knots: Vec<(f64, f64)>,
 }
 
 impl TransferFunction {
-    /// A curve through these points (value, n − 1); values must be finite and strictly increase.
+    /// Creates a curve through these points (value, n − 1). All numbers must be finite, and values
+    /// must strictly increase.
     pub fn new(knots: Vec<(f64, f64)>) -> Result<Self, IndexError> {
         let impossible = |value, reason| IndexError::Impossible {
             quantity: "transfer function knot",
@@ -69,28 +70,29 @@ impl TransferFunction {
     }
 }
 
-/// How the contributions of the fields are put together.
+/// How the contributions of the fields are combined.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// Refractivities add, as those of gases do.
+    /// The sum: refractivities add, as those of gases do.
     #[default]
     Sum,
-    /// The largest in magnitude: each field is seen where it dominates.
+    /// The largest in magnitude: each field is visible where it dominates.
     Largest,
 }
 
 /// Fields with their curves and weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Multifield {
-    /// One per field, with its weight.
+    /// One curve per field, with its weight.
     pub parts: Vec<(TransferFunction, f64)>,
     /// How they combine.
     pub rule: Rule,
 }
 
 impl Multifield {
-    /// n − 1 where the fields have these values, one per part. NaN when a field with weight is NaN.
+    /// n − 1 for these values of the fields, one per part. NaN if a field with nonzero weight is
+    /// NaN.
     ///
     /// ```
     /// use schlieren::index::multifield::{Multifield, Rule, TransferFunction};

@@ -1,7 +1,7 @@
-//! Free electrons: n² = 1 − n_e/n_c, without collisions and without a magnetic field.
+//! Computes the index of free electrons: n² = 1 − n_e/n_c, without collisions and magnetic field.
 //!
-//! The critical density n_c = ε0 m_e ω²/e² is where the plasma frequency is that of the light.
-//! Beyond it nothing propagates.
+//! At the critical density n_c = ε0 m_e ω²/e², the plasma frequency equals that of the light. Light
+//! does not propagate at higher densities.
 
 use super::IndexError;
 
@@ -13,8 +13,8 @@ pub fn critical_density_m3(wavelength_um: f64) -> f64 {
     CRITICAL_M3_UM2 / (wavelength_um * wavelength_um)
 }
 
-/// n − 1 of electrons of this density (1/m³), never positive. The difference is not formed: −x/(1 +
-/// √(1 − x)).
+/// n − 1 of free electrons with this density (1/m³); never positive. Computed as −x/(1 + √(1 − x)),
+/// which avoids the cancellation in √(1 − x) − 1.
 ///
 /// ```
 /// use schlieren::index::plasma;
