@@ -40,17 +40,17 @@ pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, Outp
 ///
 /// | plane | unit | |
 /// |---|---|---|
-/// | `R` `G` `B`, or `Y` | | the picture, linear |
-/// | `deflection.X` `.Y` | rad | along the picture's right and up |
+/// | `R` `G` `B`, or `Y` | | the image, linear |
+/// | `deflection.X` `.Y` | rad | along the image's right and up |
 /// | `displacement.X` `.Y` | m | in the plane of focus, in the test section |
 /// | `phase.Y` | waves | in the plane of focus |
 /// | `transmission.Y` | | 1 free, 0 blocked |
-/// | `samples.Y` | photons | that landed on the pixel |
-/// | `error.Y` | | of the picture, by too few photons |
-/// | `error.deflection` | rad | of the deflection, by march and interpolation |
-/// | `optical_depth.Y` | | of the light's way, when the scene has `media.absorption` |
-/// | `emission.Y` | | of the camera's way, 1 is undisturbed light without a cut-off, when it has `media.emission` |
-/// | `rotation.Y` | rad | of the plane of polarisation, when it has `media.rotation` |
+/// | `samples.Y` | photons | landed on the pixel |
+/// | `error.Y` | | noise of the image, from the finite number of photons |
+/// | `error.deflection` | rad | error of the deflection, from march and interpolation |
+/// | `optical_depth.Y` | | along the light's path, when the scene has `media.absorption` |
+/// | `emission.Y` | | along the camera's path, 1 is undisturbed light without a cut-off, when the scene has `media.emission` |
+/// | `rotation.Y` | rad | of the plane of polarisation, when the scene has `media.rotation` |
 ///
 /// The metadata holds every value of the effective scene under its TOML path, the whole scene as
 /// text, and a report of the run.

@@ -45,8 +45,8 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     let mut steps = match &args.files[..] {
         [] | [_] => match crate::input::series(std::slice::from_ref(&scene.flow.file)) {
             Ok(steps) => steps,
-            // A time series whose steps have several parts cannot be shown step by step. The first
-            // step is read as a whole.
+            // Steps whose data set is split into several files cannot be selected. The first step
+            // is read as a whole.
             Err(e @ crate::input::InputError::InFile { .. }) => {
                 common.warn(format_args!(
                     "only the first time is shown: {}",

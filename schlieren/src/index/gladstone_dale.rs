@@ -53,15 +53,25 @@ pub struct KnownGas {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Dispersion {
     /// n − 1 = c + Σ b/(a − 1/λ²), with terms (b, a), at a reference state.
-    Sellmeier { constant: f64, terms: &'static [(f64, f64)], state: State },
+    Sellmeier {
+        constant: f64,
+        terms: &'static [(f64, f64)],
+        state: State,
+    },
     /// n − 1 = a + b/λ² at a reference state.
-    Cauchy { a: f64, b: f64, state: State },
+    Cauchy {
+        a: f64,
+        b: f64,
+        state: State,
+    },
     /// From the index of the liquid, n = a + b/λ + c/λ², and its density in kg/m³, by the
     /// Lorentz-Lorenz relation.
-    Liquid { n: [f64; 3], density: f64 },
-    /// Dry air of Ciddor's equation.
+    Liquid {
+        n: [f64; 3],
+        density: f64,
+    },
+    /// Dry air and water vapour of Ciddor's equation.
     CiddorAir,
-    /// Water vapour of Ciddor's equation.
     CiddorVapour,
 }
 

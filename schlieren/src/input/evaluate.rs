@@ -1,4 +1,4 @@
-//! n − 1 at every place, and whether the numbers that went in can be true.
+//! Computes n − 1 at every point, and warns about input values that are implausible.
 
 use super::medium::Column;
 use super::{InputError, Medium, Options, Report};
@@ -8,17 +8,19 @@ use crate::index::{Gas, IndexError, Mixture, mixture, plasma};
 use rayon::prelude::*;
 use rt_core::math::median_high;
 
-/// Densities of gases that people photograph, kg/m³, with room to spare: rarefied wind tunnels to
+/// Plausible densities of gases, kg/m³: a generous range from rarefied wind tunnels to
 /// supercritical injection.
 const PLAUSIBLE_DENSITY: [f64; 2] = [1e-4, 100.0];
 const PLAUSIBLE_PRESSURE: [f64; 2] = [10.0, 1e9];
 const PLAUSIBLE_TEMPERATURE: [f64; 2] = [20.0, 20_000.0];
-/// Temperatures in °C of ordinary experiments; gases at these in K would be liquid or solid.
+/// Temperatures in °C of ordinary experiments. In K, gases at these temperatures would be liquid or
+/// solid.
 const CELSIUS_SUSPECT: [f64; 2] = [-80.0, 75.0];
-/// A density whose median is this close to 1 is probably normalised by the free stream.
+/// If the median density is within this of 1, the density is probably normalised by the free
+/// stream.
 const NORMALISED: f64 = 2e-3;
 
-/// Smallest, median (of a sample) and largest finite value; `None` when there is none.
+/// Smallest, median (of a sample) and largest finite value.
 struct Spread {
     low: f64,
     median: f64,
@@ -33,13 +35,13 @@ fn spread(len: usize, value: impl Fn(usize) -> f64 + Sync) -> Option<Spread> {
         .filter(|v| v.is_finite())
         .fold(|| nothing, |(l, h), v| (l.min(v), h.max(v)))
         .reduce(|| nothing, |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    // Every so many, to be cheap: it serves a hint only.
+    // The median is only a hint, so a sample of the values is enough.
     let step = (len / 10_001).max(1);
     let mut some: Vec<f64> = (0..len).step_by(step).map(&value).filter(|v| v.is_finite()).collect();
     (low <= high).then(|| Spread { low, high, median: median_high(&mut some).unwrap_or(low) })
 }
 
-/// n − 1 at every place; NaN where it cannot be.
+/// n − 1 at every point; NaN where no gas has these values.
 pub(super) fn evaluate(
     columns: &[Column],
     options: &Options,
@@ -86,7 +88,7 @@ pub(super) fn evaluate(
     Ok(out)
 }
 
-/// Warns of places that had finite values but no index.
+/// Warns about points with finite values but no index.
 fn count_lost(columns: &[Column], out: &[f64], options: &Options, report: &mut Report) {
     let lost = (0..out.len())
         .into_par_iter()
@@ -163,7 +165,7 @@ fn by_state(
     let wet = spread(len, |i| humidity.at(i)).is_some_and(|s| s.high != 0.0);
     plausible(&t, &p, report);
 
-    // Which formula: one for all places, so that there is no seam.
+    // One formula for all points, so that there is no seam.
     let [cold, hot] = ciddor::TEMPERATURE_RANGE_C.map(|c| c + ZERO_CELSIUS_K);
     let in_range = t.as_ref().is_some_and(|s| s.low >= cold && s.high <= hot);
     let use_ciddor = match options.model {
@@ -232,7 +234,7 @@ fn by_state(
     Ok((0..len).into_par_iter().map(|i| blends.at(&mixture, i).n_minus_1(density(i))).collect())
 }
 
-/// Warnings about temperature and pressure that are probably in other units.
+/// Warns about temperatures and pressures that are probably in other units.
 fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
     if let Some(s) = t {
         let [low, high] = PLAUSIBLE_TEMPERATURE;
@@ -263,7 +265,7 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
     }
 }
 
-/// Mixtures place by place, or one for all.
+/// Mixtures point by point, or one for all.
 enum Blends<'a> {
     Same(mixture::Blend),
     Each(&'a [Column]),
@@ -274,7 +276,7 @@ impl Blends<'_> {
         match self {
             Blends::Same(b) => *b,
             Blends::Each(columns) => {
-                // Mixtures of flames have some ten species; more take the heap.
+                // Mixtures in flames have about ten species; more are allocated on the heap.
                 let mut few = [0.0; 16];
                 if let Some(room) = few.get_mut(..columns.len()) {
                     room.iter_mut().zip(*columns).for_each(|(f, c)| *f = c.at(i));

@@ -1,4 +1,4 @@
-//! Where the values of a data set stand, and how they get to a uniform lattice.
+//! Finds the points of a data set's values, and converts the values to a uniform lattice.
 
 use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
@@ -8,19 +8,19 @@ use datasets::resample::{
 };
 use glam::{DMat3, DVec3};
 
-/// The places at which the index is computed.
+/// The points at which the index is computed.
 pub(super) enum Places {
-    /// The nodes of a uniform lattice that serves as it is.
+    /// The nodes of a uniform lattice, which is used unchanged.
     Uniform {
         lattice: Lattice,
         /// Axes that run backwards in the file.
         backwards: [bool; 3],
     },
-    /// Points or cells of a mesh that has to be resampled.
+    /// Points or cells of a mesh, which has to be resampled.
     Mesh { mesh: Box<Mesh>, per_point: bool, own: Option<Lattice> },
 }
 
-/// Values on a lattice.
+/// Values at the nodes of a lattice.
 pub(super) struct LatticeValues {
     pub(super) lattice: Lattice,
     pub(super) values: Vec<f32>,
@@ -28,8 +28,8 @@ pub(super) struct LatticeValues {
     pub(super) report: Option<Report>,
 }
 
-/// Nodes along the axis over which a two-dimensional flow is repeated: enough for any interpolant's
-/// border.
+/// Number of nodes along the span of a two-dimensional flow: enough for the border of any
+/// interpolant.
 const SPAN_NODES: usize = 8;
 
 impl Places {
@@ -39,7 +39,7 @@ impl Places {
         for name in options.medium.arrays() {
             associations.push(ColorBy::find(data, name)?.per_point);
         }
-        // Arrays of points and of cells together meet at the points.
+        // If there are arrays of points and of cells, all are evaluated at the points.
         let per_point = associations.iter().any(|p| *p);
         let mixed = per_point && associations.iter().any(|p| !p);
         let own = uniform(data);
@@ -65,10 +65,10 @@ impl Places {
         Ok(Places::Mesh { mesh: Box::new(mesh), per_point, own: own.map(|o| o.0) })
     }
 
-    /// The values of an array, in the order of the places.
+    /// The values of an array, in the order of the points.
     pub(super) fn values(&self, data: &Dataset, color: &ColorBy) -> Vec<f64> {
         let of = |a: &Attributes, i: usize| {
-            // Blocks may lack the array, or have it for the other of points and cells.
+            // Blocks may lack the array, or have it for cells instead of points or the reverse.
             let array = if color.per_point {
                 a.point_array(&color.name)
             } else {
@@ -106,7 +106,7 @@ impl Places {
         }
     }
 
-    /// Values at the places as values on a lattice.
+    /// Converts values at the points to values on a lattice.
     pub(super) fn to_lattice(
         &self,
         values: Vec<f64>,
@@ -164,7 +164,8 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
             cure: "give the lower and the upper corner in the file's unit of length",
         });
     }
-    // A sheet's thickness says nothing of its cells; the plane's own steps are taken instead.
+    // The thickness of a plane's cells is arbitrary, so the plane's own steps determine the
+    // resolution.
     let typical = match options.depth {
         Some(_) => {
             (high - low).truncate().element_product().sqrt() / (mesh.num_cells() as f64).sqrt()
@@ -186,7 +187,7 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
     Ok(lattice)
 }
 
-/// Thickness that a plane gets before it is revolved: far below any lattice's spacing, far above
+/// Thickness of a plane before it is revolved: far below the spacing of any lattice and far above
 /// rounding.
 fn sheet(data: &Dataset) -> f64 {
     let range = |p: &mut dyn Iterator<Item = f64>| {
@@ -217,8 +218,8 @@ fn cell_centres(points: Lattice) -> Lattice {
     }
 }
 
-/// The lattice of uniform data in three dimensions whose axes are those of space, and which of them
-/// run backwards.
+/// The lattice of uniform three-dimensional data with axes parallel to those of space, and which
+/// axes run backwards.
 fn uniform(data: &Dataset) -> Option<(Lattice, [bool; 3])> {
     let (dims, first, step) = match data {
         Dataset::ImageData(d) => {
@@ -248,8 +249,8 @@ fn uniform(data: &Dataset) -> Option<(Lattice, [bool; 3])> {
     Some((Lattice { dims, origin: first.min(last), spacing: step.abs() }, backwards))
 }
 
-/// The step of coordinates that are where equal steps put them, to four roundings of the largest in
-/// f32 (the precision most files have).
+/// The step of uniformly spaced coordinates. `None` if they differ from equal steps by more than
+/// four f32 roundings of the largest one; f32 is the precision of most files.
 fn even_step(x: &[f64]) -> Option<f64> {
     let (&first, &last) = (x.first()?, x.last()?);
     if x.len() < 2 {

@@ -1,4 +1,4 @@
-//! Arrays of a file as properties of the medium.
+//! Loads properties of the medium (absorption, emission, rotation) from the arrays of a file.
 
 use super::lattice::Places;
 use super::medium::Column;
@@ -9,9 +9,9 @@ use datasets::model::Dataset;
 use datasets::resample::Mark;
 use std::path::Path;
 
-/// Reads properties of the medium from a file; `options` are those of the field, whose formula,
-/// smoothing and reference do not matter here. Each array gets a lattice of its own, so none of
-/// them changes the field. See [`media_from_dataset`].
+/// Reads properties of the medium from a file. `options` are those of the field; formula, smoothing
+/// and reference have no effect here. Each array has a lattice of its own, so none of them changes
+/// the field. See [`media_from_dataset`].
 pub fn load_media(
     path: &Path,
     options: &Options,
@@ -21,10 +21,10 @@ pub fn load_media(
     Ok(with_data(path, |data| media_from_dataset(data, options, quantities, field))?.0)
 }
 
-/// Properties of the medium from the arrays of a data set. Numbers hold for all of `field`. Values
-/// outside the mesh and in hidden cells are continued from their neighbours; so are those that are
-/// not finite, and negative ones become zero where they mean nothing: both are counted
-/// ([`Media::warnings`]).
+/// Creates properties of the medium from the arrays of a data set. Constants apply to all of
+/// `field`. Values outside the mesh, in hidden cells or not finite are continued from their
+/// neighbours. Negative values of properties that cannot be negative become zero. Both repairs are
+/// counted ([`Media::warnings`]).
 pub fn media_from_dataset(
     data: &Dataset,
     options: &Options,
@@ -50,7 +50,7 @@ fn volume(
     property: Property,
     quantity: &Quantity,
 ) -> Result<Volume, InputError> {
-    // As an index that is given: values as they are, on the lattice that such an array would get.
+    // Treat the array as a given index: unchanged values, on the lattice that the array would get.
     let options = Options { medium: Medium::NMinus1(quantity.clone()), ..options.clone() };
     let places = Places::find(data, &options)?;
     let values = match options.medium.columns(data, &places)?.pop() {
@@ -102,7 +102,7 @@ mod tests {
             &field,
         )
         .unwrap();
-        // Cell centres at 5, 15, 25, 35 mm.
+        // Cell centres are at 5, 15, 25 and 35 mm.
         let soot = media.get(Property::Absorption).unwrap();
         assert_eq!(soot.dims(), [4; 3]);
         assert!((soot.sample(DVec3::new(0.025, 0.035, 0.035)) - 2.0).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Which arrays mean what, in which unit.
+//! Gives the arrays of a file their meaning and units.
 
 use super::InputError;
 use super::lattice::Places;
@@ -8,13 +8,13 @@ use datasets::model::{ColorBy, Dataset};
 use std::convert::Infallible;
 use std::str::FromStr;
 
-/// An array of the file, or one number everywhere; times a scale plus an offset it is in the unit
-/// that is needed.
+/// An array of the file, or one number everywhere. A scale and an offset convert it to the required
+/// unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// Where it comes from.
+    /// Where the values come from.
     pub source: Source,
-    /// Units of SI per unit of the file.
+    /// SI units per unit of the file.
     pub scale: f64,
     /// Added after scaling: 273.15 for temperatures in °C, 101325 for gauge pressures.
     pub offset: f64,
@@ -25,12 +25,12 @@ pub struct Quantity {
 pub enum Source {
     /// An array, named as in [`ColorBy`] (`velocity:x` takes a component).
     Array(String),
-    /// The same everywhere.
+    /// One value everywhere.
     Constant(f64),
 }
 
 impl Quantity {
-    /// The same everywhere, in SI.
+    /// One value everywhere, in SI.
     pub fn constant(value: f64) -> Self {
         Quantity { source: Source::Constant(value), scale: 1.0, offset: 0.0 }
     }
@@ -38,12 +38,12 @@ impl Quantity {
     pub fn array(name: impl Into<String>) -> Self {
         Quantity { source: Source::Array(name.into()), scale: 1.0, offset: 0.0 }
     }
-    /// Times `scale`.
+    /// Multiplies the scale by `scale`.
     pub fn scaled(mut self, scale: f64) -> Self {
         self.scale *= scale;
         self
     }
-    /// Plus `offset`, after scaling.
+    /// Adds `offset`, which applies after scaling.
     pub fn shifted(mut self, offset: f64) -> Self {
         self.offset += offset;
         self
@@ -52,7 +52,7 @@ impl Quantity {
 
 impl FromStr for Quantity {
     type Err = Infallible;
-    /// A number is a constant, anything else the name of an array.
+    /// Parses a number as a constant, and anything else as the name of an array.
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text.trim().parse::<f64>() {
             Ok(x) => Quantity::constant(x),
@@ -61,17 +61,18 @@ impl FromStr for Quantity {
     }
 }
 
-/// What the index depends on.
+/// The quantities that determine the index.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Medium {
-    /// Gas by its density: Gladstone-Dale.
+    /// Gas given by its density: Gladstone-Dale.
     Density {
-        /// kg/m³.
+        /// Density, kg/m³.
         density: Quantity,
         /// Mass fractions and what they are of; the rest is air.
         species: Vec<(Quantity, Gas)>,
     },
-    /// Gas by its state: Ciddor for air, Gladstone-Dale with the density of an ideal gas else.
+    /// Gas given by its state: Ciddor for air, otherwise Gladstone-Dale with the density of an
+    /// ideal gas.
     TemperaturePressure {
         /// K.
         temperature: Quantity,
@@ -88,7 +89,7 @@ pub enum Medium {
     NMinus1(Quantity),
     /// Free electrons, 1/m³.
     Electrons(Quantity),
-    /// Any fields through transfer functions (thesis, section 5.7).
+    /// Any fields through transfer functions (dissertation, section 5.7).
     Multifield {
         /// Field, curve, weight.
         parts: Vec<(Quantity, TransferFunction, f64)>,
@@ -97,12 +98,12 @@ pub enum Medium {
     },
 }
 
-/// Values of a quantity at all places.
+/// Values of a quantity at all points.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Column {
-    /// One for all.
+    /// One value for all points.
     Constant(f64),
-    /// One each.
+    /// One value per point.
     Values(Vec<f64>),
 }
 
@@ -116,11 +117,11 @@ impl Column {
 }
 
 impl Medium {
-    /// Air whose density in kg/m³ is this array.
+    /// Air with its density in kg/m³ from this array.
     pub fn density(array: impl Into<String>) -> Self {
         Medium::Density { density: Quantity::array(array), species: Vec::new() }
     }
-    /// Dry air with 450 ppm CO2 whose temperature (K) and pressure (Pa) are these.
+    /// Dry air with 450 ppm CO2, given by temperature (K) and pressure (Pa).
     pub fn temperature_pressure(temperature: Quantity, pressure: Quantity) -> Self {
         Medium::TemperaturePressure {
             temperature,
@@ -131,7 +132,7 @@ impl Medium {
         }
     }
 
-    /// The quantities in the order in which [`super::evaluate`] takes them.
+    /// The quantities in the order that [`super::evaluate`] expects.
     fn quantities(&self) -> Vec<&Quantity> {
         match self {
             Medium::Density { density, species } => {
@@ -146,7 +147,7 @@ impl Medium {
         }
     }
 
-    /// Names of the arrays it needs.
+    /// Names of the required arrays.
     pub fn arrays(&self) -> Vec<&str> {
         let names = self.quantities().into_iter().filter_map(|q| match &q.source {
             Source::Array(name) => Some(name.as_str()),
@@ -155,7 +156,7 @@ impl Medium {
         names.collect()
     }
 
-    /// For messages.
+    /// Names of the arrays, for messages.
     pub(super) fn describe(&self) -> String {
         let names = self.arrays().iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
         if names.is_empty() { "constants".into() } else { names }
@@ -190,7 +191,7 @@ impl Medium {
         }
     }
 
-    /// The values of all quantities at the places.
+    /// The values of all quantities at the points.
     pub(super) fn columns(
         &self,
         data: &Dataset,

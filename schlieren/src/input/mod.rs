@@ -1,13 +1,13 @@
-//! From the files of a flow solver to [`Field`]: which arrays mean what, what they make of the
-//! index, and the lattice.
+//! Loads a [`Field`] from the files of a flow solver: gives the arrays their meaning, computes the
+//! index and resamples it to a lattice.
 //!
 //! ```text
 //! file ── arrays by name and unit ── n − 1 at the points of the file (f64) ── uniform lattice ── eps = n/n0 − 1 (f32)
 //!         [medium]                   [crate::index]                           [datasets::resample]
 //! ```
-//! The index is computed before resampling, at the points the solver computed, and a common
-//! background is subtracted in f64 before anything is rounded: a plume with differences of 1e-9 in
-//! n keeps its digits.
+//! The index is computed before resampling, at the points of the solver. A common background is
+//! subtracted in f64 before values are rounded, so a plume with differences of 1e-9 in n keeps its
+//! digits.
 
 mod evaluate;
 mod lattice;
@@ -30,13 +30,13 @@ use datasets::resample::{self, Mark, ResampleError, Resolution};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// Why there is no field.
+/// Why no field can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// What is in the file does not serve.
+    /// The contents of the file cannot be used.
     #[error("{}: no field can be made of it", path.display())]
     InFile {
         /// The file.
@@ -44,10 +44,10 @@ pub enum InputError {
         /// What is wrong.
         source: Box<InputError>,
     },
-    /// An array is missing or broken.
+    /// An array is missing or invalid.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The mesh cannot be put on a lattice.
+    /// The mesh cannot be resampled to a lattice.
     #[error(transparent)]
     Resample(#[from] ResampleError),
     /// The index cannot be computed.
@@ -56,25 +56,26 @@ pub enum InputError {
     /// The lattice cannot be a field.
     #[error(transparent)]
     Field(#[from] FieldError),
-    /// An option makes no sense.
+    /// An option is invalid.
     #[error("{what}; {cure}")]
     Option {
-        /// Which, and its value.
+        /// The option and its value.
         what: String,
-        /// What to do.
+        /// How to correct it.
         cure: &'static str,
     },
 }
 
-/// What a node without gas does to light.
+/// How a node without gas affects light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// It is not known what is there: the picture says so.
+    /// Unknown: the image is marked there.
     Blank,
-    /// A body, which stops light.
+    /// A solid body, which blocks light.
     Solid,
-    /// Gas like that around it, continued from there: right where a mesh ends in undisturbed flow.
+    /// Gas, with values continued from the gas around it. This is right where a mesh ends in
+    /// undisturbed flow.
     Gas,
 }
 
@@ -91,45 +92,47 @@ impl Role {
 /// What two-dimensional data becomes in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Depth {
-    /// The same flow over this span, in units of the file, half on either side of the plane.
+    /// The same flow over this span, in units of the file; half of it lies on either side of the
+    /// plane.
     Span(f64),
-    /// The flow turned about the x axis; y is the radius.
+    /// The flow revolved about the x axis; y is the radius.
     Revolve,
 }
 
-/// Everything that decides how a data set becomes a field.
+/// Options for converting a data set to a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// What the arrays mean.
     pub medium: Medium,
     /// Vacuum wavelength, nm.
     pub wavelength_nm: f64,
-    /// Which formula, for air by temperature and pressure.
+    /// The formula for air given by temperature and pressure.
     pub model: Model,
     /// Metres per unit of length of the file.
     pub length_unit_m: f64,
-    /// How fine the lattice is to be. Uniform data keeps its own lattice with [`Resolution::Auto`].
+    /// Resolution of the lattice. With [`Resolution::Auto`], uniform data keeps its own lattice.
     pub resolution: Resolution,
-    /// Only this part of the data, lower and upper corner in units of the file.
+    /// The part of the data to use: lower and upper corner in units of the file.
     pub bounds: Option<[DVec3; 2]>,
-    /// What two-dimensional data becomes in space; must be given for it, and only for it.
+    /// What two-dimensional data becomes in space. Required for two-dimensional data, and only
+    /// allowed for it.
     pub depth: Option<Depth>,
     /// See [`resample::Options`].
     pub samples_per_axis: usize,
-    /// Shock smoothing: standard deviation in nodes; 0 for none, 1 to 1.4 where shocks are one cell
-    /// wide.
+    /// Standard deviation of the shock smoothing in nodes: 0 for none, 1 to 1.4 for shocks that are
+    /// one cell wide.
     pub smoothing_nodes: f64,
-    /// What nodes outside every cell are.
+    /// Role of nodes outside all cells.
     pub outside: Role,
-    /// What nodes in hidden cells are (iblank 0, `vtkGhostType`).
+    /// Role of nodes in hidden cells (iblank 0, `vtkGhostType`).
     pub hidden: Role,
-    /// The medium around the field, n0.
+    /// The reference medium around the field, n0.
     pub reference: Reference,
 }
 
 impl Options {
     /// Defaults for a medium: 532 nm, metres, the file's own lattice, no smoothing, hidden cells
-    /// solid, the reference that of the border.
+    /// solid, outside blank, and the reference at the border.
     pub fn new(medium: Medium) -> Self {
         Options {
             medium,
@@ -148,7 +151,7 @@ impl Options {
     }
 }
 
-/// How a field came about.
+/// How a field was made.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Report {
     /// The formula: `ciddor`, `gladstone-dale`, `plasma`, `given` or `multifield`.
@@ -157,42 +160,43 @@ pub struct Report {
     pub reference_n_minus_1: f64,
     /// Smallest and largest n − 1 at the points of the file.
     pub n_minus_1_range: [f64; 2],
-    /// Smallest and largest density used, kg/m³, where there is one.
+    /// Smallest and largest density used, kg/m³, if the formula uses density.
     pub density_range_kg_m3: Option<[f64; 2]>,
-    /// Of the resampling; `None` for data that is uniform already. Its differences are in n − 1.
+    /// Report of the resampling; `None` for data that is already uniform. Its differences are in n
+    /// − 1.
     pub resampling: Option<resample::Report>,
-    /// Change of n − 1 by the smoothing, root mean square.
+    /// Root mean square change of n − 1 by the smoothing.
     pub smoothing_rms: f64,
-    /// What the user should know, a sentence each.
+    /// Warnings for the user, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// A field and how it came about.
+/// A field and how it was made.
 #[derive(Debug, Clone)]
 pub struct LoadedField {
     /// The field.
     pub field: Field,
-    /// How it came about.
+    /// How the field was made.
     pub report: Report,
 }
 
-/// Reads a file and makes a field of it. Of a time series this is the first time; see [`series`]
-/// for the others.
+/// Reads a file as a field. For a time series this reads the first time; see [`series`] for the
+/// others.
 pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
     let (mut loaded, warnings) = with_data(path, |data| from_dataset(data, options))?;
     loaded.report.warnings.splice(0..0, warnings);
     Ok(loaded)
 }
 
-/// Reads a file and makes something of its data; also what the reader warns of. Errors name the
-/// file.
+/// Reads a file and converts its data with `make`. Also returns the reader's warnings. Errors name
+/// the file.
 fn with_data<T>(
     path: &Path,
     make: impl FnOnce(&Dataset) -> Result<T, InputError>,
 ) -> Result<(T, Vec<String>), InputError> {
     let in_file =
         |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
-    // A table of points on a lattice: cell centres of a solver, or ParaView's export.
+    // A table of points on a lattice: cell centres of a solver, or an export from ParaView.
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
         return Ok((make(&data).map_err(in_file)?, Vec::new()));
@@ -202,7 +206,7 @@ fn with_data<T>(
     Ok((make(data).map_err(in_file)?, opened.warnings))
 }
 
-/// Makes a field of a data set.
+/// Converts a data set to a field.
 ///
 /// ```
 /// use datasets::model::{DataArray, Dataset, ImageData, Values};
@@ -231,7 +235,7 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     }
     let mut report = Report::default();
 
-    // n − 1 where the file has values, less a common background.
+    // n − 1 at the points of the file, less a common background.
     let places = lattice::Places::find(data, options)?;
     let columns = options.medium.columns(data, &places)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;
@@ -244,7 +248,7 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     }
     index.iter_mut().for_each(|n| *n -= background);
 
-    // On a uniform lattice.
+    // Resample to a uniform lattice.
     let mut on = places.to_lattice(index, options)?;
     if let Some(r) = &on.report {
         report.warnings.extend(r.warnings());
@@ -270,7 +274,7 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     Ok(LoadedField { field, report })
 }
 
-/// What the nodes are to light.
+/// The kinds of the nodes; `None` if all are gas.
 fn nodes_of(marks: &[Mark], options: &Options, report: &mut Report) -> Option<Vec<Node>> {
     if marks.iter().all(|m| *m == Mark::Inside) {
         return None;

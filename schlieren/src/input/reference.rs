@@ -1,35 +1,35 @@
-//! The medium that light comes from and goes to: n0.
+//! Chooses n0, the index of the reference medium around the field.
 
 use super::lattice::LatticeValues;
 use super::{InputError, Options, Report, Role};
 use datasets::resample::Mark;
 use rt_core::math::median_high;
 
-/// How n0 is found.
+/// How n0 is chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Reference {
-    /// Median over the gas on the six faces of the lattice: the undisturbed flow, for most data.
+    /// Median over the gas on the six faces of the lattice. For most data this is the undisturbed
+    /// flow.
     #[default]
     Border,
     /// Median over all gas.
     Median,
-    /// This n − 1, for instance that of the free stream from [`crate::index::conditions`]. Also how
-    /// the fields of a time series get the same reference: take
-    /// [`super::Report::reference_n_minus_1`] of the first.
+    /// A given n − 1, such as that of the free stream from [`crate::index::conditions`]. For the
+    /// fields of a time series, pass [`super::Report::reference_n_minus_1`] of the first.
     Given {
         /// n0 − 1.
         n_minus_1: f64,
     },
 }
 
-/// Median of the finite values; NaN when there is none.
+/// Median of the finite values; NaN if there are none.
 pub(super) fn median(values: &[f64]) -> f64 {
     let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     median_high(&mut finite).unwrap_or(f64::NAN)
 }
 
 impl Reference {
-    /// The reference relative to the background that was subtracted from the values.
+    /// The reference, relative to the background that was subtracted from the values.
     pub(super) fn choose(
         &self,
         on: &LatticeValues,
@@ -71,13 +71,13 @@ impl Reference {
     }
 }
 
-/// Without any gas the field is refused later, with its own error.
+/// Replaces NaN by zero. A field without gas is refused later, with its own error.
 fn or_zero(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }
 }
 
-/// Values where nodes outside the mesh are to be gas: continued from the nearest gas, layer by
-/// layer. Others are left to [`crate::field::Field::new`].
+/// Continues values from the nearest gas, layer by layer, to nodes whose role is gas.
+/// [`crate::field::Field::new`] fills the others.
 pub(super) fn continued(
     mut eps: Vec<f32>,
     dims: [usize; 3],
@@ -125,7 +125,7 @@ pub(super) fn continued(
         next.dedup();
         layer = next;
     }
-    // Pockets that no gas reaches are undisturbed.
+    // Pockets that the continuation does not reach get the reference index.
     for (i, e) in eps.iter_mut().enumerate() {
         if open(marks[i]) && !known[i] {
             *e = 0.0;

@@ -1,4 +1,4 @@
-//! Flows in time: a PVD collection, or a list of files.
+//! Lists the times of a flow, from a PVD collection or a list of files.
 
 use super::InputError;
 use std::path::PathBuf;
@@ -6,15 +6,15 @@ use std::path::PathBuf;
 /// One time of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Its time in the unit of the file; the number in the list where files carry none.
+    /// Time in the unit of the file, or the number in the list if files have no time.
     pub time: f64,
     /// The file to give to [`super::load`].
     pub path: PathBuf,
 }
 
-/// The times of a series: those in a single PVD file, or one per file in the order given.
+/// Lists the times of a series: those of a single PVD file, or one per file in the given order.
 ///
-/// All of them need the same reference to be compared: load the first, then give its
+/// Comparing them requires the same reference: load the first, then pass its
 /// [`super::Report::reference_n_minus_1`] as [`super::Reference::Given`] to the others.
 pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
     if let [only] = paths

@@ -96,7 +96,7 @@ fn temperature_and_pressure_choose_the_formula() {
     let expected = (at(290.0) - at(292.6)) / field.n0();
     assert!(close(f64::from(field.eps()[0] - field.eps()[26]), expected, 1e-5));
 
-    // A flame: one hot place takes all of it to Gladstone-Dale, so that there is no seam.
+    // A flame: one hot point selects Gladstone-Dale everywhere, so that there is no seam.
     let flame = image([3, 3, 3], vec![("T", true, ramp(27, 290.0, 60.0))]);
     let constant_p = Medium::temperature_pressure(Quantity::array("T"), "101325".parse().unwrap());
     let report = from_dataset(&flame, &Options::new(constant_p.clone())).unwrap().report;
@@ -181,7 +181,7 @@ fn numbers_that_cannot_be_true_are_named_with_their_cure() {
         tp(Quantity::constant(300.0), Quantity::array("p")),
         "101325 as offset",
     );
-    // The cures work.
+    // The suggested corrections work.
     let data = image([3, 3, 3], vec![("r", true, normalised)]);
     let scaled = Medium::Density { density: Quantity::array("r").scaled(1.2), species: vec![] };
     assert_eq!(
@@ -217,7 +217,7 @@ fn nan_places_are_blank_and_negative_densities_too() {
     assert!(text.contains("no value of `rho` gives an index"), "{text}");
 }
 
-/// A half annulus, stretched towards the inner radius, with a density that falls outwards.
+/// A half annulus with finer cells near the inner radius and a density that decreases outwards.
 fn annulus() -> Dataset {
     let n = [12, 24, 5];
     let (mut points, mut rho) = (Vec::new(), Vec::new());
@@ -253,7 +253,8 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
     let r = report.resampling.unwrap();
     assert_eq!(field.dims()[0], 64);
     assert!(r.outside > 0 && field.count(Node::Blank) == r.outside && r.hidden == 0, "{r:?}");
-    // Linear interpolation between radii up to 0.17 apart and back: half a per cent of the range.
+    // Linear interpolation between radii up to 0.17 apart, and back, has an error of half a per
+    // cent of the range.
     assert!(r.back.rms / r.back.range < 5e-3 && r.back.compared > 700, "{r:?}");
     assert!(report.warnings.iter().any(|w| w.contains("outside the mesh and are blank")));
     for (role, node) in [(Role::Solid, Node::Solid), (Role::Gas, Node::Gas)] {
@@ -263,7 +264,7 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
         assert_eq!(other.field.count(Node::Blank), 0);
         assert!(other.field.eps().iter().all(|e| e.is_finite()));
     }
-    // Where it is gas, eps = K (ρ − 1) of the radius.
+    // In the gas, eps = K (ρ − 1) at the node's radius.
     let [nx, ny, _] = field.dims();
     let nodes = field.nodes().unwrap();
     for (i, e) in field.eps().iter().enumerate().filter(|(i, _)| nodes[*i] == Node::Gas) {
@@ -417,9 +418,9 @@ fn no_error_repeats_its_cause() {
     std::fs::write(&file, "x,rho\n0,1\n1,1\n").unwrap();
     let missing = folder.path().join("missing.vti");
     for (path, option, causes) in [
-        // No file: the system's reason is the cause.
+        // The file is missing: the cause is the system's error.
         (&missing, "rho", 2),
-        // A file without the array.
+        // The file lacks the array.
         (&file, "density", 2),
     ] {
         let error = load(path, &Options::new(Medium::density(option))).unwrap_err();
@@ -429,7 +430,7 @@ fn no_error_repeats_its_cause() {
         for pair in texts.windows(2) {
             assert!(!pair[0].contains(&pair[1]), "{texts:?}");
         }
-        // Around it nothing is added.
+        // Conversion to a render error adds no text.
         assert_eq!(chain(&crate::render::RenderError::from(error)), texts);
     }
 }
