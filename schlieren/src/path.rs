@@ -166,7 +166,7 @@ pub trait LightPaths: Sync {
     /// half a voxel.
     fn difference_step_m(&self) -> f64;
 
-    /// A warning for the user when the device failed and the CPU traced the rest, with the cause.
+    /// A warning for the user if the device failed and lost rays were traced again, with the cause.
     fn device_warning(&self) -> Option<String> {
         None
     }

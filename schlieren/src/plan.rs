@@ -182,7 +182,7 @@ impl Plan {
         };
         // The share of steps is a quarter of the tolerance. Where the interpolant's bound is more
         // than three quarters of it, the share is a third of that bound, because shorter steps
-        // would only cost time. The two cases agree where they meet. Tolerance zero requests the
+        // would only cost time. The two shares are equal at that point. Tolerance zero requests the
         // highest accuracy.
         let share =
             |i| if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(i) / 3.0) } else { 0.0 };
@@ -190,7 +190,7 @@ impl Plan {
         // Strong index: deflections too large for the paraxial mode, or an index far from the
         // reference index.
         let strong = r.eps > 0.05 || deflection_rad > 0.5 && r.eps > 0.01;
-        // Error of projections, which take the place of steps.
+        // Error of projections, which have no steps.
         let projected_rad = if box_path.oblique { steps_rad(1.0) } else { 0.0 };
         let spline = request.interpolant.unwrap_or(Interpolant::BSpline);
         let straight_is_enough = bending_rad + edges_rad <= 0.5 * tolerance

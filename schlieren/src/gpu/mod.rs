@@ -41,7 +41,7 @@ pub enum GpuError {
     Open {
         /// Name of the GPU.
         adapter: String,
-        /// What its driver says.
+        /// The driver's message.
         reason: String,
     },
     /// There is no kernel for the request.
@@ -49,7 +49,7 @@ pub enum GpuError {
     Unsupported {
         /// What was requested.
         what: String,
-        /// What to do instead.
+        /// An alternative.
         cure: &'static str,
     },
     /// The field does not fit.
@@ -74,7 +74,7 @@ pub enum GpuError {
     Failed {
         /// The device.
         adapter: String,
-        /// What its driver says.
+        /// The driver's message.
         reason: String,
     },
     /// The GPU failed too often.

@@ -41,7 +41,7 @@ pub enum IndexError {
         unit: &'static str,
         /// What is wrong with the value.
         reason: &'static str,
-        /// What to do.
+        /// How to correct it.
         cure: &'static str,
     },
     /// No gas has this name.
@@ -62,7 +62,7 @@ pub enum IndexError {
         species: String,
         /// Their sum.
         sum: f64,
-        /// What to do.
+        /// How to correct it.
         cure: &'static str,
     },
     /// The density of a gas of unknown molar mass is needed.
@@ -91,7 +91,7 @@ pub struct OutOfRange {
     pub range: [f64; 2],
     /// Unit of value and range.
     pub unit: &'static str,
-    /// What to use instead.
+    /// What to do instead.
     pub cure: &'static str,
 }
 

@@ -41,7 +41,7 @@ pub enum InputError {
     InFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The cause.
         source: Box<InputError>,
     },
     /// An array is missing or invalid.
@@ -70,7 +70,7 @@ pub enum InputError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// Unknown: the image is marked there.
+    /// No data: the image shows where.
     Blank,
     /// A solid body, which blocks light.
     Solid,
@@ -102,7 +102,7 @@ pub enum Depth {
 /// Options for converting a data set to a field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// What the arrays mean.
+    /// Meaning of the arrays.
     pub medium: Medium,
     /// Vacuum wavelength, nm.
     pub wavelength_nm: f64,
