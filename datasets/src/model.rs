@@ -1,4 +1,4 @@
-//! The data sets that files contain: VTK's five kinds and collections of them, with named arrays of
+//! Data sets as files contain them: VTK's five kinds and collections of them, with named arrays of
 //! any scalar type.
 //!
 //! Readers return a [`Dataset`] with the types of the file. Data is converted only on request, by
@@ -33,32 +33,32 @@ pub enum ModelError {
     NoArray {
         /// The name asked for.
         name: String,
-        /// What kind of data set.
+        /// The kind of data set.
         kind: &'static str,
-        /// The names there are, quoted.
+        /// The names of the existing arrays, quoted.
         available: String,
     },
-    /// The array has no such component.
+    /// The array does not have this component.
     #[error("array `{name}` has {components} components; `{asked}` asks for one it does not have")]
     NoComponent {
         /// Array name.
         name: String,
-        /// What was asked for.
+        /// The requested component.
         asked: String,
-        /// How many it has.
+        /// Number of components of the array.
         components: usize,
     },
-    /// The data set cannot be made into that.
+    /// The data set cannot be converted to this kind.
     #[error("{kind} cannot become {target}: {reason}")]
     NotConvertible {
         /// Kind of data set.
         kind: &'static str,
-        /// What it should become.
+        /// The requested kind.
         target: &'static str,
-        /// Why not, and what to do instead.
+        /// The reason, and what to do instead.
         reason: String,
     },
-    /// The arrays do not fit the geometry, so the data set is not consistent.
+    /// The arrays do not fit the geometry: the data set is inconsistent.
     #[error("{field}: expected {expected}, found {found}")]
     Inconsistent {
         /// Which array or count.
@@ -68,10 +68,10 @@ pub enum ModelError {
         /// Found number.
         found: u64,
     },
-    /// The mesh or grid that came out breaks the renderer's limits.
+    /// The resulting mesh or grid exceeds the renderer's limits.
     #[error(transparent)]
     Mesh(#[from] rt_core::mesh::MeshError),
-    /// The grid that came out is not usable.
+    /// The resulting grid is not usable.
     #[error(transparent)]
     Grid(#[from] rt_core::grid::GridError),
 }
@@ -99,11 +99,11 @@ impl Points {
             Points::F64(v) => v.len(),
         }
     }
-    /// True when there is none.
+    /// True when there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Point `i`; panics when out of range.
+    /// Point `i`. Panics when `i` is out of range.
     #[inline]
     pub fn get(&self, i: usize) -> DVec3 {
         match self {
@@ -111,7 +111,7 @@ impl Points {
             Points::F64(v) => DVec3::from(v[i]),
         }
     }
-    /// Points from a three-component array: single precision stays single, everything else becomes
+    /// Points from a three-component array. Single precision is kept; all other types become
     /// double.
     pub fn from_array(array: DataArray) -> Result<Self, ModelError> {
         if array.components != 3 {
@@ -176,7 +176,7 @@ pub struct UnstructuredGrid {
     pub points: Points,
     /// Point ids per cell.
     pub cells: Cells,
-    /// VTK's number for the type of each cell; see [`CellType`].
+    /// VTK cell type number of each cell; see [`CellType`].
     pub types: Vec<u8>,
     /// For polyhedra (type 42): faces of all polyhedra, as point ids.
     pub polyhedron_faces: Cells,
@@ -202,7 +202,7 @@ pub struct ImageData {
     pub attributes: Attributes,
 }
 
-/// Points on a lattice with its own spacing along each axis.
+/// Points on a lattice with individual spacing along each axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RectilinearGrid {
     /// First and last index per axis.
@@ -213,7 +213,8 @@ pub struct RectilinearGrid {
     pub attributes: Attributes,
 }
 
-/// A lattice of points at any position (a curvilinear or "structured" grid), x index fastest.
+/// A lattice with a free position for each point (a curvilinear or "structured" grid), x index
+/// fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructuredGrid {
     /// First and last index per axis.
@@ -227,7 +228,7 @@ pub struct StructuredGrid {
 /// One named member of a [`Dataset::MultiBlock`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
-    /// Its name, or its number.
+    /// Name of the block, or its number.
     pub name: String,
     /// Its content.
     pub data: Dataset,
@@ -257,14 +258,14 @@ pub fn extent_dims(extent: [i32; 6]) -> [usize; 3] {
     })
 }
 
-/// Points and cells of a lattice; `None` when the numbers do not fit in 64 bits.
+/// Number of points and cells of a lattice; `None` when they do not fit in 64 bits.
 pub fn lattice_counts(dims: [usize; 3]) -> Option<(u64, u64)> {
     let points = dims.iter().try_fold(1u64, |n, &d| n.checked_mul(d as u64))?;
     if points == 0 {
         return Some((0, 0)); // an axis without points leaves no cells either
     }
-    // An axis with one point has one layer of (flat) cells. No product overflows: each is at most
-    // that of the points.
+    // An axis with one point has one layer of (flat) cells. The product cannot overflow: each
+    // factor is at most the number of points along that axis.
     let cells = dims.iter().map(|&d| if d == 1 { 1 } else { d as u64 - 1 }).product();
     Some((points, cells))
 }
@@ -285,7 +286,7 @@ impl ImageData {
             attributes: Attributes::default(),
         }
     }
-    /// Position of the point with index (i,j,k), which counts from the start of the extent.
+    /// Position of the point with index (i,j,k), counted from the start of the extent.
     pub fn point(&self, i: usize, j: usize, k: usize) -> DVec3 {
         let e = self.extent;
         let index =
@@ -295,7 +296,7 @@ impl ImageData {
 }
 
 impl Dataset {
-    /// What it is, in VTK's words.
+    /// Kind of data set, by VTK's name.
     pub fn kind(&self) -> &'static str {
         match self {
             Dataset::PolyData(_) => "PolyData",
@@ -319,7 +320,7 @@ impl Dataset {
         }
     }
 
-    /// The arrays, to change.
+    /// The arrays, mutable; `None` for a collection.
     pub fn attributes_mut(&mut self) -> Option<&mut Attributes> {
         match self {
             Dataset::PolyData(d) => Some(&mut d.attributes),
@@ -358,8 +359,8 @@ impl Dataset {
         }
     }
 
-    /// Checks that every array has as many values as the geometry has points or cells. Readers call
-    /// this, so a data set from a file is consistent; so do the conversions and the writers.
+    /// Checks that every array has as many values as the geometry has points or cells. Readers,
+    /// conversions and writers call this, so every data set from a file is consistent.
     pub fn check(&self) -> Result<(), ModelError> {
         if let Dataset::MultiBlock(blocks) = self {
             return blocks.iter().try_for_each(|b| b.data.check());

@@ -1,9 +1,8 @@
 //! A blunt re-entry body in a hypersonic wind tunnel: bow shock, shock layer, expansion at the
-//! base, wake. Stands for the 256³ data set of a re-entry vehicle in table 5.1 of the thesis.
+//! base, wake. Represents the 256³ data set of a re-entry vehicle in table 5.1 of the thesis.
 //!
-//! A sphere-cone with a flat base, at zero incidence. What is exact, what is correlated and what is
-//! a model:
-//!
+//! The body is a sphere-cone with a flat base at zero incidence. The flow combines exact relations,
+//! correlations and models:
 //! * the shock's shape and stand-off: Billig's correlation
 //!   ([`bow_shock`](super::gas_dynamics::bow_shock)), with the attached cone's shock (Taylor and
 //!   Maccoll) far away;
@@ -17,9 +16,9 @@
 //!   and recompresses, with a growing shear layer (a model; the pressure is of the order of base
 //!   pressures in D. R. Chapman, NACA Report 1051, 1951).
 //!
-//! Defaults are conditions of the order of those in NASA Langley's 20-inch Mach 6 tunnel (p0 862
-//! kPa, T0 500 K, which give 545 Pa, 61 K, 0.031 kg/m³). The densities are from 0.05 (wake) to 6
-//! times the free stream's.
+//! The defaults are of the order of the conditions in NASA Langley's 20-inch Mach 6 tunnel (p0 862
+//! kPa, T0 500 K, which give 545 Pa, 61 K, 0.031 kg/m³). The densities range from 0.05 (wake) to 6
+//! times that of the free stream.
 
 use super::cell_average::LayeredFlow;
 use super::flow::{Fields, Flow, FlowError};
@@ -32,14 +31,14 @@ use super::revolve::revolve;
 use glam::{DVec2, DVec3, UVec3};
 use rt_core::mesh::TriMesh;
 
-/// The set-up; the nose's foremost point is the origin, the stream goes along x.
+/// Parameters of the flow. The foremost point of the nose is the origin; the stream flows along x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BluntBody {
     /// Air far upstream, at Mach 2 or faster (Billig's correlation).
     pub stream: FreeStream,
     /// Radius of the spherical nose.
     pub nose_radius_m: f64,
-    /// Half angle of the cone behind it; small enough for an attached shock.
+    /// Half angle of the cone behind the nose; small enough for an attached shock.
     pub half_angle_rad: f64,
     /// Radius of the base, larger than that of the nose.
     pub base_radius_m: f64,
@@ -63,7 +62,7 @@ impl BluntBody {
         Ok(BowShock::billig(Nose::Sphere, self.stream.mach, self.nose_radius_m, Some(far))?)
     }
 
-    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction), over
+    /// Samples density (with [`Fields::All`] also temperature, pressure and the gas fraction), over
     /// 7 nose radii along the stream and as many across.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let layers = Layers::new(self)?;
@@ -81,7 +80,7 @@ impl BluntBody {
         self.nose_radius_m * DVec2::new(1.0 - sin, cos)
     }
 
-    /// Radius of the base, not less than where sphere and cone meet.
+    /// Radius of the base, at least that of the junction of sphere and cone.
     fn base_m(&self) -> DVec2 {
         let t = self.tangent_m();
         let r = self.base_radius_m.max(t.y);
@@ -115,9 +114,9 @@ struct Layers {
     stagnation: [f64; 2],
 }
 
-/// Over the free stream's pressure.
+/// Pressure in the wake, over that of the free stream.
 const WAKE_PRESSURE: f64 = 0.35;
-/// Over the reservoir's temperature.
+/// Temperature in the wake, over that of the reservoir.
 const WAKE_TEMPERATURE: f64 = 0.85;
 /// Radius of the wake's neck over the base's, and where it is, in base radii behind the base.
 const NECK: [f64; 2] = [0.42, 1.7];
@@ -136,7 +135,7 @@ impl Layers {
         })
     }
 
-    /// Where the surface in front of the base begins at `r`.
+    /// Position of the front surface at radius `r`.
     fn front_x_m(&self, r: f64) -> f64 {
         if r <= self.tangent_m.y {
             let n = self.nose_radius_m;
@@ -146,8 +145,8 @@ impl Layers {
         }
     }
 
-    /// Radius of body or wake, and the surface's angle to the stream; on the axis before the nose 0
-    /// and 90 degrees.
+    /// Radius of body or wake, and the surface's angle to the stream; 0 and 90 degrees on the axis
+    /// upstream of the nose.
     fn inner(&self, x: f64) -> (f64, f64) {
         if x <= 0.0 {
             (0.0, std::f64::consts::FRAC_PI_2)
@@ -177,8 +176,8 @@ impl Layers {
     fn inner_state(&self, x: f64, angle: f64) -> [f64; 2] {
         let [p0, rho0] = self.stagnation;
         let newton = |angle: f64| 1.0 + (p0 - 1.0) * angle.sin().powi(2);
-        // Behind the base the gas expands to the wake's pressure, and is compressed to the free
-        // stream's at the neck.
+        // Behind the base the gas expands to the wake's pressure; at the neck it is compressed to
+        // that of the free stream.
         let behind = (x - self.base_m.x) / self.base_m.y;
         let p = if behind <= 0.0 {
             newton(angle)
@@ -196,7 +195,7 @@ impl Layers {
     }
 }
 
-/// 0 below 0, 1 above 1, smooth between.
+/// Smooth step: 0 below 0, 1 above 1.
 fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -224,13 +223,13 @@ impl LayeredFlow for Layers {
             out.copy_from_slice(&free);
             return true;
         }
-        // The shock layer: from the state behind the shock at this x to that at its inner edge.
+        // Shock layer: from the state behind the shock at this x to that at its inner edge.
         let (outer_r, (inner_r, angle)) = (self.shock_r_m(x), self.inner(x));
         let normal_mach = (self.stream.mach * self.shock.angle_rad(outer_r).sin()).max(1.0);
         let behind = jump(GAMMA_AIR, normal_mach);
         let inner = self.inner_state(x, angle);
         let t = ((r - inner_r) / (outer_r - inner_r).max(1e-12)).clamp(0.0, 1.0);
-        // On the axis before the nose the layer is crossed along x.
+        // Upstream of the nose, the layer is crossed along x on the axis.
         let t = if x < 0.0 { t.max(-x / self.shock.stand_off_m) } else { t };
         let mut p = inner[0] + (behind.pressure - inner[0]) * t;
         let mut rho = inner[1] + (behind.density - inner[1]) * t;
@@ -241,7 +240,7 @@ impl LayeredFlow for Layers {
             let outside = smooth(0.5 + (r - inner_r) / layer);
             let reservoir = self.stream.temperature_k
                 * (1.0 + 0.5 * (GAMMA_AIR - 1.0) * self.stream.mach.powi(2));
-            // The wake cools by mixing as it goes.
+            // The wake cools by mixing downstream.
             let core = WAKE_TEMPERATURE * reservoir / (1.0 + 0.12 * behind_base / self.base_m.y);
             let wake = self.wake_pressure(x);
             p = wake + (p - wake) * outside;
@@ -268,7 +267,7 @@ mod tests {
         let density = flow.grid(names::DENSITY).unwrap();
         let free = body.stream.density() as f32;
         let stand_off = body.shock().unwrap().stand_off_m;
-        // The box that the shock cuts: the excess of its mean tells where.
+        // The box cut by the shock: the excess of its mean gives the shock's position.
         let row: Vec<f32> = (0..91).map(|i| density.at(i, 18, 18)).collect();
         let cut = row.iter().position(|&v| v > 1.001 * free).unwrap();
         let layer = jump(1.4, 6.0).density as f32;

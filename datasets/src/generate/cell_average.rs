@@ -1,33 +1,33 @@
-//! Means over the boxes around lattice points, for fields that jump.
+//! Cell averages of discontinuous fields, over the boxes around lattice points.
 //!
-//! The flows of this crate with shocks are plane (the same at all z) or revolved about the x axis,
-//! and along a line parallel to x the positions of their jumps are known. So the mean along x is
-//! exact up to Gauss quadrature between the jumps; across (y, z) boxes that contain a jump are
-//! divided further. Measured in the tests: volume fractions within 2e-3 of a box.
+//! The flows with shocks are plane (the same at all z) or axisymmetric about the x axis, and the
+//! positions of their jumps along a line parallel to x are known. Along x, the mean is therefore
+//! exact up to Gauss quadrature between the jumps. In y and z, boxes that contain a jump are
+//! subdivided. Volume fractions are accurate to 2e-3 of a box (measured in the tests).
 
 use glam::DVec3;
 
-/// Sub-rows per axis across boxes with a jump.
+/// Sub-rows per axis (y and z) in boxes with a jump.
 const SUBDIVISIONS: usize = 8;
-/// Nodes and weights of Gauss quadrature with two points on -1..1.
+/// Nodes of two-point Gauss quadrature on -1..1 (the weights are 1).
 const GAUSS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 
-/// A flow around a body that is either plane (`r` = y) or revolved about x (`r` = distance to the x
-/// axis).
+/// A flow around a body that is either plane (`r` = y) or axisymmetric about x (`r` = distance from
+/// the x axis).
 pub(crate) trait LayeredFlow: Sync {
-    /// Quantities per point.
+    /// Number of quantities per point.
     const QUANTITIES: usize;
-    /// The distance that the flow depends on.
+    /// The distance on which the flow depends.
     fn r_m(&self, y_m: f64, z_m: f64) -> f64;
     /// Positions along x where the flow at `r_m` jumps or the body begins and ends, ascending;
     /// infinities are ignored.
     fn jumps_m(&self, r_m: f64) -> [f64; 4];
-    /// The quantities at a point between jumps; `None` inside the body.
+    /// Writes the quantities at a point between jumps to `out`; returns false inside the body.
     fn at(&self, x_m: f64, r_m: f64, out: &mut [f64]) -> bool;
 }
 
-/// Means over the boxes of a row, and the fraction of each box that is gas. `sums` has `QUANTITIES
-/// + 1` rows; the last is the gas fraction. Means of boxes without gas are NaN.
+/// Computes the means over the boxes of a row, and the gas fraction of each box. `sums` has
+/// `QUANTITIES + 1` rows; the last is the gas fraction. Means of boxes without gas are NaN.
 pub(crate) fn average_row<F: LayeredFlow>(
     flow: &F,
     first_m: DVec3,
@@ -41,8 +41,8 @@ pub(crate) fn average_row<F: LayeredFlow>(
     scratch.sums.resize((q + 1) * n, 0.0);
     scratch.out.resize(q, 0.0);
 
-    // How far the jumps move within the row's boxes tells whether (y, z) need subdivision, box by
-    // box.
+    // How far the jumps move within the row's boxes determines, box by box, whether (y, z) need
+    // subdivision.
     let half = 0.5 * spacing_m;
     let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (0.0, 0.0)];
     let at_corners = corners
@@ -60,7 +60,7 @@ pub(crate) fn average_row<F: LayeredFlow>(
         let low = finite().fold(f64::INFINITY, f64::min);
         let high = if partly { f64::INFINITY } else { finite().fold(f64::NEG_INFINITY, f64::max) };
         if low.is_finite() {
-            // One more box on each side: curved jumps can reach further between the corners than at
+            // Add one box on each side: curved jumps can reach further between the corners than at
             // them.
             let from = (index_of(low).floor() - 1.0).clamp(0.0, n as f64) as usize;
             let to = (index_of(high).floor() + 2.0).clamp(0.0, n as f64) as usize;
@@ -86,7 +86,7 @@ pub(crate) fn average_row<F: LayeredFlow>(
                 // 0/0 in solids: NaN
                 rows[c][i] = (scratch.sums[c * n + i] / scratch.sums[q * n + i]) as f32;
             }
-            // Rounding in sums of lengths must not make a full box "nearly full".
+            // Rounding in sums of lengths must not make a full box partly full.
             rows[q][i] = if gas > 1.0 - 1e-9 { 1.0 } else { gas as f32 };
         }
     }
@@ -120,7 +120,7 @@ fn add_line<F: LayeredFlow>(
         let (low, high) = (first + (i as f64 - 0.5) * spacing, first + (i as f64 + 0.5) * spacing);
         let mut from = low;
         for to in jumps.into_iter().chain([high]) {
-            // NaN and jumps before the box are skipped; those after it end at its border.
+            // NaN and jumps before the box are skipped; jumps after it are clipped at its border.
             let to = if to > from { to.min(high) } else { continue };
             let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
             for g in GAUSS {

@@ -1,13 +1,13 @@
-//! A round jet flame of coal volatiles in hot air, as in a pulverised-coal furnace. Stands for the
+//! A round jet flame of coal volatiles in hot air, as in a pulverised-coal furnace. Represents the
 //! 402 x 162 x 162 coal fire of table 5.1 of the thesis.
 //!
 //! The jet leaves a pipe of 50 mm along x into air of 600 K. Mean field: a top hat that turns into
 //! the self-similar Gaussian of a round jet, Z = 5 d/x · exp(-(r/b)²), b = 0.12 x (the form after
 //! S. B. Pope, "Turbulent Flows", 2000, ch. 5; the constants are of the order of measured ones);
 //! eddies grow with x. The volatiles (CH4, CO, CO2 in N2) burn at the `flame_sheet` at up to 1900
-//! K. Char and ash, which block light in a real one, are left out. Density 0.18 to 0.6 kg/m³.
-//! Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is sampled at
-//! points.
+//! K. Char and ash, which block light in a real flame, are left out. Density 0.18 to 0.6 kg/m³. The
+//! fields are smooth at the scale of a cell except at the flame sheet's rounded corner, so they are
+//! sampled at points.
 
 use super::combustion_jet::{gas_fields, gas_row};
 use super::flame_sheet::{FlameSheet, Species};
@@ -16,7 +16,7 @@ use super::turbulence::{Displacement, Turbulence, Vortex, Vortices};
 use glam::{DVec3, UVec3};
 use rt_core::math::SplitMix64;
 
-/// Points of table 5.1.
+/// Number of points in table 5.1.
 pub const THESIS_DIMS: UVec3 = UVec3::new(402, 162, 162);
 
 /// The streams.
@@ -39,25 +39,25 @@ const LENGTH_M: f64 = 1.5;
 /// Width over length: 161 / 401 spacings.
 const WIDTH_M: f64 = LENGTH_M * 161.0 / 401.0;
 
-/// The set-up.
+/// Parameters of the flame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CoalFire {
     /// Points over 1.5 m x 0.6 m x 0.6 m; the pipe ends at x = 0, on the axis y = z = 0.
     pub dims: UVec3,
-    /// The seed; another seed gives another flame of the same kind.
+    /// The seed of the random numbers; another seed gives another flame of the same kind.
     pub seed: u64,
 }
 
 impl CoalFire {
-    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions
-    /// of CH4, CO, O2, N2, CO2 and H2O.
+    /// Samples the density; with [`Fields::All`] also temperature, mixture fraction and the mass
+    /// fractions of CH4, CO, O2, N2, CO2 and H2O.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
         let side = 0.5 * WIDTH_M;
         let mut flow =
             Flow::over(self.dims, DVec3::new(0.0, -side, -side), DVec3::new(LENGTH_M, side, side))?;
         let turbulence = Turbulence::new(&flow, 0.24, self.seed);
         let mut random = SplitMix64::new(self.seed);
-        // Rings of the shear layer near the pipe, doubling in size as they pair.
+        // Vortex rings of the shear layer near the pipe, which double in size as they pair.
         let mut rings = Vec::new();
         let mut x = 0.7 * PIPE_M;
         while x < 8.0 * PIPE_M {
@@ -94,7 +94,7 @@ fn width_m(x: f64) -> f64 {
     0.5 * PIPE_M + 0.12 * (x - 2.0 * PIPE_M).max(0.0)
 }
 
-/// Mixture fraction before the turbulence.
+/// Mean mixture fraction, before the turbulent displacement.
 fn mean(x: f64, r: f64) -> f64 {
     let x = x.max(0.0);
     let axis = (5.0 * PIPE_M / x.max(1e-9)).min(1.0);

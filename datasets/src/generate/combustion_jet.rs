@@ -1,14 +1,14 @@
-//! A turbulent plane jet of fuel between two streams of oxidiser, burning in thin sheets. Stands
-//! for the combustion simulation of 480 x 720 x 100 points in table 5.1 of the thesis (a temporally
-//! evolving jet: x along it, periodic; y across; z the span).
+//! A turbulent plane jet of fuel between two streams of oxidiser, burning in thin sheets.
+//! Represents the combustion simulation of 480 x 720 x 100 points in table 5.1 of the thesis (a
+//! temporally evolving jet: x along it, periodic; y across; z the span).
 //!
-//! Streams, pressure and slot are after E. R. Hawkes et al., "Scalar mixing in direct numerical
+//! Streams, pressure and slot follow E. R. Hawkes et al., "Scalar mixing in direct numerical
 //! simulations of temporally evolving plane jet flames with skeletal CO/H2 kinetics", Proc.
 //! Combust. Inst. 31, 2007: fuel 50 % CO, 10 % H2, 40 % N2 and oxidiser 25 % O2, 75 % N2 by volume,
 //! both at 500 K and 1 atm, slot 1.37 mm. The mean mixture fraction is a smoothed top hat; rollers
 //! and `turbulence` fold it; the gas follows from the `flame_sheet`. Ranges: 500 to about 2030 K,
-//! density 0.19 to 0.71 kg/m³. Smooth at the scale of a cell (the finest wave has six), so it is
-//! sampled at points.
+//! density 0.19 to 0.71 kg/m³. The fields are smooth at the scale of a cell (the shortest
+//! wavelength has six), so they are sampled at points.
 
 use super::flame_sheet::{FlameSheet, Species};
 use super::flow::{Fields, Flow, FlowError, names};
@@ -17,7 +17,7 @@ use glam::{DVec3, UVec3};
 use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
-/// Points of table 5.1.
+/// Number of points in table 5.1.
 pub const THESIS_DIMS: UVec3 = UVec3::new(480, 720, 100);
 
 /// The streams.
@@ -34,23 +34,23 @@ pub(crate) const SYNGAS: FlameSheet<'static> = FlameSheet {
     pressure_pa: 101_325.0,
 };
 
-/// Height of the slot that the jet came from.
+/// Height of the slot from which the jet issues.
 const SLOT_M: f64 = 1.37e-3;
-/// Height of the domain at its own proportions.
+/// Height of the domain; the other extents follow from the number of points.
 const HEIGHT_M: f64 = 14.0 * SLOT_M;
 
-/// The set-up.
+/// Parameters of the jet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CombustionJet {
-    /// Points; spacing is 14 slots over `dims.y - 1`, the same along all axes.
+    /// Number of points; the spacing is 14 slots over `dims.y - 1` along all axes.
     pub dims: UVec3,
-    /// The seed; another seed gives another jet of the same kind.
+    /// The seed of the random numbers; another seed gives another jet of the same kind.
     pub seed: u64,
 }
 
 impl CombustionJet {
-    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions
-    /// of CO, H2, O2, N2, CO2 and H2O.
+    /// Samples the density; with [`Fields::All`] also temperature, mixture fraction and the mass
+    /// fractions of CO, H2, O2, N2, CO2 and H2O.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
         let mut flow = self.lattice()?;
         let table = SYNGAS.table();
@@ -64,19 +64,19 @@ impl CombustionJet {
         Ok(flow)
     }
 
-    /// The points, without fields.
+    /// The lattice without fields.
     pub(crate) fn lattice(&self) -> Result<Flow, FlowError> {
         let h = HEIGHT_M / self.dims.y.max(2).saturating_sub(1) as f64;
         let high = (self.dims.as_dvec3() - 1.0).max(DVec3::ONE) * h;
         Flow::over(self.dims, -0.5 * high, 0.5 * high)
     }
 
-    /// How fuel and oxidiser are mixed.
+    /// The mixing of fuel and oxidiser.
     pub(crate) fn mixing(&self, flow: &Flow) -> Mixing {
         let mut random = SplitMix64::new(self.seed);
         let length = flow.spacing_m.x * (flow.dims.x - 1) as f64;
-        // Rollers on both faces, staggered, about 3 slots apart; images left and right make them
-        // periodic.
+        // Rollers on both faces, staggered, about 3 slots apart. Images to the left and right make
+        // them periodic.
         let count = (length / (3.0 * SLOT_M)).round().max(1.0);
         let mut rollers = Vec::new();
         for n in 0..count as u32 {
@@ -115,7 +115,7 @@ pub(crate) struct Mixing {
 }
 
 impl Mixing {
-    /// The mixture fraction along a row; leaves the displacements behind.
+    /// Computes the mixture fraction along a row; `d` holds the displacements afterwards.
     pub(crate) fn mixture_row(&self, d: &mut Displacement, j: u32, k: u32, z: &mut Vec<f32>) {
         self.turbulence.displace_row(d, j, k, |_| (2.5 * SLOT_M, 0.45));
         z.clear();
@@ -126,9 +126,9 @@ impl Mixing {
         }));
     }
 
-    /// The field before the turbulence.
+    /// The mean field, before the turbulent displacement.
     fn mean(&self, p: DVec3) -> f64 {
-        // Rollers wander along the span.
+        // The rollers meander along the span.
         let [a, b, c] = self.braid;
         let wander = 0.25
             * SLOT_M
@@ -157,7 +157,7 @@ pub(crate) fn gas_fields(
     all
 }
 
-/// Density, and where asked for temperature, mixture fraction and mass fractions.
+/// Density and, if requested, temperature, mixture fraction and mass fractions.
 pub(crate) fn gas_row(table: &super::flame_sheet::Table, z: &[f32], rows: &mut [&mut [f32]]) {
     for (r, row) in rows.iter_mut().enumerate() {
         for (v, &z) in row.iter_mut().zip(z) {
@@ -186,13 +186,13 @@ mod tests {
         let (cold, hot) = flow.field(names::TEMPERATURE).unwrap().range().unwrap();
         assert!(cold >= 499.9 && hot > 1900.0 && hot <= 2100.0, "{cold} {hot}");
         let z = flow.grid(names::MIXTURE_FRACTION).unwrap();
-        // Far from the jet pure oxidiser, within it mostly fuel.
+        // Pure oxidiser far from the jet, mostly fuel inside it.
         for i in 0..96 {
             assert!(z.at(i, 0, 5) < 1e-3 && z.at(i, 143, 5) < 1e-3);
         }
         let core = (0..96).map(|i| z.at(i, 72, 5)).sum::<f32>() / 96.0;
         assert!(core > 0.6, "{core}");
-        // Folded: lines across the jet cross the flame more often than twice.
+        // Folding: lines across the jet cross the flame more often than twice.
         let crossings = |i: u32, k: u32| {
             (1..144).filter(|&j| (z.at(i, j, k) > 0.42) != (z.at(i, j - 1, k) > 0.42)).count()
         };

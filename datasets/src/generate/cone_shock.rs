@@ -1,7 +1,7 @@
-//! A cone at zero incidence in a supersonic stream: the solution of Taylor and Maccoll as means
-//! over boxes.
+//! A cone at zero incidence in a supersonic stream: the solution of Taylor and Maccoll as cell
+//! averages.
 //!
-//! The apex is the origin, the axis x. The flow is exact up to the end of the cone, where the
+//! The apex is the origin, the axis is x. The flow is exact up to the end of the cone, where the
 //! lattice ends.
 
 use super::cell_average::LayeredFlow;
@@ -12,15 +12,15 @@ use super::oblique_shock::fill_gas;
 use super::revolve::revolve;
 use glam::{DVec2, DVec3, UVec3};
 
-/// The set-up. The default is a cone of 20 degrees at Mach 3 in a tunnel with a reservoir at 700
-/// kPa and 300 K.
+/// Parameters of the flow. The default is a cone of 20 degrees at Mach 3 in a tunnel with a
+/// reservoir at 700 kPa and 300 K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cone {
     /// Air far upstream.
     pub stream: FreeStream,
     /// Half of the angle at the apex.
     pub half_angle_rad: f64,
-    /// Along the axis.
+    /// Length along the axis.
     pub length_m: f64,
 }
 
@@ -40,7 +40,7 @@ impl Cone {
         Ok(cone_flow(GAMMA_AIR, self.stream.mach, self.half_angle_rad)?)
     }
 
-    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction). The
+    /// Computes density (with [`Fields::All`] also temperature, pressure and the gas fraction). The
     /// lattice reaches from a fifth of the length before the apex to the end of the cone, and as
     /// far sideways as the shock.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
@@ -104,8 +104,8 @@ mod tests {
                     let r = p.y.hypot(p.z);
                     let reach = h.length();
                     let value = density.at(i, j, k) as f64 / cone.stream.density();
-                    // Boxes that no surface crosses have the exact value (boxes are small, the
-                    // field smooth); the apex aside.
+                    // Boxes that no surface crosses have the exact value (boxes are small and the
+                    // field is smooth), except at the apex.
                     let distance = |angle: f64| (r * angle.cos() - p.x * angle.sin()).abs();
                     if distance(exact.shock_rad) < reach
                         || distance(exact.cone_rad) < reach

@@ -1,12 +1,12 @@
-//! A heptane pool fire: a pool of 0.3 m burns in air. Stands for the 293³ heptane fire of table 5.1
+//! A heptane pool fire: a pool of 0.3 m burns in air. Represents the 293³ heptane fire of table 5.1
 //! of the thesis.
 //!
-//! `plume` mixes, the `flame_sheet` burns: C7H16 + 11 O2 = 7 CO2 + 8 H2O, stoichiometric mixture
-//! fraction 0.062. The flame's temperature is set to 1500 K, well below the adiabatic one of about
-//! 2270 K, as soot radiates: the order of magnitude of pool fires of this size. Ranges: 300 to 1500
-//! K, density 0.23 to 3.3 kg/m³ (heptane's heavy vapour at its boiling point, just above the pool).
-//! Smooth at the scale of a cell but for the flame sheet's rounded corner, so it is sampled at
-//! points.
+//! `plume` models the mixing and `flame_sheet` the combustion: C7H16 + 11 O2 = 7 CO2 + 8 H2O,
+//! stoichiometric mixture fraction 0.062. The flame's temperature is set to 1500 K, well below the
+//! adiabatic one of about 2270 K, because soot radiates; this is the order of magnitude of pool
+//! fires of this size. Ranges: 300 to 1500 K, density 0.23 to 3.3 kg/m³ (heptane's heavy vapour at
+//! its boiling point, just above the pool). The fields are smooth at the scale of a cell except at
+//! the flame sheet's rounded corner, so they are sampled at points.
 
 use super::combustion_jet::{gas_fields, gas_row};
 use super::flame_sheet::{FlameSheet, Species};
@@ -15,7 +15,7 @@ use super::plume::{Plume, Shape};
 use super::turbulence::Displacement;
 use glam::{DVec3, UVec3};
 
-/// Points of table 5.1.
+/// Number of points in table 5.1.
 pub const THESIS_DIMS: UVec3 = UVec3::splat(293);
 
 /// The streams.
@@ -41,18 +41,18 @@ const SHAPE: Shape = Shape {
     wildness: 0.75,
 };
 
-/// The set-up.
+/// Parameters of the fire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fire {
     /// Points over 1 m x 1 m x 1 m; z is up, the pool in the middle of the floor.
     pub dims: UVec3,
-    /// The seed; another seed gives another flicker.
+    /// The seed of the random numbers; another seed gives another state of the same fire.
     pub seed: u64,
 }
 
 impl Fire {
-    /// Fields: density; with [`Fields::All`] temperature, mixture fraction and the mass fractions
-    /// of C7H16, O2, N2, CO2 and H2O.
+    /// Samples the density; with [`Fields::All`] also temperature, mixture fraction and the mass
+    /// fractions of C7H16, O2, N2, CO2 and H2O.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
         let mut flow =
             Flow::over(self.dims, DVec3::new(-0.5, -0.5, 0.0), DVec3::new(0.5, 0.5, 1.0))?;

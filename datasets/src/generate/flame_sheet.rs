@@ -1,37 +1,38 @@
-//! The gas of a diffusion flame from its mixture fraction: Burke and Schumann's flame sheet.
+//! The gas of a diffusion flame as a function of the mixture fraction: Burke and Schumann's flame
+//! sheet.
 //!
 //! S. P. Burke and T. E. W. Schumann, "Diffusion flames", Ind. Eng. Chem. 20, 1928. With infinitely
-//! fast chemistry mass fractions and temperature are piecewise linear in the mixture fraction Z,
-//! with a corner at the stoichiometric value; the density follows from p = ρ R T Σ Y/W. The corner
-//! is rounded over a tenth of the way to either side, as finite rates do.
+//! fast chemistry, mass fractions and temperature are piecewise linear in the mixture fraction Z,
+//! with a corner at the stoichiometric value. The density follows from p = ρ R T Σ Y/W. The corner
+//! is rounded over a tenth of the range on either side, as finite reaction rates do.
 
-/// A gas.
+/// A chemical species.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Species {
-    /// Name of its field.
+    /// Name of its mass fraction field.
     pub(crate) name: &'static str,
-    /// kg/mol.
+    /// Molar mass, kg/mol.
     pub(crate) molar_mass: f64,
-    /// Mass fraction in the oxidiser's stream.
+    /// Mass fraction in the oxidiser stream.
     pub(crate) oxidiser: f64,
-    /// Mass fraction in the fuel's stream.
+    /// Mass fraction in the fuel stream.
     pub(crate) fuel: f64,
     /// Mass produced (or, if negative, consumed) when one kilogram of the fuel stream burns
     /// completely.
     pub(crate) made: f64,
 }
 
-/// Two streams that burn where they mix.
+/// A fuel stream and an oxidiser stream that burn where they mix.
 pub(crate) struct FlameSheet<'a> {
     pub(crate) species: &'a [Species],
-    /// Oxidiser, flame, fuel; K.
+    /// Temperatures of oxidiser, flame and fuel, K.
     pub(crate) temperatures_k: [f64; 3],
     pub(crate) pressure_pa: f64,
 }
 
 /// Molar gas constant, J/(mol K).
 const GAS_CONSTANT: f64 = 8.314_462_618;
-/// Entries of a [`Table`].
+/// Number of entries of a [`Table`].
 const ENTRIES: usize = 2048;
 
 impl FlameSheet<'_> {
@@ -50,7 +51,7 @@ impl FlameSheet<'_> {
         let z = z.clamp(0.0, 1.0);
         let progress = if (z - st).abs() < round {
             let (low, high) = (burnt(st - round), burnt(st + round));
-            // Integrals of both straight parts within z - round..z + round; exact for a piecewise
+            // Integrals of both linear parts over z - round..z + round; exact for a piecewise
             // linear function.
             let t = (z - st) / round;
             let parabola = 1.0
@@ -62,7 +63,7 @@ impl FlameSheet<'_> {
         };
         let [cold, flame, hot] = self.temperatures_k;
         let unburnt = |a: f64, b: f64| a + (b - a) * z;
-        // The excess of the flame's temperature over that of mixing, at the corner.
+        // Rise of the flame temperature above the mixing temperature, at the corner.
         let rise = flame - (cold + (hot - cold) * st);
         let temperature = unburnt(cold, hot) + rise * progress;
         let mut out = vec![0.0, temperature];
@@ -76,7 +77,7 @@ impl FlameSheet<'_> {
         out
     }
 
-    /// Evaluates [`FlameSheet::at`] for rows.
+    /// Tabulates [`FlameSheet::at`] for the evaluation of rows.
     pub(crate) fn table(&self) -> Table {
         let columns = 2 + self.species.len();
         let mut values = vec![Vec::with_capacity(ENTRIES + 1); columns];
@@ -89,8 +90,8 @@ impl FlameSheet<'_> {
     }
 }
 
-/// Density, temperature and mass fractions at equal steps of the mixture fraction; linear between
-/// (error below 1e-3 of a column's range next to the corner, far below elsewhere).
+/// Density, temperature and mass fractions at equal steps of the mixture fraction, interpolated
+/// linearly (error below 1e-3 of a column's range next to the corner, far below elsewhere).
 pub(crate) struct Table {
     columns: Vec<Vec<f32>>,
 }

@@ -10,9 +10,10 @@ use rt_core::mesh::TriMesh;
 /// A flow on a uniform lattice, in SI units.
 ///
 /// A value is the mean over the box of one spacing around its point (over the part of it that is
-/// not solid), never a sample at the point. Otherwise shocks and surfaces between points would
-/// become staircases, which a schlieren image, an image of gradients, shows most clearly. Smooth
-/// generators sample where that is the same to within their own accuracy, and say so.
+/// not solid), not a sample at the point. With samples, shocks and surfaces between points would
+/// become staircases, which are most visible in schlieren images because these show gradients.
+/// Generators of smooth fields sample at points where both agree to within their own accuracy, and
+/// say so.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flow {
     /// Points per axis.
@@ -33,13 +34,13 @@ pub struct Flow {
 pub struct Field {
     /// `density`, `temperature`, `pressure`, `Y_He` (mass fraction of a species), …; see [`names`].
     pub name: &'static str,
-    /// Unit as in "kg/m³"; "1" for ratios.
+    /// Unit, such as "kg/m³"; "1" for ratios.
     pub unit: &'static str,
     /// One value per point, x fastest. NaN inside solids.
     pub values: Vec<f32>,
 }
 
-/// The names that fields have in all generators.
+/// Field names, the same in all generators.
 pub mod names {
     /// Density, kg/m³.
     pub const DENSITY: &str = "density";
@@ -66,17 +67,17 @@ pub enum Fields {
     All,
 }
 
-/// Why a flow cannot be made.
+/// Why a flow cannot be generated.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FlowError {
-    /// Too few or too many points.
+    /// Too few or too many lattice points.
     #[error("the lattice has {dims} points; each axis needs 4 to {most} points, and all together \
              at most 2³² points", most = MOST_POINTS)]
     Dims {
         /// The requested number.
         dims: UVec3,
     },
-    /// No gas flow has these parameters.
+    /// No gas flow exists for these parameters.
     #[error(transparent)]
     Gas(#[from] super::gas_dynamics::GasError),
 }
@@ -85,7 +86,7 @@ pub enum FlowError {
 const MOST_POINTS: u32 = 8192;
 
 impl Flow {
-    /// A lattice without fields over a box, with points on its border.
+    /// A lattice without fields over a box; the outermost points lie on the box's border.
     pub(crate) fn over(dims: UVec3, low_m: DVec3, high_m: DVec3) -> Result<Flow, FlowError> {
         let points = dims.as_u64vec3();
         let fits = dims.cmpge(UVec3::splat(4)).all() && dims.cmple(UVec3::splat(MOST_POINTS)).all();
@@ -122,8 +123,8 @@ impl Flow {
         Some(Grid { dims: self.dims, origin: self.origin_m, spacing: self.spacing_m, values })
     }
 
-    /// The fields as VTK image data, to be written as `.vti`. The values are moved; the body is
-    /// dropped.
+    /// Converts the fields to VTK image data, to be written as `.vti`. The values are moved; the
+    /// body is dropped.
     pub fn into_dataset(self) -> Dataset {
         let mut image = ImageData::new(self.dims.to_array(), self.origin_m, self.spacing_m);
         let arrays =
@@ -132,9 +133,9 @@ impl Flow {
         Dataset::ImageData(image)
     }
 
-    /// Adds fields, computed a row (of constant y and z) at a time, in parallel over planes of
-    /// constant z, so that the bits do not depend on the number of threads. `row(scratch, j, k,
-    /// rows)` fills one slice per field.
+    /// Adds fields, computed one row (of constant y and z) at a time, in parallel over planes of
+    /// constant z. The result does not depend on the number of threads. `row(scratch, j, k, rows)`
+    /// fills one slice per field.
     pub(crate) fn fill<S>(
         &mut self,
         fields: &[(&'static str, &'static str)],
@@ -143,7 +144,7 @@ impl Flow {
     ) {
         let (nx, ny) = (self.dims.x as usize, self.dims.y as usize);
         let mut values: Vec<Vec<f32>> = fields.iter().map(|_| vec![0f32; self.points()]).collect();
-        // One list of planes per k, each with one slice per field.
+        // One list of plane slices per k, with one slice per field.
         let mut planes: Vec<Vec<&mut [f32]>> = (0..self.dims.z).map(|_| Vec::new()).collect();
         for field in &mut values {
             for (k, plane) in field.chunks_mut(nx * ny).enumerate() {

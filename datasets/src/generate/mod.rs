@@ -1,8 +1,8 @@
 //! Generators: every data set of the thesis as a deterministic function of its size.
 //!
-//! (The module is called `generate` because `gen` is a keyword.) Nothing here needs a file; random
-//! numbers come from [`rt_core::math::SplitMix64`], so the same parameters give the same data on
-//! every machine and any number of threads.
+//! The generators need no files. Random numbers come from [`rt_core::math::SplitMix64`], so equal
+//! parameters give equal data on every machine and with any number of threads. (The module is
+//! called `generate` because `gen` is a keyword.)
 
 pub mod blunt_body;
 mod cell_average;

@@ -17,7 +17,7 @@ pub enum ScalarType {
 }
 
 impl ScalarType {
-    /// All of them.
+    /// All scalar types.
     pub const ALL: [ScalarType; 10] = {
         use ScalarType::*;
         [I8, U8, I16, U16, I32, U32, I64, U64, F32, F64]
@@ -33,7 +33,7 @@ impl ScalarType {
         }
     }
 
-    /// Rust's name: `u8`, `f32`, …
+    /// The type's name in Rust: `u8`, `f32`, …
     pub const fn name(self) -> &'static str {
         match self {
             ScalarType::I8 => "i8",
@@ -49,7 +49,7 @@ impl ScalarType {
         }
     }
 
-    /// The name that VTK's XML files use: `UInt8`, `Float32`, …
+    /// The type's name in VTK's XML files: `UInt8`, `Float32`, …
     pub const fn vtk_name(self) -> &'static str {
         match self {
             ScalarType::I8 => "Int8",
@@ -91,7 +91,7 @@ pub enum Values {
     F64(Vec<f64>),
 }
 
-/// Runs `$body` with `$v` bound to the vector inside, whatever its type.
+/// Runs `$body` with `$v` bound to the inner vector, whatever its type.
 macro_rules! with_values {
     ($values:expr, $v:ident => $body:expr) => {
         match $values {
@@ -168,7 +168,7 @@ macro_rules! with_type {
 }
 pub(crate) use with_values;
 
-/// A vector of one of the scalar types as [`Values`].
+/// Wraps a vector of one of the scalar types as [`Values`].
 pub(crate) trait IntoValues {
     fn into_values(self) -> Values;
 }
@@ -190,7 +190,7 @@ impl Values {
         with_type!(kind, T, wrap => wrap(Vec::<T>::new()))
     }
 
-    /// The values in `bytes`; a remainder shorter than one value is ignored.
+    /// Decodes the values in `bytes`; a remainder shorter than one value is ignored.
     pub fn from_bytes(kind: ScalarType, bytes: &[u8], endian: Endian) -> Self {
         with_type!(kind, T, wrap => {
             let (items, _) = bytes.as_chunks::<{ size_of::<T>() }>();
@@ -201,13 +201,13 @@ impl Values {
         })
     }
 
-    /// The values as bytes, least significant first.
+    /// Encodes the values as bytes, least significant byte first.
     pub fn to_le_bytes(&self) -> Vec<u8> {
         with_values!(self, v => v.iter().flat_map(|x| x.to_le_bytes()).collect())
     }
 
-    /// The values written in `words`, or the first word that is not one. Integers may be written
-    /// with a fraction or exponent (`3.0`) if the value is whole, as some programs do.
+    /// Parses the values in `words`, or returns the first word that is not a value. As some
+    /// programs write them, integers may have a fraction or exponent (`3.0`) if the value is whole.
     #[allow(clippy::unnecessary_cast, reason = "the macro covers f64 too")]
     pub fn from_words<'a>(
         kind: ScalarType,
@@ -233,11 +233,11 @@ impl Values {
     pub fn len(&self) -> usize {
         with_values!(self, v => v.len())
     }
-    /// True when there is none.
+    /// True when there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// The type.
+    /// The scalar type.
     pub fn kind(&self) -> ScalarType {
         match self {
             Values::I8(_) => ScalarType::I8,
@@ -263,7 +263,7 @@ impl Values {
     pub fn to_f32(&self) -> Vec<f32> {
         with_values!(self, v => v.iter().map(|&x| x as f32).collect())
     }
-    /// Values `range`, same type.
+    /// Copies the values in `range`; the type is kept.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Values {
         with_type!(self.kind(), T, wrap => wrap(
             with_values!(self, v => v[range].iter().map(|&x| x as T).collect())
@@ -340,7 +340,7 @@ pub struct Attributes {
     pub point: Vec<DataArray>,
     /// One tuple per cell.
     pub cell: Vec<DataArray>,
-    /// Any length; belongs to the data set as a whole.
+    /// Arrays of any length that belong to the data set as a whole.
     pub field: Vec<DataArray>,
     /// Names and texts that belong to the data set as a whole.
     pub text: Vec<(String, Vec<String>)>,

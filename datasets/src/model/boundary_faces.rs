@@ -8,10 +8,11 @@ use super::surface::GhostFlags;
 use super::{CellType, UnstructuredGrid};
 use rayon::slice::ParallelSliceMut;
 
-/// A face whichever way round and wherever it starts: number of corners and the four smallest ids.
+/// Identifies a face independently of its orientation and first corner: the number of corners and
+/// the four smallest ids.
 type FaceKey = (u32, [u32; 4]);
 
-/// The outside of a grid. Faces are numbered through all cells in order.
+/// The boundary of a grid. Faces are numbered through all cells in order.
 pub(super) struct BoundaryFaces {
     /// Number of the first face of each cell.
     first: Vec<usize>,
@@ -19,9 +20,9 @@ pub(super) struct BoundaryFaces {
 }
 
 impl BoundaryFaces {
-    /// Looks at all cells but those that are hidden or name points that do not exist. Cells that
-    /// another process has count: they tell that a face at the border between two processes is
-    /// inside.
+    /// Visits all cells except those that are hidden or refer to points that do not exist. Cells
+    /// owned by another process are included: they show that a face at the border between two
+    /// processes is interior.
     pub(super) fn find(d: &UnstructuredGrid, hidden: &GhostFlags<'_>) -> Self {
         let mut keys: Vec<(FaceKey, usize)> = Vec::new();
         let mut first = Vec::with_capacity(d.cells.len());
@@ -47,7 +48,7 @@ impl BoundaryFaces {
         BoundaryFaces { first, is_boundary }
     }
 
-    /// Puts the outer faces of a usable cell into `out`.
+    /// Appends the boundary faces of a usable cell to `out`.
     pub(super) fn of_cell(
         &self,
         d: &UnstructuredGrid,

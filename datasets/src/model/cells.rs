@@ -3,9 +3,10 @@
 /// Point ids of many cells: cell `i` is `connectivity[offsets[i]..offsets[i + 1]]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells {
-    /// Starts of the cells and, last, the end: one more than there are cells.
+    /// Starts of the cells, followed by the end of the last one: one entry more than there are
+    /// cells.
     offsets: Vec<usize>,
-    /// Point ids. [`Cells::NO_POINT`] stands for an id that the file gives but 32 bits cannot hold.
+    /// Point ids. [`Cells::NO_POINT`] replaces ids in the file that do not fit in 32 bits.
     connectivity: Vec<u32>,
 }
 
@@ -15,27 +16,27 @@ impl Default for Cells {
     }
 }
 
-/// What is wrong with offsets and connectivity that do not form cells.
+/// Reports offsets and connectivity that do not form cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BadOffsets {
-    /// Which cell.
+    /// Index of the cell.
     pub cell: usize,
-    /// Its end.
+    /// End of the cell as given.
     pub end: i64,
-    /// The smallest and the largest end it could have.
+    /// Smallest and largest valid end.
     pub allowed: (usize, usize),
 }
 
 impl Cells {
-    /// Id of a point that cannot exist.
+    /// Id that stands for a point that cannot exist.
     pub const NO_POINT: u32 = u32::MAX;
 
-    /// No cells.
+    /// An empty list.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Cells from the ends of each cell (VTK XML's `offsets`) and the ids.
+    /// Builds cells from the end of each cell (`offsets` in VTK XML) and the ids.
     pub fn from_ends(
         ends: impl Iterator<Item = i64>,
         connectivity: Vec<u32>,
@@ -52,14 +53,14 @@ impl Cells {
         Ok(Cells { offsets, connectivity })
     }
 
-    /// Cells of `n` points each; a remainder is dropped.
+    /// Builds cells of `n` points each; a remainder is dropped.
     pub fn uniform(n: usize, mut connectivity: Vec<u32>) -> Self {
         let count = connectivity.len().checked_div(n).unwrap_or(0);
         connectivity.truncate(count * n);
         Cells { offsets: (0..=count).map(|i| i * n).collect(), connectivity }
     }
 
-    /// An id as VTK writes it (signed 64 bits) as ours.
+    /// Converts an id as VTK writes it (signed 64 bits).
     #[inline]
     pub fn id(value: i64) -> u32 {
         u32::try_from(value).unwrap_or(Self::NO_POINT)
@@ -86,11 +87,11 @@ impl Cells {
     pub fn len(&self) -> usize {
         self.offsets.len() - 1
     }
-    /// True when there is none.
+    /// True when there are no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Point ids of cell `i`; panics when out of range.
+    /// Point ids of cell `i`. Panics when `i` is out of range.
     #[inline]
     pub fn get(&self, i: usize) -> &[u32] {
         &self.connectivity[self.offsets[i]..self.offsets[i + 1]]
@@ -109,16 +110,16 @@ impl Cells {
     }
 }
 
-/// What a cell of some VTK type looks like to a renderer (numbers of `vtkCellType.h`; orders of the
-/// VTK book, fig. 5-2). Cells of higher order are rendered by their linear corners, which VTK
-/// stores first.
+/// How a cell of a VTK type is rendered (numbers from `vtkCellType.h`, point orders from the VTK
+/// book, fig. 5-2). Higher-order cells are rendered by their linear corners, which VTK stores
+/// first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellType {
     /// Nothing to draw (type 0).
     Empty,
     /// Single points.
     Vertices,
-    /// A chain of line segments; the number is how many ids belong to it (0: all).
+    /// A chain of line segments; the number of ids that belong to it (0: all).
     Line(usize),
     /// A triangle strip.
     Strip,
@@ -126,11 +127,11 @@ pub enum CellType {
     Polygon(usize),
     /// A quad whose corners come in raster order.
     Pixel,
-    /// A solid bounded by these faces.
+    /// A solid with these faces.
     Solid(&'static [&'static [u8]]),
     /// A solid whose faces are listed separately.
     Polyhedron,
-    /// A type this program does not know.
+    /// An unsupported type.
     Unknown,
 }
 

@@ -2,21 +2,21 @@
 
 use super::{Attributes, DataArray, Dataset, ModelError, Values};
 
-/// An array and what to take of it. Written `pressure`, `velocity` (length of the vector),
+/// An array and the component to use. Written as `pressure`, `velocity` (length of the vector),
 /// `velocity:x` or `velocity:0`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColorBy {
     /// Name of the array.
     pub name: String,
-    /// Which component; `None` is the length of the tuple.
+    /// The component; `None` is the length of the tuple.
     pub component: Option<usize>,
     /// True when the array belongs to points, false when it belongs to cells.
     pub per_point: bool,
 }
 
 impl ColorBy {
-    /// Finds `wish` in `data` (in its blocks if it has some), point arrays first. A name that
-    /// contains a colon is tried as it stands before it is split.
+    /// Finds `wish` in `data` (and in its blocks, if any), point arrays first. A name that contains
+    /// a colon is tried unsplit first.
     pub fn find(data: &Dataset, wish: &str) -> Result<ColorBy, ModelError> {
         let leaves = data.leaves();
         let attributes: Vec<&Attributes> = leaves.iter().filter_map(|d| d.attributes()).collect();
@@ -58,7 +58,7 @@ impl ColorBy {
         Err(ModelError::NoArray { name: wish.into(), kind: data.kind(), available })
     }
 
-    /// The array in `attributes`, if it is there and has the component.
+    /// The array in `attributes`, if it exists and has the component.
     pub fn array<'a>(&self, attributes: &'a Attributes) -> Option<&'a DataArray> {
         let a = if self.per_point {
             attributes.point_array(&self.name)
@@ -76,7 +76,7 @@ impl ColorBy {
         }
     }
 
-    /// True when the values are colours already: 8 bits, three or four components (VTK's "direct
+    /// True when the values are already colours: 8 bits, three or four components (VTK's "direct
     /// scalars").
     pub fn is_direct_color(&self, array: &DataArray) -> bool {
         self.component.is_none()

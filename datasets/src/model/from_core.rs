@@ -6,7 +6,7 @@ use rt_core::grid::Grid;
 use rt_core::mesh::{PerElement, TriMesh};
 
 impl ImageData {
-    /// A scalar field as image data with one point array.
+    /// Converts a scalar field to image data with one point array.
     pub fn from_grid(grid: &Grid, name: &str) -> Self {
         let attributes = Attributes {
             point: vec![DataArray::new(name, 1, Values::F32(grid.values.clone()))],
@@ -26,8 +26,9 @@ impl ImageData {
 }
 
 impl PolyData {
-    /// A mesh as polygons; scalars are named `scalars`, colours become the 8-bit sRGB array `RGBA`.
-    /// Positions are double precision when the mesh has an origin, so that none is rounded.
+    /// Converts a mesh to polygons. Scalars are named `scalars`; colours become the 8-bit sRGB
+    /// array `RGBA`. Positions are double precision when the mesh has an origin, so that none is
+    /// rounded.
     pub fn from_trimesh(mesh: &TriMesh) -> Self {
         let points = if mesh.origin == glam::DVec3::ZERO {
             Points::F32(mesh.positions.iter().map(|p| p.to_array()).collect())

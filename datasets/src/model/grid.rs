@@ -8,7 +8,7 @@ use rt_core::grid::Grid;
 impl Dataset {
     /// The scalar field `array` (see [`ColorBy`] for components) of image data, or of a rectilinear
     /// grid whose steps are equal to single precision. Cell arrays become values at the cell
-    /// centres. Axes that run backwards are turned round.
+    /// centres. Axes with negative spacing are reversed.
     pub fn to_grid(&self, array: &str) -> Result<Grid, ModelError> {
         self.check()?;
         let cannot = |reason: String| ModelError::NotConvertible {
@@ -85,8 +85,8 @@ impl Dataset {
     }
 }
 
-/// The values with axes of negative spacing turned round. Spacing 0 along an axis of one point
-/// becomes 1.
+/// The values, with axes of negative spacing reversed. Spacing 0 along an axis of one point becomes
+/// 1.
 fn values_forward(
     data: &DataArray,
     color: &ColorBy,
@@ -125,9 +125,9 @@ fn values_forward(
     out
 }
 
-/// The common step of `x` if every coordinate is where that step puts it, to four roundings in f32
-/// of the largest one (the precision most files store coordinates in); `None` for a single
-/// coordinate; else the first index that is off.
+/// The common step of `x`, if every coordinate agrees with it to four f32 roundings of the largest
+/// coordinate (most files store coordinates in this precision). Returns `None` for a single
+/// coordinate, and the first deviating index as the error.
 fn uniform_step(x: &[f64]) -> Result<Option<f64>, usize> {
     let (Some(first), Some(last)) = (x.first(), x.last()) else { return Ok(None) };
     if x.len() == 1 {

@@ -4,28 +4,28 @@ use super::surface::GhostFlags;
 use super::{Attributes, CellType, ColorBy, Dataset, ModelError, Points};
 use glam::DVec3;
 
-/// A chain of points with one scalar each.
+/// A chain of points with optional scalars.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
     /// At least two points, in world coordinates.
     pub points: Vec<DVec3>,
-    /// One value per point when an array was asked for. A cell array gives every point of the line
-    /// its cell's value.
+    /// One value per point when an array was requested. A cell array gives every point of the line
+    /// the value of its cell.
     pub scalars: Option<Vec<f32>>,
 }
 
-/// Points with one scalar each.
+/// Points with optional scalars.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointSet {
     /// World coordinates.
     pub points: Vec<DVec3>,
-    /// One value per point when an array was asked for; NaN in blocks that lack the array.
+    /// One value per point when an array was requested; NaN in blocks that lack the array.
     pub scalars: Option<Vec<f32>>,
 }
 
 impl Dataset {
-    /// All line cells. The number is how many line cells were left out because they have fewer than
-    /// two points or name points that do not exist. Lattices have no lines.
+    /// All line cells, and the number of line cells that were left out because they have fewer than
+    /// two points or refer to points that do not exist. Lattices have no lines.
     pub fn to_lines(&self, color_by: Option<&str>) -> Result<(Vec<Polyline>, usize), ModelError> {
         self.check()?;
         let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
@@ -69,8 +69,8 @@ impl Dataset {
         Ok((lines, dropped))
     }
 
-    /// All points, whether cells use them or not (particles often come without cells). Cell arrays
-    /// cannot colour points.
+    /// All points, including those that no cell uses (particles often come without cells). Cell
+    /// arrays cannot colour points.
     pub fn to_points(&self, color_by: Option<&str>) -> Result<PointSet, ModelError> {
         self.check()?;
         let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;

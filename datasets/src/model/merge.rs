@@ -6,14 +6,14 @@ use super::{
 };
 
 impl Dataset {
-    /// One data set out of pieces of one kind. Lattice pieces must cover their common extent.
-    /// Points that pieces share are kept once for lattices and once per piece otherwise (VTK does
-    /// the same). Arrays that not all pieces have are left out and named in `warnings`.
+    /// Merges pieces of one kind into one data set. Lattice pieces must cover their common extent.
+    /// Shared points are stored once for lattices and once per piece otherwise, as in VTK. Arrays
+    /// that some pieces lack are left out and named in `warnings`.
     pub fn merge(
         mut pieces: Vec<Dataset>,
         warnings: &mut Vec<String>,
     ) -> Result<Dataset, ModelError> {
-        // Pieces that a process had nothing to put in.
+        // Ignore empty pieces, which processes without data write.
         if pieces.iter().any(|p| p.counts().0 > 0) {
             pieces.retain(|p| p.counts().0 > 0);
         }
@@ -46,7 +46,8 @@ impl Dataset {
     }
 }
 
-/// Arrays that all pieces have with the same number of components, put together by `join`.
+/// Merges the arrays that all pieces have with the same number of components; `join` concatenates
+/// the values.
 fn join_arrays(
     lists: &[&[DataArray]],
     what: &str,
@@ -80,7 +81,7 @@ fn attributes_of(pieces: &[Dataset]) -> Vec<&Attributes> {
     pieces.iter().filter_map(|p| p.attributes()).collect()
 }
 
-/// The attributes of the first piece with other point and cell arrays.
+/// The attributes of the first piece, with its point and cell arrays replaced.
 fn with_arrays(all: &[&Attributes], point: Vec<DataArray>, cell: Vec<DataArray>) -> Attributes {
     Attributes { point, cell, ..all[0].clone() }
 }
@@ -109,8 +110,8 @@ fn merge_poly(pieces: &[Dataset], warnings: &mut Vec<String>) -> Dataset {
         out.strips.append(&d.strips, shift);
         shift += d.points.len();
     }
-    // Cell data runs verts, lines, polys, strips: take the verts of all pieces first, then the
-    // lines of all, …
+    // Cell data is ordered verts, lines, polys, strips: take the verts of all pieces first, then
+    // the lines of all, …
     let all = attributes_of(pieces);
     let lists: Vec<&[DataArray]> = all.iter().map(|a| a.cell.as_slice()).collect();
     let cell = join_arrays(&lists, "cell", warnings, |arrays| {
@@ -190,8 +191,8 @@ fn merge_lattices(
     if dims.contains(&0) {
         return Ok(pieces.swap_remove(0));
     }
-    // Pieces must cover the whole, or there would be values that no file gives. This also bounds
-    // the memory taken.
+    // Pieces must cover the whole extent; otherwise some values would be undefined. This check also
+    // bounds the memory.
     let covered: u64 = extents
         .iter()
         .map(|&e| lattice_counts(extent_dims(e)).map_or(0, |c| c.0))
@@ -205,8 +206,8 @@ fn merge_lattices(
     if covered < expected {
         return Err(gap(covered));
     }
-    // Without arrays an extent is only a claim; nothing of its size may be allocated, and there is
-    // nothing to put together.
+    // Without arrays, nothing backs the declared extent, so no memory of its size may be allocated;
+    // and there are no values to merge.
     let (mut points_from, mut cells_from) = (Vec::new(), Vec::new());
     if gather_something {
         points_from = index_map(whole, &extents, false);
@@ -219,8 +220,8 @@ fn merge_lattices(
 
     let all = attributes_of(&pieces);
     let gather = |map: &[(u32, usize)], arrays: &[&DataArray]| -> Option<DataArray> {
-        // Piece by piece into one array first, so that the types agree; then the values in their
-        // order.
+        // First concatenate the pieces into one array, so that the types agree; then put the values
+        // into lattice order.
         let joined = concatenate_arrays(arrays)?;
         let starts: Vec<usize> = arrays
             .iter()
@@ -239,8 +240,7 @@ fn merge_lattices(
             super::array::IntoValues::into_values(picked.collect::<Option<Vec<_>>>()?)
         });
         let mut out = DataArray { values, ..joined };
-        // Every point and cell is here once now: none is a copy of another process's any more (bit
-        // 1).
+        // Every point and cell now exists once, so none is another process's copy (bit 1) any more.
         if let ("vtkGhostType", Values::U8(v)) = (out.name.as_str(), &mut out.values) {
             v.iter_mut().for_each(|g| *g &= !1);
         }
@@ -294,7 +294,7 @@ fn merge_lattices(
     Ok(first)
 }
 
-/// For each point (or cell) of the whole lattice, which piece has it and at which index there.
+/// For each point (or cell) of the whole lattice: the piece that has it, and its index there.
 fn index_map(whole: [i32; 6], extents: &[[i32; 6]], cells: bool) -> Vec<(u32, usize)> {
     let size = |e: [i32; 6]| extent_dims(e).map(|d| if cells && d > 1 { d - 1 } else { d });
     let dims = size(whole);
@@ -303,7 +303,7 @@ fn index_map(whole: [i32; 6], extents: &[[i32; 6]], cells: bool) -> Vec<(u32, us
         let n = size(e);
         let shift: [usize; 3] =
             std::array::from_fn(|a| (i64::from(e[2 * a]) - i64::from(whole[2 * a])) as usize);
-        // A piece that is flat where the whole is not has no cells of the whole.
+        // A piece that is flat along an axis where the whole lattice is not has no cells of it.
         if cells && (0..3).any(|a| extent_dims(e)[a] == 1 && extent_dims(whole)[a] > 1) {
             continue;
         }

@@ -5,8 +5,8 @@
 
 use glam::{DVec2, DVec3};
 
-/// Ear clipping takes time with the square of the corners; polygons with more corners than this are
-/// fanned instead, which [`super::SurfaceReport::fanned_polygons`] counts.
+/// Largest number of corners for ear clipping, whose time grows with their square. Larger polygons
+/// are divided as fans, which [`super::SurfaceReport::fanned_polygons`] counts.
 pub const MAX_EAR_CORNERS: usize = 4096;
 
 /// How a polygon was divided.
@@ -17,12 +17,12 @@ pub enum Division {
     /// A fan over a polygon that is not convex and could not be clipped (self-intersecting, or too
     /// many corners).
     Fanned,
-    /// Fewer than three corners: nothing.
+    /// Fewer than three corners: no triangles.
     Nothing,
 }
 
-/// Calls `emit` with the corner numbers of each triangle. Orientation is kept. Not-finite corners
-/// give a fan.
+/// Calls `emit` with the corner numbers of each triangle. Orientation is kept. Polygons with
+/// non-finite corners are divided as fans.
 pub fn triangulate(corners: &[DVec3], mut emit: impl FnMut([usize; 3])) -> Division {
     let n = corners.len();
     match n {
@@ -37,12 +37,12 @@ pub fn triangulate(corners: &[DVec3], mut emit: impl FnMut([usize; 3])) -> Divis
     let flat = project(corners, normal);
     let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp_dot(flat[c] - flat[b]);
 
-    // Convex: every turn goes the same way. (A star polygon that winds twice also passes; its fan
-    // covers what it covers.)
+    // Convex: all turns have the same sign. (A star polygon that winds twice also passes and
+    // becomes a fan.)
     let convex = (0..n).all(|i| turn(i, (i + 1) % n, (i + 2) % n) >= 0.0);
     if n == 4 {
-        // The diagonal that lies inside, and the shorter one when both do, so that thin quads keep
-        // their shape.
+        // Choose the diagonal that lies inside, or the shorter one when both do, so that thin quads
+        // keep their shape.
         let first = turn(0, 1, 2) > 0.0 && turn(2, 3, 0) > 0.0;
         let second = turn(1, 2, 3) > 0.0 && turn(3, 0, 1) > 0.0;
         let shorter =
@@ -63,7 +63,7 @@ pub fn triangulate(corners: &[DVec3], mut emit: impl FnMut([usize; 3])) -> Divis
     clip_ears(&flat, emit)
 }
 
-/// Cuts off one ear after the other. A ring without ears (self-intersecting) is finished as a fan.
+/// Cuts off one ear after another. A ring without ears (self-intersecting) is finished as a fan.
 fn clip_ears(flat: &[DVec2], mut emit: impl FnMut([usize; 3])) -> Division {
     let mut ring: Vec<usize> = (0..flat.len()).collect();
     let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp_dot(flat[c] - flat[b]);
@@ -74,8 +74,8 @@ fn clip_ears(flat: &[DVec2], mut emit: impl FnMut([usize; 3])) -> Division {
         at %= m;
         let [a, b, c] = [ring[(at + m - 1) % m], ring[at], ring[(at + 1) % m]];
         let t = turn(a, b, c);
-        // A corner without area (a repeated or collinear point) can always go; it gives no triangle
-        // worth having, but emitting it keeps neighbours on shared edges watertight.
+        // A corner without area (a repeated or collinear point) can always be cut. Its triangle is
+        // degenerate, but emitting it keeps shared edges watertight.
         let is_ear = t == 0.0
             || t > 0.0
                 && !ring.iter().any(|&p| {
@@ -89,7 +89,7 @@ fn clip_ears(flat: &[DVec2], mut emit: impl FnMut([usize; 3])) -> Division {
             emit([a, b, c]);
             ring.remove(at);
             misses = 0;
-            at = at.max(1) - 1; // neighbours changed: look at the one before again
+            at = at.max(1) - 1; // the neighbours changed: test the previous corner again
         } else {
             at += 1;
             misses += 1;
@@ -108,14 +108,14 @@ fn inside(a: DVec2, b: DVec2, c: DVec2, p: DVec2) -> bool {
     side(a, b) >= 0.0 && side(b, c) >= 0.0 && side(c, a) >= 0.0
 }
 
-/// Normal of a polygon that need not be flat; its length is twice the projected area.
+/// Normal of a polygon that may be non-planar; its length is twice the projected area.
 pub fn newell_normal(corners: &[DVec3]) -> DVec3 {
-    // Relative to the first corner, so that far-away polygons do not cancel.
+    // Relative to the first corner, to avoid cancellation for polygons far from the origin.
     let o = corners.first().copied().unwrap_or_default();
     (0..corners.len()).map(|i| (corners[i] - o).cross(corners[(i + 1) % corners.len()] - o)).sum()
 }
 
-/// Drops the axis in which the normal is largest, keeping counter-clockwise counter-clockwise.
+/// Drops the axis in which the normal is largest and keeps the orientation.
 fn project(corners: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let n = normal.abs();
     let o = corners[0];

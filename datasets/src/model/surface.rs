@@ -9,7 +9,7 @@ use super::{
 use glam::{DVec3, Vec2, Vec3};
 use rt_core::mesh::{Attribute, MeshError, TriMesh};
 
-/// What became of the cells, so that nothing is lost unseen.
+/// Statistics of a surface extraction: the cells that were drawn, left out or approximated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SurfaceReport {
     /// Triangles in the mesh.
@@ -17,7 +17,8 @@ pub struct SurfaceReport {
     /// Cells that are lines or points: not part of a surface, see [`Dataset::to_lines`] and
     /// [`Dataset::to_points`].
     pub line_and_point_cells: usize,
-    /// Cells marked as hidden or as another process's copy (`vtkGhostType`), and left out for that.
+    /// Cells left out because they are hidden or copies of another process's cells
+    /// (`vtkGhostType`).
     pub ghost_cells: usize,
     /// Cells left out because a point id is out of range.
     pub bad_ids: usize,
@@ -25,21 +26,21 @@ pub struct SurfaceReport {
     pub too_few_points: usize,
     /// Cells left out because their type is unknown.
     pub unknown_type: usize,
-    /// Polygons that are not convex and were divided as a fan all the same (too many corners, or
-    /// self-crossing).
+    /// Polygons that are not convex but were divided as a fan (too many corners, or
+    /// self-intersecting).
     pub fanned_polygons: usize,
-    /// Cells of higher order drawn by their straight corners.
+    /// Higher-order cells drawn by their linear corners.
     pub straightened_cells: usize,
-    /// Data sets of a collection without the array asked for; their values are NaN.
+    /// Data sets of a collection that lack the requested array; their values are NaN.
     pub blocks_without_array: usize,
 }
 
 impl SurfaceReport {
-    /// Cells that should be visible and are not.
+    /// Number of cells that should be visible but are missing.
     pub fn dropped(&self) -> usize {
         self.bad_ids + self.too_few_points + self.unknown_type
     }
-    /// One line per thing worth telling a user; empty when all is well.
+    /// One line per problem that a user should know about; empty when there are none.
     pub fn warnings(&self) -> Vec<String> {
         let items = [
             (self.bad_ids, "cells left out: they name points that do not exist"),
@@ -57,10 +58,10 @@ impl SurfaceReport {
 }
 
 impl Dataset {
-    /// The outer surface: polygons and strips, two-dimensional cells, and those faces of solid
-    /// cells that belong to one cell only; the outer faces of lattices. `color_by` fills
-    /// [`TriMesh::scalars`], or [`TriMesh::colors`] when the array is 8-bit sRGB(A); see
-    /// [`ColorBy`] for how to name components. Normals and texture coordinates come along when the
+    /// Extracts the boundary surface: polygons and strips, two-dimensional cells, those faces of
+    /// solid cells that belong to one cell only, and the boundary faces of lattices. `color_by`
+    /// fills [`TriMesh::scalars`], or [`TriMesh::colors`] when the array is 8-bit sRGB(A); see
+    /// [`ColorBy`] for how to name components. Normals and texture coordinates are kept when the
     /// file marks some. Vertices that no triangle uses are left out.
     pub fn to_trimesh(
         &self,
@@ -108,9 +109,9 @@ impl Dataset {
     }
 }
 
-/// `vtkGhostType` bits for cells (vtkDataSetAttributes.h): another process has it too.
+/// `vtkGhostType` bit for cells (vtkDataSetAttributes.h): 1 = copy of another process's cell.
 const COPIED_CELL: u8 = 1;
-/// Hidden.
+/// `vtkGhostType` bit for cells: 32 = hidden.
 const HIDDEN_CELL: u8 = 32;
 /// `vtkGhostType` bit for points: 2 = hidden.
 const HIDDEN_POINT: u8 = 2;
@@ -128,12 +129,12 @@ struct Builder {
     texcoords: Vec<Vec2>,
     any_texcoords: bool,
     direct_color: bool,
-    /// Vertex of each point of the present data set; `NO_POINT` when it is not used yet.
+    /// Vertex of each point of the current data set; `NO_POINT` when it is not used yet.
     vertex_of_point: Vec<u32>,
     report: SurfaceReport,
 }
 
-/// The arrays of the present data set that vertices take values from.
+/// The arrays of the current data set from which vertices take values.
 #[derive(Clone, Copy, Default)]
 struct Source<'a> {
     color: Option<&'a DataArray>,
@@ -188,7 +189,7 @@ impl Builder {
         }
     }
 
-    /// The vertex for point `id`, made when first used.
+    /// Returns the vertex for point `id` and creates it on first use.
     fn vertex(&mut self, id: usize, position: DVec3, from: &Source<'_>) -> u32 {
         if self.vertex_of_point[id] != Cells::NO_POINT {
             return self.vertex_of_point[id];
@@ -227,7 +228,7 @@ impl Builder {
         }
     }
 
-    /// One polygon of `cell`. Ids must be in range.
+    /// Adds one polygon of `cell`. Ids must be in range.
     fn polygon(
         &mut self,
         ids: &[u32],
@@ -260,7 +261,7 @@ impl Builder {
             self.report.too_few_points += 1;
         }
         for (i, w) in ids.windows(3).enumerate() {
-            // Every second triangle of a strip is turned over.
+            // Every second triangle of a strip has the opposite orientation.
             let order = if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] };
             let corners = order.map(|k| self.vertex(k as usize, at(k as usize), from));
             self.triangle(corners, cell, from);
@@ -344,8 +345,8 @@ impl Builder {
         }
     }
 
-    /// The faces of visible lattice cells that have no visible neighbour. A lattice one point thick
-    /// is a sheet.
+    /// Adds the faces of visible lattice cells that have no visible neighbour. A lattice one point
+    /// thick is a sheet.
     fn lattice(
         &mut self,
         dims: [usize; 3],
@@ -362,7 +363,7 @@ impl Builder {
             self.report.line_and_point_cells += cells as usize;
             return;
         }
-        // A box of huge declared size without a single array carries no information beyond its
+        // A lattice of huge declared size without any array carries no information beyond its
         // corners.
         if attributes.point.is_empty()
             && attributes.cell.is_empty()
@@ -408,7 +409,7 @@ impl Builder {
             for j in 0..cells[1] {
                 for i in 0..cells[0] {
                     let index = [i, j, k];
-                    // Only cells at the rim or next to a hidden one can have outer faces.
+                    // Only cells at the border or next to a hidden one can have boundary faces.
                     let rim = (0..3).any(|a| index[a] == 0 || index[a] + 1 == cells[a]);
                     if !rim && hidden.none() {
                         continue;
@@ -427,7 +428,7 @@ impl Builder {
                         for high in [false, true] {
                             let sheet = dims[axis] == 1;
                             if sheet && !high {
-                                continue; // a sheet has one face, not two at the same place
+                                continue; // a sheet has one face, not two coincident ones
                             }
                             let at_rim = if high {
                                 index[axis] + 1 == cells[axis]
@@ -511,11 +512,11 @@ impl<'a> GhostFlags<'a> {
     fn any_points(&self) -> bool {
         self.points.is_some()
     }
-    /// Not to be drawn: hidden, or another process draws it.
+    /// Whether cell `i` is not drawn: it is hidden, or another process draws it.
     pub(super) fn cell(&self, i: usize) -> bool {
         self.has(i, HIDDEN_CELL | COPIED_CELL)
     }
-    /// Hidden: as if it were not there.
+    /// Whether cell `i` is hidden and treated as absent.
     pub(super) fn is_blanked(&self, i: usize) -> bool {
         self.has(i, HIDDEN_CELL)
     }

@@ -2,8 +2,8 @@
 //! experiments.
 //!
 //! F. S. Billig, "Shock-wave shapes around spherical- and cylindrical-nosed bodies", J. Spacecraft
-//! and Rockets 4(6), 1967, pages 822-823. They hold to a few percent from about Mach 2 upwards in
-//! air.
+//! and Rockets 4(6), 1967, pages 822-823. The correlations hold to a few percent from about Mach 2
+//! upwards in air.
 
 use super::theta_beta_m::mach_angle_rad;
 use super::{GasError, check_supersonic};
@@ -26,13 +26,14 @@ pub struct BowShock {
     pub stand_off_m: f64,
     /// Radius of curvature at the vertex, m.
     pub vertex_radius_m: f64,
-    /// Angle far away: Mach angle, or that of the shock of the cone (wedge) behind the nose.
+    /// Angle far away: the Mach angle, or the shock angle of the cone (wedge) behind the nose.
     pub far_angle_rad: f64,
 }
 
 impl BowShock {
-    /// The shock of a nose followed by an afterbody whose own attached shock would have
-    /// `far_angle_rad`; `None` for a parallel afterbody, whose shock decays to a Mach wave.
+    /// The shock of a nose followed by an afterbody. `far_angle_rad` is the angle of the
+    /// afterbody's own attached shock, or `None` for a parallel afterbody, whose shock decays to a
+    /// Mach wave.
     pub fn billig(
         nose: Nose,
         mach: f64,
@@ -68,8 +69,9 @@ impl BowShock {
         })
     }
 
-    /// Position of the shock along the stream at distance `r` from the axis, from the foremost
-    /// point of the nose, positive downstream (Billig's equation with his x reversed and moved).
+    /// Position of the shock along the stream at distance `r` from the axis, measured from the
+    /// foremost point of the nose, positive downstream (Billig's equation with x reversed and
+    /// shifted).
     pub fn x_m(&self, r_m: f64) -> f64 {
         let t = self.far_angle_rad.tan();
         let s = r_m * t / self.vertex_radius_m;

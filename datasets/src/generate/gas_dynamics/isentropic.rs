@@ -1,4 +1,4 @@
-//! Ratios to the reservoir's values in isentropic flow.
+//! Ratios to the reservoir values in isentropic flow.
 
 /// T / T0 (NACA 1135 eq. 43).
 pub fn temperature(gamma: f64, mach: f64) -> f64 {

@@ -1,6 +1,6 @@
-//! Steady compressible flow of a perfect gas in closed form or by one ordinary differential
-//! equation. The shocks of these flows are known exactly, so an image of them can be checked with a
-//! ruler.
+//! Steady compressible flow of a perfect gas, in closed form or by one ordinary differential
+//! equation. The shocks of these flows are known exactly, so images of them can be checked by
+//! measurement.
 //!
 //! | module | what | source |
 //! |---|---|---|
@@ -28,23 +28,23 @@ pub mod prandtl_meyer;
 pub mod taylor_maccoll;
 pub mod theta_beta_m;
 
-/// Why there is no such flow.
+/// Why a flow does not exist.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GasError {
     /// Shocks and expansions need a supersonic stream.
     #[error("the Mach number is {mach}; it must be finite and greater than {least}")]
     Mach {
-        /// What was given.
+        /// The given Mach number.
         mach: f64,
-        /// What it must exceed.
+        /// The value that it must exceed.
         least: f64,
     },
-    /// Not a gas.
+    /// The ratio of specific heats is not that of a gas.
     #[error(
         "the ratio of specific heats is {gamma}; it must be greater than 1 and at most 2 (air: 1.4)"
     )]
     Gamma {
-        /// What was given.
+        /// The given ratio.
         gamma: f64,
     },
     /// An angle outside its range.
@@ -53,13 +53,13 @@ pub enum GasError {
          degrees"
     )]
     Angle {
-        /// Which angle.
+        /// Name of the angle.
         what: &'static str,
-        /// What was given.
+        /// The given angle.
         given_degrees: f64,
-        /// Smallest.
+        /// Smallest allowed angle.
         least_degrees: f64,
-        /// Largest.
+        /// Largest allowed angle.
         most_degrees: f64,
     },
     /// The body is too blunt for an attached shock.
@@ -71,9 +71,9 @@ pub enum GasError {
     Detached {
         /// "a wedge" or "a cone".
         body: &'static str,
-        /// Free stream.
+        /// Mach number of the free stream.
         mach: f64,
-        /// Half angle asked for.
+        /// The requested half angle.
         given_degrees: f64,
         /// Largest half angle with an attached shock.
         most_degrees: f64,
@@ -106,7 +106,7 @@ impl FreeStream {
         }
     }
 
-    /// Density, kg/m³, by the law of perfect gases.
+    /// Density, kg/m³, by the perfect gas law.
     pub fn density(&self) -> f64 {
         self.pressure_pa / (GAS_CONSTANT_AIR * self.temperature_k)
     }
@@ -116,14 +116,14 @@ fn check_gamma(gamma: f64) -> Result<(), GasError> {
     if gamma > 1.0 && gamma <= 2.0 { Ok(()) } else { Err(GasError::Gamma { gamma }) }
 }
 
-/// Gas and stream must make sense, and the stream be supersonic.
+/// Checks that the gas is valid and the stream supersonic.
 fn check_supersonic(gamma: f64, mach: f64) -> Result<(), GasError> {
     check_gamma(gamma)?;
     if mach.is_finite() && mach > 1.0 { Ok(()) } else { Err(GasError::Mach { mach, least: 1.0 }) }
 }
 
-/// The zero of a continuous `f` that changes its sign between `low` and `high` (in either order; it
-/// may be zero at `high`), to the last bit that bisection can tell.
+/// Finds the zero of a continuous `f` that changes sign between `low` and `high` (in either order;
+/// it may be zero at `high`), to the last bit that bisection resolves.
 fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let positive_at_low = f(low) > 0.0;
     loop {

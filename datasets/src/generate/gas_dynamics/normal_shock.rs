@@ -2,7 +2,7 @@
 
 use super::{GasError, check_gamma, isentropic};
 
-/// Ratios of the values behind a shock to those in front.
+/// Ratios of the values behind a shock to those in front of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
     /// Density.
@@ -11,14 +11,14 @@ pub struct Jump {
     pub pressure: f64,
     /// Temperature.
     pub temperature: f64,
-    /// Total pressure: the loss.
+    /// Total pressure, which measures the loss.
     pub total_pressure: f64,
-    /// Mach number behind the shock of the velocity component across it.
+    /// Mach number of the normal velocity component behind the shock.
     pub normal_mach_behind: f64,
 }
 
-/// The jump for a stream that hits the shock with `normal_mach` at right angles (NACA 1135 eq.
-/// 93-99). At exactly 1 it is no jump; below 1 there is no shock, which is an error.
+/// The jump for a stream that meets the shock at right angles with `normal_mach` (NACA 1135 eq.
+/// 93-99). At exactly 1 all ratios are 1. Below 1 there is no shock, which is an error.
 pub fn normal_shock(gamma: f64, normal_mach: f64) -> Result<Jump, GasError> {
     check_gamma(gamma)?;
     if !(normal_mach.is_finite() && normal_mach >= 1.0) {
@@ -27,7 +27,7 @@ pub fn normal_shock(gamma: f64, normal_mach: f64) -> Result<Jump, GasError> {
     Ok(jump(gamma, normal_mach))
 }
 
-/// [`normal_shock`] of arguments known to be right.
+/// [`normal_shock`] for arguments known to be valid.
 pub(crate) fn jump(gamma: f64, normal_mach: f64) -> Jump {
     let (g, m2) = (gamma, normal_mach * normal_mach);
     let density = (g + 1.0) * m2 / ((g - 1.0) * m2 + 2.0);
@@ -42,14 +42,14 @@ pub(crate) fn jump(gamma: f64, normal_mach: f64) -> Jump {
     }
 }
 
-/// Pressure where the gas comes to rest behind a normal shock, over the pressure in front:
-/// Rayleigh's pitot formula (NACA 1135 eq. 100).
+/// Stagnation pressure behind a normal shock, over the static pressure in front of it: Rayleigh's
+/// pitot formula (NACA 1135 eq. 100).
 pub fn pitot_pressure(gamma: f64, mach: f64) -> Result<f64, GasError> {
     let j = normal_shock(gamma, mach)?;
     Ok(j.pressure / isentropic::pressure(gamma, j.normal_mach_behind))
 }
 
-/// Density there, over the density in front.
+/// Stagnation density behind a normal shock, over the density in front of it.
 pub fn stagnation_density(gamma: f64, mach: f64) -> Result<f64, GasError> {
     let j = normal_shock(gamma, mach)?;
     Ok(j.density / isentropic::density(gamma, j.normal_mach_behind))

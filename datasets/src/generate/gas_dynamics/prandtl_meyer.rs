@@ -18,12 +18,12 @@ fn unchecked_angle_rad(gamma: f64, mach: f64) -> f64 {
     k * (b / k).atan() - b.atan()
 }
 
-/// The turn at which the gas has become a vacuum.
+/// The turning angle at which the gas expands to vacuum.
 pub fn largest_angle_rad(gamma: f64) -> f64 {
     (((gamma + 1.0) / (gamma - 1.0)).sqrt() - 1.0) * FRAC_PI_2
 }
 
-/// The Mach number after a stream of Mach 1 has turned by `angle`.
+/// The Mach number after a sonic stream has turned by `angle`.
 pub fn mach(gamma: f64, angle: f64) -> Result<f64, GasError> {
     super::check_gamma(gamma)?;
     let most = largest_angle_rad(gamma);
@@ -39,7 +39,7 @@ pub fn mach(gamma: f64, angle: f64) -> Result<f64, GasError> {
     while unchecked_angle_rad(gamma, high) <= angle {
         high *= 2.0;
         if high > 1e15 {
-            return Ok(high); // within rounding of the vacuum
+            return Ok(high); // within rounding of the vacuum limit
         }
     }
     Ok(bisect(1.0, high, |m| unchecked_angle_rad(gamma, m) - angle))

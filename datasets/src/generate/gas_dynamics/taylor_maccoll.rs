@@ -1,4 +1,5 @@
-//! Supersonic flow about a circular cone at zero incidence: constant on every cone about the axis.
+//! Supersonic flow about a circular cone at zero incidence, which is constant on every cone about
+//! the axis.
 //!
 //! G. I. Taylor and J. W. Maccoll, "The air pressure on a cone moving at high speeds", Proc. R.
 //! Soc. A 139, 1933. With velocities u (along the ray from the apex) and v (across it, towards
@@ -10,19 +11,19 @@
 //! ```
 //!
 //! integrated with RK4 from the shock (where the oblique jump gives u and v) towards the axis until
-//! v = 0, which is the cone. Steps are equal in ln tan(θ/2), so that slender cones, where the
-//! solution varies like ln θ, need no more care; behind weak shocks, where a - v² is nearly zero,
-//! they are shorter.
+//! v = 0, which is the cone's surface. Steps are equal in ln tan(θ/2), so slender cones, where the
+//! solution varies like ln θ, need no special treatment. Behind weak shocks, where a - v² is nearly
+//! zero, the steps are shorter.
 
 use super::normal_shock::{Jump, jump};
 use super::theta_beta_m::{deflection_rad, mach_angle_rad};
 use super::{GasError, bisect, check_supersonic, isentropic};
 use std::f64::consts::FRAC_PI_2;
 
-/// RK4 steps per unit of ln tan(θ/2); the shock angles of the golden table change in the eighth
-/// digit when halved.
+/// RK4 steps per unit of ln tan(θ/2). Halving it changes the shock angles of the golden table in
+/// the eighth digit.
 const STEPS_PER_UNIT: f64 = 500.0;
-/// Cones below this (0.006 degrees) count as no cone.
+/// Half angles below this (0.006 degrees) count as no cone.
 const LEAST_CONE_RAD: f64 = 1e-4;
 
 /// The flow between shock and cone.
@@ -38,7 +39,7 @@ pub struct ConeFlow {
     pub mach: f64,
     /// Ratios across the shock.
     pub jump: Jump,
-    /// From the shock to the cone.
+    /// Samples from the shock to the cone.
     samples: Vec<Sample>,
 }
 
@@ -60,11 +61,11 @@ pub struct ConeState {
     pub pressure: f64,
     /// Temperature.
     pub temperature: f64,
-    /// Velocity along and across the axis (outwards), over the free stream's.
+    /// Velocity along the axis and away from it, over that of the free stream.
     pub velocity: [f64; 2],
 }
 
-/// The flow about a cone of half angle `cone_rad`, on the weak branch, which is the one in
+/// The flow about a cone of half angle `cone_rad`, on the weak branch, which is observed in
 /// experiments.
 pub fn cone_flow(gamma: f64, mach: f64, cone_rad: f64) -> Result<ConeFlow, GasError> {
     check_supersonic(gamma, mach)?;
@@ -97,7 +98,7 @@ pub fn cone_flow(gamma: f64, mach: f64, cone_rad: f64) -> Result<ConeFlow, GasEr
 /// The largest half angle of a cone with an attached shock, and that shock's angle.
 pub fn detachment(gamma: f64, mach: f64) -> Result<(f64, f64), GasError> {
     check_supersonic(gamma, mach)?;
-    // Golden-section search: the cone's angle has one maximum over the shock's.
+    // Golden-section search: the cone angle has a single maximum as a function of the shock angle.
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     let (mut low, mut high) = (mach_angle_rad(mach), FRAC_PI_2);
     while high - low > 1e-7 {
@@ -141,8 +142,8 @@ impl ConeFlow {
         }
     }
 
-    /// Cubic Hermite interpolation between the integrator's steps, whose derivatives the equation
-    /// gives.
+    /// Cubic Hermite interpolation between the integrator's steps; the differential equation gives
+    /// the derivatives.
     fn velocity(&self, angle_rad: f64) -> [f64; 2] {
         let i = self
             .samples
@@ -170,7 +171,7 @@ fn derivative(gamma: f64, angle_rad: f64, [u, v]: [f64; 2]) -> [f64; 2] {
     [v, (u * v * v - a * (2.0 * u + v / angle_rad.tan())) / (a - v * v)]
 }
 
-/// The step (in s, towards the axis) that changes (a - v²)² by 4 % at most, or the usual one where
+/// The step (in s, towards the axis) that changes (a - v²)² by at most 4 %, or the usual step where
 /// that is longer. Zero behind a Mach wave.
 fn step_at(gamma: f64, now: Sample) -> f64 {
     let [u, v] = now.velocity;
@@ -199,8 +200,8 @@ fn rk4(gamma: f64, from: Sample, step: f64) -> Sample {
     Sample { angle_rad: end[0], velocity: [end[1], end[2]] }
 }
 
-/// Integrates from the shock to the cone with steps divided by `refinement`, and tells every step
-/// to `keep`; returns the cone's angle.
+/// Integrates from the shock to the cone with steps divided by `refinement`, and passes every step
+/// to `keep`. Returns the cone's angle.
 fn integrate(
     gamma: f64,
     mach: f64,
@@ -224,7 +225,7 @@ fn integrate(
         }
         let next = rk4(gamma, now, step);
         if next.velocity[1] >= 0.0 {
-            // The part of the step after which v = 0.
+            // The fraction of the step after which v = 0.
             let part = bisect(0.0, step, |h| rk4(gamma, now, h).velocity[1]);
             let end = rk4(gamma, now, part);
             keep(end);
@@ -261,7 +262,7 @@ mod tests {
         let surface = flow.state(flow.cone_rad);
         assert!((surface.mach - 1.834).abs() < 2e-3, "{}", surface.mach);
         assert!((surface.pressure - 1.292).abs() < 2e-3, "{}", surface.pressure);
-        // Slip: the stream follows the surface.
+        // Slip condition: the stream follows the surface.
         let [along, across] = surface.velocity;
         assert!((across.atan2(along) - flow.cone_rad).abs() < 1e-9);
     }

@@ -4,21 +4,21 @@ use super::normal_shock::{Jump, jump};
 use super::{GasError, bisect, check_supersonic};
 use std::f64::consts::FRAC_PI_2;
 
-/// Which of the two shocks that turn the stream by the same angle.
+/// Selects one of the two shocks that turn the stream by the same angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Branch {
-    /// The flatter one, which wedges have.
+    /// The shallower shock, which wedges have.
     Weak,
-    /// The steeper one, with subsonic flow behind it.
+    /// The steeper shock, with subsonic flow behind it.
     Strong,
 }
 
 /// An oblique shock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObliqueShock {
-    /// Between stream and shock.
+    /// Angle between stream and shock.
     pub shock_rad: f64,
-    /// By how much the stream turns.
+    /// Angle by which the stream turns.
     pub deflection_rad: f64,
     /// Ratios across it.
     pub jump: Jump,
@@ -36,7 +36,7 @@ pub fn deflection_rad(gamma: f64, mach: f64, shock_rad: f64) -> f64 {
     (numerator / (s * (m2 * (gamma + (2.0 * shock_rad).cos()) + 2.0))).atan()
 }
 
-/// The Mach angle: that of a shock of no strength.
+/// The Mach angle, which is the angle of an infinitely weak shock.
 pub fn mach_angle_rad(mach: f64) -> f64 {
     (1.0 / mach).asin()
 }
@@ -50,12 +50,12 @@ pub fn detachment(gamma: f64, mach: f64) -> Result<(f64, f64), GasError> {
     Ok((deflection_rad(gamma, mach, shock), shock))
 }
 
-/// Angle of the shock that turns the stream by `deflection_rad`. For no deflection it is the Mach
-/// angle (weak) or 90 degrees (strong).
+/// Angle of the shock that turns the stream by `deflection_rad`. For zero deflection, it is the
+/// Mach angle (weak) or 90 degrees (strong).
 ///
-/// Found by bisection between Mach angle, detachment and 90 degrees, on each of which θ(β) is
-/// monotonic. The cubic in tan β has a closed form, but that loses all digits for small deflections
-/// (0/0); a test compares the two.
+/// Found by bisection between Mach angle and detachment, or between detachment and 90 degrees; θ(β)
+/// is monotonic on each interval. The cubic in tan β has a closed form, but it loses all digits for
+/// small deflections (0/0). A test compares both.
 pub fn shock_angle_rad(
     gamma: f64,
     mach: f64,
@@ -89,7 +89,7 @@ pub fn shock_angle_rad(
     Ok(bisect(none, at_most, |shock| deflection_rad(gamma, mach, shock) - deflection))
 }
 
-/// The whole shock of a wedge of half angle `deflection`.
+/// The oblique shock of a wedge of half angle `deflection`.
 pub fn oblique_shock(
     gamma: f64,
     mach: f64,
