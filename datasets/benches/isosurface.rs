@@ -1,4 +1,4 @@
-//! How long contouring takes: counting alone, positions and triangles, and normals on top.
+//! Measures contouring: counting alone, positions and triangles, and additional normals.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use datasets::generate::nested_wavelet::{POINTS, Size};

@@ -1,6 +1,6 @@
-//! Writes the middle slices of a flow's fields as PNG, grey from the field's smallest to its
-//! largest value, magenta where there is none: `cargo run --release -p datasets --example
-//! flow_slices -- helium-plume small DIRECTORY`.
+//! Writes the middle slices of a flow's fields as PNG, grey from the field's minimum to its
+//! maximum, magenta where there is no value: `cargo run --release -p datasets --example flow_slices
+//! -- helium-plume small DIRECTORY`.
 
 use datasets::catalogue::flows::find;
 use datasets::generate::flow::{Fields, Flow};
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The slice across `axis` in the middle; z, or else y, is up.
+/// The slice across `axis` in the middle; z is up, or y for a slice across z.
 fn slice(flow: &Flow, field: &str, axis: usize) -> Result<Picture, Box<dyn std::error::Error>> {
     let grid = flow.grid(field).ok_or("no such field")?;
     let (low, high) = grid.range().ok_or("no values")?;
@@ -46,7 +46,7 @@ fn slice(flow: &Flow, field: &str, axis: usize) -> Result<Picture, Box<dyn std::
         }
     }
     let mut picture = Picture::new(dims[across], dims[up]);
-    // Looks linear on a screen.
+    // Invert the display's gamma, so that the grey levels appear linear.
     let linear: Vec<f32> = values.iter().map(|v| v.powf(2.2)).collect();
     for channel in ["R", "G", "B"] {
         picture.add(channel, "1", linear.clone())?;

@@ -1,7 +1,7 @@
-//! From the two OpenFOAM cases of `datasets/openfoam` to files for schlieren pictures:
+//! Converts the two OpenFOAM cases of `datasets/openfoam` to files for schlieren images:
 //!
 //! * `openfoam_slice slice internal.vtu cone20_mach3/slice.vts`: the cells that foamToVTK writes as
-//!   a lattice, density and temperature only, compressed;
+//!   a lattice, with density and temperature only, compressed;
 //! * `openfoam_slice revolve slice.vts 128 cone.vti`, `openfoam_slice extrude slice.vts 128
 //!   wedge.vti`: the whole flow.
 
@@ -57,8 +57,8 @@ fn dataset(path: &str) -> Result<Dataset, Failure> {
     Ok(open(path)?.dataset()?.clone())
 }
 
-/// blockMesh numbers cells by block, then across, x fastest. Cells are checked to be where that
-/// puts them.
+/// blockMesh numbers cells by block, then across, x fastest. The positions of the cells are checked
+/// against this order.
 fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
     let nx: usize = BLOCKS.iter().sum();
     // A plane mesh has two layers of points at constant z; an axisymmetric one is a wedge, whose
@@ -74,7 +74,7 @@ fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
             .sum();
         sum / ids.len() as f64
     };
-    // The body's height: from the lowest cells above the afterbody, whose middle is half a cell
+    // The body's height, from the lowest cells above the afterbody, whose centres are half a cell
     // above it.
     let flat = middle(ACROSS * (BLOCKS[0] + BLOCKS[1])).y;
     let half_cell = (TOP_M - flat) / (2 * ACROSS - 1) as f64;
@@ -101,7 +101,7 @@ fn slice(cells: &UnstructuredGrid) -> Result<Dataset, Failure> {
                 let expected =
                     corners.map(|p| DVec2::new(p[0] as f64, p[1] as f64)).iter().sum::<DVec2>()
                         / 4.0;
-                // Collapsed cells at the axis have their mean elsewhere.
+                // The centres of collapsed cells at the axis differ more.
                 let tolerance = if j == 0 { 2e-4 } else { 1e-5 };
                 if middle(cell).distance(expected) > tolerance {
                     return Err(format!(

@@ -3,8 +3,9 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes a file under a temporary name in the directory of `path` and renames it, so that neither
-/// a crash nor a second process leaves or reads an incomplete file. `write` gets a buffered writer.
+/// Writes a file under a temporary name in the directory of `path` and renames it. Neither a crash
+/// nor a second process can then leave or read an incomplete file. `write` receives a buffered
+/// writer.
 pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -12,7 +13,7 @@ pub(crate) fn write_atomically(
     let name = path
         .file_name()
         .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
-    // The process id keeps two processes that write the same file apart; the last one to finish
+    // The process id distinguishes two processes that write the same file; the last one to finish
     // wins.
     let mut temporary_name = name.to_os_string();
     temporary_name.push(format!(".{}.partial", std::process::id()));
@@ -24,8 +25,7 @@ pub(crate) fn write_atomically(
         std::fs::rename(&temporary, path)
     })();
     if result.is_err() {
-        // The first error is the one to report; a leftover that cannot be removed changes nothing
-        // about it.
+        // Report the first error; a failure to remove the leftover file does not change it.
         let _ = std::fs::remove_file(&temporary);
     }
     result

@@ -1,9 +1,10 @@
-//! Caches generated meshes on disk, so that a benchmark generates its 300 million triangles once.
+//! Caches generated meshes on disk, so that a benchmark generates its 300 million triangles only
+//! once.
 //!
 //! The directory is `RTSV_CACHE`, else `rtsv` in the user's cache directory (`XDG_CACHE_HOME`, else
-//! `~/.cache`). Files may be deleted at any time. A file that is damaged, of another version or of
-//! another machine's byte order is regenerated, and this is reported to the caller. A full disk
-//! prevents caching but does not lose the mesh.
+//! `~/.cache`). Files may be deleted at any time. A file that is damaged, or has another version or
+//! byte order, is regenerated and reported to the caller. A full disk prevents caching but does not
+//! lose the mesh.
 //!
 //! ```
 //! use datasets::cache::{MeshCache, Origin};
@@ -38,20 +39,21 @@ pub struct MeshCache {
 pub struct CachedMesh {
     /// The mesh.
     pub mesh: TriMesh,
-    /// Where it comes from.
+    /// Source of the mesh.
     pub origin: Origin,
-    /// Why the mesh could not be stored for the next time, if so.
+    /// Why the mesh could not be stored, if storing failed.
     pub not_stored: Option<String>,
 }
 
-/// Where a mesh comes from.
+/// Source of a mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
-    /// From the file.
+    /// Read from the file.
     Read,
-    /// There was no file.
+    /// Generated because there was no file.
     Generated,
-    /// There was a file that could not be used; the reason names it. Tell the user.
+    /// Generated because the file could not be used, for the given reason. Callers should report
+    /// it.
     Regenerated(String),
 }
 
@@ -66,15 +68,15 @@ impl Display for Origin {
 }
 
 impl MeshCache {
-    /// The cache in `directory`, which is created when first needed.
+    /// The cache in `directory`, which is created on first use.
     pub fn at(directory: impl Into<PathBuf>) -> Self {
         MeshCache { directory: directory.into() }
     }
 
-    /// The user's cache, as the module's documentation says. `None` when the environment names no
-    /// place for it (neither `RTSV_CACHE` nor `XDG_CACHE_HOME` nor `HOME` is set).
+    /// The user's cache, as described in the module's documentation. `None` when the environment
+    /// names no directory (neither `RTSV_CACHE` nor `XDG_CACHE_HOME` nor `HOME` is set).
     pub fn from_environment() -> Option<Self> {
-        // Empty variables count as unset, as the XDG specification wants.
+        // Empty variables count as unset, as the XDG specification requires.
         let variable =
             |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
         variable("RTSV_CACHE")
@@ -89,14 +91,15 @@ impl MeshCache {
     pub fn path(&self, key: &str) -> PathBuf {
         let safe = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
         let readable: String = key.chars().take(80).map(safe).collect();
-        // The checksum keeps keys apart that look the same after replacement.
+        // The checksum distinguishes keys that look the same after the replacement of characters.
         let mut crc = flate2::Crc::new();
         crc.update(key.as_bytes());
         self.directory.join(format!("{readable}-{:08x}-v{}.mesh", crc.sum(), format::VERSION))
     }
 
-    /// The mesh of `key`: read when it is there and whole, else generated and stored. `key` must
-    /// name everything that the mesh depends on (generator, parameters, attributes).
+    /// Returns the mesh of `key`: read from the file if it exists and is intact, else generated and
+    /// stored. `key` must name everything that determines the mesh (generator, parameters,
+    /// attributes).
     pub fn mesh<E>(
         &self,
         key: &str,
@@ -118,7 +121,7 @@ impl MeshCache {
     }
 }
 
-/// `None` when there is no such file.
+/// Returns `None` when the file does not exist.
 fn read(path: &Path, key: &str) -> Result<Option<TriMesh>, String> {
     let file = match File::open(path) {
         Ok(file) => file,

@@ -1,5 +1,5 @@
 //! Data sets by name, with their sizes, their views and the figure of the thesis that each
-//! represents. Meshes and lines are here, flows in [`flows`].
+//! represents. This module has the meshes and lines, [`flows`] the flows.
 //!
 //! ```
 //! use datasets::catalogue::{Data, find};
@@ -27,7 +27,7 @@ use glam::DVec3;
 use rt_core::mesh::TriMesh;
 use std::cell::Cell;
 
-/// All data sets of the catalogue use this seed; the generators take any.
+/// Seed of all data sets of the catalogue; the generators accept any.
 const SEED: u64 = 1;
 
 /// A named data set.
@@ -37,7 +37,7 @@ pub struct Entry {
     pub name: &'static str,
     /// What it shows.
     pub description: &'static str,
-    /// Where the thesis has it.
+    /// Where the data set appears in the thesis.
     pub thesis: &'static str,
     /// Sizes, ascending.
     pub sizes: &'static [EntrySize],
@@ -51,13 +51,13 @@ pub struct EntrySize {
     pub name: &'static str,
     /// The generator's parameter: points per axis, lines, subdivision level…
     pub parameter: u32,
-    /// Number of triangles, or of tube segments for lines: exact for the wavelet and the shapes,
-    /// measured and rounded elsewhere, and extrapolated for the `thesis` sizes of mixing-layer and
+    /// Number of triangles, or of tube segments for lines. Exact for the wavelet and the shapes;
+    /// measured and rounded for the others; extrapolated for the `thesis` sizes of mixing-layer and
     /// plasma.
     pub elements: u64,
 }
 
-/// What a generator makes.
+/// Output of a generator.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Data {
     /// Triangles.
@@ -66,34 +66,34 @@ pub enum Data {
     Lines(Polylines),
 }
 
-/// Why a data set cannot be had.
+/// Why a data set cannot be generated.
 #[derive(Debug, thiserror::Error)]
 pub enum CatalogueError {
-    /// No such name.
+    /// No data set has this name.
     #[error("no data set is called `{name}`; there are: {known}")]
     UnknownName {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// All names.
         known: String,
     },
-    /// No such size.
+    /// The data set does not have this size.
     #[error("{name} has no size `{size}`; it has: {known}")]
     UnknownSize {
         /// The data set.
         name: &'static str,
-        /// The size asked for.
+        /// The requested size.
         size: String,
         /// All its sizes.
         known: String,
     },
-    /// It is not made of triangles.
+    /// The data set is not made of triangles.
     #[error("{name} consists of lines, not triangles; ask for its lines (Entry::generate)")]
     NotAMesh {
         /// The data set.
         name: &'static str,
     },
-    /// The caller's progress function said stop.
+    /// The caller's progress function stopped the work.
     #[error("stopped while generating {name}")]
     Stopped {
         /// The data set.
@@ -110,7 +110,7 @@ pub enum CatalogueError {
     Flow(#[from] FlowError),
 }
 
-/// Told how many steps of how many are done; returning false stops the work.
+/// Called with the number of finished steps and the total; returning false stops the work.
 pub type Progress<'a> = &'a mut dyn FnMut(usize, usize) -> bool;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -260,13 +260,13 @@ impl Entry {
         })
     }
 
-    /// Whether it consists of lines and not of triangles.
+    /// Whether the data set consists of lines rather than triangles.
     pub fn is_lines(&self) -> bool {
         matches!(self.source, Source::PlasmaTubes | Source::Star)
     }
 
-    /// Generates the data set. `options` adds normals and scalars to isosurfaces; other shapes have
-    /// what they have.
+    /// Generates the data set. `options` adds normals and scalars to isosurfaces and has no effect
+    /// on other shapes.
     pub fn generate(
         &self,
         size: &str,
@@ -307,11 +307,11 @@ impl Entry {
                 Data::Mesh(shapes::closed_wavelet(parameter, 157.0909652709961)?)
             }
         };
-        // Half a data set would look like a whole one.
+        // An incomplete data set must not be mistaken for a complete one.
         if stopped.get() { Err(CatalogueError::Stopped { name: self.name }) } else { Ok(data) }
     }
 
-    /// The data set as a mesh through the cache.
+    /// The data set as a mesh, generated or read through the cache.
     pub fn mesh(
         &self,
         size: &str,
@@ -333,11 +333,11 @@ impl Entry {
         })
     }
 
-    /// The views that the data set is known by; the first is the whole.
+    /// Standard views of the data set; the first shows all of it.
     pub fn views(&self) -> Vec<View> {
         match self.source {
-            // ParaView's first camera for the wavelet, raised by 20 degrees as in the measurements
-            // with VTK.
+            // ParaView's initial camera for the wavelet, raised by 20 degrees as in the
+            // measurements with VTK.
             Source::Wavelet => {
                 let (s, c) = 20f64.to_radians().sin_cos();
                 vec![

@@ -1,4 +1,4 @@
-//! Implements the conventions that all command-line programs of the workspace share.
+//! Conventions that all command-line programs of the workspace share.
 //!
 //! * Results go to stdout (as text, or as JSON with `--json`); progress, notes and errors go to
 //!   stderr.
@@ -40,17 +40,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
-/// How a program ended; the numbers are its exit code.
+/// Exit status of a program; the number is its exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Status {
-    /// All was done.
+    /// The program did all its work.
     Success = 0,
-    /// Something could not be done; stderr says what.
+    /// Part of the work failed; stderr says what.
     Failure = 1,
-    /// The command line makes no sense; nothing was done.
+    /// The command line is invalid; nothing was done.
     Usage = 2,
-    /// Ctrl-C came; what was finished before is kept.
+    /// Ctrl-C stopped the program; finished results are kept.
     Interrupted = 130,
 }
 
@@ -81,7 +81,7 @@ pub struct CommonArgs {
 }
 
 impl CommonArgs {
-    /// Prints a result to stdout: `value` as a line of JSON with `--json`, else the text.
+    /// Prints a result to stdout: `value` as a line of JSON with `--json`, otherwise the text.
     pub fn result<D: Display>(
         &self,
         value: &impl serde::Serialize,
@@ -97,22 +97,23 @@ impl CommonArgs {
         Ok(())
     }
 
-    /// A note for the person in front of the terminal, with `level` 0 for all but `--quiet`, 1 from
-    /// `-v`, 2 from `-vv`.
+    /// Prints a note for the user. `level` 0 is shown unless `--quiet` is set, 1 with `-v`, 2 with
+    /// `-vv`.
     pub fn note(&self, level: u8, text: impl Display) {
         if !self.quiet && self.verbose >= level {
             to_stderr(format_args!("{text}"));
         }
     }
 
-    /// Something that may surprise; printed even with `--quiet`.
+    /// Prints a warning, even with `--quiet`.
     pub fn warn(&self, text: impl Display) {
         to_stderr(format_args!("warning: {text}"));
     }
 
     /// A progress bar on stderr over `total` steps of `what`; invisible with `--quiet` or when
-    /// stderr is no terminal ([`ProgressBar::is_hidden`]). Dropping it removes it from the screen.
-    /// One at a time: notes, warnings and results are printed above the one made last.
+    /// stderr is not a terminal ([`ProgressBar::is_hidden`]). Dropping the bar removes it from the
+    /// screen. Use one at a time: notes, warnings and results are printed above the most recent
+    /// one.
     pub fn progress(&self, total: u64, what: &str) -> ProgressBar {
         let visible = !self.quiet && io::stderr().is_terminal();
         let target =
@@ -124,7 +125,7 @@ impl CommonArgs {
         bar.set_message(what.to_string());
         let bar = bar.with_finish(indicatif::ProgressFinish::AndClear);
         if visible {
-            // The clock goes on during long steps.
+            // Keep the elapsed time running during long steps.
             bar.enable_steady_tick(Duration::from_millis(500));
             if let Ok(mut last) = VISIBLE_BAR.lock() {
                 *last = Some(bar.downgrade());
@@ -135,21 +136,21 @@ impl CommonArgs {
 }
 
 /// Runs a program: prints its error, if any, and turns the outcome into the exit code. Parse
-/// arguments *inside* `work` with [`clap::Parser::try_parse`], so that wrong usage ends up here as
-/// well.
+/// arguments *inside* `work` with [`clap::Parser::try_parse`], so that usage errors are handled
+/// here as well.
 pub fn run_main<S: Into<Status>>(work: impl FnOnce() -> anyhow::Result<S>) -> ExitCode {
     status_of(work().map(Into::into)).into()
 }
 
-/// What [`run_main`] does, with the status visible.
+/// Does the work of [`run_main`] and returns the status.
 pub fn status_of(outcome: anyhow::Result<Status>) -> Status {
     let error = match outcome {
         Ok(status) => return status,
         Err(error) => error,
     };
     if let Some(usage) = error.downcast_ref::<clap::Error>() {
-        // `--help` and `--version` are such errors, too: clap knows where they are printed. When
-        // even that fails there is nobody left to tell.
+        // `--help` and `--version` are also such errors; clap knows where to print them. A failure
+        // to print cannot be reported anywhere.
         let _ = usage.print();
         return if usage.use_stderr() { Status::Usage } else { Status::Success };
     }
@@ -185,7 +186,7 @@ pub fn report(error: &anyhow::Error) -> String {
     text
 }
 
-/// A mistake on the command line that clap cannot see: exit code 2.
+/// A command-line error that clap cannot detect: exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct UsageError(pub String);
@@ -199,9 +200,9 @@ impl Display for Cure {
     }
 }
 
-/// Adds what the user can do about an error.
+/// Adds advice for the user to an error.
 pub trait CureExt<T> {
-    /// `text` is printed after the error as its cure.
+    /// Adds `text`, which is printed after the error as its cure.
     fn cure(self, text: impl Display) -> anyhow::Result<T>;
 }
 
@@ -214,23 +215,23 @@ where
     }
 }
 
-/// The work was stopped by Ctrl-C.
+/// Ctrl-C stopped the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted; what was finished is kept")]
 pub struct Interrupted;
 
-/// A flag that Ctrl-C sets, and TERM and HUP, too. Long work looks at it at good places to stop.
+/// A flag that Ctrl-C, TERM and HUP set. Long work checks it where it can stop safely.
 #[derive(Debug, Clone, Copy)]
 pub struct Cancel(&'static Arc<AtomicBool>);
 
 impl Cancel {
-    /// Installs the Ctrl-C handler (once a process; later calls give the same flag). The second
+    /// Installs the Ctrl-C handler (once per process; later calls return the same flag). The second
     /// Ctrl-C ends the program.
     pub fn on_ctrl_c() -> anyhow::Result<Cancel> {
         static CANCELLED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
         static INSTALLED: OnceLock<Result<(), String>> = OnceLock::new();
         let flag = CANCELLED.get_or_init(Arc::default);
-        // A second Ctrl-C means now: the only place that leaves without returning to the main
+        // A second Ctrl-C exits at once. No other place leaves without returning to the main
         // function.
         let handler = || {
             if flag.swap(true, Ordering::SeqCst) {
@@ -247,7 +248,7 @@ impl Cancel {
         Ok(Cancel(flag))
     }
 
-    /// Whether Ctrl-C (or a TERM, as batch systems send) came.
+    /// Whether Ctrl-C was pressed or TERM received (as batch systems send it).
     pub fn is_set(self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -257,7 +258,7 @@ impl Cancel {
         self.0
     }
 
-    /// [`Interrupted`] as an error after Ctrl-C, for use with `?`.
+    /// Returns [`Interrupted`] as an error after Ctrl-C, for use with `?`.
     pub fn check(self) -> Result<(), Interrupted> {
         if self.is_set() { Err(Interrupted) } else { Ok(()) }
     }
@@ -275,7 +276,7 @@ impl CompletionsArgs {
     pub fn print<C: clap::CommandFactory>(&self) -> anyhow::Result<()> {
         let mut command = C::command();
         let name = command.get_name().to_string();
-        // Into memory first: the generator panics when it cannot write.
+        // Generate into memory first: the generator panics when it cannot write.
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut command, name, &mut script);
         io::stdout().lock().write_all(&script)?;
@@ -283,10 +284,10 @@ impl CompletionsArgs {
     }
 }
 
-/// The bar that may be on the screen.
+/// The progress bar that may be on the screen.
 static VISIBLE_BAR: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
-/// Prints with the progress bar out of the way.
+/// Hides the progress bar while `print` runs.
 fn above_progress_bar<T>(print: impl FnOnce() -> T) -> T {
     let bar = VISIBLE_BAR.lock().ok().and_then(|last| last.as_ref()?.upgrade());
     match bar {

@@ -51,7 +51,7 @@ pub fn cool_warm(range: [f32; 2]) -> ColorMap {
     )
 }
 
-/// Black to white in equal steps of sRGB (which are about equal steps for the eye).
+/// Black to white in equal steps of sRGB (which are approximately perceptually uniform).
 pub fn grey(range: [f32; 2]) -> ColorMap {
     ColorMap::new((0..256).map(|i| opaque([i as f32 / 255.0; 3])).collect(), range)
 }
@@ -64,8 +64,8 @@ fn opaque(srgb: [f32; 3]) -> Rgba {
 // Moreland's Msh space: polar coordinates of CIELAB. M is the magnitude, s the angle from the
 // lightness axis (saturation), h the hue.
 
-/// Between two saturated ends, through an unsaturated middle of magnitude 88 (Moreland 2009, figure
-/// 6).
+/// Interpolates between two saturated ends through an unsaturated middle of magnitude 88 (Moreland
+/// 2009, figure 6).
 fn diverging([a, b]: [[f64; 3]; 2], t: f64) -> [f64; 3] {
     let middle = a[0].max(b[0]).max(88.0);
     let (from, to, t) = if t < 0.5 {
@@ -76,7 +76,7 @@ fn diverging([a, b]: [[f64; 3]; 2], t: f64) -> [f64; 3] {
     srgb_from_msh([0, 1, 2].map(|c| from[c] + (to[c] - from[c]) * t))
 }
 
-/// Hue at the unsaturated end that makes the way there look straight (Moreland 2009, figure 5).
+/// Hue at the unsaturated end that makes the interpolation look straight (Moreland 2009, figure 5).
 fn adjusted_hue([m, s, h]: [f64; 3], unsaturated_m: f64) -> f64 {
     if m >= unsaturated_m {
         return h;
@@ -85,7 +85,7 @@ fn adjusted_hue([m, s, h]: [f64; 3], unsaturated_m: f64) -> f64 {
     if h > -std::f64::consts::FRAC_PI_3 { h + spin } else { h - spin }
 }
 
-/// White point D65, as the paper's supplement has it.
+/// White point D65, with the values of the paper's supplement.
 const WHITE: [f64; 3] = [0.9505, 1.0, 1.089];
 
 fn msh_from_srgb(srgb: [f64; 3]) -> [f64; 3] {
@@ -186,7 +186,8 @@ mod tests {
         for name in ["viridis", "grey"] {
             let map = by_name(name, [0.0, 1.0]).unwrap();
             let luminance = |c: &Rgba| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
-            // The table's rounding to 8 bits may take back half a code (0.002 in bright green).
+            // The table's rounding to 8 bits may reduce the value by half a code (0.002 in bright
+            // green).
             let falls = map
                 .colors
                 .windows(2)

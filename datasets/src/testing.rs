@@ -1,4 +1,4 @@
-//! Helpers that the tests of several modules share.
+//! Helpers shared by the tests of several modules.
 
 use rayon::ThreadPoolBuilder;
 use std::collections::HashMap;
@@ -12,13 +12,13 @@ pub(crate) fn crc32_f32(values: &[f32]) -> u32 {
     crc.sum()
 }
 
-/// Runs `f` on a pool of its own with exactly `threads` threads.
+/// Runs `f` in a thread pool with exactly `threads` threads.
 pub(crate) fn with_threads<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
     ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool").install(f)
 }
 
-/// How often each directed edge occurs; a closed, consistently oriented surface has each edge once
-/// per direction.
+/// Counts edges that are not used exactly once in each direction; zero for a closed, consistently
+/// oriented surface.
 pub(crate) fn open_or_flipped_edges(indices: &[[u32; 3]]) -> usize {
     let mut balance: HashMap<(u32, u32), (u32, u32)> = HashMap::new();
     for t in indices {
@@ -38,7 +38,7 @@ pub(crate) fn volume(mesh: &rt_core::mesh::TriMesh) -> f64 {
     t.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
-/// Number of connected pieces of a mesh.
+/// Number of connected components of a mesh.
 pub(crate) fn pieces(indices: &[[u32; 3]]) -> usize {
     fn root(parent: &mut HashMap<u32, u32>, mut v: u32) -> u32 {
         while let Some(&p) = parent.get(&v) {
@@ -52,8 +52,8 @@ pub(crate) fn pieces(indices: &[[u32; 3]]) -> usize {
         for e in 0..2 {
             let (a, b) = (root(&mut parent, t[e]), root(&mut parent, t[e + 1]));
             if a != b {
-                // Towards the smaller id: ids grow along the surface, so that chains stay short
-                // enough for tests.
+                // Link to the smaller id: ids grow along the surface, so chains stay short enough
+                // for tests.
                 parent.insert(a.max(b), a.min(b));
             }
         }

@@ -5,7 +5,7 @@ use glam::DVec3;
 /// A pinhole camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// Short and unique within its data set.
+    /// Short name, unique within its data set.
     pub name: String,
     /// World position of the camera.
     pub eye: DVec3,

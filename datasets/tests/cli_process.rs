@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 const MODE: &str = "RTSV_TEST_CLI_CHILD";
 
-/// Not a test of its own: what the child processes run (this test binary again, with `MODE` set).
+/// Not a test: the code of the child processes (this test binary, with `MODE` set).
 #[test]
 fn child() {
     let Ok(mode) = std::env::var(MODE) else { return };
@@ -54,7 +54,7 @@ fn interrupt(child: &Child) {
     );
 }
 
-/// Waits for a line of the child; the test harness prints lines of its own before.
+/// Waits for a line of the child, skipping lines of the test harness.
 fn wait_for(expected: &str, child: &mut Child) -> BufReader<std::process::ChildStdout> {
     let mut out = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
@@ -92,7 +92,7 @@ fn second_ctrl_c_ends_a_program_that_does_not_listen() {
     let mut child = start("deaf");
     let _out = wait_for("\"ready\"", &mut child);
     interrupt(&child);
-    // Signals that come together are merged into one: wait until the first was noticed.
+    // Pending signals of the same kind are merged: wait until the first one was handled.
     let mut line = String::new();
     BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
     interrupt(&child);

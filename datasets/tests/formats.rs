@@ -1,4 +1,4 @@
-//! What each format means, on small files whose content is known.
+//! Interpretation of each format, tested with small files of known content.
 
 mod sample_files;
 
@@ -71,7 +71,7 @@ fn plot3d_layouts_are_told_apart_by_size() {
                         let Dataset::StructuredGrid(g) = leaf else { panic!() };
                         check_block(g, blocks[b], b, iblank);
                     }
-                    // Naming the solution finds the grid.
+                    // Opening the solution finds the grid.
                     assert_eq!(data(open(dir.path().join("flowq.bin")).unwrap()), d);
                 }
             }
@@ -121,8 +121,8 @@ fn plot3d_solution_of_another_grid_is_refused() {
     assert!(e.contains("[4, 2, 3]") && e.contains("[4, 3, 2]"), "{e}");
 }
 
-/// The real data set, on machines that have it: `RTSV_BLUNT_FIN` names bluntfinxyz.bin with
-/// bluntfinq.bin beside it.
+/// The real data set, on machines that have it: `RTSV_BLUNT_FIN` names bluntfinxyz.bin, with
+/// bluntfinq.bin in the same directory.
 #[test]
 fn blunt_fin_has_its_known_free_stream_and_shock() {
     let Some(path) = std::env::var_os("RTSV_BLUNT_FIN") else {
@@ -255,8 +255,7 @@ fn obj_concave_faces_materials_and_far_coordinates() {
     assert_eq!((m.base_color, m.ior), ([1.0, 0.0, 0.0, 0.5], 1.33));
     assert!((m.roughness - 0.02f32.powf(0.25)).abs() < 1e-6);
 
-    // The five corners make an arrow head, whose inner corner a fan would cover from outside:
-    // area 3.
+    // The five corners form an arrow head. A fan would cover area outside its inner corner: area 3.
     let o = opened("b.obj", sample_files::OBJ.as_bytes());
     assert!(
         o.warnings.iter().any(|w| w.contains("none.mtl"))
@@ -276,7 +275,7 @@ fn obj_concave_faces_materials_and_far_coordinates() {
     );
     assert!(mesh.normals.is_some() && mesh.texcoords.is_some() && mesh.colors.is_some());
 
-    // Millimetres at six thousand kilometres.
+    // Millimetres at a distance of six thousand kilometres.
     let far = "v 6000000.001 0 0\nv 6000000.002 0 0\nv 6000000.001 0.001 0\nf 1 2 3\n";
     let mesh = scene(opened("c.obj", far.as_bytes())).meshes.remove(0).mesh;
     let [a, b, _] = mesh.triangle(0).map(|p| p.as_dvec3());
@@ -305,7 +304,7 @@ fn gltf_transforms_turn_mirrored_triangles_back() {
     }
 }
 
-/// A triangle with every kind of picture; `alpha` is what the material says of that.
+/// A triangle with every kind of texture; `alpha` is the material's alpha mode.
 fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> LoadedFile {
     let mut bytes: Vec<u8> = Vec::new();
     let mut floats = |values: &[f32]| values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
@@ -377,7 +376,7 @@ fn gltf_materials_have_all_their_pictures_and_samplers() {
     assert_eq!(m.emissive_texture, None);
     let told = |what: &str| warnings.iter().any(|w| w.contains(what));
     assert!(warnings.len() == 2 && told("gone.png") && told("KHR_materials_sheen"), "{warnings:?}");
-    // The mirror turns tangents and the sense of their frame.
+    // The reflection transforms tangents and reverses the handedness of their frame.
     assert_eq!(
         s.meshes[0].mesh.tangents.as_ref().unwrap()[0],
         glam::Vec4::new(-1.0, 0.0, 0.0, -1.0)
@@ -499,7 +498,7 @@ fn far_meshes_survive_ply_and_vtp() {
         let s = again.scalars.unwrap().values;
         assert!(s[0] == 1.0 && s[1].is_nan() && s[2] == 3.0);
     }
-    // VTK cannot read NaN from text: refused with the cure, and no half file is left.
+    // VTK cannot read NaN from text: the writer rejects it with a cure, and leaves no partial file.
     let text = dir.path().join("b.vtp");
     let e = write_vtk(&text, &data, VtkOptions { encoding: Encoding::Ascii, compress: false })
         .unwrap_err()
@@ -556,7 +555,8 @@ fn legacy_binary_and_text_mean_what_they_say() {
 
 #[test]
 fn copies_of_other_processes_close_no_hole_and_open_none() {
-    // Three hexahedra in a row; the last is another process's (bit 1), then hidden (bit 32).
+    // Three hexahedra in a row; the last is first a copy of another process's (bit 1), then hidden
+    // (bit 32).
     let mut d = datasets::model::UnstructuredGrid::default();
     let mut points = Vec::new();
     for x in 0..4 {

@@ -1,5 +1,5 @@
-//! Wedge and cone shocks against a table computed with another program (f64, gamma = 1.4); its
-//! wedges agree with the figures of NACA 1135.
+//! Compares wedge and cone shocks with a table computed by another program (f64, gamma = 1.4),
+//! whose wedges agree with the figures of NACA 1135.
 
 use datasets::generate::gas_dynamics::taylor_maccoll::cone_flow;
 use datasets::generate::gas_dynamics::theta_beta_m::{Branch, oblique_shock};

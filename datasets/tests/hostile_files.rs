@@ -1,5 +1,5 @@
-//! Truncated and damaged files: never a panic, never memory that the bytes cannot justify, always
-//! an error with a cure.
+//! Truncated and damaged files: readers never panic, never allocate memory that the bytes cannot
+//! justify, and always return an error with a cure.
 
 mod sample_files;
 
@@ -7,7 +7,7 @@ use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
 use std::path::Path;
 
-/// Reads bytes as a file of this name, and makes everything of it that can be made.
+/// Reads bytes as a file of this name, and applies all conversions.
 fn read_and_use(name: &str, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
@@ -17,7 +17,7 @@ fn read_and_use(name: &str, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
         Ok(o) => use_all(o),
         Err(e) => {
             let text = e.to_string();
-            // A damaged name of another file gives the error of that one.
+            // A damaged name of another file gives an error about that file.
             let named = text.contains(name) || matches!(e, ReadError::Io { .. });
             assert!(named, "the error does not name the file: {text}");
             assert!(text.contains("; "), "no cure in: {text}");
@@ -27,7 +27,7 @@ fn read_and_use(name: &str, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
 }
 
 fn use_all(opened: &LoadedFile) {
-    // Errors are fine here; panics are not.
+    // Errors are allowed here, panics are not.
     let Content::Data(data) = &opened.content else {
         let _ = opened.to_meshes(None);
         return;
@@ -48,33 +48,33 @@ fn use_all(opened: &LoadedFile) {
     }
 }
 
-/// The most address space this process ever had, where the system tells. Memory that is asked for
-/// but never touched counts.
+/// Peak address space of this process, where the system reports it. It includes memory that was
+/// allocated but never touched.
 fn peak_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmPeak:"))?;
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
-/// All test files are below 10 kB; thread stacks and arenas take most of this.
+/// All test files are below 10 kB; thread stacks and arenas account for most of this.
 fn assert_memory_is_bounded() {
     if let Some(peak) = peak_bytes() {
         assert!(peak < 3 << 30, "the process asked for {} MiB", peak >> 20);
     }
 }
 
-/// Ways to damage a file.
+/// A kind of damage to a file.
 #[derive(Debug, Clone)]
 enum Damage {
-    /// Keep this fraction.
+    /// Keep this fraction of the file.
     Truncate(f64),
-    /// Put these bytes there.
+    /// Overwrite bytes at this position.
     Overwrite(f64, Vec<u8>),
-    /// Put another number where one is written.
+    /// Replace a number at this position.
     Number(f64, &'static str),
-    /// Leave a part out.
+    /// Remove bytes at this position.
     Cut(f64, usize),
-    /// Repeat a part.
+    /// Repeat bytes at this position.
     Repeat(f64, usize),
 }
 
@@ -167,8 +167,8 @@ fn every_truncation_is_survived() {
     assert_memory_is_bounded();
 }
 
-/// Cases per run: enough to find a new fault in days of CI, quick enough for every change.
-/// `PROPTEST_CASES` overrides.
+/// Cases per run: enough to find a new fault within days of CI, few enough for every change.
+/// `PROPTEST_CASES` overrides the number.
 fn cases() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1500)
 }
@@ -193,7 +193,7 @@ proptest! {
     }
 }
 
-/// Asserts that the file is refused with a message that has all of `words`.
+/// Asserts that the file is rejected with a message that contains all of `words`.
 fn refused(name: &str, bytes: &[u8], words: &[&str]) {
     let e = read_and_use(name, bytes).err().unwrap_or_else(|| panic!("{name} was read"));
     let text = e.to_string();
@@ -237,8 +237,8 @@ fn declared_sizes_beyond_the_file_are_refused_before_memory_is_taken() {
     refused("a.glb", &glb, &["at byte 8", "5 bytes"]);
     let normal = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//6148914691236517207\n";
     refused("a.obj", normal, &["in line 5", "6148914691236517207"]);
-    // A megabyte of zeros packs into a kilobyte; a header that asks for a terabyte does not become
-    // one.
+    // A megabyte of zeros compresses to a kilobyte; a header that declares a terabyte must not
+    // cause its allocation.
     let bomb = sample_files::raw_appended("vtkZLibDataCompressor", sample_files::zlib);
     let at = bomb.windows(4).position(|w| w == [20, 0, 0, 0]).unwrap();
     let mut bomb = bomb;

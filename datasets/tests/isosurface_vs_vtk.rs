@@ -1,4 +1,4 @@
-//! Isosurfaces against the real `vtkFlyingEdges3D`: counts, vertex positions, normals and enclosed
+//! Compares isosurfaces with `vtkFlyingEdges3D`: counts, vertex positions, normals and enclosed
 //! volume.
 
 mod peer;
@@ -100,12 +100,11 @@ fn counts_points_normals_and_orientation_are_vtks() {
             worst_normal = worst_normal.max((a[c + 3] - b[c + 3]).abs());
         }
     }
-    // Coordinates are at most 33: a few units in the last place (2e-6 there). VTK's gradients are
-    // f32, too.
+    // Coordinates are at most 33: allow a few ulps (2e-6 each). VTK's gradients are f32, too.
     assert!(worst_position < 1e-5, "positions differ by {worst_position}");
     assert!(worst_normal < 1e-4, "normals differ by {worst_normal}");
 
-    // The diagonals differ, so the volume does a little; its sign is the orientation of the
+    // The diagonals differ, so the volumes differ slightly; the sign is the orientation of the
     // triangles.
     let theirs: f64 = lines.next().unwrap().parse().unwrap();
     let ours = volume(&mesh);

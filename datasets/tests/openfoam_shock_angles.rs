@@ -1,5 +1,5 @@
-//! The committed OpenFOAM results against the exact solutions: shock angles within 0.3 degrees,
-//! densities within 2 %.
+//! Compares the committed OpenFOAM results with the exact solutions: shock angles within 0.3
+//! degrees, densities within 2 %.
 
 use datasets::generate::gas_dynamics::taylor_maccoll::cone_flow;
 use datasets::generate::gas_dynamics::theta_beta_m::{Branch, oblique_shock};
@@ -11,16 +11,16 @@ fn slice(case: &str) -> Slice {
     Slice::from_dataset(open(path).unwrap().dataset().unwrap()).unwrap()
 }
 
-/// Slope of the line through the points where the density, going inwards, passes the middle of the
-/// jump; in degrees.
+/// Slope, in degrees, of the line through the points where the density, going inwards, reaches half
+/// of the jump.
 fn shock_angle_degrees(slice: &Slice, free: f64, ratio: f64) -> f64 {
     let middle = free * 0.5 * (1.0 + ratio);
     let mut points = Vec::new();
     for line in 0..slice.lines() {
         let cells = slice.line("density", line).unwrap();
         let x = cells[0].0[0];
-        // Away from the apex, where the shock has fewer cells than it is thick, and before the
-        // shoulder.
+        // Skip the apex, where the shock is thicker than its distance in cells, and the region
+        // behind the shoulder.
         if !(0.015..0.048).contains(&x) {
             continue;
         }
@@ -37,12 +37,12 @@ fn shock_angle_degrees(slice: &Slice, free: f64, ratio: f64) -> f64 {
     (covariance / variance).atan().to_degrees()
 }
 
-/// Density of a cell near the surface at x, over the first cell's, and the angle at which that cell
-/// is seen from the apex.
+/// Density of a cell near the surface at x, relative to the free stream's, and the angle of that
+/// cell seen from the apex.
 fn surface_density(slice: &Slice, x: f64) -> (f64, f64) {
     let free = slice.line("density", 0).unwrap()[60].1;
     let line = (0..slice.lines()).find(|&l| slice.line("density", l).unwrap()[0].0[0] > x).unwrap();
-    // Not the very first: the wall's boundary condition heats it a little.
+    // Skip the first cells: the wall's boundary condition heats them slightly.
     let (at, density) = slice.line("density", line).unwrap()[8];
     (density / free, at[1].atan2(at[0]))
 }
@@ -88,8 +88,8 @@ fn revolved_cone_keeps_its_shock_and_its_hole() {
     let flow = slice.flow(Sweep::Revolve, glam::UVec3::splat(48)).unwrap();
     let rho = flow.grid("density").unwrap();
     let exact = cone_flow(1.4, 3.0, 20f64.to_radians()).unwrap();
-    // In the plane x = 40 mm: free stream outside the shock, compressed inside, nothing in the
-    // cone.
+    // In the plane x = 40 mm: free stream outside the shock, compressed gas inside, no values in
+    // the cone.
     let i = ((0.04 - flow.origin_m.x) / flow.spacing_m.x).round() as u32;
     let x = flow.position_m(i, 0, 0).x;
     for jk in 0..48 * 48 {

@@ -1,4 +1,4 @@
-//! The program `datasets` as its users start it: what it prints, what it writes, how it ends.
+//! The program `datasets` as started by a user: its output, its files, its exit codes.
 #![cfg(feature = "program")]
 
 use serde_json::Value;
@@ -17,7 +17,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// The JSON that a successful run prints.
+/// The JSON output of a successful run.
 fn json(dir: &Path, args: &[&str]) -> Value {
     let out = datasets(dir, &[&["--json", "--quiet"], args].concat());
     assert_eq!(out.status.code(), Some(0), "{args:?}: {}", text(&out.stderr));

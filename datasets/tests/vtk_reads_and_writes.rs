@@ -1,4 +1,4 @@
-//! Files written by the real VTK are read as VTK reads them, and VTK reads the files written here.
+//! Files written by VTK are read as VTK reads them, and VTK reads the files written here.
 
 mod peer;
 mod sample_files;
@@ -13,12 +13,12 @@ use std::path::Path;
 /// Writes files with VTK and reads them with it.
 const SCRIPT: &str = include_str!("vtk_files/write_all.py");
 
-/// The number that shows any value out of place, as the script computes it.
+/// A weighted sum that changes with any misplaced value, computed as in the script.
 fn weighted(values: impl Iterator<Item = f64>) -> f64 {
     values.enumerate().map(|(i, v)| v * ((i + 1) as f64 % 97.0)).sum()
 }
 
-/// Equal but for the rounding of a sum in another order.
+/// Asserts equality up to the rounding of a sum in another order.
 fn assert_close(found: f64, expected: f64, scale: f64, what: &str) {
     assert!(
         (found - expected).abs() <= 1e-9 * scale.max(1.0),
@@ -42,7 +42,7 @@ fn same_type(kind: ScalarType, vtk: &str) -> bool {
     names.contains(&vtk)
 }
 
-/// Compares a data set with what VTK said about it. `ascii` legacy files round to few digits.
+/// Compares a data set with VTK's description of it. `ascii` legacy files round to few digits.
 fn compare(file: &str, opened: &LoadedFile, expected: &Value) {
     let Content::Data(data) = &opened.content else { panic!("{file}: not a data set") };
     assert_eq!(data.kind(), expected["kind"], "{file}");
@@ -172,7 +172,7 @@ fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
                 read += 1;
             }
             Err(e) => {
-                // LZMA is refused, by name and with the cure.
+                // LZMA is rejected by name, with a cure.
                 let text = e.to_string();
                 assert!(
                     file.contains("lzma") && matches!(e, ReadError::Unsupported { .. }),
@@ -210,7 +210,7 @@ fn check_series_and_blocks(dir: &Path) {
     assert!(mesh.num_triangles() > 296 && mesh.scalars.is_some());
 }
 
-/// What VTK must say about a file with this data.
+/// The description that VTK must give of a file with this data.
 fn description(data: &Dataset) -> serde_json::Map<String, Value> {
     let (points, cells) = data.counts();
     let a = data.attributes().unwrap();
@@ -283,7 +283,7 @@ fn vtk_reads_every_file_that_is_written_here() {
                 }
             }
         }
-        // Ours of ours is the same again, bit for bit.
+        // Reading and writing our own files preserves every bit.
         let Content::Data(again) = open(path).unwrap().content else { panic!() };
         assert_eq!(&again, data, "{file}");
         let (mesh, _) = data.to_trimesh(None).unwrap();

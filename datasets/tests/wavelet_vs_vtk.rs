@@ -1,4 +1,4 @@
-//! The wavelet generator against the real `vtkRTAnalyticSource`, bit for bit.
+//! Compares the wavelet generator with `vtkRTAnalyticSource`, bit for bit.
 
 mod peer;
 

@@ -1,6 +1,5 @@
-//! The cache's file format: plain arrays after a small header, protected by a checksum. The cache
-//! is private to one machine, so numbers are in native byte order; a marker rejects files of the
-//! other order.
+//! The cache's file format: a small header, plain arrays and a checksum. The cache is private to
+//! one machine, so numbers are in native byte order; a marker detects files of the other order.
 //!
 //! | part | content |
 //! |---|---|
@@ -13,8 +12,8 @@ use glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, PerElement, TriMesh};
 use std::io::{self, Read, Write};
 
-/// Format version, which is also part of the file name. Raise it when the format *or a generator's
-/// output* changes.
+/// Format version, which is also part of the file name. Increase it when the format *or a
+/// generator's output* changes.
 pub(super) const VERSION: u32 = 1;
 
 const MAGIC: [u8; 8] = *b"RTSVMESH";
@@ -62,7 +61,7 @@ pub(super) fn write(out: &mut dyn Write, key: &str, mesh: &TriMesh) -> io::Resul
     w.inner.write_all(&sum.to_ne_bytes())
 }
 
-/// `length` is the file's length: arrays that do not fit into it are rejected before memory is
+/// `length` is the length of the file. Arrays that exceed it are rejected before memory is
 /// allocated.
 pub(super) fn read(input: impl Read, length: u64, key: &str) -> Result<TriMesh, String> {
     let mut r = ChecksumStream { inner: input, crc: flate2::Crc::new() };

@@ -30,9 +30,9 @@ pub struct FlowEntry {
     pub name: &'static str,
     /// What it shows.
     pub description: &'static str,
-    /// Where the thesis has it.
+    /// Where the flow appears in the thesis.
     pub thesis: &'static str,
-    /// Points at full size.
+    /// Number of points at full size.
     pub full_dims: UVec3,
     source: Source,
 }
@@ -51,8 +51,8 @@ enum Source {
     Sample(SampleField),
 }
 
-/// The sizes that every flow has, ascending: full size divided by 8, 4 and 2 along each axis, and
-/// full size.
+/// The sizes of every flow, ascending: full size divided by 8, 4 and 2 along each axis, and full
+/// size.
 pub const SIZES: [(&str, u32); 4] = [("tiny", 8), ("small", 4), ("medium", 2), ("thesis", 1)];
 
 const fn flow(
@@ -167,7 +167,7 @@ pub fn find(name: &str) -> Result<&'static FlowEntry, CatalogueError> {
 }
 
 impl FlowEntry {
-    /// Points at a named size.
+    /// Number of points at a named size.
     pub fn dims(&self, size: &str) -> Result<UVec3, CatalogueError> {
         let divisor = SIZES.iter().find(|s| s.0.eq_ignore_ascii_case(size)).ok_or_else(|| {
             CatalogueError::UnknownSize {
@@ -184,8 +184,8 @@ impl FlowEntry {
         Ok(self.generate_at(self.dims(size)?, fields)?)
     }
 
-    /// Generates the flow on any number of points. With [`Fields::Density`] the sample fields and
-    /// the multifield jet are cut to their first field.
+    /// Generates the flow on any number of points. With [`Fields::Density`], only the first field
+    /// of the sample fields and the multifield jet is kept.
     pub fn generate_at(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let seed = SEED;
         match self.source {

@@ -1,12 +1,13 @@
-//! A helium plume that puffs: a disc of helium of 1 m rises into air at rest, rolls up into rings
-//! and breaks up. Stands for the 227 x 302 x 302 simulation of table 5.1 of the thesis.
+//! A puffing helium plume: helium rises from a disc of 1 m into air at rest, rolls up into rings
+//! and breaks up. Represents the 227 x 302 x 302 simulation of table 5.1 of the thesis.
 //!
-//! The source is after the experiment of T. J. O'Hern et al., "Experimental study of a turbulent
+//! The source follows the experiment of T. J. O'Hern et al., "Experimental study of a turbulent
 //! buoyant helium plume", J. Fluid Mech. 544, 2005 (source 1 m, puffing about 1.4 times a second);
-//! the neck at half a diameter and the rings are ours. Isothermal at 298 K and 1 atm, so density
-//! and helium are one field seen twice: 0.164 (helium) to 1.185 kg/m³ (air). The index of
-//! refraction is not a function of the density alone, which is why the mass fractions come along.
-//! Smooth at the scale of a cell, so it is sampled at points.
+//! the neck at half a diameter and the rings are choices of this model. The flow is isothermal at
+//! 298 K and 1 atm, so density and helium fraction determine each other: 0.164 (helium) to 1.185
+//! kg/m³ (air). The index of refraction is not a function of the density alone, so the mass
+//! fractions are included. The fields are smooth at the scale of a cell, so they are sampled at
+//! points.
 
 use super::flow::{Field, Fields, Flow, FlowError, names};
 use super::plume::{Plume, Shape};
@@ -14,12 +15,12 @@ use super::turbulence::Displacement;
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
-/// Points of table 5.1.
+/// Number of points in table 5.1.
 pub const THESIS_DIMS: UVec3 = UVec3::new(227, 302, 302);
 
 const TEMPERATURE_K: f64 = 298.0;
 const PRESSURE_PA: f64 = 101_325.0;
-/// kg/mol.
+/// Molar mass, kg/mol.
 const HELIUM: f64 = 0.004_002_6;
 const AIR: f64 = 0.028_965_2;
 const SHAPE: Shape = Shape {
@@ -32,22 +33,22 @@ const SHAPE: Shape = Shape {
     wildness: 0.65,
 };
 
-/// The set-up.
+/// Parameters of the plume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HeliumPlume {
     /// Points over 3 m x 4 m x 4 m; z is up, the source in the middle of the floor.
     pub dims: UVec3,
-    /// The seed; another seed gives another puff.
+    /// The seed of the random numbers; another seed gives another puff.
     pub seed: u64,
 }
 
-/// Density of helium with air, kg/m³, from helium's mass fraction.
+/// Density of a mixture of helium and air, kg/m³, from the mass fraction of helium.
 fn density(helium: f64) -> f64 {
     PRESSURE_PA / (8.314_462_618 * TEMPERATURE_K * (helium / HELIUM + (1.0 - helium) / AIR))
 }
 
 impl HeliumPlume {
-    /// Fields: density; with [`Fields::All`] the mass fractions of helium and air.
+    /// Samples the density; with [`Fields::All`] also the mass fractions of helium and air.
     pub fn flow(&self, fields: Fields) -> Result<Flow, FlowError> {
         let mut flow =
             Flow::over(self.dims, DVec3::new(-1.5, -2.0, 0.0), DVec3::new(1.5, 2.0, 4.0))?;
@@ -57,7 +58,7 @@ impl HeliumPlume {
         let scratch = || (Displacement::default(), Vec::new());
         flow.fill(wanted, scratch, |(displacement, share), j, k, rows| {
             plume.share_row(displacement, j, k, share);
-            // Volumes rise and mix, so fractions are mole fractions.
+            // Volumes rise and mix, so the shares are mole fractions.
             for (i, &x) in share.iter().enumerate() {
                 let x = x as f64;
                 let y = x * HELIUM / (x * HELIUM + (1.0 - x) * AIR);
@@ -93,7 +94,7 @@ mod tests {
             let air = flow.field("Y_air").unwrap().values[i];
             assert!((0.0..=1.0).contains(&y) && y + air == 1.0);
         }
-        // It necks: narrower half a metre up than at the floor.
+        // The plume necks: it is narrower half a metre up than at the floor.
         let wide = |k: u32| (0..45).filter(|&j| rho.at(17, j, k) < 0.9).count();
         assert!(wide(6) < wide(0), "{} {}", wide(6), wide(0));
     }

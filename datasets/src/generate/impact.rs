@@ -26,10 +26,10 @@ const PLATE_THICKNESS: f64 = 0.25;
 const ROUGHNESS: f32 = 0.008;
 const BATCH: usize = 32;
 
-/// An ellipsoid that flew off.
+/// An ellipsoidal fragment.
 struct Fragment {
     center: DVec3,
-    /// World to unit sphere.
+    /// Maps world space to the unit sphere.
     unit_from_world: DMat3,
     largest_radius: f64,
     smallest_radius: f64,
@@ -44,14 +44,14 @@ pub struct Impact {
 }
 
 impl Impact {
-    /// The field on `points` x `points` x 0.8·`points` points (clamped to 16..=4096) with
+    /// Samples the field on `points` x `points` x 0.8·`points` points (clamped to 16..=4096), with
     /// `fragments` ejecta.
     pub fn new(points: u32, fragments: usize, seed: u64) -> Self {
         let mut random = SplitMix64::new(seed);
         let fragments = (0..fragments)
             .map(|_| {
-                // Sizes by a power law, as fragments have; the fastest are the smallest and
-                // furthest.
+                // Sizes follow a power law, as for real fragments; the smallest fragments are the
+                // fastest and furthest.
                 let size = 0.01 * (1.0 - 0.997 * random.unit()).powf(-0.4);
                 let flight = random.between(0.05, 1.0).powf(0.7) * (1.0 - (size / 0.15).min(0.6));
                 let (s, c) = random.between(0.0, std::f64::consts::TAU).sin_cos();
@@ -72,7 +72,7 @@ impl Impact {
         Impact { points, seed, plate: Impact::plate_faces(points), fragments }
     }
 
-    /// All pieces as one mesh; memory is bounded by the result. See
+    /// All parts as one mesh; memory is bounded by the result. See
     /// [`MixingLayer::surface`](super::mixing_layer::MixingLayer::surface) for `progress`.
     pub fn surface(
         &self,
@@ -82,7 +82,7 @@ impl Impact {
         extract_streamed(self, ISO, options, BATCH, progress)
     }
 
-    /// The whole, and into the crater.
+    /// Standard views: the whole scene, and into the crater.
     pub fn views() -> Vec<View> {
         vec![
             View::new("whole", DVec3::new(2.4, -3.4, 2.2), DVec3::new(0.0, 0.0, 0.15)),
@@ -90,7 +90,7 @@ impl Impact {
         ]
     }
 
-    /// Top and bottom of the plate at every (x, y): they do not depend on z.
+    /// Top and bottom of the plate at every (x, y), which do not depend on z.
     fn plate_faces(points: u32) -> Vec<[f32; 2]> {
         let d = (HIGH - LOW) / (points - 1) as f64;
         let face = |i: u32| {
@@ -106,7 +106,7 @@ impl Impact {
         (0..points * points).into_par_iter().map(face).collect()
     }
 
-    /// Plate and ball at a point, given the plate's top and bottom there.
+    /// Distance to plate and ball at a point, given the plate's top and bottom there.
     fn solid(p: DVec3, [top, bottom]: [f32; 2]) -> f32 {
         let sides = PLATE_HALF - p.x.abs().max(p.y.abs());
         let plate = (top as f64 - p.z).min(p.z - bottom as f64).min(sides);
@@ -150,7 +150,7 @@ impl PlaneSource for Impact {
                 &mut scratch,
             );
         }
-        // Fragments touch few points each: only those in their bounding squares are visited.
+        // Each fragment affects few points: only those in its bounding square are visited.
         for f in self.fragments.iter().filter(|f| (f.center.z - z).abs() < f.largest_radius + d.z) {
             let reach = f.largest_radius + d.x.max(d.y);
             let first = ((f.center - reach - LOW) / d).max(DVec3::ZERO).as_uvec3();
@@ -180,7 +180,7 @@ mod tests {
     fn pieces_are_closed() {
         let mesh = Impact::new(96, 200, 1).surface(Options::default(), |_| true).unwrap().mesh;
         assert_eq!(open_or_flipped_edges(&mesh.indices), 0);
-        // The plate alone, less the bowl, plus rim and bulge.
+        // The plate alone, minus the bowl, plus rim and bulge.
         let plate = 4.0 * PLATE_HALF * PLATE_HALF * PLATE_THICKNESS;
         assert!((0.8..1.1).contains(&(volume(&mesh) / plate)), "{}", volume(&mesh) / plate);
         assert!(mesh.bounds().max.z > 0.4, "ejecta fly: {:?}", mesh.bounds());
@@ -194,7 +194,7 @@ mod tests {
             )
         };
         let [none, many] = [0, 400].map(count);
-        // The plate and the ball touch; fragments smaller than a cell are not seen at this
+        // The plate and the ball touch; fragments smaller than a cell are missed at this
         // resolution.
         assert_eq!(none, 1);
         assert!(many > 60, "{many}");

@@ -6,8 +6,8 @@
 //! layer).
 //!
 //! The field is the fraction of the heavy gas, 0 above to 1 below. It falls linearly across a
-//! surface. The height of the surface is a sum of long waves (which the shock left behind) plus
-//! noise in octaves down to a few cells, with Kolmogorov's amplitudes ∝ wavelength^(1/3). Where the
+//! surface. The height of the surface is a sum of long waves (left behind by the shock) plus noise
+//! in octaves down to a few cells, with Kolmogorov's amplitudes ∝ wavelength^(1/3). Where the
 //! noise's slope in z exceeds one, the surface folds over, so its area grows faster than the square
 //! of the resolution, as in the simulation (measured: 0.18, 1.1, 6.8 and 42.5 million triangles at
 //! 128, 256, 512 and 1024 points). Along x and y the field is periodic.
@@ -20,14 +20,14 @@ use rayon::prelude::*;
 use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
-/// Half heavy, half light: the value of the surface.
+/// Isovalue of the surface: equal parts of heavy and light gas.
 pub const ISO: f64 = 0.5;
 
-/// Height of the domain over its width: 1920 / 2048.
+/// Height of the domain relative to its width: 1920 / 2048.
 const HEIGHT: f64 = 0.9375;
 /// Thickness over which the fraction falls from 1 to 0.
 const TRANSITION: f32 = 0.4;
-/// Waves of the undisturbed interface.
+/// Number of waves of the undisturbed interface.
 const MODES: usize = 60;
 /// Cells per wavelength of the finest octave; shorter waves would be aliased.
 const CELLS_PER_WAVELENGTH: f64 = 3.9;
@@ -36,10 +36,10 @@ const AMPLITUDE: f32 = 0.24;
 const FIRST_PERIOD: u32 = 8;
 /// Half thickness of the turbulent zone.
 const ZONE: f64 = 0.13;
-/// Planes in memory at a time.
+/// Number of planes in memory at a time.
 const BATCH: usize = 32;
 
-/// The field; the domain is 1 x 1 x 0.9375 whatever the resolution.
+/// The field; the domain is 1 x 1 x 0.9375 at any resolution.
 pub struct MixingLayer {
     points: u32,
     seed: u64,
@@ -50,11 +50,11 @@ pub struct MixingLayer {
 
 impl MixingLayer {
     /// A layer sampled with `points` x `points` x 0.9375·`points` points (2048 for the thesis's
-    /// size); between 16 and 8192, values outside are clamped.
+    /// size); `points` is clamped to 16..=8192.
     pub fn new(points: u32, seed: u64) -> Self {
         let points = points.clamp(16, 8192);
         let mut random = SplitMix64::new(seed);
-        // Wave numbers in a ring; longer waves are higher.
+        // Wave numbers in a ring; longer waves have larger amplitudes.
         let modes: Vec<[f64; 4]> = (0..MODES)
             .map(|_| {
                 let k = random.between(3.0, 12.0);
@@ -88,7 +88,7 @@ impl MixingLayer {
         extract_streamed(self, ISO, options, BATCH, progress)
     }
 
-    /// "RMO", the whole from outside, and "RMI", from within the layer.
+    /// Standard views: "RMO", the whole from outside, and "RMI", from within the layer.
     pub fn views() -> Vec<View> {
         let middle = DVec3::new(0.5, 0.5, HEIGHT / 2.0);
         vec![
@@ -104,7 +104,7 @@ impl MixingLayer {
         ]
     }
 
-    /// Noise octaves and their amplitudes.
+    /// The noise octaves and their amplitudes.
     fn octaves(&self) -> impl Iterator<Item = (Noise, f32)> {
         let finest = (self.points - 1) as f64 / CELLS_PER_WAVELENGTH;
         let seed = self.seed;
@@ -135,8 +135,8 @@ impl PlaneSource for MixingLayer {
         let z = k as f64 * dx;
         let from_middle = (z - HEIGHT / 2.0) as f32;
         let calm = (-(from_middle as f64 / ZONE).powi(2)).exp() as f32;
-        // Gradient noise with components in ±1 stays within ±1.5: beyond that the surface cannot
-        // be, and noise is left out.
+        // Gradient noise with components in ±1 stays within ±1.5. The surface cannot lie outside
+        // that range, so noise is left out there.
         let octaves: Vec<_> = self.octaves().collect();
         let reach = self.highest_wave + 1.5 * calm * octaves.iter().map(|(_, a)| a).sum::<f32>();
         let turbulent = from_middle.abs() <= reach;

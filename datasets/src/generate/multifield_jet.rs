@@ -1,13 +1,13 @@
-//! The combustion jet as five fields for pictures of several quantities at once (section 5.7 of the
+//! The combustion jet as five fields, for images of several quantities at once (section 5.7 of the
 //! thesis): scalar dissipation `chi`, heat release `hr`, mixture fraction `mixfrac`, vorticity
-//! `vort` and hydroxyl `Y_OH`, with the density in front of them.
+//! `vort` and hydroxyl `Y_OH`. The density precedes them.
 //!
 //! Mixture fraction and density are those of [`combustion_jet`](super::combustion_jet). The others
 //! follow from them as in laminar flamelets (N. Peters, "Laminar diffusion flamelet models in
-//! non-premixed turbulent combustion", Prog. Energy Combust. Sci. 10, 1984): χ = 2 D |∇Z|²; the
-//! flame is a band of Z about the stoichiometric value, whose heat release grows with χ and which
-//! goes out (no OH) where χ exceeds its quenching value. The vorticity is the curl of the jet's
-//! mean velocity plus eddies that follow the displacements. Derivatives are central differences,
+//! non-premixed turbulent combustion", Prog. Energy Combust. Sci. 10, 1984): χ = 2 D |∇Z|². The
+//! flame is a band of Z about the stoichiometric value. Its heat release grows with χ, and it is
+//! extinct (no OH) where χ exceeds the quenching value. The vorticity is the curl of the jet's mean
+//! velocity plus eddies that follow the displacements. Derivatives are central differences,
 //! one-sided at the border.
 
 use super::combustion_jet::{CombustionJet, SYNGAS};
@@ -17,21 +17,22 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Diffusivity of mass, m²/s: that of N2 in air at 450 K, so that most of the flame burns and its
-/// most strained parts are out.
+/// most strained parts are extinct.
 const DIFFUSIVITY: f64 = 4e-5;
-/// Scalar dissipation at which the flame goes out, 1/s: 2000, the order of magnitude for this fuel.
+/// Scalar dissipation at which the flame is extinguished, 1/s: 2000, the order of magnitude for
+/// this fuel.
 const QUENCHING: f64 = 2000.0;
 /// Mass fraction of OH in a burning flame.
 const HYDROXYL: f64 = 4e-3;
-/// Heat release of a flame at χ = 1/s times its root, W/m³.
+/// Heat release at χ = 1/s, W/m³; it grows with the square root of χ.
 const HEAT_RELEASE: f64 = 1.5e8;
-/// Mean velocity of the jet against the coflow, m/s.
+/// Mean velocity of the jet relative to the coflow, m/s.
 const JET_SPEED: f64 = 190.0;
-/// Metres per second per metre of displacement: eddies of a slot's size turn over about as fast as
+/// Velocity per displacement, in m/s per metre: eddies of a slot's size turn over about as fast as
 /// the jet passes.
 const EDDY_RATE: f64 = JET_SPEED / 1.4e-3;
 
-/// The six fields, in the order above behind the density.
+/// Computes the six fields: the density, then the five in the order above.
 pub fn multifield_jet(jet: CombustionJet) -> Result<Flow, FlowError> {
     let mut flow = jet.lattice()?;
     let mixing = jet.mixing(&flow);
@@ -45,8 +46,8 @@ pub fn multifield_jet(jet: CombustionJet) -> Result<Flow, FlowError> {
             rows[0][i] = table.at(0, z);
             rows[1][i] = z;
             for c in 0..3 {
-                // The jet moves in opposite directions to its two sides' gas; eddies live where the
-                // jet mixes.
+                // The jet moves in the opposite direction to the gas on both sides; eddies live
+                // where the jet mixes.
                 let eddies =
                     EDDY_RATE as f32 * d.rows[c][i] * (4.0 * z * (1.0 - z)).clamp(0.1, 1.0);
                 rows[2 + c][i] =

@@ -1,19 +1,19 @@
 //! Nested isosurfaces of the wavelet with 1, 2, 4 … 64 million triangles: the scaling series of
-//! figures 3.5 and 3.6 of the thesis, which contours the same field more often rather than more
-//! finely.
+//! figures 3.5 and 3.6 of the thesis, which varies the number of isosurfaces rather than the
+//! resolution of the field.
 //!
 //! The isovalues are evenly spaced and rounded to two decimals, so that they can be typed into
-//! ParaView's Contour filter; the triangle counts are those of `vtkFlyingEdges3D`. 27 values give
+//! ParaView's Contour filter. The triangle counts are those of `vtkFlyingEdges3D`. 27 values give
 //! exactly the 16 022 136 triangles that the thesis reports.
 
 use super::wavelet::{Wavelet, WaveletError};
 use crate::isosurface::{self, IsosurfaceError, Isosurfaces, Options, count_triangles};
 use rt_core::grid::Grid;
 
-/// Points per axis of the grid behind the named sizes (`WholeExtent` -100..100).
+/// Points per axis of the grid for the named sizes (`WholeExtent` -100..100).
 pub const POINTS: u32 = 201;
 
-/// The values that larger series are spread over: below and above, surfaces become small.
+/// Range of the isovalues of larger series; outside it, surfaces become small.
 const SPREAD: [f64; 2] = [115.0, 195.0];
 
 /// The named sizes.
@@ -39,12 +39,12 @@ impl Size {
         ["1M", "2M", "4M", "8M", "16M", "32M", "64M"][self as usize]
     }
 
-    /// The size of that name, in either case.
+    /// The size of that name, in upper or lower case.
     pub fn from_name(name: &str) -> Option<Size> {
         Size::ALL.into_iter().find(|s| s.name().eq_ignore_ascii_case(name))
     }
 
-    /// Triangles at 201³ points.
+    /// Number of triangles at 201³ points.
     pub fn triangles(self) -> usize {
         [1_002_484, 1_996_950, 4_003_478, 8_005_776, 16_022_136, 31_996_300, 64_135_816]
             [self as usize]
@@ -64,26 +64,26 @@ impl Size {
         evenly_spaced(count, lowest, highest)
     }
 
-    /// Generates the surfaces: 24 bytes a triangle, 30 with normals. 16 million take about a second
-    /// and a half on two cores.
+    /// Generates the surfaces: 24 bytes per triangle, 30 with normals. 16 million triangles take
+    /// about 1.5 seconds on two cores.
     pub fn generate(self, options: Options) -> Result<Isosurfaces, NestedWaveletError> {
         let grid = Wavelet::with_points(POINTS).grid()?;
         Ok(isosurface::extract(&grid, &self.isovalues(), options)?)
     }
 }
 
-/// Why the surfaces cannot be made.
+/// Why the surfaces cannot be generated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NestedWaveletError {
-    /// The field.
+    /// The field cannot be sampled.
     #[error(transparent)]
     Wavelet(#[from] WaveletError),
-    /// The surfaces.
+    /// The surfaces cannot be extracted.
     #[error(transparent)]
     Isosurface(#[from] IsosurfaceError),
 }
 
-/// `count` values from `lowest` to `highest`, rounded to two decimals. One value is put in the
+/// `count` values from `lowest` to `highest`, rounded to two decimals. A single value lies in the
 /// middle.
 pub fn evenly_spaced(count: usize, lowest: f64, highest: f64) -> Vec<f64> {
     let step = (highest - lowest) / (count.max(2) - 1) as f64;
@@ -92,14 +92,15 @@ pub fn evenly_spaced(count: usize, lowest: f64, highest: f64) -> Vec<f64> {
     (0..count).map(|i| (value(i) * 100.0).round() / 100.0).collect()
 }
 
-/// Isovalues between 115 and 195 for any wavelet grid (larger ones have proportionally more
-/// triangles per surface) that come as close to `triangles` as an evenly spaced series can.
+/// Isovalues between 115 and 195 for any wavelet grid, whose triangle count comes as close to
+/// `triangles` as an evenly spaced series can. (Larger grids have proportionally more triangles per
+/// surface.)
 pub fn isovalues_for(grid: &Grid, triangles: usize) -> Result<Vec<f64>, IsosurfaceError> {
     let total = |n: usize| -> Result<usize, IsosurfaceError> {
         Ok(count_triangles(grid, &evenly_spaced(n, SPREAD[0], SPREAD[1]))?.iter().sum())
     };
-    // The mean over a fine series barely changes with its length: one guess, then compare with its
-    // neighbours.
+    // The mean over a fine series barely changes with its length, so one estimate and a comparison
+    // with its neighbours suffice.
     let mean = total(16)? as f64 / 16.0;
     let guess = if mean > 0.0 { (triangles as f64 / mean).round().max(1.0) as usize } else { 1 };
     let mut best = (usize::MAX, guess);
@@ -144,7 +145,7 @@ mod tests {
         for wish in [1, 100_000, 1_000_000] {
             let isos = isovalues_for(&grid, wish).unwrap();
             let counted: usize = count_triangles(&grid, &isos).unwrap().iter().sum();
-            // Half a surface off at most (one surface of 81³ has about 100,000 triangles).
+            // Off by at most half a surface (one surface of 81³ has about 100,000 triangles).
             assert!(
                 isos.len() == 1 || counted.abs_diff(wish) < 60_000,
                 "{wish}: {counted} by {}",

@@ -1,9 +1,8 @@
 //! Periodic gradient noise (Perlin 2002), evaluated one grid row at a time.
 //!
 //! Along a row of constant y and z, the noise in each lattice cell is a blend of two linear
-//! functions of x. Their coefficients are the same for the whole cell and are computed once per
-//! cell. About a dozen operations per point remain, which makes fields of 8 billion points
-//! affordable.
+//! functions of x. Their coefficients are computed once per cell. About a dozen operations per
+//! point remain, which makes fields of 8 billion points affordable.
 
 #[cfg(test)]
 use glam::DVec3;
@@ -16,13 +15,13 @@ pub(crate) struct Noise {
     pub(crate) seed: u64,
 }
 
-/// Storage of [`Noise::add_row`]; keep one for each noise. Rows that follow each other mostly lie
-/// in the same lattice cells in y and z, and then need no new gradients.
+/// Storage of [`Noise::add_row`]; keep one for each noise. Consecutive rows mostly lie in the same
+/// lattice cells in y and z and then reuse the gradients.
 #[derive(Default)]
 pub(crate) struct RowScratch {
-    /// Lattice cell in y and z, and last node, of `gradients`; the noise itself.
+    /// Key of `gradients`: lattice cell in y and z, last node, and the noise itself.
     key: Option<([i64; 3], Noise)>,
-    /// At each lattice node, for the four corners (y, z) of the cell.
+    /// Gradients at each lattice node, for the four corners (y, z) of the cell.
     gradients: Vec<[[f32; 3]; 4]>,
     /// Slope and offset at each lattice node.
     nodes: Vec<[f32; 2]>,
@@ -33,8 +32,8 @@ impl Noise {
         let wrapped = |a: usize| cell[a].rem_euclid(self.period[a] as i64) as u64;
         let key = wrapped(0) | wrapped(1) << 21 | wrapped(2) << 42;
         let h = mix64(key ^ self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        // Each component uniform in -1..1: not unit vectors, but isotropic enough once octaves are
-        // added.
+        // Each component is uniform in -1..1. The gradients are not unit vectors, but isotropic
+        // enough once octaves are added.
         [0, 21, 42].map(|shift| ((h >> shift & 0x1f_ffff) as f32) * (2.0 / 0x1f_ffff as f32) - 1.0)
     }
 
@@ -78,7 +77,7 @@ impl Noise {
         }));
         for (i, v) in row.iter_mut().enumerate() {
             let x = i as f64 * per_point;
-            // Rounding can put the last point one cell further than `last_cell`.
+            // Rounding can place the last point one cell beyond `last_cell`.
             let cell = (x as usize).min(last_cell as usize);
             let fx = (x - cell as f64) as f32;
             let [a, b] = [scratch.nodes[cell], scratch.nodes[cell + 1]];
@@ -87,7 +86,7 @@ impl Noise {
         }
     }
 
-    /// The noise at one point: the slow reference of [`Noise::add_row`].
+    /// The noise at one point: the slow reference implementation of [`Noise::add_row`].
     #[cfg(test)]
     pub(crate) fn at(&self, p: DVec3) -> f32 {
         let q = p * DVec3::new(self.period[0] as f64, self.period[1] as f64, self.period[2] as f64);
@@ -120,7 +119,7 @@ mod tests {
         let dx = 1.0 / 24.0; // two periods
         let mut scratch = RowScratch::default();
         let mut row = Vec::new();
-        // The second row reuses the first one's gradients, the others must not.
+        // The second row reuses the gradients of the first; the others must not.
         for (y, z) in [(0.37, 1.81), (0.38, 1.82), (0.5, 1.82), (0.5, 0.1)] {
             row = vec![0f32; 50];
             noise.add_row(&mut row, dx, y, z, 2.0, &mut scratch);

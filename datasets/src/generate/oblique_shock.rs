@@ -1,11 +1,11 @@
 //! A wedge in a supersonic stream: exact plane shocks, and the exact expansion behind its shoulder.
 //!
-//! The wedge lies along x with its edge at the origin, symmetric about y = 0, the same at all z.
-//! Its surface is at `half_angle` for `length_m`; then it is parallel to the stream. Between shock
-//! and shoulder the gas is uniform ([`theta_beta_m`](super::gas_dynamics::theta_beta_m)); the fan
-//! of Mach lines from the shoulder is the centred wave of Prandtl and Meyer. The lattice ends
-//! before the fan reaches the shock and bends it, so all of it is exact; values are means over
-//! boxes.
+//! The wedge lies along x with its edge at the origin, symmetric about y = 0 and the same at all z.
+//! Its surface is inclined at `half_angle` for `length_m`; then it is parallel to the stream.
+//! Between shock and shoulder, the gas is uniform
+//! ([`theta_beta_m`](super::gas_dynamics::theta_beta_m)); the fan of Mach lines from the shoulder
+//! is the centred wave of Prandtl and Meyer. The lattice ends before the fan reaches and bends the
+//! shock, so the whole flow is exact. Values are cell averages.
 
 use super::cell_average::{LayeredFlow, Scratch, average_row};
 use super::flow::{Fields, Flow, FlowError, names};
@@ -15,17 +15,17 @@ use glam::{DVec3, UVec3};
 use rt_core::mesh::TriMesh;
 use std::f64::consts::FRAC_PI_2;
 
-/// The set-up. The default is a wedge of 10 degrees at Mach 2 in a tunnel with a reservoir at 200
-/// kPa and 300 K.
+/// Parameters of the flow. The default is a wedge of 10 degrees at Mach 2 in a tunnel with a
+/// reservoir at 200 kPa and 300 K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wedge {
     /// Air far upstream.
     pub stream: FreeStream,
     /// Half of the angle at the edge.
     pub half_angle_rad: f64,
-    /// From edge to shoulder, along x.
+    /// Length from edge to shoulder, along x.
     pub length_m: f64,
-    /// Extent along z, the line of sight of a wind tunnel's window.
+    /// Extent along z, the line of sight through a wind tunnel's window.
     pub span_m: f64,
 }
 
@@ -46,8 +46,8 @@ impl Wedge {
         Ok(oblique_shock(GAMMA_AIR, self.stream.mach, self.half_angle_rad, Branch::Weak)?)
     }
 
-    /// Fields: density (with [`Fields::All`] temperature and pressure, and the gas fraction). The
-    /// lattice reaches from 0.2 lengths before the edge to 1.6 lengths behind it at most, and as
+    /// Computes density (with [`Fields::All`] also temperature, pressure and the gas fraction). The
+    /// lattice reaches from 0.2 lengths before the edge to at most 1.6 lengths behind it, and as
     /// far up and down as the shock.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let wave = Wave::new(self)?;
@@ -85,7 +85,8 @@ impl Wedge {
     }
 }
 
-/// Density, and with [`Fields::All`] temperature, pressure and gas fraction, as means over boxes.
+/// Fills in cell averages of the density; with [`Fields::All`] also of temperature, pressure and
+/// gas fraction.
 pub(crate) fn fill_gas<F: LayeredFlow>(flow: &mut Flow, layers: &F, fields: Fields) {
     let (origin, spacing, n) = (flow.origin_m, flow.spacing_m, flow.dims.x as usize);
     let all = [
@@ -135,11 +136,11 @@ struct Wave {
     fan_rad: [f64; 2],
     /// Prandtl-Meyer angle before the fan.
     turn_before_rad: f64,
-    /// Where the fan meets the shock.
+    /// Position where the fan meets the shock.
     undisturbed_until_m: f64,
-    /// Density, temperature, pressure: free, behind the shock, behind the fan.
+    /// Density, temperature and pressure: in the free stream, behind the shock, behind the fan.
     states: [[f64; 3]; 3],
-    /// Total values behind the shock.
+    /// Total (stagnation) values behind the shock.
     total: [f64; 3],
 }
 
@@ -151,16 +152,16 @@ impl Wave {
         let free = [s.density(), s.temperature_k, s.pressure_pa];
         let ratios = [shock.jump.density, shock.jump.temperature, shock.jump.pressure];
         let behind = [0, 1, 2].map(|c| free[c] * ratios[c]);
-        // Close to detachment the flow behind the shock is subsonic, and the closed form has no
-        // shoulder.
+        // Close to detachment, the flow behind the shock is subsonic, and the closed form does not
+        // cover the shoulder.
         let turn_before_rad = prandtl_meyer::angle_rad(GAMMA_AIR, before)?;
         let after = prandtl_meyer::mach(GAMMA_AIR, turn_before_rad + wedge.half_angle_rad)?;
         let fan_rad = [wedge.half_angle_rad + (1.0 / before).asin(), (1.0 / after).asin()];
         let total = [0, 1, 2].map(|c| behind[c] / ratios_at(before)[c]);
         let (l, h) = (wedge.length_m, wedge.length_m * wedge.half_angle_rad.tan());
         let (fan, front) = (fan_rad[0].tan(), shock.shock_rad.tan());
-        // The first Mach line is steeper than the shock (the flow behind a shock is subsonic across
-        // it), so they meet.
+        // The first Mach line is steeper than the shock (the flow component normal to a shock is
+        // subsonic behind it), so they meet.
         let undisturbed_until_m =
             if fan_rad[0] < FRAC_PI_2 { (l * fan - h) / (fan - front) } else { l };
         Ok(Wave {
@@ -176,7 +177,7 @@ impl Wave {
         })
     }
 
-    /// Position where the line from the shoulder at `angle` has the height `r`.
+    /// Position at height `r` of the line from the shoulder at `angle`.
     fn line_x_m(&self, angle: f64, r: f64) -> f64 {
         self.shoulder_m[0] + (r - self.shoulder_m[1]) / angle.tan()
     }
@@ -190,7 +191,7 @@ impl Wave {
     }
 }
 
-/// Density, temperature and pressure over their total values.
+/// Density, temperature and pressure over their total (stagnation) values.
 fn ratios_at(mach: f64) -> [f64; 3] {
     [isentropic::density, isentropic::temperature, isentropic::pressure].map(|f| f(GAMMA_AIR, mach))
 }
@@ -250,7 +251,7 @@ mod tests {
         let flow = wedge.flow(DIMS, Fields::Density).unwrap();
         let density = flow.grid(names::DENSITY).unwrap();
         let (free, behind) = (wedge.stream.density(), wedge.stream.density() * shock.jump.density);
-        // Along rows above the shoulder and before the fan: the excess is (behind - free) times the
+        // Along rows above the shoulder and before the fan, the excess is (behind - free) times the
         // length behind the shock.
         for j in (50..78).step_by(3) {
             let y = flow.position_m(0, j, 0).y;
@@ -278,7 +279,8 @@ mod tests {
         let exponent = (wave.states[2][2] / wave.states[1][2]).ln()
             / (wave.states[2][0] / wave.states[1][0]).ln();
         assert!((exponent - 1.4).abs() < 1e-12);
-        // Shock loss aside, the pressure is back near the free stream's behind the shoulder.
+        // Apart from the loss in the shock, the pressure behind the shoulder is near that of the
+        // free stream.
         assert!((wave.states[2][2] / wave.states[0][2] - 1.0).abs() < 0.05);
     }
 
@@ -294,8 +296,8 @@ mod tests {
         for (d, g) in density.values.iter().zip(&gas.values) {
             assert_eq!(d.is_nan(), *g == 0.0);
         }
-        // Volume of the solid within the boxes, from fractions and from the body (whose ends lie in
-        // the middle of boxes).
+        // Volume of the solid within the boxes, from the fractions and from the body (whose ends
+        // lie in the middle of boxes).
         let cell = flow.spacing_m.x * flow.spacing_m.y;
         let mut solid = 0.0;
         for i in 0..flow.dims.x as usize {
@@ -306,7 +308,7 @@ mod tests {
         }
         let area = volume(body) / wedge.span_m;
         assert!((solid / area - 1.0).abs() < 0.01, "{solid} {area}");
-        // p = rho R T holds for means in uniform regions.
+        // p = rho R T also holds for means in uniform regions.
         let at = flow.grid(names::PRESSURE).unwrap().index(2, 40, 1);
         let of = |name| flow.field(name).unwrap().values[at] as f64;
         let gas_constant = of(names::PRESSURE) / of(names::DENSITY) / of(names::TEMPERATURE);

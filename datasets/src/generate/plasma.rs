@@ -4,7 +4,7 @@
 //!
 //! The field is a Harris sheet (Harris 1962) with a chain of magnetic islands that wander along y,
 //! under a guide field: B = ∇×(A ŷ) + B_g ŷ with A = -λ ln cosh(z/λ) + ε cos(k·x + κ(y))
-//! exp(-z²/w²), so it is free of divergence exactly. Density is a function of A (plasma is tied to
+//! exp(-z²/w²), so it is exactly free of divergence. Density is a function of A (plasma is tied to
 //! flux surfaces) with turbulence in octaves down to a few cells. The domain is 2 x 1 x 1, periodic
 //! along x and y, with z = 0 in the sheet.
 
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use rt_core::math::SplitMix64;
 use std::f64::consts::TAU;
 
-/// Density of the surface: the skin of the ropes.
+/// Isovalue of the density: the outer surface of the flux ropes.
 pub const ISO: f64 = 0.31;
 
 /// Half thickness of the sheet, λ.
@@ -26,7 +26,7 @@ const SHEET: f64 = 0.05;
 /// Strength ε and half height w of the islands.
 const ISLAND: f64 = 0.06;
 const ISLAND_HEIGHT: f64 = 0.2;
-/// Five islands over the length of 2.
+/// Wave number of the island chain: five islands over the length of 2.
 const WAVE_NUMBER: f64 = 5.0 * TAU / 2.0;
 const GUIDE_FIELD: f64 = 0.5;
 /// Noise of the first octave, and its wavelengths per unit.
@@ -35,7 +35,7 @@ const FIRST_PERIOD: u32 = 6;
 const CELLS_PER_WAVELENGTH: f64 = 3.9;
 const BATCH: usize = 32;
 
-/// The plasma; as a [`PlaneSource`] it is the density.
+/// The plasma; as a [`PlaneSource`], it provides the density.
 #[derive(Debug, Clone, Copy)]
 pub struct Plasma {
     points: u32,
@@ -44,7 +44,7 @@ pub struct Plasma {
 }
 
 impl Plasma {
-    /// Density sampled with 2·`points` x `points` x `points` points; `points` is clamped to
+    /// Samples the density with 2·`points` x `points` x `points` points; `points` is clamped to
     /// 16..=4096.
     pub fn new(points: u32, seed: u64) -> Self {
         let mut random = SplitMix64::new(seed);
@@ -113,7 +113,7 @@ impl Plasma {
         Polylines::from_lines((0..count).into_par_iter().map(line).collect())
     }
 
-    /// The whole, and along a rope.
+    /// Standard views: the whole, and along a rope.
     pub fn views() -> Vec<View> {
         let middle = DVec3::new(1.0, 0.5, 0.0);
         vec![
@@ -152,13 +152,13 @@ impl PlaneSource for Plasma {
     fn fill_plane(&self, k: u32, values: &mut [f32]) {
         let d = self.spacing();
         let z = -0.5 + k as f64 * d.z;
-        // A = harris + chain·envelope, of which only the chain varies within the plane.
+        // A = harris + chain·envelope; only the chain varies within the plane.
         let harris = -SHEET * (z / SHEET).cosh().ln();
         let envelope = ISLAND * (-(z / ISLAND_HEIGHT).powi(2)).exp();
         let wave: Vec<DVec2> =
             (0..2 * self.points).map(|i| DVec2::from_angle(WAVE_NUMBER * i as f64 * d.x)).collect();
-        // Where even the middle of an island is thin, turbulence cannot reach the surface: leave it
-        // out.
+        // Where the density is too low even in the middle of an island, turbulence cannot reach the
+        // surface and is left out.
         let thickest = density(harris + envelope);
         let turbulent =
             thickest * (1.0 + 1.5 * self.octaves().map(|(_, a)| a).sum::<f32>()) > 0.9 * ISO as f32;
@@ -170,7 +170,8 @@ impl PlaneSource for Plasma {
             if turbulent {
                 turbulence.fill(0.0);
                 for ((noise, amplitude), scratch) in octaves.iter().zip(&mut scratch) {
-                    // The noise repeats after a length of 1 in its own x, which is the domain's 2.
+                    // The noise repeats after a length of 1 in its own x, which corresponds to the
+                    // domain's length of 2.
                     noise.add_row(&mut turbulence, d.x / 2.0, y, z + 0.5, *amplitude, scratch);
                 }
             }
@@ -184,7 +185,7 @@ impl PlaneSource for Plasma {
 }
 
 /// Density without turbulence: 1 in the middle of an island, where A = ε; 1/9 on the separatrix,
-/// where A = -ε; and falling further away from the sheet. (An exponential would do as well, but
+/// where A = -ε; and falling further away from the sheet. (An exponential would also work but would
 /// cost more than the noise.)
 fn density(flux: f64) -> f32 {
     let q = ISLAND / (2.0 * ISLAND - flux);
@@ -215,7 +216,7 @@ mod tests {
         let plasma = Plasma::new(32, 4);
         let d = plasma.dims();
         let mut plane = vec![0f32; (d.x * d.y) as usize];
-        // The outermost plane is beyond the turbulence.
+        // The outermost plane lies outside the turbulence.
         plasma.fill_plane(0, &mut plane);
         for (i, v) in plane.iter().enumerate() {
             let (i, j) = (i as u32 % d.x, i as u32 / d.x);

@@ -1,5 +1,5 @@
-//! The shape that helium plumes and pool fires share: a round source at the floor, puffs that roll
-//! up into rings, and a column that necks in, breaks up and widens as it rises.
+//! Common shape of helium plumes and pool fires: a round source at the floor, puffs that roll up
+//! into rings, and a column that necks in, breaks up and widens as it rises.
 
 use super::flow::Flow;
 use super::turbulence::{Displacement, Turbulence, Vortex, Vortices};
@@ -23,7 +23,7 @@ pub(crate) struct Shape {
     pub(crate) half_height: f64,
     /// Heights of the rings.
     pub(crate) rings: &'static [f64],
-    /// How far eddies carry gas, as a share of the local radius.
+    /// Distance that eddies carry gas, as a fraction of the local radius.
     pub(crate) wildness: f64,
 }
 
@@ -46,7 +46,8 @@ impl Plume {
             let z = (height + random.between(-0.1, 0.1)) * r0;
             let radius = column_radius(&shape, z);
             Vortex {
-                // Cores lie at the edge of the column; outward at the top, down at the outside.
+                // Cores lie at the edge of the column; the flow goes outward at the top and down at
+                // the outside.
                 center_m: [radius * random.between(0.95, 1.15), z],
                 size_m: (0.45 + 0.12 * height) * r0.min(radius),
                 turn_rad: -random.between(2.2, 3.6),
@@ -64,11 +65,11 @@ impl Plume {
         }
     }
 
-    /// The share of source gas along a row, 0 to 1.
+    /// Computes the fraction of source gas along a row, 0 to 1.
     pub(crate) fn share_row(&self, d: &mut Displacement, j: u32, k: u32, share: &mut Vec<f32>) {
         let r0 = self.shape.source_radius_m;
         let height = self.spacing_m.z * k as f64 + self.origin_m.z;
-        // Calm at the floor, wild above the neck.
+        // The flow is calm at the floor and turbulent above the neck.
         let calm = (height / (0.8 * self.shape.neck_height * r0)).clamp(0.0, 1.0);
         let strength = self.shape.wildness * calm * calm;
         let size = column_radius(&self.shape, height).max(0.3 * r0) * 1.6;
@@ -81,11 +82,11 @@ impl Plume {
         }));
     }
 
-    /// Before the turbulence.
+    /// Mean field, before the turbulent displacement.
     fn mean(&self, p: DVec3) -> f64 {
         let s = &self.shape;
         let r0 = s.source_radius_m;
-        // The column sways; rings are tilted and not quite round.
+        // The column sways; the rings are tilted and not quite round.
         let up = (p.z / r0).max(0.0);
         let [a, b, c, e] = self.lean;
         let sway = 0.06 * r0 * up.min(6.0);
@@ -94,7 +95,7 @@ impl Plume {
         let uneven = r0 * (0.07 * (angle + c).cos() + 0.05 * (3.0 * angle + e).sin()) * up.min(1.0);
         let [r, z] = self.rings.origin_of([r, p.z + uneven]);
         let radius = column_radius(s, z);
-        // From a top hat at the source to a Gaussian above the neck.
+        // The profile changes from a top hat at the source to a Gaussian above the neck.
         let sharpness = 2.0 + 10.0 * (-(z / (s.neck_height * r0)).max(0.0)).exp();
         let dilution = 1.0 / (1.0 + (z.max(0.0) / (s.half_height * r0)).powf(5.0 / 3.0));
         dilution * (-(r.abs() / radius).powf(sharpness)).exp()

@@ -1,5 +1,5 @@
-//! Lines with a radius and a scalar at every point: what streamline generators give, ready to
-//! become tubes.
+//! Polylines with a radius and a scalar at every point, as streamline generators produce them, for
+//! rendering as tubes.
 
 use glam::Vec3;
 use rt_core::shapes::{Radii, ShapeError, Tubes};
@@ -50,7 +50,7 @@ impl Polylines {
         self.offsets.windows(2).map(|w| (w[1] - w[0]).saturating_sub(1) as usize).sum()
     }
 
-    /// Tubes of rt-core with the lines' radii and scalars.
+    /// Converts the lines to rt-core tubes with their radii and scalars.
     pub fn into_tubes(self) -> Result<Tubes, ShapeError> {
         Tubes::new(self.points, &self.offsets, Radii::Each(self.radii))?.with_scalars(self.scalars)
     }
@@ -61,8 +61,8 @@ impl Polylines {
 pub struct Line {
     /// World positions.
     pub points: Vec<Vec3>,
-    /// One per point.
+    /// Tube radii, one per point.
     pub radii: Vec<f32>,
-    /// One per point.
+    /// Scalars, one per point.
     pub scalars: Vec<f32>,
 }

@@ -4,9 +4,9 @@ use glam::{DVec2, DVec3};
 use rt_core::mesh::TriMesh;
 use std::f64::consts::TAU;
 
-/// Turns a profile of (x, r) about the x axis with `segments` (at least 3) per turn. It must begin
-/// and end on the axis (r = 0) and run upstream to downstream, with r above 0 between; then the
-/// surface is closed and counter-clockwise from outside.
+/// Revolves a profile of (x, r) about the x axis with `segments` (at least 3) per turn. The profile
+/// must begin and end on the axis (r = 0), run from upstream to downstream and have r above 0 in
+/// between. Then the surface is closed and counter-clockwise from outside.
 pub(crate) fn revolve(profile: &[DVec2], segments: u32) -> TriMesh {
     let segments = segments.max(3);
     let inner = &profile[1..profile.len() - 1];

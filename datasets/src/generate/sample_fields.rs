@@ -4,14 +4,14 @@
 use super::flow::{Flow, FlowError, names};
 use glam::{DVec3, UVec3};
 
-/// The fields; positions in metres, the origin in the middle.
+/// The fields. Positions are in metres; the origin is the centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SampleField {
     /// n = 1 + A exp(-r²/(2σ²)).
     Gaussian {
-        /// A.
+        /// Amplitude A.
         amplitude: f64,
-        /// σ.
+        /// Width σ.
         sigma_m: f64,
     },
     /// Luneburg's lens: n² = 2 - r² within the unit ball, 1 outside. Parallel rays meet at its far
@@ -19,9 +19,9 @@ pub enum SampleField {
     Luneburg,
     /// Maxwell's fish-eye: n = n0 / (1 + r²/a²). Rays are circles.
     Maxwell {
-        /// n0.
+        /// Index n0 at the centre.
         n0: f64,
-        /// a.
+        /// Radius a.
         radius_m: f64,
     },
 }
@@ -39,14 +39,14 @@ impl SampleField {
         }
     }
 
-    /// The index on a cube of `half_width_m` about the origin. The one field is called
-    /// [`refractive_index`](names::REFRACTIVE_INDEX); as f32 it resolves changes of 6e-8, so weak
-    /// Gaussians (A < 1e-3) should be taken from [`SampleField::index_minus_one`].
+    /// Samples the index on a cube of `half_width_m` about the origin. The only field is
+    /// [`refractive_index`](names::REFRACTIVE_INDEX). As f32 it resolves changes of 6e-8, so use
+    /// [`SampleField::index_minus_one`] for weak Gaussians (A < 1e-3).
     pub fn flow(&self, dims: UVec3, half_width_m: f64) -> Result<Flow, FlowError> {
         self.sampled(dims, half_width_m, (names::REFRACTIVE_INDEX, "1"), |p| self.index(p))
     }
 
-    /// The same field as `index_minus_one`, n - 1, with all digits of an f32.
+    /// Samples the same field as `index_minus_one`, n - 1, with full f32 precision.
     pub fn index_minus_one(&self, dims: UVec3, half_width_m: f64) -> Result<Flow, FlowError> {
         self.sampled(dims, half_width_m, ("index_minus_one", "1"), |p| match *self {
             SampleField::Gaussian { amplitude, sigma_m } => {

@@ -26,7 +26,8 @@ pub fn icosphere(level: u32) -> TriMesh {
             points.push(p.normalize());
         }
     }
-    // Three corners at the edge length of each other are a triangle; its normal tells the order.
+    // Three corners at edge length from each other form a triangle; its normal determines the
+    // order.
     let edge = points.iter().skip(1).map(|p| p.distance(points[0])).fold(f64::MAX, f64::min) * 1.01;
     let mut triangles = Vec::new();
     for a in 0..12usize {
@@ -76,7 +77,8 @@ pub fn cube() -> TriMesh {
 }
 
 /// The unit sphere by longitude and latitude around z, with one vertex at each pole: `around` (at
-/// least 3) by `rings` (at least 2) patches. Long thin triangles at the poles are the point of it.
+/// least 3) by `rings` (at least 2) patches. It serves as an example of long thin triangles (at the
+/// poles).
 pub fn uv_sphere(around: u32, rings: u32) -> TriMesh {
     let (around, rings) = (around.max(3), rings.max(2));
     let mut positions = vec![Vec3::Z];

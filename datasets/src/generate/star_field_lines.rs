@@ -1,9 +1,9 @@
-//! Magnetic field lines of a star: stands for the 48 000 streamlines of the VAPOR star in table 4.1
-//! of the thesis (there 86 million triangles of tubes; here round tubes without triangles).
+//! Magnetic field lines of a star. Represents the 48 000 streamlines of the VAPOR star in table 4.1
+//! of the thesis (86 million triangles of tubes there; round tubes without triangles here).
 //!
 //! The field is that of a tilted dipole at the centre and a dozen smaller ones under the surface
-//! (starspots), so lines are of all lengths, from small arcades to loops that leave the domain.
-//! Units: the star's radius is 1.
+//! (starspots), so lines have all lengths, from small arcades to loops that leave the domain. The
+//! unit of length is the star's radius.
 
 use super::fibonacci::fibonacci_direction;
 use super::polylines::{Line, Polylines};
@@ -13,14 +13,14 @@ use glam::DVec3;
 use rayon::prelude::*;
 use rt_core::math::SplitMix64;
 
-/// Lines in the thesis.
+/// Number of lines in the thesis.
 pub const THESIS_LINES: usize = 48_000;
 
 const SPOTS: usize = 12;
-/// Lines that get this far from the centre end.
+/// Distance from the centre at which lines end.
 const OUTER_RADIUS: f64 = 8.0;
-/// Step as a fraction of the distance to the centre: fine at the surface, where the field is
-/// intricate.
+/// Step length as a fraction of the distance to the centre: small at the surface, where the field
+/// is intricate.
 const RELATIVE_STEP: f64 = 0.03;
 /// Tube radius as a fraction of the distance to the centre.
 const RELATIVE_TUBE: f32 = 0.002;
@@ -36,7 +36,7 @@ pub struct StarField {
 }
 
 impl StarField {
-    /// The field of this seed.
+    /// The field for a seed.
     pub fn new(seed: u64) -> Self {
         let mut random = SplitMix64::new(seed);
         let mut dipoles = vec![Dipole { position: DVec3::ZERO, moment: DVec3::new(0.2, 0.1, 1.0) }];
@@ -58,8 +58,8 @@ impl StarField {
         self.dipoles.iter().map(dipole).sum()
     }
 
-    /// `count` field lines from points spread evenly over the surface, outward until they come back
-    /// or reach eight radii. The scalar is log₁₀|B|.
+    /// Traces `count` field lines from points spread evenly over the surface, outward until they
+    /// return or reach eight radii. The scalar is log₁₀|B|.
     pub fn lines(&self, count: usize) -> Polylines {
         let line = |i: usize| -> Line {
             let seed = fibonacci_direction(i, count);
@@ -68,7 +68,7 @@ impl StarField {
                 sign: if self.at(seed).dot(seed) < 0.0 { -1.0 } else { 1.0 },
                 min_speed: 1e-12,
             };
-            // The first step leaves the surface, so "back inside" is tested after that only.
+            // The first step leaves the surface, so the test for a return inside starts after it.
             let step = |p: DVec3| {
                 let r = p.length();
                 (r < OUTER_RADIUS && (r >= 1.0 || p == seed)).then_some(RELATIVE_STEP * r)
@@ -83,7 +83,7 @@ impl StarField {
         Polylines::from_lines((0..count).into_par_iter().map(line).collect())
     }
 
-    /// The whole, and close to the surface.
+    /// Standard views: the whole, and close to the surface.
     pub fn views() -> Vec<View> {
         vec![
             View::new("whole", DVec3::new(14.0, -18.0, 7.0), DVec3::ZERO),

@@ -6,20 +6,20 @@
 
 use glam::DVec3;
 
-/// How to follow a line.
+/// Parameters of the tracing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamlineOptions {
-    /// Most points of a line.
+    /// Maximum number of points of a line.
     pub max_points: usize,
     /// Along the field (1) or against it (-1).
     pub sign: f64,
-    /// Where the field is weaker than this, a line ends: its direction would be noise.
+    /// Minimum speed: where the field is weaker, a line ends because its direction would be noise.
     pub min_speed: f64,
 }
 
-/// Follows the field from `seed`, which becomes the first point. `step` gives the arc length of the
-/// next step at a point; a line ends where it returns `None` (outside), where the field is too weak
-/// or not finite, or at `max_points`.
+/// Traces the field from `seed`, which becomes the first point. `step` returns the arc length of
+/// the next step at a point. A line ends where `step` returns `None` (outside), where the field is
+/// too weak or not finite, or at `max_points`.
 pub fn trace(
     field: impl Fn(DVec3) -> DVec3,
     seed: DVec3,
@@ -29,7 +29,7 @@ pub fn trace(
     let direction = |p: DVec3| -> Option<DVec3> {
         let v = field(p) * tracing.sign;
         let speed = v.length();
-        // A NaN speed fails this comparison, too.
+        // A NaN speed also fails this comparison.
         (speed > tracing.min_speed && speed.is_finite()).then(|| v / speed)
     };
     let mut points = Vec::new();
@@ -42,7 +42,8 @@ pub fn trace(
     points
 }
 
-/// One step of length `h`: y + h/6·(k1 + 2k2 + 2k3 + k4). `None` when the field ends on the way.
+/// One step of length `h`: y + h/6·(k1 + 2k2 + 2k3 + k4). `None` when the field is undefined on the
+/// way.
 pub fn rk4_step(field: impl Fn(DVec3) -> Option<DVec3>, p: DVec3, h: f64) -> Option<DVec3> {
     let k1 = field(p)?;
     let k2 = field(p + 0.5 * h * k1)?;
@@ -74,7 +75,7 @@ mod tests {
             );
             line[n].distance(DVec3::X)
         };
-        // With fewer steps two error terms of opposite sign hide the order.
+        // With fewer steps, two error terms of opposite sign hide the order.
         let order = (error(320) / error(640)).log2();
         assert!((3.8..4.2).contains(&order), "order {order}");
         assert!(error(80) < 1e-6);

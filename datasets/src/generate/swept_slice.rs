@@ -1,8 +1,8 @@
-//! A plane slice of a computed flow, revolved or extruded to the three-dimensional flow that it
-//! stands for.
+//! Sweeps a plane slice of a computed flow, by revolution or extrusion, to the three-dimensional
+//! flow that it represents.
 //!
-//! Solvers compute axisymmetric and plane flows on one layer of cells. What a beam of light crosses
-//! is the whole flow: the slice turned about its axis, or repeated along the span.
+//! Solvers compute axisymmetric and plane flows on one layer of cells. A beam of light crosses the
+//! whole flow: the slice revolved about its axis, or repeated along the span.
 
 use super::flow::{Flow, FlowError, names};
 use crate::model::{Dataset, ModelError, StructuredGrid};
@@ -15,17 +15,17 @@ use glam::{DVec3, UVec3};
 pub struct Slice {
     /// x of the lines, ascending.
     x_m: Vec<f64>,
-    /// y of the lattice's points on line i, ascending; the first is the body's surface, or the
+    /// y of the lattice points on line i, ascending; the first is on the body's surface or the
     /// axis.
     y_m: Vec<Vec<f64>>,
-    /// Per field: name, unit, and cell values by line and then along it.
+    /// Per field: name, unit, and cell values, first by line and then along the line.
     fields: Vec<(&'static str, &'static str, Vec<f64>)>,
 }
 
-/// What the slice stands for.
+/// How the slice extends to three dimensions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sweep {
-    /// Turned about the x axis.
+    /// Revolved about the x axis.
     Revolve,
     /// Repeated along z over this span, and mirrored at y = 0.
     Extrude {
@@ -34,38 +34,38 @@ pub enum Sweep {
     },
 }
 
-/// Why a data set is no such slice.
+/// Why a data set cannot be used as a slice.
 #[derive(Debug, thiserror::Error)]
 pub enum SliceError {
-    /// Not a structured grid of one layer.
+    /// The data set is not a structured grid of one layer.
     #[error(
         "the slice must be a structured grid of at least 2 x 2 points in one layer, not {found}"
     )]
     NotASlice {
-        /// What it is.
+        /// Kind of the data set.
         found: String,
     },
-    /// Lines lean, or run backwards.
+    /// Lines are not at constant x, or run backwards.
     #[error(
         "line {line} of the slice {what}; lines of constant first index must have constant and \
          growing x, and growing y"
     )]
     Line {
-        /// First index.
+        /// First index of the line.
         line: usize,
         /// What is wrong.
         what: &'static str,
     },
-    /// No density.
+    /// An array is missing or unusable.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The lattice asked for.
+    /// The requested lattice is not possible.
     #[error(transparent)]
     Flow(#[from] FlowError),
 }
 
 impl Slice {
-    /// Takes the cell arrays `density` and, where there is one, `temperature`.
+    /// Takes the cell arrays `density` and, if there is one, `temperature`.
     pub fn from_dataset(data: &Dataset) -> Result<Slice, SliceError> {
         data.check()?;
         let not_a_slice = |found: String| SliceError::NotASlice { found };
@@ -102,11 +102,11 @@ impl Slice {
         Ok(Slice { x_m, y_m, fields })
     }
 
-    /// The whole flow on a lattice of `dims` points. Values are means of 2 x 2 x 2 samples a box,
+    /// The whole flow on a lattice of `dims` points. Values are means of 2 x 2 x 2 samples per box,
     /// bilinear between the slice's cells; NaN within the body.
     pub fn flow(&self, sweep: Sweep, dims: UVec3) -> Result<Flow, SliceError> {
         let (first, last) = (self.x_m[0], self.x_m[self.x_m.len() - 1]);
-        // No further out than all lines reach.
+        // Reach only as far out as the shortest line.
         let side = self.y_m.iter().map(|l| l[l.len() - 1]).fold(f64::INFINITY, f64::min);
         let half_span = match sweep {
             Sweep::Revolve => side / 2f64.sqrt(), // the corners of the lattice lie within the slice
@@ -148,7 +148,7 @@ impl Slice {
         Ok(flow)
     }
 
-    /// Cell values of a field along line `line` of cells, with the positions of the cells' middles.
+    /// Cell values of a field along line `line` of cells, with the positions of the cells' centres.
     pub fn line(&self, name: &str, line: usize) -> Option<Vec<([f64; 2], f64)>> {
         let (_, _, values) = self.fields.iter().find(|f| f.0 == name)?;
         let [a, b] = [self.y_m.get(line)?, self.y_m.get(line + 1)?];
@@ -168,11 +168,11 @@ impl Slice {
         self.x_m.iter().zip(&self.y_m).map(|(&x, y)| [x, y[0]]).collect()
     }
 
-    /// How a point's value follows from cells: `None` within the body.
+    /// The cells and weights that determine the value at a point; `None` within the body.
     ///
-    /// Linear along each of the two nearest columns of cells at the point's own y, then between the
-    /// columns: where the surface has a corner, cells of equal number lie at different heights, and
-    /// interpolating by number would shear the field.
+    /// Interpolates along each of the two nearest columns of cells at the point's own y, then
+    /// between the columns. Where the surface has a corner, cells of equal number lie at different
+    /// heights, and interpolation by number would shear the field.
     fn locate(&self, x: f64, y: f64) -> Option<[(usize, f64); 4]> {
         let line = self.x_m.partition_point(|&l| l <= x).clamp(1, self.x_m.len() - 1) - 1;
         let s = (x - self.x_m[line]) / (self.x_m[line + 1] - self.x_m[line]);

@@ -1,4 +1,4 @@
-//! The mean turbulent plume above a small heat source: similar at all heights, and in closed form.
+//! The mean turbulent plume above a small heat source, which is self-similar and has a closed form.
 //!
 //! B. R. Morton, G. I. Taylor and J. S. Turner, "Turbulent gravitational convection from maintained
 //! and instantaneous sources", Proc. R. Soc. A 234, 1956. With the buoyancy flux F = g Q / (cp T0
@@ -23,19 +23,19 @@ const GRAVITY: f64 = 9.806_65;
 /// Heat capacity of air, J/(kg K).
 const HEAT_CAPACITY: f64 = 1004.7;
 
-/// The set-up. The default is 100 W (a person) in a room at 293.15 K and 1 atm, seen from 0.5 to 2
-/// m above the source.
+/// Parameters of the plume. The default is 100 W (a person) in a room at 293.15 K and 1 atm, from
+/// 0.5 to 2 m above the source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalPlume {
-    /// Heat that convection carries, W.
+    /// Convective heat flux, W.
     pub heat_w: f64,
-    /// Entrainment; 0.1 for Gaussian profiles.
+    /// Entrainment coefficient; 0.1 for Gaussian profiles.
     pub entrainment: f64,
-    /// Of the still air, K.
+    /// Temperature of the still air, K.
     pub temperature_k: f64,
-    /// Pa.
+    /// Pressure, Pa.
     pub pressure_pa: f64,
-    /// Lowest and highest point above the source; above 0.
+    /// Heights of the lowest and highest point above the source; greater than 0.
     pub heights_m: [f64; 2],
 }
 
@@ -57,7 +57,7 @@ impl ThermalPlume {
         self.pressure_pa / (GAS_CONSTANT_AIR * self.temperature_k)
     }
 
-    /// Radius b at a height: where the disturbance is 1/e of that on the axis.
+    /// Radius b at a height, where the disturbance is 1/e of that on the axis.
     pub fn radius_m(&self, z_m: f64) -> f64 {
         1.2 * self.entrainment * z_m
     }
@@ -69,7 +69,7 @@ impl ThermalPlume {
         (3.0 * self.buoyancy_flux() / PI * z_m / (b * b)).cbrt()
     }
 
-    /// How much lighter than still air the axis is, as a share: g'/g.
+    /// Relative density deficit on the axis: g'/g.
     pub fn lightness(&self, z_m: f64) -> f64 {
         let b = self.radius_m(z_m);
         2.0 * self.buoyancy_flux() / (PI * self.velocity_m_per_s(z_m) * b * b * GRAVITY)
@@ -86,16 +86,16 @@ impl ThermalPlume {
         self.still_density() * (1.0 - self.lightness(z_m) * (-(r_m / b).powi(2)).exp())
     }
 
-    /// Density missing along a horizontal line that passes the axis at distance `y_m`, kg/m²: times
-    /// the Gladstone-Dale constant it is the optical path difference, its derivative the
-    /// deflection.
+    /// Density deficit integrated along a horizontal line at distance `y_m` from the axis, kg/m².
+    /// Times the Gladstone-Dale constant, it is the optical path difference; the derivative of that
+    /// is the deflection.
     pub fn deficit_kg_per_m2(&self, y_m: f64, z_m: f64) -> f64 {
         let b = self.radius_m(z_m);
         self.still_density() * self.lightness(z_m) * PI.sqrt() * b * (-(y_m / b).powi(2)).exp()
     }
 
-    /// Fields: density; with [`Fields::All`] temperature and pressure. The lattice is three radii
-    /// of the highest plane wide to each side; z is up, the source at the origin.
+    /// Samples the density; with [`Fields::All`] also temperature and pressure. The lattice extends
+    /// to each side by three radii of the highest plane; z is up, the source is at the origin.
     pub fn flow(&self, dims: UVec3, fields: Fields) -> Result<Flow, FlowError> {
         let [bottom, top] = self.heights_m;
         let side = 3.0 * self.radius_m(top);
@@ -137,7 +137,7 @@ mod tests {
         let plume = ThermalPlume::default();
         let flux = |z: f64| {
             let (w, b) = (plume.velocity_m_per_s(z), plume.radius_m(z));
-            // Volume (without π), momentum (without π/2).
+            // Volume flux (without π), momentum flux (without π/2).
             (w * b * b, w * w * b * b)
         };
         for z in [0.3, 1.0, 4.0] {
@@ -171,7 +171,7 @@ mod tests {
                     (0..81).map(|i| plume.still_density() - rho.at(i, j, k) as f64).sum();
                 let exact = plume.deficit_kg_per_m2(p.y, p.z);
                 let most = plume.deficit_kg_per_m2(0.0, p.z);
-                // f32 densities of 1.2 carry 6e-8 each.
+                // Densities of 1.2 as f32 have a rounding error of 6e-8 each.
                 assert!(
                     (sum * flow.spacing_m.x - exact).abs()
                         < 1e-4 * most + 81.0 * 6e-8 * flow.spacing_m.x,

@@ -1,17 +1,18 @@
-//! The look of turbulence without its equations: smooth mean fields evaluated at displaced
+//! Imitates turbulence without solving its equations: smooth mean fields are evaluated at displaced
 //! positions.
 //!
-//! Two displacements follow each other. [`Vortices`] wind the field up around a few large cores
-//! (Kelvin-Helmholtz rollers, the rings of puffing plumes). [`Turbulence`] displaces by gradient
-//! noise in octaves down to six cells, with amplitudes ∝ wavelength^(1/3): then differences of a
-//! passive scalar grow with distance^(1/3), as Obukhov and Corrsin found for real turbulence.
-//! Fronts of the mean field become folded, torn sheets that stay as sharp as the mean field makes
-//! them.
+//! Two displacements are applied one after the other. [`Vortices`] wind the field up around a few
+//! large cores (Kelvin-Helmholtz rollers, the rings of puffing plumes). [`Turbulence`] displaces by
+//! gradient noise in octaves down to six cells, with amplitudes ∝ wavelength^(1/3). Differences of
+//! a passive scalar then grow with distance^(1/3), as Obukhov and Corrsin found for real
+//! turbulence. Fronts of the mean field become folded, torn sheets that stay as sharp as in the
+//! mean field.
 
 use super::flow::Flow;
 use super::noise::{Noise, RowScratch};
 
-/// Wavelengths below this many cells would be aliased, and gradients of the field unresolved.
+/// Cells per wavelength of the finest octave; below that, waves would be aliased and gradients
+/// unresolved.
 const CELLS_PER_WAVELENGTH: f64 = 6.0;
 
 /// Displacements by noise on the lattice of a flow.
@@ -28,18 +29,19 @@ struct Octave {
 /// Storage of [`Turbulence::displace_row`].
 #[derive(Default)]
 pub(crate) struct Displacement {
-    /// Along x, y and z, per point of the row, in metres.
+    /// Displacements along x, y and z, per point of the row, in metres.
     pub(crate) rows: [Vec<f32>; 3],
     octave: Vec<f32>,
     scratch: Vec<[RowScratch; 3]>,
-    /// Size and strength along the row, and what follows for each octave: most rows have those of
-    /// the row before.
+    /// Size and strength along the row, and the resulting weights of each octave. Most rows reuse
+    /// those of the previous row.
     local: Vec<(f64, f64)>,
     weights: Vec<Vec<f32>>,
 }
 
 impl Turbulence {
-    /// Octaves from `largest_m` downwards. Coarser lattices have the same large octaves, and fewer.
+    /// Octaves from `largest_m` downwards. Coarser lattices have the same large octaves but fewer
+    /// of them.
     pub(crate) fn new(flow: &Flow, largest_m: f64, seed: u64) -> Turbulence {
         let length = flow.spacing_m * (flow.dims - 1).as_dvec3();
         let finest = CELLS_PER_WAVELENGTH * flow.spacing_m.max_element();
@@ -55,9 +57,9 @@ impl Turbulence {
         Turbulence { octaves, points: flow.dims.to_array() }
     }
 
-    /// Displacements along the row of constant y and z with indices `j`, `k`. `strength(i)` gives
-    /// the local size of the eddies at point `i`, and how far they carry gas, as a share of that
-    /// size.
+    /// Computes the displacements along the row of constant y and z with indices `j`, `k`.
+    /// `strength(i)` returns the local size of the eddies at point `i`, and how far they carry gas
+    /// as a fraction of that size.
     pub(crate) fn displace_row(
         &self,
         out: &mut Displacement,
@@ -100,8 +102,8 @@ impl Turbulence {
     }
 }
 
-/// Amplitude of an octave where eddies have this size and strength: the third-root law below it,
-/// little above.
+/// Amplitude of an octave for eddies of this size and strength: follows the third-root law below
+/// the size and is small above it.
 fn weight(wavelength_m: f64, (size_m, strength): (f64, f64)) -> f64 {
     if size_m <= 0.0 || strength <= 0.0 {
         return 0.0;
@@ -110,7 +112,7 @@ fn weight(wavelength_m: f64, (size_m, strength): (f64, f64)) -> f64 {
     strength * size_m * relative.cbrt() / (1.0 + relative.powi(4))
 }
 
-/// Cores that wind up what is around them, in a plane: (x, y) for rollers, (r, z) for rings.
+/// Vortex cores that wind up the surrounding gas in a plane: (x, y) for rollers, (r, z) for rings.
 pub(crate) struct Vortices(pub(crate) Vec<Vortex>);
 
 pub(crate) struct Vortex {
@@ -121,7 +123,7 @@ pub(crate) struct Vortex {
 }
 
 impl Vortices {
-    /// Where the gas at `p` was before the cores turned it.
+    /// The position of the gas at `p` before the cores turned it.
     pub(crate) fn origin_of(&self, p: [f64; 2]) -> [f64; 2] {
         let mut q = p;
         for v in &self.0 {

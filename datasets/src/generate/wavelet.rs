@@ -1,6 +1,6 @@
-//! The wavelet of `vtkRTAnalyticSource` (ParaView's *Sources > Wavelet*), bit for bit: the field
-//! whose nested isosurfaces chapter 3 of the thesis renders with 1 to 32 million triangles (figures
-//! 3.5 and 3.6).
+//! The wavelet of `vtkRTAnalyticSource` (ParaView's *Sources > Wavelet*), bit for bit: chapter 3 of
+//! the thesis renders nested isosurfaces of this field with 1 to 32 million triangles (figures 3.5
+//! and 3.6).
 //!
 //! With the scaled distances `x = (Cx - i)·sx`, `sx = 1/(xmax - xmin)` (y and z alike) and `t =
 //! 1/(2·σ²)`:
@@ -9,16 +9,16 @@
 //! f = 255·exp(-(z² + y² + x²)·t) + 10·sin(60·x) + 18·sin(30·y) + 5·cos(40·z)
 //! ```
 //!
-//! VTK computes in f64, rounds each of the three waves to f32 and adds them one after the other in
-//! f64; only then the sum becomes f32. That order is kept here. `exp`, `sin` and `cos` come from
-//! the platform's C library, as VTK's do; results that differ in their last f64 bit disappear in
-//! the rounding to f32 except about once in 2²⁹ samples.
+//! VTK computes in f64, rounds each of the three waves to f32, adds them one after the other in f64
+//! and rounds the sum to f32. This module keeps that order. `exp`, `sin` and `cos` come from the
+//! platform's C library, as in VTK. Results that differ in their last f64 bit agree after the
+//! rounding to f32, except about once in 2²⁹ samples.
 
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use rt_core::grid::Grid;
 
-/// The largest number of points per axis: f32 vertices of finer grids would collide anyway.
+/// The largest number of points per axis: f32 vertices of finer grids would coincide.
 const MAX_POINTS_PER_AXIS: i64 = 1 << 20;
 
 /// Parameters of the wavelet; the default is VTK's.
@@ -35,7 +35,7 @@ pub struct Wavelet {
     pub first: IVec3,
     /// Last point index per axis, not smaller than `first`.
     pub last: IVec3,
-    /// Where the Gaussian peak is, in point indices.
+    /// Position of the Gaussian peak, in point indices.
     pub center: DVec3,
     /// Height of the Gaussian peak.
     pub maximum: f64,
@@ -64,7 +64,7 @@ impl Default for Wavelet {
 /// Why a wavelet cannot be sampled.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WaveletError {
-    /// An axis has no points, or absurdly many.
+    /// An axis has no points, or more than 2²⁰.
     #[error(
         "wavelet extent {first}..={last} along {axis} has {points} points; give between 1 and \
          {MAX_POINTS_PER_AXIS}"
@@ -76,7 +76,7 @@ pub enum WaveletError {
         first: i32,
         /// Last index.
         last: i32,
-        /// Their distance plus one.
+        /// Number of points, `last - first + 1`.
         points: i64,
     },
 }
@@ -94,8 +94,8 @@ impl Wavelet {
         }
     }
 
-    /// Samples the field; parallel over planes, same bits on any number of threads. An extent that
-    /// is empty or has more than 2²⁰ points along an axis is an error.
+    /// Samples the field, in parallel over planes; the result does not depend on the number of
+    /// threads. An extent that is empty or has more than 2²⁰ points along an axis is an error.
     pub fn grid(&self) -> Result<Grid, WaveletError> {
         let axis = |a: usize| -> Result<Axis, WaveletError> {
             let (first, last) = (self.first[a], self.last[a]);
@@ -131,8 +131,8 @@ impl Wavelet {
     }
 }
 
-/// What depends on one coordinate only: the squared scaled distance, and the wave after its
-/// rounding to f32.
+/// The terms that depend on one coordinate only: the squared scaled distance, and the wave rounded
+/// to f32.
 struct Axis {
     square: Vec<f64>,
     wave: Vec<f64>,

@@ -33,10 +33,10 @@ pub struct Picture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// The planes, in the order they were added. Colour planes are linear with premultiplied alpha,
-    /// as OpenEXR wants.
+    /// The planes, in the order in which they were added. Colour planes are linear with
+    /// premultiplied alpha, as OpenEXR requires.
     pub planes: Vec<Plane>,
-    /// How the picture was made: see [`Metadata`].
+    /// How the image was made: see [`Metadata`].
     pub metadata: Metadata,
 }
 
@@ -51,16 +51,16 @@ pub struct Plane {
     pub samples: Vec<f32>,
 }
 
-/// What a picture's file says about its making. Customary keys: [`keys`].
+/// Metadata stored with an image. Customary keys: [`keys`].
 pub type Metadata = BTreeMap<String, MetadataValue>;
 
-/// Customary metadata keys, so that all programs here write and look for the same.
+/// Customary metadata keys, shared by all programs of the workspace.
 pub mod keys {
     /// The program's name and version (text).
     pub const SOFTWARE: &str = "software";
     /// The command line (text).
     pub const COMMAND_LINE: &str = "command_line";
-    /// Wall-clock seconds the picture took (number).
+    /// Wall-clock time to make the image, in seconds (number).
     pub const ELAPSED_SECS: &str = "elapsed_secs";
     /// Samples per pixel (number).
     pub const SAMPLES_PER_PIXEL: &str = "samples_per_pixel";
@@ -95,21 +95,20 @@ impl From<f64> for MetadataValue {
     }
 }
 
-/// Why a picture cannot be read, written or put together.
+/// Why an image cannot be read, written or assembled.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// The file system says no.
+    /// The file system reports an error.
     #[error("{path}: cannot {action}")]
     Io {
         /// The file.
         path: PathBuf,
         /// "read" or "write".
         action: &'static str,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// The file's contents are not a picture that can be read, or the picture is not one that the
-    /// format can hold.
+    /// The file does not contain a readable image, or the format cannot store the image.
     #[error("{path}: {reason}")]
     Format {
         /// The file.
@@ -128,7 +127,7 @@ pub enum ImageError {
         width: u32,
         /// Rows.
         height: u32,
-        /// Their product.
+        /// The required number, width times height.
         expected: u64,
     },
     /// Two planes have the same name.
@@ -137,12 +136,12 @@ pub enum ImageError {
         /// The name.
         name: String,
     },
-    /// A plane that the operation needs is absent.
+    /// A required plane is absent.
     #[error("the picture has no plane `{name}` (it has: {present}); {cure}")]
     MissingPlane {
-        /// The name looked for.
+        /// The requested name.
         name: &'static str,
-        /// The names that are there.
+        /// The existing names.
         present: String,
         /// What to do.
         cure: &'static str,
@@ -150,7 +149,7 @@ pub enum ImageError {
 }
 
 impl Picture {
-    /// A picture without planes.
+    /// An image without planes.
     pub fn new(width: u32, height: u32) -> Self {
         Picture { width, height, ..Default::default() }
     }
@@ -219,7 +218,7 @@ impl Picture {
     }
 }
 
-/// Metadata that every program can give: its name and version, and its command line.
+/// Metadata that every program can provide: its name, its version and its command line.
 pub fn metadata_of_this_run(software: &str, version: &str) -> Metadata {
     let arguments: Vec<String> =
         std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();

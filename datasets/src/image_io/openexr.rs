@@ -22,7 +22,7 @@ const UNIT_PREFIX: &str = "unit.";
 /// Longest attribute or channel name that every OpenEXR reader accepts.
 const MAX_NAME_BYTES: usize = 255;
 
-/// Writes all planes and the metadata. The file appears whole or not at all.
+/// Writes all planes and the metadata. The file is written atomically.
 pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
     picture.check()?;
     if picture.planes.is_empty() || picture.width == 0 || picture.height == 0 {
@@ -68,9 +68,9 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
     write_atomically(path, |w| w.write_all(bytes.get_ref())).map_err(io_error(path, "write"))
 }
 
-/// Reads the channels of the first part that has any, 16-bit and integer channels as f32. Planes
-/// come sorted by name, as the format stores them; [`Picture`]s that differ in the order of planes
-/// hold the same.
+/// Reads the channels of the first part that has any; 16-bit and integer channels become f32.
+/// Planes are sorted by name, as the format stores them. [`Picture`]s that differ only in the order
+/// of planes are equivalent.
 pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
     let bytes = std::fs::read(path).map_err(io_error(path, "read"))?;
     let image = exr::prelude::read()
@@ -118,7 +118,7 @@ fn metadata_entry((key, value): (&Text, &AttributeValue)) -> Option<(String, Met
 }
 
 // ---- attributes that the format defines ---------------------------------------------------------
-/// The name of an attribute and its place in the crate's structure.
+/// The name of an attribute and its field in the crate's structure.
 type Standard<T> = (&'static str, fn(&mut LayerAttributes) -> &mut Option<T>);
 
 /// Standard texts.
@@ -133,7 +133,7 @@ const STANDARD_TEXTS: [Standard<Text>; 8] = [
     ("lookModTransform", |a| &mut a.look_modification_transform_name),
 ];
 
-/// Standard numbers that may be absent.
+/// Standard numeric attributes, all optional.
 const STANDARD_NUMBERS: [Standard<f32>; 14] = [
     ("expTime", |a| &mut a.exposure),
     ("aperture", |a| &mut a.aperture),
@@ -151,7 +151,7 @@ const STANDARD_NUMBERS: [Standard<f32>; 14] = [
     ("whiteLuminance", |a| &mut a.white_luminance),
 ];
 
-/// Sets a standard attribute; false where that one holds something else.
+/// Sets a standard attribute; returns false when there is none with this name and type.
 fn put_standard(attributes: &mut LayerAttributes, key: &str, value: &MetadataValue) -> bool {
     match value {
         MetadataValue::Text(t) => {
@@ -170,7 +170,7 @@ fn put_standard(attributes: &mut LayerAttributes, key: &str, value: &MetadataVal
     true
 }
 
-/// The standard attributes that a file has.
+/// The standard attributes present in a file.
 fn standard_entries(mut attributes: LayerAttributes) -> Metadata {
     let a = &mut attributes;
     let mut found = Metadata::new();
@@ -190,7 +190,7 @@ fn text(s: &str) -> Text {
     Text::from_slice_unchecked(s.as_bytes())
 }
 
-/// A name of a channel or an attribute: not empty, without the terminating zero, short.
+/// The name of a channel or an attribute: not empty, without a zero byte, at most 255 bytes.
 fn name(path: &Path, s: &str) -> Result<Text, ImageError> {
     if s.is_empty() || s.contains('\0') || s.len() > MAX_NAME_BYTES {
         let reason = format!(

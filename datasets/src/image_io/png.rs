@@ -10,23 +10,24 @@ use std::path::Path;
 /// Bits per channel of a PNG.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum PngDepth {
-    /// For eyes.
+    /// For viewing.
     #[default]
     Eight,
-    /// For comparisons that 8 bits would round away.
+    /// For comparisons that need more than 8 bits.
     Sixteen,
 }
 
-/// What PNG could not hold.
+/// Counts pixels that PNG cannot represent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PngReport {
-    /// Pixels with a NaN in colour or alpha; written as opaque magenta.
+    /// Pixels with NaN in colour or alpha, written as opaque magenta.
     pub nan: usize,
     /// Pixels with a colour outside 0..=1 (after division by alpha) that was clamped.
     pub clamped: usize,
 }
 
-/// Writes the colour planes (R, G, B and maybe A, or Y). Alpha is written when the picture has `A`.
+/// Writes the colour planes (R, G, B and optionally A, or Y). Alpha is written when the image has
+/// `A`.
 pub fn write_png(path: &Path, picture: &Picture, depth: PngDepth) -> Result<PngReport, ImageError> {
     let pixels = picture.rgba()?;
     if pixels.is_empty() {
@@ -82,8 +83,8 @@ pub fn read_png(path: &Path) -> Result<Picture, ImageError> {
     Ok(picture)
 }
 
-/// Samples divided by their largest value. (The crate's own conversion to f32 does the same, but is
-/// free to treat the values as a colour space of its choice.)
+/// Normalises samples to 0..=1. (The crate's own conversion to f32 does the same but may interpret
+/// the values in a colour space of its choice.)
 fn unit_range(decoded: DynamicImage) -> ImageBuffer<image::Rgba<f32>, Vec<f32>> {
     let pixels = decoded.to_rgba16();
     ImageBuffer::from_fn(pixels.width(), pixels.height(), |x, y| {
@@ -91,7 +92,7 @@ fn unit_range(decoded: DynamicImage) -> ImageBuffer<image::Rgba<f32>, Vec<f32>> 
     })
 }
 
-/// Linear premultiplied to sRGB with straight alpha, all in 0..=1.
+/// Converts linear premultiplied colour to sRGB with straight alpha, all in 0..=1.
 fn encode(p: [f32; 4], report: &mut PngReport) -> [f32; 4] {
     if p.iter().any(|v| v.is_nan()) {
         report.nan += 1;
@@ -99,7 +100,7 @@ fn encode(p: [f32; 4], report: &mut PngReport) -> [f32; 4] {
     }
     let alpha = p[3].clamp(0.0, 1.0);
     let straight = [0, 1, 2].map(|c| if alpha > 0.0 { p[c] / alpha } else { 0.0 });
-    // Division by alpha may leave the range by a rounding error, which is not worth a report.
+    // Division by alpha may leave the range by a rounding error, which is not reported.
     report.clamped += straight.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v)) as usize;
     let [r, g, b] = straight.map(|v| linear_to_srgb(v.clamp(0.0, 1.0)));
     [r, g, b, alpha]

@@ -1,17 +1,17 @@
-//! The 256 cases of a surface in a cell, derived from two rules instead of typed in.
+//! The 256 cases of a surface in a cell, derived from two rules rather than tabulated by hand.
 //!
-//! 1. **Faces decide.** On each of the six faces, walking around it, every run of inside corners is
-//!    cut off by one segment from where the walk enters it to where it leaves. On an ambiguous face
-//!    (two inside corners on a diagonal) this *separates the inside corners*. Both cells at a face
-//!    see the same corners, so they agree, and the surface has no holes (the flaw of the original
-//!    table: Dürst 1988; Nielson and Hamann 1991).
-//! 2. **Loops become triangles.** The segments join to closed loops; each loop of n edges becomes
-//!    n - 2 triangles. Among all ways to do that, the one is taken that puts no diagonal into a
-//!    face of the cell (there the neighbour might have the same diagonal, and four triangles would
-//!    meet at one edge) and that has the shortest diagonals.
+//! 1. **Segments on faces.** On each of the six faces, walking around it, every run of inside
+//!    corners is cut off by one segment, from the edge where the walk enters the run to the edge
+//!    where it leaves. On an ambiguous face (two inside corners on a diagonal), this *separates the
+//!    inside corners*. Both cells at a face see the same corners and so agree, and the surface has
+//!    no holes (the flaw of the original table: Dürst 1988; Nielson and Hamann 1991).
+//! 2. **Triangulation of loops.** The segments join to closed loops; each loop of n edges becomes n
+//!    - 2 triangles. Among all triangulations, the one is chosen that has no diagonal in a face of
+//!    the cell (the neighbour might have the same diagonal, and four triangles would meet at one
+//!    edge) and the shortest diagonals otherwise.
 //!
-//! The number of triangles per case is that of VTK's `vtkMarchingCubesTriangleCases`, so counts
-//! agree with `vtkFlyingEdges3D`; the diagonals are our own.
+//! The number of triangles per case equals that of VTK's `vtkMarchingCubesTriangleCases`, so counts
+//! agree with `vtkFlyingEdges3D`. The choice of diagonals differs from VTK's.
 
 use std::sync::LazyLock;
 
@@ -37,7 +37,7 @@ pub(crate) const EDGE_CORNERS: [[u8; 2]; 12] = [
 const FACES: [[u8; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-/// Maximum number of triangles per case. More would be a bug in the derivation; a test counts them.
+/// Maximum number of triangles per case, which a test verifies.
 pub(crate) const MAX_TRIANGLES: usize = 5;
 
 /// The triangles of one case.
@@ -168,8 +168,8 @@ mod tests {
 
     #[test]
     fn inverting_a_case_without_ambiguous_faces_flips_its_triangles() {
-        // One corner: one triangle; four corners of a face: two; five corners around one: the
-        // inverse of three.
+        // One corner gives one triangle; four corners of a face give two; the inverse of five
+        // corners around one gives three.
         for (case, count) in [
             (0b0000_0001, 1),
             (0b1111_1110, 1),
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn ambiguous_faces_separate_inside_corners() {
-        // Two inside corners on a diagonal of one face: two corners cut off, not a tunnel.
+        // Two inside corners on a diagonal of one face: two corners cut off, no tunnel.
         assert_eq!(CASES[0b0000_1001].count, 2);
         assert_eq!(CASES[0b0110_1001].count, 4, "checkerboard");
     }

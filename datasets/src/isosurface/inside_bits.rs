@@ -94,15 +94,16 @@ impl PlaneBits {
     }
 }
 
-/// Word `at` moved by one point, with the first bit of the next word (when the row has one) moving
+/// Word `at` shifted by one point; the first bit of the next word (when the row has one) is shifted
 /// in.
 #[inline]
 pub(crate) fn shifted(bits: &[u64], at: usize, has_next: bool) -> u64 {
     bits[at] >> 1 | if has_next { bits[at + 1] << 63 } else { 0 }
 }
 
-/// Packs a predicate of each row's values into words. Eight comparisons at a time become bytes
-/// first, which the compiler vectorises; a multiplication gathers their lowest bits into one byte.
+/// Packs a predicate of each row's values into words. Eight comparisons at a time first become
+/// bytes, which the compiler vectorises; a multiplication then gathers their lowest bits into one
+/// byte.
 fn pack(plane: &[f32], nx: usize, bits: &mut [u64], predicate: impl Fn(f32) -> bool) {
     let words = nx.div_ceil(64);
     for (row, out) in plane.chunks_exact(nx).zip(bits.chunks_exact_mut(words)) {

@@ -1,10 +1,10 @@
 //! Isosurfaces of uniform grids as triangle meshes with shared vertices: marching cubes (Lorensen
 //! and Cline 1987) with a hole-free case table, in two parallel passes over bit masks.
 //!
-//! The same rules as `vtkFlyingEdges3D`, so triangle counts are equal to VTK's: a point is inside
-//! when its value is at or above the isovalue (compared in f64), and triangles without area, which
-//! appear where a value equals the isovalue exactly, are kept. Triangles are counter-clockwise seen
-//! from the lower values, and normals point there too.
+//! The rules are those of `vtkFlyingEdges3D`, so triangle counts are equal to VTK's. A point is
+//! inside when its value is at or above the isovalue (compared in f64). Triangles without area,
+//! which appear where a value equals the isovalue exactly, are kept. Triangles are
+//! counter-clockwise seen from the lower values, and normals point there too.
 //!
 //! | file | what |
 //! |---|---|
@@ -59,21 +59,21 @@ pub enum IsosurfaceError {
     /// An isovalue is NaN or infinite.
     #[error("isovalue number {index} is {value}; isovalues must be finite")]
     Isovalue {
-        /// Which one, from 0.
+        /// Index of the isovalue, from 0.
         index: usize,
         /// Its value.
         value: f64,
     },
-    /// The grid's parts do not fit together.
+    /// The grid is inconsistent.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// The result needs more than 32-bit ids.
+    /// The result needs ids of more than 32 bits.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
-/// Extracts the surfaces where `grid` has the values `isos`. The result is the same on any number
-/// of threads.
+/// Extracts the surfaces where `grid` has the values `isos`. The result does not depend on the
+/// number of threads.
 ///
 /// ```
 /// use datasets::{generate::wavelet::Wavelet, isosurface};
@@ -102,7 +102,7 @@ pub fn extract(
     result.skipped_cells =
         counts.first().map_or(0, |c| c.iter().map(|p| p.skipped_cells as u64).sum());
 
-    // Exact sizes, then every plane's own place in the result.
+    // Allocate the exact sizes; every plane then has its own range of the result.
     let mut arrays = Arrays::new(options);
     let (mut vertices, mut triangles) = (0u64, 0u64);
     let first_vertices: Vec<Vec<u32>> = counts.iter().map(|c| prefix(c, &mut vertices)).collect();
@@ -133,8 +133,8 @@ pub fn extract(
     Ok(result)
 }
 
-/// Number of triangles of each isovalue, without making them: about a third of the work and no
-/// memory.
+/// Counts the triangles of each isovalue without generating them: about a third of the work and no
+/// memory for the result.
 pub fn count_triangles(grid: &Grid, isos: &[f64]) -> Result<Vec<usize>, IsosurfaceError> {
     let placement =
         Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
@@ -146,7 +146,7 @@ pub fn count_triangles(grid: &Grid, isos: &[f64]) -> Result<Vec<usize>, Isosurfa
     Ok(cuts.iter().map(total).collect())
 }
 
-/// A checked grid's shape, and where its surfaces are placed.
+/// Shape of a checked grid, and the placement of its surfaces.
 struct Placement {
     dims: [usize; 3],
     mesh_origin: DVec3,
@@ -172,8 +172,8 @@ impl Placement {
         if !origin.is_finite() {
             return Err(GridError::Geometry { field: "origin", value: origin, rule: "finite" });
         }
-        // Far from zero, f32 positions would lose detail: make them relative to the middle (as
-        // TriMesh does). Near zero they stay absolute, which keeps them equal to VTK's.
+        // Far from the origin, f32 positions would lose precision: make them relative to the middle
+        // (as TriMesh does). Near the origin they stay absolute, which keeps them equal to VTK's.
         let extent = spacing * (dims.as_dvec3() - DVec3::ONE);
         let center = origin + 0.5 * extent;
         let far = center.abs().max_element() > extent.max_element();
@@ -207,7 +207,7 @@ fn cuts(isos: &[f64], placement: &Placement) -> Result<Vec<Cut>, IsosurfaceError
 }
 
 /// Splits planes into jobs. Every job computes the bits of one extra plane, so jobs are as long as
-/// balance allows; the result does not depend on the split.
+/// load balance allows. The result does not depend on the split.
 fn split_planes(planes: Range<usize>) -> Vec<Range<usize>> {
     let length = (planes.len() / (4 * rayon::current_num_threads())).clamp(1, 16);
     planes.clone().step_by(length).map(|a| a..(a + length).min(planes.end)).collect()
@@ -220,8 +220,8 @@ fn count_planes(block: &Block<'_>, cut: &Cut, planes: Range<usize>) -> Vec<Plane
         .collect()
 }
 
-/// Ids of every plane's first vertex, and one after the last plane; `next` goes on counting. Ids
-/// past u32 wrap here: [`Arrays::allocate`] refuses them before they are used.
+/// Id of every plane's first vertex, and one after the last plane; `next` is the running count. Ids
+/// beyond u32 wrap here, but [`Arrays::allocate`] rejects them before they are used.
 fn prefix(counts: &[PlaneCount], next: &mut u64) -> Vec<u32> {
     let mut ids = Vec::with_capacity(counts.len() + 1);
     for c in counts {
@@ -240,7 +240,7 @@ struct Arrays {
     triangles: Vec<[u32; 3]>,
 }
 
-/// The part of the result that no job has yet.
+/// The part of the result that is not assigned to a job yet.
 struct RemainingOutput<'a> {
     positions: &'a mut [Vec3],
     normals: Option<&'a mut [Vec3]>,
@@ -298,7 +298,7 @@ impl Arrays {
 }
 
 impl<'a> RemainingOutput<'a> {
-    /// Takes the part that planes with these counts fill.
+    /// Takes the output range of the planes with these counts.
     fn take(&mut self, counts: &[PlaneCount]) -> Output<'a> {
         let vertices = counts.iter().map(|c| c.vertices as usize).sum();
         let triangles = counts.iter().map(|c| c.triangles as usize).sum();

@@ -2,12 +2,12 @@
 //! a time.
 //!
 //! Ids depend on position, not on the thread that computes them. Plane k has, in this order, the
-//! vertices on its x and y edges (row by row, x before y), then those on the z edges up to plane
-//! k + 1. Slab k has its triangles. Two passes therefore suffice. They count every plane in
-//! parallel, take prefix sums, and emit every plane in parallel into its own part of the result.
-//! This is the method of flying edges (Schroeder, Maynard and Geveci 2015), with planes in place of
-//! rows. The in-plane vertices come first, so slab k knows the ids on plane k + 1 without reading
-//! plane k + 2.
+//! vertices on its x and y edges (row by row, x before y), then those on the z edges up to plane k
+//! + 1. Slab k has its triangles. Two passes therefore suffice: count every plane in parallel, take
+//! prefix sums, and emit every plane in parallel into its own part of the result. This is the
+//! method of flying edges (Schroeder, Maynard and Geveci 2015), with planes in place of rows. The
+//! in-plane vertices come first, so slab k knows the ids on plane k + 1 without reading plane k +
+//! 2.
 
 use super::case_table::{CASES, EDGES_AT_CORNERS};
 use super::gradient::normal_on_edge;
@@ -28,8 +28,8 @@ pub(crate) struct PlaneCount {
 #[derive(Clone, Copy)]
 pub(crate) struct Cut {
     pub(crate) iso: f64,
-    /// Smallest f32 that is at or above `iso`: comparing with it in f32 is comparing with `iso` in
-    /// f64.
+    /// Smallest f32 that is at or above `iso`: an f32 comparison with it is equivalent to an f64
+    /// comparison with `iso`.
     pub(crate) threshold: f32,
     /// Position of point (0,0,0) relative to the mesh's origin.
     pub(crate) base: DVec3,
@@ -110,7 +110,7 @@ pub(crate) fn emit(
         }
 
         // Triangles. Every crossed edge at or to the left of a cell belongs to an active cell, so
-        // running ids that only active cells advance are always right.
+        // ids that are advanced only by active cells are correct.
         for j in 0..ny - 1 {
             let mut x =
                 [below_rows[j][0], below_rows[j + 1][0], above_rows[j][0], above_rows[j + 1][0]];

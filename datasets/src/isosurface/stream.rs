@@ -1,6 +1,6 @@
-//! Isosurfaces of fields that do not fit into memory. Planes are requested in batches, and only one
-//! batch and the result are in memory. The result equals that of the whole field in memory, id for
-//! id.
+//! Isosurfaces of fields that do not fit into memory. Planes are requested in batches; only one
+//! batch and the result are in memory. The result is identical to that of the whole field in
+//! memory, including the ids.
 
 use super::inside_bits::Block;
 use super::{
@@ -10,7 +10,7 @@ use super::{
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
-/// A scalar field that can give any plane of its grid.
+/// A scalar field that can compute any plane of its grid.
 pub trait PlaneSource: Sync {
     /// Points per axis.
     fn dims(&self) -> UVec3;
@@ -18,8 +18,8 @@ pub trait PlaneSource: Sync {
     fn origin(&self) -> DVec3;
     /// World distance between neighbouring points.
     fn spacing(&self) -> DVec3;
-    /// Writes the `dims.x * dims.y` values of plane `k`, x fastest. Called once or twice a plane,
-    /// from many threads.
+    /// Writes the `dims.x * dims.y` values of plane `k`, x fastest. Called once or twice per plane,
+    /// from several threads.
     fn fill_plane(&self, k: u32, values: &mut [f32]);
 }
 
@@ -38,9 +38,9 @@ impl PlaneSource for rt_core::grid::Grid {
     }
 }
 
-/// Extracts one surface, holding about `batch_planes` planes of the field in memory (at least 4).
-/// `progress` gets the number of finished planes and may stop the extraction by returning false;
-/// the surface then ends at that plane.
+/// Extracts one surface while holding about `batch_planes` planes of the field in memory (at least
+/// 4). `progress` receives the number of finished planes and may stop the extraction by returning
+/// false; the surface then ends at that plane.
 pub fn extract_streamed(
     source: &dyn PlaneSource,
     iso: f64,
@@ -99,7 +99,8 @@ pub fn extract_streamed(
         });
         start = range.end;
         if !progress(start) && start < planes {
-            // The last slab's triangles name vertices of the next plane, which will not come.
+            // The last slab's triangles refer to vertices of the next plane, which is not
+            // processed.
             let known = arrays.positions.len() as u32;
             arrays.triangles.retain(|t| t.iter().all(|&v| v < known));
             break;

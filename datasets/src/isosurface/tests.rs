@@ -34,7 +34,7 @@ fn sphere_is_closed_outward_and_has_the_right_volume() {
     let mesh = extract(&grid, &[0.0], Options { normals: true, scalars: true }).unwrap().mesh;
     assert_eq!(open_or_flipped_edges(&mesh.indices), 0);
     let exact = 4.0 / 3.0 * std::f64::consts::PI * 15f64.powi(3);
-    // Inscribed triangles with circumradius c <= 1 are short by at most r - sqrt(r² - c²), 0.22 %
+    // Inscribed triangles with circumradius c <= 1 fall short by at most r - sqrt(r² - c²), 0.22 %
     // of the radius.
     let ratio = volume(&mesh) / exact;
     assert!((1.0 - 3.0 * 0.0022..1.0).contains(&ratio), "volume is {ratio} of the sphere's");
@@ -162,7 +162,7 @@ fn nan_and_infinity_leave_holes_of_counted_cells() {
     let mut grid = sampled(20, |p| 7.0 - p.length());
     let whole = extract(&grid, &[0.0], Options::default()).unwrap();
     assert_eq!(whole.skipped_cells, 0);
-    // One in the surface, one at the corner of the grid, one far inside.
+    // One missing value on the surface, one at the corner of the grid, one far inside.
     let on_surface = grid.index(10, 10, 3);
     for (at, v) in
         [(on_surface, f32::NAN), (0, f32::INFINITY), (grid.index(10, 10, 10), f32::NEG_INFINITY)]

@@ -91,7 +91,7 @@ pub(super) fn make(common: CommonArgs, args: &MakeArgs) -> anyhow::Result<()> {
     output::report(common, &Output { data: Some(&args.name), size: Some(size), ..written })
 }
 
-/// A wrong name or size is a mistake on the command line.
+/// A wrong name or size is a usage error.
 fn usage(e: CatalogueError) -> anyhow::Error {
     UsageError(e.to_string()).into()
 }

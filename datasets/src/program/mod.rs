@@ -43,7 +43,7 @@ enum Command {
     Completions(CompletionsArgs),
 }
 
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 usage error, 130 interrupted.
 pub(crate) fn main() -> ExitCode {
     run_main(|| execute(Cli::try_parse()?))
 }

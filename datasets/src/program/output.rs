@@ -8,9 +8,9 @@ use rt_core::mesh::TriMesh;
 use serde::Serialize;
 use std::path::Path;
 
-/// Endings of the VTK files that can be written.
+/// Extensions of the VTK files that can be written.
 const VTK: [&str; 6] = ["vti", "vtp", "vtu", "vtr", "vts", "vtm"];
-/// Endings of the mesh files that can be written.
+/// Extensions of the mesh files that can be written.
 const MESHES: [&str; 3] = ["ply", "obj", "glb"];
 
 /// How VTK files are written.
@@ -24,7 +24,7 @@ pub(super) struct EncodingArgs {
     compress: bool,
 }
 
-/// What is to be written.
+/// Content of an output file.
 #[expect(clippy::large_enum_variant, reason = "one value a run")]
 pub(super) enum Content {
     /// Triangles.
@@ -33,7 +33,7 @@ pub(super) enum Content {
     Data(Dataset),
 }
 
-/// What was written.
+/// Summary of what was written.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Output<'a> {
     /// Name in the catalogue.
@@ -50,7 +50,7 @@ pub(super) struct Output<'a> {
     pub(super) warnings: Vec<String>,
 }
 
-/// The ending in lower case; an error names those that can be written.
+/// Returns the file extension in lower case; an error names the supported ones.
 pub(super) fn check_name(path: &Path) -> Result<String, UsageError> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let mut known = VTK.iter().chain(&MESHES);
@@ -65,9 +65,8 @@ pub(super) fn check_name(path: &Path) -> Result<String, UsageError> {
     )))
 }
 
-/// Writes `content` in the format of the name's ending. A data set of another kind becomes its
-/// surface, which keeps the
-/// array `color_by`.
+/// Writes `content` in the format of the file extension. A data set of another kind becomes its
+/// surface, which keeps the array `color_by`.
 pub(super) fn write(
     path: &Path,
     content: Content,
@@ -96,7 +95,7 @@ pub(super) fn write(
     let data = match content {
         Content::Mesh(mesh) => Dataset::PolyData(PolyData::from_trimesh(&mesh)),
         Content::Data(data @ Dataset::PolyData(_)) if color_by.is_none() => data,
-        // The one file that can only hold a surface; other mismatches are the writer's to refuse.
+        // Only this format is limited to surfaces; the writer rejects other mismatches.
         Content::Data(data) if ending == "vtp" => {
             let mesh = surface(&data, color_by, &mut warnings)?;
             Dataset::PolyData(PolyData::from_trimesh(&mesh))
@@ -127,7 +126,7 @@ fn surface(
     Ok(mesh)
 }
 
-/// Prints what was written: warnings to stderr, the rest to stdout.
+/// Prints the summary: warnings to stderr, the rest to stdout.
 pub(super) fn report(common: CommonArgs, output: &Output<'_>) -> anyhow::Result<()> {
     output.warnings.iter().for_each(|w| common.warn(w));
     common.result(output, || {

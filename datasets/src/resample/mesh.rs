@@ -13,12 +13,12 @@ use std::ops::Range;
 const HIDDEN_POINT: u8 = 2;
 const HIDDEN_CELL: u8 = 32 | 8;
 
-/// What fills space in a data set.
+/// The solid cells of a data set.
 #[derive(Debug, Clone)]
 pub struct Mesh {
     points: Vec<DVec3>,
     parts: Vec<Part>,
-    /// Per cell; empty when none is hidden.
+    /// Flag per cell; empty when no cell is hidden.
     hidden: Vec<bool>,
     cells: usize,
     left_out: usize,
@@ -27,9 +27,9 @@ pub struct Mesh {
 
 #[derive(Debug, Clone)]
 struct Part {
-    /// Number among [`Dataset::leaves`].
+    /// Index into [`Dataset::leaves`].
     leaf: usize,
-    /// The axis along which a plane lattice was given depth.
+    /// The axis along which a plane lattice was extruded.
     extruded: Option<usize>,
     points: Range<usize>,
     cells: Range<usize>,
@@ -43,15 +43,15 @@ enum PartKind {
     Cells(Box<Explicit>),
 }
 
-/// Cells with their own lists. Numbers of points and faces count within the part.
+/// Cells with explicit lists. Point and face ids are relative to the part.
 #[derive(Debug, Clone)]
 struct Explicit {
-    /// Cell of the grid for each of ours.
+    /// The cell of the grid for each cell of the part.
     cell: Vec<u32>,
     grid: UnstructuredGrid,
 }
 
-/// A cell: corners in VTK's order, and what they span.
+/// A cell: its corners in VTK's order and its shape.
 pub(super) struct Corners {
     pub(super) ids: Vec<u32>,
     pub(super) shape: Shape,
@@ -67,7 +67,7 @@ pub(super) enum Shape {
     Faces(Vec<Vec<u32>>),
 }
 
-/// What to do with data in a plane, which has no depth for light to go through.
+/// Treatment of data in a plane, which has no depth for light to cross.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Plane {
     /// The same flow over this span, half on either side of the plane.
@@ -78,13 +78,13 @@ pub enum Plane {
 }
 
 impl Mesh {
-    /// All cells of a data set that fill space. Lines, surfaces and vertices are counted in
+    /// All solid cells of a data set. Lines, surfaces and vertices are counted in
     /// [`Self::left_out`].
     pub fn new(data: &Dataset) -> Result<Mesh, ResampleError> {
         Self::build(data, None)
     }
 
-    /// As [`Self::new`], with depth for data in a plane. Data that has depth of its own is refused.
+    /// As [`Self::new`], with depth for data in a plane. Three-dimensional data is rejected.
     pub fn with_plane(data: &Dataset, plane: Plane) -> Result<Mesh, ResampleError> {
         Self::build(data, Some(plane))
     }
@@ -135,7 +135,7 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Adds a leaf; true when it is a plane.
+    /// Adds a leaf; returns true when it is plane.
     fn add(&mut self, leaf: &Dataset, plane: Option<Plane>) -> Result<bool, ResampleError> {
         match leaf {
             Dataset::ImageData(d) => {
@@ -183,8 +183,8 @@ impl Mesh {
                 self.left_out += count;
                 return Ok(true);
             };
-            // A second layer of points along the missing axis; the layers lie half a span to either
-            // side.
+            // Add a second layer of points along the missing axis; the layers lie half a span to
+            // either side.
             let axis = flat_axis.unwrap_or(2);
             let flat: Vec<DVec3> = (0..count).map(at).collect();
             let normal = plane_normal(&flat, dims, axis);
@@ -286,23 +286,23 @@ impl Mesh {
     pub fn num_points(&self) -> usize {
         self.points.len()
     }
-    /// Number of cells that fill space.
+    /// Number of solid cells.
     pub fn num_cells(&self) -> usize {
         self.cells
     }
-    /// Position of a point; panics when out of range.
+    /// Position of a point. Panics when `i` is out of range.
     pub fn point(&self, i: usize) -> DVec3 {
         self.points[i]
     }
-    /// Cells that do not fill space or name points that do not exist.
+    /// Number of cells that are not solid or refer to points that do not exist.
     pub fn left_out(&self) -> usize {
         self.left_out
     }
-    /// Cells of higher order, which count with their straight corners.
+    /// Number of higher-order cells, which are treated as linear cells.
     pub fn higher_order(&self) -> usize {
         self.higher_order
     }
-    /// Cells that are hidden.
+    /// Number of hidden cells.
     pub fn num_hidden(&self) -> usize {
         self.hidden.iter().filter(|h| **h).count()
     }
@@ -310,15 +310,15 @@ impl Mesh {
         self.hidden.get(cell).copied().unwrap_or(false)
     }
 
-    /// Smallest box around all finite points.
+    /// Bounding box of all finite points.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let finite = self.points.iter().filter(|p| p.is_finite());
         finite.fold(nothing, |(low, high), p| (low.min(*p), high.max(*p)))
     }
 
-    /// Side of a cube as large as the box of a typical cell: the median over at most 10 000 of
-    /// them; NaN without cells.
+    /// Side of a cube with the volume of a typical cell's box: the median over at most 10 000
+    /// cells; NaN without cells.
     pub fn typical_cell(&self) -> f64 {
         let step = (self.cells / 10_000).max(1);
         let side = |cell: usize| {
@@ -335,7 +335,7 @@ impl Mesh {
         median_high(&mut sides).unwrap_or(f64::NAN)
     }
 
-    /// The corners of a cell; panics when out of range.
+    /// The corners of a cell. Panics when `cell` is out of range.
     pub(super) fn corners(&self, cell: usize) -> Corners {
         let part = &self.parts[self.parts.partition_point(|p| p.cells.end <= cell)];
         let local = cell - part.cells.start;
@@ -369,8 +369,8 @@ impl Mesh {
         c.ids.iter().map(|&i| self.points[i as usize]).sum::<DVec3>() / c.ids.len() as f64
     }
 
-    /// For each point the mean of the finite values of its cells that are not hidden; NaN where
-    /// there is none.
+    /// For each point, the mean of the finite values of its visible cells; NaN where there are
+    /// none.
     pub fn cells_to_points(&self, of_cells: &[f64]) -> Vec<f64> {
         let mut sum = vec![(0.0, 0u32); self.points.len()];
         for (cell, value) in of_cells.iter().enumerate().take(self.cells) {
@@ -384,8 +384,8 @@ impl Mesh {
         sum.into_iter().map(|(s, n)| if n == 0 { f64::NAN } else { s / f64::from(n) }).collect()
     }
 
-    /// Values per point in the order of [`Self::point`]. `value` is called with the arrays of each
-    /// block and the number of the point in it.
+    /// Collects values per point in the order of [`Self::point`]. `value` is called with the arrays
+    /// of each block and the index of the point in it.
     pub fn gather_points(
         &self,
         data: &Dataset,
@@ -404,7 +404,7 @@ impl Mesh {
         out
     }
 
-    /// Values per cell in the order of this mesh; as [`Self::gather_points`].
+    /// Collects values per cell in the order of this mesh; like [`Self::gather_points`].
     pub fn gather_cells(
         &self,
         data: &Dataset,
@@ -420,7 +420,7 @@ impl Mesh {
         out
     }
 
-    /// The parts with the arrays of the leaves they were made from.
+    /// Visits the parts with the arrays of the leaves from which they were made.
     fn each_part(&self, data: &Dataset, mut f: impl FnMut(&Part, &Attributes)) {
         let leaves = data.leaves();
         for part in &self.parts {
@@ -480,8 +480,8 @@ impl Explicit {
     }
 }
 
-/// In a lattice that was given a second layer along `axis`: which point of the flat one this was,
-/// and on which side.
+/// For a lattice with a second layer along `axis`: the corresponding point of the flat lattice, and
+/// its side.
 fn flat_source(i: usize, dims: [usize; 3], axis: usize) -> (usize, usize) {
     let mut at = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]];
     let mut n = dims;
@@ -490,7 +490,7 @@ fn flat_source(i: usize, dims: [usize; 3], axis: usize) -> (usize, usize) {
     (at[0] + n[0] * (at[1] + n[1] * at[2]), side)
 }
 
-/// Unit normal of a plane lattice: that of the sum of its quads.
+/// Unit normal of a plane lattice: the direction of the summed normals of its quads.
 fn plane_normal(points: &[DVec3], dims: [usize; 3], axis: usize) -> DVec3 {
     let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
     let stride = [1, dims[0], dims[0] * dims[1]];
@@ -505,7 +505,7 @@ fn plane_normal(points: &[DVec3], dims: [usize; 3], axis: usize) -> DVec3 {
     sum.normalize_or(DVec3::AXES[axis])
 }
 
-/// Which cells are hidden themselves or by one of their points; empty when none is.
+/// Flags the cells that are hidden themselves or through one of their points; empty when none is.
 fn hidden_cells_of_lattice(dims: [usize; 3], a: &Attributes) -> Vec<bool> {
     let (cells, points) = (a.cell_array("vtkGhostType"), a.point_array("vtkGhostType"));
     if cells.is_none() && points.is_none() {

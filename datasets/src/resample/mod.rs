@@ -1,13 +1,13 @@
 //! Resamples data of any mesh on a uniform lattice: curvilinear and rectilinear grids, tetrahedra,
 //! hexahedra, wedges, pyramids, prisms, polyhedra, and collections of them.
 //!
-//! Each cell finds the lattice nodes inside it (`rasterize`). No search tree is needed, and the
-//! time is proportional to the number of nodes plus the number of cells. Inside a cell, values are
-//! those of the finite element (`shape`): Newton's method inverts the trilinear map of a
-//! hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
+//! For each cell, the lattice nodes inside it are determined (`rasterize`). No search tree is
+//! needed, and the time is proportional to the number of nodes plus the number of cells. Inside a
+//! cell, values are those of the finite element (`shape`): Newton's method inverts the trilinear
+//! map of a hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
 //!
-//! [`Mark`] classifies a node. [`Report`] gives the loss of accuracy: the lattice is sampled back
-//! at the points of the mesh.
+//! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
+//! back at the points of the mesh.
 
 mod mesh;
 mod rasterize;
@@ -27,35 +27,35 @@ use glam::DVec3;
 /// Why a data set cannot be resampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ResampleError {
-    /// Nothing in it fills space.
+    /// The data set has no solid cells.
     #[error("the {kind} has no cells that fill space ({found}); {cure}")]
     NoVolume {
         /// Kind of data set.
         kind: &'static str,
-        /// What it has.
+        /// What the data set contains.
         found: String,
         /// What to do.
         cure: &'static str,
     },
-    /// The lattice asked for is impossible.
+    /// The requested lattice is impossible.
     #[error("a lattice of {0}x{1}x{2} nodes: {what}", dims[0], dims[1], dims[2])]
     Lattice {
-        /// Its nodes.
+        /// Nodes per axis.
         dims: [usize; 3],
         /// What is wrong, with the cure.
         what: String,
     },
-    /// Another number of values than points or cells.
+    /// The number of values equals neither the number of points nor that of cells.
     #[error("{found} values for a mesh with {points} points and {cells} cells")]
     Count {
-        /// Values given.
+        /// Number of values given.
         found: usize,
-        /// Points of the mesh.
+        /// Number of points of the mesh.
         points: usize,
-        /// Cells of the mesh.
+        /// Number of cells of the mesh.
         cells: usize,
     },
-    /// An option that cannot be.
+    /// An option has an invalid value.
     #[error("{option} is {value}; {cure}")]
     Option {
         /// Its name.
@@ -81,24 +81,24 @@ pub struct Lattice {
     pub spacing: DVec3,
 }
 
-/// How fine a lattice is to be.
+/// Resolution of a lattice.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Resolution {
     /// Two nodes along the side of half of the cells or more, with 64 to 256 nodes along the
     /// longest axis.
     #[default]
     Auto,
-    /// This many nodes along the longest axis, and equal spacing along the others as near as whole
-    /// numbers allow.
+    /// This many nodes along the longest axis, and the nearest equal spacing along the others that
+    /// whole numbers of nodes allow.
     Longest(usize),
-    /// Nodes at this distance, in the unit of the mesh; what does not divide is left over on both
-    /// sides.
+    /// Nodes at this distance, in the unit of the mesh; the remainder is left over in equal parts
+    /// on both sides.
     Spacing(f64),
     /// Nodes per axis.
     Dims([usize; 3]),
 }
 
-/// More nodes than this are refused: indices have to fit 31 bits.
+/// Maximum number of nodes: indices must fit in 31 bits.
 const MAX_NODES: usize = (1 << 31) - 1;
 
 impl Lattice {
@@ -122,8 +122,8 @@ impl Lattice {
         };
         let (dims, spacing) = match resolution {
             Resolution::Auto => {
-                // Means of stretched meshes are those of their far field: the median is where the
-                // cells are.
+                // In stretched meshes, the mean is dominated by the far field; the median
+                // represents the region where the cells are.
                 let wish = size.max_element() / (0.5 * typical_cell) + 1.0;
                 let longest = if wish.is_finite() { wish.clamp(64.0, 256.0).round() } else { 64.0 };
                 (even(size.max_element() / (longest - 1.0)), None)
@@ -137,7 +137,7 @@ impl Lattice {
                     let cure = "give the distance between nodes in the unit of the mesh";
                     return Err(ResampleError::Option { option: "spacing", value: h, cure });
                 }
-                // A hair more than whole, so that 1/0.1 gives ten steps.
+                // The small excess absorbs rounding, so that 1/0.1 gives ten steps.
                 let dims = size
                     .to_array()
                     .map(|l| (l / h * (1.0 + 1e-12)).floor().min(MAX_NODES as f64) as usize + 1);
@@ -163,7 +163,7 @@ impl Lattice {
     pub fn len(&self) -> usize {
         self.dims.iter().product()
     }
-    /// Never: a lattice has nodes.
+    /// Always false: a lattice has nodes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -173,7 +173,7 @@ impl Lattice {
     }
 }
 
-/// What a node of the lattice is in the mesh.
+/// Location of a lattice node relative to the mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Mark {
     /// Inside a cell with values.
@@ -196,11 +196,11 @@ pub enum Samples<'a> {
     Cells(&'a [f64]),
 }
 
-/// How to resample.
+/// Options of the resampling.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// A node gets the mean over this many samples per axis of the box around it. 1 takes the value
-    /// at the node; 2 or more average what is finer than the lattice, such as shocks.
+    /// at the node; 2 or more also average features finer than the lattice, such as shocks.
     pub samples_per_axis: usize,
 }
 
@@ -213,20 +213,21 @@ impl Default for Options {
 /// Values on a lattice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResampledField {
-    /// Where.
+    /// The lattice.
     pub lattice: Lattice,
     /// Values at the nodes, x fastest; NaN where the mark is not [`Mark::Inside`].
     pub values: Vec<f32>,
-    /// What the nodes are.
+    /// The mark of each node.
     pub marks: Vec<Mark>,
-    /// What it cost.
+    /// Statistics and errors of the resampling.
     pub report: Report,
 }
 
-/// Most samples per axis and node: 4³ per node is already more than any mesh rewards.
+/// Maximum samples per axis and node. Meshes gain little beyond 4³ samples per node.
 const MAX_SAMPLES: usize = 8;
 
-/// Puts the values of a mesh on a lattice. The result does not depend on the number of threads.
+/// Resamples the values of a mesh on a lattice. The result does not depend on the number of
+/// threads.
 ///
 /// ```
 /// use datasets::model::{Dataset, ImageData};

@@ -1,7 +1,7 @@
-//! Cells find the nodes inside them, one layer of the lattice at a time.
+//! Finds the lattice nodes inside each cell, one layer of the lattice at a time.
 //!
 //! A layer of nodes (one k) is one task. The task visits the cells that overlap it in the order of
-//! their numbers, so a node on a face that two cells share gets the same value for any number of
+//! their numbers, so a node on a face shared by two cells gets the same value for any number of
 //! threads. A node outside all cells but within [`NEAR`] of one takes the value of the nearest,
 //! because curved faces of different cell types do not match exactly.
 
@@ -12,8 +12,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// A point this far outside, in units of the cell, is inside: rounding in the inversion, with 1e3
-/// to spare.
+/// Points at most this far outside, in units of the cell, count as inside. This is about 1000 times
+/// the rounding error of the inversion.
 pub(super) const INSIDE_TOLERANCE: f64 = 1e-9;
 /// A point this far outside may lie in a gap between faces that do not match.
 const NEAR: f64 = 1e-3;
@@ -25,13 +25,13 @@ pub(super) struct Counts {
     pub(super) in_gaps: usize,
     /// Cells whose map folds.
     pub(super) folded: usize,
-    /// Cells that no sample fell into.
+    /// Cells that contain no sample.
     pub(super) missed: usize,
     /// Cells with corners that are not finite.
     pub(super) nowhere: usize,
 }
 
-/// One sample of a layer: its value, how far outside its cell, and what it is.
+/// One sample of a layer: its value, its distance outside the cell, and its mark.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     value: f64,
@@ -41,7 +41,7 @@ struct Sample {
 
 const NO_SAMPLE: Sample = Sample { value: f64::NAN, outside: f64::INFINITY, mark: Mark::Outside };
 
-/// Marks by how much they say: a cell with values beats a hidden one.
+/// Rank of marks by information: a cell with values takes precedence over a hidden one.
 fn rank(mark: Mark) -> u8 {
     match mark {
         Mark::Inside => 3,
@@ -51,8 +51,8 @@ fn rank(mark: Mark) -> u8 {
     }
 }
 
-/// The samples of a lattice with `n` per axis and node: index `i` stands at `(i + 0.5)/n − 0.5`
-/// nodes from the first node.
+/// The samples of a lattice with `n` per axis and node: index `i` is at `(i + 0.5)/n − 0.5` nodes
+/// from the first node.
 struct FineLattice<'a> {
     lattice: &'a Lattice,
     n: usize,
@@ -66,17 +66,18 @@ impl FineLattice<'_> {
     fn count(&self, axis: usize) -> usize {
         self.lattice.dims[axis] * self.n
     }
-    /// Samples between two coordinates, a hair more rather than less.
+    /// Samples between two coordinates, with a small tolerance outwards.
     fn between(&self, axis: usize, low: f64, high: f64) -> Option<(usize, usize)> {
         let n = self.n as f64;
         let index =
             |x: f64| ((x - self.lattice.origin[axis]) / self.lattice.spacing[axis] + 0.5) * n - 0.5;
         let last = (self.count(axis) - 1) as f64;
         let (a, b) = ((index(low) - 1e-6).ceil().max(0.0), (index(high) + 1e-6).floor().min(last));
-        // NaN compares false.
+        // NaN fails the comparison.
         (a <= b).then_some((a as usize, b as usize))
     }
-    /// Half a node beyond the lattice lies nothing that its nodes should average.
+    /// Whether sample `i` lies between the first and the last node. Samples beyond the border are not
+    /// averaged.
     fn within(&self, axis: usize, i: usize) -> bool {
         let nodes = (i as f64 + 0.5) / self.n as f64 - 0.5;
         self.n == 1 || (0.0..=(self.lattice.dims[axis] - 1) as f64).contains(&nodes)
@@ -93,7 +94,7 @@ pub(super) fn rasterize(
 ) -> (Vec<f32>, Vec<Mark>, Counts) {
     let fine = FineLattice { lattice, n: samples_per_axis };
 
-    // Which layers each cell reaches into.
+    // Range of layers that each cell overlaps.
     let reach: Vec<Option<(u32, u32)>> = (0..mesh.num_cells())
         .into_par_iter()
         .map(|cell| {
@@ -166,7 +167,7 @@ pub(super) fn rasterize(
     (values, marks, counts)
 }
 
-/// Box of a cell with room for [`NEAR`]; `None` when a corner is not finite.
+/// Bounding box of a cell, enlarged by [`NEAR`]; `None` when a corner is not finite.
 fn cell_box(mesh: &Mesh, cell: usize) -> Option<(DVec3, DVec3)> {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for id in mesh.corners(cell).ids {
@@ -186,7 +187,7 @@ struct Scratch {
     values: Vec<f64>,
 }
 
-/// A cell with all that is known of it.
+/// A cell with its values and mark.
 struct CellData<'a> {
     mesh: &'a Mesh,
     of_points: &'a [f64],
@@ -195,8 +196,8 @@ struct CellData<'a> {
 }
 
 impl CellData<'_> {
-    /// Fills in the samples of layer `k` that lie in the cell; whether any does, and whether the
-    /// cell folds.
+    /// Fills in the samples of layer `k` that lie in the cell. Returns whether there is any, and
+    /// whether the cell is folded.
     fn visit(
         &self,
         fine: &FineLattice<'_>,
@@ -232,9 +233,9 @@ impl CellData<'_> {
                     let slot =
                         &mut samples[x + fine.count(0) * (y + fine.count(1) * (z - k * fine.n))];
                     if slot.mark == Mark::Inside && slot.outside == 0.0 {
-                        // Already inside another cell. Whether it would also be in this one matters
-                        // to the count of cells without samples only, and there cells that share
-                        // faces with others are not missed.
+                        // The sample is already inside another cell. Testing this cell as well
+                        // would only affect the count of cells without samples, which does not
+                        // matter for cells that share faces with others.
                         hit = true;
                         continue;
                     }
@@ -254,8 +255,8 @@ impl CellData<'_> {
                     };
                     let outside =
                         if place.outside <= INSIDE_TOLERANCE { 0.0 } else { place.outside };
-                    // Inside beats near; then what says more; then nearer; then the cell that came
-                    // first.
+                    // Precedence: inside before near, then the more informative mark, then the
+                    // smaller distance, then the first cell.
                     let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
                     let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
                     if new > old || new == old && outside < slot.outside {
@@ -268,8 +269,8 @@ impl CellData<'_> {
     }
 }
 
-/// Nodes of layer `k` from their samples: the mean of those with values when they are at least
-/// half, else what most of the others are.
+/// Computes the nodes of layer `k` from their samples: the mean of the samples with values if they
+/// are at least half of all, otherwise the most frequent other mark.
 fn reduce(
     fine: &FineLattice<'_>,
     k: usize,

@@ -6,51 +6,50 @@ use super::{Lattice, Mark, Samples};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Differences between the lattice, interpolated linearly, and the values the mesh has at its
-/// points (or cell centres).
+/// Differences between the linearly interpolated lattice and the values of the mesh at its points
+/// (or cell centres).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ResamplingError {
     /// Root mean square, in the unit of the values.
     pub rms: f64,
-    /// Largest, in the unit of the values.
+    /// Largest difference, in the unit of the values.
     pub max: f64,
-    /// Where the largest is.
+    /// Position of the largest difference.
     pub max_at: DVec3,
-    /// Largest minus smallest value at the places compared: what the differences are to be seen
-    /// against.
+    /// Largest minus smallest value at the compared points, as the scale for the differences.
     pub range: f64,
-    /// Places compared.
+    /// Number of compared points.
     pub compared: usize,
-    /// Places that could not be compared: next to nodes without value, off the lattice, hidden or
-    /// not finite.
+    /// Number of points that could not be compared: next to nodes without value, outside the
+    /// lattice, hidden or not finite.
     pub not_compared: usize,
 }
 
-/// What became of mesh and lattice.
+/// Statistics of mesh and lattice.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Report {
-    /// Nodes with a value.
+    /// Number of nodes with a value.
     pub inside: usize,
-    /// Nodes in no cell.
+    /// Number of nodes outside all cells.
     pub outside: usize,
-    /// Nodes in hidden cells.
+    /// Number of nodes in hidden cells.
     pub hidden: usize,
-    /// Nodes in cells without finite values.
+    /// Number of nodes in cells without finite values.
     pub not_finite: usize,
-    /// Samples in gaps between cells, given the value of the nearest cell.
+    /// Number of samples in gaps between cells, which get the value of the nearest cell.
     pub in_gaps: usize,
-    /// Cells of the mesh.
+    /// Number of cells of the mesh.
     pub cells: usize,
-    /// Cells finer than the lattice: no sample lies in them, so what is in them is seen only
-    /// through their neighbours.
+    /// Number of cells that contain no sample because they are finer than the lattice; their values
+    /// appear only through their neighbours.
     pub missed_cells: usize,
-    /// Cells divided into tetrahedra because their map folds or collapses.
+    /// Number of cells divided into tetrahedra because their map folds or collapses.
     pub folded_cells: usize,
-    /// Cells left out: not solid, with points that do not exist or are not finite.
+    /// Number of cells left out: not solid, or with points that do not exist or are not finite.
     pub left_out_cells: usize,
-    /// Cells of higher order taken with their straight corners.
+    /// Number of higher-order cells treated as linear cells.
     pub straightened_cells: usize,
-    /// The error.
+    /// Error of sampling the lattice back at the mesh.
     pub back: ResamplingError,
 }
 
@@ -72,7 +71,7 @@ impl Report {
         }
     }
 
-    /// Sentences worth telling a user; empty when all is well.
+    /// Warnings for the user, as sentences; empty when there are none.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         let mut say = |n: usize, text: &str| {
@@ -98,7 +97,7 @@ impl Report {
     }
 }
 
-/// Places compared in one task; fixed, so that sums do not depend on the number of threads.
+/// Points compared in one task; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 1 << 14;
 
 pub(super) fn resampling_error(
@@ -162,14 +161,14 @@ pub(super) fn resampling_error(
     }
 }
 
-/// Linear interpolation. `None` off the lattice and next to nodes without value that have weight.
+/// Linear interpolation. `None` outside the lattice, and where a node without value has a weight.
 fn trilinear(lattice: &Lattice, values: &[f32], p: DVec3) -> Option<f64> {
     let mut cell = [0usize; 3];
     let mut t = [0.0f64; 3];
     for a in 0..3 {
         let x = (p[a] - lattice.origin[a]) / lattice.spacing[a];
         let last = (lattice.dims[a] - 1) as f64;
-        // Points of the mesh lie on the border of the lattice but for rounding.
+        // Up to rounding, points of the mesh can lie exactly on the border of the lattice.
         if !(x >= -1e-6 && x <= last + 1e-6) {
             return None;
         }

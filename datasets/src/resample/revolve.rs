@@ -1,8 +1,8 @@
 //! Axisymmetric data: revolves a plane of axial position (x) and radius (y) about the x axis.
 //!
 //! The plane is first resampled to an image four times as fine as the lattice. Each node of the
-//! lattice then reads the image at its radius. Linear interpolation in the image adds a sixteenth
-//! of the error that the lattice has anyway.
+//! lattice then reads the image at its radius. Linear interpolation in the image adds one sixteenth
+//! of the error of the lattice itself.
 
 use super::mesh::Mesh;
 use super::report::{self, Report};
@@ -12,11 +12,12 @@ use rayon::prelude::*;
 
 /// Image samples per node of the lattice, along each axis.
 const FINER: f64 = 4.0;
-/// An inner radius below this fraction of the outer one is the first row of cells next to the axis,
-/// not a body. The values there extend to the axis, where their slope is zero by symmetry.
+/// An inner radius below this fraction of the outer one is not a body but the first row of cells
+/// next to the axis. The values there are extended to the axis, where their slope is zero by
+/// symmetry.
 const TO_THE_AXIS: f64 = 0.1;
 
-/// Box of the body of revolution of a mesh whose points lie in the plane z = 0 but for a thin
+/// Box of the body of revolution of a mesh whose points lie in the plane z = 0, apart from a thin
 /// extrusion.
 pub fn revolved_bounds(mesh: &Mesh) -> Result<(DVec3, DVec3), ResampleError> {
     let (low, high) = mesh.bounds();
@@ -30,8 +31,8 @@ pub fn revolved_bounds(mesh: &Mesh) -> Result<(DVec3, DVec3), ResampleError> {
     Ok((DVec3::new(low.x, -high.y, -high.y), DVec3::new(high.x, high.y, high.y)))
 }
 
-/// As [`resample`], for a mesh made by [`Mesh::with_plane`] with a span that is small against the
-/// lattice's spacing.
+/// As [`resample`], for a mesh made by [`Mesh::with_plane`] with a span that is
+/// small compared with the lattice's spacing.
 pub fn revolve(
     mesh: &Mesh,
     samples: Samples<'_>,
@@ -41,7 +42,7 @@ pub fn revolve(
     revolved_bounds(mesh)?;
     let (low, high) = mesh.bounds();
 
-    // The image: x and radius, a little inside the plane's thickness.
+    // The image: x and radius, slightly inside the plane's thickness.
     let h = lattice.spacing / FINER;
     let nodes = |a: usize| ((high[a] - low[a]) / h[a]).ceil().clamp(1.0, 1e5) as usize + 1;
     let dims = [nodes(0), nodes(1), 2];
@@ -79,7 +80,8 @@ pub fn revolve(
     Ok(ResampledField { lattice: *lattice, values, marks, report })
 }
 
-/// Bilinear in the image where all four samples have values, else what the nearest of them is.
+/// Bilinear interpolation in the image if all four samples have values; otherwise the mark of the
+/// nearest sample.
 fn look_up(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
     let Lattice { dims, origin, spacing } = &flat.lattice;
     let (u, v) = ((x - origin.x) / spacing.x, (r - origin.y) / spacing.y);
@@ -111,8 +113,7 @@ fn look_up(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
     if complete {
         return (sum as f32, Mark::Inside);
     }
-    // At a border the nearest sample with a value stands for the node that lies within half a
-    // sample of it.
+    // At a border, the nearest sample with a value represents a node within half a sample of it.
     match heaviest.1 {
         Mark::Inside => {
             let at =

@@ -9,30 +9,31 @@
 use super::mesh::Shape;
 use glam::{DMat3, DVec3};
 
-/// How a point lies in a cell.
+/// Result of locating a point in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CellSample {
     /// Interpolated value.
     pub(super) value: f64,
-    /// How far outside the cell the point is, in units of the cell; 0 inside.
+    /// Distance outside the cell, in units of the cell; 0 inside.
     pub(super) outside: f64,
 }
 
-/// A cell with its corners, ready for many points.
+/// A cell with its corners, prepared for queries at many points.
 pub(super) struct Cell<'a> {
     corners: &'a [DVec3],
     values: &'a [f64],
     shape: &'a Shape,
-    /// Use the fan for all points.
+    /// Whether to use the tetrahedra for all points.
     folded: bool,
-    /// Length of the diagonal of its box.
+    /// Length of the diagonal of the cell's box.
     size: f64,
 }
 
 /// Newton has converged when the step is this small, in units of the cell: far below
 /// [`super::rasterize::INSIDE_TOLERANCE`].
 const CONVERGED: f64 = 1e-12;
-/// From the centre of a convex cell it takes three to five steps; distorted ones need more.
+/// From the centre of a convex cell, Newton's method takes three to five steps; distorted cells
+/// need more.
 const MAX_STEPS: usize = 25;
 /// Ratio of the smallest to the largest Jacobian among corners below which a cell counts as folded
 /// or collapsed.
@@ -96,8 +97,8 @@ fn basis(shape: &Shape, q: DVec3) -> Basis {
     (n, d)
 }
 
-/// Parameters of the corners where the Jacobian is looked at. That of a pyramid vanishes at its tip
-/// by construction.
+/// Parameters of the corners at which the Jacobian is tested. A pyramid's Jacobian vanishes at its
+/// apex by construction.
 fn corner_parameters(shape: &Shape) -> &'static [DVec3] {
     const fn v(x: f64, y: f64, z: f64) -> DVec3 {
         DVec3::new(x, y, z)
@@ -160,7 +161,7 @@ impl<'a> Cell<'a> {
             j.x_axis += d[i].x * p;
             j.y_axis += d[i].y * p;
             j.z_axis += d[i].z * p;
-            // 0 · NaN is NaN: a corner without weight must not spoil the value.
+            // 0 · NaN is NaN: a corner without weight must not affect the value.
             if n[i] != 0.0 {
                 value += n[i] * v;
             }
@@ -168,7 +169,7 @@ impl<'a> Cell<'a> {
         (x, j, value)
     }
 
-    /// Where `p` lies.
+    /// Locates `p` in the cell and interpolates the value.
     pub(super) fn place(&self, p: DVec3) -> Option<CellSample> {
         match self.shape {
             Shape::Tetra => {
@@ -193,12 +194,13 @@ impl<'a> Cell<'a> {
                 return None;
             }
             let step = jacobian.inverse() * (target - x);
-            // Kept near the cell: far outside, the map may have other solutions.
+            // Keep the iterate near the cell: far outside, the map may have other solutions.
             let next = (q + step).clamp(DVec3::splat(-0.5), DVec3::splat(1.5));
             let moved = (next - q).abs().max_element();
             q = next;
             if moved <= CONVERGED {
-                // A point at the edge of the clamp has converged to nowhere: it is outside.
+                // An iterate at the edge of the clamp has not converged to a solution: the point is
+                // outside.
                 let below = -q;
                 let above = if *self.shape == Shape::Wedge {
                     DVec3::new(q.x + q.y - 1.0, -1.0, q.z - 1.0)
@@ -212,7 +214,7 @@ impl<'a> Cell<'a> {
         None
     }
 
-    /// The best of the tetrahedra between the centre, the centres of faces and edges.
+    /// The best result of the tetrahedra between the cell's centre, face centres and edges.
     fn in_fan(&self, p: DVec3) -> Option<CellSample> {
         let centre = mean(self.corners.iter().copied());
         let centre_value = self.values.iter().sum::<f64>() / self.values.len() as f64;
@@ -263,11 +265,12 @@ fn mean(points: impl ExactSizeIterator<Item = DVec3>) -> DVec3 {
     points.sum::<DVec3>() / n
 }
 
-/// Barycentric coordinates; `None` for a tetrahedron without volume at the scale of the cell.
+/// Barycentric coordinates; `None` for a tetrahedron whose volume vanishes at the scale of the
+/// cell.
 fn barycentric(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3, size: f64) -> Option<[f64; 4]> {
     let edges = DMat3::from_cols(b - a, c - a, d - a);
     let det = edges.determinant();
-    // Fourteen digits of the volume of the cell's box: below, rounding decides.
+    // 1e-14 of the volume of the cell's box: below this, rounding dominates.
     if det.is_nan() || det.abs() <= 1e-14 * size * size * size {
         return None;
     }
@@ -373,7 +376,7 @@ mod tests {
         let mut collapsed = corners(&CUBE);
         collapsed[3] = collapsed[0];
         collapsed[7] = collapsed[4];
-        // Inside out: a left-handed lattice.
+        // Inverted orientation: a left-handed lattice.
         let mirrored: Vec<DVec3> =
             corners(&CUBE).iter().map(|p| DVec3::new(-p.x, p.y, p.z)).collect();
         for (points, folded, p) in [

@@ -1,18 +1,17 @@
 //! Binomial smoothing of a lattice, for shocks that its spacing cannot resolve.
 //!
-//! A shock one cell wide looks like a staircase to a ray that crosses it at an angle, and the
-//! errors of deflections are as large as the deflections. Smoothing over about one node reduces the
-//! errors to a few per cent, because the deflection by a plane step does not depend on its
-//! thickness.
+//! To an oblique ray, a shock one cell wide is a staircase, and the errors of deflections are as
+//! large as the deflections. Smoothing over about one node reduces the errors to a few per cent,
+//! because the deflection by a plane step does not depend on its thickness.
 
 use super::ResampleError;
 use rayon::prelude::*;
 
 /// Smooths the finite values by a binomial kernel with standard deviation `sigma_nodes` along each
-/// axis. Values that are not finite stay so, and take no part: the weights of the others are scaled
-/// up.
+/// axis. Values that are not finite are unchanged and ignored: the weights of the others are
+/// rescaled.
 ///
-/// A pass is the kernel (a, 1 − 2a, a), whose variance is 2a; passes are repeated with a ≤ 1/4
+/// A pass applies the kernel (a, 1 − 2a, a), whose variance is 2a. Passes are repeated with a ≤ 1/4
 /// until the variance is reached, so every σ is exact. Border nodes are repeated outwards.
 pub fn smooth(values: &mut [f32], dims: [usize; 3], sigma_nodes: f64) -> Result<(), ResampleError> {
     if !(0.0..=16.0).contains(&sigma_nodes) {
@@ -51,7 +50,7 @@ pub fn smooth(values: &mut [f32], dims: [usize; 3], sigma_nodes: f64) -> Result<
                     };
                     let lower = neighbour(at > 0, here.wrapping_sub(stride[axis]));
                     let upper = neighbour(at + 1 < dims[axis], here + stride[axis]);
-                    // As differences: a constant stays what it is, bit for bit.
+                    // Sum differences, so that a constant field is unchanged bit for bit.
                     let mut change = 0.0;
                     let mut weight = 1.0;
                     for n in [lower, upper] {

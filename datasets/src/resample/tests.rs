@@ -10,8 +10,8 @@ fn linear(p: DVec3) -> f64 {
     0.7 + 2.0 * p.x - 1.5 * p.y + 0.25 * p.z
 }
 
-/// A quarter of an annulus with radii 1 and 2, height 1: curvilinear, and its bounding box has
-/// corners outside.
+/// A quarter of an annulus with radii 1 and 2 and height 1: a curvilinear grid that does not fill
+/// the corners of its bounding box.
 fn annulus(n: [usize; 3]) -> StructuredGrid {
     let mut points = Vec::new();
     for k in 0..n[2] {
@@ -36,7 +36,7 @@ fn lattice_of(mesh: &Mesh, resolution: Resolution) -> Lattice {
     Lattice::fit(low, high, mesh.typical_cell(), resolution).unwrap()
 }
 
-/// All nodes inside have the value of `f` to `tolerance`.
+/// Asserts that all inside nodes have the value of `f` to `tolerance`.
 fn assert_field(r: &ResampledField, tolerance: f64, f: impl Fn(DVec3) -> f64) {
     let [nx, ny, _] = r.lattice.dims;
     for (n, (&v, &m)) in r.values.iter().zip(&r.marks).enumerate() {
@@ -57,7 +57,7 @@ fn curvilinear_grids_give_linear_fields_exactly_and_a_mask() {
     let lattice = lattice_of(&mesh, Resolution::Dims([41, 41, 9]));
     let r = resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
     assert_field(&r, 1e-6, linear);
-    // The mask is the annulus but for the chords of its cells: 1 − cos(π/44) = 0.26 % of the
+    // The mask is the annulus except for the chords of its cells: 1 − cos(π/44) = 0.26 % of the
     // radius.
     for (n, m) in r.marks.iter().enumerate() {
         let p = lattice.node(n % 41, n / 41 % 41, n / 41 / 41);
@@ -89,7 +89,7 @@ fn the_error_falls_with_the_square_of_the_spacing() {
     assert!((3.0..5.5).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
-/// A cube of side 2 cut into the given cells around shared points.
+/// A cube of side 2, divided into the given cells around shared points.
 fn unstructured(types: &[u8], cells: &[&[u32]], points: &[[f64; 3]]) -> UnstructuredGrid {
     let mut list = Cells::new();
     cells.iter().for_each(|c| list.push(c.iter().copied()));
@@ -161,7 +161,7 @@ fn every_kind_of_cell_fills_its_space_without_gaps() {
 
 #[test]
 fn mixed_cells_beside_each_other_join() {
-    // A hexahedron, and on its face x = 2 a pyramid; on y = 2 a wedge.
+    // A hexahedron with a pyramid on its face x = 2 and a wedge on y = 2.
     let mut points = CUBE.to_vec();
     points.extend([[3., 1., 1.], [1., 3., 0.], [1., 3., 2.]]);
     let cells: [&[u32]; 3] = [&[0, 1, 2, 3, 4, 5, 6, 7], &[1, 5, 6, 2, 9], &[3, 2, 10, 7, 6, 11]];
@@ -171,7 +171,7 @@ fn mixed_cells_beside_each_other_join() {
     let lattice = lattice_of(&mesh, Resolution::Dims([31, 31, 21]));
     let r = resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
     assert_field(&r, 2e-6, linear);
-    // Volumes 8 + 4/3 + 2 of a box of 18.
+    // Volumes 8 + 4/3 + 2, in a box of 18.
     let share = r.report.inside as f64 / lattice.len() as f64;
     assert!((share - (8.0 + 4.0 / 3.0 + 2.0) / 18.0).abs() < 0.06, "{share}");
 }
@@ -254,7 +254,7 @@ fn cell_values_are_averaged_and_the_smoothing_shows_in_the_report() {
     let of_cells: Vec<f64> = (0..512).map(|c| if c % 8 < 4 { 0.0 } else { 1.0 }).collect();
     let lattice = lattice_of(&mesh, Resolution::Dims([17, 17, 17]));
     let r = resample(&mesh, Samples::Cells(&of_cells), &lattice, &Options::default()).unwrap();
-    // Cells beside the step at x = 4 have their centres half a cell from the value 1/2 there.
+    // Cells next to the step at x = 4 have their centres half a cell from the value 1/2 there.
     assert!(
         (r.report.back.max - 0.25).abs() < 1e-6 && r.report.back.range == 1.0,
         "{:?}",
@@ -266,8 +266,8 @@ fn cell_values_are_averaged_and_the_smoothing_shows_in_the_report() {
 
 #[test]
 fn samples_within_a_node_average_what_is_finer() {
-    // Layers one unit thick alternate between 0 and 1; nodes 8 apart see their mean, or whatever
-    // they hit.
+    // Layers one unit thick alternate between 0 and 1; nodes 8 apart get their mean, or the value
+    // of the layer that contains them.
     let mesh = Mesh::new(&Dataset::ImageData(ImageData::new([65, 3, 3], DVec3::ZERO, DVec3::ONE)))
         .unwrap();
     let values = at_points(&mesh, |p| if (p.x as usize).is_multiple_of(2) { 0.0 } else { 1.0 });
@@ -340,7 +340,7 @@ fn broken_meshes_give_errors_or_counts() {
     let mesh =
         Mesh::new(&Dataset::UnstructuredGrid(unstructured(&[10; 3], &cells, &CUBE))).unwrap();
     assert_eq!((mesh.num_cells(), mesh.left_out()), (1, 2));
-    // A point at infinity takes its cell with it.
+    // A point at infinity removes its cell.
     let mut points = CUBE;
     points[5][0] = f64::INFINITY;
     let cells: [&[u32]; 2] = [&[0, 1, 2, 5], &[0, 2, 3, 7]];
@@ -409,7 +409,7 @@ fn revolved_planes_are_round() {
         }
     }
     assert!(r.report.back.compared > 300 && r.report.back.rms < 5e-3, "{:?}", r.report.back);
-    // Radii below zero are no radii.
+    // Radii below zero are invalid.
     let below =
         Mesh::new(&Dataset::ImageData(ImageData::new([3; 3], DVec3::splat(-1.0), DVec3::ONE)))
             .unwrap();

@@ -17,16 +17,17 @@ const MAGIC: u32 = 0x4654_6C67;
 const CHUNK_JSON: u32 = 0x4E4F_534A;
 const CHUNK_BIN: u32 = 0x004E_4942;
 
-/// Normals whose squared length is off by no more than this are written as they are; the Khronos
+/// Normals whose squared length deviates by at most this are written unchanged; the Khronos
 /// validator allows more.
 const UNIT_LENGTH_SQUARED: f32 = 1e-5;
 
-/// Writes positions, triangles, and per-vertex normals, colours (linear, as they are) and texture
+/// Writes positions, triangles, and per-vertex normals, colours (linear, unchanged) and texture
 /// coordinates, with one matt two-sided material. The mesh's origin becomes the node's translation,
-/// which glTF keeps in 32 bits: what does not fit goes into the positions.
+/// which glTF stores in 32 bits; the remainder is added to the positions.
 ///
-/// glTF has y up: other programs show data with z up lying on their back. What glTF cannot hold is
-/// refused: scalars (map them to colours first), values per triangle, coordinates that are not
+/// In glTF, y points up: other programs show data with z up rotated by 90 degrees. Content that
+/// glTF cannot represent is rejected: scalars (map them to colours first), values per triangle,
+/// coordinates that are not finite, normals without a direction.
 /// finite, normals without a direction.
 ///
 /// ```
@@ -46,7 +47,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
         return refused(what, cure);
     }
 
-    // The translation that 32 bits can hold; the rest, at most half a step of it, moves into the
+    // The translation rounded to 32 bits; the remainder, at most half an ulp, is added to the
     // positions.
     let translation = mesh.origin.as_vec3();
     let rest = mesh.origin - translation.as_dvec3();
@@ -55,7 +56,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
     let (lo, hi) =
         mesh.positions.iter().map(place).fold((far, -far), |(lo, hi), p| (lo.min(p), hi.max(p)));
 
-    // Layout of the binary chunk: one view and one accessor after the other.
+    // Layout of the binary chunk: views and accessors in sequence.
     let mut parts = Layout::default();
     let n = mesh.positions.len();
     let positions = parts.add(n, FLOAT, "VEC3", VERTICES);
@@ -94,7 +95,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
         text.push(' ');
     }
 
-    // A header of 12 bytes, and 8 before each of the two chunks.
+    // A file header of 12 bytes, and 8 bytes before each of the two chunks.
     let whole = 12 + 8 + text.len() as u64 + 8 + bytes;
     let Ok(length) = u32::try_from(whole) else {
         return refused(
@@ -120,7 +121,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
     })
 }
 
-/// Why a mesh cannot be written, and the cure.
+/// Why a mesh cannot be written, and how to fix that.
 fn unsupported_content(mesh: &TriMesh) -> Option<(String, &'static str)> {
     if let Err(e) = mesh.check() {
         return Some((e.to_string(), "make the attributes as long as the mesh"));
@@ -178,7 +179,7 @@ fn unit(v: Vec3) -> Vec3 {
     if (v.length_squared() - 1.0).abs() <= UNIT_LENGTH_SQUARED { v } else { v.normalize() }
 }
 
-/// Views and accessors of the binary chunk, every element a multiple of four bytes.
+/// Views and accessors of the binary chunk; the size of every element is a multiple of four bytes.
 #[derive(Default)]
 struct Layout {
     views: Vec<Value>,
@@ -187,7 +188,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// Room for `count` elements; gives the index of their accessor.
+    /// Reserves space for `count` elements; returns the index of their accessor.
     fn add(&mut self, count: usize, component: u32, kind: &str, target: u32) -> usize {
         let components = match kind {
             "SCALAR" => 1,
@@ -215,7 +216,7 @@ mod tests {
     use glam::Vec2;
     use rt_core::mesh::Attribute;
 
-    /// A sphere with everything that glTF can hold.
+    /// A sphere with all attributes that glTF supports.
     fn full() -> TriMesh {
         let mut mesh = icosphere(2);
         let of =

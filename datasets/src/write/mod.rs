@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 /// Why a file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The operating system refuses.
+    /// The operating system reports an error.
     #[error("{}: cannot be written; check that the directory exists, may be written and has \
              room", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The data or the name does not fit the format.
@@ -42,8 +42,7 @@ impl WriteError {
     }
 }
 
-/// Writes a file by way of `body`; a file that could not be finished is removed, so that no half
-/// file is left behind.
+/// Writes a file with `body`. An unfinished file is removed.
 pub(crate) fn write_file(
     path: &Path,
     body: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
@@ -52,8 +51,7 @@ pub(crate) fn write_file(
     let mut out = std::io::BufWriter::new(std::fs::File::create(path).map_err(io)?);
     let written = body(&mut out).and_then(|()| std::io::Write::flush(&mut out));
     written.map_err(|source| {
-        // The error that matters is the one of writing; a file that cannot be removed either
-        // changes nothing.
+        // Report the write error; a failure to remove the file does not change it.
         let _ = std::fs::remove_file(path);
         io(source)
     })

@@ -4,8 +4,8 @@ use super::{WriteError, write_file};
 use rt_core::mesh::{PerElement, TriMesh};
 use std::path::Path;
 
-/// Writes positions, vertex normals, texture coordinates and triangles. Colours and scalars have no
-/// place in OBJ: a mesh with some is refused, so that they are not lost unseen.
+/// Writes positions, vertex normals, texture coordinates and triangles. OBJ cannot store colours
+/// and scalars: a mesh that has them is rejected, so that they are not lost silently.
 pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteError> {
     let path = path.as_ref();
     if mesh.colors.is_some() || mesh.scalars.is_some() {
@@ -22,7 +22,7 @@ pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteErro
     write_file(path, |f| {
         for p in &mesh.positions {
             let p = mesh.origin + p.as_dvec3();
-            // Without an origin the f32 text is exact and shorter.
+            // Without an origin, the f32 text is exact and shorter.
             if mesh.origin == glam::DVec3::ZERO {
                 let p = p.as_vec3();
                 writeln!(f, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;

@@ -6,8 +6,8 @@ use rt_core::mesh::{PerElement, TriMesh};
 use std::path::Path;
 
 /// Writes a mesh as binary little-endian PLY: positions (double precision when the mesh has an
-/// origin), normals, colours as 8-bit sRGB, texture coordinates `s t`, scalars as the property
-/// `scalar`; values per face go to the faces.
+/// origin), normals, colours as 8-bit sRGB, texture coordinates `s t`, and scalars as the property
+/// `scalar`. Values per face become properties of the faces.
 pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), WriteError> {
     let path = path.as_ref();
     mesh.check().map_err(|e| {

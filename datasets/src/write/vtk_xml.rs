@@ -12,30 +12,29 @@ use crate::model::{
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// How numbers are written.
+/// Encoding of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Encoding {
-    /// Text that people can read; larger, and cannot hold NaN or infinity, which VTK does not read
-    /// back.
+    /// Readable text; larger, and without NaN and infinity, which VTK cannot read back from text.
     Ascii,
     /// Base64 in one block at the end of the file.
     #[default]
     Base64,
 }
 
-/// How VTK files are written.
+/// Options for VTK files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VtkOptions {
-    /// How numbers are written.
+    /// Encoding of numbers.
     pub encoding: Encoding,
-    /// Compress with ZLib; only with base64.
+    /// Whether to compress with ZLib; only with base64.
     pub compress: bool,
 }
 
 /// Bytes per compressed block. Readers can unpack blocks one at a time.
 const BLOCK_BYTES: usize = 1 << 20;
 
-/// Writes a data set; the ending of `path` must be that of its kind (`.vtp` for PolyData and so
+/// Writes a data set. The extension of `path` must be that of its kind (`.vtp` for PolyData and so
 /// on). A collection becomes a `.vtm` file and a directory of the same name with its blocks.
 pub fn write_vtk(
     path: impl AsRef<Path>,
@@ -178,8 +177,8 @@ fn escaped(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // Line ends in attributes would be read as spaces; other control characters are not
-            // allowed at all.
+            // Line ends in attributes would be read as spaces; other control characters are
+            // invalid.
             '\n' | '\r' | '\t' => {
                 let _ = write!(out, "&#{};", c as u32);
             }
@@ -190,7 +189,7 @@ fn escaped(text: &str) -> String {
     out
 }
 
-/// A file while it is put together. Writing to a `String` cannot fail.
+/// A file under construction. Writing to a `String` cannot fail.
 struct Document {
     xml: String,
     appended: Vec<String>,
@@ -290,7 +289,7 @@ impl Document {
             self.array(array, &format!(" NumberOfTuples=\"{}\"", array.tuples()));
         }
         for (name, texts) in &a.text {
-            // Letters as numbers, each text ended by a zero.
+            // Characters as numbers; each text is terminated by a zero.
             let letters: Vec<String> =
                 texts.iter().flat_map(|t| t.bytes().chain([0])).map(|b| b.to_string()).collect();
             let (name, n) = (escaped(name), texts.len());
@@ -353,7 +352,7 @@ impl Document {
         self.array(&DataArray::new("types", 1, Values::U8(d.types.clone())), "");
         if d.faces_of_cell.iter().any(|r| !r.is_empty()) {
             // The layout that all versions of VTK read: per polyhedron its number of faces, then
-            // each face's size and ids.
+            // the size and ids of each face.
             let (mut stream, mut ends) = (Vec::new(), Vec::new());
             for faces in &d.faces_of_cell {
                 if faces.is_empty() {
@@ -401,7 +400,7 @@ impl Document {
     }
 }
 
-/// The shortest text that gives the same number back. Large and small reals get an exponent.
+/// The shortest text that parses to the same number. Large and small reals get an exponent.
 fn shortest<T: std::fmt::Debug>(x: &T) -> String {
     format!("{x:?}")
 }

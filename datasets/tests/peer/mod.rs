@@ -1,14 +1,14 @@
-//! Finds a Python that has VTK, so that tests can compare with the original instead of with
-//! remembered numbers.
+//! Finds a Python with VTK, so that tests compare with VTK itself rather than with recorded
+//! numbers.
 //!
-//! Order: `RTSV_PYTHON`, `python3`, `$RTSV_PEERS/venv/bin/python`. Without one the test says why it
-//! is skipped; with `RTSV_REQUIRE_PEERS=1` that is a failure.
+//! Order: `RTSV_PYTHON`, `python3`, `$RTSV_PEERS/venv/bin/python`. Without one, the test is skipped
+//! and says why; with `RTSV_REQUIRE_PEERS=1` it fails instead.
 
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// A Python that can `import vtk`, or `None` after saying what was tried.
+/// A Python that can `import vtk`; otherwise prints what was tried and returns `None`.
 pub(crate) fn python_with_vtk(test: &str) -> Option<PathBuf> {
     let mut candidates: Vec<PathBuf> =
         std::env::var_os("RTSV_PYTHON").into_iter().map(PathBuf::from).collect();
@@ -37,14 +37,13 @@ pub(crate) fn python_with_vtk(test: &str) -> Option<PathBuf> {
     None
 }
 
-/// Says on stderr why a test does nothing. `println!` and `eprintln!` would not do: libtest
-/// swallows both in tests that pass.
+/// Prints on stderr why a test is skipped. `println!` and `eprintln!` would not work: libtest
+/// captures both in tests that pass.
 pub(crate) fn say_skipped(reason: &str) {
     writeln!(std::io::stderr(), "skipped: {reason}").expect("stderr can be written");
 }
 
-/// Runs `script` with `args` and gives back what it printed. Panics with its error output when it
-/// fails.
+/// Runs `script` with `args` and returns its output. Panics with its error output when it fails.
 pub(crate) fn run(python: &PathBuf, script: &str, args: &[&str]) -> String {
     let out =
         Command::new(python).arg("-c").arg(script).args(args).output().expect("python starts");

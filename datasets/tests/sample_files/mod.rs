@@ -1,5 +1,4 @@
-//! Small files of every format, made here byte by byte or by the writers, for the tests of the
-//! readers.
+//! Small files of every format for the tests of the readers, built byte by byte or by the writers.
 #![allow(dead_code, reason = "each test uses some of them")]
 
 use datasets::model::*;
@@ -49,7 +48,7 @@ pub(crate) fn poly() -> PolyData {
     d
 }
 
-/// A tetrahedron, a hexahedron and a cube as a polyhedron.
+/// A tetrahedron, a hexahedron and a cube stored as a polyhedron.
 pub(crate) fn unstructured() -> UnstructuredGrid {
     let mut points = vec![[5., 0., 0.], [6., 0., 0.], [5., 1., 0.], [5., 0., 1.]];
     for shift in [0., 2.] {
@@ -109,7 +108,7 @@ pub(crate) fn structured() -> StructuredGrid {
     d
 }
 
-/// Every kind of data set with the ending of its files.
+/// Every kind of data set with its file extension.
 pub(crate) fn data_sets() -> Vec<(&'static str, Dataset)> {
     vec![
         ("vti", Dataset::ImageData(image())),
@@ -127,7 +126,7 @@ fn written(name: &str, data: &Dataset, options: VtkOptions) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// A VTI with raw appended data, compressed in two blocks as `compressor` says.
+/// A VTI with raw appended data, compressed in two blocks by `compressor`.
 pub(crate) fn raw_appended(compressor: &str, pack: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
     let values: Vec<u8> = (0..8).flat_map(|i| (i as f32).to_le_bytes()).collect();
     let blocks = [pack(&values[..20]), pack(&values[20..])];
@@ -207,7 +206,7 @@ pub(crate) const LEGACY_IMAGE: &str = "# vtk DataFile Version 2.0\nv\nASCII\nDAT
                                        STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n\
     SPACING 1 1 1\nPOINT_DATA 8\nSCALARS d int\nLOOKUP_TABLE default\n0 1 2 3 4 5 6 7\n";
 
-/// A PLOT3D grid and solution of `dims` points in the layout that the arguments describe.
+/// A PLOT3D grid and solution of `dims` points in the given layout.
 pub(crate) fn plot3d(
     blocks: &[[u32; 3]],
     multi: bool,
@@ -328,7 +327,7 @@ pub(crate) const OBJ: &str = "mtllib none.mtl\no a\nv 0 0 0 1 0 0\nv 2 0 0 0 1 0
                               1 0.5 0 1 1 1\nv 0 2 0 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
     vn 0 0 1\nusemtl red\nf 1/1/1 2/2/1 3/3/1 4/4/1 5/4/1\nl 1 2\n";
 
-/// A triangle with a doubled and mirrored node, as `.gltf` with its buffer inside.
+/// A triangle whose node is scaled by two and mirrored, as `.gltf` with an embedded buffer.
 pub(crate) fn gltf() -> Vec<u8> {
     let mut data: Vec<u8> =
         [0f32, 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|x| x.to_le_bytes()).collect();
