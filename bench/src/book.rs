@@ -1,8 +1,8 @@
 //! Compiles and runs the Rust examples of the book (docs/src) and of READMEs as documentation
 //! tests, so that they stay correct.
 //!
-//! This is done in bench because it may use every member, as an example may. The test
-//! `the_book_is_complete` finds a chapter with examples that is missing here.
+//! They are in bench because it may use every member, as an example may. The test
+//! `the_book_is_complete` finds chapters with examples that are missing here.
 
 macro_rules! chapters {
     ($($name:ident $path:literal)*) => {

@@ -13,15 +13,15 @@ use std::time::Instant;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Clock {
-    /// CPU time of the calling thread: right for work on one thread.
+    /// CPU time of the calling thread, for work on one thread.
     ThreadCpu,
     /// CPU time of all threads of the process.
     ProcessCpu,
-    /// Wall-clock time: right for work on several threads.
+    /// Wall-clock time, for work on several threads.
     Wall,
 }
 
-/// The duration of one piece of work by all three clocks, in seconds.
+/// The duration of some work by all three clocks, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sample {
     /// Wall-clock time.

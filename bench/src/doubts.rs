@@ -1,24 +1,24 @@
 //! Reasons to distrust a measurement: a working tree that no commit matches, a busy machine, or a
 //! build that is not a release build.
 //!
-//! Reports show these reasons beside every record, even old ones. `bench run --record` keeps no
-//! record that has any.
+//! Reports show these reasons next to every record, even old ones. `bench run --record` rejects
+//! measurements that have any.
 
 use crate::machine::Machine;
 use crate::record::Record;
 use std::time::Duration;
 
-/// Running processes per core that a measurement bears: more, and others have a core that it wants.
+/// Maximum load per core for a valid measurement; above it, other processes compete for the cores.
 pub const MOST_LOAD_PER_CORE: f64 = 0.75;
 
 impl Machine {
-    /// Whether the tree had changes that no commit has. Older records say it with a `+` behind the
+    /// Whether the tree had uncommitted changes. Older records mark this with a `+` after the
     /// commit.
     pub fn is_dirty(&self) -> bool {
         self.dirty.unwrap_or(false) || self.commit.as_ref().is_some_and(|c| c.ends_with('+'))
     }
 
-    /// What speaks against measurements in this state, each with the cure.
+    /// Reasons to distrust measurements in this state, each with the cure.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         match &self.commit {
@@ -58,40 +58,42 @@ impl Machine {
 }
 
 impl Record {
-    /// What speaks against this record.
+    /// Reasons to distrust this record.
     pub fn doubts(&self) -> Vec<String> {
         self.machine.doubts()
     }
 }
 
-/// What `--record` does with a measurement about to be made.
+/// Decision of `--record` before a measurement.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Admission {
-    /// Nothing speaks against it.
+    /// There are no objections.
     Clean,
-    /// Kept because the command line insists; what spoke against it goes into the record.
+    /// Recorded because the command line insists; the objections are stored in the record.
     Despite(Vec<String>),
-    /// Not kept, for these reasons.
+    /// Not recorded, for these reasons.
     Refused(Vec<String>),
 }
 
-/// Decides what is recorded.
+/// Decides which measurements are recorded.
 pub struct Gate {
-    /// `--record-despite-doubts`.
+    /// Whether `--record-despite-doubts` was given.
     pub insist: bool,
-    /// How the machine is now.
+    /// Returns the current state of the machine.
     pub state: Box<dyn FnMut() -> Machine>,
-    /// Waits; false when the user has no more patience.
+    /// Waits for the duration; returns false when the user interrupts the wait.
     pub pause: Box<dyn FnMut(Duration) -> bool>,
 }
 
-/// Our own last experiment is in the load of the last minute, and leaves it in two.
+/// Time for the load of our own previous experiment to decay: the one-minute average contains it
+/// and loses it after two minutes.
 const OWN_LOAD_FADES: Duration = Duration::from_secs(180);
 const STEP: Duration = Duration::from_secs(5);
 
 impl Gate {
-    /// Whether the `nth` experiment of a run (from 0) may be recorded. The first one meets the load
-    /// as it is; before others the gate waits until the load that the one before has made is gone.
+    /// Decides whether the `nth` experiment of a run (from 0) may be recorded. The first experiment
+    /// is judged by the current load. Before the others, the gate waits until the load of the
+    /// previous experiment has decayed.
     pub fn admit(&mut self, nth: usize) -> Admission {
         let mut machine = (self.state)();
         let mut waited = Duration::ZERO;
@@ -132,7 +134,7 @@ mod tests {
         }
     }
 
-    /// A gate before machines of these loads, and how often it paused.
+    /// A gate with machines of these loads, and the number of its pauses.
     fn gate(insist: bool, machine: Machine, loads: &[f64]) -> (Gate, Rc<RefCell<u32>>) {
         let (pauses, seen) = (Rc::new(RefCell::new(0)), RefCell::new(0));
         let (counted, loads) = (pauses.clone(), loads.to_vec());

@@ -12,7 +12,7 @@ pub struct BruteForce {
 }
 
 impl BruteForce {
-    /// Triangles that cannot be rendered are left out of the answers.
+    /// Prepares a mesh. Triangles that cannot be rendered are ignored.
     pub fn new(mesh: &TriMesh) -> BruteForce {
         let corners = |i: usize| {
             if mesh.is_renderable(i) {
@@ -25,8 +25,8 @@ impl BruteForce {
     }
 
     /// Distance, triangle and barycentric coordinates of the closest hit in `tmin..=tmax`. The edge
-    /// functions are volumes of origin and edge (Pluecker form): the same number for both triangles
-    /// of an edge, so nothing leaks between them.
+    /// functions are volumes of origin and edge (Pluecker form). Both triangles of an edge get the
+    /// same number, so no ray passes between them.
     pub fn closest_hit(
         &self,
         o: DVec3,

@@ -13,17 +13,17 @@ use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock, RaySet};
 use rayon::prelude::*;
 use rt_core::mesh::TriMesh;
 
-/// A ray tracer. All coordinates are the mesh's own (relative to its origin).
+/// A ray tracer. All coordinates are those of the mesh (relative to its origin).
 pub trait Tracer: Sync {
-    /// Name with version and mode, as shown in tables.
+    /// Name with version and mode, as in tables.
     fn name(&self) -> String;
 
     /// Finds the closest hits of `rays` and stores them in `hits`, which has the same length. Empty
     /// lanes may hold any value.
     fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]);
 
-    /// Whether each ray hits anything: bit i of a block's mask is lane i. Bits of empty lanes are
-    /// 0.
+    /// Tests whether each ray hits anything: bit i of a block's mask is lane i. Bits of empty lanes
+    /// are 0.
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]);
 }
 
@@ -39,14 +39,14 @@ impl<T: Tracer + ?Sized> Tracer for &T {
     }
 }
 
-/// The cost of building.
+/// Cost of a build.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BuildCost {
-    /// Time by the wall clock, without copying the input.
+    /// Wall-clock time, excluding copies of the input.
     pub wall_secs: f64,
     /// CPU time of all threads.
     pub cpu_secs: f64,
-    /// Memory the structure holds afterwards, without the input mesh.
+    /// Memory of the finished structure, without the input mesh.
     pub bytes: u64,
     /// Peak memory while building, if the baseline reports it.
     pub peak_bytes: Option<u64>,
@@ -55,14 +55,14 @@ pub struct BuildCost {
 /// Why a baseline cannot be measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BaselineError {
-    /// It is not installed.
+    /// The baseline is not installed.
     #[error("{name} is not installed (looked in {looked_in}); {cure}")]
     NotFound {
         /// Its name.
         name: String,
-        /// Where it was searched for.
+        /// The places searched.
         looked_in: String,
-        /// How to get it.
+        /// How to install it.
         cure: String,
     },
     /// A library was found but cannot be used.
@@ -70,16 +70,16 @@ pub enum BaselineError {
     Unusable {
         /// The file.
         path: String,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// The mesh has triangles that no baseline accepts.
+    /// The mesh has triangles that some baselines cannot handle.
     #[error(
         "the mesh has {count} triangles with missing or non-finite vertices; peers need a clean \
          mesh: remove them"
     )]
     Mesh {
-        /// How many.
+        /// Number of such triangles.
         count: usize,
     },
     /// The baseline reported an error.
@@ -87,7 +87,7 @@ pub enum BaselineError {
     Failed {
         /// Its name.
         name: String,
-        /// Its error.
+        /// The error.
         error: String,
         /// The operation that failed.
         doing: &'static str,
@@ -95,7 +95,7 @@ pub enum BaselineError {
 }
 
 impl BaselineError {
-    /// The message for records, which are public: file names without this machine's directories.
+    /// The message for published records: file names without directories of this machine.
     pub fn for_a_record(&self) -> String {
         let BaselineError::Unusable { path, reason } = self else { return self.to_string() };
         let file = std::path::Path::new(path);
@@ -178,7 +178,7 @@ mod tests {
 
 #[cfg(test)]
 pub(crate) mod testing {
-    //! One test for every baseline: the same answers as testing all triangles in f64.
+    //! One test for every baseline: agreement with brute force in f64.
 
     use super::*;
     use crate::rays::{self, View};
@@ -205,7 +205,7 @@ pub(crate) mod testing {
         TriMesh::new(positions, triangles.collect())
     }
 
-    /// A kind of rays, with the expected answers.
+    /// A kind of rays with the expected results.
     struct Case {
         kind: &'static str,
         rays: RaySet,
@@ -213,7 +213,7 @@ pub(crate) mod testing {
         masks: Vec<u16>,
     }
 
-    /// Primary, shadow, ambient-occlusion and random rays through [`mesh`], answered once by brute
+    /// Primary, shadow, ambient-occlusion and random rays through [`mesh`], traced once by brute
     /// force.
     fn cases() -> &'static [Case] {
         static CASES: OnceLock<Vec<Case>> = OnceLock::new();
@@ -244,9 +244,9 @@ pub(crate) mod testing {
         })
     }
 
-    /// Compares a tracer that was built from [`mesh`] with brute force. If a ray hits an edge or a
-    /// silhouette, f32 may differ: at most one ray in 2000 may; distances agree to 1e-4 of the
-    /// mesh's size.
+    /// Compares a tracer that was built from [`mesh`] with brute force. At edges and silhouettes,
+    /// f32 results may differ: at most one ray in 2000 may. Distances agree to 1e-4 of the mesh's
+    /// size.
     pub(crate) fn agrees_with_brute_force(tracer: &dyn Tracer) {
         for Case { kind, rays, hits, masks } in cases() {
             let what = format!("{}, {kind}", tracer.name());

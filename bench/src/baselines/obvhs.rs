@@ -16,7 +16,7 @@ use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use rt_core::mesh::TriMesh;
 
-/// obvhs' own ladder of build qualities.
+/// The build presets of obvhs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Preset {
     /// `fastest_build`.
@@ -34,7 +34,7 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// From fastest to best.
+    /// All presets, from fastest to best.
     pub const ALL: [Preset; 6] = [
         Preset::Fastest,
         Preset::VeryFast,
@@ -72,9 +72,9 @@ impl Preset {
 pub struct Obvhs {
     preset: Preset,
     bvh: CwBvh,
-    /// In leaf order.
+    /// The triangles, in leaf order.
     triangles: Vec<RtTriangle>,
-    /// What building cost; obvhs reports no peak.
+    /// Cost of the build; obvhs reports no peak.
     pub cost: BuildCost,
 }
 

@@ -2,11 +2,11 @@
 //! the text: a texture of (gradient, n) with trilinear interpolation, Euler steps for position and
 //! direction in f32, and one step length for all rays.
 //!
-//! The signs and lengths of the gradients are correct here. In the author's published code
-//! (TACC/SchlierenRay, 2015) they are not. Central differences are divided by twice the spacing and
-//! point to the higher index. Rays start with |v| = n and march until they leave the box. The
-//! limits of the method remain: 16 bytes per voxel, first order, and deflections that are lost when
-//! they are smaller than half a unit in the last place of the direction.
+//! The signs and lengths of the gradients are correct here, unlike in the author's published code
+//! (TACC/SchlierenRay, 2015): central differences are divided by twice the spacing and point to the
+//! higher index. Rays start with |v| = n and march until they leave the box. The limits of the
+//! method remain: 16 bytes per voxel, first order, and deflections that are lost when they are
+//! smaller than half an ulp of the direction.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use schlieren::field::Field;
 use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::view::View;
 
-/// The march, ready for a field and a view.
+/// A march prepared for a field and a view.
 pub struct ThesisMarch {
     /// Gradient of n per metre, and n.
     texels: Vec<[f32; 4]>,
@@ -91,7 +91,7 @@ impl ThesisMarch {
         let [x, y] = start.position_m.map(f64::from);
         let middle = v.centre_m + v.right * x + v.up * y - self.origin_m;
         let size = DVec3::from(self.dims.map(|d| (d - 1) as f64)) * self.spacing_m;
-        // The box's near and far side along the ray, by slabs.
+        // Entry and exit of the ray by the slab test.
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
         for c in 0..3 {
             let (o, d) = (middle[c], v.forward[c]);
@@ -113,7 +113,7 @@ impl ThesisMarch {
         let mut direction = v.forward.as_vec3() * self.texture(at * rcp_h)[3];
         let (size, limit) =
             (size.as_vec3(), ((far - near) / f64::from(self.step_m) * 2.0) as u32 + 4);
-        // A hair of slack, or rays that start on a face would stop there.
+        // A small tolerance: otherwise rays that start on a face would stop there.
         let slack = size * 1e-5;
         for _ in 0..limit {
             let [gx, gy, gz, n] = self.texture(at * rcp_h);
@@ -176,9 +176,9 @@ mod tests {
 
     #[test]
     fn weak_deflections_seen_obliquely_drown_in_rounding() {
-        // The flaw that the deviational form does not have: 1e-8 is below the direction's last
-        // place, so light on both sides of the blob, which it bends in opposite directions, comes
-        // out the same.
+        // This flaw does not exist in the deviational form: 1e-8 is below the ulp of the direction,
+        // so light on both sides of the blob, which is bent in opposite directions, gets the same
+        // result.
         let view =
             View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO).unwrap();
         let exits = |amplitude: f64| {

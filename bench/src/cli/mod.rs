@@ -156,7 +156,7 @@ struct PictureArgs {
     samples: u32,
 }
 
-/// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+/// Runs the program. Exit codes: 0 done, 1 failed, 2 usage error, 130 interrupted.
 pub fn main() -> ExitCode {
     run_main(|| execute(Cli::try_parse()?))
 }
@@ -176,7 +176,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
     }
 }
 
-/// Where records and reports go unless told otherwise: the build folder that this program lies in.
+/// Default directory of records and reports: the build folder that contains this program.
 fn default_dir() -> PathBuf {
     let beside = std::env::current_exe().ok().and_then(|exe| {
         let build = exe.parent()?.parent()?;

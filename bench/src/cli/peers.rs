@@ -8,10 +8,10 @@ use serde::Serialize;
 struct Peer {
     name: &'static str,
     found: bool,
-    /// Of the library that was loaded.
+    /// Version of the loaded library.
     version: Option<String>,
     path: Option<String>,
-    /// Why it was not found, and the cure.
+    /// Why the library was not found, and the cure.
     reason: Option<String>,
 }
 

@@ -4,7 +4,7 @@ use crate::quote;
 use datasets::cli::{CommonArgs, UsageError};
 use serde_json::json;
 
-/// Brings what the book quotes from records up to date, and prints the files that changed.
+/// Updates the quotations of records in the book, and prints the files that changed.
 pub(super) fn quote(common: CommonArgs) -> anyhow::Result<()> {
     let here = std::env::current_dir()?;
     let root =

@@ -153,12 +153,12 @@ pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<
     ended(&p.rendered)
 }
 
-/// After Ctrl-C the picture is there with the samples it got, and the program says so.
+/// After Ctrl-C, the image is saved with the samples so far, and the program says so.
 fn ended(rendered: &RenderedImage) -> anyhow::Result<()> {
     if rendered.is_interrupted() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
-/// Checks the names before hours of work are spent on a picture that cannot be written.
+/// Checks the file names before hours of work are spent on an image that cannot be written.
 fn outputs<'a>(
     png: Option<&'a Path>,
     exr: Option<&'a Path>,
@@ -216,7 +216,7 @@ fn rays(r: &RayStats) -> Value {
 }
 
 // ---- values of options --------------------------------------------------------------------------
-/// `960x540`.
+/// Parses an image size such as `960x540`.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let wrong =
         || format!("`{text}` is not a size; write for example 960x540 (1 to 16384 pixels each)");
@@ -225,7 +225,7 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([pixels(w).ok_or_else(wrong)?, pixels(h).ok_or_else(wrong)?])
 }
 
-/// `0.5,2`.
+/// Parses a range such as `0.5,2`.
 pub(super) fn range(text: &str) -> Result<[f32; 2], String> {
     let wrong =
         || format!("`{text}` is not a range; write for example 0.5,2 (the lower number first)");
@@ -235,7 +235,7 @@ pub(super) fn range(text: &str) -> Result<[f32; 2], String> {
     if lo < hi { Ok([lo, hi]) } else { Err(wrong()) }
 }
 
-/// One of the values by its name; the error lists the names.
+/// Finds a value by its name; the error lists the names.
 fn by_name<T: Copy>(
     text: &str,
     what: &str,
@@ -255,7 +255,7 @@ pub(super) fn quality(text: &str) -> Result<BuildQuality, String> {
 pub(super) fn robustness(text: &str) -> Result<Robustness, String> {
     by_name(text, "robustness", Robustness::ALL.into_iter().map(|r| (r.name(), r)))
 }
-/// Scalars and opacities of a volume.
+/// Scalars and opacities of a volume's transfer function.
 #[derive(Debug, Clone)]
 pub(super) struct Opacity(Vec<[f32; 2]>);
 

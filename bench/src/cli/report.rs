@@ -14,7 +14,7 @@ pub(super) fn report(common: CommonArgs, args: &ReportArgs) -> anyhow::Result<()
     common.result(&json!({ "report": page }), || page.display().to_string())
 }
 
-/// Makes the page of all records in a folder.
+/// Writes the page for all records in a folder.
 pub(super) fn write_page(dir: &Path, page: &Path) -> anyhow::Result<PathBuf> {
     let cure = "`bench run ID` writes records, `bench list` names the experiments";
     let records = record::read_dir(dir).cure(cure)?;

@@ -37,7 +37,7 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
         }
         let Outcome { mut record, interrupted } = match experiments::run(experiment, &mut context) {
             Err(e) if e.is::<Interrupted>() && written => {
-                // What was finished is worth its report.
+                // Report the experiments that finished.
                 finish(common, &dir)?;
                 return Err(e);
             }
@@ -46,7 +46,7 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
         if let Admission::Despite(why) = admission {
             record.recorded_despite = why;
         }
-        // Half a measurement is no record to keep for years.
+        // An interrupted measurement is not kept among the permanent records.
         for dir in &dirs[..if interrupted { 1 } else { dirs.len() }] {
             record.write(dir)?;
         }
@@ -61,7 +61,7 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     finish(common, &dir)
 }
 
-/// Between experiments it waits as long as nobody interrupts it.
+/// A gate that waits between experiments until Ctrl-C is pressed.
 fn gate(insist: bool, cancel: Cancel) -> Gate {
     let pause = move |time| {
         std::thread::sleep(time);
@@ -70,7 +70,7 @@ fn gate(insist: bool, cancel: Cancel) -> Gate {
     Gate { insist, state: Box::new(Machine::describe), pause: Box::new(pause) }
 }
 
-/// Nothing was measured: it would not have been kept.
+/// The error for a measurement that was not made because it would not have been kept.
 fn refusal(id: &str, why: &[String]) -> UsageError {
     UsageError(format!(
         "`{id}` is not recorded:\n  {}\n--record-despite-doubts records it all the same, and its \
@@ -80,19 +80,19 @@ fn refusal(id: &str, why: &[String]) -> UsageError {
     ))
 }
 
-/// The progress of experiments: a bar on a terminal; elsewhere a line for each experiment, and with
+/// Progress of the experiments: a bar on a terminal; elsewhere a line for each experiment, and with
 /// -v for each step.
 struct Steps {
     common: CommonArgs,
     cancel: Cancel,
     bar: ProgressBar,
     start: Instant,
-    /// Index and id of the experiment that runs.
+    /// Index and id of the current experiment.
     now: Cell<(usize, &'static str)>,
     count: usize,
 }
 
-/// Steps of the bar for each experiment.
+/// Steps of the progress bar for each experiment.
 const FINE: f64 = 1000.0;
 
 impl Steps {
@@ -124,9 +124,10 @@ impl Steps {
     }
 }
 
-/// Every experiment in its quick form. One that fails is reported, and the others go on; one that
-/// compares with programs which are not there (another of our members not built, ParaView not
-/// installed) is left out by name, with the cure: with Rust alone that is no failure.
+/// Runs every experiment in its quick form. An experiment that fails is reported, and the others
+/// continue. An experiment that needs programs which are not installed (another member of the
+/// workspace, ParaView) is left out by name, with the cure; this is not a failure, because only
+/// Rust is required.
 pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
     let dir = default_dir();
     let cancel = Cancel::on_ctrl_c()?;
@@ -156,7 +157,7 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
             Err(e) => match e.downcast_ref::<UsageError>() {
                 Some(UsageError(why)) => {
                     common.note(0, format_args!("left out: {why}"));
-                    // An earlier run's measurements stay.
+                    // Keep measurements of an earlier run.
                     if !dir.join(format!("{}.json", experiment.id)).exists() {
                         experiments::left_out(experiment, why).write(&dir)?;
                     }
@@ -182,7 +183,7 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
         );
     }
     anyhow::ensure!(failed.is_empty(), "these experiments failed: {}", failed.join(", "));
-    // Where all peers must be there (CI), what is left out is a fault and not a circumstance.
+    // Where all baselines are required (CI), a left-out experiment is a failure.
     let all_peers = std::env::var_os("RTSV_REQUIRE_PEERS").is_some_and(|v| v == "1");
     anyhow::ensure!(
         left_out.is_empty() || !all_peers,
@@ -192,8 +193,7 @@ pub(super) fn everything_quick(common: CommonArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes the report and says where it is: on standard output, or beside the progress where that
-/// carries JSON.
+/// Writes the report and prints its path: on stdout, or on stderr when stdout carries JSON.
 fn finish(common: CommonArgs, dir: &Path) -> anyhow::Result<()> {
     let page = write_page(dir, &dir.join("index.html"))?;
     if common.json {
@@ -213,7 +213,7 @@ fn find(id: &str) -> Result<&'static Experiment, UsageError> {
     })
 }
 
-/// What is missing and the ratios.
+/// A summary of the missing parts and the ratios.
 fn summary(r: &Record) -> String {
     let mut text =
         format!("{}: {} ({} rows, {:.1} s)", r.id, r.title, r.rows.len(), r.elapsed_secs);
@@ -230,7 +230,7 @@ fn summary(r: &Record) -> String {
     text
 }
 
-/// `bench/runs/DATE-MACHINE` of the repository that the working directory is in.
+/// The directory `bench/runs/DATE-MACHINE` of the repository that contains the working directory.
 fn runs_dir() -> anyhow::Result<PathBuf> {
     let here = std::env::current_dir()?;
     let root = here.ancestors().find(|d| d.join("bench/Cargo.toml").exists()).ok_or_else(|| {

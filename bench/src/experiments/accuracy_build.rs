@@ -32,7 +32,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     );
     let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
-    // One version: the newest there is.
+    // Only the newest version.
     let embree = installed.embree.last();
     let (size, pixels) = if context.quick { (Size::M1, 512) } else { (Size::M4, 1024) };
     let pipes = meshes::pipes(if context.quick { 600 } else { 2600 });
@@ -141,7 +141,8 @@ fn scene(
     Ok(())
 }
 
-/// Time to the n-th frame, build included: where lines cross, the better build has paid for itself.
+/// Time to the n-th frame, including the build: at the intersections, the better build has paid
+/// off.
 fn plot(record: &Record, mesh: &str) -> Plot {
     let title = format!(
         "{mesh}: build, then frames of these primary and ambient-occlusion rays, one thread tracing"
@@ -170,7 +171,7 @@ mod tests {
     use super::*;
     use std::path::PathBuf;
 
-    /// Of the newest record: mesh, preset, seconds of the build, and seconds of all its rays.
+    /// From the newest record: mesh, preset, build time and time of all rays, in seconds.
     fn recorded() -> Vec<(String, String, f64, f64)> {
         let runs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("runs");
         let folders = std::fs::read_dir(runs).expect("bench/runs").flatten();
@@ -184,7 +185,7 @@ mod tests {
         let [mesh, tracer, time, preset, build] =
             ["mesh", "tracer", "time [ms]", "preset", "build [s]"].map(place);
         let mut out: Vec<(String, String, f64, f64)> = vec![];
-        // Names of rivals have commas and quotes; ours have none.
+        // Names of baselines contain commas and quotes; ours do not.
         for row in lines.filter(|l| !l.contains('"')).map(|l| l.split(',').collect::<Vec<_>>()) {
             assert!(row[tracer].starts_with("rt-core"), "{row:?}");
             let number = |i: usize| row[i].parse::<f64>().expect("a number");

@@ -17,7 +17,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 const TIMEOUT: Duration = Duration::from_secs(600);
-/// One layer per rank.
+/// Number of layers; each rank has one.
 const LAYERS: usize = 128;
 const ALPHAS: [f64; 3] = [0.005, 0.02, 0.1];
 
@@ -45,7 +45,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let icet = icet::find()
         .map_err(|why| record.missing.push(format!("IceT's 8-bit blending: {why}")))
         .ok();
-    // The strategies give the same bits: the one with fewer messages will do for the short form.
+    // All strategies give the same bits, so the short form uses only the one with fewer messages.
     let strategies =
         [("radix-k", Strategy::RadixK { k: 8 }), ("direct send", Strategy::DirectSend)];
     let strategies = &strategies[..if context.quick { 1 } else { 2 }];
@@ -54,7 +54,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         measure(record, &Case { alpha, size, frames, strategies, icet: icet.as_deref() })?;
     }
     record.notes.extend(describe(&record.rows));
-    // A series for each format: what it loses with how faint layers, and at what time.
+    // One series per format: the error as a function of the layers' opacity, and the time.
     let mut by_alpha = Plot::lines(
         "Error of 128 layers",
         Axis::log("opacity of a layer", ""),
@@ -80,7 +80,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// IceT's only way to blend few bits.
+/// The only format in which IceT blends.
 const ICET_FORMAT: &str = "u8 of IceT";
 
 struct Case<'a> {
@@ -91,7 +91,7 @@ struct Case<'a> {
     icet: Option<&'a Path>,
 }
 
-/// What 8 bits lose, ours and IceT's, by the rows.
+/// Describes the error with 8 bits, ours and IceT's, from the rows.
 fn describe(rows: &[Row]) -> Option<String> {
     let error = |format: &str, alpha: f64| {
         let here = |r: &&Row| r.text("format") == Some(format) && r.number("alpha") == Some(alpha);
@@ -109,9 +109,9 @@ fn describe(rows: &[Row]) -> Option<String> {
     })
 }
 
-/// Premultiplied colour of `layer` at pixel `k`: a function that every format then rounds.
+/// Premultiplied colour of `layer` at pixel `k`: an exact function, which every format then rounds.
 fn layer_color(alpha: f64, layer: usize, k: usize) -> [f64; 4] {
-    // Golden-ratio steps: no two pixels have the same layers.
+    // Golden-ratio steps make the layers differ between all pixels.
     let vary = |step: f64| 1.0 + 0.1 * ((layer as f64 * 0.618_034 + k as f64 * step).fract() - 0.5);
     let a = alpha * vary(0.754_878);
     [a * 0.9 * vary(0.569_840), a * 0.5, a * 0.2, a]
@@ -130,12 +130,12 @@ fn exact(alpha: f64, k: usize) -> [f64; 4] {
     sum
 }
 
-/// One way to composite, on one rank.
+/// A compositing method on one rank.
 trait Contender {
-    /// Composites the rank's layer. When that was done on the rank's clock, and the bytes it sent,
-    /// where that is known.
+    /// Composites the rank's layer. Returns the time of completion on the rank's clock, and the
+    /// number of bytes sent, if known.
     fn composite(&mut self, comm: &mut SimComm) -> anyhow::Result<(f64, Option<u64>)>;
-    /// The last image, on rank 0.
+    /// The most recent image, on rank 0.
     fn image(&self) -> Option<Vec<[f32; 4]>>;
 }
 
@@ -192,7 +192,7 @@ impl Contender for IcetCompositor {
     }
 }
 
-/// A contender with what its rows say of it.
+/// A contender with the description for its rows.
 struct NamedContender {
     format: &'static str,
     bytes_per_pixel: usize,
@@ -232,7 +232,7 @@ fn ours<C: Color + 'static>(
     }
 }
 
-/// All ways to composite on one rank, in the order of the rows.
+/// All contenders on one rank, in the order of the rows.
 fn contenders(comm: &mut SimComm, case: &Case<'_>) -> anyhow::Result<Vec<NamedContender>> {
     let (rank, ranks) = (comm.rank(), comm.size());
     let mut all = Vec::new();
@@ -258,7 +258,7 @@ fn contenders(comm: &mut SimComm, case: &Case<'_>) -> anyhow::Result<Vec<NamedCo
     Ok(all)
 }
 
-/// What a rank has to say of a contender.
+/// Results of a contender on one rank.
 struct RankResult {
     format: &'static str,
     bytes_per_pixel: usize,
@@ -273,7 +273,7 @@ fn measure(record: &mut Record, case: &Case<'_>) -> anyhow::Result<()> {
         let mut all = contenders(&mut comm, case)?;
         let mut secs = vec![Vec::new(); all.len()];
         let mut sent = vec![None; all.len()];
-        // The first frame warms up.
+        // The first frame is a warm-up.
         for n in 0..=case.frames {
             for k in order(all.len(), n) {
                 comm.barrier(TIMEOUT)?;
@@ -314,7 +314,7 @@ fn measure(record: &mut Record, case: &Case<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Largest and root mean square difference of a channel from the sum in f64, in 1/255.
+/// Largest and root mean square difference of a channel from the f64 sum, in 1/255.
 fn error_of(image: &[[f32; 4]], alpha: f64) -> (f64, f64) {
     let (mut worst, mut squares) = (0.0f64, 0.0);
     for (k, color) in image.iter().enumerate() {
@@ -356,8 +356,8 @@ mod tests {
             let row = record.rows.iter().find(|r| r.text("format") == Some(format)).expect(format);
             row.number("error").unwrap()
         };
-        // 128 layers of 1/255 each sum up to 0.473 of white; whoever rounds every sum down has no
-        // more than one of them.
+        // 128 layers of 1/255 each sum to 0.473 of white. If every sum is rounded down, at most one
+        // of them remains.
         assert!(of(ICET_FORMAT) > 100.0, "{}", of(ICET_FORMAT));
         assert!(of("u8") < 60.0 && of("u16") < 1.0 && of("f32") < 1e-3, "{:?}", record.rows);
         let note = describe(&record.rows).unwrap();

@@ -23,10 +23,10 @@ use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// Rays per batch: generated, traced and counted by one thread.
+/// Rays per batch; one thread generates, traces and counts a batch.
 const BATCH: usize = 1 << 16;
 
-/// A closed mesh and a ball inside it that rays start from.
+/// A closed mesh and a ball inside it that contains the rays' origins.
 struct Case {
     name: &'static str,
     mesh: Arc<TriMesh>,
@@ -71,7 +71,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     );
     let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
-    // 12 combinations of mesh and aim: 10^8 rays for each of our modes in full.
+    // 12 combinations of mesh and target: 10^8 rays for each of our modes in the full form.
     let (per_combination, rivals) =
         if context.quick { (4 * BATCH, 2 * BATCH) } else { (128 * BATCH, 32 * BATCH) };
     record.notes.push(format!(
@@ -149,15 +149,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 
 /// A tracer in one mode.
 struct TracerUnderTest<'a> {
-    /// What its rows begin with.
+    /// The first columns of its rows.
     row: Row,
-    /// Ways into it: for rays alone, and for packets.
+    /// Entry points: for single rays and for packets.
     modes: [Box<dyn Tracer + 'a>; 2],
-    /// Rays for each aim.
+    /// Number of rays for each target.
     count: usize,
 }
 
-/// One row per shooter and aim. The shooters take turns batch by batch, on the same rays.
+/// One row per tracer and target. The tracers alternate batch by batch, on the same rays.
 fn count_leaks(case: &Case, tracers: &[TracerUnderTest<'_>]) -> Vec<Row> {
     let most = tracers.iter().map(|s| s.count / BATCH).max().unwrap_or(0);
     let mut by_tracer: Vec<Vec<Row>> = vec![vec![]; tracers.len()];
@@ -189,10 +189,10 @@ fn count_leaks(case: &Case, tracers: &[TracerUnderTest<'_>]) -> Vec<Row> {
     by_tracer.concat()
 }
 
-/// A batch of rays from inside, the same for every tracer: even batches from random points at
-/// random triangles, odd ones from one point at triangles in the mesh's order, so that neighbouring
-/// rays go the same way and packets are used. Origins are rounded to f32 first, so that the
-/// direction is the difference of the numbers the tracer sees.
+/// A batch of rays from inside, the same for every tracer. Even batches go from random points to
+/// random triangles. Odd batches go from one point to triangles in the mesh's order, so that
+/// neighbouring rays have similar directions and form packets. Origins are rounded to f32 first, so
+/// that the direction is the difference of the numbers that the tracer uses.
 fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
     let mut random = SplitMix64::new(batch << 8 | aim as u64);
     let (mesh, packets) = (&case.mesh, batch % 2 == 1);
@@ -210,7 +210,7 @@ fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
             Aim::Vertices => corners[below(&mut random, 3)] - origin,
             Aim::Edges => {
                 let k = below(&mut random, 3);
-                // The point is rounded to f32, as an application's would be.
+                // Round the point to f32, like an application.
                 let point = corners[k].lerp(corners[(k + 1) % 3], random.unit());
                 point.as_vec3().as_dvec3() - origin
             }
@@ -220,12 +220,12 @@ fn rays_at_target(case: &Case, aim: Aim, batch: u64) -> RaySet {
     }))
 }
 
-/// Below `n`, which is not 0.
+/// A random number below `n`, which must not be 0.
 fn below(random: &mut SplitMix64, n: usize) -> usize {
     (random.unit() * n as f64) as usize
 }
 
-/// Leaks per million rays, by aim.
+/// Leaks per million rays, by target.
 fn plot(record: &Record) -> Plot {
     let categories = Aim::ALL.map(|a| a.name().to_string()).to_vec();
     let title = "Rays that leak through closed surfaces (none drawn where none leaked)";
@@ -265,7 +265,7 @@ mod tests {
     use crate::baselines::brute_force::BruteForce;
     use crate::baselines::closest_all;
 
-    /// The oracle itself must not leak: f64 edge functions from the same numbers.
+    /// The reference must not leak either: f64 edge functions from the same numbers.
     #[test]
     fn brute_force_sees_no_leak_where_aim_is_exact() {
         let mesh = Arc::new(meshes::crumpled_sphere(1, 0.02, DVec3::ZERO));

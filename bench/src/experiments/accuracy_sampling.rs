@@ -1,4 +1,4 @@
-//! Error against time of the sampled effects: low-discrepancy points against independent ones.
+//! Error against time of the sampled effects, for low-discrepancy and independent sample points.
 
 use super::Context;
 use crate::clock::{self, Clock, Sample};
@@ -19,14 +19,14 @@ use rt_core::sampler::Sampling;
 use rt_core::scene::{AmbientOcclusion, Scene};
 use std::cell::RefCell;
 
-/// Seed of the references: other points than any measured picture has.
+/// Seed of the references, so that they share no points with any measured image.
 const REFERENCE_SEED: u64 = 0x5eed;
 
 /// One sampled quantity: a scene whose number of samples is set by `with`.
 struct Quantity {
     name: &'static str,
     scene: Scene,
-    /// The scene and the options with so many samples.
+    /// Returns the scene and the options for the given number of samples.
     with: fn(&Scene, &RenderOptions, u32) -> (Scene, RenderOptions),
 }
 
@@ -67,7 +67,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
         let (exact, _) = picture(&quantity, &camera, &options, reference)?;
-        // All settings of a quantity in turns: a slow minute of the machine is slow for all.
+        // All settings of a quantity alternate, so that a slow minute of the machine affects all of
+        // them.
         let counts: Vec<u32> = (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most).collect();
         let settings: Vec<(Sampling, u32)> =
             Sampling::ALL.into_iter().flat_map(|s| counts.iter().map(move |n| (s, *n))).collect();
@@ -81,7 +82,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 let options = RenderOptions { sampling, ..plain.clone() };
                 let (quantity, camera, frames, failed) = (&quantity, &camera, &frames, &failed);
                 Variant::timed(format!("{}, {n}", sampling.name()), move || {
-                    // After Ctrl-C pictures end at once.
+                    // After Ctrl-C, images end at once.
                     match picture(quantity, camera, &options, n) {
                         Ok((frame, sample)) => {
                             frames.borrow_mut()[i] = Some(frame);
@@ -177,7 +178,7 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
     ]
 }
 
-/// The picture and what the renderer took for it.
+/// Renders the image; returns it with the time that the renderer took.
 fn picture(
     q: &Quantity,
     camera: &Camera,

@@ -1,5 +1,5 @@
 //! Error against time of ray paths through a gas, by integrator, interpolant, step and precision,
-//! on closed-form solutions. Also the requested tolerance against the measured error.
+//! on closed-form solutions. Also compares the requested tolerance with the measured error.
 
 use super::Context;
 use super::test_section::{
@@ -67,7 +67,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     tolerances(context, record)
 }
 
-/// Rays to time and rays to compare with the truth.
+/// Rays for timing, and rays for the comparison with the exact solution.
 struct Rays {
     timed: Vec<Start>,
     compared: Vec<Start>,
@@ -75,21 +75,22 @@ struct Rays {
 }
 
 impl Rays {
-    /// The same rays for all: a march that takes them.
+    /// A march that takes these rays.
     fn march_case<'a>(&'a self, paths: Box<dyn LightPaths + 'a>) -> MarchCase<'a> {
         MarchCase { rays: self, paths }
     }
 }
 
-/// Rays and the way they take.
+/// Rays and the march that traces them.
 struct MarchCase<'a> {
     rays: &'a Rays,
     paths: Box<dyn LightPaths + 'a>,
 }
 
-/// Times in turns on this thread, in ns a ray (median), rms and largest error of each.
+/// Alternates the cases on this thread. Returns for each the median time in ns per ray, the rms
+/// error and the largest error.
 fn measure_cases(quick: bool, cases: &[MarchCase<'_>]) -> anyhow::Result<Vec<(f64, f64, f64)>> {
-    // The runs that give the errors warm up.
+    // The runs that determine the errors also serve as warm-up.
     let errors: Vec<(f64, f64)> = cases
         .iter()
         .map(|s| error_of(&traced(&*s.paths, &s.rays.compared), &s.rays.truth))
@@ -107,7 +108,7 @@ fn measure_cases(quick: bool, cases: &[MarchCase<'_>]) -> anyhow::Result<Vec<(f6
     Ok(ns.zip(errors).map(|(ns, (rms, largest))| (ns, rms, largest)).collect())
 }
 
-/// Rounds of what is timed here.
+/// The schedule of the timings in this experiment.
 fn rounds_of(quick: bool) -> Schedule {
     let rounds = if quick { 3 } else { VERDICT_ROUNDS as u32 };
     Schedule { warmup_rounds: 0, rounds, min_rounds: rounds, ..Schedule::one_thread() }
@@ -121,14 +122,14 @@ fn steps(quick: bool) -> &'static [f64] {
     }
 }
 
-/// A blob on a lattice, seen obliquely: every march, interpolant and step.
+/// A blob on a lattice, viewed obliquely: every march, interpolant and step.
 fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> anyhow::Result<()> {
     let n = if context.quick { 96 } else { 128 };
     context.report_step(format!("closed form on a lattice, amplitude {amplitude:e}"))?;
     let (gaussian, field) = blob(amplitude, n)?;
     let view = oblique()?;
-    // All are compared by the same rays. The f64 marches take a ray at a time and ten times as
-    // long, so fewer are timed.
+    // The same rays are compared for all. The f64 marches trace one ray at a time and take ten
+    // times as long, so fewer rays are timed for them.
     let compared = tiles(if context.quick { 16 } else { 32 }, 0.5);
     let truth = blob_deflections(&gaussian, &view, &compared)?;
     let few = Rays { timed: compared.clone(), compared, truth };
@@ -147,7 +148,7 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
             0.08 * (n - 1) as f64
         ));
     }
-    // Splines first: settings borrow them.
+    // Build the splines first: settings borrow them.
     let spline = BSpline::new(&field);
     let linear = Trilinear::new(&field);
     let gradients = TrilinearGradient::new(&field);
@@ -244,8 +245,8 @@ fn lattice(context: &mut Context<'_>, record: &mut Record, amplitude: f64) -> an
     Ok(())
 }
 
-/// What decides the error on a lattice: rms errors by interpolant, by integrator, and of the
-/// dissertation's march by step.
+/// Describes what determines the error on a lattice: rms errors by interpolant, by integrator, and
+/// of the dissertation's march by step.
 fn describe_lattice(rows: &[Row], amplitude: f64) -> String {
     let find = |march: &str, interpolant: &str, precision: &str, step: f64| {
         let here = |r: &&Row| {
@@ -300,7 +301,7 @@ impl<'a> FullMarches<'a> {
             ("RK4", self.one(i, RungeKutta4)),
             ("PEFRL", self.one(i, Pefrl)),
         ];
-        // Its steps end on the cells' faces whatever is asked for.
+        // The steps of this integrator end at the cells' faces, regardless of the requested step.
         if self.options.step_voxels == 1.0 {
             all.push(("cell-exact", self.one(i, CellExact::new(self.field))));
         }
@@ -308,7 +309,7 @@ impl<'a> FullMarches<'a> {
     }
 }
 
-/// A Luneburg lens: the integrators without any lattice, in f64, with their orders.
+/// A Luneburg lens without a lattice: the integrators in f64, with their orders.
 fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     context.report_step("integrators on the Luneburg lens")?;
     record.notes.push(
@@ -329,7 +330,7 @@ fn integrators(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result
     plot.series.push(order_curve("Sharma", Sharma, record));
     plot.series.push(order_curve("RK4", RungeKutta4, record));
     plot.series.push(order_curve("PEFRL", Pefrl, record));
-    // The adaptive one has a tolerance in place of steps.
+    // The adaptive integrator has a tolerance instead of a step.
     let mut points = vec![];
     for exponent in [4, 6, 8, 10, 12] {
         let march = DormandPrince { tolerance: 10f64.powi(-exponent), longest_step_m: 1.0 };
@@ -378,7 +379,7 @@ fn entry_ray(b: f64) -> Ray {
     Ray::new(at, w)
 }
 
-/// Time of a ray, rms and largest error of the place after a quarter turn.
+/// Time per ray, and rms and largest error of the position after a quarter turn.
 fn lens(mut end: impl FnMut(f64) -> DVec3) -> (f64, f64, f64) {
     let heights: Vec<f64> = (-50..=50).map(|i| f64::from(i) * 0.018).collect();
     let mut ends = vec![];
@@ -397,7 +398,8 @@ fn lens(mut end: impl FnMut(f64) -> DVec3) -> (f64, f64, f64) {
     (secs * 1e9 / n, (squares / n).sqrt(), largest)
 }
 
-/// How many plans kept what was asked, and how far bounds lie above what was got.
+/// Describes how many plans met the requested tolerance, and how far the bounds exceed the measured
+/// error.
 fn describe_tolerances(rows: &[Row]) -> String {
     let plans: Vec<&Row> = rows.iter().filter(|r| r.text("part") == Some("tolerance")).collect();
     let kept = |r: &&&Row| r.text("kept") == Some("yes");
@@ -419,7 +421,7 @@ fn describe_tolerances(rows: &[Row]) -> String {
     )
 }
 
-/// Plans for tolerances from coarse to fine: what was asked, what was bounded, what came.
+/// Plans for tolerances from coarse to fine: requested tolerance, error bound and measured error.
 fn tolerances(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let n = if context.quick { 64 } else { 128 };
     record.notes.push(format!(

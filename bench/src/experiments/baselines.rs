@@ -82,7 +82,7 @@ fn scene(
         .with("triangles", mesh.num_triangles())
         .with("simd", isa.name());
 
-    // ---- Builds. Each was built once; fig4.7 measures build times in turns.
+    // ---- Builds. Each was built once; fig4.7 measures build times in alternation.
     for (tracer, cost) in tracers.costs() {
         let per_triangle = |bytes: u64| bytes as f64 / mesh.num_triangles() as f64;
         let row = base.clone().with("tracer", tracer).with("build", cost.wall_secs);
@@ -104,7 +104,7 @@ fn scene(
         };
         let watertight = tracers.ours[0].1.view(crate::rt_core_tracer::Mode::Coherent);
         for (kind, rays) in compare::make_rays(mesh, view, size, kinds, &watertight) {
-            // Eight ambient-occlusion rays per pixel: runs of blocks from the whole image are
+            // Eight ambient-occlusion rays per pixel: a subset of blocks from the whole image is
             // enough.
             let rays = rays.thinned(if context.quick { 1 << 18 } else { 1 << 21 });
             if rays.len == 0 {
@@ -122,8 +122,8 @@ fn scene(
                 let ours: &[&str] =
                     if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
                 for tracer in ours {
-                    // Our mode for the kind of rays is listed first. Only for baselines the best
-                    // mode is selected.
+                    // Our mode for this kind of rays comes first. The best mode is selected for
+                    // baselines only.
                     let Some(c) = contenders.iter().find(|c| c.tracer_name == *tracer) else {
                         continue;
                     };
@@ -142,7 +142,7 @@ fn plots(record: &mut Record) {
     let mut groups: Vec<(String, Vec<(String, Ratio)>)> = vec![];
     for r in &record.ratios {
         let Some(what) = r.name.strip_suffix(&format!(": {OURS}")) else { continue };
-        // "mesh, view, rays"; the rays' name may have a comma of its own.
+        // The label is "mesh, view, rays"; the name of the rays may contain a comma.
         let kind = Kind::ALL
             .iter()
             .map(|k| k.name())

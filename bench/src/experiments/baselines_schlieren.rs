@@ -22,7 +22,7 @@ use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
 use schlieren::view::{Axis as ViewAxis, View};
 use std::cell::RefCell;
 
-/// A setting of ours, by rising cost.
+/// One of our settings; they are sorted by rising cost.
 struct OurMarch<'a> {
     name: String,
     paths: Box<dyn LightPaths + 'a>,
@@ -78,7 +78,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// What shorter steps gain the rival.
+/// Describes the gain of the baseline from shorter steps.
 fn describe(rows: &[Row]) -> String {
     let rival = "dissertation's scheme in our kernel";
     let of = || rows.iter().filter(|r| r.text("march") == Some(rival));
@@ -189,7 +189,7 @@ fn compare(
     Ok(())
 }
 
-/// Traced settings of ours.
+/// Our settings, traced.
 fn ours(field: &Field, view: View) -> Vec<OurMarch<'_>> {
     let mut list = vec![];
     for (name, interpolant) in [
@@ -211,9 +211,9 @@ fn ours(field: &Field, view: View) -> Vec<OurMarch<'_>> {
     list
 }
 
-/// Errors of all settings, and their times of a trial in turns.
+/// Determines the errors of all settings, and their times in one alternating trial.
 fn trial(ours: &mut [OurMarch<'_>], starts: &[Start], truth: &[[f64; 2]]) -> anyhow::Result<()> {
-    // The runs that give the errors warm up.
+    // The runs that determine the errors also serve as warm-up.
     let schedule =
         Schedule { warmup_rounds: 0, rounds: 2, min_rounds: 2, ..Schedule::one_thread() };
     for o in ours.iter_mut() {

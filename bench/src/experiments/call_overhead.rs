@@ -11,23 +11,23 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-/// The ways a program's calls can go.
+/// The routes that a program's calls can take.
 const BACKENDS: [(&str, &[&str]); 3] = [
     ("native", &[]),
     ("vendor library", &["run", "--via", "vendor", "--"]),
     ("LD_PRELOAD", &["run", "--via", "preload", "--"]),
 ];
 
-/// The program that calls.
+/// The program that makes the calls.
 const CALLS: &str = include_str!("../opengl/scripts/calls.c");
 
-/// The calls that the program tells the times of, in its order.
+/// The calls whose times the program reports, in its order.
 fn calls_of(source: &str) -> Vec<&str> {
     let timed = source.lines().filter_map(|l| l.trim_start().strip_prefix("TIME(\""));
     timed.filter_map(|l| l.split('"').next()).collect()
 }
 
-/// Refuses a run that does not tell each call once: there is nothing to compare the others with.
+/// Rejects a run that does not report each call once: the comparison would be incomplete.
 fn check_complete(backend: &str, calls: &[&str], reported: &[(String, f64)]) -> anyhow::Result<()> {
     let missing: Vec<&str> =
         calls.iter().copied().filter(|c| reported.iter().all(|(t, _)| t != c)).collect();

@@ -1,4 +1,4 @@
-//! Timing tracers on the same rays.
+//! Times tracers on the same rays.
 
 use crate::baselines::{Tracer, closest_all, count_hits, count_occluded, occluded_all};
 use crate::rays::{self, HitBlock, RaySet, View};
@@ -7,7 +7,7 @@ use crate::runner::{Schedule, Timings, Unstable, Variant, interleave};
 use rt_core::mesh::TriMesh;
 use std::cell::RefCell;
 
-/// What rays are for.
+/// Purpose of rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Primary,
@@ -41,14 +41,14 @@ impl Kind {
         matches!(self, Kind::Shadow | Kind::ShadowFromLight | Kind::AmbientOcclusion)
     }
 
-    /// Neighbouring rays go the same way.
+    /// Whether neighbouring rays have similar directions.
     pub(super) fn coherent(self) -> bool {
         matches!(self, Kind::Primary | Kind::Shadow | Kind::ShadowFromLight)
     }
 }
 
-/// Makes the rays of a kind for a view of `size` x `size` pixels; `tracer` finds the surface they
-/// start on.
+/// Generates the rays of a kind for a view of `size` x `size` pixels; `tracer` finds the surface on
+/// which they start.
 pub(super) fn make_rays(
     mesh: &TriMesh,
     view: &View,
@@ -72,9 +72,9 @@ pub(super) fn make_rays(
 
 /// One of the tracers compared.
 pub(super) struct Contender<'a> {
-    /// Name of the tracer with its build. Baselines are compared by their best mode.
+    /// Name of the tracer with its build. For baselines, the best mode is compared.
     pub(super) tracer_name: String,
-    /// How rays are sent.
+    /// The entry point or packet width.
     pub(super) mode: String,
     pub(super) tracer: Box<dyn Tracer + 'a>,
 }
@@ -85,14 +85,14 @@ impl Contender<'_> {
     }
 }
 
-/// Traces `rays` with every contender in turns, on one thread.
+/// Traces `rays` with all contenders in alternation, on one thread.
 pub(super) fn time(
     schedule: &Schedule,
     kind: Kind,
     rays: &RaySet,
     contenders: &[Contender<'_>],
 ) -> Result<Timings, Unstable> {
-    // One buffer for all, so that it is warm for all: contenders take turns.
+    // One buffer for all contenders, so that the cache state is equal.
     let hits = RefCell::new(vec![HitBlock::MISS; rays.blocks.len()]);
     let masks = RefCell::new(vec![0u16; rays.blocks.len()]);
     let mut variants: Vec<Variant<'_>> = contenders
@@ -112,7 +112,7 @@ pub(super) fn time(
     interleave(schedule, &mut variants)
 }
 
-/// Explains the columns that [`rows`] fills.
+/// Describes the columns that [`rows`] fills.
 pub(super) fn explain_columns(record: &mut Record) {
     record.column("mesh", "", "name of the mesh");
     record.column("triangles", "", "triangles of the mesh");

@@ -21,7 +21,7 @@ use rt_core::render::{RenderOptions, render};
 use rt_core::scene::{AmbientOcclusion, Scene};
 use std::cell::RefCell;
 
-/// The row that all others are compared with, and the one that shows how far equal work scatters.
+/// The row that all others are compared with, and the row that shows the scatter of equal work.
 const PLAIN: &str = "plain";
 const ALL_ALLOWED: &str = "plain, every effect allowed";
 
@@ -142,7 +142,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// What effects cost that nothing needs, as far as the rounds say.
+/// Describes the cost of effects that the scene does not need, as far as the rounds show it.
 fn describe_unused_effects(ratio: &Ratio) -> String {
     let conclusion = match ratio.verdict() {
         Verdict::Open => "whether unused effects cost time is left open",
@@ -255,7 +255,7 @@ mod tests {
                 _ => None,
             };
             for (i, &n) in kinds.iter().enumerate() {
-                // Glass reflects too, and paths look for lights.
+                // Glass also reflects, and paths also sample lights.
                 let may = expected == Some(i) || c.name == "refraction" || c.name == "path tracing";
                 assert!(may || n == 0, "{}: kind {i} sent {n} rays", c.name);
                 assert!(expected != Some(i) || n > 0, "{}: kind {i} sent none", c.name);

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 const TIMEOUT: Duration = Duration::from_secs(600);
 
-/// Who composites.
+/// A compositor.
 #[derive(Clone, Copy)]
 enum Backend {
     Ours(Strategy),
@@ -133,7 +133,7 @@ fn measure(
     let results = simulated(Network::QDR_AS_SMPI, ranks, |mut comm| {
         run_rank(&mut comm, &all, size, frames, icet)
     })?;
-    // By compositor and frame: the slowest rank.
+    // The slowest rank, by compositor and frame.
     let secs = |k: usize, f: usize| results.iter().map(|r| r.secs[k][f]).fold(0.0, f64::max);
     for (k, (name, _)) in all.iter().enumerate() {
         let times: Vec<f64> = (0..frames).map(|f| secs(k, f)).collect();
@@ -160,7 +160,7 @@ fn measure(
     Ok(())
 }
 
-/// Puts SMPI's times of direct send and of the best of IceT beside ours.
+/// Compares SMPI's times of direct send and of the best IceT strategy with ours.
 fn compare_with_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64; 2]) {
     let is_of = |r: &Row| r.number("ranks") == Some(ranks as f64);
     let icet = record.rows.iter().filter(|r| is_of(r));
@@ -182,8 +182,8 @@ fn compare_with_smpi(record: &mut Record, ranks: usize, [ours_ms, icet_ms]: [f64
     }
 }
 
-/// One rank's times by compositor and frame, and on rank 0 the pixels that differ from the first
-/// compositor's.
+/// One rank's times by compositor and frame; on rank 0 also the number of pixels that differ from
+/// the first compositor's.
 struct RankResult {
     secs: Vec<Vec<f64>>,
     differ: Vec<u64>,
@@ -219,7 +219,7 @@ fn run_rank(
         Workload::Discs.draw(n as u64, rank, ranks, &mut drawn);
         let frame = Frame::with_depth(size, size, &drawn.colors, &drawn.depths)?
             .with_bounds(drawn.bounds)?;
-        // In turns, in another order for every frame, which is the same on all ranks.
+        // Alternate in another order for every frame, the same on all ranks.
         let mut images: Vec<Option<Vec<[u8; 4]>>> = vec![None; all.len()];
         for k in order(all.len(), n) {
             let (_, who) = &all[k];
@@ -258,7 +258,7 @@ fn run_rank(
             }
         }
     }
-    // The first frame warmed up.
+    // The first frame was a warm-up.
     out.secs.iter_mut().for_each(|s| drop(s.drain(..1)));
     Ok(out)
 }

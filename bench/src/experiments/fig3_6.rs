@@ -63,7 +63,7 @@ fn mesh(context: &mut Context<'_>, largest: Size, ranks: usize) -> anyhow::Resul
     });
     match named {
         Some(size) => context.wavelet(size),
-        // Triangles of a surface grow with the square of the points per axis.
+        // The triangles of a surface grow with the square of the points per axis.
         None => {
             let points = (201.0 * (wanted as f64 / Size::M1.triangles() as f64).sqrt()).round();
             meshes::coarse_wavelet(points.max(9.0) as u32)

@@ -1,6 +1,6 @@
-//! Figure 4.10: replicated data with image tiles distributed over ranks (section 4.2.3). It is
-//! compared with the same scene partitioned, and with processes that share the images of an
-//! unmodified program ([`super::program_ranks`]).
+//! Figure 4.10: replicated data with image tiles distributed over ranks (section 4.2.3). Compared
+//! with the same scene partitioned, and with processes that share the images of an unmodified
+//! program ([`super::program_ranks`]).
 
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
 use super::{Context, program_ranks};
@@ -28,7 +28,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          node is for composite's tests, and not looked at here."
             .into(),
     );
-    // One frame after the first is enough: a frame is seconds of computing.
+    // One frame after the first is enough: a frame takes seconds.
     let (size, pixels, count) = if context.quick { ("1M", 320, 1) } else { ("4M", 1024, 1) };
     let demo = Demo {
         size: Some(size.into()),

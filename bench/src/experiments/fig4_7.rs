@@ -1,5 +1,5 @@
 //! Figure 4.7: build time against the number of triangles, for fast and for high-quality builds.
-//! The baselines' builds are measured too, as is a frame of Mesa's rasteriser, which needs no
+//! Also measures the builds of the baselines, and a frame of Mesa's rasteriser, which needs no
 //! build.
 
 use super::Context;
@@ -19,7 +19,7 @@ use rt_core::bvh::{BuildOptions, BuildQuality};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// A way to build, by name.
+/// A named builder.
 type Builder<'a> = (String, Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>);
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -67,7 +67,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         for size in Size::ALL {
             if fits_in_memory(size, record) {
                 let mesh = context.wavelet(size)?;
-                // Slow builders drop out where they would take minutes each.
+                // Slow builders are omitted where they would take minutes each.
                 let small = size <= Size::M4;
                 measure(context, record, &with, &mesh, VERDICT_ROUNDS, small)?;
             }
@@ -77,13 +77,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// Whom our builds are set against.
+/// The baselines for our builds.
 struct Baselines<'a> {
     installed: &'a InstalledBaselines,
     mesa: Option<&'a Mesa>,
 }
 
-/// Builds one mesh with everyone, in turns.
+/// Builds one mesh with all builders in alternation.
 fn measure(
     context: &mut Context<'_>,
     record: &mut Record,
@@ -125,7 +125,7 @@ fn measure(
     Ok(())
 }
 
-/// A frame is short beside the builds of its round.
+/// Frames per round: a frame is short compared with the builds of its round.
 const FRAMES_A_ROUND: usize = 3;
 
 fn builders<'a>(
@@ -178,8 +178,8 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
         .with("peak_bytes_per_triangle", cost.peak_bytes.map(|b| b as f64 / n))
 }
 
-/// The largest sizes need up to 400 bytes per triangle while building; a machine without them
-/// reports it.
+/// Checks that a size fits in memory; otherwise reports it in the record. The largest sizes need up
+/// to 400 bytes per triangle while building.
 pub(super) fn fits_in_memory(size: Size, record: &mut Record) -> bool {
     let needed_gib = size.triangles() as f64 * 400.0 / (1u64 << 30) as f64;
     let there_gib = record.machine.memory_gib;

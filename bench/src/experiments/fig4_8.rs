@@ -84,7 +84,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let file = |name: &str| dir.path().join(name);
     std::fs::write(file("report.json"), serde_json::to_vec(&report)?)?;
     draw(&tools.gluray, &file("report.json"), &[&file("chart.svg"), &file("trace.json")], None)?;
-    // The whole run is mostly one build: some frames in the middle show what a frame is.
+    // Most of the run is one build: some frames in the middle show a typical frame.
     let (from, to) = middle_frame(spans);
     draw(&tools.gluray, &file("report.json"), &[&file("frames.svg")], Some((from, to)))?;
     for (name, caption) in [
@@ -98,7 +98,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// Some frames at the end of the run, in milliseconds.
+/// The time range of some frames at the end of the run, in milliseconds.
 fn middle_frame(spans: &[Value]) -> (f64, f64) {
     let frame = |s: &Value| s["frame"].as_u64().unwrap_or(0);
     let last = spans.iter().map(frame).max().unwrap_or(0);

@@ -64,7 +64,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// How the time of each view grew from the fewest triangles to the most.
+/// Describes how the time of each view grew from the smallest to the largest number of triangles.
 fn describe_growth(record: &Record) -> Option<String> {
     let mut words = vec![];
     for series in &plot(record).series {

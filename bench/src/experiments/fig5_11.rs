@@ -24,7 +24,7 @@ use std::sync::atomic::AtomicBool;
 const TECHNIQUES: [(&str, &str); 9] = [
     ("shadowgraph", "[technique]\nkind = \"shadowgraph\""),
     ("schlieren, knife", "[technique]\nkind = \"schlieren\""),
-    // The pair that shows what absorption costs, and that without it in the scene nothing is paid.
+    // This pair shows the cost of absorption, and that scenes without it pay nothing.
     (
         "schlieren, knife, smoke",
         "[technique]\nkind = \"schlieren\"\n[media]\nabsorption = \"smoke\"",
@@ -54,7 +54,7 @@ const PIXELS: u32 = 512;
 const LOS: &str = "line of sight";
 const TRACED: &str = "traced";
 
-/// Paths traced against the light, with the optical path, and through smoke.
+/// What a technique needs from light paths: backward tracing, the optical path, smoke.
 type Needs = (bool, bool, bool);
 
 /// A technique ready to be exposed.
@@ -122,7 +122,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
 
     for (march, method, passes) in [(LOS, "line-of-sight", 10), (TRACED, "verlet", 1)] {
-        // Light paths that several techniques share are made once.
+        // Light paths that several techniques share are computed once.
         let mut shared: Vec<(Needs, Box<dyn LightPaths + '_>)> = vec![];
         for b in &benches {
             if shared.iter().any(|s| s.0 == b.needs) {
@@ -168,7 +168,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// Smoke as dense as the gas is disturbed, on the flow's own lattice: at most 2 per metre.
+/// Smoke whose density follows the disturbance of the gas, on the flow's own lattice: at most 2 per
+/// metre.
 fn smoke(field: &Field) -> anyhow::Result<Media> {
     let largest = field.eps().iter().fold(f32::MIN_POSITIVE, |m, e| m.max(e.abs()));
     let values = field.eps().iter().map(|e| 2.0 * e.abs() / largest).collect();
@@ -176,7 +177,7 @@ fn smoke(field: &Field) -> anyhow::Result<Media> {
     Ok(Media::default().with(Property::Absorption, volume))
 }
 
-/// One exposure; returns the light on the film.
+/// Makes one exposure; returns the light on the film.
 fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32) -> u64 {
     let never = AtomicBool::new(false);
     let framing = framing(&b.scene, section);
@@ -210,8 +211,8 @@ fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32
     }
 }
 
-/// Whole pictures by line of sight, the comparisons that have no photons, and one as the customary
-/// tolerance chooses the march.
+/// Complete images by line of sight, the comparisons without photons, and one whose march is chosen
+/// by the default tolerance.
 fn pictures(
     context: &mut Context<'_>,
     record: &mut Record,
@@ -227,7 +228,7 @@ fn pictures(
     }
     list.push(("schlieren, knife, to 1e-7 rad".into(), TECHNIQUES[1].1.into()));
     if context.quick {
-        // Two stand for all.
+        // Two techniques represent all.
         list.retain(|(name, _)| name == TECHNIQUES[1].0 || name == "slice");
     }
     for (name, toml) in list {

@@ -1,5 +1,5 @@
 //! Figure 5.12: the same flow by volume rendering, along straight lines of sight and with ray
-//! tracing. Also the difference between the latter two, against n − 1.
+//! tracing. Also the difference between the latter two as a function of n − 1.
 
 use super::Context;
 use super::test_section::{blob, check_cancelled, flow, picture, render_picture, scene};
@@ -77,7 +77,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// How far the two are apart in a gas of the laboratory, and how that grows with n - 1.
+/// Describes the difference for a laboratory gas, and its growth with n - 1.
 fn describe(rows: &[Row]) -> String {
     let mut flows: Vec<&str> = rows.iter().filter_map(|r| r.text("flow")).collect();
     flows.dedup();
@@ -113,12 +113,12 @@ struct Difference {
     stray_voxels: f64,
 }
 
-/// Line of sight against traced, over a picture of the whole field along z. Rays that a body stops
-/// are left out.
+/// Difference between line of sight and traced rays, over an image of the whole field along z. Rays
+/// that a body stops are ignored.
 fn difference(field: &Field, pixels: u32) -> Difference {
     let view = View::along(ViewAxis::Z, field.centre_m());
     let size = field.size_m();
-    // A little inside, so that no ray runs along a face.
+    // Slightly inside, so that no ray runs along a face.
     let starts = Framing::fitted(pixels, pixels, [0.98 * size.x, 0.98 * size.y]).pixel_centers();
     let wanted = PathQuantities { opd: true };
     let mut straight = vec![Exit::UNDISTURBED; starts.len()];
@@ -162,12 +162,13 @@ fn difference(field: &Field, pixels: u32) -> Difference {
     }
 }
 
-/// The figure itself: the same jet three ways, and the difference of the latter two, brightened.
+/// The figure itself: the same jet in three renderings, and the amplified difference of the latter
+/// two.
 fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let (size, pixels) = if context.quick { ("medium", 384) } else { ("thesis", 768) };
     context.report_step("combustion jet")?;
     let field = flow("combustion-jet", size)?;
-    // The jet is half as high again as it is wide.
+    // The jet's height is 1.5 times its width.
     let film = format!("[film]\nsize = [{}, {pixels}]\n", pixels * 2 / 3);
     let schlieren = format!("{film}[technique]\nkind = \"schlieren\"\n");
     let views = [
@@ -196,12 +197,12 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
         )?);
         painted.push(rendered);
     }
-    // Both have the same photons, so what is left is the bending.
+    // Both use the same photons, so the difference is due to the bending.
     if let [_, straight, traced] = &mut painted[..] {
         let off: Vec<f32> =
             straight.pixels.iter().zip(&traced.pixels).map(|(a, b)| a[0] - b[0]).collect();
         let rms = (off.iter().map(|o| f64::from(o * o)).sum::<f64>() / off.len() as f64).sqrt();
-        // A power of ten that makes the root mean square a visible grey.
+        // A power of ten that makes the root mean square difference a visible grey.
         let gain = 10f64.powf((0.5 / rms.max(1e-12)).log10().floor());
         straight.pixels = off.iter().map(|o| [0.5 + (gain * f64::from(*o)) as f32; 3]).collect();
         let caption = format!(

@@ -1,4 +1,4 @@
-//! Figure 5.13: what the techniques show of one flow, and how the filters change its noise.
+//! Figure 5.13: images of one flow by all techniques, and the effect of the filters on noise.
 
 use super::Context;
 use super::fig5_14::{FILTERS, NoiseCase, rms_difference};
@@ -8,7 +8,7 @@ use crate::record::{Record, Row};
 use schlieren::render::TestSection;
 use schlieren::scene::Jitter;
 
-/// Techniques on the combustion jet: name, TOML, what is seen.
+/// Techniques on the combustion jet: name, TOML, meaning.
 const GALLERY: [(&str, &str, &str); 12] = [
     (
         "shadowgraph",
@@ -94,8 +94,8 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         check_cancelled(context)?;
         context.report_step(format!("picture: {name}"))?;
         let toml = toml.replace("FRINGE", &fringe);
-        // Comparisons follow no light and refuse a march; a shadowgraph of so small a flow is all
-        // caustics at the customary 0.5 m.
+        // Comparisons trace no light and reject a march. A shadowgraph of such a small flow is all
+        // caustics at the default 0.5 m.
         let lit = !meaning.starts_with("for comparison");
         let march = if lit {
             "[march]\nmethod = \"verlet\"\ninterpolant = \"b-spline\"\nstep_voxels = 1.0\n"
@@ -105,7 +105,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         let focus = if name == "shadowgraph" { "focus_m = 0.05\n" } else { "" };
         let film = format!("[film]\nsize = [{}, {pixels}]\n{focus}", pixels * 2 / 3);
         let scene = scene(&format!("{film}[technique]\n{toml}\n{march}"))?;
-        // A field for each wavelength; the catalogue's is for one.
+        // One field for each wavelength; the catalogue has one for a single wavelength.
         let lines = scene.lines();
         let single = (lines.len() > 1).then(|| section.fields[0].clone());
         if let Some(single) = &single {
@@ -135,7 +135,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     Ok(())
 }
 
-/// The field for each line: eps in proportion to air's n - 1.
+/// The field for each line: eps in proportion to n - 1 of air.
 fn dispersed(
     field: &schlieren::field::Field,
     lines: &[schlieren::spectrum::Line],

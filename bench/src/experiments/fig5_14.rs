@@ -36,13 +36,13 @@ pub(super) struct NoiseCase {
 }
 
 impl NoiseCase {
-    /// Each photon has its own point of an extended source, and the knife stops it or not: the
-    /// dissertation's way, and the noisiest.
+    /// Each photon has its own point of an extended source, and the knife blocks or passes it: the
+    /// dissertation's method, and the noisiest.
     pub(super) fn knife(context: &mut Context<'_>) -> anyhow::Result<NoiseCase> {
         NoiseCase::of(context, "[technique]\nkind = \"schlieren\"\n[light]\nbeams = \"tilted\"\n")
     }
 
-    /// Photons move from pixel to pixel; a film 0.5 m behind the flow.
+    /// Photons move between pixels; the film is 0.5 m behind the flow.
     fn shadowgraph(context: &mut Context<'_>) -> anyhow::Result<NoiseCase> {
         NoiseCase::of(context, "[technique]\nkind = \"shadowgraph\"\n")
     }
@@ -94,12 +94,12 @@ pub(super) fn rms_difference(a: &RenderOutput, b: &RenderOutput) -> f64 {
     100.0 * (squares / a.pixels.len().max(1) as f64).sqrt()
 }
 
-/// How photons are spread over pixel and source, by name.
+/// Sampling of pixel and source, by name.
 const SAMPLINGS: [(&str, Jitter); 2] =
     [("random", Jitter::Random), ("low-discrepancy", Jitter::Sobol)];
 
-/// The image that is compared with the dissertation's numbers: a knife, and photons all over the
-/// source.
+/// The image for the comparison with the dissertation's numbers: a knife, and photons from the
+/// whole source.
 const KNIFE: &str = "schlieren, knife";
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -196,8 +196,8 @@ fn errors(
     Ok(())
 }
 
-/// The dissertation's own quantity, for both of its filters. Each image has ten times the photons
-/// of the previous one, which are the first of its photons.
+/// The quantity of the dissertation, for both of its filters. Each image has ten times the photons
+/// of the previous one, whose photons are the first of them.
 fn differences(
     context: &mut Context<'_>,
     record: &mut Record,
@@ -238,7 +238,7 @@ fn differences(
     Ok(())
 }
 
-/// What the errors say, in words made of them.
+/// Describes the errors in words.
 fn describe_errors(rows: &[Row]) -> String {
     let error = |sampling: &str, filter: &str, samples: f64| {
         let here = |r: &&Row| {
@@ -280,7 +280,7 @@ fn describe_errors(rows: &[Row]) -> String {
     words
 }
 
-/// Compares the differences with the dissertation's in words.
+/// Compares the differences with those of the dissertation in words.
 fn describe_differences(rows: &[Row]) -> String {
     let mut words = String::from(
         "`difference` is the dissertation's quantity: it prints root mean square differences \
@@ -311,7 +311,8 @@ fn describe_differences(rows: &[Row]) -> String {
     words
 }
 
-/// Exponent of a power law through the points: least squares in logarithms, falling is positive.
+/// Exponent of a power law through the points, by least squares in logarithms; positive for falling
+/// errors.
 fn order(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> =
         points.iter().filter(|p| p.1 > 0.0).map(|p| (p.0.ln(), p.1.ln())).collect();
@@ -348,7 +349,7 @@ mod tests {
         };
         let (random, even) = (error(Jitter::Random, 16), error(Jitter::Sobol, 16));
         assert!(even < 0.8 * random, "{even} {random}");
-        // Independent photons: a quarter of them has twice the noise.
+        // With independent photons, a quarter of them gives twice the noise.
         let ratio = error(Jitter::Random, 4) / random;
         assert!((1.8..2.2).contains(&ratio), "{ratio}");
     }

@@ -1,4 +1,4 @@
-//! Every tracer there is, built for one mesh.
+//! All available tracers, built for one mesh.
 
 use super::compare::{Contender, Kind};
 use crate::baselines::BuildCost;
@@ -10,7 +10,7 @@ use rt_core::mesh::TriMesh;
 use rt_core::simd::SimdLevel;
 use std::sync::Arc;
 
-/// The widest instructions everyone may use.
+/// The widest instruction set that all tracers may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Isa {
     Best,
@@ -43,7 +43,7 @@ impl Isa {
         }
     }
 
-    /// Packet widths that Embree has kernels for at this level; others it takes apart.
+    /// Packet widths for which Embree has kernels at this level; it splits others.
     fn embree_widths(self) -> &'static [usize] {
         match self {
             Isa::Best => &[16, 8],
@@ -61,7 +61,7 @@ pub(super) struct TracerSet {
     obvhs: Option<(String, Obvhs)>,
 }
 
-/// The peers that are installed, and what to say about those that are not.
+/// The installed baselines, and messages about the missing ones.
 pub(super) struct InstalledBaselines {
     pub(super) embree: Vec<Embree>,
     pub(super) missing: Vec<String>,
@@ -81,8 +81,8 @@ impl InstalledBaselines {
 }
 
 impl TracerSet {
-    /// Builds each tracer, fast and watertight or robust. obvhs, whose instructions are chosen by
-    /// the compiler, takes part at the best level only.
+    /// Builds each tracer, fast and watertight or robust. obvhs, whose instruction set is fixed at
+    /// compile time, takes part at the best level only.
     pub(super) fn build(
         mesh: &Arc<TriMesh>,
         installed: &InstalledBaselines,
@@ -115,7 +115,8 @@ impl TracerSet {
         Ok(tracers)
     }
 
-    /// Everyone in the modes that suit the rays. `all_modes` adds those that usually do not win.
+    /// All tracers in the modes that suit the rays. `all_modes` adds the modes that are usually
+    /// slower.
     pub(super) fn contenders(&self, kind: Kind, all_modes: bool) -> Vec<Contender<'_>> {
         let mut list: Vec<Contender<'_>> = vec![];
         for (name, ours) in &self.ours {
@@ -151,7 +152,7 @@ impl TracerSet {
         list
     }
 
-    /// What each build cost.
+    /// Cost of each build.
     pub(super) fn costs(&self) -> Vec<(&str, BuildCost)> {
         let ours = self.ours.iter().map(|(n, o)| (n.as_str(), o.cost));
         let embree = self.embree.iter().map(|(n, s)| (n.as_str(), s.cost));

@@ -1,5 +1,5 @@
-//! What the experiments of many ranks share: ranks simulated in this process, frames measured,
-//! columns and words.
+//! Code shared by the experiments with many ranks: ranks simulated in this process, measured
+//! frames, columns and texts.
 
 use crate::record::{Record, Row};
 use crate::stats::Summary;
@@ -13,7 +13,7 @@ use composite::render::{
 use rt_core::bvh::BuildOptions;
 use std::time::Duration;
 
-/// What stands beside every figure of many ranks.
+/// Note printed with every figure with many ranks.
 pub(super) const CAVEAT: &str = "Computing is measured for real: every rank is a thread, one at a \
                                  time has a core, and its clock advances by \
      the processor time of its thread. The network is simulated in this process by the LogGP model \
@@ -23,27 +23,27 @@ pub(super) const CAVEAT: &str = "Computing is measured for real: every rank is a
      the network, noise of the operating system, and that a node has its caches and its memory to \
      itself. One thread a rank.";
 
-/// Longest wait for a message, on the ranks' own clocks.
+/// Maximum wait for a message, on the ranks' own clocks.
 const TIMEOUT: Duration = Duration::from_secs(600);
 
-/// The network of all these figures.
+/// The simulated network of all these figures.
 pub(super) const NETWORK: Network = Network::QDR;
 
-/// What a frame cost a group of ranks, in seconds.
+/// Cost of a frame for a group of ranks, in seconds.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FrameCost {
-    /// From the first rank's begin to the last rank's end.
+    /// From the start of the first rank to the end of the last.
     pub(super) frame_secs: f64,
-    /// Tracing and shading, mean over the ranks, and the slowest rank.
+    /// Tracing and shading: mean over the ranks, and the slowest rank.
     pub(super) render_mean_secs: f64,
     pub(super) render_max_secs: f64,
     /// Choosing hits, collecting tiles, messages and waiting: mean over the ranks.
     pub(super) rest_mean_secs: f64,
     /// Bytes sent by all ranks.
     pub(super) bytes: f64,
-    /// Rounds of questions.
+    /// Rounds of ray requests.
     pub(super) rounds: f64,
-    /// Camera rays of all ranks.
+    /// Primary rays of all ranks.
     pub(super) camera_rays: f64,
 }
 
@@ -69,11 +69,11 @@ impl FrameCost {
     }
 }
 
-/// Frames of a group, the last one's reports by rank, and how light crossed borders.
+/// Frames of a group, and the reports of the last frame by rank.
 pub(super) struct Frames {
-    /// One per counted frame.
+    /// One entry per counted frame.
     pub(super) costs: Vec<FrameCost>,
-    /// Of the last frame.
+    /// Reports of the last frame.
     pub(super) last: Vec<RankReport>,
 }
 
@@ -92,16 +92,16 @@ impl Frames {
     }
 }
 
-/// How the ranks share the work.
+/// Distribution of the work over ranks.
 #[derive(Clone, Copy)]
 pub(super) enum Sharing {
     /// Every rank has a part of the data.
     SortLast,
-    /// Every rank has all data, and bands of the picture.
+    /// Every rank has all data and renders bands of the image.
     RayParallel,
 }
 
-/// Renders one frame to warm up and then `frames` counted ones on `ranks` simulated ranks.
+/// Renders one warm-up frame and `frames` counted frames on `ranks` simulated ranks.
 pub(super) fn frames(
     prepared: &PreparedDemo,
     ranks: usize,
@@ -162,7 +162,7 @@ pub(super) fn powers(first: usize, last: usize) -> impl Iterator<Item = usize> {
     std::iter::successors(Some(first), |n| Some(2 * n)).take_while(move |n| *n <= last)
 }
 
-/// Columns of [`with_cost`].
+/// Describes the columns of [`with_cost`].
 pub(super) fn cost_columns(record: &mut Record) {
     record.column("ranks", "", "ranks, one thread each");
     record.column(
@@ -192,7 +192,7 @@ pub(super) fn cost_columns(record: &mut Record) {
     record.notes.push(CAVEAT.into());
 }
 
-/// A row with what frames cost.
+/// Adds the cost of frames to a row.
 pub(super) fn with_cost(row: Row, ranks: usize, frames: &Frames) -> Row {
     let c = frames.median();
     let (low, high) = frames.range().unwrap_or_default();
@@ -207,7 +207,7 @@ pub(super) fn with_cost(row: Row, ranks: usize, frames: &Frames) -> Row {
         .with("camera_rays", c.camera_rays * 1e-6)
 }
 
-/// Runs `work` on ranks simulated over `network`, of which every result must be there.
+/// Runs `work` on ranks simulated over `network`; every rank must return a result.
 pub(super) fn simulated<T: Send>(
     network: Network,
     ranks: usize,

@@ -47,9 +47,9 @@ use std::time::Instant;
 
 /// One experiment.
 pub struct Experiment {
-    /// Name on the command line: the dissertation's figure or table, or the question.
+    /// Name on the command line: the dissertation's figure or table, or the research question.
     pub id: &'static str,
-    /// Chapter of the dissertation that it belongs to.
+    /// Chapter of the dissertation to which it belongs.
     pub chapter: u8,
     /// What it shows.
     pub title: &'static str,
@@ -252,19 +252,19 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
     ALL.iter().find(|e| e.id.eq_ignore_ascii_case(id))
 }
 
-/// What experiments share in one run of the program.
+/// State shared by the experiments of one run of the program.
 pub struct Context<'a> {
-    /// Smaller data and fewer rounds: done within a minute on two cores.
+    /// Smaller data and fewer rounds: each experiment takes less than a minute on two cores.
     pub quick: bool,
-    /// Told what is done next and, where it is known, what share of the experiment is done; an
-    /// error stops the experiment there.
+    /// Called with the next step and, where known, the completed fraction of the experiment. An
+    /// error stops the experiment.
     pub progress: &'a mut Progress<'a>,
-    /// Set to true to stop long pictures between two tiles.
+    /// Set to true to stop long renderings between two tiles.
     pub cancel: Option<Arc<AtomicBool>>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
-/// What is told about progress: the step, and the share of the experiment that is done, 0..=1.
+/// Progress callback: the step, and the completed fraction of the experiment, 0..=1.
 pub type Progress<'a> = dyn FnMut(&str, Option<f64>) -> anyhow::Result<()> + 'a;
 
 impl<'a> Context<'a> {
@@ -281,12 +281,12 @@ impl<'a> Context<'a> {
         (self.progress)(what.as_ref(), None)
     }
 
-    /// As [`Context::report_step`], with the share of the experiment that is done.
+    /// As [`Context::report_step`], with the completed fraction of the experiment.
     fn report_share(&mut self, what: impl AsRef<str>, done: f64) -> anyhow::Result<()> {
         (self.progress)(what.as_ref(), Some(done))
     }
 
-    /// The wavelet surfaces of a size. Those up to 4 million triangles are kept for the next
+    /// The wavelet surfaces of a size. Those of up to 4 million triangles are cached for the next
     /// experiment.
     fn wavelet(&mut self, size: Size) -> anyhow::Result<Arc<TriMesh>> {
         if let Some(m) = self.wavelets.get(&size) {
@@ -300,27 +300,27 @@ impl<'a> Context<'a> {
         Ok(mesh)
     }
 
-    /// `full`, or its short form that measures for about `quick_secs`.
+    /// Returns `full`, or its short form, which measures for about `quick_secs`.
     fn schedule(&self, full: runner::Schedule, quick_secs: f64) -> runner::Schedule {
         if self.quick { full.quick(quick_secs) } else { full }
     }
 }
 
-/// What an experiment came to.
+/// Result of an experiment.
 pub struct Outcome {
     /// The measurements.
     pub record: Record,
-    /// Ctrl-C ended it before its time: the record holds what was finished and says so.
+    /// Whether Ctrl-C stopped it early: the record contains the finished part and says so.
     pub interrupted: bool,
 }
 
-/// Runs one experiment. Interrupted before its first row it gives [`Interrupted`].
+/// Runs one experiment. If interrupted before its first row, returns [`Interrupted`].
 pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result<Outcome> {
     let start = Instant::now();
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
-    // Ctrl-C is no failure of the experiment.
+    // Ctrl-C is not a failure of the experiment.
     let interrupted = match run(context, &mut record) {
         Ok(()) => false,
         Err(e) if e.is::<Interrupted>() && record.rows.is_empty() => return Err(e),
@@ -343,7 +343,7 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     Ok(Outcome { record, interrupted })
 }
 
-/// The record of an experiment that could not be run for want of another program: without rows, and
+/// The record of an experiment that could not run because another program is missing: without rows,
 /// with the reason.
 pub fn left_out(experiment: &Experiment, why: &str) -> Record {
     let Experiment { id, chapter, title, .. } = *experiment;

@@ -20,10 +20,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 const SCRIPT: &str = include_str!("paraview_frames.py");
-/// Who draws, in the order of their turns.
+/// The renderers, in the order of their turns.
 const PROGRAMS: [&str; 2] = ["llvmpipe", "vtk-bridge"];
 
-/// A data set and how often it is measured.
+/// A data set and the number of its measurements.
 struct Subject {
     data: &'static str,
     size: &'static str,
@@ -132,7 +132,7 @@ fn order(subject: &Subject, pixels: u32, quick: bool, folder: &Path) -> anyhow::
     Ok(order)
 }
 
-/// Rows and ratios of one data set from all rounds, each with a result per program.
+/// Rows and ratios of one data set from all rounds; each round has one result per program.
 fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Result<()> {
     let first = rounds.first().and_then(|r| r.first()).context("no round was measured")?;
     let views: Vec<String> =
@@ -194,7 +194,7 @@ fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Resul
     Ok(())
 }
 
-/// NaN of nothing, which a record shows as missing.
+/// The median; NaN for no values, which a record shows as missing.
 fn median(values: &[f64]) -> f64 {
     Summary::of(values).map_or(f64::NAN, |s| s.median)
 }
@@ -233,7 +233,7 @@ fn plots(record: &mut Record) {
     }
 }
 
-/// What is needed on the machine.
+/// The programs that the experiment needs on the machine.
 struct Host {
     pvbatch: PathBuf,
     bridge: PathBuf,
@@ -280,7 +280,7 @@ impl Host {
         Ok(Host { pvbatch, bridge, version, display: Display::start(&xvfb)? })
     }
 
-    /// What the script measured.
+    /// Runs the script and returns its measurements.
     fn frames(&self, drawn_by: &str, order: &Value, folder: &Path) -> anyhow::Result<Value> {
         let (script, file) = (folder.join("frames.py"), folder.join("order.json"));
         std::fs::write(&script, SCRIPT)?;
@@ -330,7 +330,7 @@ impl Host {
     }
 }
 
-/// A program by its variable, or on the path.
+/// A program from its environment variable or the search path.
 fn program(variable: &str, name: &str) -> Option<PathBuf> {
     if let Some(named) = std::env::var_os(variable) {
         return Some(PathBuf::from(named)).filter(|p| p.is_file());
@@ -339,7 +339,7 @@ fn program(variable: &str, name: &str) -> Option<PathBuf> {
     std::env::split_paths(&path).map(|d| d.join(name)).find(|p| p.is_file())
 }
 
-/// An X server of our own, for as long as this lives.
+/// An X server that runs as long as this value exists.
 struct Display {
     name: String,
     server: Child,
@@ -347,8 +347,8 @@ struct Display {
 
 impl Display {
     fn start(xvfb: &Path) -> anyhow::Result<Display> {
-        // -noreset: else the server begins anew when its last client goes, and the next one dies of
-        // that.
+        // -noreset: otherwise the server resets when its last client leaves, which breaks the next
+        // client.
         let mut server = Command::new(xvfb)
             .args([
                 "-displayfd",
@@ -374,13 +374,13 @@ impl Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        // Nothing else could be done about an error here.
+        // An error here cannot be handled.
         let _ = self.server.kill();
         let _ = self.server.wait();
     }
 }
 
-/// A folder for data and the bridge's pieces, removed at the end.
+/// A folder for data and files of the bridge, removed at the end.
 struct Folder(PathBuf);
 
 impl Folder {

@@ -80,8 +80,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// The slowest rank's time with parts of as many triangles by that with parts of as much work, view
-/// by view.
+/// Describes, view by view, the ratio of the slowest rank's times: parts of equal triangle count
+/// over parts of equal work.
 fn describe(rows: &[Row]) -> String {
     let mut views: Vec<&str> = rows.iter().filter_map(|r| r.text("view")).collect();
     views.dedup();

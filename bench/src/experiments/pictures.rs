@@ -1,4 +1,4 @@
-//! Pictures of the dissertation's data sets, each with its command and what it took.
+//! Images of the dissertation's data sets, each with its command and its cost.
 
 use super::Context;
 use crate::picture::{RenderControl, gallery, save};
@@ -21,7 +21,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         context.report_share(format!("{}: data", entry.name), share(0))?;
         let cancel = context.cancel.clone();
         let mut told = |done: u32| {
-            // The flag stops the picture; nothing is lost when the account of it is not heard.
+            // The flag stops the rendering; an error of the progress report is irrelevant here.
             let _ = context
                 .report_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
         };

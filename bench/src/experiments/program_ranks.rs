@@ -8,11 +8,11 @@ use crate::runner::order;
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
 
-/// The side of the program's window.
+/// Width and height of the program's window.
 const SIZE_PX: u32 = 1024;
-/// VTK in Python: it can write what is in its window.
+/// VTK in Python, which can write the contents of its window.
 const PROGRAM: Program = Program::Vtk;
-/// What these rows have in the column `sharing`.
+/// Value of these rows in the column `sharing`.
 pub(super) const SHARING: &str = "gluray";
 
 pub(super) fn columns(record: &mut Record) {
@@ -30,7 +30,7 @@ pub(super) fn columns(record: &mut Record) {
     );
 }
 
-/// The rows of the program; without it or what runs it, its name among what is missing.
+/// Adds the rows of the program; if it or its tools are missing, adds it to the missing parts.
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let tools = match (Tools::find(), PROGRAM.find()) {
         (Ok(tools), Ok(_)) => tools,
@@ -59,7 +59,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let data = dir.path().join("wavelet").with_extension(PROGRAM.format().extension());
     write(&mesh, PROGRAM.format(), &data)?;
 
-    // ---- All numbers of ranks at once, taking turns ----
+    // ---- All numbers of ranks run concurrently and alternate ----
     let mut sessions = Vec::new();
     for &ranks in counts {
         context.report_step(format!("{}, {ranks} ranks: starting", PROGRAM.name()))?;
@@ -137,7 +137,7 @@ fn row(ranks: u32, secs: &[f64], report: &serde_json::Value, differ: usize) -> a
     Ok(row)
 }
 
-/// Pixels in which two files of raw RGB end differently.
+/// Number of pixels that differ at the ends of two files of raw RGB.
 fn differing(a: &[u8], b: &[u8]) -> usize {
     let pixels = |f: &[u8]| f[f.len().saturating_sub(3 * (SIZE_PX * SIZE_PX) as usize)..].to_vec();
     let (a, b) = (pixels(a), pixels(b));

@@ -14,7 +14,7 @@ use schlieren::input::{Medium, Options, from_dataset};
 use schlieren::measure::{From, Line, Mark, Photograph, fitted_line};
 use schlieren::render::{Layers, RenderOutput, TestSection};
 
-/// Air drawn from the room into a vacuum vessel.
+/// Pressure and temperature of air drawn from the room into a vacuum vessel.
 const RESERVOIR: (f64, f64) = (1e5, 300.0);
 
 /// Body, Mach number, half angle in degrees.
@@ -31,8 +31,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("outliers", "", "columns that were left out as outliers");
     record.column("scatter", "pixel", "root mean square distance of the points from the line");
     record.column("time", "s", "wall time of the picture, flow at hand");
-    // Rays go with the square. At 400 pixels the cones alone take most of a minute of a release
-    // build.
+    // The number of rays grows with the square. At 400 pixels, the cones alone take most of a
+    // minute in a release build.
     let width = if context.quick { 200 } else { 400 };
     record.notes.push(format!(
         "Means over cells of the exact flows, air from a reservoir of 1 bar and 300 K, through the \
@@ -50,8 +50,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         Axis::log("nodes of the lattice along the stream", ""),
         Axis::log("error", "deg"),
     );
-    // The cones' rays take more time the finer the lattice: 91 nodes alone took more than half of
-    // the quick form's.
+    // The rays of the cones take longer on finer lattices: 91 nodes alone took more than half of
+    // the quick form's time.
     let sizes: &[u32] = if context.quick { &[46, 61] } else { &[46, 61, 91, 121, 181] };
     let finest = sizes.last().copied().unwrap_or(0);
     if context.quick {
@@ -110,7 +110,7 @@ fn flow(body: &str, mach: f64, half_deg: f64, nodes: u32) -> anyhow::Result<(Flo
     let half_angle_rad = half_deg.to_radians();
     if body == "wedge" {
         let wedge = Wedge { stream, half_angle_rad, ..Wedge::default() };
-        // Its lattice is about as high as it is long; nothing changes along the span.
+        // The lattice is about as high as it is long; nothing varies along the span.
         return Ok((
             wedge.flow(UVec3::new(nodes, nodes, 17), Fields::Density)?,
             wedge.shock()?.shock_rad,
@@ -136,18 +136,18 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
     render_picture_with(context, &scene, &section, Layers { map: true, ..Layers::NONE })
 }
 
-/// The shock above the body, without the third of the picture around the tip.
+/// The shock above the body, without the third of the image around the tip.
 fn shock(rendered: &RenderOutput) -> Option<Line> {
     let photograph = Photograph::of(rendered)?;
     let width = f64::from(photograph.framing.width);
     let [left, right] =
         [0.35, 0.98].map(|p| photograph.framing.plane_from_pixel(p * width, 0.0)[0]);
-    // On a coarse lattice a shock is many pixels wide, and the change from one to the next small.
+    // On a coarse lattice, a shock is many pixels wide and the change between pixels is small.
     let points = photograph.fronts_m(From::Top, Mark::Edge, 0.01, 4);
     fitted_line(&points.into_iter().filter(|p| (left..right).contains(&p[0])).collect::<Vec<_>>())
 }
 
-/// The picture with the fitted line drawn into it.
+/// The image with the fitted line drawn into it.
 fn marked(mut rendered: RenderOutput, line: &Line) -> RenderOutput {
     let framing = rendered.framing;
     let (width, height) = (framing.width as usize, framing.height as usize);
@@ -155,7 +155,7 @@ fn marked(mut rendered: RenderOutput, line: &Line) -> RenderOutput {
         let [x, _] = framing.plane_from_pixel(i as f64 + 0.5, 0.0);
         let y = line.through_m[1] + (x - line.through_m[0]) * line.angle_rad.tan();
         let row = 0.5 * height as f64 - (y - framing.center_m[1]) / framing.pixel_m;
-        // Dashed: half of what it lies on stays visible.
+        // Dashed, so that half of the image under the line stays visible.
         if (0.0..height as f64).contains(&row) && i / 6 % 2 == 0 {
             rendered.pixels[i + row as usize * width] = [0.9, 0.0, 0.0];
         }

@@ -1,12 +1,12 @@
-//! The same frames under SimGrid's SMPI, the established simulator of MPI programs: how far is our
-//! model from it?
+//! The same frames under SimGrid's SMPI, the established simulator of MPI programs, to validate our
+//! model.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Names the program `composite`.
+/// Environment variable with the path of the program `composite`.
 const PROGRAM_VARIABLE: &str = "RTSV_COMPOSITE";
-/// Names the same program as a shared library, to the program `composite`.
+/// Environment variable that gives the program `composite` its shared library.
 const LIBRARY_VARIABLE: &str = "COMPOSITE_SMPI_LIBRARY";
 
 /// The program `composite`, if it has been built.
@@ -18,16 +18,16 @@ fn program() -> Option<PathBuf> {
     beside.is_file().then_some(beside)
 }
 
-/// The library that was built with a program.
+/// The shared library that was built with a program.
 fn library(program: &Path) -> Option<PathBuf> {
     let built = program.with_file_name("examples").join("libcomposite_smpi.so");
     built.is_file().then_some(built)
 }
 
 /// Median time in milliseconds of direct send, and of IceT's best strategy, for frames of
-/// `composite compare` under SMPI; or why there is none. With `as_built`, the library is taken as
-/// it was built before. Else `composite` has cargo bring it up to date, which can take minutes, and
-/// waits where another cargo is at work.
+/// `composite compare` under SMPI; or the reason why there is none. With `as_built`, an existing
+/// library is used. Otherwise `composite` runs cargo to update it, which can take minutes and waits
+/// for other cargo processes.
 pub(super) fn compare_ms(
     ranks: usize,
     size: u32,

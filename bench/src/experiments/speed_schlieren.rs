@@ -51,7 +51,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// Adds a row for each variant; `count` of each is what one run does.
+/// Adds a row for each variant; `count` is the amount of work of one run.
 fn rows(record: &mut Record, timings: &Timings, counts: &[(f64, &str, Option<f64>)]) {
     for (v, (count, unit, bar)) in timings.variants.iter().zip(counts) {
         let (wall, cpu) = (v.summary(Clock::Wall), v.summary(Clock::ProcessCpu));
@@ -99,7 +99,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             marches.push((format!("{name}, {view_name}"), march, bar));
         }
         let los = LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
-        // What one run does, by the march's own counters.
+        // Work of one run, from the march's own counters.
         let mut counts = vec![];
         for (_, march, bar) in &marches {
             let mut exits = vec![Exit::UNDISTURBED; rays.len()];
@@ -118,7 +118,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     Ok(())
 }
 
-/// One run traces all starts in parallel; outside the measured time the exits are looked at.
+/// One run traces all rays in parallel; the exits are inspected outside the measured time.
 fn tracing<'a>(name: &str, paths: &'a dyn LightPaths, starts: &'a [Start]) -> Variant<'a> {
     let exits = std::rc::Rc::new(RefCell::new(vec![Exit::UNDISTURBED; starts.len()]));
     let seen = exits.clone();
@@ -129,8 +129,8 @@ fn tracing<'a>(name: &str, paths: &'a dyn LightPaths, starts: &'a [Start]) -> Va
     )
 }
 
-/// A frame of 512² pixels with 10 photons each, of the combustion jet, by line of sight: figure
-/// 5.11's 13 frames a second.
+/// A frame of 512² pixels with 10 photons each, of the combustion jet, by line of sight:
+/// corresponds to the 13 frames per second of figure 5.11.
 fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     context.report_step("combustion jet 480x720x100")?;
     let field = flow("combustion-jet", "thesis")?;

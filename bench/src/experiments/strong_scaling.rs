@@ -1,4 +1,4 @@
-//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering, with the same scene cut into
+//! Figures 3.7 to 3.10: strong scaling of data-parallel rendering; the same scene is divided into
 //! more and more parts.
 
 use super::Context;
@@ -35,7 +35,7 @@ const HEADLIGHT: &str = "headlight";
 const NOT_STREAMED: &str = "headlight, not streamed";
 const LAMP: &str = "lamp and occlusion";
 
-/// What streaming gains, in words.
+/// Describes the gain from streaming.
 fn streaming(record: &Record) -> String {
     let frame = |light: &str, ranks: f64| {
         let row = record
@@ -96,7 +96,7 @@ fn run(
         let demo = Demo { global_light, ..demo.clone() };
         let mut prepared = demo.prepare(1, &mut |_, _| true)?;
         let mut alone = None;
-        // Every other number of ranks is enough to see what streaming gains.
+        // Every other number of ranks is enough to show the gain from streaming.
         let some = quick || !stream;
         for ranks in powers(1, 128).filter(|r| !some || matches!(r, 1 | 2 | 8 | 32 | 128)) {
             context.report_step(format!("{data} {size}, {light}: {ranks} ranks"))?;
@@ -137,7 +137,7 @@ fn run(
     Ok(())
 }
 
-/// The scene in eight parts, each in a colour of its own.
+/// The scene in eight parts, each in its own colour.
 fn picture(demo: &Demo) -> anyhow::Result<Picture> {
     const RANKS: usize = 8;
     let demo = Demo { color_by_rank: true, global_light: true, ..demo.clone() };

@@ -13,12 +13,13 @@ use rt_core::mesh::TriMesh;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The side of the programs' windows.
+/// Width and height of the programs' windows.
 const SIZE_PX: u32 = 1024;
 const BACKENDS: [Backend; 3] = [Backend::Llvmpipe, Backend::Serial, Backend::Asynchronous];
 
-/// The ways that differ for a program: ParaView and VTK draw into framebuffer objects, which are
-/// never late. What being late changes is seen at one million triangles.
+/// The backends that differ for a program. ParaView and VTK draw into framebuffer objects, which
+/// are never presented one frame late. One million triangles suffice to measure the effect of
+/// pipelined presentation.
 fn backends(program: Program, triangles: usize) -> &'static [Backend] {
     match program {
         Program::Gmsh | Program::Geomview if triangles < 2_000_000 => &BACKENDS,
@@ -106,7 +107,7 @@ struct ProgramSetup<'a> {
     dir: &'a Path,
 }
 
-/// What was measured of one way.
+/// Measurements of one backend.
 #[derive(Default)]
 struct Measurement {
     first_secs: f64,
@@ -125,14 +126,15 @@ fn measure(
     let data = setup.dir.join(format!("{n}")).with_extension(program.format().extension());
     context.report_step(format!("{}, {n} triangles: data", program.name()))?;
     write(mesh, program.format(), &data)?;
-    // CPU time is measured in hundredths of a second; groups of frames take much longer than that.
+    // CPU time has a resolution of 1/100 s; groups of frames take much longer than that.
     let (groups, frames) = match (context.quick, n) {
         (true, _) => (3, 5),
         (_, ..2_000_000) => (7, 6),
         (_, ..8_000_000) => (5, 3),
         _ => (5, 2),
     };
-    // The best hierarchy comes in the background after some frames: what is measured is what stays.
+    // The best hierarchy is built in the background during some frames; only the steady state is
+    // measured.
     let settle = if context.quick { 4 } else { 6 };
     let together = n < 8_000_000;
     let backends = backends(program, n);
@@ -152,8 +154,8 @@ fn measure(
         measurement.first_secs = begun.elapsed().as_secs_f64();
         s.frames(if backend == Backend::Llvmpipe { 1 } else { settle })?;
         if backend != Backend::Llvmpipe && !is_built_once(n) {
-            // Builds of the best hierarchy continue in the background. They take about a second per
-            // million triangles and core.
+            // Builds of the best hierarchy continue in the background. They take about one second
+            // per million triangles and core.
             std::thread::sleep(std::time::Duration::from_secs_f64(2.0 + n as f64 / 4e5));
         }
         Ok(s)
@@ -207,7 +209,7 @@ fn measure(
     Ok(())
 }
 
-/// Small meshes are not built a second time.
+/// Whether a mesh is too small for a second build.
 fn is_built_once(triangles: usize) -> bool {
     triangles < 20_000
 }
@@ -216,7 +218,7 @@ fn per_frame(c: Cost, frames: u32) -> Cost {
     Cost { wall_secs: c.wall_secs / f64::from(frames), cpu_secs: c.cpu_secs / f64::from(frames) }
 }
 
-/// Frames that the driver drew would be no frames of ours.
+/// Fails if the driver drew frames that gluray should have traced.
 fn check(
     program: Program,
     backend: Backend,

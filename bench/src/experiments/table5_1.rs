@@ -1,5 +1,5 @@
-//! Table 5.1: memory by data set: the dissertation's numbers computed from its layout, and what
-//! this program uses.
+//! Table 5.1: memory by data set: the dissertation's numbers, computed from its layout, and the
+//! memory of this program.
 
 use super::Context;
 use super::test_section::check_cancelled;
@@ -14,7 +14,7 @@ use schlieren::march::{BlankCells, Deviational, LineOfSight, Options};
 use schlieren::path::PathQuantities;
 use schlieren::view::{Axis as ViewAxis, View};
 
-/// Data sets of the table, and its megabytes.
+/// Data sets of the table, with its megabytes.
 const TABLE: [(&str, f64); 5] = [
     ("combustion-jet", 589.62),
     ("heptane-fire", 429.71),
@@ -23,12 +23,12 @@ const TABLE: [(&str, f64); 5] = [
     ("blunt-body", 287.31),
 ];
 
-/// Pixels along the side of the table's picture.
+/// Width and height of the table's image, in pixels.
 const FILM: usize = 512;
 
-/// The layout that gives the table's numbers: a texture of gradient and index (16 B) and an octree
-/// level (1 B) a voxel, and two numbers of 4 B a pixel. The text speaks of random numbers three
-/// times the picture's size; its own table has no room for them.
+/// Bytes of the layout that gives the table's numbers: a texture of gradient and index (16 B) and
+/// an octree level (1 B) per voxel, and two numbers of 4 B per pixel. The text mentions random
+/// numbers of three times the image's size, which the table does not include.
 fn legacy_bytes(dims: [usize; 3]) -> usize {
     17 * dims.iter().product::<usize>() + 2 * 4 * FILM * FILM
 }
@@ -165,7 +165,7 @@ fn bars(values: &[f64]) -> Vec<(f64, f64)> {
     values.iter().enumerate().map(|(i, v)| (i as f64, *v)).collect()
 }
 
-/// What a film of one channel with counts holds.
+/// Memory of a film of one channel with counts.
 fn film_bytes() -> usize {
     let framing = Framing::fitted(FILM as u32, FILM as u32, [1.0; 2]);
     let film = Film::<1>::new(framing, true);
@@ -173,7 +173,7 @@ fn film_bytes() -> usize {
     framing.pixels() * size_of::<u64>() + counts
 }
 
-/// Resident memory of this process, where Linux tells.
+/// Resident memory of this process, where Linux reports it.
 fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;

@@ -37,7 +37,7 @@ pub(super) fn flow(name: &str, size: &str) -> anyhow::Result<Field> {
     Ok(from_dataset(&flow.into_dataset(), &options)?.field)
 }
 
-/// A scene from its TOML without the flow, which is at hand.
+/// A scene from its TOML without the flow, which is passed separately.
 pub(super) fn scene(rest: &str) -> anyhow::Result<Scene> {
     Ok(Scene::from_toml(&format!("[flow]\nfile = \"\"\ndensity = \"-\"\n{rest}"))?)
 }
@@ -51,7 +51,7 @@ pub(super) fn render_picture(
     render_picture_with(context, scene, section, Layers::NONE)
 }
 
-/// [`render_picture`], with what is wanted beside the picture.
+/// [`render_picture`] with additional outputs.
 pub(super) fn render_picture_with(
     context: &Context<'_>,
     scene: &Scene,
@@ -102,7 +102,7 @@ pub(super) fn tiles(width: usize, side_m: f64) -> Vec<Start> {
         .collect()
 }
 
-/// A view that no lattice axis lies along, 0.6 rad off.
+/// A view 0.6 rad off every lattice axis.
 pub(super) fn oblique() -> anyhow::Result<View> {
     Ok(View::new(DVec3::new(0.6f64.sin(), 0.0, 0.6f64.cos()), DVec3::Y, DVec3::ZERO)?)
 }
@@ -116,9 +116,9 @@ pub(super) fn blob(amplitude: f64, n: usize) -> anyhow::Result<(Gaussian, Field)
     Ok((blob, field))
 }
 
-/// Deflections by the blob itself, without a lattice: an adaptive march in f64, to 1e-13 of the
-/// index's amplitude. Rays have to pass within 0.3 m of the middle: farther out, the cube cuts off
-/// what this does not.
+/// Deflections by the exact blob, without a lattice: an adaptive march in f64, to 1e-13 of the
+/// index's amplitude. Rays must pass within 0.3 m of the middle, because the lattice is cut off at
+/// the cube and the exact blob is not.
 pub(super) fn blob_deflections(
     blob: &Gaussian,
     view: &View,
@@ -137,7 +137,7 @@ pub(super) fn blob_deflections(
     starts.par_iter().map(one).collect()
 }
 
-/// Error of deflections: root mean square and largest, as parts of the largest true one.
+/// Error of deflections: root mean square and maximum, relative to the largest exact deflection.
 pub(super) fn error_of(exits: &[Exit], truth: &[[f64; 2]]) -> (f64, f64) {
     let size = |v: [f64; 2]| v[0].hypot(v[1]);
     let scale = truth.iter().map(|t| size(*t)).fold(0.0, f64::max);
@@ -150,14 +150,14 @@ pub(super) fn error_of(exits: &[Exit], truth: &[[f64; 2]]) -> (f64, f64) {
     ((squares / truth.len().max(1) as f64).sqrt(), largest)
 }
 
-/// Traces all on this thread.
+/// Traces all rays on this thread.
 pub(super) fn traced(paths: &dyn LightPaths, starts: &[Start]) -> Vec<Exit> {
     let mut exits = vec![Exit::UNDISTURBED; starts.len()];
     paths.trace(starts, &mut exits);
     exits
 }
 
-/// A number that depends on every bit of the deflections: what variants are checked by.
+/// A number that depends on every bit of the deflections, as the check number of variants.
 pub(super) fn fingerprint(exits: &[Exit]) -> u64 {
     exits.iter().fold(0u64, |f, e| {
         let [x, y] = e.deflection_rad.map(f32::to_bits);

@@ -76,8 +76,8 @@ impl FineLattice<'_> {
         // NaN fails the comparison.
         (a <= b).then_some((a as usize, b as usize))
     }
-    /// Whether sample `i` lies between the first and the last node. Samples beyond the border are not
-    /// averaged.
+    /// Whether sample `i` lies between the first and the last node. Samples beyond the border are
+    /// not averaged.
     fn within(&self, axis: usize, i: usize) -> bool {
         let nodes = (i as f64 + 0.5) / self.n as f64 - 0.5;
         self.n == 1 || (0.0..=(self.lattice.dims[axis] - 1) as f64).contains(&nodes)

@@ -1,5 +1,5 @@
-//! The subset of Embree's C interface that is used, from the headers of 3.13.5 and 4.4.0
-//! (`rtcore_ray.h`, `rtcore_common.h`, `rtcore_scene.h`, `rtcore_device.h`, `rtcore_geometry.h`).
+//! The subset of Embree's C interface in use, from the headers of 3.13.5 and 4.4.0 (`rtcore_ray.h`,
+//! `rtcore_common.h`, `rtcore_scene.h`, `rtcore_device.h`, `rtcore_geometry.h`).
 
 use core::ffi::{c_char, c_int, c_uint, c_void};
 
@@ -21,12 +21,12 @@ pub(super) const PROPERTY_VERSION_MAJOR: c_int = 1;
 pub(super) const PROPERTY_VERSION_MINOR: c_int = 2;
 pub(super) const PROPERTY_VERSION_PATCH: c_int = 3;
 
-/// Rows of instance ids behind a hit. A default build writes one (Embree 3) or two (Embree 4:
-/// `instID` and `instPrimID`); builds with more instance levels write more. Room for eight levels
+/// Rows of instance ids in a hit. A default build writes one (Embree 3) or two (Embree 4: `instID`
+/// and `instPrimID`); builds with more instance levels write more. There is space for eight levels
 /// of both.
 const INSTANCE_ROWS: usize = 16;
 
-/// `RTCRay` (N = 1) or `RTCRay4`, `RTCRay8`, `RTCRay16`: twelve rows of N numbers, no gaps.
+/// `RTCRay` (N = 1) or `RTCRay4`, `RTCRay8`, `RTCRay16`: twelve rows of N numbers without padding.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(super) struct RayN<const N: usize> {
@@ -44,7 +44,7 @@ pub(super) struct RayN<const N: usize> {
     pub(super) flags: [u32; N],
 }
 
-/// `RTCHit` and its packets, with room for any number of instance levels.
+/// `RTCHit` and its packets, with space for any number of instance levels.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(super) struct HitN<const N: usize> {
@@ -56,9 +56,9 @@ pub(super) struct HitN<const N: usize> {
     pub(super) instance: [[u32; N]; INSTANCE_ROWS],
 }
 
-/// `RTCRayHit` and its packets. The C type is aligned to 16, 32 or 64 bytes by N; 64 serves all.
-/// The hit follows the ray without a gap in C too, because a ray's size (48 N bytes) is a multiple
-/// of each alignment.
+/// `RTCRayHit` and its packets. The C type is aligned to 16, 32 or 64 bytes by N; 64 satisfies all.
+/// As in C, the hit follows the ray without padding, because a ray's size (48 N bytes) is a
+/// multiple of each alignment.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct RayHitN<const N: usize> {
@@ -119,7 +119,7 @@ pub(super) enum Queries {
 /// `RTCMemoryMonitorFunction`.
 pub(super) type Monitor = unsafe extern "C" fn(*mut c_void, isize, bool) -> bool;
 
-/// The functions both versions share.
+/// The functions that both versions share.
 #[derive(Clone, Copy)]
 pub(super) struct Calls {
     pub(super) new_device: unsafe extern "C" fn(*const c_char) -> Handle,
@@ -137,13 +137,13 @@ pub(super) struct Calls {
     pub(super) set_geometry_build_quality: unsafe extern "C" fn(Handle, c_int),
     pub(super) commit_geometry: unsafe extern "C" fn(Handle),
     pub(super) attach_geometry: unsafe extern "C" fn(Handle, Handle) -> c_uint,
-    /// geometry, type, slot, format, pointer, byte offset, byte stride, item count
+    /// Arguments: geometry, type, slot, format, pointer, byte offset, byte stride, item count.
     pub(super) set_shared_geometry_buffer:
         unsafe extern "C" fn(Handle, c_int, c_uint, c_int, *const c_void, usize, usize, usize),
     pub(super) queries: Queries,
 }
 
-/// `RTCError` in words.
+/// The name of an `RTCError`.
 pub(super) fn error_name(code: c_int) -> String {
     match code {
         1 => "an unknown error".into(),
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use core::mem::{align_of, offset_of, size_of};
 
-    /// Offsets as a C compiler gives them for the headers' structures.
+    /// Compares the offsets with those that a C compiler computes for the headers' structures.
     #[test]
     fn layouts_are_those_of_the_c_headers() {
         assert_eq!(

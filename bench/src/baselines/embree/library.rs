@@ -13,7 +13,7 @@ use super::abi::{self, Calls, Queries, Widths};
 use crate::baselines::BaselineError;
 use std::path::{Path, PathBuf};
 
-/// Which interface.
+/// Version of the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Version {
     /// Embree 3.
@@ -29,7 +29,7 @@ impl Version {
             Version::V4 => 4,
         }
     }
-    /// The variable that names a library to use instead of the first one found.
+    /// The environment variable that names a library to use instead of the first one found.
     pub fn variable(self) -> &'static str {
         match self {
             Version::V3 => "RTSV_EMBREE3",
@@ -45,27 +45,27 @@ impl Version {
     }
 }
 
-/// A loaded library. It stays loaded until the program ends: its worker threads, and those of the
-/// TBB it may bring, outlive the devices, and unloading pulls the code from under them (seen as a
-/// crash in about every second run).
+/// A loaded library. It stays loaded until the program ends: its worker threads, and those of a
+/// bundled TBB, outlive the devices, and unloading would remove the code that they run (observed as
+/// a crash in about every second run).
 #[derive(Clone)]
 pub struct Embree {
     pub(super) calls: Calls,
-    /// `3.13.5`.
+    /// Version, such as `3.13.5`.
     version: String,
-    /// The file that was loaded, or the name the system's loader resolved.
+    /// The loaded file, or the name that the system's loader resolved.
     path: String,
 }
 
 impl Embree {
-    /// Loads the first library found that works.
+    /// Loads the first usable library.
     pub fn load(version: Version) -> Result<Embree, BaselineError> {
         let mut unusable = None;
         for candidate in candidates(version) {
             match Embree::open(version, &candidate) {
                 Ok(e) => return Ok(e),
-                // A file that is there and fails is worth a report; a name the loader does not know
-                // is not.
+                // Report a file that exists but fails to load, but not a name that the loader
+                // cannot resolve.
                 Err(e) if candidate.is_absolute() => unusable = Some(e),
                 Err(_) => {}
             }
@@ -84,7 +84,7 @@ impl Embree {
     pub fn open(version: Version, path: &Path) -> Result<Embree, BaselineError> {
         let shown = path.display().to_string();
         let unusable = |reason: String| BaselineError::Unusable { path: shown.clone(), reason };
-        // The loader's own words (missing file, wrong format) are in the cause.
+        // The loader's own message (missing file, wrong format) is in the cause.
         let because = |e: libloading::Error| {
             let cause = std::error::Error::source(&e).map_or(String::new(), |c| format!(": {c}"));
             unusable(format!("{e}{cause}"))
@@ -139,7 +139,7 @@ impl Embree {
         &self.version
     }
 
-    /// The file that was loaded.
+    /// The loaded file.
     pub fn path(&self) -> &str {
         &self.path
     }
@@ -195,13 +195,13 @@ unsafe fn calls(
     })
 }
 
-/// Files and loader names to try, best first.
+/// Files and loader names to try, in order of preference.
 fn candidates(version: Version) -> Vec<PathBuf> {
     let stem = format!("libembree{}", version.number());
     let mut found = vec![];
     if let Some(named) = std::env::var_os(version.variable()) {
-        // Named explicitly: nothing else is tried, so that a measurement is never of another
-        // library than asked for.
+        // If a library is named explicitly, nothing else is tried, so that the measured library is
+        // always the requested one.
         let named = PathBuf::from(named);
         if named.is_dir() {
             collect(&named, &stem, 6, &mut found);
@@ -220,11 +220,11 @@ fn candidates(version: Version) -> Vec<PathBuf> {
     found
 }
 
-/// Folders that may hold peers.
+/// Directories that may contain baselines.
 fn peer_dirs() -> Vec<PathBuf> {
     let mut dirs = vec![PathBuf::from("target/peers")];
-    // The program may be started from anywhere: the build folder it lies in has a `peers` folder
-    // too.
+    // The program may be started from any directory, so the build folder of the executable is also
+    // searched for `peers`.
     if let Ok(exe) = std::env::current_exe() {
         dirs.extend(exe.ancestors().skip(1).take(3).map(|a| a.join("peers")));
     }
@@ -234,7 +234,7 @@ fn peer_dirs() -> Vec<PathBuf> {
     dirs.into_iter().filter_map(|d| std::path::absolute(d).ok()).filter(|d| d.is_dir()).collect()
 }
 
-/// Files below `dir` whose names begin with `stem` and contain `.so`, in the order of their names.
+/// Files below `dir` whose names begin with `stem` and contain `.so`, sorted by name.
 fn collect(dir: &Path, stem: &str, depth: u32, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(dir) else { return };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|e| e.path()).collect();

@@ -25,7 +25,7 @@ pub enum Quality {
 }
 
 impl Quality {
-    /// From fastest to best.
+    /// All qualities, from fastest to best.
     pub const ALL: [Quality; 3] = [Quality::Low, Quality::Medium, Quality::High];
 
     /// Name in the tables.
@@ -38,18 +38,18 @@ impl Quality {
     }
 }
 
-/// How a scene is built.
+/// Build options of a scene.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Options {
-    /// Effort of the builder.
+    /// Quality of the builder.
     pub quality: Quality,
-    /// `RTC_SCENE_FLAG_ROBUST`: Pluecker edge tests and conservative boxes.
+    /// `RTC_SCENE_FLAG_ROBUST`: Pluecker edge tests and conservative bounding boxes.
     pub robust: bool,
     /// `RTC_SCENE_FLAG_COMPACT`: less memory.
     pub compact: bool,
-    /// Threads of the builder; 0 is all.
+    /// Threads of the builder; 0 for all.
     pub threads: usize,
-    /// The most modern instructions allowed: `sse4.2`, `avx2`, …; all when `None`.
+    /// The widest allowed instruction set: `sse4.2`, `avx2`, …; `None` for all.
     pub max_isa: Option<&'static str>,
 }
 
@@ -63,7 +63,7 @@ impl Options {
     }
 }
 
-/// Bytes held now, and the most so far.
+/// Current and peak number of bytes.
 #[derive(Default)]
 struct Memory {
     now: AtomicI64,
@@ -80,15 +80,15 @@ unsafe extern "C" fn monitor(user: *mut c_void, bytes: isize, _post: bool) -> bo
     true
 }
 
-/// A built scene. Holds copies of the mesh's arrays, which Embree reads while tracing.
+/// A built scene. It owns copies of the mesh's arrays, which Embree reads while tracing.
 pub struct EmbreeScene {
     embree: Embree,
     device: Handle,
     scene: Handle,
     options: Options,
-    /// What building cost. Memory as Embree's monitor counts it; the input arrays are not in it.
+    /// Cost of the build. Memory is counted by Embree's monitor and excludes the input arrays.
     pub cost: BuildCost,
-    /// Shared with Embree until the scene is released; padded, since Embree reads 16 bytes at the
+    /// Shared with Embree until the scene is released. Padded, because Embree reads 16 bytes at the
     /// last vertex.
     _positions: Vec<f32>,
     _indices: Vec<u32>,
@@ -180,8 +180,8 @@ impl EmbreeScene {
         })
     }
 
-    /// A way to send rays: 1, 4, 8 or 16 at a time, marked as coherent or not. Panics on another
-    /// width.
+    /// A view that sends 1, 4, 8 or 16 rays at a time, marked as coherent or not. Panics for other
+    /// widths.
     pub fn view(&self, width: usize, coherent: bool) -> View<'_> {
         assert!(
             [1, 4, 8, 16].contains(&width),
@@ -265,7 +265,8 @@ impl EmbreeScene {
                 }
                 // SAFETY: as in `closest_n`.
                 unsafe { self.query::<N, true>(&valid, &mut q, &mut flags) };
-                // An occluded ray's end is set to -infinity; an empty lane's was negative before.
+                // Embree sets the end of an occluded ray to -infinity; that of an empty lane was
+                // already negative.
                 for l in 0..N {
                     *m |= u16::from(q.ray.tfar[l] < 0.0 && valid.0[l] != 0) << (from + l);
                 }
@@ -285,7 +286,7 @@ impl Drop for EmbreeScene {
     }
 }
 
-/// Coherence hints in the form of either version.
+/// Coherence flags in the form of either version.
 struct Flags {
     context3: Context3,
     arguments4: Arguments4,
@@ -314,7 +315,7 @@ impl Flags {
 }
 
 impl<const N: usize> RayHitN<N> {
-    /// A packet whose constant fields are set: queries do not change them.
+    /// A packet whose constant fields are set; queries do not change these.
     fn unused() -> Self {
         let (f, zero, all) = ([0.0; N], [0; N], [u32::MAX; N]);
         let ray = RayN {
@@ -336,7 +337,7 @@ impl<const N: usize> RayHitN<N> {
         RayHitN { ray, hit }
     }
 
-    /// Copies lanes `from..from + N` of a block and forgets earlier hits.
+    /// Copies lanes `from..from + N` of a block and resets the hits.
     #[inline(always)]
     fn load(&mut self, r: &RayBlock, from: usize) -> Valid<N> {
         let q = &mut self.ray;
@@ -397,8 +398,9 @@ mod tests {
     use crate::baselines::testing;
     use std::io::Write as _;
 
-    /// Runs a check with each version that is installed. Says which are not, in a way that libtest
-    /// does not swallow in tests that pass; with `RTSV_REQUIRE_PEERS=1` that is a failure.
+    /// Runs a check with each installed version. Reports the missing ones in a way that libtest
+    /// does not capture in passing tests; with `RTSV_REQUIRE_PEERS=1`, a missing version is a
+    /// failure.
     fn with_each(check: impl Fn(&Embree)) {
         for version in [Version::V3, Version::V4] {
             match Embree::load(version) {
