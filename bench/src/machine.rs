@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The machine, its state and the program's version.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
-    /// The processor's own name.
+    /// Name of the processor.
     pub cpu: String,
     /// Cores this process may use.
     pub cores: usize,

@@ -2,15 +2,15 @@
 //!
 //! All of `bench` allocates through a counting allocator (crate peak_alloc: two atomic additions
 //! per call). The resident set size from the operating system is not suitable: the allocator keeps
-//! freed memory, so the second build of a run would seem to need none.
+//! freed memory, so the second build of a run would appear to need none.
 
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Runs `work`. Returns its result and by how many bytes the heap at its peak exceeded the heap at
-/// the start. Other threads' memory is included; allocations of C libraries are not.
+/// Runs `work`. Returns its result, and the number of bytes by which the peak heap size exceeded
+/// the initial one. Other threads' memory is included; allocations of C libraries are not.
 pub fn peak<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let start = HEAP.current_usage();
     HEAP.reset_peak_usage();

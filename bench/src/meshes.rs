@@ -31,7 +31,7 @@ pub fn coarse_wavelet(points: u32) -> anyhow::Result<Arc<TriMesh>> {
 }
 
 /// Pipes through a box in all directions, like a plant's piping: long thin triangles that overlap
-/// in no order, the opposite of an isosurface. Each pipe has 2 x 24 x 8 triangles.
+/// without order, the opposite of an isosurface. Each pipe has 2 x 24 x 8 triangles.
 pub fn pipes(count: u32) -> Arc<TriMesh> {
     const SIDES: u32 = 24;
     const SEGMENTS: u32 = 8;
@@ -156,7 +156,7 @@ pub fn globe(meridians: u32, parallels: u32) -> TriMesh {
 mod tests {
     use super::*;
 
-    /// Every edge is used once in each direction: nothing to leak through.
+    /// Whether every edge is used once in each direction, so that the surface has no holes.
     fn is_closed(mesh: &TriMesh) -> bool {
         let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
         for &[a, b, c] in &mesh.indices {

@@ -28,18 +28,18 @@ const CLOSING: &str = "<!-- end record -->";
 /// A file that [`update`] would write.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quotation {
-    /// Where, from the root of the repository.
+    /// Path of the file, relative to the root of the repository.
     pub path: PathBuf,
-    /// What it has to hold.
+    /// Its required content.
     pub text: String,
 }
 
-/// Writes each document of `docs/src` that quotes records, and the plots that it shows, where they
-/// differ from what they have to be. Returns their paths from `root`.
+/// Writes each document of `docs/src` that quotes records, and the plots that it shows, if they are
+/// out of date. Returns their paths relative to `root`.
 ///
 /// # Errors
-/// A quotation that cannot be read or names a record, column or plot that is not there; a file that
-/// cannot be read or written.
+/// A quotation that cannot be parsed or names a missing record, column or plot; a file that cannot
+/// be read or written.
 pub fn update(root: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut written = vec![];
     for file in stale_quotations(root)? {
@@ -79,7 +79,7 @@ fn read(path: &Path) -> anyhow::Result<String> {
     std::fs::read_to_string(path).with_context(|| format!("cannot read `{}`", path.display()))
 }
 
-/// All Markdown files of a folder and its folders, by name.
+/// All Markdown files of a folder and its subfolders, by name.
 fn documents(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder)
         .with_context(|| format!("cannot read the folder `{}`", folder.display()))?;
@@ -95,7 +95,7 @@ fn documents(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// The document with its quotations, and its plots.
+/// The document with its quotations filled in, and its plots.
 fn quotations_filled(root: &Path, path: &Path, text: &str) -> anyhow::Result<Vec<Quotation>> {
     let mut plots = vec![];
     let mut filled = String::new();
@@ -123,7 +123,7 @@ fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
 }
 
-/// What stands for `ID: table ...` or `ID: plot ...`, and the file of the plot.
+/// The text for `ID: table ...` or `ID: plot ...`, and the file of the plot.
 fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Option<Quotation>)> {
     let (id, what) =
         request.split_once(':').context("a quotation is `ID: table ...` or `ID: plot ...`")?;
@@ -154,7 +154,7 @@ fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Opt
     bail!("`{what}` is neither `table COLUMNS` nor `plot TITLE`")
 }
 
-/// What speaks against a record, for a reader who has only a line for it.
+/// The objections to a record, in one line.
 fn doubts_in_short(record: &Record) -> String {
     let machine = &record.machine;
     let mut why = vec![];
@@ -169,7 +169,7 @@ fn doubts_in_short(record: &Record) -> String {
     if why.is_empty() { String::new() } else { format!(" In doubt: {}.", why.join("; ")) }
 }
 
-/// The newest record of that name: folders of `bench/runs` begin with their dates.
+/// The newest record with this id: folders of `bench/runs` begin with their dates.
 fn newest(root: &Path, id: &str) -> anyhow::Result<(Record, PathBuf)> {
     let runs = root.join("bench/runs");
     let entries = std::fs::read_dir(&runs)
@@ -189,7 +189,7 @@ fn plot_with_title<'r>(record: &'r Record, title: &str) -> anyhow::Result<&'r Pl
     })
 }
 
-/// The plot on white: a file of its own does not know the colours of the page around it.
+/// The plot on a white background: as a separate file, it cannot adapt to the colours of the page.
 fn opaque(plot: &Plot) -> String {
     let svg = plot.to_svg().replace("currentColor", "#222222");
     match svg.find('>') {
@@ -239,7 +239,7 @@ fn table(record: &Record, request: &str) -> anyhow::Result<String> {
     Ok(s)
 }
 
-/// Whether the cell is one of `values`, which ` | ` parts.
+/// Whether the cell equals one of `values`, which are separated by ` | `.
 fn is_one_of(row: &Row, column: &str, values: &str) -> bool {
     let cell = cell(row, column);
     values.split(" | ").any(|v| v.trim() == cell)
@@ -254,7 +254,7 @@ fn cell(row: &Row, column: &str) -> String {
     }
 }
 
-/// Three significant digits; whole numbers as they are.
+/// Three significant digits; whole numbers are unchanged.
 fn significant(x: f64) -> String {
     if x == x.trunc() && x.abs() < 1e9 {
         return format!("{x:.0}");

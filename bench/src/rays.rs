@@ -1,16 +1,16 @@
 //! The ray sets on which all tracers are timed.
 //!
-//! The rays are generated once by one exact rule from one set of hits, and stored. Every tracer
-//! then gets the same bits in the same order. Rays are stored in blocks of 16 as a structure of
+//! The rays are generated once, by a deterministic rule from one set of hits, and stored. Every
+//! tracer gets the same bits in the same order. Rays are stored in blocks of 16 as a structure of
 //! arrays. Pixels are in Morton order, so 16 primary rays cover 4 x 4 pixels and 256 cover 16 x 16.
-//! Hit points are computed in f64 from the triangle that was hit, so secondary rays do not depend
-//! on the tracer that found it.
+//! Hit points are computed in f64 from the hit triangle, so secondary rays do not depend on the
+//! tracer that found it.
 
 use glam::{DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 pub use rt_core::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 
-/// One ray as f64 numbers, before it is rounded into a block.
+/// One ray in f64, before it is rounded into a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray64 {
     /// Origin.
@@ -52,8 +52,8 @@ impl RaySet {
         set
     }
 
-    /// About `limit` of the rays, spread evenly: every n-th run of 1024, so that neighbours stay
-    /// together. All rays if there are fewer.
+    /// About `limit` of the rays, spread evenly: every n-th run of 1024 rays is kept, so that
+    /// neighbours stay together. All rays if there are fewer.
     pub fn thinned(self, limit: usize) -> RaySet {
         const RUN: usize = 64;
         let step = self.len.div_ceil(limit.max(1)).max(1);
@@ -202,7 +202,7 @@ pub fn shadow_from_light(points: &[SurfacePoint], light: DVec3) -> RaySet {
     RaySet::pack(points.iter().map(|p| {
         let to_point = p.origin - light;
         let distance = to_point.length();
-        // Stops just short of the point, so that its own surface does not count.
+        // The ray ends just before the point, so that its own surface does not count.
         Ray64 { origin: light, direction: to_point / distance, t_max: distance * (1.0 - 1e-5) }
     }))
 }

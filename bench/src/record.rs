@@ -36,7 +36,8 @@ impl Row {
     pub fn new() -> Row {
         Row::default()
     }
-    /// Returns the row with one more value. Non-finite numbers become null, as JSON has no others.
+    /// Returns the row with one more value. Non-finite numbers become null, because JSON cannot
+    /// represent them.
     pub fn with(mut self, column: &str, value: impl Into<Value>) -> Row {
         self.0.insert(column.to_string(), value.into());
         self
@@ -90,24 +91,24 @@ pub struct Record {
     pub quick: bool,
     /// The machine and the time.
     pub machine: Machine,
-    /// Objections to recording it that the command line overrode (`--record-despite-doubts`).
+    /// Objections to the measurement that the command line overrode (`--record-despite-doubts`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recorded_despite: Vec<String>,
     /// Wall time of the whole experiment, data and builds included.
     pub elapsed_secs: f64,
-    /// How to read the rows.
+    /// Descriptions of the columns.
     pub columns: Vec<Column>,
     /// The measurements.
     pub rows: Vec<Row>,
     /// Comparisons, above 1 where we are faster.
     pub ratios: Vec<Ratio>,
-    /// How things were measured, in sentences.
+    /// Notes on the measurement, in sentences.
     pub notes: Vec<String>,
     /// What could not be measured, and the cure.
     pub missing: Vec<String>,
     /// Plots of the rows.
     pub plots: Vec<Plot>,
-    /// Pictures.
+    /// Images.
     pub pictures: Vec<Picture>,
     /// Other files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -142,7 +143,8 @@ impl Record {
         self.columns.push(Column { name: name.into(), unit: unit.into(), meaning: meaning.into() });
     }
 
-    /// Columns that rows use but that are not described, once each: a mistake of the experiment.
+    /// Columns that rows use but that are not described, once each; any is a mistake of the
+    /// experiment.
     pub fn unexplained_columns(&self) -> Vec<&str> {
         let known = |k: &str| self.columns.iter().any(|c| c.name == k);
         let mut unknown: Vec<&str> = self
@@ -259,7 +261,7 @@ pub fn read_dir(dir: &Path) -> anyhow::Result<Vec<Record>> {
     paths.iter().map(|p| Record::read(p)).collect()
 }
 
-/// Whether it is JSON that does not declare itself a record.
+/// Whether the file is JSON that does not declare itself a record.
 fn is_of_another_kind(path: &Path) -> bool {
     let text = std::fs::read(path).unwrap_or_default();
     serde_json::from_slice::<serde_json::Value>(&text)

@@ -1,4 +1,4 @@
-//! rt-core behind the interface of the baselines.
+//! Implements the baselines' interface for rt-core.
 
 use crate::baselines::{BuildCost, Tracer};
 use crate::{clock, memory, rays};
@@ -8,14 +8,14 @@ use rt_core::bvh::{BuildError, BuildOptions, World};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// Which of the world's entry points rays go through.
+/// Entry point of the world through which rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// One ray a call.
+    /// One ray per call.
     Single,
-    /// Packets of rays that go the same way.
+    /// Packets of rays with similar directions.
     Coherent,
-    /// Rays in any direction, sorted inside.
+    /// Rays in any direction, sorted internally.
     Incoherent,
 }
 
@@ -35,9 +35,9 @@ pub struct RtCoreTracer {
     /// The world.
     pub world: World,
     options: BuildOptions,
-    /// What building cost; the peak is what the heap grew by, without the mesh.
+    /// Cost of the build; the peak is the growth of the heap, without the mesh.
     pub cost: BuildCost,
-    /// Render space minus the mesh's coordinates; zero unless the mesh lies far from zero.
+    /// Render space minus the mesh's coordinates; zero unless the mesh is far from the origin.
     shift: Vec3,
 }
 
@@ -57,7 +57,7 @@ impl RtCoreTracer {
         Ok(RtCoreTracer { world, options: *options, cost, shift })
     }
 
-    /// A way to send rays.
+    /// A view that sends rays through one entry point.
     pub fn view(&self, mode: Mode) -> View<'_> {
         View { ours: self, mode }
     }
@@ -77,7 +77,7 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Rays in render space: as they are, unless the mesh was moved.
+    /// Rays in render space: unchanged unless the mesh was shifted.
     fn shifted<T>(&self, rays: &[RayBlock], then: impl FnOnce(&[RayBlock]) -> T) -> T {
         let s = self.ours.shift;
         if s == Vec3::ZERO {
@@ -93,7 +93,7 @@ impl View<'_> {
     }
 }
 
-/// What every caller of a [`Tracer`] gives.
+/// Contract for every caller of a [`Tracer`].
 const ONE_EACH: &str = "one block of answers for each of rays";
 
 impl Tracer for View<'_> {

@@ -11,8 +11,9 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Minimum number of rounds for a verdict of faster or slower. If both are equal, all of five
-/// rounds fall on the same side of 1 once in 16 times; of three, once in 4.
+/// Minimum number of rounds for a verdict of faster or slower. If both variants are equally fast,
+/// all five rounds are on the same side of 1 with probability 1/16; with three rounds it would be
+/// 1/4.
 pub const VERDICT_ROUNDS: usize = 5;
 
 /// How often and how long to measure.
@@ -59,7 +60,8 @@ pub struct Variant<'a> {
     pub name: String,
     /// Does the work once and returns a check number that must be the same every time, such as the
     /// number of hits. The number exposes a variant that skips work, and prevents the compiler from
-    /// removing the work. It also returns the times, if the work knows them better than our clocks.
+    /// removing the work. It may also return times, if the work measures them better than our
+    /// clocks.
     run: Box<dyn FnMut() -> (u64, Option<Sample>) + 'a>,
     /// Computes the check number after the clock has stopped, if that takes work of its own.
     check: Option<Box<dyn FnMut() -> u64 + 'a>>,
@@ -71,8 +73,8 @@ impl<'a> Variant<'a> {
         Variant { name: name.into(), run: Box::new(move || (run(), None)), check: None }
     }
 
-    /// A named closure that lets another process do the work, or times a part of its own, and
-    /// returns the time that it took.
+    /// A named closure that delegates the work to another process, or times only a part of it, and
+    /// returns the measured time.
     pub fn timed(name: impl Into<String>, mut run: impl FnMut() -> Sample + 'a) -> Self {
         Variant { name: name.into(), run: Box::new(move || (0, Some(run()))), check: None }
     }
@@ -255,14 +257,14 @@ impl Timings {
     }
 }
 
-/// Why a comparison cannot be trusted.
+/// Why a comparison is invalid: a variant's check number changed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unstable {
     /// The variant.
     pub variant: String,
-    /// What it returned first.
+    /// The first check number.
     pub first: u64,
-    /// What it returned later.
+    /// The later, different one.
     pub later: u64,
 }
 
@@ -364,7 +366,7 @@ impl Cores {
         Cores { allowed, ids }
     }
 
-    /// If pinning is not permitted, the times only scatter more, so a refusal is not an error.
+    /// If pinning is not permitted, the times only scatter more, so a failure is not an error.
     fn pin(&self, round: usize) {
         if !self.ids.is_empty() {
             let mut set = CpuSet::new();
@@ -398,7 +400,7 @@ mod tests {
 
     #[test]
     fn a_slow_round_of_the_machine_cancels_in_the_ratio() {
-        // Round 3 ran while the machine was ten times as slow; a ratio of means would be wrong, the
+        // The machine was ten times slower during round 3. A ratio of means would be wrong; the
         // median of ratios is not.
         let r = timings(&[1.0, 1.0, 10.0], &[2.0, 2.0, 20.0]).ratio("ours", "rival").unwrap();
         assert_eq!((r.value, r.spread, r.rounds), (2.0, 0.0, 3));
@@ -511,7 +513,7 @@ mod tests {
         assert!(apart.why_open().unwrap().contains("turns"));
         let both = Ratio::of_rounds("a", "b", &[0.9, 1.1, 1.2, 1.3, 1.4]).unwrap();
         assert_eq!(both.verdict(), Verdict::Even);
-        // A round that could not be measured does not count.
+        // A round without a measurement does not count.
         assert_eq!(Ratio::of_rounds("a", "b", &[2.0, 2.0, 2.0, 2.0, f64::NAN]).unwrap().rounds, 4);
     }
 

@@ -1,5 +1,5 @@
-//! What records, reports and notes may claim: nothing that was not measured, and nothing without
-//! what speaks against it.
+//! Checks the claims of records, reports and notes: only measured results, and always with the
+//! objections.
 
 use bench::experiments::{self, Context};
 use bench::machine::Machine;
@@ -8,7 +8,7 @@ use bench::report;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// A record of other times and places, as its file would hold it.
+/// A record from another time and machine, as its file would contain it.
 fn record(machine: Value, ratios: Value) -> Record {
     let mut value =
         serde_json::to_value(Record::new("fig4.7", "Build time", 4, false, Machine::describe()))
@@ -43,7 +43,7 @@ fn a_report_shows_the_load_that_the_machine_had() {
         json!({ "load_1_min": 6.75, "cores": 2, "commit": "97db1462332d", "optimised": true });
     let page = report::page(&[record(machine, json!([]))]);
     assert!(page.contains("load 6.75 on 2 cores"), "{page}");
-    // Above 0.75 a core it is not merely shown.
+    // Above 0.75 per core, the load is marked as a doubt.
     assert!(page.contains("In doubt: the load"), "{page}");
     let machine =
         json!({ "load_1_min": 1.49, "cores": 2, "commit": "97db1462332d", "optimised": true });
@@ -53,7 +53,7 @@ fn a_report_shows_the_load_that_the_machine_had() {
 
 #[test]
 fn a_report_shows_which_records_come_from_trees_with_uncommitted_changes() {
-    // As records of before there was a field for it say it.
+    // As older records without the field express it.
     let machine =
         json!({ "load_1_min": 0.1, "cores": 2, "commit": "53342d595e91+", "optimised": true });
     let page = report::page(&[record(machine, json!([]))]);
@@ -77,7 +77,7 @@ fn the_dissertation_s_noise_stands_beside_differences_between_pictures() {
         for (from, thesis) in [1.0, 10.0, 100.0].into_iter().zip(percent) {
             let of_thesis = |r: &&Row| r.number("thesis") == Some(thesis);
             let rows: Vec<&Row> = record.rows.iter().filter(of_thesis).collect();
-            // Ours stand in the same rows: independent photons and low-discrepancy ones.
+            // Our results are in the same rows: independent and low-discrepancy photons.
             assert_eq!(rows.len(), 2, "{thesis} %");
             for r in rows {
                 assert_eq!(r.text("filter"), Some(filter), "{r:?}");
@@ -98,7 +98,7 @@ fn settings_of_sampling_are_timed_in_turns() {
     let record = quick("accuracy-sampling");
     let rounds: Vec<Option<f64>> = record.rows.iter().map(|r| r.number("rounds")).collect();
     assert!(rounds.iter().all(|r| r.is_some_and(|r| r >= 1.0)), "{rounds:?}");
-    // All settings of a quantity have the same rounds: they went through them together.
+    // All settings of a quantity have the same rounds, because they alternate.
     for quantity in ["ambient occlusion", "soft shadow", "antialiasing"] {
         let of: Vec<f64> = record
             .rows
@@ -117,8 +117,8 @@ fn sources() -> Vec<(PathBuf, String)> {
     files.map(|p| (p.clone(), std::fs::read_to_string(p).expect("source"))).collect()
 }
 
-/// A ratio that an experiment puts together itself may leave the verdict's rule out: it may only
-/// rename what `Ratio::of_rounds` made.
+/// A ratio that an experiment builds itself could bypass the rule of the verdict: it may only
+/// rename a result of `Ratio::of_rounds`.
 #[test]
 fn ratios_are_formed_in_one_place() {
     for (path, text) in sources() {
@@ -135,7 +135,8 @@ fn ratios_are_formed_in_one_place() {
     }
 }
 
-/// Records of before `--record` refused them stay, and the book says what speaks against them.
+/// Records older than the checks of `--record` are kept, and the book states the objections to
+/// them.
 #[test]
 fn the_book_names_every_record_in_doubt() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");

@@ -1,4 +1,4 @@
-//! The program as its users start it: what it prints, what it writes, how it ends.
+//! The program as started by a user: its output, its files, its exit codes.
 
 use serde_json::Value;
 use std::io::{BufRead as _, BufReader};
@@ -73,11 +73,11 @@ fn peers_are_found_or_explained() {
 fn a_run_prints_one_object_and_writes_record_table_and_report() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().to_str().unwrap();
-    // A repository, as far as `--record` looks.
+    // A directory that `--record` accepts as the repository.
     let repository = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(repository.path().join("bench/src")).unwrap();
     std::fs::write(repository.path().join("bench/Cargo.toml"), "").unwrap();
-    // Tests run on busy machines, from trees that are being changed, in debug builds.
+    // Tests run on busy machines, in modified trees and in debug builds.
     let keep = "--record-despite-doubts";
     let args = ["run", "accuracy-robust", "--quick", "--json", "--quiet", keep, "--out", folder];
     let out = bench_in(&repository.path().join("bench/src"), &args);
@@ -107,8 +107,7 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     assert!(file("accuracy-robust.csv").lines().count() > rows.len());
     assert!(file("index.html").contains("id=\"accuracy-robust\""));
 
-    // What spoke against it is in the record and in the report: here at least that no commit is
-    // known.
+    // The objections are in the record and in the report; here at least that no commit is known.
     let despite = record["recorded_despite"].as_array().expect("what spoke against it");
     assert!(
         despite.iter().any(|d| d.as_str().unwrap().contains("commit is not known")),
@@ -121,8 +120,7 @@ fn a_run_prints_one_object_and_writes_record_table_and_report() {
     check_kept(repository.path(), &record);
 }
 
-/// What `--record` keeps: DATE-MACHINE with the record, and nothing of where this machine has its
-/// files.
+/// Checks what `--record` keeps: DATE-MACHINE with the record, and no paths of this machine.
 fn check_kept(repository: &Path, record: &Value) {
     let entries = |p: &Path| -> Vec<std::path::PathBuf> {
         let mut found: Vec<_> = std::fs::read_dir(p).unwrap().map(|e| e.unwrap().path()).collect();
@@ -153,7 +151,7 @@ fn check_kept(repository: &Path, record: &Value) {
     assert_eq!(&kept, record);
 }
 
-/// A repository with one commit of what `--record` looks for.
+/// A repository with one commit that contains what `--record` looks for.
 fn repository() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(dir.path().join("bench/runs")).unwrap();
@@ -203,7 +201,7 @@ fn ctrl_c_among_pictures_keeps_those_that_are_finished() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    // Nobody at a terminal: steps are lines.
+    // Without a terminal, steps are printed as lines.
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
     lines
         .by_ref()

@@ -1,4 +1,5 @@
-//! `bench render` as its users start it: files of several formats in, a picture and an account out.
+//! `bench render` as started by a user: reads files of several formats, writes an image and a
+//! summary.
 
 use datasets::image_io::{read_exr, read_png};
 use datasets::model::{DataArray, Dataset, ImageData, PolyData, Values};
@@ -44,7 +45,7 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     let poly = Dataset::PolyData(PolyData::from_trimesh(&ball()));
     write_vtk(&vtp, &poly, VtkOptions::default()).unwrap();
     write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
-    // OBJ holds shape alone.
+    // OBJ stores geometry only.
     let bare = TriMesh { scalars: None, colors: None, ..ball() };
     write_obj(&obj, &bare).unwrap();
     write_ply(&ply, &ball()).unwrap();
@@ -127,7 +128,7 @@ fn unknown_effects_sizes_and_endings_end_with_2_and_say_what_there_is() {
     }
 }
 
-/// Draws the field as a volume and gives the picture's colours and the account.
+/// Draws the field as a volume; returns the image's colours and the summary.
 fn volume(vti: &Path, args: &[&str]) -> (Vec<[f32; 4]>, Value) {
     let png = vti.with_extension("png");
     let always =
@@ -150,8 +151,8 @@ fn image_data_becomes_a_volume_that_opacity_and_isovalue_change() {
     assert!(object["effects"].as_array().unwrap().contains(&"volumes".into()), "{object}");
     assert!(object["contents"][0].as_str().unwrap().contains("`distance` as a volume"), "{object}");
     assert_eq!((&object["triangles"], &object["warnings"]), (&0.into(), &serde_json::json!([])));
-    // The distance is largest in the middle, so that is what glows most; the corners of the picture
-    // show nothing.
+    // The distance is largest in the middle, so the middle glows most; the corners of the image are
+    // empty.
     let light = |p: [f32; 4]| p[0] + p[1] + p[2];
     let (middle, side) = (light(ramp[24 * 48 + 24]), light(ramp[24 * 48 + 8]));
     assert!(middle > 1.2 * side && side > 0.0 && light(ramp[0]) == 0.0, "{middle} {side}");
@@ -166,7 +167,7 @@ fn image_data_becomes_a_volume_that_opacity_and_isovalue_change() {
     assert_ne!(both, ramp);
     assert_eq!(object["contents"].as_array().unwrap().len(), 2, "{object}");
 
-    // A volume alone answers to no light: that is said, not passed over.
+    // Light effects do not change a volume alone, which the program must report.
     let (_, object) = with(&["--effects", "volumes,shadows"]);
     assert!(
         object["warnings"][0].as_str().unwrap().contains("shadows changes no pixel"),
@@ -224,7 +225,7 @@ fn ctrl_c_within_a_picture_keeps_the_samples_it_has_and_ends_with_130() {
         .find(|l| l.as_ref().unwrap().starts_with("drawing"))
         .expect("notes with -v")
         .unwrap();
-    // One sample takes milliseconds and all of them minutes.
+    // One sample takes milliseconds, all of them minutes.
     std::thread::sleep(Duration::from_secs(3));
     let pressed = Instant::now();
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();

@@ -1,4 +1,4 @@
-//! Checks the packages we build with against the lists in deny.toml, with nothing but `cargo tree`.
+//! Checks the packages that we build with against the lists in deny.toml, using only `cargo tree`.
 //!
 //! cargo-deny checks more (advisories, sources, other platforms) but takes minutes to build and
 //! needs github.com; this check takes a second and runs everywhere. Both read the same deny.toml.
@@ -8,7 +8,7 @@ use std::process::Command;
 
 use crate::runner::{Context, Outcome};
 
-/// The step `licences`.
+/// Runs the step `licences`.
 pub(crate) fn check(context: &Context<'_>) -> Outcome {
     let deny = match std::fs::read_to_string(context.root.join("deny.toml")) {
         Ok(text) => text,
@@ -47,14 +47,13 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
     Outcome::Failed(format!("{} of {packages} packages are against deny.toml", faults.len()))
 }
 
-/// Number of packages in the output of `cargo tree`, and one line per package that may not be
-/// there.
+/// Number of packages in the output of `cargo tree`, and one line per forbidden package.
 fn faults(
     tree: &str,
     allowed: &BTreeSet<String>,
     banned: &BTreeSet<String>,
 ) -> (usize, Vec<String>) {
-    // A package that occurs again ends in "(*)", after the licence.
+    // A repeated package ends in "(*)", after the licence.
     let packages: BTreeSet<&str> =
         tree.lines().map(|l| l.trim_end_matches(" (*)")).filter(|l| !l.is_empty()).collect();
     let mut faults = Vec::new();
@@ -95,8 +94,7 @@ fn section<'a>(deny: &'a str, head: &'a str) -> impl Iterator<Item = &'a str> {
 }
 
 // ---- SPDX expressions ---------------------------------------------------------------------------
-/// Whether an SPDX expression can be met with the allowed licences. The slash of old manifests
-/// means OR.
+/// Whether the allowed licences satisfy an SPDX expression. The slash in old manifests means OR.
 fn satisfied(expression: &str, allowed: &BTreeSet<String>) -> Result<bool, String> {
     let spaced = expression
         .replace('/', " OR ")

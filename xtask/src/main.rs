@@ -1,8 +1,8 @@
 //! Set-up and checks of the workspace, as one small program without dependencies.
 //!
-//! The steps are a list in [`plan`]; [`runner`] runs them and prints what each cost; [`peers`]
-//! finds and installs the software of others that some tests compare with; [`licences`] checks what
-//! we link against; [`package`] checks what we publish.
+//! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`peers`] finds
+//! and installs the third-party software that some tests compare with; [`licences`] checks what we
+//! link against; [`package`] checks what we publish.
 
 mod licences;
 mod main_job;
@@ -47,7 +47,7 @@ Exit status: 0 all passed, 1 a step failed, 2 the command line was wrong, 3 a re
 missing.
 ";
 
-/// What the command line asks for.
+/// A parsed command line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Command {
     Help,
@@ -69,7 +69,7 @@ struct TestOptions {
     only: Vec<String>,
 }
 
-/// How the program ends: the only place where exit codes have numbers.
+/// Exit status; the only place where exit codes have numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Exit {
     Success = 0,
@@ -141,7 +141,7 @@ fn workspace_root() -> PathBuf {
         .to_owned()
 }
 
-/// Builds vtk-bridge and lets it install itself. Its own options and messages are its business.
+/// Builds vtk-bridge and runs its own installation; it handles its options and messages itself.
 fn vtk(release: bool, install: &[String]) -> Exit {
     let mut args = vec!["--bin", "vtk-bridge"];
     args.extend(release.then_some("--release"));

@@ -1,21 +1,21 @@
-//! The step `main-job`: what `cargo run --release -p bench` does for users, with the programs that
-//! the tests were built with.
+//! The step `main-job`: runs what `cargo run --release -p bench` does for users, with the binaries
+//! that the tests were built with.
 //!
-//! Nothing has to be compiled that the step `build-tests` has not: a release build takes ten
-//! minutes on two cores. The dev profile optimises all members, but keeps their checks, so numbers
-//! measured here mean nothing; what is checked is that every experiment runs to its end.
+//! Nothing needs to be compiled beyond the step `build-tests`: a release build takes ten minutes on
+//! two cores. The dev profile optimises all members but keeps their checks, so the measured times
+//! are meaningless. The step checks that every experiment runs to its end.
 
 use crate::runner::{self, Context, Outcome};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What bench is told: nothing, which is the quick form of every experiment.
+/// Arguments of bench: none, which runs the quick form of every experiment.
 pub(crate) const ARGUMENTS: &[&str] = &[];
 
 /// Runs the program `bench` of the build folder.
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
-    // Nothing to do after `build-tests`; alone, this step builds what it runs, with the features
-    // that the tests have.
+    // A no-op after `build-tests`. When run alone, this step builds what it needs, with the
+    // features of the tests.
     let built = runner::cargo(context, &["test", "--workspace", "--no-run", "--quiet"], &[]);
     if built != Outcome::Passed {
         return built;
@@ -34,7 +34,8 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     }
 }
 
-/// Where cargo builds; a relative folder is one of the root, in which cargo is started.
+/// The directory where cargo builds; a relative path is relative to the root, where cargo is
+/// started.
 fn build_folder(root: &Path, named: Option<PathBuf>) -> PathBuf {
     root.join(named.unwrap_or_else(|| "target".into()))
 }

@@ -1,19 +1,20 @@
-//! The step `package`: every member that is published makes a package which has what it needs.
+//! The step `package`: every published member makes a complete package.
 //!
-//! Cargo's own verification would compile every package and all its dependencies once more. What
-//! goes wrong in practice is cheaper to find: a file that lies outside the package, a licence or a
-//! README that is not in it, a package above the registry's limit.
+//! Cargo's own verification would compile every package and all its dependencies again. The common
+//! faults are cheaper to find: a file outside the package, a licence or a README missing from it,
+//! or a package above the registry's size limit.
 
 use std::path::Path;
 use std::process::Command;
 
 use crate::runner::{self, Context, Outcome};
 
-/// The registry's limit, in bytes. Cargo compares the compressed package, we what it holds.
+/// The registry's limit, in bytes. Cargo compares the compressed package; this check compares its
+/// contents.
 const LARGEST_BYTES: u64 = 10 << 20;
-/// Files that every package has.
+/// Files that every package must contain.
 const REQUIRED: &[&str] = &["README.md", "LICENSE-MIT", "LICENSE-APACHE"];
-/// What `cargo package` is told besides the members to leave out.
+/// Arguments of `cargo package`, in addition to the members to leave out.
 const ARGUMENTS: &[&str] = &["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"];
 
 /// Checks the files of each package, then makes the packages.
@@ -71,7 +72,7 @@ fn list(root: &Path, member: &str) -> Result<Vec<String>, String> {
     Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
 }
 
-/// What is wrong with a package of these files.
+/// Faults of a package with these files.
 fn faults_of(files: &[String], bytes: u64, read: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let has = |path: &str| files.iter().any(|f| f == path);
     let missing = REQUIRED.iter().filter(|f| !has(f));
@@ -89,7 +90,7 @@ fn faults_of(files: &[String], bytes: u64, read: impl Fn(&str) -> Option<String>
     faults
 }
 
-/// The files that a source file includes or names as its modules, by path from the member's folder.
+/// The files that a source file includes or declares as modules, by path from the member's folder.
 /// A path that begins above the member keeps its dots.
 fn included(file: &str, text: &str) -> Vec<String> {
     let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
@@ -102,7 +103,7 @@ fn included(file: &str, text: &str) -> Vec<String> {
     named.map(|path| resolved(folder, path)).collect()
 }
 
-/// `path` seen from `folder`, without `.` and, as far as `folder` reaches, without `..`.
+/// Resolves `path` relative to `folder`, without `.` and, as far as `folder` reaches, without `..`.
 fn resolved(folder: &str, path: &str) -> String {
     let mut parts: Vec<&str> = folder.split('/').filter(|p| !p.is_empty()).collect();
     for part in path.split('/').filter(|p| *p != ".") {

@@ -1,9 +1,9 @@
-//! Peers: software of others that some tests and measurements compare with. None of it is linked or
-//! shipped.
+//! Peers: third-party software that some tests and measurements compare with. None of it is linked
+//! or shipped.
 //!
-//! Debian packages come with apt-get; Python wheels go into `target/peers/venv`, where `cargo
-//! clean` removes them. Tests learn about peers only through the variables of
-//! [`Peers::environment`]; CONTRIBUTING.md documents these.
+//! Debian packages are installed with apt-get; Python wheels are installed in `target/peers/venv`,
+//! where `cargo clean` removes them. Tests find peers only through the variables of
+//! [`Peers::environment`], which CONTRIBUTING.md documents.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -13,7 +13,7 @@ use std::process::Command;
 
 use crate::runner::first_line_of;
 
-/// Debian 12 packages, and what each is for.
+/// Debian 12 packages, and the purpose of each.
 const PACKAGES: &[(&str, &str)] = &[
     (
         "libembree-dev",
@@ -59,7 +59,7 @@ const PACKAGES: &[(&str, &str)] = &[
 /// instead of installed.
 const UNPACKED: &[&str] = &["libvtk9-dev", "python3-vtk9", "libvtk9.1", "libvtk9.1-qt", "vtk9"];
 
-/// Programs: name, variable through which tests learn of it, and where Debian puts it.
+/// Programs: name, environment variable for the tests, and Debian's path.
 const PROGRAMS: &[(&str, &str, &str)] = &[
     ("Chromium", "RTSV_CHROMIUM", "/usr/bin/chromium"),
     ("Open MPI", "RTSV_MPIRUN", "/usr/bin/mpirun.openmpi"),
@@ -78,7 +78,7 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("xscreensaver-gl-extra", "RTSV_XSCREENSAVER_EXTRA", "/usr/libexec/xscreensaver/sballs"),
 ];
 
-/// Wheels, with the versions that our numbers were measured with, and what each is for.
+/// Wheels, with the versions of our measurements, and the purpose of each.
 const WHEELS: &[(&str, &str, &str)] = &[
     ("numpy", "2.4.6", "arrays for the two below"),
     ("vtk", "9.7.2", "reads what we write, writes what we read"),
@@ -91,16 +91,16 @@ const WHEELS: &[(&str, &str, &str)] = &[
 pub(crate) enum Install {
     /// apt-get and pip may be called.
     Allowed,
-    /// Only what is there is used.
+    /// Only installed peers are used.
     Forbidden,
 }
 
-/// One piece of software, found or not.
+/// One peer, found or not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Peer {
-    /// For people.
+    /// Name for messages.
     name: &'static str,
-    /// For tests.
+    /// Environment variable for tests.
     variable: &'static str,
     /// `None` when it was not found.
     path: Option<PathBuf>,
@@ -109,11 +109,11 @@ struct Peer {
 /// The peers that were found and those that were not.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Peers {
-    /// `target/peers`.
+    /// The folder `target/peers`.
     folder: PathBuf,
-    /// All of them.
+    /// All peers.
     all: Vec<Peer>,
-    /// What went wrong or was not allowed while installing.
+    /// Failures, and installations that were not allowed.
     notes: Vec<String>,
 }
 
@@ -147,8 +147,8 @@ impl Peers {
     }
 }
 
-/// Finds the peers, after installing those that are missing where that is allowed. Never fails:
-/// what is missing stays missing, with a note.
+/// Finds the peers and, if allowed, first installs the missing ones. Never fails: a peer that
+/// cannot be installed stays missing, with a note.
 pub(crate) fn set_up(root: &Path, install: Install) -> Peers {
     let folder = root.join("target/peers");
     let venv = folder.join("venv");
@@ -212,8 +212,8 @@ fn install_packages(notes: &mut Vec<String>) {
         ));
         return;
     };
-    // The lists may be empty (fresh container) or old; without an update the packages may not be
-    // found.
+    // The package lists may be empty (fresh container) or old; without an update, packages may not
+    // be found.
     for args in
         [vec!["update"], [&["install", "-y", "--no-install-recommends"], &missing[..]].concat()]
     {
@@ -231,7 +231,7 @@ fn install_packages(notes: &mut Vec<String>) {
     }
 }
 
-/// Downloads [`UNPACKED`] and unpacks them below `root`, which needs no rights and installs
+/// Downloads [`UNPACKED`] and unpacks them below `root`, which needs no privileges and installs
 /// nothing.
 fn unpack_packages(root: &Path) -> Result<(), String> {
     if vtk91_is_there(root) || first_line_of("apt-get", &["--version"]).is_none() {
@@ -265,8 +265,8 @@ fn package_is_there(package: &str) -> bool {
         == Some("installed")
 }
 
-/// What to put before a command to run it as root: nothing, or sudo; `None` when there is no way.
-/// Without a terminal sudo must not ask for a password, or the run would wait for ever.
+/// The prefix to run a command as root: nothing, or sudo; `None` when neither works. Without a
+/// terminal, sudo must not ask for a password, because the run would wait forever.
 fn root_prefix() -> Option<Vec<&'static str>> {
     if first_line_of("id", &["-u"]).as_deref() == Some("0") {
         return Some(vec![]);
@@ -292,7 +292,7 @@ fn install_wheels(venv: &Path, notes: &mut Vec<String>) -> Result<(), String> {
         };
         run_noted(Command::new(base).args(["-m", "venv", "--clear"]).arg(venv))?;
     }
-    // --no-deps: vtk asks for matplotlib (60 MB with its own dependencies) for text in formulas,
+    // --no-deps: vtk depends on matplotlib (60 MB with its own dependencies) for text in formulas,
     // which nothing here draws.
     let mut pip = Command::new(&python);
     pip.args([
@@ -322,15 +322,15 @@ fn run_noted(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// A Python that can make virtual environments: Debian's own before others, because apt-get can
-/// complete that one.
+/// A Python that can create virtual environments. Debian's own is preferred, because apt-get can
+/// complete it.
 fn base_python() -> Option<&'static str> {
     ["/usr/bin/python3", "python3"]
         .into_iter()
         .find(|p| first_line_of(p, &["-c", "import venv, ensurepip"]).is_some())
 }
 
-/// True when every wheel is there in its version and can be imported.
+/// Whether every wheel is installed in its version and can be imported.
 fn wheels_are_there(python: &Path) -> bool {
     let mut script =
         "from importlib.metadata import version\nfrom vtkmodules import vtkCommonCore\n".to_owned();
@@ -356,7 +356,7 @@ fn library_in(folder: &Path, prefix: &str) -> Option<PathBuf> {
     names.min_by_key(|p| (p.as_os_str().len(), p.clone()))
 }
 
-/// A library that a wheel brings: `venv/lib/python3.*/site-packages/FOLDER/PREFIX*`.
+/// A library in a wheel: `venv/lib/python3.*/site-packages/FOLDER/PREFIX*`.
 fn wheel_library(venv: &Path, folder: &str, prefix: &str) -> Option<PathBuf> {
     let mut pythons: Vec<PathBuf> =
         fs::read_dir(venv.join("lib")).ok()?.filter_map(|e| Some(e.ok()?.path())).collect();

@@ -1,9 +1,9 @@
 //! The steps of `cargo xtask test`, in order. To add, drop or change a check, edit this list.
 //!
-//! The order is cheap before dear, so that a misplaced comma is reported after seconds and not
-//! after minutes. All steps share one target directory and one set of features, so that nothing is
-//! compiled twice without need: `clippy` and `api-docs` check, all others build with the dev
-//! profile, whose members are optimised: also `main-job`.
+//! Cheap steps come first, so that a misplaced comma is reported after seconds rather than minutes.
+//! All steps share one target directory and one set of features, so that nothing is compiled twice
+//! without need. `clippy` and `api-docs` check; all others, including `main-job`, build with the
+//! dev profile, whose members are optimised.
 
 use crate::runner::{Context, Outcome};
 use crate::{licences, main_job, package, runner};
@@ -13,9 +13,9 @@ use crate::{licences, main_job, package, runner};
 pub(crate) struct Step {
     /// Name in the summary and for `--only`.
     pub(crate) name: &'static str,
-    /// What a green step tells.
+    /// What a passed step shows.
     pub(crate) tells: &'static str,
-    /// What is done.
+    /// The action.
     pub(crate) action: Action,
 }
 
@@ -37,7 +37,7 @@ const fn cargo(args: &'static [&'static str]) -> Action {
     Action::Cargo { args, env: &[] }
 }
 
-/// All steps, in the order they run.
+/// All steps, in execution order.
 pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "tools",
@@ -132,8 +132,8 @@ pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "tests",
         tells: "unit and integration tests of all members pass, with the peers that were found",
-        // Not --examples: with it, examples become test harnesses, and tests need the one that is a
-        // shared library.
+        // Not --examples: it would turn examples into test harnesses, and tests need the example
+        // that is a shared library.
         action: cargo(&["test", "--workspace", "--no-fail-fast", "--lib", "--bins", "--tests"]),
     },
     Step {

@@ -1,4 +1,4 @@
-//! Runs the steps, prints every command before it runs and what everything cost at the end.
+//! Runs the steps, prints every command before it runs, and prints the cost of all at the end.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,7 +8,7 @@ use crate::peers::{self, Install, Peers};
 use crate::plan::{Action, STEPS, Step};
 use crate::{Exit, TestOptions};
 
-/// What a step may know about the run.
+/// The state of the run that steps can access.
 #[derive(Debug)]
 pub(crate) struct Context<'a> {
     /// Root of the workspace; every command runs there.
@@ -19,17 +19,17 @@ pub(crate) struct Context<'a> {
     pub(crate) peers: &'a Peers,
 }
 
-/// How a step ended.
+/// Result of a step.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// It holds.
+    /// The check passed.
     Passed,
-    /// It could not be checked here, for this reason. Does not stop the run; the summary repeats
+    /// The check could not run here, for this reason. Does not stop the run; the summary repeats
     /// it.
     NotRun(String),
-    /// It does not hold, for this reason.
+    /// The check failed, for this reason.
     Failed(String),
-    /// A peer is missing that the command line requires.
+    /// A peer that the command line requires is missing.
     PeerMissing(String),
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn list() {
     }
 }
 
-/// The command of a step as one would type it.
+/// The command of a step as typed in a shell.
 fn describe(action: &Action) -> String {
     match action {
         Action::Call(_) => "(inside xtask)".to_owned(),
@@ -121,7 +121,7 @@ pub(crate) fn cargo(context: &Context<'_>, args: &[&str], env: &[(&str, &str)]) 
     }
 }
 
-/// First line that a program prints, or `None` when it cannot be run.
+/// First line of a program's output, or `None` when it cannot be run.
 pub(crate) fn first_line_of(program: impl AsRef<std::ffi::OsStr>, args: &[&str]) -> Option<String> {
     let output = Command::new(program).args(args).output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout);
@@ -129,7 +129,8 @@ pub(crate) fn first_line_of(program: impl AsRef<std::ffi::OsStr>, args: &[&str])
 }
 
 // ---- Steps that are functions -------------------------------------------------------------------
-/// The compiler is at least the `rust-version` of the workspace; rustfmt and clippy are there.
+/// Checks that the compiler is at least the `rust-version` of the workspace, and that rustfmt and
+/// clippy are installed.
 pub(crate) fn check_tools(context: &Context<'_>) -> Outcome {
     let manifest = match std::fs::read_to_string(context.root.join("Cargo.toml")) {
         Ok(text) => text,
@@ -173,7 +174,7 @@ fn version_numbers(text: &str) -> Option<(u32, u32)> {
     })
 }
 
-/// Says which peers the tests will meet; an error when one is required and missing.
+/// Reports the peers that the tests will find; an error when a required one is missing.
 pub(crate) fn report_peers(context: &Context<'_>) -> Outcome {
     print!("{}", context.peers.describe());
     let missing = context.peers.missing();

@@ -84,7 +84,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let file = |name: &str| dir.path().join(name);
     std::fs::write(file("report.json"), serde_json::to_vec(&report)?)?;
     draw(&tools.gluray, &file("report.json"), &[&file("chart.svg"), &file("trace.json")], None)?;
-    // Most of the run is one build: some frames in the middle show a typical frame.
+    // Most of the run is one build; some of the last frames show the typical frame.
     let (from, to) = middle_frame(spans);
     draw(&tools.gluray, &file("report.json"), &[&file("frames.svg")], Some((from, to)))?;
     for (name, caption) in [

@@ -53,11 +53,11 @@ for camera in order["views"]:
         first = False
     wall, seconds = [], []
     for i in range(order["frames"] + 1):
-        # About the focal point, or on the spot where the eye is inside of the data.
+        # Orbit the focal point, or turn in place when the eye is inside the data.
         (GetActiveCamera().Yaw if camera["inside"] else GetActiveCamera().Azimuth)(5)
         clock, used = time.time(), cpu()
         Render(view)
-        # The first after a jump of the camera sorts itself out.
+        # The first frame after a camera jump is not representative.
         if i > 0:
             wall.append(time.time() - clock)
             seconds.append(cpu() - used)

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-/// A kind of file.
+/// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Binary STL: triangles without shared vertices.
@@ -20,7 +20,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The extension of its files.
+    /// The file extension of the format.
     pub fn extension(self) -> &'static str {
         match self {
             Format::Stl => "stl",

@@ -5,7 +5,7 @@ use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-/// Xvfb on a display that nobody else has; it ends with this value.
+/// Xvfb on an unused display; dropping this value ends it.
 pub struct Display {
     server: Child,
     name: String,
@@ -32,7 +32,7 @@ impl Display {
         Ok(display)
     }
 
-    /// What `DISPLAY` has to be.
+    /// Value of `DISPLAY` for this server.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -40,7 +40,7 @@ impl Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        // It may be gone already.
+        // The server may have ended already.
         self.server.kill().ok();
         self.server.wait().ok();
     }

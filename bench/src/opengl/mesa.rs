@@ -11,7 +11,7 @@ use std::sync::Arc;
 use tempfile::TempDir;
 
 /// An X server without a screen, and a program that keeps its mesh in buffers of the driver, so
-/// that its frames are the driver's.
+/// that its frame time is the driver's.
 pub struct Mesa {
     display: Display,
     programs: Vec<Program>,
@@ -19,7 +19,8 @@ pub struct Mesa {
 }
 
 impl Mesa {
-    /// Those of this machine; else what is missing, each with its cure.
+    /// Finds the server and the programs on this machine. The error lists what is missing, each
+    /// with its cure.
     pub fn find() -> Result<Mesa, Vec<String>> {
         let mut missing = Vec::new();
         let programs = [Program::Vtk, Program::Gmsh, Program::ParaView];
@@ -40,9 +41,9 @@ impl Mesa {
         Ok(Mesa { display, programs, dir })
     }
 
-    /// A program that draws `mesh`, which fills a window of `size_px` pixels a side and turns by
-    /// some degrees from frame to frame. The error says what each program said that would not
-    /// start.
+    /// Starts a program that draws `mesh`, filling a window of `size_px` pixels a side and turning
+    /// by some degrees from frame to frame. The error contains the messages of all programs that
+    /// did not start.
     pub fn draw(&self, mesh: &Arc<TriMesh>, size_px: u32) -> anyhow::Result<MesaFrames> {
         let mut faults = Vec::new();
         for &program in &self.programs {
@@ -61,7 +62,7 @@ impl Mesa {
             std::fs::remove_file(&data)?;
             match started {
                 Ok(mut session) => {
-                    // The first may still send buffers.
+                    // The first frame may still upload buffers.
                     session.frames(1)?;
                     return Ok(MesaFrames { program: program.name(), session, costs: Vec::new() });
                 }
@@ -72,8 +73,7 @@ impl Mesa {
     }
 }
 
-/// A program that draws a mesh by llvmpipe, a frame whenever it is asked, and what its frames have
-/// cost.
+/// A program that draws a mesh with llvmpipe, one frame per request, and the cost of its frames.
 pub struct MesaFrames {
     program: &'static str,
     session: Session,
@@ -81,12 +81,12 @@ pub struct MesaFrames {
 }
 
 impl MesaFrames {
-    /// Who draws, in words.
+    /// Name of the renderer, for notes.
     pub fn name(&self) -> String {
         format!("llvmpipe ({})", self.program)
     }
 
-    /// Has `count` more frames drawn.
+    /// Draws `count` more frames.
     pub fn take(&mut self, count: usize) -> anyhow::Result<()> {
         for _ in 0..count {
             self.costs.push(self.session.frames(1)?);
@@ -94,20 +94,20 @@ impl MesaFrames {
         Ok(())
     }
 
-    /// What one more frame took.
+    /// Draws one more frame and returns its cost.
     pub fn frame(&mut self) -> anyhow::Result<Sample> {
         let cost = self.session.frames(1)?;
         let (wall_secs, process_cpu_secs) = (cost.wall_secs, cost.cpu_secs);
         Ok(Sample { wall_secs, process_cpu_secs, ..Sample::default() })
     }
 
-    /// Ends the program whose frames somebody else has kept the times of.
+    /// Ends the program without a row, for callers that keep the frame times themselves.
     pub fn close(self) -> anyhow::Result<()> {
         self.session.end().map(drop)
     }
 
-    /// Ends the program. `row` with the columns `time`, `time_low`, `time_high` and `cpu` of a
-    /// frame, where `per_second` of their unit are a second.
+    /// Ends the program. Adds to `row` the columns `time`, `time_low`, `time_high` and `cpu` of a
+    /// frame; `per_second` is the number of their units in a second.
     pub fn end(self, row: Row, per_second: f64) -> anyhow::Result<Row> {
         self.session.end()?;
         let of =

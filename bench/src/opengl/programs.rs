@@ -1,15 +1,15 @@
-//! The programs of table 4.1, and how to make each draw one frame at a time. The installed programs
-//! are used unchanged, through their own script languages.
+//! The programs of table 4.1, and the scripts that make each draw one frame at a time. The
+//! installed programs are used unchanged, through their own script languages.
 
 use super::Format;
 use std::path::{Path, PathBuf};
 
-/// A program that draws.
+/// An OpenGL program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {
     /// gmsh: vertex arrays, sent again each frame.
     Gmsh,
-    /// geomview: immediate mode, eight calls a triangle.
+    /// geomview: immediate mode, eight calls per triangle.
     Geomview,
     /// ParaView's pvbatch: buffers and shaders.
     ParaView,
@@ -18,11 +18,11 @@ pub enum Program {
 }
 
 impl Program {
-    /// All of them.
+    /// All programs.
     pub const ALL: [Program; 4] =
         [Program::Gmsh, Program::Geomview, Program::ParaView, Program::Vtk];
 
-    /// Its name in tables.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Program::Gmsh => "gmsh",
@@ -32,7 +32,7 @@ impl Program {
         }
     }
 
-    /// What it reads.
+    /// The file format that the program reads.
     pub fn format(self) -> Format {
         match self {
             Program::Gmsh => Format::Stl,
@@ -41,8 +41,8 @@ impl Program {
         }
     }
 
-    /// The executable, from the variable that `cargo xtask test` sets or from where Debian puts it;
-    /// else what is missing, with the cure.
+    /// Finds the executable, from the variable that `cargo xtask test` sets or in Debian's
+    /// directory. The error says what is missing, with the cure.
     pub fn find(self) -> Result<PathBuf, String> {
         let (variable, place, package) = match self {
             Program::Gmsh => ("RTSV_GMSH", "/usr/bin/gmsh", "gmsh"),
@@ -58,15 +58,15 @@ impl Program {
             format!("{}: install {package}, or name it in {variable}", self.name())
         })?;
         match self {
-            // Its library is driven by Python.
+            // gmsh's library is driven from Python.
             Program::Gmsh => find("RTSV_PYTHON", "/usr/bin/python3")
                 .ok_or_else(|| "gmsh: install python3, or name it in RTSV_PYTHON".to_string()),
             _ => Ok(found),
         }
     }
 
-    /// The command that draws `data` in a window of `size_px` a side, as arguments of `executable`;
-    /// scripts go into `dir`.
+    /// The arguments of `executable` that draw `data` in a window of `size_px` a side; scripts are
+    /// written to `dir`.
     pub(super) fn arguments(
         self,
         dir: &Path,
@@ -98,7 +98,7 @@ impl Program {
         })
     }
 
-    /// What it is told first.
+    /// Commands that the program receives at the start.
     pub(super) fn greeting(self, data: &Path, size_px: u32) -> String {
         match self {
             Program::Geomview => format!(
@@ -112,7 +112,7 @@ impl Program {
         }
     }
 
-    /// What makes it draw the next frame, from another side.
+    /// Commands that make the program draw the next frame, from another side.
     pub(super) fn next_frame(self) -> &'static str {
         match self {
             Program::Geomview => {
@@ -123,7 +123,7 @@ impl Program {
     }
 }
 
-/// The path that a variable names, or a well-known one, if there is a file.
+/// The path from the environment variable, or a well-known path, if the file exists.
 pub fn find(variable: &str, place: &str) -> Option<PathBuf> {
     let named = std::env::var_os(variable).map(PathBuf::from);
     named.or_else(|| Some(PathBuf::from(place))).filter(|p| p.is_file())

@@ -13,7 +13,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// What runs everything.
+/// Programs that every session needs.
 #[derive(Debug, Clone)]
 pub struct Tools {
     /// The X server.
@@ -23,7 +23,7 @@ pub struct Tools {
 }
 
 impl Tools {
-    /// Those of this machine; else what is missing, each with its cure.
+    /// Finds the programs on this machine. The error lists what is missing, each with its cure.
     pub fn find() -> Result<Tools, Vec<String>> {
         let beside = std::env::current_exe().ok().and_then(|e| Some(e.parent()?.join("gluray")));
         let gluray =
@@ -48,21 +48,21 @@ impl Tools {
     }
 }
 
-/// By what a program draws.
+/// The renderer of a program's frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
-    /// By Mesa's llvmpipe.
+    /// Mesa's llvmpipe.
     Llvmpipe,
-    /// Through us, each frame when it is asked for.
+    /// gluray; each frame is shown before the next one begins.
     Serial,
-    /// Through us, each frame shown while the next one comes.
+    /// gluray with pipelined presentation: each frame is shown one frame late.
     Asynchronous,
-    /// Through us, by so many processes.
+    /// gluray with this number of processes.
     Ranks(u32),
 }
 
 impl Backend {
-    /// Its name in tables.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Backend::Llvmpipe => "llvmpipe",
@@ -73,20 +73,20 @@ impl Backend {
     }
 }
 
-/// What frames cost.
+/// Cost of some frames.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cost {
-    /// Seconds until they were done.
+    /// Wall-clock seconds until the frames were finished.
     pub wall_secs: f64,
-    /// Seconds of all cores, of the program's process.
+    /// CPU seconds of the program's process, all threads.
     pub cpu_secs: f64,
 }
 
-/// A program that waits for the next frame.
+/// A running program that waits for the next request.
 pub struct Session {
     program: Program,
     child: Child,
-    /// The program itself: behind `gluray run` it is a child's child.
+    /// Process id of the program itself; with `gluray run` it is a grandchild.
     pid: u32,
     input: ChildStdin,
     lines: Receiver<String>,
@@ -94,12 +94,12 @@ pub struct Session {
     log: PathBuf,
 }
 
-/// Programs that do not answer for that long are given up.
+/// Programs that do not answer within this time are abandoned.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(600);
 
 impl Session {
-    /// Starts `program` with `data`. Scripts, logs and the report go into `dir`, which is its own.
-    /// Backends that are not the driver's need `gluray`.
+    /// Starts `program` with `data`. Scripts, logs and the report are written to `dir`, which the
+    /// session owns. Backends other than the driver need `gluray`.
     pub fn start(
         program: Program,
         backend: Backend,
@@ -183,7 +183,7 @@ impl Session {
         }
     }
 
-    /// Has `count` frames drawn.
+    /// Draws `count` frames.
     pub fn frames(&mut self, count: u32) -> anyhow::Result<Cost> {
         let (start, cpu) = (Instant::now(), cpu_secs(self.pid)?);
         for _ in 0..count {
@@ -194,7 +194,7 @@ impl Session {
         Ok(Cost { wall_secs: start.elapsed().as_secs_f64(), cpu_secs: cpu_secs(self.pid)? - cpu })
     }
 
-    /// Has VTK write what is in its window, as raw RGB behind a short head.
+    /// Makes VTK write the contents of its window, as raw RGB after a short header.
     pub fn save(&mut self, file: &Path) -> anyhow::Result<Vec<u8>> {
         anyhow::ensure!(
             self.program == Program::Vtk,
@@ -207,14 +207,14 @@ impl Session {
         std::fs::read(file).with_context(|| format!("no picture `{}`", file.display()))
     }
 
-    /// The most memory that the program has held, in bytes.
+    /// Peak memory of the program, in bytes.
     pub fn peak_bytes(&self) -> Option<u64> {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid)).ok()?;
         let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
         Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
     }
 
-    /// Ends the program; gives our report of the run when it went through us.
+    /// Ends the program; returns gluray's report if the program ran through it.
     pub fn end(mut self) -> anyhow::Result<Option<serde_json::Value>> {
         let text = if self.program == Program::Geomview { "(exit)\n" } else { "" };
         self.input.write_all(text.as_bytes()).ok();
@@ -223,7 +223,7 @@ impl Session {
         let deadline = Instant::now() + Duration::from_secs(60);
         while child.try_wait()?.is_none() {
             if Instant::now() > deadline {
-                // The program, not `gluray run` before it, which then writes its report.
+                // Signal the program, not `gluray run`, which then writes its report.
                 rustix::process::Pid::from_raw(pid as i32)
                     .map(|p| rustix::process::kill_process(p, rustix::process::Signal::TERM));
                 child.wait()?;
@@ -238,19 +238,19 @@ impl Session {
     }
 }
 
-/// CPU seconds of a process, its threads included, from the kernel's account of its threads in
-/// nanoseconds; of threads that have ended, in ticks.
+/// CPU seconds of a process including its threads, with a resolution of 1/100 s (`utime` and
+/// `stime` in `/proc/PID/stat`).
 fn cpu_secs(pid: u32) -> anyhow::Result<f64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat"))
         .with_context(|| format!("process {pid} is gone"))?;
-    // The name in brackets may have spaces in it.
+    // The name in brackets may contain spaces.
     let fields: Vec<&str> =
         stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
     let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).unwrap_or(0.0);
     Ok((ticks(11) + ticks(12)) / 100.0)
 }
 
-/// The child of a process that has one.
+/// The child of a process with exactly one.
 fn only_child(pid: u32) -> Option<u32> {
     let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).ok()?;
     children.split_whitespace().next()?.parse().ok()

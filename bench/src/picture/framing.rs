@@ -11,18 +11,18 @@ use rt_core::scene::Scene;
 use serde::Deserialize;
 use std::path::Path;
 
-/// Where the camera stands.
+/// Position of the camera.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Framing {
     /// The whole subject just fits into the image, viewed from the front, slightly from the side
     /// and from above.
     #[default]
     Fitted,
-    /// The same, seen from this direction (towards the eye, world, any length).
+    /// Like `Fitted`, but viewed from this direction (towards the eye, world space, any length).
     FittedFrom(DVec3),
-    /// There.
+    /// The given view.
     At(View),
-    /// A parallel projection that shows so many world units from bottom to top.
+    /// A parallel projection with this image height in world units.
     Parallel(View, f64),
 }
 
@@ -35,10 +35,10 @@ pub(super) struct FramedCamera {
 
 /// Vertical angle of fitted cameras, degrees (VTK's default).
 const FOV_DEGREES: f64 = 30.0;
-/// Room around a fitted subject.
+/// Margin around a fitted subject.
 const MARGIN: f64 = 1.04;
 
-/// World corners of everything that is drawn.
+/// World corners of all geometry.
 pub(super) fn bounds(scene: &Scene) -> anyhow::Result<(DVec3, DVec3)> {
     let volumes =
         scene.volumes.iter().map(|v| (v.volume.grid().origin, v.volume.grid().max_corner()));
@@ -69,8 +69,7 @@ impl Framing {
         Ok(self.camera(view.as_ref(), lo, hi, size)?.camera)
     }
 
-    /// The view that a fitted framing takes of the points that `outline` names; `None` for the
-    /// other framings.
+    /// The view of a fitted framing for the points of `outline`; `None` for the other framings.
     pub(super) fn fitted(&self, outline: &Outline<'_>, up: DVec3, size: [u32; 2]) -> Option<View> {
         let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
         match self {
@@ -82,7 +81,7 @@ impl Framing {
         }
     }
 
-    /// The camera for a subject between two corners. `fitted` is what [`Framing::fitted`] gave.
+    /// The camera for a subject between two corners. `fitted` is the result of [`Framing::fitted`].
     pub(super) fn camera(
         &self,
         fitted: Option<&View>,
@@ -147,7 +146,7 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
         };
         (normal, if normal.dot(up).abs() > 0.5 { other_up(normal) } else { up })
     } else {
-        // A third of a turn off the front and 25 degrees up: three faces of a box show.
+        // Turned from the front and 25 degrees up, so that three faces of a box are visible.
         let front = if up.dot(DVec3::Y).abs() > 0.5 { DVec3::Z } else { DVec3::NEG_Y };
         let right = up.cross(front).normalize_or(DVec3::X);
         ((front + 0.55 * right + 0.5 * up).normalize(), up)
@@ -175,12 +174,12 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
     let [right_most, left_most, upper_most, lower_most] = most;
     let distance =
         (0.5 * (right_most + left_most) / tan_x).max(0.5 * (upper_most + lower_most) / tan_y);
-    // Points and lines seen end on have no extent to fit.
+    // Points, and lines viewed end on, have no extent to fit.
     let distance = distance.max(nearest + 1e-3 * extent.length()).max(1e-12);
     let mut shift = [0.5 * (right_most - left_most), 0.5 * (upper_most - lower_most)];
 
-    // Along the axis with room to spare, equal room on both sides: the outermost points seen from
-    // there, as slopes, each with the reciprocal of its distance, by which its slope changes when
+    // Along the axis with a margin to spare, centre the subject: find the outermost points as
+    // slopes from the eye, each with its reciprocal distance, which is the change of the slope when
     // the eye moves.
     let mut ends = [[(f64::INFINITY, 0.0), (f64::NEG_INFINITY, 0.0)]; 2];
     outline(&mut |p| {
@@ -205,7 +204,7 @@ fn fit(outline: &Outline<'_>, backward: Option<DVec3>, up: DVec3, aspect: f64) -
     View { up, ..View::new("fitted", target + backward * distance, target) }
 }
 
-/// An upward direction for an image viewed along `normal`, an axis.
+/// An upward direction for an image viewed along the axis `normal`.
 fn other_up(normal: DVec3) -> DVec3 {
     if normal.y.abs() > 0.5 { DVec3::Z } else { DVec3::Y }
 }
@@ -230,9 +229,9 @@ fn default_fov() -> f64 {
     FOV_DEGREES
 }
 
-/// Reads a camera: `eye` and `target` (world), and if wished `up`, `vertical_fov_degrees`, or
-/// `parallel_height` (world units) for a parallel projection; as TOML, or as JSON when the name
-/// ends so.
+/// Reads a camera: `eye` and `target` (world), optionally `up`, `vertical_fov_degrees`, or
+/// `parallel_height` (world units) for a parallel projection. The format is TOML, or JSON for files
+/// with that extension.
 pub fn read_camera(path: &Path) -> anyhow::Result<Framing> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the camera file `{}`", path.display()))?;
@@ -288,7 +287,7 @@ mod tests {
                         [0, 1].map(|a| seen.iter().map(|c| c[a].abs()).fold(0.0, f64::max));
                     let most = most_x.max(most_y);
                     assert!((0.95..=1.0).contains(&most), "{lo} {hi} {up} {size:?}: {most}");
-                    // Centred along the other axis, too.
+                    // Also centred along the other axis.
                     for a in [0, 1] {
                         let ends = seen
                             .iter()

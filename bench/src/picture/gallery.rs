@@ -14,7 +14,7 @@ use rt_core::bvh::BuildOptions;
 use rt_core::effects::Effects;
 use rt_core::frame::Layers;
 
-/// What the colours show.
+/// Meaning of the colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Coloring {
     /// The data set's scalars: isovalues, field strength.
@@ -23,7 +23,7 @@ enum Coloring {
     Height,
     /// One colour, linear RGB.
     Plain([f32; 3]),
-    /// None: glass that lets this much light through, linear RGB.
+    /// Clear glass that transmits this fraction of light, linear RGB.
     Glass([f32; 3]),
 }
 
@@ -42,19 +42,19 @@ pub struct Entry {
     range: Option<[f32; 2]>,
     background: &'static str,
     occlusion_radii: f64,
-    /// The data's tubes are drawn so many times as thick: true to the data they would be thinner
-    /// than a pixel.
+    /// Factor on the radii of the data's tubes; with the original radii they would be thinner than
+    /// a pixel.
     tubes: f32,
 }
 
 /// The camera position of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Viewpoint {
-    /// All of it, from this direction.
+    /// The whole subject, viewed from this direction.
     Direction([f64; 3]),
-    /// The view of that name of the first data set.
+    /// The view with this name of the first data set.
     View(&'static str),
-    /// An eye that looks at a target.
+    /// Eye and target.
     Eye([f64; 3], [f64; 3]),
 }
 
@@ -167,20 +167,20 @@ pub fn find(name: &str) -> Result<&'static Entry, String> {
     })
 }
 
-/// An image with its request and costs.
+/// An image with its request and its cost.
 pub struct GalleryImage {
-    /// The image.
+    /// The rendered image.
     pub rendered: RenderedImage,
-    /// How it was wished.
+    /// The request that made it.
     pub request: RenderRequest,
-    /// What is in it, in words.
+    /// Description of the contents.
     pub contents: String,
     /// Wall time of generating the data.
     pub data_secs: f64,
 }
 
 impl Entry {
-    /// Generates the data and draws them, see [`draw`].
+    /// Generates the data and draws it, see [`draw`].
     pub fn render(
         &self,
         size: [u32; 2],
@@ -246,7 +246,7 @@ impl Entry {
         Ok(GalleryImage { rendered, request, contents, data_secs })
     }
 
-    /// The command that draws it.
+    /// The command that draws the image.
     pub fn command(&self, size: [u32; 2], samples: u32) -> String {
         let [w, h] = size;
         format!(
@@ -265,7 +265,7 @@ mod tests {
         for e in ALL.iter().filter(|e| e.name != "wavelet") {
             // Large enough for the star's thin tubes.
             let p = e.render([144, 96], 1, &mut RenderControl::default()).unwrap();
-            // Paths inside glass may be cut; the renderer says so.
+            // Paths inside glass may be truncated, which the renderer reports.
             let expected = |w: &String| e.name == "glass" && w.contains("max_bounces");
             assert!(
                 p.rendered.warnings.iter().all(expected),

@@ -7,17 +7,17 @@ use rt_core::texture::Texture;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The interpretation of an image: the same file may be a colour in one material and roughness in
+/// The interpretation of a texture: the same file may be a colour in one material and roughness in
 /// another.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Role {
     /// sRGB with alpha.
     Color,
-    /// sRGB, alpha not used.
+    /// sRGB; alpha is ignored.
     Opaque,
-    /// sRGB, seen where alpha is at least this many 255ths.
+    /// sRGB, visible where alpha is at least this many 255ths.
     AlphaMask(u8),
-    /// Numbers.
+    /// Linear data.
     Linear,
 }
 
@@ -32,7 +32,7 @@ impl<'a> SceneMaterials<'a> {
         SceneMaterials { model, made: HashMap::new() }
     }
 
-    /// The texture of an image in a role; `None` for a material without one.
+    /// The texture in a role; `None` for a material without one.
     fn texture(
         &mut self,
         index: Option<usize>,
@@ -47,8 +47,8 @@ impl<'a> SceneMaterials<'a> {
         }
         let row = picture.width.max(1) as usize;
         let rows = picture.rgba8.chunks(row);
-        // The reader leaves texture coordinates as the file has them: v = 0 is the upper edge
-        // unless `v_up`.
+        // The reader keeps the texture coordinates of the file: v = 0 is the upper edge unless
+        // `v_up`.
         let mut texels: Vec<[u8; 4]> = if picture.v_up {
             rows.rev().flatten().copied().collect()
         } else {
@@ -76,7 +76,7 @@ impl<'a> SceneMaterials<'a> {
 
     pub(super) fn material(&mut self, m: &SurfaceMaterial) -> anyhow::Result<Material> {
         let [r, g, b, factor] = m.base_color;
-        // Reflectance of a smooth interface at normal incidence (Fresnel); rough dielectrics are
+        // Reflectance of a smooth interface at normal incidence (Fresnel). Rough dielectrics are
         // drawn without mirror rays.
         let fresnel = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
         let mut out =

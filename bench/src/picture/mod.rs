@@ -24,7 +24,7 @@ use std::time::Instant;
 use style::RenderStyle;
 use subject::Subject;
 
-/// How to draw a subject.
+/// Settings for drawing a subject.
 #[derive(Debug, Clone)]
 pub struct RenderRequest {
     /// Width and height in pixels.
@@ -46,9 +46,9 @@ pub struct RenderRequest {
 pub struct RenderedImage {
     /// The image.
     pub frame: Frame,
-    /// Rays by kind, effects, warnings.
+    /// Statistics: rays by kind, effects, warnings.
     pub report: RenderReport,
-    /// Requested effects that have no use in the scene.
+    /// Requested effects that have no effect in the scene.
     pub warnings: Vec<String>,
     /// Wall time of building the acceleration structure.
     pub build_secs: f64,
@@ -66,7 +66,7 @@ pub struct RenderControl<'a> {
 }
 
 impl RenderControl<'_> {
-    /// [`Interrupted`] once the flag is set.
+    /// Returns [`Interrupted`] once the flag is set.
     fn check(&self) -> Result<(), Interrupted> {
         let is_set = self.cancel.as_ref().is_some_and(|c| c.load(Ordering::Relaxed));
         if is_set { Err(Interrupted) } else { Ok(()) }
@@ -109,7 +109,7 @@ pub fn draw(
     let requested = request.style.effects;
     let glass = requested.contains(Effects::REFRACTION);
     let path = requested.contains(Effects::PATH_TRACING);
-    // Requested effects are named, so that the report says which of them change no pixel.
+    // Pass the requested effects explicitly, so that the report says which of them change no pixel.
     let needed = Effects::required_by(&scene) | Effects::required_by_camera(&camera);
     let options = RenderOptions {
         effects: Some(needed | requested),

@@ -6,7 +6,7 @@ use datasets::image_io::{self, Metadata, Picture, PngDepth, keys};
 use rt_core::frame::{Frame, PlaneValues};
 use std::path::Path;
 
-/// Every layer of a frame as named planes. Where there is nothing, ids are -1.
+/// Every layer of a frame as named planes. Pixels without a hit have id -1.
 pub fn picture(frame: &Frame) -> anyhow::Result<Picture> {
     let mut p = Picture::new(frame.width, frame.height);
     for plane in frame.planes() {
@@ -31,7 +31,7 @@ pub fn rounds_ids(frame: &Frame) -> bool {
     ids.filter(|&&i| i != u32::MAX).any(|&i| i > LARGEST_EXACT_ID)
 }
 
-/// What the file says about its making.
+/// Metadata about how the image was made.
 pub fn metadata(rendered: &RenderedImage, request: &RenderRequest) -> Metadata {
     let mut m = image_io::metadata_of_this_run("bench", env!("CARGO_PKG_VERSION"));
     let names = |n: &mut dyn Iterator<Item = &'static str>| n.collect::<Vec<_>>().join(", ");

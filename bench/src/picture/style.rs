@@ -20,10 +20,10 @@ use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{Volume, VolumeOptions};
 
-/// What is drawn around and upon the subject.
+/// Appearance of the subject and its surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RenderStyle {
-    /// The effects to show. What a file asks for by itself (opacity, glass) is shown in any case.
+    /// The effects to show. Effects that a file requires (opacity, glass) are always shown.
     pub effects: Effects,
     /// Colour map of scalars: one of [`colormaps::NAMES`].
     pub colors: String,
@@ -31,13 +31,13 @@ pub struct RenderStyle {
     pub range: Option<[f32; 2]>,
     /// What fills uncovered pixels.
     pub background: Background,
-    /// Refraction belongs to the parts that are [`PartColoring::Glass`]; otherwise it makes glass
-    /// of everything.
+    /// If true, only parts with [`PartColoring::Glass`] refract; otherwise refraction turns
+    /// everything into glass.
     pub glass_parts_only: bool,
-    /// How far ambient occlusion looks, in radii of the subject.
+    /// Range of ambient occlusion, in radii of the subject.
     pub occlusion_radii: f64,
-    /// Of a volume: scalars and the opacity of a stretch as long as a tenth of its diagonal, linear
-    /// in between; `None` for a ramp over the range of the colours.
+    /// Transfer function of a volume: scalars, and the opacity of a path of one tenth of its
+    /// diagonal, linear in between. `None` for a ramp over the range of the colours.
     pub opacity: Option<Vec<[f32; 2]>>,
 }
 
@@ -55,7 +55,7 @@ impl Default for RenderStyle {
     }
 }
 
-/// Pale, darker below.
+/// A pale gradient, darker at the bottom.
 const BACKDROP: Background =
     Background::Gradient { bottom: [0.42, 0.45, 0.50], top: [0.86, 0.89, 0.93] };
 
@@ -69,15 +69,15 @@ pub const BACKGROUNDS: [(&str, Background); 4] = [
 
 /// Angular radius of the key light when its shadows are soft, radians.
 const KEY_SIZE_RAD: f64 = 0.06;
-/// Aperture of the lens as a share of the distance to the subject.
+/// Aperture of the lens as a fraction of the distance to the subject.
 const APERTURE: f64 = 0.012;
 
-/// Opacity at the upper end of a volume's default ramp, and the stretch that opacities are given
-/// for as a share of the volume's diagonal: neither fog nor a wall for smooth fields.
+/// Opacity at the upper end of a volume's default ramp, and the path length for opacities as a
+/// fraction of the volume's diagonal. Smooth fields become neither faint nor opaque.
 const RAMP_OPACITY: f32 = 0.5;
 const OPACITY_STRETCH: f64 = 0.1;
 
-/// Effects by the names of the command line, the first of each being the one in messages.
+/// Effects by their names on the command line; messages use the first name.
 const NAMES: [(Effects, &[&str]); 10] = [
     (Effects::SHADOWS, &["shadows", "shadow"]),
     (Effects::SOFT_SHADOWS, &["soft-shadows"]),
@@ -91,7 +91,7 @@ const NAMES: [(Effects, &[&str]); 10] = [
     (Effects::PATH_TRACING, &["path-tracing"]),
 ];
 
-/// A list of effects, separated by commas; `none` and nothing at all are the empty set.
+/// Parses a list of effects, separated by commas; `none` and the empty string are the empty set.
 ///
 /// ```
 /// use bench::picture::style::parse_effects;
@@ -121,7 +121,7 @@ impl RenderStyle {
         self.effects.intersects(effects)
     }
 
-    /// The subject in the studio, built.
+    /// Builds the scene of the subject with lights and background.
     pub fn scene(&self, subject: Subject, build: &BuildOptions) -> anyhow::Result<Scene> {
         let mut builder = SceneBuilder::new();
         builder.build_options = *build;
@@ -156,9 +156,9 @@ impl RenderStyle {
             builder.light(light);
         }
         if surrounded {
-            // Something to see in the mirrors; it takes the place of the ambient light.
+            // A gradient environment for mirrors to reflect; it replaces the ambient light.
             let up = subject.up.as_vec3().try_normalize().unwrap_or(Vec3::Z);
-            // What is seen through glass is as bright as what is seen beside it.
+            // Surroundings seen through glass are as bright as those next to it.
             let (bottom, top) = match self.background {
                 Background::Gradient { bottom, top } if self.has(Effects::REFRACTION) => {
                     (bottom, top)
@@ -197,7 +197,7 @@ impl RenderStyle {
         vec![key, Light::headlight().with_color([0.16; 3]), Light::ambient([0.27; 3])]
     }
 
-    /// A material with the wished effects on it.
+    /// A material with the requested effects.
     fn with_effects(&self, mut m: Material) -> Material {
         if self.has(Effects::REFRACTION) && !self.glass_parts_only {
             m = glass(m.color);
@@ -219,7 +219,8 @@ impl RenderStyle {
         m
     }
 
-    /// Lengths that depend on the subject's radius (half the diagonal of its bounds, world units).
+    /// Sets the lengths that depend on the subject's radius (half the diagonal of its bounds, world
+    /// units).
     pub(super) fn scale_to_subject(&self, scene: &mut Scene, radius: f64) {
         if self.has(Effects::AMBIENT_OCCLUSION) {
             let distance = (self.occlusion_radii * radius).max(f64::MIN_POSITIVE);
@@ -234,7 +235,7 @@ impl RenderStyle {
         }
     }
 
-    /// The camera with a lens when depth of field is wished.
+    /// The camera, with a lens when depth of field is requested.
     pub(super) fn lens(&self, camera: Camera, focus_distance: f64) -> anyhow::Result<Camera> {
         if !self.has(Effects::DEPTH_OF_FIELD) {
             return Ok(camera);
@@ -244,19 +245,19 @@ impl RenderStyle {
     }
 }
 
-/// Effects that replace what a file says about its surfaces.
+/// Effects that override a file's materials.
 const MATERIAL_EFFECTS: Effects = Effects::REFLECTION
     .union(Effects::GLOSSY_REFLECTION)
     .union(Effects::REFRACTION)
     .union(Effects::TRANSPARENCY);
 
-/// Glass, its absorption over a length of 1.
+/// Glass with absorption over a length of 1.
 fn glass(color: [f32; 3]) -> Material {
     let absorption = color.map(|c| -c.clamp(0.02, 0.999).ln());
     Material { model: SurfaceModel::Dielectric { ior: 1.5, absorption }, ..Material::matte(color) }
 }
 
-/// A little gloss shows the shape.
+/// A plain material with a weak gloss that shows the shape.
 fn plain(color: [f32; 3]) -> Material {
     Material::phong(color, 0.12, 40.0)
 }

@@ -19,13 +19,13 @@ use std::sync::Arc;
 /// Where a part's colour comes from.
 #[derive(Debug, Clone)]
 pub enum PartColoring {
-    /// The geometry's scalars through the colour map.
+    /// The geometry's scalars mapped to colours.
     Scalars,
-    /// The geometry's own colours, else this one (linear RGB).
+    /// The geometry's own colours, or else this one (linear RGB).
     Color([f32; 3]),
-    /// Glass that lets this much of white light through over the subject's radius (linear RGB).
+    /// Glass that transmits this fraction of white light over the subject's radius (linear RGB).
     Glass([f32; 3]),
-    /// A material out of the file.
+    /// A material from the file.
     FileMaterial(Material),
 }
 
@@ -36,7 +36,7 @@ pub struct Part {
     pub geometry: Geometry,
     /// Its colour.
     pub coloring: PartColoring,
-    /// World points that a shape lies between; a mesh has its vertices.
+    /// World points that bound a shape; empty for meshes, which have vertices.
     outline: Vec<DVec3>,
 }
 
@@ -59,55 +59,55 @@ pub struct VolumeField {
     pub range: [f32; 2],
 }
 
-/// Everything that is drawn.
+/// All geometry and volumes of an image.
 #[derive(Clone)]
 pub struct Subject {
     /// The parts.
     pub parts: Vec<Part>,
-    /// What is drawn by direct volume rendering.
+    /// The field for direct volume rendering.
     pub volume: Option<VolumeField>,
     /// Range of all scalars.
     pub scalar_range: Option<[f32; 2]>,
-    /// Upward in the world.
+    /// Upward direction in the world.
     pub up: DVec3,
-    /// What was left out or chosen, one sentence each.
+    /// What was left out or chosen automatically, one sentence each.
     pub warnings: Vec<String>,
-    /// What kinds of geometry, in words.
+    /// Descriptions of the kinds of geometry.
     pub contents: Vec<String>,
 }
 
-/// How a file is turned into a subject.
+/// Options for loading a file as a subject.
 #[derive(Debug, Clone, Default)]
 pub struct LoadOptions {
-    /// The array to colour by; `None` for the one that the file marks, if it does.
+    /// The array to colour by; `None` for the one that the file marks, if any.
     pub color_by: Option<String>,
-    /// Isovalue for image data; `None` for the middle of the range, and for no isosurface inside a
-    /// volume.
+    /// Isovalue for image data; `None` for the middle of the range, or for no isosurface when there
+    /// is a volume.
     pub isovalue: Option<f32>,
     /// Whether image data is drawn as a volume.
     pub volume: VolumeChoice,
 }
 
-/// Which field is drawn as a volume.
+/// Selects the field for volume rendering.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum VolumeChoice {
     /// None.
     #[default]
     No,
-    /// The one to colour by, else the one that the file marks, else the first.
+    /// The array to colour by, or else the one that the file marks, or else the first.
     Marked,
     /// This array.
     Named(String),
 }
 
-/// Colour of things without one, linear.
+/// Colour of geometry without one, linear.
 const DEFAULT_COLOR: [f32; 3] = [0.62, 0.60, 0.56];
-/// Radius of tubes and points, as a share of the diagonal.
+/// Radius of tubes and points, as a fraction of the diagonal.
 const TUBE_RADIUS: f64 = 0.002;
 const POINT_RADIUS: f64 = 0.004;
 
 impl Subject {
-    /// Nothing.
+    /// An empty subject.
     pub fn empty(up: DVec3) -> Subject {
         Subject {
             parts: vec![],
@@ -119,7 +119,7 @@ impl Subject {
         }
     }
 
-    /// Triangles of all parts.
+    /// Number of triangles of all parts.
     pub fn triangles(&self) -> usize {
         let count = |p: &Part| match &p.geometry {
             Geometry::Mesh(m) => m.num_triangles(),
@@ -128,8 +128,8 @@ impl Subject {
         self.parts.iter().map(count).sum()
     }
 
-    /// Calls `point` with world points that all of the subject lies between: vertices, points of
-    /// lines, corners of boxes.
+    /// Calls `point` with world points that bound the subject: vertices, points of lines, corners
+    /// of boxes.
     pub(super) fn outline(&self, point: &mut dyn FnMut(DVec3)) {
         for part in &self.parts {
             match &part.geometry {
@@ -146,7 +146,7 @@ impl Subject {
         }
     }
 
-    /// Adds triangles; their scalars, if any, are mapped to colours.
+    /// Adds triangles; scalars, if any, are mapped to colours.
     pub fn add_mesh(&mut self, mesh: TriMesh, otherwise: [f32; 3]) {
         let coloring = match &mesh.scalars {
             Some(s) => {
@@ -177,7 +177,7 @@ impl Subject {
         Ok(())
     }
 
-    /// Everything visible in a file.
+    /// Builds a subject from all visible content of a file.
     pub fn from_file(opened: &LoadedFile, load_options: &LoadOptions) -> anyhow::Result<Subject> {
         let mut subject = match &opened.content {
             Content::Scene(_) if load_options.volume != VolumeChoice::No => {
@@ -287,15 +287,14 @@ fn add_volume(
     Ok(())
 }
 
-/// The first array of a file, those on points before those on cells.
+/// The first array of a file; arrays on points come before those on cells.
 fn first_array(data: &Dataset) -> Option<String> {
     let attributes = data.leaves().first()?.attributes()?;
     let first = attributes.point.first().or_else(|| attributes.cell.first());
     first.map(|a| a.name.clone())
 }
 
-/// The field of image data; `None` where there is none, or where its outer surface is all there is
-/// to see.
+/// The field of image data; `None` if there is none, or if only its boundary surface can be drawn.
 fn lattice(
     data: &Dataset,
     color: &Option<String>,
@@ -324,7 +323,7 @@ fn isosurface(
     colors: Arc<Grid>,
     load_options: &LoadOptions,
 ) -> anyhow::Result<Subject> {
-    // The surface belongs to the field that the file marks; another array colours it.
+    // The isosurface is that of the field that the file marks; another array colours it.
     let marked = data.leaves()[0].attributes().and_then(|a| {
         a.point_scalars
             .clone()
@@ -414,7 +413,7 @@ fn add_points(subject: &mut Subject, data: &Dataset, color: Option<&str>) -> any
 }
 
 // ---- meshes with materials ----------------------------------------------------------------------
-/// Scenes have y up, as glTF demands and most OBJ files do.
+/// Scenes have y up, as glTF requires and most OBJ files use.
 fn from_scene(model: &SceneModel, load_options: &LoadOptions) -> anyhow::Result<Subject> {
     let mut subject = Subject::empty(DVec3::Y);
     if let Some(request) = &load_options.color_by {
@@ -443,7 +442,7 @@ fn from_scene(model: &SceneModel, load_options: &LoadOptions) -> anyhow::Result<
     Ok(subject)
 }
 
-/// Height as the scalar of a mesh.
+/// Sets the height as the scalar of a mesh.
 pub fn color_by_height(mesh: &mut TriMesh, up: Vec3) {
     mesh.scalars = Some(Attribute::per_vertex(mesh.positions.iter().map(|p| p.dot(up)).collect()));
 }

@@ -11,7 +11,7 @@ pub(crate) use svg::escape;
 
 use serde::{Deserialize, Serialize};
 
-/// How an axis maps numbers to the page.
+/// Mapping of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scale {
@@ -21,17 +21,17 @@ pub enum Scale {
     Log,
 }
 
-/// Points joined by lines, or bars side by side.
+/// Kind of plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// x against y.
+    /// Points joined by lines.
     Lines,
-    /// x is the index of a category; one bar per series.
+    /// Bars side by side: x is the index of a category; one bar per series.
     Bars,
 }
 
-/// An axis with what it shows.
+/// An axis with its label.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Axis {
     /// The quantity.
@@ -60,7 +60,7 @@ impl Axis {
     }
 }
 
-/// A point with the range its samples had.
+/// A point with the range of its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// Value, or index of the category.
@@ -76,12 +76,12 @@ pub struct Point {
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// In the order they are joined.
+    /// The points, in the order in which lines join them.
     pub points: Vec<Point>,
 }
 
 impl Series {
-    /// Points without ranges.
+    /// A series of points without ranges.
     pub fn new(name: impl Into<String>, points: Vec<(f64, f64)>) -> Series {
         let points = points.into_iter().map(|(x, y)| Point { x, y, range: None }).collect();
         Series { name: name.into(), points }
@@ -95,15 +95,15 @@ pub struct Plot {
     pub title: String,
     /// Lines or bars.
     pub kind: Kind,
-    /// Across.
+    /// Horizontal axis.
     pub x: Axis,
-    /// Up.
+    /// Vertical axis.
     pub y: Axis,
     /// Names of the categories of [`Kind::Bars`].
     pub categories: Vec<String>,
-    /// What is drawn.
+    /// The data.
     pub series: Vec<Series>,
-    /// A value worth a line across, such as a ratio of 1.
+    /// A value to mark with a line across the plot, such as a ratio of 1.
     #[serde(default)]
     pub mark: Option<f64>,
 }

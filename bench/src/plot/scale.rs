@@ -40,7 +40,7 @@ impl Mapping {
                 (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
             }
             Scale::Log => {
-                // A little room, then the ticks of the decades that are touched.
+                // Add a margin, then extend to the ticks of the decades in range.
                 let room = ((high / low).ln() * 0.04).max(0.05);
                 (low, high) = ((low.ln() - room).exp(), (high.ln() + room).exp());
             }
@@ -58,7 +58,7 @@ impl Mapping {
         f.is_finite().then_some(self.from + f * (self.to - self.from))
     }
 
-    /// Where bars stand on: 0, or the lower end.
+    /// The value at which bars start: 0, or the lower end.
     pub(super) fn base(&self) -> f64 {
         self.at(0.0_f64.clamp(self.low, self.high)).unwrap_or(self.from)
     }

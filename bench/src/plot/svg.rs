@@ -10,12 +10,12 @@ const RIGHT: f64 = 16.0;
 const TOP: f64 = 34.0;
 const INNER_HEIGHT: f64 = 270.0;
 const LEGEND_LINE: f64 = 18.0;
-/// Width of a character relative to the font size, for placing legends; on the safe side for
+/// Width of a character relative to the font size, for placing legends; an upper estimate for
 /// sans-serif fonts.
 const CHARACTER: f64 = 0.58;
 
-/// Okabe and Ito's palette, told apart with any colour vision; without the yellow that vanishes on
-/// white.
+/// Okabe and Ito's palette, distinguishable with any colour vision; without yellow, which is
+/// invisible on white.
 const COLORS: [&str; 7] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#777777"];
 const DASHES: [&str; 4] = ["", "7 3", "2 3", "9 3 2 3"];
@@ -123,7 +123,7 @@ fn line(s: &mut String, series: &Series, i: usize, x: &Mapping, y: &Mapping) {
     let mut path = String::new();
     let mut pen_down = false;
     for p in &series.points {
-        // A point that the axes cannot show breaks the line rather than bending it.
+        // A point that the axes cannot show interrupts the line.
         let (Some(px), Some(py)) = (x.at(p.x), y.at(p.y)) else {
             pen_down = false;
             continue;
@@ -192,7 +192,7 @@ fn bars(s: &mut String, plot: &Plot, y: &Mapping, right: f64, bottom: f64) {
     }
 }
 
-/// Names that do not fit side by side are turned.
+/// Whether the names are rotated because they do not fit side by side.
 fn labels_turned(plot: &Plot) -> bool {
     let slot = (WIDTH - LEFT - RIGHT) / plot.categories.len().max(1) as f64;
     plot.categories.iter().any(|c| c.chars().count() as f64 * 12.0 * CHARACTER > slot)
@@ -207,7 +207,7 @@ fn bar_label_height(plot: &Plot) -> f64 {
     }
 }
 
-/// Where each series' legend entry begins: filled row by row.
+/// Position of each series' legend entry, filled row by row.
 fn legend_places(plot: &Plot, top: f64) -> Vec<(f64, f64)> {
     let (mut x, mut y) = (LEFT, top);
     let mut places = vec![];
@@ -232,7 +232,7 @@ fn fill(i: usize) -> (&'static str, f64) {
     (COLORS[i % COLORS.len()], if (i / COLORS.len()).is_multiple_of(2) { 0.9 } else { 0.45 })
 }
 
-/// A mark of its own shape for each series.
+/// Draws a marker with a different shape for each series.
 fn mark(s: &mut String, i: usize, x: f64, y: f64) {
     let color = COLORS[i % COLORS.len()];
     let d = match i % 5 {
@@ -285,8 +285,8 @@ mod tests {
     use super::super::{Axis, Point};
     use super::*;
 
-    /// Checks that the text is well-formed XML with a real parser and gives the number of elements
-    /// of a name.
+    /// Parses the text as XML, to check that it is well-formed, and returns the number of elements
+    /// with a name.
     fn count(svg: &str, element: &str) -> usize {
         let doc = roxmltree::Document::parse(svg).unwrap_or_else(|e| panic!("{e}\n{svg}"));
         doc.descendants()

@@ -172,7 +172,7 @@ fn chapter_title(chapter: u8) -> &'static str {
     }
 }
 
-/// Sorts `fig4.10` behind `fig4.9`.
+/// Sort key that places `fig4.10` after `fig4.9`.
 fn natural(id: &str) -> Vec<(String, u32)> {
     let mut parts = vec![];
     let mut rest = id;
@@ -227,8 +227,8 @@ mod tests {
 
     #[test]
     fn page_is_well_formed() {
-        // The page is written so that, doctype and void tags aside, it is XML: then nothing is left
-        // open.
+        // Apart from the doctype and void tags, the page is XML, so the parser finds elements that
+        // are not closed.
         let page = page(&records()).replace("<!doctype html>", "");
         let mut closed = String::new();
         let mut rest = page.as_str();

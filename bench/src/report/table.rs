@@ -4,7 +4,7 @@ use crate::plot::escape;
 use crate::record::{Column, Record};
 use serde_json::Value;
 
-/// Tables longer than this are folded.
+/// Longer tables are collapsed.
 const ROWS_SHOWN: usize = 12;
 
 pub(super) fn rows(r: &Record) -> String {
@@ -49,7 +49,8 @@ fn cell(v: Option<&Value>) -> String {
     }
 }
 
-/// Four significant digits: more would claim what the machine cannot repeat. The CSV has them all.
+/// Four significant digits; more would exceed the repeatability of the machine. The CSV has all
+/// digits.
 fn four_digits(x: f64) -> String {
     if x == 0.0 {
         return "0".into();

@@ -1,9 +1,11 @@
-//! Exceptions that are counted: what a rule found when it was made may grow fewer, never more.
+//! Counted exceptions: the number of faults that existed when a rule was introduced may fall but
+//! not rise.
 
 use std::collections::BTreeMap;
 
-/// Compares faults, each with the place it counts for, with the number that `allowed` has for that
-/// place. A number that is too high is a fault too, or new faults would hide below it.
+/// Compares faults, each with the place to which it is counted, with the number that `allowed` has
+/// for that place. A number that is too high is also a fault; otherwise new faults could go
+/// unnoticed.
 pub(crate) fn exceptions(
     list: &str,
     allowed: &[(&str, usize)],

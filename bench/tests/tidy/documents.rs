@@ -1,4 +1,5 @@
-//! What the documents say must be there: linked files, chapters, named tests, experiments.
+//! Everything that the documents refer to must exist: linked files, chapters, named tests,
+//! experiments.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -7,7 +8,7 @@ use std::process::Command;
 use crate::counted::exceptions;
 use crate::tree::{File, files, root, words};
 
-/// Files that documents link to and that are still to be made, and by what.
+/// Files that documents link to but that do not exist yet, and who makes them.
 const PENDING: &[(&str, &str)] = &[];
 
 fn documents() -> Vec<File> {
@@ -46,7 +47,7 @@ fn links(file: &File) -> Vec<(usize, String)> {
     found
 }
 
-/// `path` seen from `folder`, without `.` and `..`.
+/// Resolves `path` relative to `folder`, without `.` and `..`.
 fn normalized(folder: &str, path: &str) -> String {
     let mut parts: Vec<&str> = folder.split('/').filter(|p| !p.is_empty()).collect();
     for part in path.split('/') {
@@ -87,8 +88,8 @@ fn planted_dead_links_are_found() {
 }
 
 // ---- The book -----------------------------------------------------------------------------------
-/// Chapters that SUMMARY.md lists, or that exist, or whose examples are compiled: all by path from
-/// docs/src.
+/// Chapters that SUMMARY.md lists, that exist, or whose examples are compiled; all as paths
+/// relative to docs/src.
 #[test]
 fn the_book_is_complete() {
     let summary: BTreeSet<String> =
@@ -132,7 +133,7 @@ fn has_rust_examples(file: &File) -> bool {
 }
 
 // ---- Invariants and their tests -----------------------------------------------------------------
-/// The items of the lists below headings that begin with `## Invariants`.
+/// The list items below headings that begin with `## Invariants`.
 fn invariants(document: &File) -> Vec<String> {
     let mut items: Vec<String> = Vec::new();
     let (mut in_section, mut in_item) = (false, false);
@@ -175,15 +176,15 @@ fn untested_invariants(document: &File, is_test: impl Fn(&str) -> bool) -> (usiz
             faults.push(format!("{path}: `{head}...`: neither `*Test:*` nor `*Not tested yet:*`"));
         }
     }
-    // A list that nobody reads looks like one that is kept.
+    // A list in an unknown format would look like one that is checked.
     if document.text.contains("*Test:*") && items.is_empty() {
         faults.push(format!("{path}: `*Test:*` outside a list below `## Invariants`"));
     }
     (items.len(), faults)
 }
 
-/// What ARCHITECTURE.md and the READMEs of all members call invariants: what moves between them is
-/// not lost.
+/// Minimum number of invariants in ARCHITECTURE.md and the READMEs of all members, so that none is
+/// lost when they are moved.
 const FEWEST_INVARIANTS: usize = 110;
 
 #[test]
@@ -238,7 +239,7 @@ fn architecture_names_every_room() {
 }
 
 // ---- READMEs of members -------------------------------------------------------------------------
-/// The sections of every member's README, in this order; others may stand between.
+/// The sections of every member's README, in this order; other sections may come between them.
 const README_SECTIONS: &[&str] = &["## Use it", "## Read on", "## Invariants"];
 
 fn readme_faults(member: &str, text: &str) -> Vec<String> {
@@ -277,8 +278,7 @@ fn planted_readmes_out_of_order_are_found() {
 }
 
 // ---- The map of the sources ---------------------------------------------------------------------
-/// Files and folders that a document names in backticks, each with its line and the section it
-/// stands in.
+/// Files and folders that a document names in backticks, each with its line and section.
 fn named_paths(file: &File) -> Vec<(usize, &str, &str)> {
     let (mut section, mut found) = ("", Vec::new());
     for (number, line) in prose(file) {
@@ -296,15 +296,15 @@ fn named_paths(file: &File) -> Vec<(usize, &str, &str)> {
     found
 }
 
-/// A path is the end of a path of the tree; a bare name is one of the member whose section it
-/// stands in.
+/// Named paths that do not exist. A path must be the end of a path of the tree; a bare name must
+/// belong to the member of its section.
 fn lost_paths(file: &File, tree: &[String]) -> Vec<String> {
     let members: BTreeSet<&str> = tree.iter().filter_map(|p| p.split('/').next()).collect();
     let lost = named_paths(file).into_iter().filter(|(_, section, path)| {
         let path = path.trim_start_matches("../").trim_end_matches('/');
         let anywhere = path.contains('/') || !members.contains(section);
         let of_section = |p: &str| anywhere || p.split('/').next() == Some(section);
-        // Folders are what files stand in; `a/b` may be the module `a/b.rs`.
+        // Folders contain files; `a/b` may be the module `a/b.rs`.
         let (inside, folder) = (format!("/{path}"), format!("/{path}/"));
         let ends = [inside.clone(), inside.clone() + ".rs"];
         !tree.iter().any(|p| {
@@ -318,7 +318,7 @@ fn lost_paths(file: &File, tree: &[String]) -> Vec<String> {
     lost.map(|(line, _, path)| format!("{}:{line}: there is no {path}", file.path)).collect()
 }
 
-/// Paths that the map still names and that have moved.
+/// Number of moved paths that the map still names.
 const LOST_PATHS: &[(&str, usize)] = &[("docs/src/appendix/code_map.md", 51)];
 
 #[test]
@@ -349,7 +349,7 @@ fn experiment_ids(file: &File) -> Vec<String> {
     let id = |rest: &str| {
         rest.chars().take_while(|c| c.is_alphanumeric() || "_-".contains(*c)).collect::<String>()
     };
-    // `run ID` stands for any of them.
+    // `run ID` is a placeholder.
     commands.map(id).filter(|i| !i.is_empty() && i != "ID").collect()
 }
 

@@ -1,19 +1,20 @@
-//! What the libraries offer is shown somewhere: in an example, a documentation test, a README or
-//! the book.
+//! Every public item of the libraries appears in an example, a documentation test, a README or the
+//! book.
 
 use std::collections::BTreeSet;
 
 use crate::counted::exceptions;
 use crate::tree::{File, files};
 
-/// The members that people embed, and how many of their public items are not shown yet.
+/// The members that other programs embed, and the number of their public items that do not appear
+/// yet.
 const NOT_SHOWN: &[(&str, usize)] = &[("composite", 46), ("rt-core", 77), ("schlieren", 154)];
 
 const ITEMS: &[&str] =
     &["fn ", "const fn ", "unsafe fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
 
-/// Names of the public items of a source file, with their lines. The lint `unreachable_pub` sees to
-/// it that what is `pub` can be reached from outside.
+/// Names of the public items of a source file, with their lines. The lint `unreachable_pub` ensures
+/// that `pub` items can be reached from outside.
 fn public_items(file: &File) -> Vec<(usize, &str)> {
     let name = |line: &'_ str| {
         let rest = line.strip_prefix("pub ")?;
@@ -32,8 +33,8 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// The code that a file shows to readers: a whole example, what stands between fences or backticks
-/// in a document, the fenced parts of Rust's documentation comments.
+/// The code that a file shows to readers: a whole example, the text between fences or backticks in
+/// a document, the fenced parts of Rust's documentation comments.
 fn shown(file: &File) -> String {
     if file.path.contains("/examples/") {
         return file.code.clone();

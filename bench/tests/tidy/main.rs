@@ -1,8 +1,8 @@
-//! Keeps ARCHITECTURE.md true: reads the manifests, the sources and the documents of the workspace
+//! Enforces ARCHITECTURE.md: reads the manifests, the sources and the documents of the workspace,
 //! and fails where they break a rule that is written there. Every check has a twin (`planted_...`)
-//! that shows it finds what it should.
+//! that shows that it finds planted faults.
 //!
-//! The checks read text, so they are rules for people who want to follow them, not a defence
+//! The checks read text. They help people who want to follow the rules; they are not a defence
 //! against tricks.
 
 mod counted;

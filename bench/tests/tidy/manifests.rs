@@ -1,11 +1,11 @@
-//! What the Cargo.toml files may say: which member may use which, and where versions stand.
+//! Rules for the Cargo.toml files: dependencies between members, and the place of versions.
 
 use std::collections::BTreeMap;
 use std::process::Command;
 
 use crate::tree::{File, root};
 
-/// When an arrow may be drawn.
+/// When a member may depend on another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum May {
     /// Always.
@@ -14,7 +14,7 @@ enum May {
     UseBehindAFeature,
 }
 
-/// The arrows of ARCHITECTURE.md. A new line here is a decision; record it there.
+/// The allowed dependencies of ARCHITECTURE.md. A new line here is a decision; record it there.
 const ARROWS: &[(&str, May, &[&str])] = &[
     ("rt-core", May::Use, &[]),
     ("datasets", May::Use, &["rt-core"]),
@@ -31,11 +31,11 @@ const ARROWS: &[(&str, May, &[&str])] = &[
 pub(crate) struct Arrow {
     from: String,
     to: String,
-    /// Optional, or in tests only.
+    /// Whether the dependency is optional, or for tests only.
     weak: bool,
 }
 
-/// The members, with their arrows, as cargo sees them.
+/// The members with their dependencies on each other, according to cargo.
 pub(crate) fn members() -> BTreeMap<String, Vec<Arrow>> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
@@ -106,8 +106,8 @@ fn planted_arrows_are_found() {
     assert_eq!(fault(&arrow("gluray", "composite", false)), None);
 }
 
-// ---- Versions, lints and licences stand in the root, once ---------------------------------------
-/// What a member's Cargo.toml must inherit, and the dependencies that do not.
+// ---- Versions, lints and licences are defined once, in the root ---------------------------------
+/// What a member's Cargo.toml must inherit but does not, including dependencies.
 fn not_inherited(manifest: &File) -> Vec<String> {
     let mut faults = Vec::new();
     for key in ["version", "edition", "rust-version", "license"] {

@@ -1,14 +1,14 @@
-//! Modules of one folder import each other in one direction: who reads them can begin somewhere.
+//! Modules of one folder import each other in one direction, so that a reader knows where to begin.
 //!
-//! A module and the modules inside it are one thing here; what counts is what stands side by side.
+//! A module and its submodules count as one; only modules in the same folder are compared.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::counted::exceptions;
 use crate::tree::{File, files, words};
 
-/// How many imports between the modules of a folder lie on a circle. What two modules need of each
-/// other belongs into a third.
+/// Number of imports between the modules of a folder that are part of a cycle. Code that two
+/// modules need from each other belongs into a third.
 const CIRCLES: &[(&str, usize)] = &[
     ("composite/src", 4),
     ("datasets/src/model", 2),
@@ -33,7 +33,7 @@ const CIRCLES: &[(&str, usize)] = &[
 
 /// The source files of one member, by module path: `[]` is main.rs, or lib.rs without one.
 type Modules<'a> = BTreeMap<Vec<&'a str>, &'a File>;
-/// An import between two modules of a folder, with a place where it is written.
+/// An import between two modules of a folder, with a place where it occurs.
 type Imports<'a> = BTreeMap<(&'a str, &'a str), String>;
 
 /// `bvh/layout/mod.rs` as `["bvh", "layout"]`.
@@ -46,18 +46,19 @@ fn module_path(path: &str) -> Vec<&str> {
     parts
 }
 
-/// Code up to the module of unit tests, which may use what they like.
+/// Code before the module of unit tests, which may import anything.
 fn without_tests(code: &str) -> &str {
     code.find("#[cfg(test)]\nmod tests").map_or(code, |at| &code[..at])
 }
 
-/// The paths that begin with `crate` or `super`, each with its offset; groups in braces are taken
-/// apart.
+/// The paths that begin with `crate` or `super`, each with its offset; groups in braces are
+/// expanded.
 fn imports(code: &str) -> Vec<(usize, Vec<&str>)> {
     let mut found = Vec::new();
     for start in ["crate", "super"] {
         for at in words(code, start) {
-            // `super::super::x` is one path, `$crate` one of a macro, `in crate::x` no import.
+            // `super::super::x` is one path; `$crate` belongs to a macro; `in crate::x` is not an
+            // import.
             let before = &code[..at];
             let begins = !["::", "$", "in "].iter().any(|end| before.ends_with(end));
             if begins && code[at + start.len()..].starts_with("::") {
@@ -68,7 +69,7 @@ fn imports(code: &str) -> Vec<(usize, Vec<&str>)> {
     found
 }
 
-/// Reads one path, or a tree of them, and returns the offset behind it.
+/// Parses one path, or a tree of them, and returns the offset after it.
 fn take_path<'a>(
     code: &'a str,
     mut at: usize,
@@ -82,7 +83,7 @@ fn take_path<'a>(
             at = code.len() - group.len();
             while !code[at..].starts_with('}') && at < code.len() {
                 at = take_path(code, at, path, found);
-                // What is left of an element is a new name, `as x`.
+                // The rest of an element is a new name, `as x`.
                 at += code[at..].find([',', '}']).unwrap_or(code.len() - at);
                 at += usize::from(code[at..].starts_with(','));
                 at += code[at..].len() - code[at..].trim_start().len();
@@ -104,7 +105,7 @@ fn take_path<'a>(
     at
 }
 
-/// The module that a path written in `from` leads to: the deepest that there is.
+/// The module to which a path in `from` leads: the deepest one that exists.
 fn target<'a>(modules: &Modules<'a>, from: &[&'a str], path: &[&str]) -> Vec<&'a str> {
     let mut at = from.to_vec();
     for (i, name) in path.iter().enumerate() {
@@ -126,7 +127,7 @@ fn target<'a>(modules: &Modules<'a>, from: &[&'a str], path: &[&str]) -> Vec<&'a
     at
 }
 
-/// Imports between modules side by side, for each folder of a member's sources.
+/// Imports between modules of the same folder, for each folder of a member's sources.
 fn folders<'a>(modules: &Modules<'a>) -> BTreeMap<Vec<&'a str>, Imports<'a>> {
     let mut folders: BTreeMap<Vec<&str>, Imports<'_>> = BTreeMap::new();
     for (from, file) in modules {
@@ -143,7 +144,7 @@ fn folders<'a>(modules: &Modules<'a>) -> BTreeMap<Vec<&'a str>, Imports<'a>> {
     folders
 }
 
-/// The modules that a module can be followed to.
+/// The modules that can be reached from a module.
 fn reached<'a>(imports: &Imports<'a>, from: &'a str) -> BTreeSet<&'a str> {
     let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
     while let Some(module) = open.pop() {
@@ -156,7 +157,7 @@ fn reached<'a>(imports: &Imports<'a>, from: &'a str) -> BTreeSet<&'a str> {
     seen
 }
 
-/// Whether a module is compiled for unit tests alone: `#[cfg(test)]` stands before its declaration.
+/// Whether a module is compiled for unit tests only: `#[cfg(test)]` precedes its declaration.
 fn is_for_tests(modules: &Modules<'_>, module: &[&str]) -> bool {
     (0..module.len()).any(|depth| {
         let Some(parent) = modules.get(&module[..depth]) else { return false };
@@ -170,7 +171,7 @@ fn is_for_tests(modules: &Modules<'_>, module: &[&str]) -> bool {
     })
 }
 
-/// The imports of a member that lie on a circle: the folder, and the import with its place.
+/// The imports of a member that are part of a cycle: the folder, and the import with its place.
 fn circles(member: &str, files: &[File]) -> Vec<(String, String)> {
     let source = format!("{member}/src/");
     let mut modules: Modules<'_> = files

@@ -1,9 +1,9 @@
-//! What Rust sources may contain, and how long they may be.
+//! Rules for the content and the length of Rust sources.
 
 use crate::tree::{File, files, words};
 
-/// The only places where `unsafe` may be written, and why it cannot be avoided there.
-/// ARCHITECTURE.md explains each.
+/// The only places where `unsafe` is allowed, and why it cannot be avoided there. ARCHITECTURE.md
+/// explains each.
 pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
     ("gluray/src/interpose/symbols", "exported OpenGL symbols, called by programs we do not know"),
@@ -24,14 +24,14 @@ pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("bench/src/baselines", "calls into C libraries that we measure against"),
 ];
 
-/// Longest file, in lines, without its module of unit tests.
+/// Maximum length of a file, in lines, without its module of unit tests.
 const LONGEST: usize = 600;
-/// The median length that readers can count on.
+/// Maximum median length of the files.
 const LONGEST_MEDIAN: usize = 300;
 /// Files that may be longer, and why.
 const LONG_FILES: &[(&str, &str)] = &[];
 
-/// Every `.rs` file with its faults by `check`, as one list.
+/// The faults that `check` finds in all `.rs` files.
 fn all_faults(check: impl Fn(&File) -> Vec<String>) -> Vec<String> {
     files().iter().filter(|f| f.is_rust()).flat_map(check).collect()
 }
@@ -104,8 +104,8 @@ fn planted_unsafe_is_found() {
     );
 }
 
-// ---- Who may do I/O -----------------------------------------------------------------------------
-/// Modules of std that reach outside the process.
+// ---- Which code may do I/O ----------------------------------------------------------------------
+/// Modules of std that access resources outside the process.
 const OUTSIDE: &[&str] = &["fs", "net", "io", "process"];
 const PRINTING: &[&str] = &["print!", "println!", "eprint!", "eprintln!", "dbg!"];
 
@@ -150,8 +150,8 @@ fn rt_core_does_no_io() {
     assert_none(&all_faults(io_in_rt_core));
 }
 
-/// Library code: not a program, not the shared command-line conventions, not bench and xtask, which
-/// are programs.
+/// Whether a file is library code: not a program, not the shared command-line conventions, not
+/// bench and xtask, which are programs.
 fn is_library(path: &str) -> bool {
     let Some((member, rest)) = path.split_once("/src/") else { return false };
     let program = rest == "main.rs"
@@ -211,8 +211,8 @@ fn composite_faults(file: &File) -> Vec<String> {
         );
     }
     if !outer && !path.starts_with("comm/mpi/") {
-        // Names of MPI functions would be strings for dlsym, so the whole text counts, without
-        // comments.
+        // Names of MPI functions would be strings for dlsym, so the whole text without comments is
+        // searched.
         let lines =
             file.text.lines().filter(|l| !l.trim_start().starts_with("//") && l.contains("MPI_"));
         faults.extend(lines.map(|l| format!("{}: `{}` outside comm/mpi", file.path, l.trim())));
@@ -238,7 +238,7 @@ fn planted_rays_and_mpi_in_composite_are_found() {
 }
 
 // ---- Length -------------------------------------------------------------------------------------
-/// Lines up to the module of unit tests.
+/// Number of lines before the module of unit tests.
 fn length(file: &File) -> usize {
     let lines: Vec<&str> = file.text.lines().collect();
     let tests =
@@ -271,7 +271,7 @@ fn no_file_is_too_long() {
         files.iter().filter(|f| f.path.contains("/src/")).map(length).collect();
     lengths.sort_unstable();
     let (median, longest) = (lengths[lengths.len() / 2], lengths[lengths.len() - 1]);
-    // Written past libtest's capture: the number is worth seeing when all is well, too.
+    // Bypasses libtest's capture, because the number is also of interest when the test passes.
     writeln!(
         std::io::stderr(),
         "{} files in src folders: median {median} lines, longest {longest}",
@@ -366,8 +366,8 @@ fn planted_loose_ends_are_found() {
     }
 }
 
-/// Beginnings of paths that exist on one machine only, put together so that this file does not
-/// contain them.
+/// Beginnings of paths that exist on one machine only, composed so that this file does not contain
+/// them.
 fn machine_paths() -> Vec<String> {
     ["work", "root", "home", "Users"].iter().map(|folder| format!("/{folder}/")).collect()
 }
@@ -376,7 +376,7 @@ fn names_a_machine(file: &File) -> Vec<String> {
     let mut faults = Vec::new();
     for path in machine_paths() {
         for (at, _) in file.text.match_indices(&path) {
-            // `frame/work/x` or `https://x.org/home/` are other things.
+            // `frame/work/x` or `https://x.org/home/` are not such paths.
             if !file.text[..at].ends_with(|c: char| c.is_alphanumeric() || "._-}*".contains(c)) {
                 faults.push(format!("{}: `{path}` is a path of one machine", file.place(at)));
             }

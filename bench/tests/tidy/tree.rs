@@ -10,8 +10,8 @@ pub(crate) struct File {
     pub(crate) path: String,
     /// The whole text.
     pub(crate) text: String,
-    /// For Rust: the text with comments and the inside of literals blanked, line by line as long as
-    /// before.
+    /// For Rust: the text with comments and the contents of literals blanked; all lines keep their
+    /// length.
     pub(crate) code: String,
 }
 
@@ -25,7 +25,7 @@ impl File {
         self.path.ends_with(".rs")
     }
 
-    /// First folder of the path: the member it belongs to.
+    /// First folder of the path, which is the member.
     pub(crate) fn member(&self) -> &str {
         self.path.split('/').next().unwrap_or_default()
     }
@@ -58,7 +58,7 @@ fn walk(folder: &Path, prefix: &str, files: &mut Vec<File>) {
         let entry = entry.unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
         let name = entry.file_name().to_string_lossy().into_owned();
         let path = format!("{prefix}{name}");
-        // What .gitignore names, and git's own folder (a file in a linked work tree).
+        // Files that .gitignore excludes, and git's own folder (a file in a linked work tree).
         let ignored =
             [".git", "target", "shared", "xtask/target", "docs/book"].contains(&path.as_str());
         if ignored || name.ends_with(".tmp") {
@@ -75,7 +75,7 @@ fn walk(folder: &Path, prefix: &str, files: &mut Vec<File>) {
     }
 }
 
-/// Offsets at which `word` stands alone in `code`.
+/// Offsets of whole-word occurrences of `word` in `code`.
 pub(crate) fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
     let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     code.match_indices(word).map(|(at, _)| at).filter(move |&at| {
@@ -83,8 +83,8 @@ pub(crate) fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = us
     })
 }
 
-/// Rust source with comments and the inside of string and character literals replaced by spaces.
-/// Newlines stay, and every byte keeps its offset.
+/// Replaces comments and the contents of string and character literals in Rust source with spaces.
+/// Newlines are kept, and every byte keeps its offset.
 pub(crate) fn blank(source: &str) -> String {
     let s = source.as_bytes();
     let mut out = s.to_vec();
@@ -132,7 +132,7 @@ pub(crate) fn blank(source: &str) -> String {
             erase(&mut out, i + 1, end);
             (end + 1).min(s.len())
         } else if s[i] == b'\'' {
-            // A character literal closes; a lifetime or label does not.
+            // A character literal has a closing quote; a lifetime or label has none.
             let first = source[i + 1..].chars().next();
             let width = first.map_or(0, char::len_utf8);
             if first == Some('\\') {

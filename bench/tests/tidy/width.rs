@@ -1,13 +1,13 @@
-//! No line is wider than a page beside another, where a line can be broken.
+//! Lines are at most 100 characters wide where they can be broken.
 
 use crate::counted::exceptions;
 use crate::documents::prose;
 use crate::tree::{File, files};
 
-/// The width of a line, in characters, as rustfmt.toml has it.
+/// Maximum width of a line in characters, as in rustfmt.toml.
 const WIDEST: usize = 100;
 
-/// Files with lines that could be broken and are not yet, and how many.
+/// Number of lines per file that could be broken but are not yet.
 const WIDE_LINES: &[(&str, usize)] = &[
     ("composite/src/pixel.rs", 1),
     ("composite/src/shared/blended.rs", 1),
@@ -59,7 +59,7 @@ fn wide_lines(file: &File) -> Vec<usize> {
     }
 }
 
-/// Rows of tables, drawings, addresses and literals have the width they have.
+/// Whether a wide line of Rust can be broken: table rows, drawings, addresses and literals cannot.
 fn rust_can_break(text: &str, code: &str) -> bool {
     if let Some(comment) = text.trim_start().strip_prefix("//") {
         let row = comment.trim_start_matches(['/', '!']).trim_start().starts_with('|');
@@ -69,7 +69,8 @@ fn rust_can_break(text: &str, code: &str) -> bool {
     !inside_a_literal && !code.contains('"')
 }
 
-/// A link is one word, also where its text has several.
+/// Whether a wide line of a document can be broken; a link counts as one word, even if its text has
+/// several.
 fn prose_can_break(line: &str) -> bool {
     let line = line.trim_start();
     !line.starts_with('|') && !line.contains("](") && !line.contains("://")

@@ -26,7 +26,7 @@ def option(name, value):
 
 file, size = sys.argv[1], int(sys.argv[2])
 arguments = (ctypes.c_char_p * 2)(b"gmsh", b"-nopopup")
-# Newer versions have an argument more; what it does not expect it does not read.
+# Newer versions take an additional argument; older ones ignore it.
 call("gmshInitialize", ctypes.c_int(2), arguments, ctypes.c_int(0))
 for name, value in {
     "General.Terminal": 0, "General.GraphicsWidth": size, "General.GraphicsHeight": size, "General.MenuWidth": 0,

@@ -6,7 +6,7 @@ file, size = sys.argv[1], int(sys.argv[2])
 reader = XMLPolyDataReader(FileName=[file])
 view = CreateRenderView(ViewSize=[size, size])
 shown = Show(reader, view)
-# One colour; `ColorBy(shown, None)` fails in ParaView 5.11 where nothing was coloured before.
+# A single colour; `ColorBy(shown, None)` fails in ParaView 5.11 when nothing was coloured before.
 shown.ColorArrayName = ["POINTS", ""]
 view.ResetCamera()
 camera = view.GetActiveCamera()
@@ -14,7 +14,7 @@ camera.Azimuth(30)
 camera.Elevation(20)
 Render(view)
 print("ready", flush=True)
-# ParaView's own `sys.stdin` takes the ends off lines, so an empty one looks like the end.
+# ParaView's own `sys.stdin` strips line ends, so an empty line looks like the end of the input.
 commands = os.fdopen(os.dup(0))
 while commands.readline():
     camera.Azimuth(5)

@@ -28,7 +28,7 @@ window.Render()
 print("ready", flush=True)
 while line := sys.stdin.readline():
     if line.startswith("save "):
-        # What is in the window, as raw RGB.
+        # Write the contents of the window as raw RGB.
         picture = vtk.vtkWindowToImageFilter()
         picture.SetInput(window)
         picture.ReadFrontBufferOff()
@@ -41,6 +41,6 @@ while line := sys.stdin.readline():
         continue
     camera.Azimuth(5)
     window.Render()
-    # A picture is done when somebody has it: what is on the screen is asked for, as programs that save pictures do.
+    # Wait until the image is finished, as programs that save images do.
     window.WaitForCompletion()
     print("frame", flush=True)
