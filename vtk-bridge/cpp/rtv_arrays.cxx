@@ -43,7 +43,7 @@ RtvArray ArrayOf(vtkDataArray* array, uint32_t kind)
     static_cast<uint32_t>(array->GetNumberOfComponents()), kind };
 }
 
-// `array` in single precision: itself, or a copy.
+// Returns `array` in single precision: itself, or a copy.
 RtvArray FloatArray(vtkDataArray* array, int components, RtvKeep& keep)
 {
   if (!array || array->GetNumberOfComponents() < components)
@@ -78,7 +78,7 @@ RtvArray PointArray(vtkDataArray* array, RtvKeep& keep)
   {
     return ArrayOf(array, RTV_F64);
   }
-  // Whole numbers and other layouts: all of them fit into doubles.
+  // Integers and other layouts; doubles can represent all of them.
   double* copy = keep.Doubles(3 * array->GetNumberOfTuples());
   for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i)
   {
@@ -87,8 +87,8 @@ RtvArray PointArray(vtkDataArray* array, RtvKeep& keep)
   return RtvArray{ copy, static_cast<uint64_t>(array->GetNumberOfTuples()), 3, RTV_F64 };
 }
 
-// Cells in any storage of vtkCellArray: since VTK 9.6 cells of one size have offsets that are
-// computed, and both arrays may be of any type. Returns why not, or null.
+// Cells in any storage of vtkCellArray. Since VTK 9.6, cells of equal size have computed offsets,
+// and both arrays may have any type. Returns why not, or null.
 const char* CellsOf(
   vtkCellArray* cells, RtvCells& out, uint64_t& key, RtvKeep& keep, std::string& answer)
 {
@@ -129,16 +129,16 @@ bool rtvIds(vtkDataArray* array, RtvArray& out, RtvKeep& keep)
   }
   const int type = array->GetDataType();
   const bool isSigned = type == VTK_INT || type == VTK_LONG || type == VTK_LONG_LONG || type == VTK_ID_TYPE;
-  // The element's own size decides, not what the cells say of their storage.
+  // Use the element size of the array, not the storage type that the cells report.
   const int bytes = array->GetDataTypeSize();
   if (isSigned && (bytes == 4 || bytes == 8) && array->HasStandardMemoryLayout())
   {
     out = ArrayOf(array, bytes == 8 ? RTV_I64 : RTV_I32);
     return true;
   }
-  // Computed ones, other layouts, unsigned and narrow types, and even reals, which VTK takes too.
-  // Doubles hold every number that a point in memory can have; what is none becomes one that no
-  // point has.
+  // Computed arrays, other layouts, unsigned and narrow types, and even floating point, which VTK
+  // also accepts. Doubles represent every index of a point in memory exactly; invalid numbers
+  // become an index that no point has.
   const vtkIdType count = array->GetNumberOfTuples();
   int64_t* copy = keep.Ids(count);
   for (vtkIdType i = 0; i < count; ++i)
@@ -172,7 +172,7 @@ const char* rtvAddShape(
   key = Mixed(Mixed(key, data->GetPoints()), coordinates);
   if (points)
   {
-    // Each point is a vertex of its own.
+    // Each point is its own vertex.
     const vtkIdType count = coordinates->GetNumberOfTuples();
     int64_t* ids = keep.Ids(count + 1);
     for (vtkIdType i = 0; i <= count; ++i)
@@ -200,7 +200,7 @@ const char* rtvAddShape(
   s.cell_normals = FloatArray(ofCells, 3, keep);
   vtkDataArray* texcoords = data->GetPointData()->GetTCoords();
   s.texcoords = FloatArray(texcoords, 2, keep);
-  // The shader has a frame for normal maps only where it has normals of points.
+  // The shader has a tangent frame for normal maps only if there are point normals.
   vtkDataArray* tangents = s.point_normals.kind == RTV_NONE ? nullptr : data->GetPointData()->GetTangents();
   s.tangents = FloatArray(tangents, 3, keep);
   key = Mixed(Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords), tangents);
@@ -224,14 +224,14 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
   }
   if (cellFlag == 2 && mapper->GetFieldDataTupleId() < 0)
   {
-    // An array of the field data with a value for each cell; with a tuple's number it would be one
-    // colour for everything.
+    // A field-data array with one value per cell; with a tuple index it would be one colour for
+    // everything.
     cellFlag = 1;
   }
   const bool byCell = cellFlag == 1;
   vtkScalarsToColors* table = mapper->GetLookupTable();
   uint64_t key = Mixed(Mixed(1469598103934665603ull, scalars), table);
-  // A mapper's own time stamp also moves for things that do not change colours.
+  // A mapper's own modification time also changes for reasons that do not affect colours.
   const double* range = mapper->GetScalarRange();
   key = rtvMix(rtvMix(rtvMix(rtvMix(key, range[0]), range[1]), mapper->GetColorMode()), mapper->GetScalarMode());
   key = rtvMix(rtvMix(rtvMix(key, mapper->GetInterpolateScalarsBeforeMapping()), mapper->GetUseLookupTableScalarRange()), cellFlag);
@@ -244,7 +244,7 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
     s.color_source = source;
     return;
   }
-  // A mapper keeps one array of colours; that of another block must not be taken for this one's.
+  // A mapper caches one array of colours; another block's array must not be reused for this block.
   mapper->ClearColorArrays();
   vtkUnsignedCharArray* colors = mapper->MapScalars(data, 1.0, cellFlag);
   cellFlag = byCell ? 1 : cellFlag;
@@ -257,7 +257,7 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
     {
       int size[3];
       map->GetDimensions(size);
-      // The mapper lets go of them when the next block is coloured.
+      // The mapper releases these arrays when the next block is coloured.
       keep.Object(coordinates);
       keep.Object(texels);
       s.color_source = RTV_COLOR_MAPPED;

@@ -1,4 +1,4 @@
-// Colour and depth of the traced picture into OpenGL's framebuffer.
+// Writes colour and depth of the traced image into OpenGL's framebuffer.
 #include "rtv_shim.h"
 
 #include <vtkOpenGLQuadHelper.h>
@@ -43,7 +43,8 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p)
       texture->AutoParametersOff();
     }
     texture->SetContext(window);
-    // It would keep the type of its first picture: bytes, when nothing was translucent then.
+    // Otherwise the texture would keep the type of its first image: bytes, if nothing was
+    // translucent then.
     texture->ResetFormatAndType();
     return texture.Get();
   };
@@ -81,7 +82,7 @@ void RtvBlit::Draw(vtkRenderer* renderer, int x, int y, int width, int height, i
     vtkShaderProgram::Substitute(fragment, "//VTK::FSQ::Decl",
       "uniform sampler2D color; uniform sampler2D depth; uniform sampler2D firstDepth;\n"
       "uniform int stage; uniform int blended; uniform ivec2 size;\n");
-    // Rows of the picture come from the top.
+    // Rows of the image start at the top.
     vtkShaderProgram::Substitute(fragment, "//VTK::FSQ::Impl",
       "ivec2 at = ivec2(texCoord * vec2(size)); at.y = size.y - 1 - at.y;\n"
       "vec4 c = texelFetch(color, at, 0); float d = texelFetch(depth, at, 0).r;\n"

@@ -12,7 +12,7 @@ struct Library
   void (*End)(vtkRenderPass*, vtkRenderPass*) = nullptr;
 };
 
-// The library beside this one, if it was built and can be opened.
+// The library librtv_icet.so in the same folder, if it was built and can be opened.
 const Library& icet()
 {
   static const Library library = [] {

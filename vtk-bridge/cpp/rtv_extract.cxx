@@ -175,14 +175,14 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   }
   if (s.has_back && s.color_source != RTV_COLOR_PROPERTY)
   {
-    // Colours of points and cells show on both sides.
+    // Colours of points and cells are visible on both sides.
     s.has_back = 0;
   }
   vtkTexture* texture = a.Prop->GetTexture();
   if (vtkTexture* own = a.Prop->GetProperty()->GetTexture("albedoTex"))
   {
     texture = own;
-    // Its alpha replaces the opacity.
+    // The texture's alpha replaces the opacity.
     s.property.opacity = 1.0f;
   }
   if (texture)

@@ -1,5 +1,5 @@
-// Glyphs as instances: the matrices vtkGlyph3DMapper makes for OpenGL, made again, because it does
-// not give them away.
+// Glyphs as instances. Recomputes the matrices that vtkGlyph3DMapper makes for OpenGL, because it
+// does not expose them.
 #include "rtv_arrays.h"
 
 #include <algorithm>
@@ -104,7 +104,7 @@ void Scale(vtkGlyph3DMapper* mapper, vtkDataArray* array, vtkIdType i, double sc
     scale[c] = scale[c] == 0.0 ? 1.0e-10 : scale[c];
   }
 }
-// The sources by number. Why not, or null.
+// The glyph sources by index. Returns why not, or null.
 const char* Sources(vtkGlyph3DMapper* mapper, std::vector<vtkPolyData*>& sources)
 {
   const int count = mapper->GetSourceIndexing() ? mapper->GetNumberOfInputConnections(1)
@@ -127,7 +127,7 @@ const char* Sources(vtkGlyph3DMapper* mapper, std::vector<vtkPolyData*>& sources
   return nullptr;
 }
 
-// Which source a glyph has.
+// Index of the source of a glyph.
 size_t SourceOf(vtkDataArray* index, vtkIdType i, size_t count)
 {
   if (!index)
@@ -148,7 +148,7 @@ const char* AddGlyphsOf(RtvBatch& batch, std::string& answer, vtkActor* actor, v
 {
   vtkDataArray* scales = InputArray(mapper, vtkGlyph3DMapper::SCALE, data);
   vtkDataArray* directions = mapper->GetOrient() ? InputArray(mapper, vtkGlyph3DMapper::ORIENTATION, data) : nullptr;
-  // VTK takes nothing else for a mask.
+  // VTK accepts nothing else as a mask.
   vtkBitArray* mask =
     mapper->GetMasking() ? vtkBitArray::SafeDownCast(InputArray(mapper, vtkGlyph3DMapper::MASK, data)) : nullptr;
   vtkUnsignedCharArray* colors = nullptr;

@@ -1,6 +1,6 @@
-// ParaView's pass that composites ranks with IceT, with other pixels. A library of its own, opened
-// by the shim when there are several ranks: it needs ParaView's libraries, and if the shim brought
-// those along they would register their renderer before ours.
+// ParaView's pass that composites ranks with IceT, with floating-point pixels. This is a separate
+// library, which the shim opens when there are several ranks: it needs ParaView's libraries, and if
+// the shim depended on them, they would register their renderer before ours.
 #include <algorithm>
 #include <vector>
 #include <vtkCamera.h>
@@ -21,15 +21,15 @@
 
 #include <IceT.h>
 
-// ParaView's pass with other pixels: ranks draw into a framebuffer of floats, IceT blends floats,
-// and the result is rounded once.
+// ParaView's pass with floating-point pixels: ranks draw into a framebuffer of floats, IceT blends
+// floats, and the result is rounded once.
 class vtkRtvIceTPass : public vtkIceTCompositePass
 {
 public:
   static vtkRtvIceTPass* New();
   vtkTypeMacro(vtkRtvIceTPass, vtkIceTCompositePass);
 
-  // Whether `pass` composites translucent pictures of several ranks.
+  // Whether `pass` composites translucent images of several ranks.
   static bool Fits(vtkIceTCompositePass* pass)
   {
     vtkMultiProcessController* ranks = pass->GetController();
@@ -58,7 +58,7 @@ public:
   vtkIceTCompositePass* GiveBack()
   {
     vtkIceTCompositePass* from = this->From;
-    // Who asks for the result asks ParaView's own pass.
+    // Callers request the result from ParaView's own pass, so store it there.
     std::swap(from->*(&vtkRtvIceTPass::LastRenderedRGBAColors), this->LastRenderedRGBAColors);
     (from->*(&vtkRtvIceTPass::LastRenderedDepths))->SetNumberOfTuples(0);
     (from->*(&vtkRtvIceTPass::LastRenderedRGBA32F))->SetNumberOfTuples(0);
@@ -132,7 +132,7 @@ public:
   }
 
 private:
-  // This rank's part, with the projection that IceT wants.
+  // Draws this rank's part with the projection that IceT passes.
   static void Draw(const IceTDouble* matrix, const IceTDouble*, const IceTFloat*, const IceTInt*, IceTImage result)
   {
     vtkRtvIceTPass* self = Drawing;
@@ -203,8 +203,8 @@ vtkStandardNewMacro(vtkRtvIceTPass);
 
 #define RTV_EXPORT extern "C" __attribute__((visibility("default")))
 
-// Puts our pass into the place of ParaView's below `camera`, made with `kept` or anew. Null when
-// that does not composite translucent pictures.
+// Replaces ParaView's pass below `camera` with ours, which is `kept` or a new one. Returns null
+// when ParaView's pass does not composite translucent images.
 RTV_EXPORT vtkRenderPass* rtv_icet_begin(vtkRenderPass* camera, vtkRenderPass* kept)
 {
   auto outer = vtkCameraPass::SafeDownCast(camera);
@@ -221,7 +221,7 @@ RTV_EXPORT vtkRenderPass* rtv_icet_begin(vtkRenderPass* camera, vtkRenderPass* k
   return own;
 }
 
-// Puts ParaView's pass back, with the result.
+// Restores ParaView's pass and passes the result to it.
 RTV_EXPORT void rtv_icet_end(vtkRenderPass* camera, vtkRenderPass* own)
 {
   vtkIceTCompositePass* icet = vtkRtvIceTPass::SafeDownCast(own)->GiveBack();

@@ -27,7 +27,8 @@ public:
   // Adds `prop` to the frame. Returns false if OpenGL has to draw it; the report then gives the
   // reason.
   bool Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, int number);
-  // The surface of a data set that is not polygonal, made with the filter cached for `mapper`.
+  // Returns the surface of a data set that is not polygonal, made with the filter cached for
+  // `mapper`.
   vtkDataSet* SurfaceOf(vtkMapper* mapper, vtkDataSet* data);
   // Removes the filters of mappers that were not used this frame.
   void EndFrame();
@@ -41,7 +42,7 @@ private:
   std::map<vtkMapper*, Kept> Filters;
 };
 
-// Lights and camera of a renderer.
+// Pass the lights of a renderer to the bridge, and return its camera.
 void rtvAddLights(RtvBridge* bridge, vtkRenderer* renderer);
 RtvView rtvView(vtkRenderer* renderer, int width, int height);
 

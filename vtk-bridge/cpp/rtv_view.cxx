@@ -44,9 +44,9 @@ RtvView rtvView(vtkRenderer* renderer, int width, int height)
 {
   RtvView view = {};
   vtkCamera* camera = renderer->GetActiveCamera();
-  // Everything is in them: window centre, explicit projections, tiles, the matrix IceT sets, the
-  // eye of a stereo pair (which GetCompositeProjectionTransformMatrix leaves out, being for picks).
-  // Depth from -1 to 1, as OpenGL has it.
+  // These matrices contain everything: window centre, explicit projections, tiles, the matrix that
+  // IceT sets, and the eye of a stereo pair (which GetCompositeProjectionTransformMatrix omits,
+  // because it is meant for picking). Depth from -1 to 1, as in OpenGL.
   vtkNew<vtkMatrix4x4> matrix;
   vtkMatrix4x4::Multiply4x4(camera->GetProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1.0, 1.0),
     camera->GetModelViewTransformMatrix(), matrix);
@@ -62,8 +62,8 @@ RtvView rtvView(vtkRenderer* renderer, int width, int height)
   view.focus_distance = camera->GetDistance();
   view.width = static_cast<uint32_t>(width);
   view.height = static_cast<uint32_t>(height);
-  // While the mouse turns the scene, interactors ask for several frames a second; still pictures
-  // for far less than one.
+  // While the mouse rotates the scene, interactors request several frames a second; for still
+  // images far less than one.
   view.interactive = renderer->GetRenderWindow()->GetDesiredUpdateRate() > 1.0 ? 1 : 0;
   return view;
 }

@@ -1,5 +1,5 @@
-// Volumes of uniform grids to the bridge; which of them rt-core can draw as VTK does, and why the
-// others stay OpenGL.
+// Passes volumes on uniform grids to the bridge: decides which of them rt-core can draw as VTK
+// does, and why OpenGL draws the others.
 #include "rtv_arrays.h"
 
 #include <algorithm>
@@ -29,7 +29,7 @@
 
 namespace
 {
-// As many entries as OpenGL's tables have.
+// The number of entries of OpenGL's tables.
 const int Entries = 1024;
 
 const char* ClassReason(vtkVolume* volume, vtkVolumeMapper* mapper)
@@ -50,7 +50,7 @@ const char* ClassReason(vtkVolume* volume, vtkVolumeMapper* mapper)
   return "OpenGL draws volume mappers of this class";
 }
 
-// What OpenGL's table of opacities by gradient reaches to: a quarter of the range of the scalars.
+// The upper end of OpenGL's gradient-opacity table, as a fraction of the scalar range.
 const double GradientRange = 0.25;
 
 // RTV_BLEND_* of a mapper's blend mode, or -1.
@@ -91,7 +91,7 @@ const char* BlendReason(int mode, vtkVolumeProperty* property)
   {
     return "a volume with gradient opacity and another blending than composite";
   }
-  // OpenGL shades the largest scalar by the gradient where the ray ends.
+  // OpenGL shades the largest scalar with the gradient at the end of the ray.
   if ((blend == RTV_BLEND_MAXIMUM || blend == RTV_BLEND_MINIMUM) && property->GetShade(0))
   {
     return "a shaded volume with maximum or minimum intensity blending";
@@ -102,9 +102,10 @@ const char* BlendReason(int mode, vtkVolumeProperty* property)
 // The lights of shaded volumes.
 struct Lights
 {
-  // Six numbers each, as RtvVolume has them; empty for one white headlight.
+  // Six numbers per light, as in RtvVolume; empty for one white headlight.
   std::vector<float> List;
-  // OpenGL's other formula, for all but one headlight: no ambient part, and highlights of its own.
+  // Whether OpenGL uses its other formula, which applies unless there is exactly one headlight: no
+  // ambient term, and different highlights.
   bool Several = false;
 };
 
@@ -130,7 +131,7 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
     const double* ambient = light->GetAmbientColor();
     const double* highlight = light->GetSpecularColor();
     const double strength = light->GetIntensity();
-    // OpenGL takes a headlight of another strength for one of several.
+    // OpenGL handles a headlight of another strength like several lights.
     plain = plain && light->LightTypeIsHeadlight() && strength == 1.0;
     double from[3], to[3];
     light->GetTransformedPosition(from);
@@ -160,7 +161,7 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
   }
   if (!out.Several && colored)
   {
-    // At the viewer, not parallel.
+    // A single headlight is at the viewer, not directional.
     std::fill(out.List.begin(), out.List.begin() + 3, 0.0f);
   }
   else if (!out.Several)
@@ -254,7 +255,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     return "a volume of several components";
   }
 
-  // ---- Scalars, unless they are known.
+  // ---- Scalars, unless they are cached.
   RtvKeep keep;
   v.scalar_key = rtvMix(rtvMix(rtvMix(rtvMix(1469598103934665603ull, scalars), scalars->GetMTime()), v.dims), v.spacing);
   if (!rtvApi->has_volume(bridge, v.scalar_key))
@@ -288,8 +289,8 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     }
   }
 
-  // ---- Place: index times spacing, turned by the image's directions, moved to its first point,
-  // then the prop's matrix.
+  // ---- Transform: index times spacing, rotated by the image's directions, moved to its first
+  // point, then the prop's matrix.
   double first[3];
   image->TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first);
   vtkNew<vtkMatrix4x4> local;
@@ -305,7 +306,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), local, world);
   std::copy(&world->Element[0][0], &world->Element[0][0] + 16, v.world_from_data);
 
-  // ---- Tables over the range of the scalars, as OpenGL's are.
+  // ---- Tables over the range of the scalars, as in OpenGL.
   scalars->GetFiniteRange(v.range, 0);
   if (!(v.range[1] > v.range[0]))
   {
@@ -316,7 +317,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   std::vector<double> isovalues;
   if (blend == RTV_BLEND_AVERAGE || blend == RTV_BLEND_ADDITIVE)
   {
-    // Means and sums are of the scalars themselves, from black to white.
+    // Average and additive blending use the scalars themselves, mapped from black to white.
     for (int i = 0; i < 3 * Entries; ++i)
     {
       colors[i] = static_cast<float>(i / 3) / (Entries - 1);
@@ -354,8 +355,8 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   }
   if (HasGradientOpacity(property))
   {
-    // OpenGL takes differences over n / (n - 1) of the distance of points and back, and scales them
-    // by the mean of the spacings.
+    // OpenGL takes central differences over n / (n - 1) of the point spacing, and scales them by
+    // the mean of the spacings.
     double spacing = 0.0, reach = 0.0;
     for (int axis = 0; axis < 3; ++axis)
     {
@@ -410,8 +411,8 @@ const char* rtvAddVolume(
     {
       return reason;
     }
-    // OpenGL's highlight under several lights is that of the last one in 9.1, seen from a mirrored
-    // place.
+    // In VTK 9.1, OpenGL's highlight under several lights is that of the last one, seen from a
+    // mirrored position.
     if (!lights.List.empty() && volume->GetProperty()->GetSpecular(0) > 0.0)
     {
       return "a shaded volume with a highlight under other lights than one white headlight";
@@ -442,6 +443,6 @@ const char* rtvAddVolume(
   {
     return AddGrid(bridge, mapper, volume, only, lights, name, answer);
   }
-  // Each block would need tables over the range of all.
+  // Each block would need tables over the range of all blocks.
   return leaves > 1 ? "a volume of several blocks" : "a volume that is not image data";
 }

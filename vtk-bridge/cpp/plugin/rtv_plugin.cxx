@@ -1,10 +1,10 @@
-// What happens when ParaView loads the plugin: the bridge and the shim for this ParaView are
-// opened, the renderer's override is registered, and ParaView learns of the views' options.
-// Whatever is missing is said once, and ParaView goes on as before.
+// The ParaView plugin. When ParaView loads it, it opens the bridge and the shim for this ParaView,
+// registers the renderer's override, and tells ParaView about the views' options. If a part is
+// missing, it prints one message, and ParaView works as without the plugin.
 //
 // Compiled by `vtk-bridge install --plugin` like the shim, with ParaView's headers only. ParaView's
-// CMake package would write the class below for us, but wants the headers of a dozen libraries that
-// Debian's paraview-dev does not depend on.
+// CMake package would generate the class below, but it requires the headers of a dozen libraries
+// that Debian's paraview-dev does not depend on.
 #define PARAVIEW_BUILDING_PLUGIN
 #define PARAVIEW_PLUGIN_BUILT_SHARED 1
 #include "rtv.h"
@@ -74,7 +74,7 @@ bool isRegistered()
   return false;
 }
 
-// Why it does not work, or nothing.
+// Starts the bridge. Returns why it does not work, or an empty string.
 std::string start()
 {
   const std::string at = home();
@@ -97,7 +97,7 @@ std::string start()
   {
     return "the bridge in " + at + " is of another version; run `vtk-bridge install --plugin` again";
   }
-  // VTK_AUTOLOAD_PATH may have brought it already.
+  // VTK_AUTOLOAD_PATH may already have registered it.
   if (!isRegistered())
   {
     enroll();
@@ -132,7 +132,7 @@ public:
   }
   const char* GetEULA() override { return nullptr; }
 
-  // Options that would do nothing are not shown.
+  // Options that have no effect are not shown.
   void GetXMLs(std::vector<std::string>& xmls) override
   {
     if (this->Works)

@@ -19,8 +19,8 @@ const RtvApi* theApi = nullptr;
 RtvBridge* (*theBridgeOf)(vtkObjectBase* renderer) = nullptr;
 
 // A property's command, the option it sets, its default, and the names of an enumeration. A
-// property with its default value leaves the option what the environment says, so that RTV_*
-// variables work with the plugin too.
+// property with its default value leaves the option as the environment sets it, so that RTV_*
+// variables also work with the plugin.
 struct Row
 {
   const char* Command;
@@ -53,7 +53,7 @@ const Row Table[] = {
   { "SetRobustness", "RTV_ROBUSTNESS", "0", { "watertight", "fast" } },
 };
 
-// The value ParaView sends with a command, as text.
+// The value, as text, that ParaView sends with a command.
 bool valueOf(const vtkClientServerStream& call, std::string& text)
 {
   const char* string = nullptr;
@@ -77,7 +77,7 @@ bool valueOf(const vtkClientServerStream& call, std::string& text)
   return false;
 }
 
-// What ParaView's wrapper generator would write for this class.
+// Corresponds to the code that ParaView's wrapper generator would write for this class.
 int command(vtkClientServerInterpreter* interpreter, vtkObjectBase* object, const char* method,
   const vtkClientServerStream& call, vtkClientServerStream& result, void*)
 {
@@ -106,7 +106,7 @@ bool vtkRtvViewOptions::Enroll(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObje
 {
   theApi = api;
   theBridgeOf = bridgeOf;
-  // Interpreters that there are, and those to come.
+  // For existing and future interpreters.
   vtkClientServerInterpreterInitializer::GetInitializer()->RegisterCallback(enroll);
   return vtkClientServerInterpreterInitializer::GetGlobalInterpreter()->HasCommandFunction("vtkPVRenderView");
 }
@@ -182,12 +182,12 @@ vtkTypeBool vtkRtvViewOptions::GetVisibility()
     vtkObject* renderer = this->GetConsumer(i);
     if (vtkRenderer::SafeDownCast(renderer) && this->Renderers.insert(renderer).second)
     {
-      // Observers with a method of a vtkObject end with it.
+      // Observers with a method of a vtkObject are removed with that object.
       for (unsigned long event : { vtkCommand::StartEvent, vtkCommand::EndEvent, vtkCommand::DeleteEvent })
       {
         renderer->AddObserver(event, this, &vtkRtvViewOptions::OnRender);
       }
-      // Its first frame may have begun.
+      // The renderer's first frame may already have begun.
       this->Apply(renderer, true);
     }
   }

@@ -8,25 +8,26 @@
 #include <set>
 #include <string>
 
-// A prop that draws nothing. ParaView adds it to the view's renderer on every rank, as it does with
-// the axes grid; so it knows the renderer whose options it holds. They are those of that renderer's
-// bridge while it draws, and so two views can differ, also in two threads.
+// A prop that draws nothing and holds the options of one view. ParaView adds it to the view's
+// renderer on every rank, like the axes grid, and so the prop finds its renderer. While that
+// renderer draws, the options apply to its bridge. Two views can therefore differ, even in two
+// threads.
 class vtkRtvViewOptions : public vtkProp
 {
 public:
   static vtkRtvViewOptions* New();
   vtkTypeMacro(vtkRtvViewOptions, vtkProp);
 
-  // Makes ParaView know this class; `api` are the bridge's functions, `bridgeOf` gives a renderer's
-  // bridge. False when this ParaView has no render views.
+  // Registers this class with ParaView. `api` contains the bridge's functions; `bridgeOf` returns a
+  // renderer's bridge. Returns false when this ParaView has no render views.
   static bool Enroll(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObjectBase* renderer));
 
-  // Sets what a property's command (a row of the table in the .cxx) says. False when there is no
-  // such command.
+  // Applies a property's command (a row of the table in the .cxx). Returns false when the command
+  // is unknown.
   bool Set(const std::string& command, const std::string& value);
 
-  // There is nothing to see. Renderers ask this of their props before they draw, which is when we
-  // get to know ours.
+  // Always invisible. Renderers call this for their props before they draw, which is when the prop
+  // finds its renderers.
   vtkTypeBool GetVisibility() override;
 
 protected:
@@ -38,6 +39,6 @@ private:
   void Apply(vtkObject* renderer, bool on);
 
   std::map<std::string, std::string> Values;
-  // Renderers that tell us when they begin and end a frame.
+  // Renderers whose start and end of a frame are observed.
   std::set<vtkObject*> Renderers;
 };

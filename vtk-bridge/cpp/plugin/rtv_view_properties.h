@@ -1,6 +1,6 @@
-// What the plugin adds to ParaView, in the language of its server manager: a set of options, and a
-// property of render views that holds one. ParaView makes the panel from them. Names are those of
-// ParaView's properties for OSPRay where there is such a one.
+// The plugin's additions to ParaView in the language of its server manager: a set of options, and a
+// property of render views that holds one. ParaView builds the panel from them. Where ParaView has
+// the same property for OSPRay, its name is used.
 #pragma once
 
 static const char* const rtvViewProperties = R"xml(

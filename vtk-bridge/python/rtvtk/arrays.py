@@ -14,11 +14,11 @@ def key_of(*things):
 
 
 def numbers(array, kinds, keep):
-    """A VTK array as numpy, in its own type if that is one of `kinds`, else in the first of them."""
+    """Returns a VTK array as numpy, in its own type if that is one of `kinds`, else in the first of them."""
     try:
         found = vtk_to_numpy(array)
     except (TypeError, AttributeError, AssertionError, ValueError):
-        # Implicit and other arrays without their own memory.
+        # Implicit arrays and others without their own memory.
         n = array.GetNumberOfComponents()
         found = np.array([array.GetTuple(i) for i in range(array.GetNumberOfTuples())]).reshape(-1, n)
     if found.dtype not in kinds:
@@ -29,7 +29,7 @@ def numbers(array, kinds, keep):
 
 
 def floats(array, components, keep, rows=None):
-    """An array of the library with `components` floats, or none; of these rows."""
+    """Wraps rows of an array with `components` floats for the library; an empty array if there are none."""
     if array is None or array.GetNumberOfComponents() < components or array.GetNumberOfTuples() == 0:
         return rtv.Array()
     found = numbers(array, [np.dtype(np.float32)], keep).reshape(array.GetNumberOfTuples(), -1)
@@ -54,7 +54,7 @@ def rgba_of(colors):
 
 
 def add_colors(bridge, surface, mapper, data, cell_map, keep):
-    """Colours from the mapper's own lookup."""
+    """Adds colours from the mapper's own lookup."""
     if not mapper.GetScalarVisibility():
         return
     flag = reference(0)

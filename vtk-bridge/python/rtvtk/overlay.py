@@ -7,8 +7,9 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkTexture
 
 
 def _depth(name, texture):
-    # VTK keeps textures of floats in half precision, which is no depth: the four bytes of each float travel as a colour, and the number is put
-    # together again. All steps are exact, and OpenGL 3.2 has them.
+    # VTK stores float textures in half precision, which is too coarse for depth. The four bytes of
+    # each float are therefore stored as a colour, and the shader reassembles the number. All steps
+    # are exact and available in OpenGL 3.2.
     return (f"uvec4 {name}B = uvec4(texture({texture}, uv) * 255.0 + 0.5); uint {name}E = ({name}B.a & 127u) << 1 | {name}B.b >> 7; "
             f"float {name} = {name}E < 97u ? 0.0 : float(8388608u | ({name}B.b & 127u) << 16 | {name}B.g << 8 | {name}B.r) / 8388608.0"
             f" / float(1u << (127u - min({name}E, 127u))); ")
@@ -17,9 +18,9 @@ def _depth(name, texture):
 # Common start of all rectangles' shaders; texel centres coincide with pixel centres.
 _FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); if (c.a <= 0.0) discard; " + _depth("d", "rtvDepth")
 _OPAQUE = _FETCH + "gl_FragData[0] = c; gl_FragDepth = d;"
-# Pixels with an opaque surface; everything in front of it is already in the colour.
+# Pixels with an opaque surface; their colour already includes everything in front of it.
 _COVERED = _FETCH + "if (d >= 1.0) discard; gl_FragData[0] = vec4(c.rgb, 1.0); gl_FragDepth = d;"
-# Pixels with translucent surfaces only, blended by VTK with colours that are not premultiplied.
+# Pixels with translucent surfaces only; VTK blends them with colours that are not premultiplied.
 _THROUGH = _FETCH + "if (d < 1.0) discard; " + _depth("f", "rtvFirst") + "gl_FragData[0] = vec4(c.rgb / c.a, c.a); gl_FragDepth = f;"
 
 

@@ -19,8 +19,9 @@ _VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion())
 
 
 class _Watched:
-    """What was attached to VTK objects, by address: VTK makes a new Python object for a renderer whenever the last one is gone, but only one
-    renderer. Events tell when it goes, if nobody removed all observers (PyVista does): so each is asked whether it is there and still watched."""
+    """Data attached to VTK objects, by address: VTK makes a new Python object for a renderer whenever the last one is gone, but only one
+    renderer. An event reports its destruction unless all observers were removed (as PyVista does), so each entry is checked: does the object
+    exist, and is it still observed?"""
 
     def __init__(self):
         self._entries = {}
@@ -44,7 +45,7 @@ class _Watched:
         weak.Set(thing)
         tag = thing.AddObserver("StartEvent", observe)
         self._entries[address] = weak, tag, thing.GetCommand(tag), value
-        # Events of objects under destruction come without the object.
+        # Events of objects under destruction arrive without the object.
         thing.AddObserver("DeleteEvent", lambda *_: self._entries.pop(address, None))
 
 
@@ -83,7 +84,8 @@ class _Tracer:
         visible = [p for p in (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())) if p.GetVisibility()]
         if width < 1 or height < 1 or not visible or not self.bridge.begin():
             return
-        # Render passes read props, depths and normals themselves; this one only draws at a larger size.
+        # Render passes read props, depths and normals themselves, except this one, which only draws
+        # at a larger size.
         render_pass = renderer.GetPass()
         if render_pass is not None and render_pass.GetClassName() != "vtkSSAAPass":
             reason = f"a render pass draws this renderer ({render_pass.GetClassName()})"
@@ -92,7 +94,8 @@ class _Tracer:
                 self.bridge.pass_on(f"{prop.GetClassName()} {i}", reason)
             self.bridge.end()
             return
-        # Both are created on first use from the visible props, so before anything is hidden.
+        # Both are created on first use from the visible props, so create them before anything is
+        # hidden.
         camera = renderer.GetActiveCamera()
         prepare_lights(renderer)
         self.extractor.begin_frame()

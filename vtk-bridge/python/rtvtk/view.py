@@ -7,7 +7,7 @@ from . import library as rtv
 
 
 def prepare_lights(renderer):
-    """Prepares the lights as the renderer itself would a moment later."""
+    """Prepares the lights, as the renderer itself does later in the frame."""
     if renderer.GetLights().GetNumberOfItems() == 0 and renderer.GetAutomaticLightCreation():
         renderer.CreateLight()
     renderer.UpdateLightsGeometryToFollowCamera()
@@ -32,7 +32,7 @@ def add_lights(bridge, renderer):
 
 
 def size_of(renderer):
-    """Pixels of the viewport; of its part in this tile, when a large image is made of tiles (the call for it needs C pointers)."""
+    """Pixels of the viewport, or of its part in this tile when a large image is made of tiles (VTK's function for it needs C pointers)."""
     window = renderer.GetRenderWindow()
     viewport, tile = renderer.GetViewport(), window.GetTileViewport()
 

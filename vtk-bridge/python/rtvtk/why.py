@@ -16,7 +16,7 @@ class Untraceable(Exception):
 
 def check_actor(actor, mapper, point_radius, line_radius):
     p = actor.GetProperty()
-    # Classes derived in Python (PyVista's) are known by the names of their VTK base classes.
+    # Classes derived in Python (PyVista's) are recognised by the names of their VTK base classes.
     if actor.GetClassName() not in ACTORS:
         raise Untraceable("OpenGL draws props of this class")
     if p.GetRepresentation() == WIREFRAME and line_radius <= 0:

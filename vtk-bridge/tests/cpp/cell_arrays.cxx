@@ -1,6 +1,5 @@
-// Points and cells in every array that VTK can keep them in, read as the bridge gets them: each
-// must come out as the same two triangles. Compiled with cpp/rtv_arrays.cxx for each VTK with
-// headers; prints what it looked at.
+// Reads points and cells in every array type of VTK as the bridge does: each must give the same two
+// triangles. Compiled with cpp/rtv_arrays.cxx for each VTK with headers; prints what it tested.
 #include "rtv_arrays.h"
 
 #include <cstdio>
@@ -40,7 +39,7 @@ void Check(bool holds, const char* what)
   faults += holds ? 0 : 1;
 }
 
-// Whether an array of the bridge has these numbers.
+// Whether an array of the bridge contains these numbers.
 bool Has(const RtvArray& array, const std::vector<int64_t>& expected)
 {
   if (array.tuples != expected.size() || array.components != 1 ||
@@ -87,7 +86,7 @@ void Whole(const char* name)
   Check(rtvIds(array, out, keep) && Has(out, Corners), name);
 }
 
-// The polygons of a surface.
+// Checks the polygons of a surface.
 void Polygons(vtkCellArray* cells, const char* name)
 {
   vtkNew<vtkPoints> points;
@@ -108,7 +107,7 @@ void Polygons(vtkCellArray* cells, const char* name)
 
 int main()
 {
-  // ---- Arrays by themselves.
+  // ---- Arrays alone.
   Whole<vtkIntArray>("int");
   Whole<vtkLongArray>("long");
   Whole<vtkLongLongArray>("long long");
@@ -140,7 +139,7 @@ int main()
     Check(!rtvIds(pairs, out, keep), "two components are refused");
   }
 
-  // ---- Cells in the storages that there are.
+  // ---- Cells in all available storages.
   {
     vtkNew<vtkCellArray> cells;
     const auto set = [&](vtkDataArray* offsets, vtkDataArray* corners) { return cells->SetData(offsets, corners); };
@@ -151,7 +150,7 @@ int main()
   }
 #ifdef HAS_COMPUTED_ARRAYS
   {
-    // What vtkCellArray of 9.6 and later has for offsets of cells of one size.
+    // The implicit offsets that vtkCellArray of 9.6 and later uses for cells of equal size.
     vtkNew<vtkAffineArray<vtkTypeInt32>> narrow;
     narrow->SetBackend(std::make_shared<vtkAffineImplicitBackend<vtkTypeInt32>>(3, 0));
     narrow->SetNumberOfTuples(3);
