@@ -1,6 +1,6 @@
 """Builds the wheel (PEP 517) with Python's standard library: the package, and the shared library of vtk-bridge.
 
-The library is $RTVTK_LIBRARY, or the result of `cargo build --release -p vtk-bridge` in the workspace that contains this folder.
+The library is $RTVTK_LIBRARY, or what `cargo build --release -p vtk-bridge` makes in the workspace of this folder.
 """
 import base64
 import hashlib

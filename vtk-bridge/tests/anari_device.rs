@@ -1,11 +1,11 @@
-//! The ANARI device in ANARI's own loader, which the wheel pynari brings, with test programs in
-//! Python next to this file: `tests/anari`.
+//! The ANARI device in ANARI's own loader, which the wheel pynari contains, with Python test
+//! programs in `tests/anari`.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Python with pynari; `None`, with a word on stderr, when it is not there and need not be.
+/// Python with pynari; `None`, with a message on stderr, when it is missing and not required.
 fn python() -> Option<PathBuf> {
     let found = std::env::var_os("RTSV_PYTHON").map(PathBuf::from);
     if found.is_none() {
@@ -16,13 +16,13 @@ fn python() -> Option<PathBuf> {
     found
 }
 
-/// A folder with the device under the name that the loader looks for.
+/// A folder with the device under the file name that the loader looks for.
 fn device_folder() -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("anari");
     std::fs::create_dir_all(&folder).expect("a folder for the device");
     let built =
         std::env::current_exe().expect("a test is a file").with_file_name("libvtk_bridge.so");
-    // Tests run side by side: each moves a complete copy into place.
+    // Tests run in parallel: each moves a complete copy to the final name.
     let copy = folder.join(format!("copy-{:?}", std::thread::current().id()));
     std::fs::copy(&built, &copy).unwrap_or_else(|e| panic!("{}: {e}", built.display()));
     std::fs::rename(&copy, folder.join("libanari_library_rtv.so")).expect("a name for the device");
@@ -73,7 +73,7 @@ fn numbers_at_their_limits_and_random_values_harm_nothing() {
     assert_passes("limits.py");
 }
 
-/// `c_abi/anari.c`, which ends with "done", with a program before it.
+/// Runs `c_abi/anari.c`, which prints "done" at the end, prefixed by a command.
 fn c_program(before: &[&str]) -> Option<Output> {
     let python = python()?;
     let place = "import importlib.util, os; \
@@ -118,14 +118,14 @@ fn valgrind_finds_no_fault_in_the_device() {
     let valgrind =
         std::env::var("RTSV_VALGRIND").unwrap_or_else(|_| "/usr/bin/valgrind".to_owned());
     if !Path::new(&valgrind).exists() {
-        // Not a peer that must be there: the program itself runs without it.
+        // Valgrind is optional: the program itself runs without it.
         writeln!(std::io::stderr(), "SKIPPED: {valgrind} was not found (apt-get install valgrind)")
             .expect("stderr");
         return;
     }
-    // The loader up to 0.14 deletes the library as an object of a type that it does not know: with
-    // C++'s delete and without the destructor. It is memory of malloc's, which is what that gives
-    // it back to.
+    // Up to 0.14, the loader deletes the library as an object of an incomplete type: with C++'s
+    // delete and without the destructor. The memory comes from malloc, to which this delete returns
+    // it.
     let command =
         [valgrind.as_str(), "--error-exitcode=9", "--quiet", "--show-mismatched-frees=no"];
     let leaks =
@@ -136,7 +136,7 @@ fn valgrind_finds_no_fault_in_the_device() {
     }
 }
 
-/// PSNR that counts as the same picture: edges differ by how pixels are sampled, and barney's noise
+/// PSNR above which two images count as equal: pixel sampling differs at edges, and barney's noise
 /// remains.
 const SAME_DB: f64 = 30.0;
 

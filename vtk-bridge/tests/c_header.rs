@@ -1,11 +1,11 @@
-//! `include/rtv.h` is made from the Rust sources by this test, and compared with the committed one.
-//! With `RTV_WRITE_HEADER=1` it is written anew. (cbindgen does the same for any source; its
-//! licence, MPL-2.0, is not among those we use.)
+//! Generates `include/rtv.h` from the Rust sources and compares it with the committed file. With
+//! `RTV_WRITE_HEADER=1`, writes the file. (cbindgen does the same for any source, but its licence,
+//! MPL-2.0, is not among the allowed ones.)
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What the translation of one declaration needs to know.
+/// Translates a Rust type to C.
 fn c_type(rust: &str) -> String {
     let simple = match rust.trim() {
         "u8" => "uint8_t",
@@ -29,7 +29,7 @@ fn c_type(rust: &str) -> String {
     simple.to_owned()
 }
 
-/// `name: type` as a C declaration.
+/// Translates `name: type` to a C declaration.
 fn declaration(field: &str) -> String {
     let (name, rust) = field.split_once(": ").expect("name and type");
     if let Some(inner) = rust.strip_prefix('[') {
@@ -42,7 +42,7 @@ fn declaration(field: &str) -> String {
     }
 }
 
-/// Arguments and result of `unsafe extern "C" fn(A, B) -> R`.
+/// Argument and result types of `unsafe extern "C" fn(A, B) -> R`.
 fn function_type(rust: &str) -> Option<(String, String)> {
     let rest = rust.strip_prefix("unsafe ").unwrap_or(rust).strip_prefix("extern \"C\" fn(")?;
     let (arguments, result) = rest.rsplit_once(')').expect("closed");
@@ -53,7 +53,7 @@ fn function_type(rust: &str) -> Option<(String, String)> {
     Some((arguments, result))
 }
 
-/// The header for sources in the plain style of `src/capi`.
+/// Generates the header for sources in the plain style of `src/capi`.
 fn header(sources: &[&str]) -> String {
     let mut out = String::from(
         "/* The C interface of vtk-bridge; src/capi tells how to use it.\n * Made from the Rust \
@@ -96,7 +96,7 @@ fn header(sources: &[&str]) -> String {
                     if let Some(text) = lines[i].trim().strip_prefix("/// ") {
                         comment.push(text);
                     } else if let Some(field) = lines[i].trim().strip_prefix("pub ") {
-                        // rustfmt breaks long fields.
+                        // rustfmt breaks long fields over several lines.
                         let mut field = field.to_owned();
                         while !field.ends_with(',') {
                             i += 1;
@@ -142,13 +142,13 @@ fn header(sources: &[&str]) -> String {
 
 fn describe(out: &mut String, indent: &str, comment: &[&str]) {
     if !comment.is_empty() {
-        // Brackets of links go, those of formulas stay.
+        // Remove the brackets of links, but keep those of formulas.
         let text = comment.join(" ").replace("[`", "").replace("`]", "").replace('`', "");
         writeln!(out, "{indent}/* {text} */").expect("to a string");
     }
 }
 
-/// FNV-1a of the header without its comments and without the number itself.
+/// FNV-1a hash of the header, without its comments and the hash itself.
 fn fingerprint(header: &str) -> u32 {
     let counts = |line: &&str| !line.trim_start().starts_with("/*") && !line.contains(" RTV_ABI ");
     let bytes = header.lines().filter(counts).flat_map(str::bytes);
@@ -174,8 +174,8 @@ fn the_header_says_what_the_library_does() {
     }
     let committed = std::fs::read_to_string(&path).expect("include/rtv.h is there");
     assert!(made == committed, "include/rtv.h is old; run this test with RTV_WRITE_HEADER=1");
-    // A shim built for one interface must not be used with another: the number is that of the
-    // interface itself.
+    // A shim built for one version of the interface must not be used with another, so the number is
+    // the hash of the interface.
     let number = fingerprint(&made);
     assert_eq!(
         vtk_bridge::capi::RTV_ABI,

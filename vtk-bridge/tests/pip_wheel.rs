@@ -1,5 +1,5 @@
-//! The package for the stock `vtk` wheel: built and installed without a network, and what it says
-//! when something is missing. Pictures with and without it: `against_stock/wheel.rs`.
+//! The package for the stock `vtk` wheel: built and installed without a network, and its messages
+//! when something is missing. `against_stock/wheel.rs` compares images with and without it.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -9,15 +9,15 @@ use std::path::Path;
 pub(crate) struct Capture {
     /// Pixels in a row.
     pub(crate) width: usize,
-    /// Rows.
+    /// Channels from 0 to 255.
     pub(crate) height: usize,
     /// 0 to 255.
     pub(crate) rgb: Vec<[u8; 3]>,
-    /// Window depth, 0 to 1; empty where only the colours were kept.
+    /// Window depth, 0 to 1; empty if only the colours were stored.
     pub(crate) depth: Vec<f32>,
     /// Picks, selections, counts.
     pub(crate) facts: Value,
-    /// What `RTV_REPORT` said after this frame.
+    /// The report in `RTV_REPORT` after this frame.
     pub(crate) report: Option<Value>,
 }
 
@@ -43,18 +43,18 @@ impl Capture {
         Ok(Capture { width, height, rgb, depth, facts, report: json("report.json")? })
     }
 
-    /// Lists `renderers` of the report.
+    /// The list `renderers` of the report.
     pub(crate) fn renderers(&self) -> &[Value] {
         self.report.as_ref().and_then(|r| r["renderers"].as_array()).map_or(&[], Vec::as_slice)
     }
 
-    /// Triangles that the report says were traced, all renderers together.
+    /// Number of traced triangles in the report, over all renderers.
     pub(crate) fn traced_elements(&self) -> u64 {
         let lists = self.renderers().iter().filter_map(|r| r["traced"].as_array());
         lists.flatten().flat_map(|t| [t["triangles"].as_u64(), t["cells"].as_u64()]).flatten().sum()
     }
 
-    /// Names or reasons of what was left to OpenGL.
+    /// Names or reasons of the props that OpenGL draws.
     pub(crate) fn passed(&self, key: &str) -> Vec<String> {
         let lists = self.renderers().iter().filter_map(|r| r["passed"].as_array());
         lists.flatten().filter_map(|p| p[key].as_str().map(str::to_owned)).collect()
@@ -82,7 +82,7 @@ impl Capture {
         sum.map(|s| s / count)
     }
 
-    /// Mean colour of 3 by 3 pixels around a place that the script named in its facts.
+    /// Mean colour of 3 by 3 pixels around a position that the script named in its facts.
     pub(crate) fn at(&self, place: &str) -> [f64; 3] {
         let [x, y] = self.pixel(place);
         let (w, h) = (self.width as f64, self.height as f64);
@@ -90,7 +90,7 @@ impl Capture {
         self.color([(x - 0.5) / w, (y - 0.5) / h, (x + 2.5) / w, (y + 2.5) / h])
     }
 
-    /// The pixel of such a place.
+    /// The pixel of such a position.
     pub(crate) fn pixel(&self, place: &str) -> [usize; 2] {
         [0, 1].map(|i| {
             let v = self.facts[place][i].as_u64();

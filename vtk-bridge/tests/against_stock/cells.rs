@@ -1,5 +1,5 @@
-//! Cells in every array and storage that VTK can keep them in, read by the shim's own code in a
-//! program of its own (`tests/cpp/cell_arrays.cxx`), for each VTK with headers on this machine.
+//! Cells in every array type and storage of VTK, read by the shim's own code in a separate program
+//! (`tests/cpp/cell_arrays.cxx`), for each VTK with headers on this machine.
 
 use crate::peers;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ const MODULES: &[&str] = &[
     "CommonCore",
 ];
 
-/// What the program printed for this VTK.
+/// The output of the program for this VTK.
 fn checked(flavour: &Flavour) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let program =

@@ -1,31 +1,30 @@
-//! Two pictures of the same script: by how much they differ, and how much is allowed.
+//! Compares two images of the same script: how much they differ, and how much is allowed.
 //!
-//! Near edges the two may disagree by a pixel, because VTK's rasterizer rounds corners to 1/256 of
-//! a pixel and rays do not; so colours and depths are compared away from edges, and edges by the
-//! silhouette.
+//! Near edges they may disagree by a pixel, because VTK's rasterizer rounds corners to 1/256 of a
+//! pixel and rays do not. Colours and depths are therefore compared away from edges, and edges by
+//! the silhouette.
 
 use crate::capture::Capture;
 use std::fmt;
 
-/// What is allowed. [`Bars::STRICT`] unless a script says why not.
+/// Limits of the comparison. [`Bars::STRICT`] unless a script has a reason for others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bars {
-    /// Part of the pixels where one shows a surface and the other does not.
+    /// Fraction of the pixels where only one of the images shows a surface.
     pub(crate) silhouette: f64,
-    /// Units in the last place of the window depth, away from edges, in all but [`ROUNDED`] of
-    /// these pixels.
+    /// Limit in ulps of the window depth, away from edges, for all but [`ROUNDED`] of these pixels.
     pub(crate) depth_ulp: u32,
-    /// Part of the pixels that may be further off than [`ROUNDING_ULP`].
+    /// Fraction of the pixels that may differ by more than [`ROUNDING_ULP`].
     pub(crate) depth_strays: f64,
-    /// Mean difference of colours, of 255, over the pixels that either shows something in.
+    /// Mean difference of colours, of 255, over the pixels where either image shows something.
     pub(crate) color_mean: f64,
-    /// Part of the pixels away from edges whose colour may differ by more than 16 of 255. So a
-    /// small object in a wrong colour is found.
+    /// Fraction of the pixels away from edges whose colour may differ by more than 16 of 255. This
+    /// limit finds a small object in a wrong colour.
     pub(crate) color_strays: f64,
 }
 
 impl Bars {
-    /// The demands on the bridge.
+    /// The limits for the bridge.
     pub(crate) const STRICT: Bars = Bars {
         silhouette: 0.0002,
         depth_ulp: 4,
@@ -35,15 +34,14 @@ impl Bars {
     };
 }
 
-/// How far OpenGL's own depths may be from the exact ones: llvmpipe interpolates in f32, which was
-/// measured to be up to 22 units in the last place beside the plane through a triangle's corners,
-/// and most where a triangle covers many pixels. Ours are exact: see
-/// `our_window_depth_is_exact_where_opengl_rounds`.
+/// Possible error of OpenGL's own depths: llvmpipe interpolates in f32. The measured error is up to
+/// 22 ulps from the plane through a triangle's corners, and largest where a triangle covers many
+/// pixels. Ours are exact: see `our_window_depth_is_exact_where_opengl_rounds`.
 const ROUNDING_ULP: u32 = 32;
-/// Part of the pixels away from edges in which OpenGL may be that far off.
+/// Fraction of the pixels away from edges where OpenGL may have this error.
 const ROUNDED: f64 = 0.1;
 
-/// What was measured.
+/// Measured differences.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Measured {
     pub(crate) pixels: usize,
@@ -83,8 +81,8 @@ impl fmt::Display for Measured {
     }
 }
 
-/// Depths of one surface do not jump and do not bend by more than this between neighbours: beyond
-/// is an edge. About one part in a thousand of the depth range per pixel and pixel.
+/// Largest change of the depth's slope between neighbours on one surface; a larger change is an
+/// edge. About one thousandth of the depth range per pixel squared.
 const BEND: f32 = 1e-3;
 
 /// Marks pixels whose 3 by 3 neighbourhood lies on one surface in both images, or shows background
@@ -102,7 +100,7 @@ fn away_from_edges(a: &Capture, b: &Capture) -> Vec<bool> {
                 .all(|i| shows(a, i) == shows(a, at) && shows(b, i) == shows(a, at));
             let bends = |c: &Capture| {
                 let d = |i: usize| c.depth[i];
-                // Across, up, and both diagonals.
+                // Horizontally, vertically, and along both diagonals.
                 [1, w, w + 1, w - 1]
                     .iter()
                     .any(|&s| (d(at + s) - 2.0 * d(at) + d(at - s)).abs() > BEND)
@@ -113,12 +111,12 @@ fn away_from_edges(a: &Capture, b: &Capture) -> Vec<bool> {
     inner
 }
 
-/// Distance in units in the last place; both are positive.
+/// Distance in ulps; both are positive.
 fn ulps(a: f32, b: f32) -> u32 {
     a.to_bits().abs_diff(b.to_bits())
 }
 
-/// Measures how far `ours` is from `stock`. An error when they cannot be compared at all.
+/// Measures the difference between `ours` and `stock`. An error when they cannot be compared.
 pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Measured, String> {
     if (stock.width, stock.height) != (ours.width, ours.height) {
         return Err(format!(
@@ -165,7 +163,7 @@ pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Me
     Ok(m)
 }
 
-/// What is beyond the bars, in words; nothing when all is well.
+/// The limits that are exceeded, one line each; empty when there are none.
 pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String> {
     let m = match measure(stock, ours, bars) {
         Ok(m) => m,
@@ -212,7 +210,7 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    /// A slanted disk before a background.
+    /// A slanted disk in front of a background.
     fn disk() -> Capture {
         let (width, height) = (120, 100);
         let (mut rgb, mut depth) = (vec![[30, 40, 50]; width * height], vec![1.0; width * height]);

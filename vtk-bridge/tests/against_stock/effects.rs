@@ -6,7 +6,7 @@ use crate::session::{Program, Run, With, output};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
 
-/// Room and ball, or why there are none.
+/// Images of the room and the ball, or why there are none.
 type Pictures = Result<[Capture; 2], String>;
 
 /// The images of `scripts/effects` with some variables set. Each combination is rendered once.
@@ -168,7 +168,7 @@ fn glass_turns_the_background_upside_down() {
         }
         sum / n
     };
-    // Above the middle of the ball the background's lower part shows, and the other way round.
+    // Above the middle of the ball, the lower part of the background is visible, and vice versa.
     let (above, below) = (blueness(&glass, 0.6, 0.7), blueness(&glass, 0.3, 0.4));
     assert!(below > above + 20.0, "above the middle {above}, below {below}");
     let [above, below] = [(0.6, 0.7), (0.3, 0.4)].map(|(a, b)| blueness(&plain, a, b));
@@ -208,7 +208,7 @@ fn samples_smooth_silhouettes() {
         distinct(&smooth),
         distinct(&plain)
     );
-    // Inside surfaces nothing changes.
+    // The interior of surfaces does not change.
     for place in ["lit", "open", "convex"] {
         assert!((bright(smooth.at(place)) - bright(plain.at(place))).abs() < 1.5, "{place}");
     }

@@ -1,5 +1,5 @@
-//! ParaView's window itself, under an X server: the plugin loads by its own list, and the options
-//! of the view's panel change what the view shows.
+//! ParaView's own window under an X server: the plugin is loaded from ParaView's list of plugins,
+//! and the options of the view's panel change the image.
 
 use crate::capture::{Capture, bright};
 use crate::compare::{Bars, faults};
@@ -14,7 +14,7 @@ fn pictures() -> Result<[Capture; 4], String> {
     let folder = output("gui");
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    // As a user's list of plugins with "Auto Load" switched on.
+    // Like a user's list of plugins with "Auto Load" enabled.
     let plugin = installed().join("plugins/pv5.11/VtkBridge.so");
     let list = folder.join("plugins.xml");
     let entry = format!(

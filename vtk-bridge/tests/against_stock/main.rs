@@ -1,9 +1,9 @@
-//! The bridge in real programs: stock pictures against ours, picks, ranks, effects, the plugin,
+//! The bridge in real programs: comparison with stock images, picks, ranks, effects, the plugin,
 //! memory.
 //!
 //! Needs Debian's VTK 9.1 and ParaView 5.11, the wheel `vtk`, Xvfb and a C++ compiler (`cargo xtask
-//! test` installs them). What is missing makes its tests say so and pass, unless
-//! `RTSV_REQUIRE_PEERS` is set. The pictures stay in `target/tmp/pictures`.
+//! test` installs them). Tests whose programs are missing print that and pass, unless
+//! `RTSV_REQUIRE_PEERS` is set. The images stay in `target/tmp/pictures`.
 
 mod capture;
 mod cells;

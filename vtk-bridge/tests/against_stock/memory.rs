@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-/// `c_abi/frames.c`, compiled once: a program that runs cannot be written.
+/// `c_abi/frames.c`, compiled once, because the file of a running program cannot be overwritten.
 fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(compiled)
 }
 
-/// Compiles it against the library of this build.
+/// Compiles the program against the library of this build.
 fn compiled() -> PathBuf {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("frames");
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -54,8 +54,7 @@ fn a_c_program_can_use_and_misuse_the_interface() {
 fn valgrind_finds_no_fault_in_the_c_interface() {
     let Some(valgrind) = find("RTSV_VALGRIND", &["/usr/bin/valgrind"]) else {
         use std::io::Write as _;
-        // Not a peer that must be there: `a_c_program_can_use_and_misuse_the_interface` runs
-        // without it.
+        // Valgrind is optional: `a_c_program_can_use_and_misuse_the_interface` runs without it.
         let _ = writeln!(
             std::io::stderr(),
             "skipped: valgrind was not found (apt-get install valgrind)"

@@ -1,4 +1,4 @@
-//! The same unmodified scripts in Debian's ParaView 5.11, without us and with us.
+//! The same unmodified scripts in Debian's ParaView 5.11, without and with the bridge.
 
 use crate::peers::skip;
 use crate::scripts::differences;
@@ -57,7 +57,7 @@ fn every_paraview_script_has_a_test() {
     assert_eq!(names, TESTED);
 }
 
-/// In VTK 9.2, which is inside ParaView, by a script of VTK's own classes.
+/// The VTK 9.2 inside ParaView, used by a script with VTK's own classes.
 #[test]
 fn paraview_blocks_beside_a_refused_one_are_not_drawn_twice() {
     let scripts = [crate::peers::scripts().join("vtk/refused_blocks.py")];

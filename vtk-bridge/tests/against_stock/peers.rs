@@ -1,26 +1,26 @@
-//! The programs that the bridge is compared with: found through the variables of `cargo xtask
-//! test`, or at their usual places.
+//! The programs that the bridge is compared with, found through the variables of `cargo xtask test`
+//! or in their usual places.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// A program or folder by its variable, or the first of `places` that exists.
+/// A program or folder from its variable, or the first of `places` that exists.
 pub(crate) fn find(variable: &str, places: &[&str]) -> Option<PathBuf> {
     let from_variable = std::env::var_os(variable).map(PathBuf::from);
     from_variable.into_iter().chain(places.iter().map(PathBuf::from)).find(|p| p.exists())
 }
 
-/// Says that a test does nothing and why; with `RTSV_REQUIRE_PEERS=1` it fails instead.
+/// Reports that a test is skipped and why; with `RTSV_REQUIRE_PEERS=1` it fails instead.
 pub(crate) fn skip(reason: &str) {
     assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{reason}");
-    // Not `eprintln!`: libtest swallows that in tests that pass.
+    // Not `eprintln!`, because libtest captures it in passing tests.
     let _ = writeln!(std::io::stderr(), "skipped: {reason}");
 }
 
-/// Debian's VTK 9.1, unpacked beside the system because it conflicts with ParaView's Python
-/// packages.
+/// Debian's VTK 9.1, unpacked outside the system folders because it conflicts with ParaView's
+/// Python packages.
 pub(crate) fn vtk91() -> Option<PathBuf> {
     let root = find("RTSV_VTK91", &[])
         .or_else(|| std::env::var_os("RTSV_PEERS").map(|p| PathBuf::from(p).join("vtk91")))?;
@@ -32,20 +32,20 @@ pub(crate) fn pvbatch() -> Option<PathBuf> {
     find("RTSV_PVBATCH", &["/usr/bin/pvbatch"])
 }
 
-/// Open MPI's launcher, with which Debian's ParaView is built.
+/// Open MPI's launcher; Debian's ParaView is built with Open MPI.
 pub(crate) fn mpirun() -> Option<PathBuf> {
     find("RTSV_MPIRUN", &["/usr/bin/mpirun.openmpi"])
 }
 
-/// An X server of our own, or why there is none. It ends when this process ends, however that
-/// happens: a shell waits for the end of its input, which we hold, and then stops the server.
+/// Our own X server, or why there is none. It ends when this process ends for any reason: a shell
+/// waits for the end of its input, which this process holds, and then stops the server.
 pub(crate) fn display() -> Result<&'static str, String> {
     static DISPLAY: OnceLock<Result<(String, std::process::Child), String>> = OnceLock::new();
     let started = DISPLAY.get_or_init(|| {
         let program = find("RTSV_XVFB", &["/usr/bin/Xvfb"]).ok_or("Xvfb was not found (set \
                                                                    RTSV_XVFB)")?;
-        // -noreset: else the server begins anew when its last client goes, and the next one dies of
-        // that.
+        // -noreset: otherwise the server resets when its last client leaves, which breaks the next
+        // client.
         let script = r#""$0" -displayfd 1 -noreset -nolisten tcp -screen 0 1280x1024x24 2>/dev/null & cat >/dev/null; kill $!"#;
         let mut child = Command::new("sh")
             .args(["-c", script])

@@ -1,5 +1,5 @@
-//! The ParaView plugin, loaded by `PV_PLUGIN_PATH`: the override without `VTK_AUTOLOAD_PATH`, and
-//! its options set as a user sets them.
+//! The ParaView plugin, loaded by `PV_PLUGIN_PATH`: it overrides the renderer without
+//! `VTK_AUTOLOAD_PATH`, and its options are set as a user sets them.
 
 use crate::capture::{Capture, bright};
 use crate::compare::{Bars, faults};
@@ -49,7 +49,7 @@ fn names_are_those_of_ospray_where_there_is_one() {
     let Some(plain) = picture("plain") else { return };
     let names: Vec<&str> =
         plain.facts["names"].as_array().expect("names").iter().filter_map(|n| n.as_str()).collect();
-    // As paraview.simple calls the properties of a view in a ParaView with OSPRay.
+    // As paraview.simple names the properties of a view in a ParaView with OSPRay.
     for name in [
         "EnableRayTracing",
         "BackEnd",
@@ -60,7 +60,7 @@ fn names_are_those_of_ospray_where_there_is_one() {
     ] {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
-    // The thesis' panel, section 3.2.8.
+    // The panel of the thesis, section 3.2.8.
     for name in ["Threads", "AmbientRadius", "Reflections", "Material", "Robustness", "LensRadius"]
     {
         assert!(names.contains(&name), "{name}: {names:?}");
@@ -91,8 +91,8 @@ fn the_panel_switches_every_effect() {
         "ambient occlusion: where box and floor meet {concave}, on top of the box {convex}"
     );
     let mirror = picture("mirror").expect("the run is there");
-    // Half of what the floor shows before the box is the box, which is red, and elsewhere the
-    // background, which is blue.
+    // Half of the reflection on the floor in front of the box shows the box, which is red; the rest
+    // shows the background, which is blue.
     let redder = |c: &Capture| {
         let [a, b] = [c.at("mirror_of_box"), c.at("lit")];
         (a[0] - a[2]) - (b[0] - b[2])
@@ -136,7 +136,7 @@ fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
     {
         return skip(&reason);
     }
-    // The plugin alone in a folder: nothing it needs is above it.
+    // The plugin alone in a folder: what it needs is not in a parent folder.
     let lonely = tempfile::tempdir().unwrap();
     std::fs::copy(plugin_folder().join("VtkBridge.so"), lonely.path().join("VtkBridge.so"))
         .unwrap();

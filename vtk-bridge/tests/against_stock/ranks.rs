@@ -5,7 +5,7 @@ use crate::peers::{mpirun, scripts, skip};
 use crate::session::{Launch, Outcome, Program, With, interpreter, output};
 use std::path::PathBuf;
 
-/// Runs the script on `ranks` ranks. Pictures come into the folder that is given back, reports too.
+/// Runs the script on `ranks` ranks. Images and reports are written to the returned folder.
 fn run(
     ranks: usize,
     with: With,
@@ -23,7 +23,7 @@ fn run(
     );
     let mut launch = Launch::new(Program::ParaView, with, &line)?
         .args([scripts().join("ranks/surfaces.py"), folder.clone()])
-        // Ranks that wait would otherwise spin on cores that others need.
+        // Otherwise waiting ranks would spin on cores that others need.
         .env("OMPI_MCA_mpi_yield_when_idle", "1");
     if with == With::Bridge {
         launch = launch.env("RTV_REPORT", folder.join("report.json"));
@@ -34,9 +34,9 @@ fn run(
     Ok((folder, launch.output()))
 }
 
-/// Number of pixels that differ by more than `levels` of 255 from the pixel at their position in
-/// the other image and from all its neighbours. So edges may be one pixel off, and nothing else may
-/// differ.
+/// Number of pixels that differ by more than `levels` of 255 from the pixel at the same position in
+/// the other image and from all its neighbours. Edges may therefore be one pixel off; all other
+/// differences count.
 fn strangers(a: &Capture, b: &Capture, levels: u8) -> usize {
     let (w, h) = (a.width, a.height);
     assert_eq!((w, h), (b.width, b.height));
@@ -49,7 +49,7 @@ fn strangers(a: &Capture, b: &Capture, levels: u8) -> usize {
     (0..w * h).filter(|i| strange(a, b, i % w, i / w) || strange(b, a, i % w, i / w)).count()
 }
 
-/// Pixels that differ by more than 1 of 255 at their own place.
+/// Number of pixels that differ by more than 1 of 255 at the same position.
 fn different(a: &Capture, b: &Capture) -> usize {
     a.rgb.iter().zip(&b.rgb).filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count()
 }
@@ -76,7 +76,8 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
             let [a, b] = [&one, &folder].map(|f| Capture::read(f, name).unwrap());
             let (strange, different) = (strangers(&a, &b, 1), different(&a, &b));
             let pixels = a.width * a.height;
-            // Lines and text of the axes are OpenGL's, and move by a pixel in stock ParaView too.
+            // OpenGL draws lines and text of the axes, which also move by a pixel in stock
+            // ParaView.
             let allowed = if name == "annotated" { pixels / 2000 } else { pixels / 5000 };
             if strange > allowed || different * 200 > pixels {
                 found.push(format!(
@@ -108,7 +109,7 @@ fn one_rank_with_the_bridge_is_as_stock() {
     };
     for name in ["opaque", "translucent", "mixed", "annotated"] {
         let [a, b] = [&stock, &ours].map(|f| Capture::read(f, name).unwrap());
-        // Peeled layers of translucent surfaces are bytes in OpenGL.
+        // OpenGL stores peeled layers of translucent surfaces as bytes.
         let strange = strangers(&a, &b, if name == "opaque" { 1 } else { 3 });
         let (mean, pixels) = (difference(&a, &b), a.width * a.height);
         assert!(

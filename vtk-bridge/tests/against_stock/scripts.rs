@@ -3,11 +3,11 @@
 use crate::compare::{Bars, faults};
 use crate::session::Run;
 
-/// An image (script, name) with other limits than the rest, or none, and the reason.
+/// An image (script, name) with its own limits, or without limits, and the reason.
 pub(crate) type Exception = (&'static str, &'static str, Option<Bars>, &'static str);
 
-/// Differences in our images of `script`, one line each. The images of `untraced` have nothing to
-/// trace.
+/// Differences in our images of `script`, one line each. The images in `untraced` contain nothing
+/// to trace.
 pub(crate) fn differences(
     stock: &Run,
     ours: &Run,
@@ -19,7 +19,7 @@ pub(crate) fn differences(
     let same = ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
     assert_eq!(names, same, "{script}: other pictures than stock's");
     let mut found = Vec::new();
-    // ParaView's writer leaves a file with this in its name for a moment.
+    // ParaView's writer briefly creates a file with this in its name.
     for name in names.iter().filter(|n| !n.contains(".tmp")) {
         let place = (script, name.as_str());
         let path = ours.path(script, name);

@@ -1,4 +1,5 @@
-//! Runs the scripts in stock programs, and in the same programs with what `vtk-bridge env` prints.
+//! Runs the scripts in stock programs, and in the same programs with the output of `vtk-bridge
+//! env`.
 
 use crate::capture::Capture;
 use crate::peers;
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// What runs a script.
+/// The program that runs a script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Program {
     /// Debian's VTK 9.1 in Python.
@@ -18,7 +19,7 @@ pub(crate) enum Program {
     Wheel,
 }
 
-/// With us or without.
+/// Without or with the bridge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum With {
     /// As Debian ships it.
@@ -27,10 +28,10 @@ pub(crate) enum With {
     Bridge,
 }
 
-/// Seconds after which a process is stopped.
+/// Time limit of a process, in seconds.
 const TIME_LIMIT: &str = "240";
 
-/// The bridge, installed once for all tests of this process, by its own program.
+/// The bridge, installed by its own program once for all tests of this process.
 pub(crate) fn installed() -> &'static Path {
     static HOME: OnceLock<PathBuf> = OnceLock::new();
     HOME.get_or_init(|| {
@@ -55,13 +56,13 @@ pub(crate) fn installed() -> &'static Path {
     })
 }
 
-/// A command line for a shell, in the environment of `program`.
+/// A shell command in the environment of `program`.
 pub(crate) struct Launch {
     command: Command,
 }
 
 impl Launch {
-    /// Runs `line` (shell syntax; `"$@"` are `args`), or says why it cannot be run here.
+    /// Prepares `line` (shell syntax; `"$@"` are `args`), or says why it cannot run here.
     pub(crate) fn new(program: Program, with: With, line: &str) -> Result<Launch, String> {
         let display = peers::display()?;
         let mut command = Command::new("timeout");
@@ -79,7 +80,7 @@ impl Launch {
             .env("DISPLAY", display)
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("LC_ALL", "C.UTF-8");
-        // Nothing of the person who runs the tests.
+        // Remove the variables of the person who runs the tests.
         for (name, _) in
             std::env::vars_os().filter(|(n, _)| n.to_string_lossy().starts_with("RTV_"))
         {
@@ -90,7 +91,7 @@ impl Launch {
             .env_remove("PV_PLUGIN_PATH")
             .env_remove("PYTHONPATH");
         if program == Program::Wheel {
-            // Without a display it draws by EGL or OSMesa, as on a server.
+            // Without a display, VTK draws with EGL or OSMesa, as on a server.
             let library = std::env::current_exe()
                 .map_err(|e| e.to_string())?
                 .with_file_name("libvtk_bridge.so");
@@ -107,7 +108,7 @@ impl Launch {
         Ok(Launch { command })
     }
 
-    /// What stands for `"$@"`.
+    /// Sets the arguments for `"$@"`.
     pub(crate) fn args<S: AsRef<std::ffi::OsStr>>(
         mut self,
         args: impl IntoIterator<Item = S>,
@@ -116,13 +117,13 @@ impl Launch {
         self
     }
 
-    /// Sets a variable.
+    /// Sets an environment variable.
     pub(crate) fn env(mut self, name: &str, value: impl AsRef<std::ffi::OsStr>) -> Launch {
         self.command.env(name, value);
         self
     }
 
-    /// Everything it printed, and how it ended.
+    /// Runs the command and returns all its output and its exit status.
     pub(crate) fn output(mut self) -> Outcome {
         let out = self.command.output().expect("timeout (coreutils) starts");
         let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
@@ -130,17 +131,17 @@ impl Launch {
     }
 }
 
-/// How a process ended.
+/// Result of a process.
 #[derive(Debug, Clone)]
 pub(crate) struct Outcome {
     pub(crate) stdout: String,
     pub(crate) stderr: String,
-    /// `None`: by a signal.
+    /// Exit code; `None` after a signal.
     pub(crate) code: Option<i32>,
 }
 
 impl Outcome {
-    /// Fails with everything it printed unless it ended with 0.
+    /// Panics with all output unless the process exited with 0.
     pub(crate) fn expect_success(self, what: &str) -> Outcome {
         assert!(
             self.code == Some(0),
@@ -162,7 +163,7 @@ pub(crate) fn interpreter(program: Program, with: With) -> Result<String, String
             let module = if with == With::Bridge { " -m rtvtk" } else { "" };
             Ok(format!("'{}'{module}", python.display()))
         }
-        // Debian's modules are for Debian's Python.
+        // Debian's modules need Debian's Python.
         Program::Vtk => Ok("/usr/bin/python3".to_owned()),
         Program::ParaView => {
             let pvbatch = peers::pvbatch().ok_or("pvbatch was not found (set RTSV_PVBATCH)")?;
@@ -171,18 +172,18 @@ pub(crate) fn interpreter(program: Program, with: With) -> Result<String, String
     }
 }
 
-/// All scripts of a kind, run one after the other in as few processes as they survive.
+/// All scripts of a kind, run one after the other, in as few processes as crashes allow.
 #[derive(Debug, Default)]
 pub(crate) struct Run {
     folder: PathBuf,
-    /// How scripts failed, by name.
+    /// Failures of scripts, by name.
     failed: BTreeMap<String, String>,
-    /// Everything on stderr.
+    /// All output on stderr.
     pub(crate) stderr: String,
 }
 
 impl Run {
-    /// Runs `scripts` into `folder`. `settings` are variables.
+    /// Runs `scripts` with output to `folder`. `settings` are environment variables.
     pub(crate) fn new(
         program: Program,
         with: With,
@@ -226,7 +227,7 @@ impl Run {
                 }
                 break;
             }
-            // It died in the script that started last. The others must not suffer for that.
+            // The process crashed in the script that started last. Continue with the others.
             let name =
                 left[finished].file_stem().unwrap_or_default().to_string_lossy().into_owned();
             run.failed

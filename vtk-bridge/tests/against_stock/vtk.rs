@@ -1,4 +1,4 @@
-//! The same unmodified scripts in Debian's VTK 9.1, without us and with us.
+//! The same unmodified scripts in Debian's VTK 9.1, without and with the bridge.
 
 use crate::capture::Capture;
 use crate::compare::{Bars, faults};
@@ -7,7 +7,7 @@ use crate::scripts::{Exception, differences};
 use crate::session::{Program, Run, With, output, scripts_in};
 use std::sync::OnceLock;
 
-/// Stock, and with the bridge.
+/// Runs without and with the bridge.
 struct Both {
     stock: Run,
     ours: Run,
@@ -18,7 +18,7 @@ fn both() -> Option<&'static Both> {
     let made = BOTH.get_or_init(|| {
         let scripts = scripts_in("vtk");
         let run = |with, name| Run::new(Program::Vtk, with, &scripts, output(name), &[]);
-        // At once: stock needs neither the bridge nor the compiler that makes its shims.
+        // In parallel: stock needs neither the bridge nor the compiler that builds its shims.
         let (stock, ours) = std::thread::scope(|s| {
             let stock = s.spawn(|| run(With::Stock, "vtk-stock"));
             let ours = run(With::Bridge, "vtk-ours");
@@ -29,17 +29,17 @@ fn both() -> Option<&'static Both> {
     made.as_ref().map_err(|reason| skip(reason)).ok()
 }
 
-/// Shaded volumes.
+/// Limits for shaded volumes.
 const SHADED: Bars = Bars { color_mean: 1.5, ..Bars::STRICT };
-/// Volumes with gradient opacity.
+/// Limits for volumes with gradient opacity.
 const STEEP: Bars = Bars { color_mean: 2.5, color_strays: 0.002, ..Bars::STRICT };
-/// Isosurfaces of volumes.
+/// Limits for isosurfaces of volumes.
 const GRAZED: Bars = Bars { color_strays: 0.005, ..SHADED };
 
 const LEFT_BEHIND: &str = "OpenGL's light does not follow a turned volume; ours does \
                            (`turning_a_volume_or_camera_and_light_is_the_same`)";
 
-/// Pictures that are held to other bars than the rest, or to none, and why.
+/// Images with their own limits, or without limits, and the reason.
 pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
         "volume_blends",
@@ -113,7 +113,7 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     ),
 ];
 
-/// Pictures in which there is nothing to trace.
+/// Images that contain nothing to trace.
 pub(crate) const EMPTY: &[(&str, &str)] =
     &[("odd_inputs", "nothing"), ("windows", "no_renderer"), ("windows", "actor_gone")];
 
@@ -177,11 +177,11 @@ fn every_script_has_a_test() {
     assert_eq!(names, tested);
 }
 
-/// So the bars measure us and not the chance of OpenGL's threads.
+/// Shows that the limits measure the bridge and not the scheduling of OpenGL's threads.
 #[test]
 fn stock_against_stock_passes_and_planted_faults_do_not() {
-    // Runs of its own of the two scripts it looks at: neither the bridge nor the other scripts are
-    // needed.
+    // Separate runs of the two scripts that are compared: neither the bridge nor the other scripts
+    // are needed.
     let mut scripts = scripts_in("vtk");
     scripts.retain(|p| p.ends_with("contours.py") || p.ends_with("opacity.py"));
     let run = |name| Run::new(Program::Vtk, With::Stock, &scripts, output(name), &[]);
@@ -263,7 +263,7 @@ fn colors_and_matrices_do_not_rebuild() {
     let Some(both) = both() else { return };
     let rebuilt = |script: &str, picture: &str| -> u64 {
         let capture = both.ours.capture(script, picture).unwrap();
-        // The last is this script's; renderers of scripts before may be alive.
+        // The last renderer is this script's; renderers of earlier scripts may still exist.
         capture.renderers().last().and_then(|r| r["rebuilt"].as_u64()).expect("a report")
     };
     for (script, picture) in
@@ -278,8 +278,8 @@ fn colors_and_matrices_do_not_rebuild() {
     assert!(rebuilt("changing", "deformed") > 0, "points that moved must be built again");
 }
 
-/// The depth of the plane through a triangle's corners, in f64, at every pixel: who is right where
-/// we and OpenGL differ.
+/// The depth of the plane through a triangle's corners, in f64, at every pixel, shows which image
+/// is right where we and OpenGL differ.
 #[test]
 fn our_window_depth_is_exact_where_opengl_rounds() {
     let scripts = [crate::peers::scripts().join("exact/triangles.py")];
@@ -319,7 +319,7 @@ fn our_window_depth_is_exact_where_opengl_rounds() {
     );
 }
 
-/// Window depth of the triangle with these projected corners (x, y, z from -1 to 1) at `p`, when it
+/// Window depth at `p` of the triangle with these projected corners (x, y, z from -1 to 1), if it
 /// covers `p`.
 fn depth_at(t: &[f64], p: [f64; 2]) -> Option<f64> {
     let edge = |i: usize| [t[3 * i] - t[0], t[3 * i + 1] - t[1], t[3 * i + 2] - t[2]];
@@ -327,7 +327,7 @@ fn depth_at(t: &[f64], p: [f64; 2]) -> Option<f64> {
     let [px, py] = [p[0] - t[0], p[1] - t[1]];
     let area = ux * vy - uy * vx;
     let [a, b] = [(px * vy - py * vx) / area, (ux * py - uy * px) / area];
-    // A little inside: at the very edge the neighbour may be seen.
+    // Slightly inside: exactly at the edge, the neighbour may be visible.
     let inside = a > 1e-6 && b > 1e-6 && a + b < 1.0 - 1e-6;
     inside.then_some(0.5 * (t[2] + a * uz + b * vz) + 0.5)
 }

@@ -1,4 +1,5 @@
-//! The same unmodified scripts in the `vtk` wheel of PyPI, alone and started by `python -m rtvtk`.
+//! The same unmodified scripts in the `vtk` wheel from PyPI, alone and started by `python -m
+//! rtvtk`.
 
 use crate::peers::skip;
 use crate::scripts::{Exception, differences};
@@ -6,8 +7,8 @@ use crate::session::{Program, Run, With, output, scripts_in};
 use crate::vtk::EMPTY;
 use std::path::PathBuf;
 
-/// Pictures that are held to other bars than the rest, or to none, and why. Those of Debian's VTK
-/// hold here too.
+/// Images with their own limits, or without limits, and the reason. Those of Debian's VTK also
+/// apply here.
 const EXCEPTIONS: &[Exception] = &[
     (
         "windows",
@@ -51,8 +52,8 @@ fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
     same_as_stock("vtk");
 }
 
-/// Classes that Python derives (PyVista's are such), observers that a program removes, tiles, a
-/// fault of ours.
+/// Classes derived in Python (as in PyVista), observers that a program removes, tiled images, an
+/// error of the bridge.
 #[test]
 fn python_programs_of_other_kinds_look_the_same_and_steady_frames_look_at_no_array() {
     let Some([_, ours]) = same_as_stock("wheel") else { return };

@@ -1,4 +1,4 @@
-"""ANARI's C functions by ctypes, from the loader that the wheel pynari brings; numpy arrays in and out.
+"""ANARI's C functions through ctypes, from the loader in the wheel pynari; numpy arrays as input and output.
 
 Used by the test programs next to it, with any device: `Device("rtv")`, `Device("barney")`.
 """
@@ -18,7 +18,7 @@ TYPES = dict(
 )
 globals().update(TYPES)
 NAMES = {v: k for k, v in TYPES.items()}
-# numpy type and components of the types that frames are mapped as
+# numpy type and components of the types in which frames are mapped
 PIXELS = {UFIXED8_VEC4: (np.uint8, 4), UFIXED8_RGBA_SRGB: (np.uint8, 4), UFIXED8_VEC3: (np.uint8, 3), UFIXED8_RGB_SRGB: (np.uint8, 3),
           FLOAT32: (np.float32, 1), FLOAT32_VEC3: (np.float32, 3), FLOAT32_VEC4: (np.float32, 4), UINT32: (np.uint32, 1), FIXED16_VEC3: (np.int16, 3)}
 SEVERITIES = {1: "fatal", 2: "error", 3: "warning", 4: "performance", 5: "info", 6: "debug"}
@@ -72,7 +72,7 @@ _KIND = dict(Surface=SURFACE, Group=GROUP, World=WORLD, Frame=FRAME, Geometry=GE
 
 
 def strings(pointer):
-    """A C list of strings that ends with null."""
+    """Decodes a null-terminated C list of strings."""
     out, i = [], 0
     while pointer and pointer[i]:
         out.append(pointer[i].decode())
@@ -102,7 +102,7 @@ class Object:
         return self
 
     def put(self, **values):
-        """Sets parameters, with types guessed from the values, and commits. `__` in names stands for a dot."""
+        """Sets parameters, with types inferred from the values, and commits. `__` in names stands for a dot."""
         for name, v in values.items():
             name = name.replace("__", ".")
             if isinstance(v, Object):
@@ -166,7 +166,7 @@ class Device(Object):
         return Object(self, handle, _KIND[kind]).put(**parameters)
 
     def array(self, kind, values, dims=1):
-        """An array over the memory of numpy's, which is kept alive with the device. Dimensions: x first, as in ANARI."""
+        """An array over numpy's memory, which is kept alive with the device. Dimensions: x first, as in ANARI."""
         a = np.ascontiguousarray(values)
         self.keep.append(a)
         shape = a.shape[:dims][::-1] if dims > 1 else (a.shape[0],)
@@ -184,7 +184,7 @@ class Device(Object):
 
 
 def draw(device, frame, channel="channel.color"):
-    """Renders and gives a channel's pixels, first row at the bottom."""
+    """Renders and returns a channel's pixels, first row at the bottom."""
     render_frame(device.handle, frame.handle)
     frame_ready(device.handle, frame.handle, 1)
     return pixels(device, frame, channel)
@@ -203,6 +203,6 @@ def pixels(device, frame, channel="channel.color"):
 
 
 def psnr(a, b):
-    """Of two 8-bit pictures, in decibels."""
+    """PSNR of two 8-bit images, in decibels."""
     error = np.mean((a.astype(float) - b.astype(float)) ** 2)
     return 99.0 if error == 0 else 10 * np.log10(255.0**2 / error)

@@ -1,8 +1,8 @@
-"""Draws every scene with our device and with barney: `compare.py FOLDER [SCENE...]`. Prints a JSON object by scene; pictures go into FOLDER.
+"""Draws every scene with our device and with barney: `compare.py FOLDER [SCENE...]`. Prints a JSON object by scene; images are written to FOLDER.
 
-What is compared: uniform light from everywhere, followed over all bounces, which shows shapes, colours, textures and opacities. Other light is compared
-with closed forms (spec.py) because barney's matte material is not Lambert's: measured on a white sphere with version 1.2.6, a directional light gives 0.65
-of albedo / pi * irradiance * cos where the surface faces it and 0.32 at 64 degrees, and uniform light gives 0.826 of the albedo at all angles.
+The comparison uses uniform light from all directions with all bounces, which shows shapes, colours, textures and opacities. Other light is compared
+with closed forms (spec.py), because barney's matte material is not Lambertian: measured on a white sphere with version 1.2.6, a directional light gives
+0.65 of albedo / pi * irradiance * cos where the surface faces it and 0.32 at 64 degrees, and uniform light gives 0.826 of the albedo at all angles.
 """
 import json
 import subprocess
@@ -13,10 +13,11 @@ from anari_c import *
 
 SAMPLES = 64
 AMBIENT = 0.8
-# So that both mean the same: see above.
+# Corrects barney's albedo, see above.
 BARNEY_FACTOR = 1 / 0.826
-# What barney 1.2.6 does as we do. Of the others it has no curves (the process ends), isosurfaces and samplers other than some images (which come out black
-# or in other places), and its volumes are noise: those are compared with closed forms in spec.py.
+# Scenes that barney 1.2.6 supports with the same semantics. It has no curves (the process ends), no
+# isosurfaces, and of the samplers only some images (others are black or misplaced); its volumes are
+# noise. Those scenes are compared with closed forms in spec.py.
 COMPARED = ["triangle", "triangle_colors", "triangle_soup", "quad", "sphere", "sphere_common", "cylinder", "cylinder_open", "cone", "instances"]
 
 
@@ -37,7 +38,7 @@ def save(path, p):
 
 
 def barney(folder, name):
-    """In a process of its own, which barney may end."""
+    """Runs barney in its own process, which it may crash."""
     path = f"{folder}/{name}_barney.npy"
     run = subprocess.run([sys.executable, __file__, "--barney", path, name], capture_output=True)
     return np.load(path) if run.returncode == 0 else None

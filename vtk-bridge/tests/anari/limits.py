@@ -1,5 +1,5 @@
-"""Numbers that are none, scales from 1e-18 to 1e18, changes while a frame is drawn, and random values for every parameter of every object: the device goes on, says what is wrong, and no pixel
-becomes NaN. Exit code 1 and a line per failure."""
+"""Non-finite numbers, scales from 1e-18 to 1e18, changes while a frame is drawn, and random values for every parameter of every object: the device
+continues, reports the fault, and no pixel becomes NaN. Exit code 1 and a line per failure."""
 import sys
 import traceback
 
@@ -18,7 +18,7 @@ class Entry(C.Structure):
 
 
 def parameters(d, kind, subtype):
-    """Names with a type each, as the device tells them."""
+    """Names and types of parameters, as the device reports them."""
     entries = C.cast(object_info(d.handle, kind, subtype.encode(), b"parameter", PARAMETER_LIST), C.POINTER(Entry))
     found, i = [], 0
     while entries and entries[i].name:
@@ -58,7 +58,7 @@ def numbers_that_are_none_are_named_and_never_reach_a_pixel(d):
             if kind == "Renderer":
                 f.put(renderer=o)
             if name == "background" and not np.isfinite(v):
-                draw(d, f)  # The program's own colour is where nothing is.
+                draw(d, f)  # The program's own colour fills uncovered pixels.
             else:
                 picture_is_finite(d, f, f"{subtype} {name} {v}")
             o.release()
@@ -96,7 +96,7 @@ def changes_while_a_frame_is_drawn_are_for_the_next_one(d):
     points = [o for o in d.keep if getattr(o, "shape", None) == (1, 3)][-1]
     render_frame(d.handle, f.handle)
     m.put(color=[1.0, 0.0, 0.0])
-    points[:] = np.nan  # shared memory, which a program must not touch without mapping; the frame has its own
+    points[:] = np.nan  # shared memory, which a program must not touch without mapping; the frame has its own copy
     close(draw_again(d, f), [0.5, 0.25, 1.0])
     points[:] = 0
     for _ in range(30):
@@ -204,7 +204,7 @@ def any_value_of_any_parameter_is_survived(d):
         for _ in range(24):
             kind = str(r.choice([k for k in made]))
             o = made[kind]
-            # Parameters of all subtypes: those of another one are unknown to this one.
+            # Parameters of all subtypes: this subtype does not know those of the others.
             names = [p for s in subtypes(kind) for p in parameters(d, KINDS[kind], s)]
             name, of = names[int(r.integers(len(names)))]
             if of in (SAMPLER, DATA_TYPE) or of not in NAMES:
@@ -216,7 +216,7 @@ def any_value_of_any_parameter_is_survived(d):
             p = draw(d, f)
             refused += p is None
             if p is not None:
-                # Where nothing is, there is the program's own background, whatever it is.
+                # Uncovered pixels show the program's own background, whatever its values.
                 hit = np.isfinite(pixels(d, f, "channel.depth")) & (p[..., 3] == 1)
                 assert np.isfinite(p[hit]).all() or kind == "Renderer", f"seed {seed}: {kind} {name}: {p[hit]}"
                 assert np.isfinite(pixels(d, f, "channel.normal")).all(), f"seed {seed}: {kind} {name}"

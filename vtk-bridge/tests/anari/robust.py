@@ -1,4 +1,4 @@
-"""Programs that do it wrong, and things at their limits: the device must go on, and say what was wrong. Exit code 1 and a line per failure."""
+"""Programs that misuse the interface, and inputs at the limits: the device must continue and report the fault. Exit code 1 and a line per failure."""
 import gc
 import sys
 import threading
@@ -198,7 +198,7 @@ def completion_callbacks_come_once_a_frame(d):
     f.set("frameCompletionCallback", FRAME_COMPLETION_CALLBACK, callback).set("frameCompletionCallbackUserData", VOID_POINTER, 77).commit()
     draw(d, f)
     draw(d, f)
-    f.release()  # waits for what is still being called
+    f.release()  # waits for running callbacks
     assert seen == [(77, f.handle)] * 2, seen
 
 

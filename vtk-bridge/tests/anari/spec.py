@@ -1,4 +1,4 @@
-"""What ANARI's specification says, on our device: each function is a test, with numbers from closed forms. Exit code 1 and a line per failure."""
+"""Checks our device against ANARI's specification: each function is a test, with numbers from closed forms. Exit code 1 and a line per failure."""
 import sys
 import traceback
 
@@ -47,7 +47,8 @@ def spot_light_is_full_inside_dark_outside_and_linear_in_the_cosine_between(d):
 
 
 def ring_light_is_a_disk_with_the_cosine_to_its_normal(d):
-    # The middle is straight ahead at distance 2; (0.6, 0, 0.8) is off the axis: cosines at both ends, and the square of the distance.
+    # The middle is straight ahead at distance 2; (0.6, 0, 0.8) is off the axis and tests the
+    # cosines at both ends and the square of the distance.
     for light in (d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], radius=0.01, intensity=float(4 * np.pi)),
                   d.new("Light", "ring", position=[0.0, 0.0, 3.0], direction=[0.0, 0.0, -1.0], radius=0.01, power=float(4 * np.pi**2))):
         p = draw(d, ball(d, light=light))
@@ -136,7 +137,7 @@ def a_volume_of_one_value_has_the_opacity_of_its_thickness(d):
     v = d.new("Volume", "transferFunction1D", value=field, color=[1.0, 0.0, 0.0], opacity=0.5, unitDistance=1.0)
     f = ball(d)
     p = draw(d, f.put(world=d.new("World", volume=[v])))
-    # Two units of a medium that lets a half through per unit.
+    # Two units of a medium that transmits half of the light per unit.
     close(p[50, 50], [0.75 + 0.25 * 0.1, 0.25 * 0.1, 0.25 * 0.2, 1.0])
 
 
@@ -152,7 +153,7 @@ def isosurfaces_number_their_isovalues(d):
 
 
 def sheet_colours(d, material, **attributes):
-    """A square over the whole picture under light that shows its colours; x and y of a pixel in 0..1."""
+    """A square over the whole image under light that shows its colours; x and y of a pixel in 0..1."""
     corners = F([[-1.01, -1.01, 0], [1.01, -1.01, 0], [1.01, 1.01, 0], [-1.01, 1.01, 0]])
     g = d.new("Geometry", "quad", vertex__position=d.array(FLOAT32_VEC3, corners), **attributes)
     f = ball(d, ambient=1.0)

@@ -11,7 +11,7 @@ UNIT = F([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 
 def plain(d, **more):
-    """A physically based material that is ideal diffuse and white unless more says otherwise."""
+    """A physically based material that is ideally diffuse and white unless the arguments override that."""
     return d.new("Material", "physicallyBased", **{**dict(baseColor=[1.0, 1.0, 1.0], metallic=0.0, roughness=1.0), **more})
 
 
@@ -33,7 +33,7 @@ def emissive_occlusion_and_opacity_follow_attributes_and_samplers(d):
         m = plain(d, opacity=d.new("Sampler", "image1D", image=row), alphaMode=mode, alphaCutoff=0.4)
         p, x, _ = sheet_colours(d, m, vertex__attribute0=ramp)
         close(p[..., 0], alpha(x) + (1 - alpha(x)) * 0.1)
-    # The mask cuts by the picture's own alpha as well.
+    # The mask also uses the texture's own alpha.
     texels = F([[[1, 0, 0, 0.2], [0, 1, 0, 0.9]]])
     m = plain(d, baseColor=d.new("Sampler", "image2D", image=d.array(FLOAT32_VEC4, texels, 2), filter="nearest"), alphaMode="mask")
     p, x, _ = sheet_colours(d, m, vertex__attribute0=d.array(FLOAT32_VEC2, UNIT))
@@ -64,7 +64,7 @@ def metallic_roughness_and_specular_are_the_material_with_those_numbers(d):
 
 
 def one_picture_serves_several_channels_through_transforms(d):
-    """As glTF packs them: occlusion in red, roughness in green, metalness in blue."""
+    """Channels as glTF packs them: occlusion in red, roughness in green, metalness in blue."""
     packed = d.array(UFIXED8_VEC3, np.uint8([[[255, 102, 204]]]), 2)
 
     def channel(c):
@@ -101,7 +101,7 @@ def normal_maps_bend_along_tangents_or_along_their_own_coordinates(d):
         light, layer = lit_sheet(d, m, [-float(c) for c in to_light], **arrays)
         close(layer, normal, 1e-4)
         close(light, np.dot(normal, to_light), 1e-3)
-    # Nothing grows anywhere: there is no frame, and the normal stays.
+    # Constant texture coordinates define no tangent frame, so the normal is unchanged.
     close(lit_sheet(d, m, [0.0, 0.0, -1.0])[1], [0, 0, 1], 1e-5)
     draw(d, ball(d, material=m, ambient=0.5))
     assert any("`normal` is left out on geometry `sphere`" in t for _, t in d.messages), d.messages
@@ -144,14 +144,15 @@ def volume_colours_may_be_bytes(d):
 def quad_lights_shine_by_radiance_power_or_intensity_to_the_side_asked_for(d):
     small = dict(position=[-0.01, -0.01, 3.0], edge1=[0.02, 0.0, 0.0], edge2=[0.0, 0.02, 0.0])
     at = lambda **p: draw(d, ball(d, light=d.new("Light", "quad", **{**small, **p})))[50, 50, 0]
-    # Distance 2: a quarter of 4 pi straight ahead makes white.
+    # Straight ahead at distance 2, a quarter of 4 pi gives white.
     for strength in (dict(intensity=4 * PI), dict(power=4 * PI * PI), dict(radiance=4 * PI / 0.0004)):
         close(at(side="back", **strength), 0.5)
         assert at(side="front", **strength) == 0 and at(**strength) == 0, "edge1 x edge2 points away"
         # Both sides share the power.
         close(at(side="both", **strength), 0.25 if "power" in strength else 0.5)
     close(at(edge1=small["edge2"], edge2=small["edge1"], intensity=4 * PI), 0.5)
-    # A large one, against Lambert's formula for a square seen from its axis at half its edge's distance.
+    # A large light, compared with Lambert's formula for a square seen from its axis at half its
+    # edge's distance.
     f = ball(d, light=d.new("Light", "quad", position=[-1.0, -1.0, 2.0], edge1=[0.0, 2.0, 0.0], edge2=[2.0, 0.0, 0.0], radiance=1.0), pixelSamples=64, lightSamples=64)
     corners = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]) / np.sqrt(3)
     form = sum(np.arccos(a @ b) * np.cross(a, b)[2] / np.linalg.norm(np.cross(a, b)) for a, b in zip(corners, np.roll(corners, -1, 0))) / (2 * np.pi)
@@ -184,7 +185,7 @@ def panoramas_have_their_direction_in_the_middle(d):
         close(pixels(d, f, "channel.depth")[y, x], 3.0, 0.02)
     right = draw(d, f.put(size=(64, 64), camera=c.put(imageRegion=[0.5, 0.0, 1.0, 1.0])))
     close(right, p[:, 64:], 1e-5)
-    # Samples, lights and shadows work there too.
+    # Samples, lights and shadows also work there.
     f = scenes.view(d, dict(surface=[s]), size=(64, 32), camera=c, renderer="pathtracer", pixelSamples=4)
     assert draw(d, f).std() > 5
 

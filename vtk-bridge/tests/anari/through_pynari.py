@@ -1,4 +1,4 @@
-"""A program as pynari's users write them, with nothing but pynari: `through_pynari.py [DEVICE]`. Colours of known pixels, on our device; exit code 1 when one is wrong."""
+"""A program as users of pynari write it, with only pynari: `through_pynari.py [DEVICE]`. Checks the colours of known pixels on our device; exit code 1 when one is wrong."""
 import sys
 
 import numpy as np
@@ -30,7 +30,7 @@ def surface(kind, material, **arrays):
     return s
 
 
-# Side by side along x: a square of two triangles, a ball and a cylinder.
+# Next to each other along x: a square of two triangles, a ball and a cylinder.
 square = F([[-3, -1, 0], [-1, -1, 0], [-1, 1, 0], [-3, 1, 0]])
 surfaces = [
     surface("triangle", matte(1.0, 0.0, 0.0), vertex_position=(anari.FLOAT32_VEC3, square), primitive_index=(anari.UINT32_VEC3, np.uint32([[0, 1, 2], [0, 2, 3]]))),
@@ -64,7 +64,7 @@ for name, kind, value in (("renderer", anari.OBJECT, renderer), ("camera", anari
 frame.commitParameters()
 frame.render()
 picture = frame.get("channel.color")
-# pynari gives (width, height, 4) or (height, width, 4), by its version.
+# pynari returns (width, height, 4) or (height, width, 4), depending on its version.
 picture = picture if picture.shape[0] == 60 else picture.reshape(60, 120, 4)
 expected = {(20, 30): (255, 0, 0), (60, 30): (0, 128, 0), (100, 30): (0, 0, 64), (60, 1): (64, 64, 64)}
 wrong = {at: picture[at[1], at[0], :3].tolist() for at, color in expected.items() if np.abs(picture[at[1], at[0], :3].astype(int) - color).max() > 1}

@@ -1,7 +1,7 @@
-"""What a person would keep of a window: the picture (PNG), the window's depth (npy), and facts such as picks (json).
+"""Saves what a user sees of a window: the image (PNG), the window's depth (npy), and facts such as picks (json).
 
-Used by the scripts beside it, which are ordinary VTK and ParaView scripts. Where CAPTURE_BESIDE names a file that some part
-of the program writes after a frame, that is moved next to the picture.
+Used by the scripts in the same folder, which are ordinary VTK and ParaView scripts. If CAPTURE_BESIDE names a file that another part
+of the program writes after a frame, that file is moved next to the image.
 """
 import json
 import os
@@ -12,7 +12,7 @@ import vtk
 
 
 def write_npy(path, array, shape, kind):
-    """An array of VTK as a .npy file (format version 1), by hand, so that no numpy is needed."""
+    """Writes a VTK array as a .npy file (format version 1) without numpy."""
     head = "{'descr': '%s', 'fortran_order': False, 'shape': %s, }" % (kind, tuple(shape))
     head += " " * (-(len(head) + 11) % 64) + "\n"
     with open(path, "wb") as file:
@@ -44,7 +44,7 @@ def save(window, name, **facts):
 
 
 def window(width=300, height=300, *renderers):
-    """An off-screen window without antialiasing, so that pictures can be compared pixel by pixel."""
+    """An off-screen window without antialiasing, so that images can be compared pixel by pixel."""
     made = vtk.vtkRenderWindow()
     made.SetOffScreenRendering(1)
     made.SetMultiSamples(0)
@@ -55,7 +55,7 @@ def window(width=300, height=300, *renderers):
 
 
 def actor(source, color=None, **mapper_settings):
-    """An actor of what a filter makes, without scalars when a colour is given."""
+    """An actor for the output of a filter, without scalars when a colour is given."""
     mapper = vtk.vtkPolyDataMapper()
     mapper.SetInputConnection(source.GetOutputPort())
     made = vtk.vtkActor()
@@ -67,7 +67,7 @@ def actor(source, color=None, **mapper_settings):
 
 
 def look(renderer, position, focal_point=(0, 0, 0), up=(0, 0, 1)):
-    """Sets the camera's place and direction and fits everything in."""
+    """Sets the camera's position and direction and fits all props into the view."""
     camera = renderer.GetActiveCamera()
     camera.SetPosition(position)
     camera.SetFocalPoint(focal_point)

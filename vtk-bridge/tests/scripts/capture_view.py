@@ -1,4 +1,4 @@
-"""What `capture.py` does, for views of ParaView."""
+"""Like `capture.py`, for ParaView's views."""
 from capture import save as save_window
 from paraview.simple import CreateRenderView, Render
 
@@ -9,7 +9,7 @@ def view(size):
     made.ViewSize = size
     made.UseFXAA = 0
     made.OrientationAxesVisibility = 0
-    # No smaller pictures while things move.
+    # Disable reduced images during interaction.
     made.StillRenderImageReductionFactor = 1
     return made
 
@@ -21,7 +21,7 @@ def save(shown, name, **facts):
 
 
 def facts_of_selection(source):
-    """What is selected of a source: sorted ids, a list for each node."""
+    """The selection of a source: sorted ids, a list for each node."""
     selection = source.GetSelectionInput(source.Port)
     if selection is None:
         return None

@@ -1,5 +1,5 @@
-"""Runs scripts one after the other in one process: python run_all.py FOLDER SCRIPT... Says which one is running, so that a
-crash can be told whose it is; a script that raises does not stop the others."""
+"""Runs scripts one after the other in one process: python run_all.py FOLDER SCRIPT... Prints which one is running, so that a
+crash can be attributed; a script that raises does not stop the others."""
 import os
 import runpy
 import sys
@@ -24,7 +24,8 @@ for script in scripts:
         print("raised", name, flush=True)
         failed = 1
     if "paraview.simple" in sys.modules:
-        # Views that outlive their script would be drawn again by the next, and end in the wrong order with the process.
+        # Views that outlive their script would be drawn again by the next one, and would be
+        # destroyed in the wrong order at exit.
         simple = sys.modules["paraview.simple"]
         for view in simple.GetRenderViews():
             simple.Delete(view)

@@ -1,4 +1,4 @@
-# A ball before a background that is yellow below and blue above.
+# A ball in front of a background that is yellow below and blue above.
 import vtk
 
 from capture import actor, save, window

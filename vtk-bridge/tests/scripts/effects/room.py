@@ -1,4 +1,4 @@
-# A red box on a floor under one lamp, a far box, and the pixels at which places of interest are seen.
+# A red box on a floor under one lamp, a distant box, and the pixels of named positions.
 import vtk
 
 from capture import actor, save, window
@@ -38,11 +38,12 @@ def pixel(*world):
 save(
     win,
     "room",
-    # The lamp's light goes along (5, 2, -6): the box throws its shadow to the right and back.
+    # The lamp's light travels along (5, 2, -6): the box casts its shadow to the right and back.
     shadow=pixel(0.75, 0.2, 0),
     lit=pixel(-1.5, 0, 0),
     far_from_shadow=pixel(2.5, -1, 0),
-    # Floor and box meet: a concave corner. The top of the box is convex, the floor far away is open.
+    # The floor and the box form a concave corner. The top of the box is convex; the distant floor
+    # is open.
     concave=pixel(-0.2, -0.53, 0),
     convex=pixel(-0.3, -0.4, 1),
     open=pixel(-2.2, -1.3, 0),

@@ -1,4 +1,5 @@
-# Run by ParaView's own window (paraview --script): options of the view's panel, set as the panel's widgets set them, and what the view shows then.
+# Run by ParaView's own window (paraview --script): sets options of the view's panel as the panel's
+# widgets do, and saves the resulting images.
 import os
 import sys
 import traceback
@@ -52,7 +53,7 @@ try:
     main()
     code = 0
 except Exception:
-    # The window keeps what Python prints.
+    # The window captures Python's output.
     traceback.print_exc(file=sys.__stderr__)
 sys.__stderr__.flush()
 # The window would wait for its user.

@@ -1,4 +1,5 @@
-# Contours coloured by their normals' size and by a solid colour, a plane, a wireframe sphere; then the camera goes round.
+# Contours coloured by the magnitude of their normals and by a solid colour, a plane, a wireframe
+# sphere; then the camera moves around them.
 from paraview.simple import *
 
 from capture_view import save, view

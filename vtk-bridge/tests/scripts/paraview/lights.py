@@ -1,4 +1,4 @@
-# ParaView's light kit switched off and lights of one's own, specular and physically based surfaces.
+# ParaView's light kit switched off, with custom lights on specular and physically based surfaces.
 from paraview.simple import *
 
 from capture_view import save, view
@@ -25,7 +25,7 @@ light.FocalPoint = [1, 0, 0]
 light.DiffuseColor = [1, 0.9, 0.8]
 light.Intensity = 0.9
 save(v, "one_light")
-# Ambient light is an answer of this surface; the physically based one is away.
+# Ambient light affects this surface; the physically based one is hidden.
 Hide(balls[2], v)
 shown[1].Ambient = 0.3
 shown[1].Diffuse = 0.6

@@ -1,4 +1,4 @@
-# A picture on a plane.
+# A texture on a plane.
 import sys
 
 import vtk

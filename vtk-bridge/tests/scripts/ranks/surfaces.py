@@ -1,11 +1,12 @@
-# The same pictures on any number of ranks: opaque, translucent, and with things that stay OpenGL.
+# The same images on any number of ranks: opaque, translucent, and with props that OpenGL draws.
 import sys
 
 from paraview.simple import *
 
 out = sys.argv[1]
 wavelet = Wavelet(WholeExtent=[-16, 16, -16, 16, -16, 16])
-# Without normals: a rank computes those at its border from its own side only, so that the shading would show a seam.
+# Without normals: a rank computes those at its border from its own side only, so the shading would
+# show a seam.
 contour = Contour(Input=wavelet, ContourBy="RTData", Isosurfaces=[157.09, 210], ComputeNormals=0)
 ball = Sphere(Center=[14, -20, 8], Radius=8, ThetaResolution=64, PhiResolution=48)
 view = CreateRenderView()

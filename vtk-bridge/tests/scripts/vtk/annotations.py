@@ -1,4 +1,5 @@
-# What stays OpenGL in the same picture: axes, scalar bar, text, wireframe, points, lines, and a widget-like overlay.
+# Props that OpenGL draws in the same image: axes, scalar bar, text, wireframe, points, lines, and a
+# widget-like overlay.
 import vtk
 
 from capture import actor, look, save, window

@@ -1,4 +1,5 @@
-# Inside and outside of open surfaces: a property for back faces, culling of either side, normals that point the wrong way.
+# Inside and outside of open surfaces: a back-face property, culling of either side, reversed
+# normals.
 import vtk
 
 from capture import actor, look, save, window
@@ -27,7 +28,7 @@ inside.SetSpecularPower(20)
 bowl(1.1, 0).SetBackfaceProperty(inside)
 bowl(2.2, 0).GetProperty().BackfaceCullingOn()
 bowl(0, 1.1).GetProperty().FrontfaceCullingOn()
-# Normals turned round, but not the order of the points.
+# Reversed normals, but the same order of the points.
 source = vtk.vtkSphereSource()
 source.SetEndPhi(100)
 source.SetThetaResolution(30)

@@ -1,4 +1,5 @@
-# New topology every frame, actors that come, go, hide, move and change colour; the same data in two actors.
+# New topology every frame; actors that are added, removed, hidden, moved and recoloured; the same
+# data in two actors.
 import vtk
 
 from capture import actor, look, save, window

@@ -1,4 +1,5 @@
-# Two nested contours of the wavelet, coloured by their value, above a plane; then the camera goes round.
+# Two nested contours of the wavelet, coloured by their value, above a plane; then the camera moves
+# around them.
 import vtk
 
 from capture import actor, look, save, window

@@ -1,4 +1,5 @@
-# Edges on surfaces: of triangles, of polygons (whose diagonals are none), on colours of cells, wide ones, of glyphs.
+# Edges on surfaces: of triangles, of polygons (without their diagonals), with cell colours, wide
+# ones, of glyphs.
 import vtk
 
 from capture import actor, look, save, window

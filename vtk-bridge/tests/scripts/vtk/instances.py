@@ -1,4 +1,5 @@
-# Glyphs of one source by the mapper: each way to turn and scale, colours from an array, a mask, clamping; placed by their actors.
+# Glyphs of one source through the mapper: each mode of orientation and scaling, colours from an
+# array, a mask, clamping; placed by their actors.
 import math
 
 import vtk
@@ -72,7 +73,7 @@ win = window(420, 300, ren)
 look(ren, (3, 1.5, 12), (3, 1.5, 0), (0, 1, 0)).Zoom(1.3)
 win.Render()
 save(win, "instances", props=ren.GetNumberOfPropsRendered())
-# Sizes and colours change; the shape is the one there was.
+# Sizes and colours change; the shape stays the same.
 for i in range(12):
     sizes.SetValue(i, 0.75 - 0.05 * i)
 sizes.Modified()

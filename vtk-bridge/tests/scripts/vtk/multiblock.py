@@ -28,7 +28,7 @@ blocks.SetBlock(0, sphere(0, 0))
 blocks.SetBlock(1, sphere(1.2, 0, scalars=True))
 blocks.SetBlock(2, inner)
 blocks.SetBlock(3, sphere(2.4, 0.6))
-# One class has both names' abilities since VTK 9.3.
+# Since VTK 9.3, one class has the features of both names.
 mapper = getattr(vtk, "vtkCompositePolyDataMapper2", vtk.vtkCompositePolyDataMapper)()
 mapper.SetInputDataObject(blocks)
 attributes = vtk.vtkCompositeDataDisplayAttributes()

@@ -1,4 +1,5 @@
-# What programs get wrong: NaN points, no points, no cells, no input, no mapper, cells of points outside, zero scale, huge cells.
+# Invalid inputs: NaN points, no points, no cells, no input, no mapper, cells with points out of
+# range, zero scale, huge cells.
 import math
 
 import vtk
@@ -55,7 +56,7 @@ camera.SetClippingRange(2, 7)
 win.Render()
 save(win, "odd")
 
-# One corner is not a number: its triangles cannot be seen, all others can.
+# One corner is not a number: its triangles are invisible, all others are visible.
 ball.Update()
 torn = vtk.vtkPolyData()
 torn.DeepCopy(ball.GetOutput())

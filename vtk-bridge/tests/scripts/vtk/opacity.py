@@ -34,7 +34,7 @@ ren.ResetCameraClippingRange()
 win.Render()
 save(win, "opacity", props=ren.GetNumberOfPropsRendered())
 
-# Opacity that comes from the lookup table.
+# Opacity from the lookup table.
 table = vtk.vtkLookupTable()
 table.SetNumberOfTableValues(16)
 for i in range(16):

@@ -7,7 +7,7 @@ from capture import actor, look, save, window
 
 
 def texture(of, n=32, srgb=False, smooth=True):
-    """A picture from a function of place (0 to 1 each way) to three numbers 0 to 1."""
+    """An image from a function of the position (0 to 1 along each axis) to three numbers 0 to 1."""
     image = vtk.vtkImageData()
     image.SetDimensions(n, n, 1)
     pixels = vtk.vtkUnsignedCharArray()
@@ -102,7 +102,8 @@ ren.ResetCameraClippingRange()
 win.Render()
 save(win, "maps", props=ren.GetNumberOfPropsRendered())
 
-# Planes turned about, one of them seen from behind; and one that is cut by a plane, turned and stretched.
+# Rotated planes, one of them seen from behind; and one that is clipped by a plane, rotated and
+# stretched.
 ren.RemoveAllViewProps()
 for x, turn in ((0, 0), (1.1, 50), (2.2, 150)):
     plate = made(x, 0, "plate", metallic=0.2)

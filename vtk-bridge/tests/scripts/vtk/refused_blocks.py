@@ -1,5 +1,6 @@
-# Translucent blocks of which a later one is left to OpenGL: because of lines, and because it has colours and the actor a
-# texture. The whole actor is OpenGL's then, and no block may show twice. The floor is traced.
+# Translucent blocks of which a later one cannot be traced: because of lines, and because it has
+# colours and the actor a texture. OpenGL then draws the whole actor, and no block may appear twice.
+# The floor is traced.
 import vtk
 
 from capture import actor, look, save, window
@@ -52,7 +53,7 @@ def blocks(*data):
     made = vtk.vtkMultiBlockDataSet()
     for i, block in enumerate(data):
         made.SetBlock(i, block)
-    # One class has both names' abilities since VTK 9.3.
+    # Since VTK 9.3, one class has the features of both names.
     mapper = getattr(vtk, "vtkCompositePolyDataMapper2", vtk.vtkCompositePolyDataMapper)()
     mapper.SetInputDataObject(made)
     mapper.SetScalarRange(0, 1)
@@ -85,7 +86,7 @@ for name, shown in (
     look(ren, (1, -5, 3), (0, 0, 0.2)).Zoom(1.3)
     win.Render()
     save(win, name, props=ren.GetNumberOfPropsRendered())
-    # A second frame: what was refused once is not taken for known.
+    # A second frame: rejected surfaces must not be treated as cached.
     ren.GetActiveCamera().Azimuth(20)
     ren.ResetCameraClippingRange()
     win.Render()

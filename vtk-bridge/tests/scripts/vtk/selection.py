@@ -37,7 +37,7 @@ for x, y in ((80, 110), (160, 125), (240, 110), (5, 5), (120, 118)):
     found = point_picker.Pick(x, y, 0, ren)
     picks.append(["point", found, point_picker.GetPointId(), index(point_picker.GetActor())])
     world.Pick(x, y, 0, ren)
-    # The same window depth within an ulp or two gives the same place to six digits or so.
+    # Equal window depths within an ulp or two give the same position to about six digits.
     picks.append(["world"] + [round(v, 4) + 0.0 for v in world.GetPickPosition()])
 
 selections = []

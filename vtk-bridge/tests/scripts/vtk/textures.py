@@ -1,4 +1,5 @@
-# Textures: smooth and sharp, repeated and clamped, with transparency, and times the surface's colour.
+# Textures: interpolated and nearest, repeated and clamped, with transparency, and multiplied with
+# the surface's colour.
 import vtk
 
 from capture import actor, look, save, window
@@ -61,7 +62,7 @@ ren.ResetCameraClippingRange()
 win.Render()
 save(win, "textures", props=ren.GetNumberOfPropsRendered())
 
-# Part of this picture lets light through.
+# Part of this texture is translucent.
 ren.RemoveAllViewProps()
 ren.SetUseDepthPeeling(1)
 ren.SetOcclusionRatio(0)

@@ -1,11 +1,13 @@
-# Volumes that are no medium: the largest, smallest, mean and added scalar, and surfaces of given values. And opacity by gradient.
+# Volumes with other blend modes: the largest, smallest, mean and added scalar, and isosurfaces.
+# Also opacity by gradient.
 import vtk
 
 from capture import actor, look, save, window
 
 wavelet = vtk.vtkRTAnalyticSource()
 wavelet.SetWholeExtent(-10, 10, -10, 10, -10, 10)
-# Smooth: VTK takes the differences that are its gradient a twentieth further apart than the points are.
+# Smooth data: VTK's gradient uses differences over a distance one twentieth larger than the point
+# spacing.
 wavelet.SetXFreq(5)
 wavelet.SetYFreq(4)
 wavelet.SetZFreq(3)
@@ -60,7 +62,7 @@ prop.SetDiffuse(0.8)
 picture("isosurfaces_shaded")
 prop.ShadeOff()
 
-# A surface inside ends the rays, and one beside shows that the picture lies at the right depth.
+# A surface inside ends the rays; one next to the volume shows that the image has the right depth.
 ball = vtk.vtkSphereSource()
 ball.SetRadius(5)
 ball.SetCenter(6, -6, 2)

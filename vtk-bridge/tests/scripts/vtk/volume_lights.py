@@ -1,4 +1,4 @@
-# A shaded volume under other lights than VTK's own one: coloured, several, a kit, none.
+# A shaded volume under lights other than VTK's default: coloured, several, a kit, none.
 import vtk
 
 from capture import look, save, window
@@ -27,7 +27,8 @@ volume = vtk.vtkVolume()
 
 
 def new_mapper():
-    # For each picture one: OpenGL keeps the shader that a mapper made for the lights of its first picture.
+    # A mapper for each image: OpenGL keeps the shader that a mapper compiled for the lights of its
+    # first image.
     mapper = vtk.vtkGPUVolumeRayCastMapper()
     mapper.SetInputConnection(wavelet.GetOutputPort())
     mapper.SetAutoAdjustSampleDistances(0)
@@ -77,10 +78,11 @@ ren.RemoveAllLights()
 kit = vtk.vtkLightKit()
 kit.AddLightsToRenderer(ren)
 picture("kit")
-# Turning the volume turns its gradients.
+# Rotating the volume rotates its gradients.
 volume.RotateX(40)
 picture("kit_turned")
-# One scene told twice: the volume turned, or instead the camera and the light turned the other way.
+# The same scene twice: with the volume rotated, or with the camera and the light rotated the other
+# way.
 ren.RemoveAllLights()
 beside = light((1, 1, 1), (-4, -9, 5))
 picture("turned")

@@ -1,5 +1,5 @@
-# Volumes: spacing, directions, a turned prop, values of the nearest point, shading, a logarithmic table, other kinds of numbers,
-# and two that overlap.
+# Volumes: spacing, directions, a rotated prop, nearest-neighbour interpolation, shading, a
+# logarithmic table, other scalar types, and two that overlap.
 import vtk
 
 from capture import actor, look, save, window
@@ -59,7 +59,8 @@ picture("linear")
 shown.GetProperty().SetInterpolationTypeToNearest()
 picture("nearest")
 shown.GetProperty().SetInterpolationTypeToLinear()
-# Smooth data: VTK takes the differences that are its gradient a twentieth further apart than the points are.
+# Smooth data: VTK's gradient uses differences over a distance one twentieth larger than the point
+# spacing.
 smooth = vtk.vtkRTAnalyticSource()
 smooth.SetWholeExtent(-10, 10, -10, 10, -10, 10)
 smooth.SetXFreq(5)
@@ -79,7 +80,7 @@ shown.RotateX(30)
 shown.SetScale(1, 1.5, 0.7)
 picture("turned")
 
-# An image with a frame of its own, of whole numbers, whose extent does not begin at zero.
+# An image with its own coordinate frame and integer scalars, whose extent does not begin at zero.
 image = vtk.vtkImageData()
 image.ShallowCopy(wavelet().GetOutput())
 image.SetSpacing(0.5, 1.0, 2.0)
@@ -98,7 +99,8 @@ ren.AddVolume(shown)
 ren.ResetCamera()
 picture("directions")
 
-# A surface inside: the part in front of it dims it, the part behind is hidden. And a line that OpenGL draws in front of everything.
+# A surface inside: the part in front of it dims it, the part behind is hidden. A line that OpenGL
+# draws is in front of everything.
 ren.RemoveVolume(shown)
 shown = volume(rough, kind=vtk.vtkSmartVolumeMapper)
 ren.AddVolume(shown)
@@ -117,7 +119,7 @@ inside.GetProperty().SetOpacity(0.5)
 picture("translucent_inside")
 inside.GetProperty().SetOpacity(1.0)
 
-# What rt-core has not stays OpenGL.
+# OpenGL draws what rt-core does not support.
 shown.GetMapper().CroppingOn()
 shown.GetMapper().SetCroppingRegionPlanes(-4, 4, -10, 10, -10, 10)
 picture("cropped")

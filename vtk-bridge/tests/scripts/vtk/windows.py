@@ -1,4 +1,5 @@
-# Windows that come, go and change their size: two at once with shared actors, 1 by 1, wide, renderers deleted and moved.
+# Windows that open, close and resize: two at once with shared actors, 1 by 1, wide, renderers
+# deleted and moved.
 import vtk
 
 from capture import actor, look, save, window
@@ -32,7 +33,7 @@ first.SetSize(333, 77)
 first.Render()
 save(first, "wide")
 first.SetSize(200, 150)
-# The renderer goes while the window stays, and another comes.
+# Replace the renderer while the window stays.
 first.RemoveRenderer(one)
 del one
 first.Render()
@@ -41,14 +42,14 @@ again = renderer((0.1, 0.3, 0.1))
 first.AddRenderer(again)
 first.Render()
 save(first, "again")
-# The window goes while the renderer stays.
+# Delete the window while the renderer stays.
 second.RemoveRenderer(two)
 second.Finalize()
 del second
 third = window(120, 120, two)
 third.Render()
 save(third, "third")
-# As large as the largest screens; only one row of it is kept, and a small picture after it.
+# As large as the largest screens; only one row of it is saved, and then a small image.
 third.SetSize(7680, 4320)
 third.Render()
 row = vtk.vtkFloatArray()

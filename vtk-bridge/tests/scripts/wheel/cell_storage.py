@@ -1,4 +1,4 @@
-# The same sphere with its cells in every storage that vtkCellArray has since VTK 9.6.
+# The same sphere with its cells in every storage of vtkCellArray since VTK 9.6.
 import vtk
 
 from capture import look, save, window

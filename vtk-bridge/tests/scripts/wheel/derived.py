@@ -1,4 +1,5 @@
-# Renderers, actors and mappers of classes derived in Python, as PyVista has them; a renderer whose observers were all removed; a tiled picture.
+# Renderers, actors and mappers of classes derived in Python, as in PyVista; a renderer whose
+# observers were all removed; a tiled image.
 import vtk
 
 from capture import look, save, window
@@ -38,7 +39,8 @@ def picture(name, cleared):
     if cleared:
         ren.RemoveAllObservers()
         win.RemoveAllObservers()
-        # Programs do this when they close a window; the next renderer may lie where this one was.
+        # Programs do this when they close a window; the next renderer may have the address of this
+        # one.
         return
     save(win, name)
     tiles = vtk.vtkWindowToImageFilter()
@@ -54,7 +56,7 @@ def picture(name, cleared):
     scalars = image.GetPointData().GetScalars()
     background = scalars.GetTuple3(0)
     facts = sum(scalars.GetTuple3(i) != background for i in range(scalars.GetNumberOfTuples()))
-    # The tiles' pictures differ by a pixel here and there, so to hundreds.
+    # The tiled images differ by some pixels, so round to hundreds.
     save(win, name + "_tiled", shown=round(facts, -2))
 
 

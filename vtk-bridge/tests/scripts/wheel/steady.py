@@ -1,4 +1,5 @@
-# Frames in which nothing but the camera moves look at no array; a fault of ours leaves the frame to OpenGL.
+# Frames in which only the camera moves read no array; an error of the bridge leaves the frame to
+# OpenGL.
 import sys
 
 import vtk
