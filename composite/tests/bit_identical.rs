@@ -32,8 +32,8 @@ impl Random {
     }
 }
 
-/// The frame of one rank: about half of the image in runs, with depths from a few values so that
-/// ties are common.
+/// The frame of one rank: about half of the image in runs, with few different depths so that ties
+/// are common.
 struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -66,7 +66,7 @@ fn draw(rank: usize, size_px: (u32, u32)) -> TestFrame {
     drawn
 }
 
-/// Composites over threads; returns the whole image, assembled from pieces if it was left
+/// Composites over threads; returns the whole image, assembled from parts if it was left
 /// distributed.
 fn over_threads<P: Composite>(frames: &[Frame<'_, P>], options: &Options) -> Image<P> {
     let results: Vec<CompositeOutput<P>> = threads::run(frames.len(), |mut comm| {
@@ -168,7 +168,7 @@ fn fourteen_to_seventeen_ranks_give_the_bits_of_the_serial_reference() {
     check_rank_counts(14..=17);
 }
 
-/// Makes sure that the tests above can fail: another grouping gives other bits.
+/// Shows that the tests above can fail: another grouping gives other bits.
 #[test]
 fn a_chain_instead_of_the_canonical_grouping_would_be_noticed() {
     let drawn: Vec<TestFrame> = (0..9).map(|rank| draw(rank, (64, 33))).collect();
@@ -257,7 +257,7 @@ fn ranks_that_drew_nothing_send_no_pixel_and_background_is_exact() {
     }
 }
 
-/// The smallest rectangle that is not empty, in the last corner of the image.
+/// The smallest non-empty rectangle, in the last corner of the image.
 #[test]
 fn a_single_pixel_in_the_last_corner_is_not_lost() {
     let (w, h) = (61, 35);

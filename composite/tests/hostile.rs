@@ -1,4 +1,4 @@
-//! Ranks that announce false numbers are refused by name before memory is allocated for them.
+//! Ranks that announce false numbers are rejected by name before memory is allocated for them.
 use composite::comm::{Arrival, Receive};
 use composite::{
     CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination,
@@ -96,7 +96,7 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
 type Ended = (Result<(), CompositeError>, usize);
 
 /// The result of each of three ranks, and the memory it requested, when rank [`LIAR`] reports
-/// `rect` instead of where it drew.
+/// `rect` instead of the rectangle where it drew.
 fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
     let lie = move |number: usize, said: &mut Vec<u8>| {
         if number == 0 && said.len() == 32 {

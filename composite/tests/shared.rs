@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 const SIZE: (u32, u32) = (70, 37);
 
 /// One rank's planes, and a rectangle around what it drew (for odd ranks only; for others it must
-/// be found).
+/// be determined).
 struct TestFrame {
     bytes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
@@ -236,7 +236,7 @@ fn random_images<P: Composite>(
     let pixels = (width * height) as usize;
     (0..ranks)
         .map(|rank| {
-            // Runs of active and inactive pixels, so that whole blocks are either, too.
+            // Runs of active and inactive pixels, so that whole blocks are also active or inactive.
             let mut run = (0, false);
             let mut colors = Vec::with_capacity(pixels);
             let mut depths = Vec::with_capacity(pixels);

@@ -86,7 +86,7 @@ fn a_streamed_frame_has_the_bits_of_the_serial_reference_whatever_the_order_of_t
                 let mut stream = compositor.stream(&mut comm, (W, H), bounds_of(rank)).unwrap();
                 for (index, tile) in tiles(rank).into_iter().enumerate() {
                     draw_tile(rank, tile, &mut planes);
-                    // Some tiles are left to `finish`.
+                    // Some tiles are left for `finish`.
                     if index >= skipped {
                         stream
                             .tile_done(

@@ -11,7 +11,7 @@ use std::path::Path;
 /// The second and the third frame of each case.
 type Frames = Vec<[Seen; 2]>;
 
-/// Frames of a group, natively and through us; `None` without the peers.
+/// Frames of a group, natively and through gluray; `None` without the peers.
 fn frames(group: &str) -> Option<(Frames, Frames, Report)> {
     let python = peer("RTSV_SYSTEM_PYTHON")?;
     let x = Xvfb::start()?;
@@ -49,7 +49,8 @@ fn a_frame_that_comes_again_is_shown_without_rays_whatever_is_drawn_around_it() 
     let Some((_, ours, report)) = frames("AGAIN") else { return };
     let [second, third] = &ours[0];
     assert!(second.0.pixels == third.0.pixels && second.1 == third.1, "nothing has changed");
-    // Two frames of each of five cases; the driver's draw with a program cuts each frame in two.
+    // Two frames of each of five cases; the driver's draw with a program divides each frame into
+    // two.
     assert_eq!((ours.len(), report.pictures_again), (5, 20), "{report:?}");
 }
 
@@ -60,6 +61,6 @@ fn a_frame_of_which_one_thing_has_changed_is_never_the_one_before() {
         let differs = second.0.pixels != third.0.pixels || second.1 != third.1;
         assert!(differs, "case {case} changes the driver's picture");
     }
-    // Before the change each frame came again, and none after it.
+    // Before the change each frame was reused, and none after it.
     assert_eq!(report.pictures_again, native.len() as u64, "{report:?}");
 }

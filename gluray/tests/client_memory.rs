@@ -1,5 +1,5 @@
-//! What safe code can do with the program's memory. The module for it is compiled alone, with small
-//! stand-ins for the rest of the library, and with misuses that must not compile.
+//! Limits of what safe code can do with the program's memory. Compiles the module for it alone,
+//! with small stand-ins for the rest of the library, and checks that misuses do not compile.
 
 use std::path::Path;
 use std::process::Command;
@@ -53,7 +53,7 @@ mod interpose {
 }
 "#;
 
-/// What the compiler says of safe code that uses the room; nothing when it compiles.
+/// The compiler's message for safe code that uses the module; empty when it compiles.
 fn said_of(code: &str) -> String {
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let folder = tempfile::tempdir().expect("a folder");

@@ -187,7 +187,7 @@ fn settings_that_make_no_sense_stop_a_run_before_it_starts() {
     let file = home.path().join("g.toml");
     std::fs::write(&file, "mode = \"rich\"\n[program.gmsh.effects]\nshadow = true\n").unwrap();
     let mark = home.path().join("started");
-    // A library that is not there: options are looked at first.
+    // The library does not exist: options are checked first.
     for (options, text) in [
         (vec!["--set", "samples=0"], "--set: `samples` is 0; give a whole number from 1 to 4096"),
         (vec!["--set", "mode"], "write NAME=VALUE"),
@@ -244,7 +244,7 @@ fn completions_know_the_subcommands() {
     }
 }
 
-/// Batch systems and `timeout` send TERM to what they started, which is us.
+/// Batch systems and `timeout` send TERM to the process that they started, which is gluray.
 #[test]
 fn a_term_ends_the_program_and_the_report_is_written() {
     let home = tempfile::tempdir().expect("a folder");
@@ -265,7 +265,7 @@ fn a_term_ends_the_program_and_the_report_is_written() {
     assert_eq!(line, "started\n");
     let pid = rustix::process::Pid::from_child(&child);
     rustix::process::kill_process(pid, rustix::process::Signal::TERM).expect("it runs");
-    // Were the signal lost, this would wait for ten minutes.
+    // If the signal were lost, this would wait for ten minutes.
     let status = child.wait().expect("it ends");
     assert_eq!(status.code(), Some(128 + 15), "the program's own end, as a shell tells it");
     let text = std::fs::read_to_string(&report).expect("the report is there");

@@ -1,5 +1,5 @@
-//! Surfaces and curves of OpenGL's evaluators, one small program each. The image must be the
-//! driver's, traced where possible.
+//! Surfaces and curves of OpenGL's evaluators, one small program each. The image must equal the
+//! driver's, and be traced where possible.
 
 mod common;
 

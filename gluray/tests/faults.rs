@@ -1,4 +1,4 @@
-//! Injects a fault of the library at every function that programs can call. The program must get
+//! Injects a fault of the library into every function that programs can call. The program must get
 //! the driver's image and errors.
 
 mod common;
@@ -21,10 +21,10 @@ struct Seen {
 }
 
 const HOOKS: &str = include_str!("programs/hooks.txt");
-/// What is not taken apart: told of when nothing is open, drawn or flushed, and looked up.
+/// Functions that gluray does not record: noticed with nothing pending, drawn or flushed, and looked
+/// up.
 const OTHERS: [&str; 4] = ["glRotatef", "glTexImage2D", "glScissor", "glReadPixels"];
-/// Later calls: in the middle of primitives, of lists, and when there is a frame's worth to be
-/// handed over.
+/// Later calls: inside primitives, inside lists, and when the recorded frame is ready to be traced.
 const LATER: [&str; 13] = [
     "glVertex3f:2",
     "glVertex3f:77",
@@ -41,11 +41,11 @@ const LATER: [&str; 13] = [
     "glNewList:3",
 ];
 
-/// GLVND answers these itself, so that they come to us where we are loaded before it.
+/// GLVND answers these itself, so they reach gluray only if it is loaded first.
 const PRELOADED: [&str; 4] =
     ["eglGetProcAddress", "glXGetProcAddress", "glXGetProcAddressARB", "glXMakeContextCurrent"];
 
-/// Pixels whose colours differ by more than rounding.
+/// Number of pixels whose colours differ by more than rounding.
 fn off(a: &str, b: &str) -> usize {
     let colors = |s: &str| -> Vec<u8> {
         s.as_bytes()
@@ -86,7 +86,7 @@ fn a_fault_in_any_function_that_programs_call_leaves_them_the_drivers_pictures_a
     let (more, more_faults) = run(Some(&["--via", "preload"]), &preloaded);
     ours.extend(more);
     faults.extend(more_faults);
-    // Silhouettes are two rasterizers' where rays drew before the fault; see `metrics`.
+    // Silhouettes come from two rasterizers where rays drew before the fault; see `metrics`.
     const SILHOUETTES: usize = 128 * 128 / 200;
     let mut wrong = Vec::new();
     for name in &places {

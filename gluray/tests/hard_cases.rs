@@ -101,8 +101,8 @@ fn of_layers_in_one_plane_the_last_is_seen() {
     check("layers_in_one_plane", &Expected { traced: true, exit: 0 }, &["--trace", "all"]);
 }
 
-/// A square of 128 x 128 pixels with something large on it and, where `small` says so, a triangle
-/// of three to six pixels a side.
+/// A square of 128 x 128 pixels with a large surface and, if `small` is given, a triangle of three
+/// to six pixels a side.
 fn planted(small: Option<usize>) -> (Picture, Vec<f32>) {
     const SIZE: usize = 128;
     let (mut pixels, mut depth) = (vec![[20, 20, 40]; SIZE * SIZE], vec![1.0; SIZE * SIZE]);
@@ -145,7 +145,7 @@ fn a_lost_small_triangle_and_an_added_one_are_found() {
 fn an_edge_that_is_moved_by_a_pixel_is_found_in_corners_and_where_it_is_an_area() {
     let (native, _) = planted(None);
     let mut ours = planted(None).0;
-    // A pixel of the slanted edge more, as rounding may have it; then a block of them.
+    // One more pixel of the slanted edge, which rounding can explain; then a block of them.
     ours.pixels[60 * 128 + 60] = [200, 120, 60];
     assert_eq!(wrong_beyond_edges(&native, &ours), Vec::<String>::new());
     for (x, y) in [(61, 60), (60, 61), (61, 61)] {
@@ -157,7 +157,7 @@ fn an_edge_that_is_moved_by_a_pixel_is_found_in_corners_and_where_it_is_an_area(
 #[test]
 fn a_depth_beside_an_edge_may_continue_the_surface_and_no_more() {
     const SIZE: usize = 32;
-    // Nearest at its edge, before a far background.
+    // Nearest at its edge, in front of a distant background.
     let curved = |end: usize| -> Vec<f32> {
         let depth = |x: usize| if x < end { 0.5 - 1e-4 * (x * x) as f32 } else { 1.0 };
         (0..SIZE * SIZE).map(|i| depth(i % SIZE)).collect()

@@ -1,5 +1,4 @@
-//! The changes that the modes beyond `match` make to an image, in programs whose correct images are
-//! known.
+//! The changes of the modes beyond `match` to an image, in programs whose correct images are known.
 
 mod common;
 
@@ -9,8 +8,8 @@ use std::path::Path;
 
 const SIZE: usize = 128;
 
-/// A case of `hard_cases.py` with options of `gluray run`; `None` without the peers. Rows from the
-/// bottom up.
+/// A case of `hard_cases.py` with options of `gluray run`; `None` without the peers. Rows start at
+/// the bottom.
 fn draw(case: &str, through: Option<&[&str]>) -> Option<(Picture, Report)> {
     let python = peer("RTSV_SYSTEM_PYTHON")?;
     let x = Xvfb::start()?;
@@ -35,14 +34,14 @@ fn mean(p: &Picture, [x, y, w, h]: [usize; 4]) -> [f64; 3] {
     })
 }
 
-/// How much redder than blue a part is.
+/// Excess of red over blue in a part.
 fn redness(p: &Picture, part: [usize; 4]) -> f64 {
     let [r, _, b] = mean(p, part);
     r - b
 }
 
-/// The floor in front of the box, and far to the left of it; the floor to the box' right, where its
-/// shadow falls.
+/// The floor in front of the box, and far to the left of it; the floor to the right of the box,
+/// where its shadow falls.
 const FRONT: [usize; 4] = [58, 37, 12, 9];
 const AWAY: [usize; 4] = [8, 8, 10, 6];
 const SHADOW: [usize; 4] = [82, 51, 8, 4];
@@ -105,7 +104,7 @@ fn mirrors_are_seen_and_cost_rays_only_where_they_are_asked_for() {
     let options = ["--mode", "rich", "--set", "material.mirror=0.6"];
     let (mirrored, report) = draw("box_on_floor", Some(&options)).expect("it ran before");
     assert!(rays(&report, "reflection") > 1000, "{:?}", report.rays);
-    // The box stands 24 pixels above: its image is in the floor below its foot.
+    // The box is 24 pixels above: its image appears in the floor below its foot.
     let (before, after) = (redness(&plain, FRONT), redness(&mirrored, FRONT));
     assert!(after > before + 25.0, "the box in the floor: {before} and {after}");
     let dull = ["--mode", "rich", "--set", "material.mirror=0.6", "--set", "material.specular=0"];
@@ -156,7 +155,7 @@ fn translucent_surfaces_are_sorted_by_rays() {
     );
 }
 
-/// Pixels with a channel off by more than 8.
+/// Number of pixels with a channel off by more than 8.
 fn off(a: &Picture, b: &Picture) -> usize {
     let far = |(p, q): (&[u8; 3], &[u8; 3])| (0..3).any(|k| p[k].abs_diff(q[k]) > 8);
     a.pixels.iter().zip(&b.pixels).filter(|(p, q)| far((p, q))).count()
@@ -167,7 +166,8 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
     const PLAIN: [&str; 4] =
         ["--set", "effects.shadows=false", "--set", "effects.ambient_occlusion_samples=0"];
     let Some((native, _)) = draw("samples_of_silhouettes", None) else { return };
-    // How much there is to be wrong: pixels that are not like the one beside them or the one above.
+    // Number of pixels that can be wrong: those that differ from the next pixel in the row or
+    // column.
     let unlike = |i: usize| {
         [1, native.width]
             .iter()
@@ -194,7 +194,7 @@ fn silhouettes_have_the_samples_of_the_window_in_all_modes() {
             "{mode} {more}: {report:?}"
         );
     }
-    // More rays than samples smooth silhouettes by themselves.
+    // With more rays than samples, silhouettes are smooth without multisampling.
     let options = ["--mode", "rich", PLAIN[0], PLAIN[1], PLAIN[2], PLAIN[3], "--set", "samples=64"];
     let (ours, report) = draw("samples_of_silhouettes", Some(&options)).expect("it ran before");
     let total = |p: &Picture| p.pixels.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
@@ -254,7 +254,7 @@ fn enhance_darkens_corners_of_any_shader_that_is_a_matrix() {
     let (picture, report) = draw("shader_of_ones_own", Some(&options)).expect("it ran before");
     assert_eq!((report.traced_draws, report.passed_draws), (1, 0), "{report:?}");
     let factor = |part| mean(&picture, part)[1] / mean(&native, part)[1];
-    // In the corner of the three walls, and in the middle of the back wall far from the pillar.
+    // In the corner of the three walls, and in the middle of the back wall, far from the pillar.
     let (corner, open) = (factor([41, 41, 4, 4]), factor([50, 74, 8, 8]));
     assert!(corner < 0.8 * open && open > 0.5, "factors {corner} and {open}");
     assert!(
@@ -320,7 +320,7 @@ fn frames_are_shown_one_late_where_that_is_asked_for_and_read_as_they_are() {
     assert_eq!(shown(None).0, at_once, "the driver");
     assert_eq!(shown(Some(&["--mode", "match"])).0, at_once, "in time");
     let (late, report) = shown(Some(&["--mode", "match", "--set", "asynchronous=true"]));
-    // There is nothing before the first frame, so it is waited for.
+    // No frame precedes the first one, so it is waited for.
     assert_eq!(late, serde_json::json!({ "shown": [0, 0, 1, 2, 3, 4, 5, 6], "read": 8 }));
     assert_eq!(report.traced_draws, 9);
 }

@@ -1,4 +1,4 @@
-//! `gluray panel`, as programs, the page and unauthenticated clients talk to it.
+//! `gluray panel` as seen by programs, the page and unauthenticated clients.
 #![cfg(feature = "panel")]
 
 mod panel_common;
@@ -74,7 +74,7 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
     };
     assert_eq!(triangles, 1);
 
-    // With the panel its settings go.
+    // When the panel ends, its settings are reset.
     drop(p);
     fake.until(|s| s.mode == Mode::Match && s.objects.is_empty());
 }
@@ -141,7 +141,8 @@ fn nonsense_requests_are_refused_in_words_and_the_panel_goes_on() {
     assert_eq!(p.ask("GET", "state", "").status, 200);
 }
 
-/// Says something on the link's port; true when the panel closes the connection without an answer.
+/// Sends data to the link's port; returns true when the panel closes the connection without an
+/// answer.
 fn is_shown_the_door(p: &Panel, words: &[u8]) -> bool {
     let mut stream = TcpStream::connect(p.endpoint().address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
@@ -172,12 +173,12 @@ fn who_does_not_know_the_token_is_no_program() {
     ] {
         assert!(is_shown_the_door(&p, words.as_bytes()), "{words:.100}");
     }
-    // The same words with the right token are a program: the test would notice a panel that lets
-    // nobody in.
+    // The same message with the right token identifies a program: the test would detect a panel
+    // that accepts nobody.
     let mut stream = TcpStream::connect(p.endpoint().address).unwrap();
     stream.write_all(hello(1, &right).as_bytes()).unwrap();
     p.until("a program", |list| list.len() == 1);
-    // A program that goes mad is put out; the panel stays.
+    // A program that sends invalid messages is disconnected; the panel stays.
     stream.write_all(b"{\"type\":\"frame\",\"stats\":[]}\n").unwrap();
     p.until("put out", |list| list[0]["running"] == false);
 }

@@ -1,7 +1,7 @@
 //! The panel's page in a real browser, with a program that uses the link.
 //!
-//! Needs Chromium (`cargo xtask test` installs Debian's). Without it the test says so and passes,
-//! unless RTSV_REQUIRE_PEERS is set.
+//! Needs Chromium (`cargo xtask test` installs Debian's). Without it, the test prints that and
+//! passes, unless RTSV_REQUIRE_PEERS is set.
 #![cfg(feature = "panel")]
 
 #[path = "../../schlieren/tests/serving/browser.rs"]
@@ -14,7 +14,7 @@ use gluray::config::{Mode, Quality, Surface};
 use panel_common::{Fake, Panel};
 use std::io::Write as _;
 
-/// Kept where the person who runs the test wants to look at it.
+/// Saves a screenshot where the person who runs the test requests it.
 fn look(b: &mut Browser, name: &str) {
     let picture = b.screenshot();
     if let Some(folder) = std::env::var_os("RTSV_SCREENSHOTS") {
@@ -27,7 +27,7 @@ fn look(b: &mut Browser, name: &str) {
     assert!(picture.len() > 10_000, "a picture with something on it");
 }
 
-/// Sets a control as a person would.
+/// Sets a control as a user does.
 fn set(b: &mut Browser, path: &str, value: &str) {
     b.evaluate(&format!(
         "(() => {{ const e = document.querySelector('[data-path=\"{path}\"] \
@@ -51,7 +51,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
                 std::env::var_os("RTSV_REQUIRE_PEERS").is_none(),
                 "Chromium is required: {why}"
             );
-            // Not `eprintln!`: libtest swallows that.
+            // Not `eprintln!`: libtest captures it.
             let _ = writeln!(std::io::stderr(), "skipped: {why}");
             return;
         }
@@ -63,7 +63,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
         "document.readyState === 'complete' && document.body.innerText.includes('No program yet')",
     );
 
-    // A program starts later and appears by itself, with its numbers.
+    // A program that starts later appears automatically, with its numbers.
     let gmsh = Fake::start("gmsh", p.endpoint(), scenes.path());
     b.wait_for(
         "document.querySelectorAll('nav button').length === 1 && \
@@ -83,7 +83,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     let before = text(&mut b, "rays-legend");
     assert!(before.contains("primary") && !before.contains("occlusion"), "{before}");
 
-    // Mode, effect, quality, switch, light: all arrive; the cost shows.
+    // Mode, effect, quality, switch and light all arrive; the cost is shown.
     set(&mut b, "mode", "rich");
     gmsh.until(|s| s.mode == Mode::Rich);
     set(&mut b, "effects.ambient_occlusion_samples", "64");
@@ -109,11 +109,11 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
                     input').value"
         ) == "64"
     );
-    // So that the charts have something to show.
+    // So that the charts have data.
     b.wait_for("Number(document.getElementById('times').dataset.frames) > 30");
     look(&mut b, "rich");
 
-    // One object becomes glass of another colour; all others stay.
+    // One object becomes glass of another colour; all others are unchanged.
     assert_eq!(b.evaluate("document.querySelectorAll('.object').length"), 30);
     b.evaluate("document.querySelector('.object').click()");
     let key = b
@@ -133,13 +133,13 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     b.wait_for("document.querySelectorAll('.object.changed').length === 1");
     look(&mut b, "object");
 
-    // One change is taken back, then the object, then all.
+    // One change is undone, then the object, then all.
     b.evaluate("document.querySelector('[data-path=\"material.mirror\"] .undo').click()");
     gmsh.until(|s| s.material.mirror.is_none() && s.mode == Mode::Rich);
     b.evaluate("document.getElementById('object-reset').click()");
     gmsh.until(|s| s.objects.is_empty());
 
-    // Nonsense is answered on the page and changes nothing.
+    // Invalid input is reported on the page and changes nothing.
     set(&mut b, "samples", "0");
     b.wait_for(
         "document.getElementById('message').innerText.includes('`samples` is 0; give a \
@@ -150,7 +150,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     gmsh.until(|s| s.samples == 2);
     b.wait_for("document.getElementById('message').hidden");
 
-    // The scene as a file; the changes as a file.
+    // Exports the scene and the changes as files.
     b.evaluate("document.getElementById('export').click()");
     b.wait_for("document.getElementById('exported').innerText.startsWith('written: ')");
     assert_eq!(std::fs::read_dir(scenes.path()).unwrap().count(), 1);
@@ -166,8 +166,8 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
         "{toml}"
     );
 
-    // A second program has settings of its own; the first one's end is seen, and switching off is
-    // one click.
+    // A second program has its own settings; the end of the first one is noticed, and switching off
+    // takes one click.
     let octave = Fake::start("octave", p.endpoint(), scenes.path());
     b.wait_for("document.querySelectorAll('nav button').length === 2");
     b.evaluate("document.querySelectorAll('nav button')[1].click()");
@@ -186,7 +186,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     b.wait_for("document.querySelector('nav button').classList.contains('ended')");
     look(&mut b, "two-programs");
 
-    // Requests that were refused on purpose are the only complaints.
+    // Only the requests that were rejected on purpose may cause errors.
     let others: Vec<&String> = b.complaints.iter().filter(|c| !c.contains("422")).collect();
     assert!(others.is_empty(), "{others:?}");
     drop(p);

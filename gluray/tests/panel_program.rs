@@ -1,4 +1,4 @@
-//! The panel with a real OpenGL program. glxgears runs under Xvfb, tracing is switched off and on,
+//! The panel with a real OpenGL program: glxgears runs under Xvfb, tracing is switched off and on,
 //! and the scene is exported.
 #![cfg(feature = "panel")]
 
@@ -40,7 +40,7 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
         assert_eq!(answer.status, 200, "{answer:?}");
     };
 
-    // It appears by itself, with its objects and what it costs.
+    // The program appears automatically, with its objects and its cost.
     let list =
         p.until("glxgears", |list| newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0)));
     assert_eq!(list[0]["program"], "glxgears");
@@ -50,7 +50,7 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
     );
     assert!(newest(&list).unwrap()["rays"]["primary"].as_u64() > Some(10_000));
 
-    // Off and on, live.
+    // Switch tracing off and on while it runs.
     change(json!({"enabled": false}), json!([]));
     p.until("off", |list| {
         newest(list)
@@ -61,7 +61,7 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
         newest(list).is_some_and(|f| f["traced"].as_u64() > Some(0) && f["passed"] == 0)
     });
 
-    // Its scene: three gears about 10 units wide, 40 units away.
+    // The exported scene: three gears about 10 units wide, 40 units away.
     assert_eq!(p.ask("POST", "export", "{\"id\":1}").status, 200);
     p.until("exported", |list| !list[0]["exported"].is_null());
     let vtp = place.path().join("gears.vtp");
@@ -82,7 +82,7 @@ fn a_real_program_is_switched_off_and_on_and_gives_its_scene() {
         mesh.num_triangles()
     );
 
-    // The end of the program is the end of the run, with a report, a timeline, and the panel knows.
+    // When the program ends, the run ends with a report and a timeline, and the panel notices.
     let pid = list[0]["process"].as_u64().unwrap().to_string();
     assert!(Command::new("kill").arg(&pid).status().unwrap().success());
     run.wait().unwrap();

@@ -43,7 +43,7 @@ const FILLED: &[&str] = &[
     "fbo-srgb -auto -fbo",
     "fbo-clear-formats GL_EXT_packed_depth_stencil stencil -auto -fbo",
 ];
-/// Tests of errors, selection and what else must not suffer.
+/// Tests of errors, selection and other features that must not break.
 const OTHERS: &[&str] = &[
     "gl-1.0-beginend-coverage -auto -fbo",
     "gl-1.0-dlist-bitmap -auto -fbo",

@@ -1,4 +1,4 @@
-//! Real programs, natively and through gluray. In `match` mode the images must be the driver's.
+//! Real programs, natively and through gluray. In `match` mode the images must equal the driver's.
 
 mod common;
 
@@ -60,7 +60,7 @@ fn script(name: &str) -> String {
     path.to_str().expect("UTF-8").to_owned()
 }
 
-/// Both pictures of a program, and our account.
+/// Both images of a program, and gluray's report.
 fn both(
     program: &Path,
     arguments: &[&str],
@@ -100,23 +100,23 @@ fn both(
     Some((m, report))
 }
 
-/// How much of what a program draws is traced.
+/// Fraction of a program's drawing that is traced.
 #[derive(Debug, Clone, Copy)]
 struct Share {
-    /// Of its draws.
+    /// Fraction of its draws.
     draws: f64,
-    /// Pixels of traced surfaces, by the pixels that are not background in all frames. Surfaces
-    /// that are behind others in one go count once, so that more than 1 says that something is
-    /// drawn over what was traced.
+    /// Pixels of traced surfaces, divided by the non-background pixels of all frames. Surfaces
+    /// hidden behind others in the same trace count once, so a value above 1 means that something
+    /// was drawn over traced surfaces.
     pixels: f64,
 }
 
-/// These shares were measured to be traced.
+/// Measured fractions.
 const fn share(draws: f64, pixels: f64) -> Share {
     Share { draws, pixels }
 }
 
-/// Every pixel but those of silhouettes.
+/// Every pixel except those of silhouettes.
 const ALL: Share = share(0.99, 0.99);
 
 impl Share {
@@ -131,8 +131,8 @@ impl Share {
         }
     }
 
-    /// At least half of `least`: how often a window is drawn, and so how many of its frames are the
-    /// ones that are traced, is the machine's affair.
+    /// Requires at least half of `least`: how often a window is drawn, and so how many of its
+    /// frames are traced, depends on the machine.
     fn assert(self, what: &str, least: Share, report: &Report) {
         let enough = self.draws >= 0.5 * least.draws && self.pixels >= 0.5 * least.pixels;
         let (frames, passed) = (report.frames, &report.passed_reasons);
@@ -155,7 +155,8 @@ fn gmsh_draws_the_drivers_picture() {
         write_stl(&f.join("s.stl"));
         std::fs::write(f.join("s.geo"), lines).expect("a temporary file");
     };
-    // As much as two of its three frames: one is drawn without a depth test. Lines are passed.
+    // Corresponds to two of its three frames: one is drawn without a depth test. The driver draws
+    // the lines.
     if let Some((m, _)) = both(&gmsh, &["s.geo"], "out.png", share(0.33, 0.66), prepare) {
         m.assert_filled("gmsh");
     }
@@ -172,8 +173,8 @@ fn geomview_draws_the_drivers_picture() {
         write_off(&f.join("s.off"));
         std::fs::write(f.join("s.gcl"), lines).expect("a temporary file");
     };
-    // 0.916 of what its last picture covers, over eight frames; the number of frames is the
-    // machine's.
+    // 0.916 of the area of its last image, over eight frames; the number of frames depends on the
+    // machine.
     if let Some((m, _)) =
         both(&geomview, &["-nopanels", "-c", "s.gcl"], "out.ppm", share(0.99, 0.8), prepare)
     {
@@ -199,7 +200,7 @@ fn octave_draws_the_drivers_picture() {
     let Some(octave) = program("RTSV_OCTAVE") else { return };
     let file = script("octave.m");
     let arguments = ["--no-gui", "--quiet", "--no-init-file", file.as_str()];
-    // Half of the draws are blended, and passed.
+    // Half of the draws are blended and passed to the driver.
     if let Some((m, _)) = both(&octave, &arguments, "out.png", share(0.49, 0.99), |_| ()) {
         m.assert_lines("octave");
     }
@@ -212,7 +213,7 @@ fn pymol_without_shaders_draws_the_drivers_picture() {
                  sticks\nshow spheres\nset use_shaders, 0\n\
                  bg_color white\norient\npng out.png, ray=0\nquit\n";
     let prepare = |f: &Path| std::fs::write(f.join("s.pml"), lines).expect("a temporary file");
-    // As much as one of its three frames.
+    // Corresponds to one of its three frames.
     if let Some((m, _)) = both(&pymol, &["-q", "s.pml"], "out.png", share(0.99, 0.33), prepare) {
         m.assert_filled("pymol");
     }
@@ -222,7 +223,7 @@ fn pymol_without_shaders_draws_the_drivers_picture() {
 fn paraview_draws_the_drivers_picture() {
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
     let file = script("paraview_scene.py");
-    // As much as three of its four frames, less the lines, which are passed.
+    // Corresponds to three of its four frames, without the lines, which the driver draws.
     if let Some((m, _)) = both(&pvbatch, &[file.as_str()], "out.png", share(0.53, 0.72), |_| ()) {
         m.assert_filled("pvbatch");
     }
@@ -259,7 +260,7 @@ fn vtk_leaves_blending_on_and_is_opaque_all_the_same() {
     );
 }
 
-/// What VTK's depth peeling became: one pass for the driver, the rest in one go.
+/// Result for VTK's depth peeling: the driver draws one pass, and the rest is traced at once.
 fn assert_peeled(report: &Report) {
     assert!(report.flushes.get("depth peeling").is_some_and(|n| *n > 0), "{report:?}");
     assert_eq!(
@@ -302,7 +303,7 @@ fn lines_among_translucent_surfaces_leave_the_whole_peeling_to_the_driver() {
         return;
     };
     let file = script("vtk_translucent.py");
-    // One draw of each frame; what is peeled is passed.
+    // One draw of each frame; the peeling passes are left to the driver.
     if let Some((m, report)) =
         both(&python, &[file.as_str(), "lines"], "out.png", share(0.02, 0.13), |_| ())
     {
@@ -324,22 +325,21 @@ fn vtk_by_egl_draws_the_drivers_picture() {
     }
 }
 
-/// What is traced of a scene of `wheel_scene.py`. With four samples each counts.
+/// Traced fraction of a scene of `wheel_scene.py`. With four samples, each counts.
 fn share_of_scene(kind: &[&str]) -> Share {
     match kind {
-        // One of the four surfaces is as VTK has it.
+        // One of the four surfaces has VTK's original shader.
         ["replaced"] => share(0.25, 0.74),
         // Two of four have a texture with anisotropic filtering.
         ["pictures_smaller"] => share(0.5, 0.59),
-        // Shadow maps themselves are the driver's; in a second frame so are the surfaces.
+        // The driver draws the shadow maps; in a second frame also the surfaces.
         ["shadows"] => share(0.25, 0.99),
         ["shadows", "0", "2"] => share(0.16, 0.49),
-        // A third of the draws are lines; what is not recognised is VTK's own pass over the
-        // picture.
+        // A third of the draws are lines; VTK's own pass over the whole image is not recognised.
         ["moved_back"] => share(0.66, 0.99),
         ["moved_back", "4"] => share(0.61, 3.9),
         ["translucent_moved_back"] => share(0.61, 0.9),
-        // VTK's own passes over the whole picture.
+        // VTK's own passes over the whole image are not traced.
         ["peeled"] => share(0.42, 0.99),
         ["translucent"] => share(0.85, 0.99),
         ["translucent_pictures"] => share(0.83, 0.99),
@@ -348,9 +348,9 @@ fn share_of_scene(kind: &[&str]) -> Share {
     }
 }
 
-/// Draws scenes of `wheel_scene.py` in today's VTK and, where `old` says so, in Debian's, natively
-/// and through us. Each has to be the driver's picture, and `least` of its draws of surfaces in
-/// each frame traced.
+/// Draws scenes of `wheel_scene.py` in the current VTK and, if `old`, in Debian's, natively and
+/// through gluray. Each image must equal the driver's, and at least `least` of its surface draws in
+/// each frame must be traced.
 fn scenes(kinds: &[&[&str]], old: bool, least: u64) -> Vec<Report> {
     let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else {
         return Vec::new();
@@ -420,7 +420,7 @@ fn back_faces_have_a_material_of_their_own() {
 #[test]
 fn physically_based_materials_are_the_drivers() {
     scenes(&[&["physical"]], true, 4);
-    // Debian's has another rule for lamps.
+    // Debian's VTK has another formula for lamps.
     scenes(&[&["physical_lights"]], false, 4);
 }
 
@@ -431,7 +431,7 @@ fn colours_of_blocks_are_over_others_and_over_back_faces() {
 
 #[test]
 fn a_surface_with_a_scripts_own_shader_is_the_drivers() {
-    // One of the four surfaces is as VTK has it.
+    // One of the four surfaces has VTK's original shader.
     for report in scenes(&[&["replaced"]], true, 1) {
         let passed =
             report.passed_reasons.get("a surface of VTK's with a statement that is not known");
@@ -457,7 +457,7 @@ fn surfaces_that_are_moved_back_for_lines_are_the_drivers() {
     }
 }
 
-/// All surfaces of scenes with pictures are traced in both VTKs.
+/// All surfaces of scenes with textures are traced in both VTKs.
 fn pictures(kinds: &[&[&str]], least: u64) {
     for report in scenes(kinds, true, least) {
         let passed: Vec<_> =
@@ -498,8 +498,8 @@ fn slices_of_images_are_pictures_on_planes() {
 
 #[test]
 fn surfaces_that_are_drawn_again_with_shadow_maps_are_the_drivers_and_named() {
-    // The first frame is known by its shadow maps when surfaces are traced already; in the second
-    // they are the driver's.
+    // The first frame is recognised by its shadow maps when surfaces have already been traced; in
+    // the second frame, the driver draws the surfaces.
     for report in scenes(&[&["shadows"], &["shadows", "0", "2"]], false, 4) {
         assert!(report.passed_reasons.contains_key("a shadow map"), "{report:?}");
         let again = report

@@ -16,7 +16,7 @@ fn scene() -> String {
     path.to_str().expect("UTF-8").to_owned()
 }
 
-/// What VTK's script draws, with options of `gluray run` and helpers' sockets.
+/// The image of VTK's script, with options of `gluray run` and the sockets of helpers.
 fn picture(x: &Xvfb, python: &Path, options: &[&str], sockets: Option<&str>) -> (Picture, Report) {
     let place = folder();
     let home = [("HOME", place.path().to_str().expect("UTF-8"))];
@@ -68,7 +68,7 @@ fn helpers_that_go_or_lie_or_are_not_there_cost_no_pixel_and_are_named() {
     let (gone, liar, missing) = (name("gone"), name("liar"), name("missing"));
     let listeners = [&gone, &liar].map(|s| UnixListener::bind(s).expect("a socket"));
     let [first, second] = listeners;
-    // One takes a part of the first order and goes; the other answers with noise.
+    // One takes a part of the first request and leaves; the other answers with noise.
     std::thread::spawn(move || {
         let (mut stream, _) = first.accept().expect("a program");
         stream.read_exact(&mut [0; 1000]).expect("the beginning of an order");
@@ -79,7 +79,7 @@ fn helpers_that_go_or_lie_or_are_not_there_cost_no_pixel_and_are_named() {
         answer.extend(5000_u64.to_ne_bytes());
         answer.extend(vec![0x5a; 5000]);
         stream.write_all(&answer).expect("noise");
-        // Whatever is still to come is not answered.
+        // Remaining requests are not answered.
         while matches!(stream.read(&mut [0; 1 << 16]), Ok(n) if n > 0) {}
     });
     let sockets = format!("{gone}:{missing}:{liar}");
@@ -111,7 +111,7 @@ fn helpers_end_with_whoever_started_them_and_leave_no_socket() {
         std::thread::sleep(Duration::from_millis(5));
     }
     assert!(socket.exists());
-    // A second one may not take its place.
+    // A second helper must not take over its socket.
     let second = Command::new(env!("CARGO_BIN_EXE_gluray"))
         .args(["serve-rays", "--socket"])
         .arg(&socket)

@@ -11,13 +11,13 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Far beyond what any step needs, on a slow and busy machine too; a hang fails here.
+/// Far longer than any step needs, even on a slow and busy machine; a hang fails here.
 const BOUND: Duration = Duration::from_secs(100);
 
 /// The jobs take turns: ranks poll while they wait, and six of them leave two cores nothing.
 static ONE_JOB: Mutex<()> = Mutex::new(());
 
-/// `mpirun -n 3 gluray serve-rays --mpi`, which ends with this value.
+/// `mpirun -n 3 gluray serve-rays --mpi`; dropping the value ends the job.
 struct Job {
     launcher: Child,
     sockets: Vec<PathBuf>,
@@ -42,7 +42,8 @@ impl Job {
                 "--socket",
             ])
             .arg(&first)
-            // What Open MPI needs in a container and with more ranks than cores; others ignore it.
+            // Open MPI needs these in a container and with more ranks than cores; others ignore
+            // them.
             .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
             .envs([
                 ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
@@ -89,7 +90,7 @@ impl Job {
         names.join(":")
     }
 
-    /// Processes of the job's ranks, in no order.
+    /// Processes of the job's ranks, in any order.
     fn ranks(&self) -> Vec<i32> {
         let socket = self.sockets[0].as_os_str().as_encoded_bytes().to_vec();
         let mut pids = Vec::new();
@@ -124,7 +125,7 @@ fn signal(pid: i32, name: &str) {
 
 impl Drop for Job {
     fn drop(&mut self) {
-        // mpirun ends its ranks; it is killed itself where that takes too long.
+        // mpirun ends its ranks; it is killed if that takes too long.
         signal_if_there(&mut self.launcher);
     }
 }
@@ -172,7 +173,7 @@ fn a_job_helps(mpirun: &Path) {
             assert!(r.rank == 0 || (r.sent_bytes > 10_000 && r.received_bytes > 10_000), "{r:?}");
         }
     }
-    // A rank is killed, and with it the job, as MPI has it: programs do without, and say so.
+    // When a rank is killed, MPI ends the job: programs continue without it and report that.
     let ranks = job.ranks();
     assert_eq!(ranks.len(), 3);
     signal(ranks[1], "KILL");
@@ -186,7 +187,7 @@ fn a_job_helps(mpirun: &Path) {
         "{:?}",
         report.problems
     );
-    // Another takes its sockets over, and removes them in the end.
+    // Another job takes over its sockets, and removes them at the end.
     let mut job = Job::start(mpirun, place.path());
     let (many, report) = picture(&x, &python, Some(&job.places()));
     assert!(one.pixels == many.pixels && report.problems.is_empty(), "{report:?}");

@@ -8,8 +8,8 @@ use common::{Picture, Run, Xvfb, folder, peer};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Name, frame that is looked at, and whether rays have to draw some of it. What is drawn by the
-/// driver alone has to be the same to the bit.
+/// Name, tested frame, and whether rays must draw some of it. What the driver alone draws must be
+/// equal bit for bit.
 const HACKS: &[(&str, &str, bool)] = &[
     // Lists with names from glGenLists and state between their primitives.
     ("gears", "3", true),
@@ -54,7 +54,7 @@ fn screensavers_draw_the_drivers_pictures() {
     for (name, frame, traced) in HACKS {
         let run = |through, out: &str| {
             let out = place.path().join(out);
-            // Preloaded into the hack alone, by env(1): not into our own program.
+            // Preloaded into the hack alone, by env(1), not into gluray.
             let preload = format!("LD_PRELOAD={}", clock.display());
             let hack = gears.with_file_name(name);
             let (hack, out_text) = (hack.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));

@@ -1,4 +1,4 @@
-//! The surface shaders of VTK 9.1, 9.2 and the current version are recognised. Shaders that scripts
+//! The surface shaders of VTK 9.1, 9.2 and the current version are recognised; shaders that scripts
 //! have changed are not.
 
 mod common;
@@ -20,16 +20,16 @@ struct Written {
     programs: Vec<Program>,
 }
 
-/// Surfaces of VTK 9.1 and 9.2 that are left to the driver: a geometry shader that makes triangles
-/// larger, another rule for lamps.
+/// Surfaces of VTK 9.1 and 9.2 that are left to the driver: a geometry shader that enlarges
+/// triangles, another formula for lamps.
 const OLD_AND_PASSED: [&str; 2] = ["edges", "physical_lights"];
 
-/// Every VTK that is installed here, asked once.
+/// The programs of every installed VTK, generated once.
 static WRITTEN: LazyLock<Vec<Written>> = LazyLock::new(|| {
     let Some(x) = Xvfb::start() else { return Vec::new() };
     let today = peer("RTSV_PYTHON").map(|python| (python, None));
     let system = peer("RTSV_SYSTEM_PYTHON");
-    // ParaView's VTK is the system Python's; 9.1 lies in a folder of its own.
+    // ParaView's VTK is the one of the system's Python; 9.1 is in a folder of its own.
     let debian =
         system.clone().filter(|_| peer("RTSV_PVBATCH").is_some()).map(|python| (python, None));
     let before = system.and_then(|python| Some((python, Some(peer("RTSV_VTK91")?))));
@@ -52,7 +52,7 @@ fn write(x: &Xvfb, python: &Path, unpacked: Option<PathBuf>) -> Written {
             .env("LD_LIBRARY_PATH", at.join(libraries))
             .env("PYTHONPATH", at.join("usr/lib/python3/dist-packages"));
     }
-    // VTK's own complaints are about shaders that scripts have made wrong.
+    // VTK complains about shaders that scripts have broken.
     let output = command.stdin(Stdio::null()).output().expect("Python starts");
     let said = String::from_utf8_lossy(&output.stderr);
     let version = std::fs::read_to_string(place.path().join("version"))
@@ -82,7 +82,7 @@ impl Program {
         gluray::recognise(vertex, geometry, fragment)
     }
 
-    /// The scene, without the number of the program.
+    /// Name of the scene, without the number of the program.
     fn scene(&self) -> &str {
         self.name.rsplit_once('-').expect("a number").0
     }
@@ -127,10 +127,10 @@ fn sources_that_scripts_have_changed_are_the_drivers_by_name() {
     }
 }
 
-/// Places of `main`'s lines in a source that have statements.
+/// Indices of the lines of `main` that contain statements.
 fn lines_of_main(lines: &[&str]) -> Vec<usize> {
     let main = lines.iter().position(|l| l.contains("void main")).expect("a main");
-    // Empty statements are nothing wherever they are.
+    // Empty statements do not count.
     let says = |l: &str| !["", ";"].contains(&l.split("//").next().unwrap_or("").trim());
     (main + 1..lines.len()).filter(|i| says(lines[*i])).collect()
 }

@@ -22,10 +22,10 @@ fn a_child_that_outlives_the_run_finds_its_vendor_of_egl() {
     };
     let (output, _) = run.program(&python, &[script.to_str().expect("UTF-8"), "found"]);
     assert!(output.status.success(), "{output:?}");
-    // The run is over, and only now the child looks for a vendor.
+    // The run has ended; only now does the child look for a vendor.
     std::fs::write(place.path().join("go"), "").expect("written");
     let found = place.path().join("found");
-    // Of a busy machine.
+    // Long enough for a busy machine.
     let end = Instant::now() + Duration::from_secs(120);
     while !found.exists() && Instant::now() < end {
         std::thread::sleep(Duration::from_millis(20));

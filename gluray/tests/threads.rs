@@ -8,8 +8,8 @@ use common::{Run, Xvfb, folder, peer};
 use gluray::report::Report;
 use std::path::Path;
 
-/// Draws a case natively and through us; asserts that pictures agree and that nothing was said.
-/// `None` without the peers.
+/// Draws a case natively and through gluray; asserts that the images agree and that nothing was
+/// printed. `None` without the peers.
 fn draw(case: &str) -> Option<Report> {
     draw_with(case, &[])
 }
@@ -38,7 +38,7 @@ fn draw_with(case: &str, options: &[&str]) -> Option<Report> {
 #[test]
 fn a_thread_without_a_context_does_nothing_to_the_primitive_of_another() {
     draw("a_thread_without_a_context");
-    // GLVND answers such a thread itself: its calls come to us where we are loaded before it.
+    // GLVND answers such a thread itself: its calls reach gluray only if it is loaded first.
     draw_with("a_thread_without_a_context", &["--via", "preload"]);
 }
 
@@ -51,7 +51,7 @@ fn contexts_that_threads_make_current_in_turns_keep_their_own_pictures() {
 #[test]
 fn contexts_of_two_threads_do_not_read_textures_that_nobody_writes_again() {
     let Some(report) = draw("textures_that_nobody_writes") else { return };
-    // Each context reads it once, and perhaps again after what the other has set up.
+    // Each context reads the texture once, and possibly again after the other's set-up.
     assert!((2..=6).contains(&report.textures_read), "{} in 61 frames", report.textures_read);
 }
 

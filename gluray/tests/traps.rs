@@ -1,5 +1,5 @@
-//! Unusual behaviour found in real programs, one small program each. The image must be the
-//! driver's, traced where possible.
+//! Unusual behaviour found in real programs, one small program each. The image must equal the
+//! driver's, and be traced where possible.
 
 mod common;
 

@@ -8,7 +8,8 @@ use common::{Picture, Run, Xvfb, folder, peer};
 use std::path::Path;
 use std::process::Command;
 
-/// Builds the vendor as a GLX and an EGL library, with a file for EGL that comes before Mesa's.
+/// Builds the vendor as a GLX and an EGL library, with an EGL configuration file that precedes
+/// Mesa's.
 fn build(place: &Path) {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/fake_vendor.c");
     for name in ["libGLX_fake.so.0", "libEGL_fake.so.0"] {
@@ -28,8 +29,8 @@ fn build(place: &Path) {
     }
 }
 
-/// Draws a script's picture natively and through us with variables for GLVND; what the vendor wrote
-/// down when it was ours.
+/// Draws a script's image natively and through gluray, with variables for GLVND. Returns the
+/// vendor's log of the run through gluray.
 fn notes(python: &Path, script: &str, variables: &[(&str, &str)]) -> Option<String> {
     let x = Xvfb::start()?;
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs").join(script);
@@ -50,7 +51,7 @@ fn notes(python: &Path, script: &str, variables: &[(&str, &str)]) -> Option<Stri
         let (output, report) = run.program(python, &[file.to_str().expect("UTF-8")]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let picture = Picture::read(&place.path().join("out.png"));
-        // Displays may be asked for again.
+        // Displays may be queried repeatedly.
         let mut lines: Vec<String> = std::fs::read_to_string(notes)
             .unwrap_or_default()
             .lines()
@@ -75,7 +76,8 @@ fn the_glx_vendor_is_the_one_that_glvnd_would_have_taken() {
     let by = |variables: &[(&str, &str)]| notes(&python, "vtk_scene.py", variables);
     let Some(named) = by(&[("__GLX_VENDOR_LIBRARY_NAME", "fake")]) else { return };
     assert_eq!(named, "glx\n");
-    // That of the screen goes before that of all screens, which is not there at all.
+    // The variable of the screen takes precedence over that of all screens, which names a missing
+    // library.
     let forced =
         [("__GLX_FORCE_VENDOR_LIBRARY_0", "fake"), ("__GLX_VENDOR_LIBRARY_NAME", "nobody")];
     assert_eq!(by(&forced).as_deref(), Some("glx\n"));

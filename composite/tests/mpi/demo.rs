@@ -1,4 +1,4 @@
-//! `composite demo`: its images over threads, simulated ranks and MPI, and the input it refuses.
+//! `composite demo`: its images over threads, simulated ranks and MPI, and the input it rejects.
 
 use super::program::{peer, run};
 use std::path::Path;
@@ -31,7 +31,7 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
     let point = "v 5 5 5\nv 5 5 5\nv 5 5 5\nf 1 2 3\n";
     let (code, text) = demo(&["-n", "3", "--data", &file("point.obj", point)]);
     assert_eq!(code, Some(0), "{text}");
-    // ---- Refused, with the reason.
+    // ---- Rejected, with the reason.
     let known = file("known.obj", &triangle("0 0 0"));
     let missing = folder.join("missing.vtp").to_str().expect("a path in UTF-8").to_owned();
     for (wish, words) in [

@@ -1,8 +1,8 @@
 //! The program over real transports: Open MPI, MPICH, SimGrid; IceT on the same ranks; and faults
 //! that must end in bounded time.
 //!
-//! These are peers (CONTRIBUTING.md): a missing one skips its tests with a note, or fails them
-//! where RTSV_REQUIRE_PEERS is set.
+//! These are peers (CONTRIBUTING.md): a missing one skips its tests with a note, or fails them if
+//! RTSV_REQUIRE_PEERS is set.
 
 mod demo;
 mod program;

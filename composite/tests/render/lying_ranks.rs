@@ -1,4 +1,4 @@
-//! Ranks that announce other numbers than they send: refused by name, early enough.
+//! Ranks that announce other numbers than they send are rejected by name, early enough.
 use crate::{frame_options, scenes};
 use composite::comm::{Arrival, Receive};
 use composite::render::{

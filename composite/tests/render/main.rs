@@ -28,7 +28,7 @@ fn frame_options(light: SecondaryRayPolicy) -> FrameOptions {
     }
 }
 
-/// All ranks' outputs; the image is that of the last rank.
+/// The outputs of all ranks; the image is that of the last rank.
 fn many(case: &Case, ranks: usize, split: &Split, light: SecondaryRayPolicy) -> Vec<FrameOutput> {
     dealt(case, &Partition::new(&case.scene, ranks, split), light)
 }
@@ -139,7 +139,7 @@ fn frames_without_secondary_rays_send_none_and_have_the_bits_of_one_node() {
 #[test]
 fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_traced() {
     let mut case = scenes::headlight(1);
-    // Colours alone: nothing is left to do after the camera rays.
+    // Only colours: no work is left after the primary rays.
     case.options.layers = Layers::COLOR;
     (case.options.width, case.options.height) = (384, 320);
     for samples in [1, 3] {
@@ -175,8 +175,8 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
                     &outputs,
                     &format!("{samples} samples, {ranks} ranks, stream {stream}"),
                 );
-                // Some rank has finished tiles before it has traced its last ray, or none has.
-                // (With few tiles per rank streaming does not pay.)
+                // Some rank finishes tiles before it traces its last ray, or no rank does. (With
+                // few tiles per rank, streaming does not pay off.)
                 let overlaps = |o: &FrameOutput| {
                     let mut spans = o.report.spans.iter().map(|s| s.activity);
                     let last = spans.clone().rposition(|a| a == Activity::Render);
@@ -216,7 +216,7 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
         }
-        // Every rank holds its brick with two layers of points around it, and not the whole.
+        // Every rank has its brick with two layers of points around it, not the whole volume.
         let whole = case.scene.volumes[0].volume.grid().values.len();
         let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
         assert!(
@@ -226,7 +226,7 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
     }
 }
 
-/// By rank, the number of grid values of volumes that it holds.
+/// Number of grid values of volumes on each rank.
 fn values_held(case: &Case, partition: &Partition) -> Vec<usize> {
     let part = |rank| partition.part(&case.scene, rank, &BuildOptions::default()).unwrap();
     (0..partition.parts()).map(|rank| part(rank).volume_values()).collect()
@@ -258,11 +258,11 @@ fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
         );
         let asked = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
         assert_same(&expected, &asked, &format!("asking, {ranks} ranks"));
-        // With ghost zones few points are sent to other ranks: those whose hit is another rank's,
-        // once each.
+        // With ghost zones, few points are sent to other ranks: those whose hit belongs to another
+        // rank, once each.
         let traced = |o: &[FrameOutput]| o.iter().map(|o| o.report.answered_rays).sum::<u64>();
         assert!(traced(&ghost) < traced(&asked), "{} {}", traced(&ghost), traced(&asked));
-        // Zones are expensive for one frame and cheap for thousands: see the reason.
+        // Ghost zones are expensive for one frame and cheap for thousands: see the reported reason.
         let once = many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 1 });
         let often =
             many(&case, ranks, &Split::Triangles, SecondaryRayPolicy::Auto { frames: 100_000 });
@@ -334,7 +334,7 @@ fn ranks_that_render_different_pictures_all_get_an_error() {
         }
         let frame_options =
             FrameOptions { timeout: Duration::from_secs(5), ..FrameOptions::default() };
-        // A rank that is late may find the group ended already.
+        // A late rank may find that the group has already ended.
         let mut renderer = DataParallel::new(&mut comm, part, frame_options)?;
         renderer.frame(&mut comm, &case.camera, &options)
     });

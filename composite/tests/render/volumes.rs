@@ -1,4 +1,4 @@
-//! Several volumes, in bricks or whole on some ranks, that overlap each other and surfaces.
+//! Several volumes that overlap each other and surfaces, in bricks or whole on some ranks.
 use super::scenes::{self, AMBIENT, Case, camera, matte, options};
 use super::{assert_same, dealt, differing_pixels, many, one_node, values_held};
 use composite::render::{FrameError, Partition, SecondaryRayPolicy, Split};
@@ -164,7 +164,7 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
             "one whole on each rank",
             [vec![everybody.clone()], cut(&[0, 1, 2, 3, 4]), cut(&[4, 3, 2, 1, 0])],
         ),
-        // Rank 3 holds nothing of any volume.
+        // Rank 3 has no part of any volume.
         ("each whole on another", [cut(&[4]), cut(&[1]), vec![vec![2, 0]]]),
         (
             "bricks twice",

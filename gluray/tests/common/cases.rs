@@ -6,7 +6,7 @@ use std::path::Path;
 /// Colours and depths, bottom row first.
 pub(crate) type Seen = (Picture, Vec<f32>);
 
-/// The pictures that a program wrote one after the other.
+/// The images that a program wrote one after the other.
 pub(crate) fn read(file: &Path) -> Vec<Seen> {
     let bytes = std::fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
     let word = |i: usize| u32::from_ne_bytes(bytes[i..i + 4].try_into().expect("four bytes"));
@@ -24,7 +24,7 @@ pub(crate) fn read(file: &Path) -> Vec<Seen> {
     all
 }
 
-/// What a case must do besides agreeing with the driver.
+/// Requirements on a case besides agreement with the driver.
 pub(crate) struct Expected {
     pub(crate) traced: bool,
     pub(crate) exit: i32,
@@ -33,15 +33,15 @@ pub(crate) struct Expected {
 /// Cases whose triangles the driver has to clip.
 const CLIPPED: [&str; 2] = ["vertices_behind_the_eye", "levels_and_limits_of_textures"];
 
-/// Cases whose depths have more rounding than others', and how many steps of 24 bits that may make.
-/// llvmpipe comes to a sample's depth from the pixel's by one more sum: five steps were measured.
+/// Cases whose depths have larger rounding errors, and the limit in steps of 24 bits. llvmpipe
+/// computes a sample's depth from the pixel's with one more addition: five steps were measured.
 /// Where the two evaluated surfaces are seen nearly edge on, depth changes by half a million steps
 /// from pixel to pixel: six steps were measured.
 const ROUNDED: [(&str, f32); 3] =
     [("samples_of_surfaces", 6.0), ("patches_of_every_order", 7.0), ("rational_surfaces", 7.0)];
 
-/// Asserts that colours are the driver's but for pixels on edges, and depths likewise to `steps` of
-/// 24 bits.
+/// Asserts that colours equal the driver's except for pixels on edges, and depths likewise to
+/// `steps` of 24 bits.
 pub(crate) fn assert_agrees(
     what: &str,
     (native, native_depth): &Seen,
@@ -63,8 +63,8 @@ pub(crate) fn assert_agrees(
     m
 }
 
-/// Runs `case` of `script` (in `tests/programs`) both ways and compares; `None` without the peers,
-/// which is said.
+/// Runs `case` of `script` (in `tests/programs`) both ways and compares. Returns `None`, with a
+/// message, without the peers.
 pub(crate) fn check(
     script: &str,
     case: &str,
@@ -86,9 +86,9 @@ pub(crate) fn check(
     let (native, _) = run(None, "native");
     let (ours, report) = run(Some(options), "ours");
     assert_eq!(report.traced_draws > 0, expected.traced, "{case}: {report:?}");
-    // Where both pictures have the same surface its depth is the driver's to four steps of 24 bits.
-    // Of triangles that it had to clip llvmpipe interpolates from rounded new corners: up to seven
-    // steps off the plane were measured, where ours is on it.
+    // Where both images show the same surface, its depth equals the driver's to four steps of 24
+    // bits. In triangles that it had to clip, llvmpipe interpolates from rounded new corners: up to
+    // seven steps from the plane were measured. Our depths lie on the plane.
     let steps = if CLIPPED.contains(&case) { 8.0 } else { 4.0 };
     Some(assert_agrees(case, &native, &ours, steps))
 }

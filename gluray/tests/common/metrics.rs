@@ -1,21 +1,22 @@
 //! Measures how far a traced image is from a rasterized one. A single number misses some errors (a
-//! shift by a pixel, a hole, a tint), so there are four, each with a bar that two valid rasterizers
-//! keep between them.
+//! shift by a pixel, a hole, a tint), so there are four, each with a limit that two valid
+//! rasterizers satisfy.
 
 use super::Picture;
 
-/// Differences of two pictures.
+/// Differences of two images.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Metrics {
-    /// Percent of pixels with a channel off by more than 8.
+    /// Percentage of pixels with a channel off by more than 8.
     pub(crate) raw: f64,
-    /// The same when the best of the 3 x 3 neighbours counts, both ways.
+    /// The same when each pixel is compared with the best of its 3 x 3 neighbours, in both
+    /// directions.
     pub(crate) tolerant: f64,
-    /// Mean difference where both pictures are smooth.
+    /// Mean difference where both images are smooth.
     pub(crate) interior: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of that difference.
     pub interior_p99: f64,
-    /// Overlap of what is not background.
+    /// Overlap of the pixels that are not background.
     pub(crate) overlap: f64,
 }
 
@@ -41,7 +42,7 @@ fn contrast(p: &Picture, x: usize, y: usize) -> i32 {
     (0..3).map(|k| hi[k] - lo[k]).max().unwrap_or(0)
 }
 
-/// Compares pictures of one size; `counts` says which pixels are looked at.
+/// Compares images of the same size; `counts` selects the pixels.
 pub(crate) fn compare_where(
     a: &Picture,
     b: &Picture,
@@ -90,10 +91,10 @@ pub(crate) fn compare(a: &Picture, b: &Picture) -> Metrics {
     compare_where(a, b, |_, _| true)
 }
 
-/// Pixels that no difference of two rasterizers explains, in words. Where an edge goes by the
-/// middle of a pixel, one of them may draw what the other draws in the next pixel. So both colours
-/// have to be there among the neighbours in the other picture, which those of a lost or added
-/// triangle are not, and what differs may be a line but no area.
+/// Describes pixels that no difference between two rasterizers explains. Where an edge passes near
+/// the middle of a pixel, one rasterizer may draw what the other draws in the next pixel. Both
+/// colours must therefore occur among the neighbours in the other image, which is not true for a
+/// lost or added triangle, and the differences may form a line but not an area.
 pub(crate) fn wrong_beyond_edges(native: &Picture, ours: &Picture) -> Vec<String> {
     const LEVELS: i32 = 8;
     let mut out = Vec::new();
@@ -125,9 +126,9 @@ pub(crate) fn wrong_beyond_edges(native: &Picture, ours: &Picture) -> Vec<String
     out
 }
 
-/// The same for depths in rows of `w`: those of edges are between those of their neighbours, or
-/// continue a surface that ends there, both ways. The last pixel of a silhouette is where its
-/// surface is nearest or farthest, so it need not be between any two.
+/// The same for depths in rows of `w`: at edges, depths lie between those of their neighbours, or
+/// continue a surface that ends there, in both images. The last pixel of a silhouette is where its
+/// surface is nearest or farthest, so its depth need not lie between any two.
 pub(crate) fn depths_beyond_edges(
     w: usize,
     native: &[f32],
@@ -144,8 +145,8 @@ pub(crate) fn depths_beyond_edges(
         let (lo, hi) = near.fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(v), hi.max(v)));
         (lo - slack..=hi + slack).contains(&one)
     };
-    // Three neighbouring pixels in a row. The lesser of their two steps is the surface's where an
-    // edge goes through them; the next step of a curved surface is up to twice as large.
+    // Three neighbouring pixels in a row. If an edge passes through them, the smaller of their two
+    // steps belongs to the surface; the next step of a curved surface is up to twice as large.
     let continues = |all: &[f32], x: usize, y: usize, one: f32| {
         (0..9).filter(|k| *k != 4).any(|k| {
             let (dx, dy) = (k % 3 - 1, k / 3 - 1);
@@ -182,7 +183,7 @@ pub(crate) fn depths_beyond_edges(
 }
 
 impl Metrics {
-    /// The bars for filled surfaces.
+    /// Checks the limits for filled surfaces.
     pub(crate) fn assert_filled(&self, what: &str) {
         let ok = self.tolerant <= 0.02
             && self.raw <= 0.2
@@ -192,7 +193,7 @@ impl Metrics {
         assert!(ok, "{what}: {self:?}");
     }
 
-    /// The bars for pictures full of lines.
+    /// Checks the limits for images full of lines.
     pub(crate) fn assert_lines(&self, what: &str) {
         assert!(self.tolerant <= 0.1 && self.overlap >= 0.97, "{what}: {self:?}");
     }

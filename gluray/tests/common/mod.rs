@@ -1,5 +1,5 @@
-//! Shared by the tests of real programs: a private X server, running a program natively and through
-//! gluray, and comparing images.
+//! Shared by the tests of real programs: a private X server, runs of a program natively and through
+//! gluray, and the comparison of images.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 pub(crate) mod cases;
@@ -10,18 +10,18 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-/// Says that a test does not run and why, or fails where peers are required.
+/// Reports that a test does not run and why, or fails where peers are required.
 pub(crate) fn skip(why: &str) {
     assert!(
         std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"),
         "{why}, and peers are required"
     );
-    // libtest swallows what `eprintln!` says in a test that passes.
+    // libtest captures `eprintln!` in a passing test.
     writeln!(std::io::stderr(), "skipped: {why}").ok();
 }
 
-/// A peer by the variable that `cargo xtask test` sets. Without it: `None` and a loud word, or a
-/// failure where peers are required.
+/// A peer from the variable that `cargo xtask test` sets. Without it: `None` and a visible message,
+/// or a failure where peers are required.
 pub(crate) fn peer(variable: &str) -> Option<PathBuf> {
     let found = std::env::var_os(variable).map(PathBuf::from).filter(|p| p.exists());
     if found.is_none() {
@@ -71,7 +71,7 @@ impl Drop for Xvfb {
     }
 }
 
-/// A folder that goes with the test.
+/// A folder that is removed at the end of the test.
 pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
@@ -86,14 +86,14 @@ pub(crate) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Runs it to its end and gives what it printed, with our account.
+    /// Runs the program to its end; returns its output and gluray's report.
     pub(crate) fn program(&self, program: &Path, arguments: &[&str]) -> (Output, Report) {
         let (output, report) = self.faulty_program(program, arguments);
         assert_eq!(report.faults, Vec::<String>::new(), "our own faults");
         (output, report)
     }
 
-    /// The same where a fault of ours is what the test is about.
+    /// The same for tests that expect a fault of gluray.
     pub(crate) fn faulty_program(&self, program: &Path, arguments: &[&str]) -> (Output, Report) {
         let report = self.folder.join("report.json");
         let mut command = match self.through {
@@ -134,7 +134,7 @@ impl Run<'_> {
     }
 }
 
-/// A picture of 8-bit RGB, top row first.
+/// An image of 8-bit RGB, top row first.
 pub(crate) struct Picture {
     pub(crate) width: usize,
     pub(crate) height: usize,
@@ -142,7 +142,7 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    /// From a PNG, or a binary PPM.
+    /// Reads a PNG or a binary PPM.
     pub(crate) fn read(file: &Path) -> Picture {
         if file.extension().is_some_and(|e| e == "ppm") {
             return Picture::read_ppm(file);

@@ -1,5 +1,5 @@
-//! A running `gluray panel`, HTTP over a plain socket, and a program that uses the library's own
-//! end of the link.
+//! A running `gluray panel`, HTTP over a plain socket, and a program that uses the library's end of
+//! the link.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use gluray::config::Settings;
@@ -27,7 +27,7 @@ pub(crate) struct Panel {
     pub(crate) runtime: tempfile::TempDir,
 }
 
-/// An answer.
+/// An HTTP response.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -71,11 +71,11 @@ impl Panel {
         PanelEndpoint::read(&self.meeting_file()).expect("the panel has published where it is")
     }
 
-    /// Sends bytes as they are to the page's port and reads the answer, if one comes.
+    /// Sends raw bytes to the page's port and reads the response, if any.
     pub(crate) fn raw(&self, bytes: &[u8]) -> Option<Answer> {
         let mut stream = TcpStream::connect(&self.address).expect("the panel listens");
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
-        // The server may refuse and close before all is sent.
+        // The server may reject the request and close before everything is sent.
         let _ = stream.write_all(bytes);
         let mut all = Vec::new();
         let _ = stream.read_to_end(&mut all);
@@ -85,7 +85,7 @@ impl Panel {
         Some(Answer { status, head: head.into(), body: body.into() })
     }
 
-    /// A request with these head lines below the token.
+    /// A request with additional header lines, below the token.
     pub(crate) fn ask_with(&self, method: &str, path: &str, head: &str, body: &str) -> Answer {
         let (base, length) = (&self.base, body.len());
         let request = format!(
@@ -103,7 +103,7 @@ impl Panel {
         self.ask("GET", "state", "").json()["programs"].as_array().unwrap().clone()
     }
 
-    /// Waits until the programs are as they should be.
+    /// Waits until the list of programs satisfies a condition.
     pub(crate) fn until(&self, what: &str, done: impl Fn(&[Value]) -> bool) -> Vec<Value> {
         let end = Instant::now() + Duration::from_secs(60);
         loop {
@@ -124,7 +124,7 @@ impl Drop for Panel {
     }
 }
 
-/// A program that draws no picture but does everything else: its costs follow its settings.
+/// A program that draws no image but does everything else: its costs follow its settings.
 pub(crate) struct Fake {
     settings: Arc<Mutex<Settings>>,
     stop: Arc<AtomicBool>,

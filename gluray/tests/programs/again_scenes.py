@@ -1,6 +1,6 @@
-"""Frames that come again, and frames of which one thing has changed: `again_scenes.py GROUP OUT`.
+"""Frames that repeat, and frames in which one thing has changed: `again_scenes.py GROUP OUT`.
 
-Each case of a group draws its frame twice, makes its change, and draws it once more. OUT gets colour and depth of the second and of the third
+Each case of a group draws its frame twice, makes its change, and draws it once more. OUT contains colour and depth of the second and the third
 frame, case by case."""
 from texture_scenes import *
 
@@ -26,7 +26,7 @@ def sheet(bend):
 
 
 class Scene:
-    """Something of each kind: a buffer object, an array of the program's, a display list, immediate mode, a texture, a shader of its own."""
+    """One object of each kind: a buffer object, a client array, a display list, immediate mode, a texture, a custom shader."""
 
     def __init__(self):
         self.positions, self.normals = sheet(1.0)
@@ -69,7 +69,7 @@ class Scene:
         F("glEndList")()
 
     def draw_with_program(self):
-        """The driver's, in the middle of the frame."""
+        """A draw by the driver in the middle of the frame."""
         F("glUseProgram", c_uint)(self.program)
         F("glUniform4f", c_int, *[c_float] * 4)(F("glGetUniformLocation", c_uint, c.c_char_p)(self.program, b"shade"), *self.shade)
         begin(TRIANGLES)
@@ -294,7 +294,7 @@ def lines_of_the_drivers(s):
 
 
 def blended_by_the_driver(s):
-    """Between two parts of the frame: once in each of the first two frames, and in another colour in the third."""
+    """Draws between two parts of the frame: in the same colour in the first two frames, in another in the third."""
     s.shade_of_sheet = (0.9, 0.8, 0.1, 0.5)
 
 
@@ -312,14 +312,14 @@ def nothing(s):
     pass
 
 
-# Changes after which the picture is another.
+# Changes after which the image differs.
 CHANGES = [
     texels_in_part, texels_from_the_window, texture_filter, texture_bound, texture_environment, texture_matrix, light_moved, light_of_another_colour,
     a_second_light, highlights, light_of_the_model, lighting_off, smaller_view, scissors, turned, depths_halved, clipped, culled, flat,
     foggy, buffer_in_part, normals_of_the_buffer, buffer_mapped, array_rewritten, normals_of_the_array, fewer_vertices, list_compiled_anew, a_vertex,
     a_normal, a_colour,
 ]  # fmt: skip
-# What was traced is the same, with or without a change around it.
+# Cases in which the traced part is unchanged, with or without a change around it.
 AGAIN = [nothing, clear_colour, a_uniform, lines_of_the_drivers, blended_by_the_driver]
 
 
@@ -333,7 +333,7 @@ def picture():
 
 with open(sys.argv[2], "wb") as out:
     for change in globals()[sys.argv[1]]:
-        # A context for each, so that no change outlives its case.
+        # A context for each case, so that no change outlives it.
         current(w0, context())
         enable(0x0B71)
         enable(0x0C11)

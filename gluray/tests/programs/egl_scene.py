@@ -1,4 +1,4 @@
-"""Two spheres by VTK's window without a display, which uses EGL."""
+"""Two spheres in VTK's window without a display, which uses EGL."""
 import vtk
 from egl_window import show
 

@@ -1,9 +1,9 @@
-"""VTK's window without a display, where it has one, and what it shows as out.png."""
+"""VTK's window without a display, if available, and its contents as out.png."""
 import vtk
 
 
 def window(renderer):
-    """A window of 400 x 400 pixels that nobody sees."""
+    """An off-screen window of 400 x 400 pixels."""
     # Debian's VTK has none and uses the display.
     out = getattr(vtk, "vtkEGLRenderWindow", vtk.vtkRenderWindow)()
     out.SetOffScreenRendering(1)
@@ -13,7 +13,7 @@ def window(renderer):
 
 
 def show(renderer, samples=0, frames=1):
-    """Draws what `renderer` has, seen from the side."""
+    """Draws the contents of `renderer`, seen from the side."""
     renderer.SetBackground(0.1, 0.1, 0.2)
     out = window(renderer)
     out.SetMultiSamples(samples)

@@ -1,4 +1,4 @@
-"""Surfaces and curves by evaluators, one small program each: `evaluators.py CASE OUT`, like hard_cases.py."""
+"""Surfaces and curves through evaluators, one small program each: `evaluators.py CASE OUT`, like hard_cases.py."""
 from gl_by_ctypes import *
 
 MAP1, MAP2 = 0x0D90, 0x0DB0
@@ -14,7 +14,7 @@ tex = F("glTexCoord2f", c_float, c_float)
 
 
 def map2(what, rows, u=(0, 1), v=(0, 1)):
-    """A surface by its rows of control points, and switched on."""
+    """Sets and enables a surface, given by rows of control points."""
     n, m, size = len(rows), len(rows[0]), SIZES[what]
     values = (c_float * (n * m * size))(*(x for row in rows for p in row for x in p))
     f = F("glMap2f", c_uint, c_float, c_float, c_int, c_int, c_float, c_float, c_int, c_int, c_void_p)
@@ -53,7 +53,7 @@ def patch_with_automatic_normals():
 
 
 def patches_of_every_order():
-    """Orders that are equal, and not, and the least; parts of grids; domains and grids that are not from 0 to 1, grids that run backwards."""
+    """Equal, unequal and minimal orders; parts of grids; domains and grids other than 0 to 1, grids that run backwards."""
     scene(perspective=True)
     scale(0.55, 0.55, 0.55)
     for k, (n, m) in enumerate(((2, 2), (2, 5), (5, 2), (3, 3), (3, 6), (6, 3), (4, 7), (8, 8), (7, 4))):
@@ -68,7 +68,7 @@ def patches_of_every_order():
 
 
 def a_map_of_normals():
-    """Of another order than the surface, and not of unit length."""
+    """Normals of another order than the surface, and not of unit length."""
     scene()
     disable(AUTO_NORMAL)
     map2(VERTEX_3, sheet())
@@ -84,7 +84,7 @@ def colours_by_map_without_light():
     map2(VERTEX_3, sheet())
     map2(COLOR_4, hues(3, 4))
     mesh2(FILL, 0, 9, 0, 11)
-    # What is current stays so.
+    # The current values are unchanged.
     begin(TRIANGLES)
     for x, y in ((-1.4, -1.4), (-0.9, -1.4), (-1.1, -0.9)):
         vertex(x, y, 1)
@@ -97,7 +97,8 @@ def colours_by_map_as_material():
     map2(COLOR_4, hues(2, 5))
     mesh2(FILL, 0, 20, 0, 16)
     disable(MAP2 + COLOR_4)
-    # Evaluation leaves what is current alone, but Mesa 22.3 has other values then; where that would show, programs here set it again.
+    # Evaluation must not change the current values, but Mesa 22.3 does. Where that would be
+    # visible, these programs set them again.
     color(0.9, 0.6, 0.3, 1)
     translate(0.3, -0.3, 0.9)
     scale(0.3, 0.3, 0.3)
@@ -115,7 +116,7 @@ def image():
 
 
 def texture_coordinates_by_maps():
-    """One to four of them; the map with the most counts."""
+    """One to four components; the map with the most takes precedence."""
     scene()
     image()
     tex(0.5, 0.5)
@@ -131,7 +132,7 @@ def texture_coordinates_by_maps():
 
 
 def vertices_by_evaluators_among_others():
-    """Triangles and fans of points of surfaces and of curves, with vertices of the program's own between them, which have what is current."""
+    """Triangles and fans of points of surfaces and curves, mixed with ordinary vertices, which use the current values."""
     scene()
     map2(VERTEX_3, sheet())
     map2(COLOR_4, hues(2, 2))
@@ -171,7 +172,7 @@ def lists():
 
 
 def in_display_lists():
-    """Meshes and vertices in lists: with maps that are set outside, that are set in the list, and that another list has set when it is called."""
+    """Meshes and vertices in lists: with maps set outside, set in the list, and set by another list when it is called."""
     scene()
     new, done, call = lists()
     scale(0.5, 0.5, 0.5)
@@ -214,7 +215,7 @@ def in_display_lists():
 
 
 def rational_surfaces():
-    """A quarter of a ball, exactly, with automatic normals; and a sheet with weights and a colour map, in perspective."""
+    """An exact quarter of a ball with automatic normals, and a sheet with weights and a colour map, in perspective."""
     scene(perspective=True)
     h = 0.5**0.5
     arc = ((1, 0, 1), (h, h, h), (0, 1, 1))
@@ -231,7 +232,7 @@ def rational_surfaces():
 
 
 def weights_that_are_not_positive():
-    """Rows of the mesh from the middle on have points that the driver has to clip."""
+    """From the middle on, rows of the mesh have points that the driver has to clip."""
     scene(perspective=True)
     disable(AUTO_NORMAL)
     normal(0, 0.2, 1)
@@ -242,7 +243,7 @@ def weights_that_are_not_positive():
 
 
 def lines_and_points_over_patches():
-    """The driver's lines lie where the surface is, with and without an offset."""
+    """The driver's lines lie on the surface, with and without an offset."""
     scene()
     map2(VERTEX_3, sheet())
     grid2(10, 0, 1, 8, 0, 1)
@@ -281,7 +282,7 @@ def flat_patches():
 
 
 def transparent_colours_by_map():
-    """Blended where the map's alpha is below 1: the driver's from there on."""
+    """Blended where the map's alpha is below 1: the driver draws from there on."""
     scene()
     enable(0x0BE2)
     F("glBlendFunc", c_uint, c_uint)(0x0302, 0x0303)
@@ -294,7 +295,7 @@ def transparent_colours_by_map():
 
 
 def without_a_depth_test():
-    """The driver's, or in order when all is asked for."""
+    """Drawn by the driver, or traced in drawing order when everything is to be traced."""
     start()
     disable(0x0B71)
     rotate(40, 1, 0.3, 0.2)
@@ -309,7 +310,7 @@ def without_a_depth_test():
 
 
 def automatic_normals_over_a_domain_that_runs_backwards():
-    """Drivers do not agree on the side: passed."""
+    """Drivers disagree on the side: passed to the driver."""
     scene()
     map2(VERTEX_3, sheet(), (1, 0))
     mesh2(FILL, 0, 20, 0, 16)
@@ -320,7 +321,7 @@ def automatic_normals_over_a_domain_that_runs_backwards():
 
 
 def maps_of_attribute_stacks():
-    """Maps that are switched by PushAttrib and PopAttrib, and a map that is replaced between two meshes in one state."""
+    """Maps enabled and disabled by PushAttrib and PopAttrib, and a map replaced between two meshes in one state."""
     scene()
     map2(VERTEX_3, sheet())
     map2(COLOR_4, hues(2, 2))
@@ -340,7 +341,7 @@ def maps_of_attribute_stacks():
 
 
 def errors_of_evaluators():
-    """Errors are the driver's, and nothing is drawn of what is one."""
+    """Errors equal the driver's, and erroneous calls draw nothing."""
     get = GL.glGetError
     scene()
     map2(VERTEX_3, sheet())
@@ -386,7 +387,7 @@ def errors_of_evaluators():
 
 
 def glu(name, *types, result=None):
-    """A function of GLU, which is opened here as a plugin is, and linked to OpenGL when it is first called."""
+    """A function of GLU, which is opened here like a plugin and resolves OpenGL when it is first called."""
     f = getattr(c.CDLL("libGLU.so.1"), name)
     f.argtypes, f.restype = types, result
     return f
@@ -423,7 +424,7 @@ def nurbs_of_glu():
 
 
 def a_library_that_is_opened_late():
-    """GLU's ball: calls of a library that finds OpenGL only after the driver was loaded."""
+    """GLU's sphere: calls of a library that finds OpenGL only after the driver was loaded."""
     scene()
     ball = glu("gluSphere", c_void_p, c_double, c_int, c_int)
     ball(c_void_p(glu("gluNewQuadric", result=c_void_p)()), 0.9, 20, 20)

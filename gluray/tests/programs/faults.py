@@ -1,7 +1,7 @@
-"""Calls each function that gluray takes apart, in a program of its own each, while a fault of gluray's is asked for there.
+"""Calls each function that gluray intercepts, each in its own process, while a fault of gluray is injected there.
 
-`faults.py LIST OUT`: LIST has names of functions, one a line, perhaps with the number of the call that fails (`glVertex3f:40`). OUT gets for each of them, as JSON: colours of the frame in
-which it is called, of the next frame, and the errors that OpenGL reports."""
+`faults.py LIST OUT`: LIST has names of functions, one per line, optionally with the number of the call that fails (`glVertex3f:40`). OUT gets for each of them, as JSON: colours of the frame
+in which it is called, of the next frame, and the errors that OpenGL reports."""
 import json, os, re, sys
 
 NAMES = [line.strip() for line in open(sys.argv[1]) if line.strip()]
@@ -13,12 +13,12 @@ else:
 
 
 def pieces():
-    """What the table of calls below needs; imported in the child, because it opens a display."""
+    """The state that the table of calls below needs; imported in the child, because it opens a display."""
     import gl_by_ctypes as g
 
     c = g.c
     TYPES = {"b": c.c_int8, "s": c.c_int16, "i": c.c_int, "f": c.c_float, "d": c.c_double, "ub": c.c_uint8, "us": c.c_uint16, "ui": c.c_uint}
-    # One in each type, for colours and normals.
+    # The value 1 in each type, for colours and normals.
     ONE = {"b": 127, "s": 32767, "i": 2**31 - 1, "f": 1, "d": 1, "ub": 255, "us": 65535, "ui": 2**32 - 1}
     u, i, f, d, p = c.c_uint, c.c_int, c.c_float, c.c_double, c.c_void_p
     keep = []
@@ -56,7 +56,7 @@ def pieces():
             call(name, (p,), array(t, *values)) if pointer else call(name, (t,) * n, *values)
 
         if what == "Vertex":
-            # Instead of a vertex of its own: a third triangle.
+            # Instead of a vertex: a third triangle.
             def triangle():
                 g.begin(g.TRIANGLES)
                 g.vertex(-1, 0.2, 0)
@@ -81,7 +81,7 @@ def pieces():
         call(name, kinds, 4, *more, 6, 0x1403, indices(), *base)
 
     def mapped(between=lambda: None):
-        """A curved sheet by evaluators."""
+        """A curved sheet through evaluators."""
         g.enable(0x0DB7)
         g.enable(0x0D80)
         points = [v for y in (-1, 1) for x in (-1, 0, 1) for v in (x, y, 0.3 * x * y)]
@@ -163,7 +163,7 @@ def pieces():
 
     def contexts(make):
         def run():
-            """Another context, in which something is drawn, and back to the one before."""
+            """Switches to another context, draws something in it, and switches back."""
             here = (run.window, run.context)
             other = make()
             g.current(run.window, other)
@@ -260,7 +260,7 @@ def pieces():
         "glXDestroyContext": contexts(g.context),
         "glXCreateNewContext": contexts(new_context),
         "glXCreateContextAttribsARB": contexts(attribs_context),
-        # Calls that are not taken apart, of all kinds: told of, and looked up.
+        # Calls of all kinds that gluray does not record: it only notices them, and looks values up.
         "glRotatef": lambda: (vertices(), g.rotate(20, 0, 0, 1), vertices()),
         "glTexImage2D": lambda: (vertices(), call("glTexImage2D", (u, i, i, i, i, i, u, u, p), 0x0DE1, 0, 0x1908, 2, 2, 0, 0x1908, 0x1401, None), vertices()),
         "glScissor": lambda: (vertices(), call("glScissor", (i, i, i, i), 0, 0, 64, 64), g.enable(0x0C11), vertices(), g.disable(0x0C11)),
@@ -279,7 +279,7 @@ def pieces():
         one_by_one[name] = current_by(name)
 
     def egl():
-        """A context of EGL's, from its beginning to its end, before there is one of GLX'."""
+        """An EGL context from creation to destruction, before there is one of GLX."""
         e = c.CDLL("libEGL.so.1")
         for name in ("eglGetPlatformDisplay", "eglCreateContext"):
             getattr(e, name).restype = p
@@ -318,7 +318,7 @@ def seen(names):
         ctx = g.context()
         stage.__dict__.update(window=g.w0, context=ctx)
         g.current(g.w0, ctx)
-        # A list from before the fault, and a colour.
+        # A list and a colour from before the fault.
         g.start()
         g.lit()
         call("glNewList", (c.c_uint,) * 2, 900, 0x1300)

@@ -1,4 +1,4 @@
-"""Draws a bar one place further in each frame, and writes as JSON where the X server shows it after each, and where it is when the program reads its window."""
+"""Draws a bar that moves one step per frame, and writes as JSON where the X server shows it after each frame, and where it is when the program reads its window."""
 import json
 
 from gl_by_ctypes import *
@@ -21,7 +21,7 @@ def draw(frame):
 
 
 def place(bright):
-    """The frame whose bar this row of pixels shows."""
+    """The number of the frame whose bar this row of pixels shows."""
     lit = [i for i, v in enumerate(bright) if v]
     return round((min(lit) - 0.1 / 3 * W) / STEP) if lit else None
 

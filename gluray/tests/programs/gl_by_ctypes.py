@@ -1,4 +1,4 @@
-"""OpenGL, GLX and X by ctypes: the library is found the way scripts and games find it, by dlopen and dlsym. One window is made when this is imported."""
+"""OpenGL, GLX and X through ctypes: the library is found as in scripts and games, by dlopen and dlsym. Importing this creates one window."""
 import array, ctypes as c, os, struct, sys, threading
 from ctypes import c_int, c_uint, c_ulong, c_void_p, c_float, c_double
 
@@ -30,7 +30,7 @@ def F(name, *types):
 X.XInitThreads()
 dpy = c_void_p(X.XOpenDisplay(None))
 root = X.XDefaultRootWindow(dpy)
-# Cases that begin with `samples` have four of them a pixel.
+# Cases whose names begin with `samples` use four samples per pixel.
 several = (100000, 1, 100001, 4) if len(sys.argv) > 1 and sys.argv[1].startswith("samples") else ()
 vi = c_void_p(GL.glXChooseVisual(dpy, 0, (c_int * 20)(4, 5, 8, 8, 9, 8, 10, 8, 12, 24, 13, 8, *several, 0)))
 info = c.cast(vi, c.POINTER(VisualInfo)).contents
@@ -111,7 +111,7 @@ w0 = window()
 
 
 def run(cases):
-    """Draws the case that the command line names, and writes what is in the framebuffer then: width, height, RGBA bytes, depth as floats."""
+    """Draws the case named on the command line, and writes the framebuffer: width, height, RGBA bytes, depth as floats."""
     case = cases[sys.argv[1]]
     if case.__code__.co_argcount:
         current(w0, context())

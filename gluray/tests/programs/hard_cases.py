@@ -41,7 +41,8 @@ def byte_normals():
 def mirrored_model_view():
     simple()
     scale(-1, 1, 1)
-    # Front faces are clockwise: what the mirror turned round is what is seen, the rest is culled.
+    # Front faces are clockwise: the faces that the mirror reversed are visible, the others are
+    # culled.
     enable(0x0B44)
     F("glFrontFace", c_uint)(0x0900)
     F("glLightModeli", c_uint, c_int)(0x0B52, 1)
@@ -77,7 +78,8 @@ def negative_w():
 
 def vertices_behind_the_eye():
     start(perspective=True)
-    # Triangles: along which diagonal a quad is split is the driver's choice, and Mesa's is another one when it has to clip.
+    # Triangles, because the driver chooses the diagonal of a quad, and Mesa chooses another one
+    # when it has to clip.
     corners = ((-1, -0.5, -6, 0), (1, -0.5, -6, 1), (1, -0.5, 6, 0.5), (-1, -0.5, 6, 0.2))
     begin(TRIANGLES)
     for x, y, z, r in (corners[i] for i in (0, 1, 2, 0, 2, 3)):
@@ -223,7 +225,7 @@ def color_map_texture():
 
 
 def samples_of_surfaces():
-    """Two surfaces that cut each other, a hole in a far one, lines of the driver's before and after."""
+    """Two intersecting surfaces, a hole in a far one, the driver's lines before and after."""
     simple(perspective=True)
     begin(1)
     vertex(-1, -1, 0.3)
@@ -241,7 +243,7 @@ def samples_of_surfaces():
 
 
 def resolved_samples():
-    """A framebuffer object of four samples a pixel, and what its resolution comes to."""
+    """A framebuffer object with four samples per pixel, and its resolved image."""
     name = (c_uint * 2)(7, 8)
     F("glGenFramebuffers", c_int, c_void_p)(1, name)
     target = name[0]
@@ -264,7 +266,7 @@ def resolved_samples():
 
 
 def samples_in_order():
-    """Without a depth test the last one wins, sample by sample."""
+    """Without a depth test the last one is visible, sample by sample."""
     start()
     disable(0x0B71)
     for i in range(5):
@@ -276,7 +278,7 @@ def samples_in_order():
 
 
 def samples_switched_off():
-    """A framebuffer of four samples, drawn to as if it had one; and a mask, which is the driver's."""
+    """A framebuffer with four samples, drawn to as if it had one; and a sample mask, which is left to the driver."""
     simple()
     disable(0x809D)
     bump(5)
@@ -311,7 +313,7 @@ def blended_over_traced():
 
 
 def layers_in_one_plane():
-    """Squares over one another in one plane and one batch, without a depth test: the last is seen."""
+    """Overlapping squares in one plane and one batch, without a depth test: the last one is visible."""
     start()
     disable(0x0B71)
     numbers = iter(range(1, 10**6))
@@ -365,7 +367,7 @@ def context_destroyed_in_flight(w):
 
 
 def threads(w):
-    """Two threads, each with a context and a window of its own; the first one's picture is looked at."""
+    """Two threads, each with its own context and window; the image of the first one is checked."""
     other = window()
 
     def work():
@@ -409,7 +411,7 @@ def arrays_beyond_their_buffer():
 
 
 def errors():
-    """What the specification says of errors; drawn as colours."""
+    """The specification's rules for errors, drawn as colours."""
     get = GL.glGetError
     start()
     seen = []
@@ -438,7 +440,7 @@ def errors():
 
 
 def select_and_feedback():
-    """Picking and feedback give the driver's answers."""
+    """Picking and feedback give the driver's results."""
     simple()
     buffer = (c_uint * 64)()
     F("glSelectBuffer", c_int, c_void_p)(64, buffer)
@@ -457,14 +459,14 @@ def select_and_feedback():
 
 
 def resident():
-    """KiB of memory that the process holds now."""
+    """Resident memory of the process in KiB."""
     with open("/proc/self/status") as f:
         return next(int(line.split()[1]) for line in f if line.startswith("VmRSS"))
 
 
 def soak():
-    """Geometry made anew each frame, in every way that programs have, for SOAK_SECS seconds: the memory must not grow. Now and then a shape rests for
-    some frames, so that it is built a second time in the background."""
+    """New geometry in each frame, in every way that programs use, for SOAK_SECS seconds: the memory must not grow. From time to time a shape stays
+    unchanged for some frames, so that it is rebuilt in the background."""
     import json, time
     secs = float(os.environ.get("SOAK_SECS", "12"))
     pointer = F("glVertexPointer", c_int, c_uint, c_int, c_void_p)
@@ -514,7 +516,7 @@ def soak():
         step = max(1, len(samples) // 200)
         with open(os.environ["SOAK_LOG"], "w") as f:
             json.dump({"secs": time.time() - started, "frames": frames, "resident_kib": samples[::step]}, f)
-    # What the first third needed is enough for the rest; some of the allocator's holes are no leak.
+    # The memory of the first third suffices for the rest; some fragmentation is not a leak.
     third = len(samples) // 3
     early, late = max(samples[:third]), max(samples[third:])
     assert third > 30 and late < early + 30_000, f"{late - early} KiB more after {frames} frames"

@@ -3,7 +3,7 @@ from gl_by_ctypes import *
 
 
 def box(at, size):
-    """A box with normals, anticlockwise from outside."""
+    """A box with normals, counter-clockwise from outside."""
     begin(QUADS)
     for axis in range(3):
         for sign in (-1, 1):
@@ -38,7 +38,7 @@ def scene(parallel):
 
 
 def box_on_floor():
-    """A red box on a grey floor, seen from a little above; light from the upper left."""
+    """A red box on a grey floor, seen from slightly above; light from the upper left."""
     scene(False)
 
 
@@ -70,7 +70,7 @@ def sheets_blended_in_the_wrong_order():
 
 
 def samples_of_silhouettes():
-    """Unlit boards of many directions in a framebuffer of four samples a pixel: nothing but silhouettes tells modes from the driver."""
+    """Unlit boards of many directions in a framebuffer with four samples per pixel: only silhouettes distinguish the modes from the driver."""
     start(perspective=True)
     for k in range(14):
         F("glPushMatrix")()
@@ -110,7 +110,7 @@ def buffer(values):
 
 
 def corner_by_shader(vertex_text):
-    """Three walls of a corner by a program of one's own, with a pillar in it."""
+    """Three walls of a corner with a custom program, and a pillar in it."""
     start(perspective=True)
     points, normals = [], []
 

@@ -1,6 +1,6 @@
 """Writes the sources of all programs that VTK makes for surfaces: shader_sources.py FOLDER.
 
-Scenes are those of wheel_scene.py and some of composite data; `replaced-NAME` are surfaces whose shaders a script has changed.
+The scenes are those of wheel_scene.py and some of composite data; `replaced-NAME` are surfaces whose shaders a script has changed.
 """
 import os
 import runpy
@@ -17,8 +17,8 @@ KINDS = (
     "physical_pictures images blocks"
 ).split()
 
-# What scripts do to a lit surface: shader, text that is replaced, before VTK's own replacements or after them, new text.
-# VTK renames gl_FragData[0] after that.
+# Changes that scripts make to a lit surface: shader, replaced text, before or after VTK's own
+# replacements, new text. VTK renames gl_FragData[0] after that.
 LIT = "  gl_FragData[0] = vec4(ambientColor + diffuse + specular, opacity);"
 POWER = "  float sf = pow(df, specularPower);"
 REPLACED = {
@@ -49,7 +49,7 @@ def write(name, texts):
 
 
 def watch(name, mappers):
-    """Has the sources of programs written that mappers draw with."""
+    """Makes VTK write the sources of the programs that mappers draw with."""
     seen = {}
 
     @calldata_type(vtk.VTK_OBJECT)
@@ -69,7 +69,8 @@ def watch(name, mappers):
 def draw(name, renderer):
     actors = renderer.GetActors()
     watch(name, [actors.GetItemAsObject(i).GetMapper() for i in range(actors.GetNumberOfItems())])
-    # An offscreen window of the class that this VTK has; kept, because programs go with it.
+    # An off-screen window of the class that this VTK has; kept alive, because its programs are
+    # deleted with it.
     window = egl_window.window(renderer)
     window.SetSize(64, 64)
     renderer.ResetCamera()
@@ -88,7 +89,7 @@ def elevated(x):
 
 
 def composite(scalars, physical, back):
-    """Blocks, one of which has a colour of its own."""
+    """Blocks, one of which has its own colour."""
     blocks = vtk.vtkMultiBlockDataSet()
     for i in range(2):
         data = elevated(i)
@@ -98,7 +99,7 @@ def composite(scalars, physical, back):
                 values.InsertNextValue(cell)
             data.GetCellData().SetScalars(values)
         blocks.SetBlock(i, data)
-    # Before VTK 9.3 the class of this name does something else.
+    # Before VTK 9.3, the class of this name does something else.
     old = vtk.vtkVersion.GetVTKMinorVersion() < 3
     mapper = vtk.vtkCompositePolyDataMapper2() if old else vtk.vtkCompositePolyDataMapper()
     mapper.SetInputDataObject(blocks)

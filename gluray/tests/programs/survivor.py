@@ -1,10 +1,10 @@
-"""Ends at once and leaves a child behind, which makes an EGL context when the file `go` is there, and writes what it found into the file that the command line names."""
+"""Exits at once and leaves a child, which creates an EGL context when the file `go` appears, and writes the result to the file named on the command line."""
 import ctypes as c, os, sys, time
 
 if os.fork():
     os._exit(0)
 os.setsid()
-# Whoever started us waits for these to be closed.
+# The parent waits for these to be closed.
 nothing = os.open(os.devnull, os.O_RDWR)
 for fd in range(3):
     os.dup2(nothing, fd)

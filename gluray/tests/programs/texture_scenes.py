@@ -59,7 +59,7 @@ def mipmaps():
 
 
 def levels_and_limits_of_textures():
-    """Base and last level, limits and bias of the level of detail, two filters without mipmaps, and a pyramid with a hole, which is no texture."""
+    """Base and maximum level, limits and bias of the level of detail, two filters without mipmaps, and an incomplete mipmap chain, which disables the texture."""
     textured()
     for i, settings in enumerate(
         (
@@ -80,7 +80,7 @@ def levels_and_limits_of_textures():
 
 
 def generated_mipmaps():
-    """GL_GENERATE_MIPMAP, and a part of the base level replaced after something was drawn."""
+    """GL_GENERATE_MIPMAP, and a part of the base level replaced after a draw."""
     textured()
     bind_texture(TEXTURE_2D, 1)
     parameter(TEXTURE_2D, 0x8191, 1)
@@ -100,8 +100,8 @@ def square(x0, y0, x1, y1, z=0.0):
 
 
 def textures_replaced_between_draws():
-    """What was drawn keeps the texels it was drawn with: replaced, replaced in part, copied from the window, uploaded from a buffer, deleted; and the
-    program's own ways to read pixels (rows of eight bytes, a longer row, a scale) have nothing to do with it."""
+    """A draw keeps the texels that it was issued with when they are replaced, replaced in part, copied from the window, uploaded from a buffer, or
+    deleted; the program's own pixel storage (rows of eight bytes, a longer row, a scale) has no effect on them."""
     textured(perspective=False)
     normal(0, 0, 1)
     store = F("glPixelStorei", c_uint, c_int)
@@ -112,7 +112,7 @@ def textures_replaced_between_draws():
     parameter(TEXTURE_2D, MIN, 0x2601)
     store(0x0CF5, 1)
     for i in range(12):
-        # More calls than we care to be told of.
+        # More calls than gluray tracks individually.
         image(TEXTURE_2D, 0, 0x1907, 17, 9, 0, RGBA, BYTES, texels(17, 9, i))
         for k in range(i):
             parameter(TEXTURE_2D, MAG, 0x2601)
@@ -142,7 +142,7 @@ def textures_replaced_between_draws():
 
 
 def a_thousand_textures():
-    """Each drawn with once. The process must not hold them."""
+    """Each texture is drawn with once. The process must not keep them."""
     import resource
 
     textured(perspective=False)
@@ -165,7 +165,7 @@ def a_thousand_textures():
 
 
 def environments_of_textures():
-    """What each environment makes of a texture of each kind of components, where the specification says what: colours, constant colours and lit surfaces."""
+    """Each texture environment with each set of components, where the specification defines the result: colours, constant colours and lit surfaces."""
     textured(perspective=False)
     normal(0, 0.3, 0.9)
     F("glLightModeli", c_uint, c_int)(0x81F8, 0x81F9)
@@ -178,7 +178,7 @@ def environments_of_textures():
         parameter(TEXTURE_2D, MIN, 0x2601)
         parameter(TEXTURE_2D, MAG, 0x2601)
         image(TEXTURE_2D, 0, inner, 4, 4, 0, RGBA, BYTES, values)
-        # Decals are of colours.
+        # GL_DECAL is defined for colours only.
         for n, env in enumerate((0x2100, 0x1E01, 0x2101, 0x0BE2, 0x0104)):
             if env == 0x2101 and k > 1:
                 continue

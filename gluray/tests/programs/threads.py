@@ -1,4 +1,4 @@
-"""Several threads with contexts of their own, or without. `threads.py CASE OUT`; what is wrong is said on stderr."""
+"""Several threads with their own contexts, or without. `threads.py CASE OUT`; errors are printed on stderr."""
 from gl_by_ctypes import *
 from texture_scenes import *
 
@@ -30,7 +30,7 @@ def on_thread(work):
 
 
 def a_thread_without_a_context(w):
-    """Its calls do nothing, whatever another thread has open."""
+    """The thread's calls do nothing, regardless of what another thread has begun."""
 
     def calls():
         normal(0, 0, -1)
@@ -56,7 +56,7 @@ def a_thread_without_a_context(w):
 
 
 def triangles(shade, n):
-    """Immediate mode, many short primitives: what thread a vertex belongs to is decided for each."""
+    """Immediate mode, many short primitives: the thread of a vertex is determined for each."""
     start()
     lit()
     for i in range(n):
@@ -69,7 +69,7 @@ def triangles(shade, n):
 
 
 def contexts_made_current_in_turns(w):
-    """Four threads, each with a context that it makes current again and again; two more contexts wander from thread to thread."""
+    """Four threads, each with a context that it makes current repeatedly; two more contexts move from thread to thread."""
     sys.setswitchinterval(1e-5)
     no_context(w)
     places = [(window(), context(), i) for i in range(6)]
@@ -124,7 +124,7 @@ def textured_square():
 
 
 class Other:
-    """A thread with a context that shares its textures with `ctx`, which does what it is told."""
+    """A thread with a context that shares its textures with `ctx` and executes given work."""
 
     def __init__(self, ctx):
         import queue
@@ -172,7 +172,7 @@ def textures_that_nobody_writes(w):
     finish()
 
     def frame():
-        # Reading it back has it drawn, so that each frame looks for its texture anew.
+        # Reading it back forces the draw, so that each frame looks up its texture again.
         textured_square()
         seen()
 
@@ -184,7 +184,7 @@ def textures_that_nobody_writes(w):
 
 
 def a_texture_that_another_thread_writes(w):
-    """Five times over: written there, finished, bound and drawn here."""
+    """Five times: written there, finished, bound and drawn here."""
     ctx = sharing(w)
     bind_texture(TEXTURE_2D, 1)
     parameter(TEXTURE_2D, MIN, 0x2601)
@@ -210,7 +210,7 @@ def a_texture_that_another_thread_writes(w):
 
 
 def a_texture_that_another_thread_draws_into(w):
-    """A framebuffer object that stays bound there: only glFinish says that there is something new."""
+    """A framebuffer object that stays bound there: only glFinish signals new content."""
     ctx = sharing(w)
     bind_texture(TEXTURE_2D, 1)
     parameter(TEXTURE_2D, MIN, 0x2601)
@@ -243,7 +243,7 @@ def a_texture_that_another_thread_draws_into(w):
 
 
 def a_texture_that_is_written_while_it_is_drawn_with(w):
-    """One thread writes, the other draws all the time; what was written last is what is seen in the end."""
+    """One thread writes while the other draws continuously; the last write must be visible at the end."""
     sys.setswitchinterval(1e-5)
     ctx = sharing(w)
     bind_texture(TEXTURE_2D, 1)

@@ -1,4 +1,4 @@
-"""What programs of all kinds turned out to do, as small programs: `traps.py CASE OUT`, like hard_cases.py."""
+"""Behaviour observed in programs of all kinds, as small programs: `traps.py CASE OUT`, like hard_cases.py."""
 from math import cos, sin
 
 from gl_by_ctypes import *
@@ -43,7 +43,7 @@ def generated_lists_with_state_between_primitives():
 
 
 def corners(n=1, step=0.0):
-    """Quads of which the diagonal shows: two corners are bright, and the others dark."""
+    """Quads whose diagonal is visible: two corners are bright, the others dark."""
     for i in range(n):
         for k, (x, y) in enumerate(((-1, -1), (0.2, -1), (0.2, 0.6), (-1, 0.6))):
             color(k % 2, 1 - k % 2, i / n, 1)
@@ -175,13 +175,13 @@ def a_second_texture_is_bound_right_after_a_draw_with_the_first():
         rotate(turn, 1, 0, 0)
     F("glBindTexture", c_uint, c_uint)(0x0DE1, 2)
     textured(0.1)
-    # And what a draw has seen may be replaced.
+    # A texture may be replaced after a draw has used it.
     picture(2, 128)
     textured(-0.5, -1.5)
 
 
 def things_around_the_viewer():
-    """Most of what is drawn is behind the viewer or beside what he sees."""
+    """Most of the geometry is behind the viewer or outside the view."""
     start(perspective=True)
     lit()
     for k in range(12):
@@ -210,7 +210,7 @@ def masks_that_tell_front_from_back():
 
 
 def textures_of_few_components():
-    """Luminance, intensity and red of several sizes: what is not stored is not one of the components that the environment takes."""
+    """Luminance, intensity and red of several sizes: components that are not stored do not enter the texture environment."""
     simple()
     enable(0x0DE1)
     F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
@@ -229,7 +229,7 @@ def textures_of_few_components():
 
 
 def fog_by_distance():
-    """`GL_NV_fog_distance`: passed by name."""
+    """`GL_NV_fog_distance`: passed to the driver with this reason."""
     simple(perspective=True)
     enable(0x0B60)
     F("glFogi", c_uint, c_int)(0x855A, 0x855B)
@@ -240,7 +240,7 @@ def fog_by_distance():
 
 
 def an_alpha_test_for_equality():
-    """Eight bits may miss the reference: passed by name."""
+    """Eight bits may miss the alpha reference: passed to the driver with this reason."""
     start()
     enable(0x0BC0)
     F("glAlphaFunc", c_uint, c_float)(0x0202, 0.4)
@@ -253,7 +253,7 @@ def an_alpha_test_for_equality():
 
 
 def mipmaps_in_views_of_odd_heights():
-    """Footprints are taken of two by two pixels of the window, whatever the view: each level has a colour of its own."""
+    """Mipmap footprints are computed from two by two pixels of the window, regardless of the view: each level has its own colour."""
     start()
     F("glTexEnvi", c_uint, c_uint, c_int)(0x2300, 0x2200, 0x1E01)
     enable(0x0DE1)
@@ -283,7 +283,7 @@ def mipmaps_in_views_of_odd_heights():
 
 
 def colour_material_with_the_same_colour_again():
-    """As OpenSceneGraph begins its frames: a material while colour material is off, then the colour as it was."""
+    """As OpenSceneGraph begins its frames: a material while colour material is off, then the previous colour."""
     for turn in range(3):
         start()
         lit()
@@ -303,7 +303,7 @@ def colour_material_with_the_same_colour_again():
 
 
 def colour_material_after_a_material_that_nobody_has_drawn_with():
-    """As OpenSceneGraph goes from frame to frame: Mesa keeps the last material back, and writes it over what colour material sets in the next frame."""
+    """As OpenSceneGraph passes from frame to frame: Mesa delays the last material, and writes it over what colour material sets in the next frame."""
     start()
     p = (c_float * 12)(-1, -1, 0, 1, -1, 0.2, 1, 1, 0, -1, 1, 0.3)
     new, done, call, _ = lists()
@@ -335,7 +335,7 @@ def colour_material_after_a_material_that_nobody_has_drawn_with():
 
 
 def pixels_that_are_scaled_while_surfaces_wait():
-    """Pixmap fonts (FTGL) set the scales of red, green and blue to 0; then a bitmap has us show what was traced."""
+    """Pixmap fonts (FTGL) set the scales of red, green and blue to 0; then a bitmap makes gluray show what was traced."""
     start()
     lit()
     bump()
@@ -350,7 +350,7 @@ def pixels_that_are_scaled_while_surfaces_wait():
 
 
 def names_of_lists_are_small():
-    """Programs count their lists (Survex's aven has room for a thousand); state between primitives makes us need lists of our own."""
+    """Programs count their lists (Survex's aven has space for a thousand); with state between primitives, gluray needs lists of its own."""
     start()
     new, done, call, generate = lists()
     deleted = F("glDeleteLists", c_uint, c_int)
@@ -360,7 +360,7 @@ def names_of_lists_are_small():
         new(names[-1], 0x1300)
         for turn in range(3):
             F("glFrontFace", c_uint)(0x0901)
-            # Given out while another is compiled.
+            # Allocated while another is compiled.
             color(names[-1] / 20, (generate(2) % 7) / 7, turn / 3, 1)
             begin(TRIANGLES)
             for x, y in ((-0.3, -0.3), (0.3, -0.3), (0, 0.4)):
@@ -408,7 +408,7 @@ def elements_of_arrays_in_a_list():
     call(5)
     translate(0, 0, 0.5)
     scale(0.4, 0.4, 0.4)
-    # The same at once.
+    # The same in immediate mode.
     for i in range(len(points)):
         p[i] = points[i]
     begin(5)
@@ -418,7 +418,7 @@ def elements_of_arrays_in_a_list():
 
 
 def a_framebuffer_object_and_then_the_window():
-    """Rows of the window are turned over for the driver, those of a framebuffer object are not; between the two only colours are cleared."""
+    """Rows of the window are flipped for the driver, those of a framebuffer object are not; between them only colours are cleared."""
     start()
     disable(0x0B71)
     for name in ("glGenFramebuffers", "glGenTextures"):

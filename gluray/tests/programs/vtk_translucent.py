@@ -1,4 +1,4 @@
-# Two translucent surfaces that cut each other and an opaque one inside, by VTK's dual depth peeling.
+# Two translucent surfaces that intersect, and an opaque one inside, with VTK's dual depth peeling.
 import sys
 import vtk
 

@@ -1,4 +1,4 @@
-"""Surfaces as PyVista and today's VTK draw them, one kind of scene a run: wheel_scene.py [KIND [SAMPLES [FRAMES]]]."""
+"""Surfaces as PyVista and the current VTK draw them, one kind of scene per run: wheel_scene.py [KIND [SAMPLES [FRAMES]]]."""
 import sys
 import vtk
 from egl_window import show
@@ -10,7 +10,7 @@ renderer = vtk.vtkRenderer()
 
 
 def made(factory, **values):
-    """A thing of VTK's with values set; by methods, as older versions want it."""
+    """A VTK object with properties set; by methods, as older versions require."""
     out = getattr(vtk, "vtk" + factory)()
     for name, value in values.items():
         set_value = getattr(out, "Set" + name)
@@ -23,7 +23,7 @@ def place(i):
 
 
 def number_cells(data, mapper, number):
-    """Gives cells values that `number` makes of their numbers, and colours by these."""
+    """Gives cells values computed from their numbers by `number`, and colours by these."""
     values = vtk.vtkFloatArray()
     values.SetName("values")
     for cell in range(data.GetNumberOfCells()):
@@ -34,7 +34,7 @@ def number_cells(data, mapper, number):
 
 
 def sphere(i, radius=0.5, normals=True, cells=False, points=False, resolution=32):
-    """The sphere at place `i` of four as an actor; with colours of cells or points where asked for."""
+    """The sphere at place `i` of four as an actor; with colours of cells or points if requested."""
     source = made("SphereSource", ThetaResolution=resolution, PhiResolution=resolution, Radius=radius, Center=place(i))
     heights = made("ElevationFilter", LowPoint=(0, 0, -0.5), HighPoint=(0, 0, 0.5))
     heights.SetInputConnection(source.GetOutputPort())
@@ -79,7 +79,7 @@ def cells():
 
 
 def translucent():
-    """Layers that VTK sums up in any order, before and behind something opaque."""
+    """Translucent layers that VTK sums in any order, in front of and behind an opaque surface."""
     sphere(0).GetProperty().SetOpacity(0.4)
     sphere(0, radius=0.3)
     sphere(1, points=True).GetProperty().SetOpacity(0.6)
@@ -102,13 +102,13 @@ def clip(actor, i, *normals):
 
 
 def clipped():
-    """Two planes cut the mapper's triangles; what is inside is seen."""
+    """Two planes clip the mapper's triangles; the inside becomes visible."""
     for i in range(4):
         clip(sphere(i, normals=i % 2 == 0, cells=i >= 2), i, (-1, 0.3, -0.2), (0, -1, 0.2))
 
 
 def lights(material=lambda actor: None):
-    """A lamp, a spot, and light from far away."""
+    """A lamp, a spot, and a distant light."""
     for i in range(4):
         material(sphere(i, normals=i % 2 == 0, points=i >= 2))
     renderer.AutomaticLightCreationOff()
@@ -130,7 +130,7 @@ def light_kit():
 
 
 def both_sides():
-    """Hemispheres, whose insides have a material of their own."""
+    """Hemispheres whose insides have their own material."""
     for i in range(4):
         actor = sphere(i, normals=i % 2 == 0)
         clip(actor, i, (-1, 0.3, -0.6))
@@ -166,7 +166,7 @@ def edges():
 
 
 def moved_back(opacity=1):
-    """Surfaces that let lines and others lie on them, by the slope and by a constant, as vedo sets it for every mesh."""
+    """Surfaces with a polygon offset, by the slope and by a constant, as vedo sets it for every mesh."""
     moves = ((3, 4), (0, 0), (10, 66000), (1, 10))
     for i, (factor, units) in enumerate(moves):
         a = sphere(i, cells=i == 2, resolution=16)
@@ -183,12 +183,12 @@ def moved_back(opacity=1):
 
 
 def translucent_moved_back():
-    """The same, through which one sees."""
+    """The same, translucent."""
     moved_back(0.5)
 
 
 def picture(components=3, alpha=255, **values):
-    """A texture of squares on gradients."""
+    """A checkerboard texture on gradients."""
     data = vtk.vtkImageData()
     data.SetDimensions(64, 32, 1)
     data.AllocateScalars(vtk.VTK_UNSIGNED_CHAR, components)
@@ -204,7 +204,7 @@ def picture(components=3, alpha=255, **values):
 
 
 def pictured(i, texture, data=None, normals=True, cells=False, points=False):
-    """The sphere at place `i`, or other data moved there, with a picture."""
+    """The sphere at place `i`, or other data moved there, with a texture."""
     actor = sphere(i, normals=normals, cells=cells, points=points)
     if data is None:
         data = made("TexturedSphereSource", ThetaResolution=32, PhiResolution=32, Radius=0.5)
@@ -226,7 +226,7 @@ def pictured(i, texture, data=None, normals=True, cells=False, points=False):
 
 
 def floor(repeats):
-    """A plane that goes to the back, with the picture on it so many times."""
+    """A plane that recedes, with the texture repeated on it."""
     plane = made("PlaneSource", Origin=(-0.5, -0.5, 0.4), Point1=(0.5, -0.5, 0.4), Point2=(-0.5, 0.5, -2))
     scaled = made("TransformTextureCoords", Scale=(repeats, repeats, 1))
     scaled.SetInputConnection(plane.GetOutputPort())
@@ -234,7 +234,7 @@ def floor(repeats):
 
 
 def pictures():
-    """On surfaces with and without normals, with and without filters, repeated and not."""
+    """Textures on surfaces with and without normals, with and without filters, repeated and not."""
     pictured(0, picture(Interpolate=1))
     pictured(1, picture(Interpolate=0), normals=False).GetProperty().SetInterpolationToFlat()
     pictured(2, picture(Interpolate=1, Repeat=0, EdgeClamp=1), floor(2))
@@ -242,7 +242,7 @@ def pictures():
 
 
 def pictures_smaller():
-    """Much smaller than they are, by mipmaps in one direction and in all."""
+    """Strongly minified textures, with isotropic and anisotropic mipmaps."""
     for i, most in enumerate((1, 1, 4, 16)):
         texture = picture(Interpolate=1, Mipmap=1)
         texture.SetMaximumAnisotropicFiltering(most)
@@ -250,7 +250,7 @@ def pictures_smaller():
 
 
 def pictures_over_colors():
-    """Over colours of points and cells, and colour maps, whose coordinates are others."""
+    """Textures over colours of points and cells, and over colour maps, which have other coordinates."""
     pictured(0, picture(Interpolate=1), points=True)
     pictured(1, picture(Interpolate=1), normals=False, cells=True)
     pictured(2, picture(Interpolate=1), points=True).GetMapper().InterpolateScalarsBeforeMappingOn()
@@ -262,7 +262,7 @@ def pictures_over_colors():
 
 
 def pictures_under_lamps():
-    """Lit by lamps; one of them is not on back faces."""
+    """Lit by lamps, one of which does not affect back faces."""
     lights()
     renderer.RemoveAllViewProps()
     for i in range(4):
@@ -274,7 +274,7 @@ def pictures_under_lamps():
 
 
 def translucent_pictures():
-    """With translucent texels, and with an opacity of their own."""
+    """With translucent texels, and with an additional opacity."""
     pictured(0, picture(4, 120, Interpolate=1))
     pictured(1, picture(Interpolate=1)).GetProperty().SetOpacity(0.5)
     pictured(2, picture(4, 30, Interpolate=1), normals=False, points=True)
@@ -291,7 +291,7 @@ def physical_pictures():
 
 
 def images():
-    """Slices of an image through a body, which VTK draws as pictures on planes."""
+    """Slices of an image through a body, which VTK draws as textures on planes."""
     source = made("RTAnalyticSource", WholeExtent=(-10, 10, -10, 10, -10, 10))
     for i in range(3):
         mapper = made("ImageSliceMapper", Orientation=i, SliceNumber=2 * i)
@@ -306,14 +306,14 @@ def images():
 
 
 def blocks():
-    """Blocks with colours of their own over others: over colours of points and cells, over back faces, over what is physically based."""
+    """Blocks with colours of their own that override others: of points and cells, of back faces, of physically based materials."""
     for i in range(4):
         data = vtk.vtkMultiBlockDataSet()
         for k in range(2):
             one = sphere(i, radius=0.5 - 0.2 * k, cells=i == 1, points=i != 1)
             renderer.RemoveActor(one)
             data.SetBlock(k, one.GetMapper().GetInput())
-        # Before VTK 9.3 the class of the other name does something else.
+        # Before VTK 9.3, the class of the other name does something else.
         old = vtk.vtkVersion.GetVTKMinorVersion() < 3
         mapper = made("CompositePolyDataMapper2" if old else "CompositePolyDataMapper", InputDataObject=data)
         if i == 1:
@@ -331,7 +331,7 @@ def blocks():
 
 
 def replaced():
-    """A script's own shader: statements of VTK's at other places take back faces away. One surface is as it was."""
+    """A script's own shader: VTK's statements at other places discard back faces. One surface is unchanged."""
     for i in range(4):
         actor = sphere(i, normals=i % 2 == 0)
         clip(actor, i, (-1, 0.3, -0.6))
