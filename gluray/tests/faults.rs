@@ -21,8 +21,8 @@ struct Seen {
 }
 
 const HOOKS: &str = include_str!("programs/hooks.txt");
-/// Functions that gluray does not record: noticed with nothing pending, drawn or flushed, and looked
-/// up.
+/// Functions that gluray does not record: noticed with nothing pending, drawn or flushed, and
+/// looked up.
 const OTHERS: [&str; 4] = ["glRotatef", "glTexImage2D", "glScissor", "glReadPixels"];
 /// Later calls: inside primitives, inside lists, and when the recorded frame is ready to be traced.
 const LATER: [&str; 13] = [

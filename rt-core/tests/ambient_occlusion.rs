@@ -33,8 +33,8 @@ fn ambient_occlusion_of_a_plane_is_none() {
 
 #[test]
 fn ambient_occlusion_next_to_a_wall_is_its_form_factor() {
-    // Wall x = 0 of height 1 and (nearly) infinite width: from a floor point at distance a it
-    // covers a share of (1 - a/sqrt(a²+1))/2.
+    // The wall x = 0 has height 1 and (nearly) infinite width. Seen from a floor point at distance
+    // a, it covers a fraction of (1 - a/sqrt(a²+1))/2.
     let wall = quad(Vec3::new(0.0, 0.0, 0.5), Vec3::Y * 2000.0, Vec3::Z * 0.5);
     let parts =
         vec![(floor(0.0, 3000.0), Material::matte([1.0; 3])), (wall, Material::matte([1.0; 3]))];
@@ -46,7 +46,7 @@ fn ambient_occlusion_next_to_a_wall_is_its_form_factor() {
         let found = o.frame.color_at(x, 5)[0] as f64;
         assert!((found - expected).abs() < 5e-3, "a = {a}: {found} instead of {expected}");
     }
-    // Limited to a distance shorter than the distance to the wall, occlusion vanishes.
+    // With a range shorter than the distance to the wall, occlusion vanishes.
     let near = draw(&ambient_scene(parts, 0.1, 64), &top_camera(5.0, 4.0), options(16));
     assert!((near.frame.color_at(15, 5)[0] - 1.0).abs() < 1e-6);
 }

@@ -45,7 +45,7 @@ fn quadrangles_light_as_lambert_s_formula_says() {
         let found = floor_under(light, 64);
         let expected = polygon(&[corner, corner + a, corner + a + b, corner + b]);
         assert!((found - expected).abs() < 0.004 * expected, "{found} instead of {expected}");
-        // The other side is dark unless it emits as well.
+        // The back is dark unless it also emits.
         let back = Light::quad(corner, [b, a]).with_color(radiance_one);
         assert_eq!(floor_under(back, 4), 0.0);
         let kind = LightKind::Quad { corner, edges: [b, a], both_sides: true };
@@ -149,7 +149,7 @@ fn panoramas_see_all_around() {
         .sum();
     let expected = 6.0 * 2.0 * PI * (1.0 - (1.0f64 / 4.0).asin().cos());
     assert!((covered - expected).abs() < 0.02 * expected, "{covered} sr instead of {expected}");
-    // A part of it is that part, with bounces and samples too.
+    // A part of it emits only that part, also with bounces and samples.
     let part =
         Camera::omnidirectional(eye, eye - DVec3::Y, DVec3::Z, [[0.5, 0.25], [1.0, 0.75]]).unwrap();
     let crop = draw(

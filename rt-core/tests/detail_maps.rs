@@ -23,7 +23,7 @@ fn texel(rgb: [f32; 3]) -> Option<Arc<Texture>> {
     Some(Texture::from_linear(1, 1, vec![[rgb[0], rgb[1], rgb[2], 1.0]]).unwrap().into())
 }
 
-/// Texel of a tangent-space normal.
+/// A texture of one texel with a tangent-space normal.
 fn bend(n: Vec3) -> Option<Arc<Texture>> {
     texel((n * 0.5 + 0.5).to_array())
 }
@@ -40,7 +40,7 @@ fn tangents(mesh: TriMesh, t: Vec4) -> TriMesh {
     TriMesh { tangents: Some(vec![t; mesh.positions.len()]), ..mesh }
 }
 
-/// The middle pixel, rendered once with local light alone and once with a shadow pass. Both must
+/// The middle pixel, rendered once with local lighting alone and once with a shadow pass. Both must
 /// agree.
 fn middle(mesh: &TriMesh, material: &Material, lights: &[Light], from: f64) -> [f32; 4] {
     let camera = Camera::orthographic(

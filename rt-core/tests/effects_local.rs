@@ -76,8 +76,8 @@ fn headlight_sends_no_shadow_rays() {
     assert_eq!(r.primary, 32 * 32);
     assert_eq!(r.total(), r.primary);
     assert!(o.report.effects.is_empty() && o.report.warnings.is_empty());
-    // When requested to cast shadows, it does: in perspective its light is parallel and the eye's
-    // rays are not.
+    // When it is requested to cast shadows, it does: in perspective, its light is parallel and the
+    // eye's rays are not.
     let mut s = s;
     s.lights[0].shadows = true;
     assert!(draw(&s, &camera(DVec3::new(4.0, 0.0, 0.0), 0.6), options(32)).report.rays.shadow > 0);
@@ -188,8 +188,8 @@ fn rays_of_mirrors_that_are_left_out_are_counted_and_cost_at_most_their_share() 
     assert!((all - 1.0 / 0.9).abs() < 1e-6 && rays.cut_at_min_contribution == 0, "{all}");
     assert_eq!(rays.cut_at_max_bounces, 16, "after eight reflections");
     let (most, rays) = at(0.005);
-    // The third reflection is not sent. The missing radiance is 0.001 times the radiance it would
-    // have found.
+    // The third reflection ray is not sent. The missing radiance is 0.001 times the radiance that
+    // it would have found.
     assert_eq!((rays.cut_at_min_contribution, rays.cut_at_max_bounces), (16, 0));
     assert!(((all - most) - 0.001 * all).abs() < 1e-6, "{all} {most}");
 }

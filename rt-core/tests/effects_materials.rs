@@ -108,7 +108,7 @@ fn lights_in_the_camera_frame_move_with_it() {
 
 #[test]
 fn environment_lights_by_its_cosine_weighted_mean() {
-    // Up is +z and so is the normal: bottom + (top - bottom)(1/2 + 1/3).
+    // Up is +z, like the normal: bottom + (top - bottom)(1/2 + 1/3).
     let mut s = scene(vec![(floor(0.0, 1.0), Material::matte([0.5; 3]))], vec![]);
     s.environment = Some(Environment::Gradient { bottom: [0.2; 3], top: [0.8; 3], up: Vec3::Z });
     let found = draw(&s, &top_camera(5.0, 1.0), RenderOptions::new(2, 2)).frame.color_at(0, 0)[0];
@@ -140,8 +140,7 @@ fn scalars_are_interpolated_first_and_mapped_then() {
 #[test]
 fn colour_sources_of_meshes() {
     let mut mesh = floor(0.0, 1.0);
-    // The camera looks at x = 0 +- nothing: the middle of the square lies on the diagonal of both
-    // triangles.
+    // The camera looks at x = 0: the middle of the square lies on the diagonal of both triangles.
     mesh.colors = Some(Attribute::per_vertex(
         mesh.positions.iter().map(|p| [p.x + 0.5, 0.5 * p.y, 0.25, 1.0]).collect(),
     ));
@@ -158,7 +157,7 @@ fn colour_sources_of_meshes() {
     );
     assert_eq!(o.frame.color_at(1, 1), [1.0, 0.0, 0.0, 1.0], "first triangle: lower right");
     assert_eq!(o.frame.color_at(0, 0), [0.0, 1.0, 0.0, 1.0], "second triangle: upper left");
-    // Alpha of vertex colours makes the mesh transparent by itself.
+    // The alpha of vertex colours alone makes the mesh transparent.
     mesh.colors = Some(Attribute::per_face(vec![[1.0, 1.0, 1.0, 0.5]; 2]));
     assert_eq!(middle(mesh, Material::unlit([0.0; 3]), vec![]), [0.5, 0.5, 0.5, 0.5]);
     // Texture, modulated by the colour.
@@ -226,8 +225,8 @@ fn sides_choose_the_normal_and_what_is_dark() {
         (lit(&back, Sides::Both), lit(&back, Sides::BothByNormal), lit(&back, Sides::LitOutside)),
         (1.0, 1.0, 0.0)
     );
-    // Shading normals that disagree with the winding: the geometry decides for Both, the normal
-    // itself for BothByNormal.
+    // Shading normals that disagree with the winding: Both uses the geometry, BothByNormal the
+    // normal itself.
     back.normals = Some(Attribute::per_vertex(vec![Vec3::Z; 4]));
     assert_eq!(
         (lit(&back, Sides::Both), lit(&back, Sides::BothByNormal), lit(&back, Sides::LitOutside)),

@@ -1,4 +1,4 @@
-//! Volumes in images: before, between and behind surfaces.
+//! Volumes in images: in front of, between and behind surfaces.
 
 mod scenes_common;
 use rt_core::colormap::ColorMap;
@@ -91,7 +91,7 @@ fn unsupported_and_partial_requests_are_named() {
         "{:?}",
         o.report.warnings
     );
-    // Left out: the image is the same as without the volume.
+    // Left out: the image equals that without the volume.
     let o = draw(
         &s,
         &top_camera(6.0, 2.0),

@@ -123,8 +123,8 @@ fn lights_at_the_eye_give_the_picture_of_the_same_lights_in_the_world() {
     for camera in [perspective(), parallel()] {
         compare("local", square_above_floor, &camera, &plain, true);
     }
-    // A mirror shows what the light at the eye does not reach. No ray goes through the mirror's
-    // edges: there the camera's ray may miss what the ray to the light hits.
+    // A mirror shows what the light at the eye does not reach. No ray hits the mirror's edges:
+    // there the camera's ray might miss what the ray to the light hits.
     let with_mirror = |light| {
         let mirror = quad(Vec3::new(1.2, 0.0, 2.0), Vec3::Y * 1.9, Vec3::Z * 2.0);
         let square = quad(Vec3::new(0.5, 0.0, 1.0), Vec3::X * 0.25, Vec3::Y * 0.5);

@@ -15,8 +15,8 @@ use rt_core::simd::SimdLevel;
 use scenes_common::*;
 use std::f64::consts::FRAC_PI_2;
 
-/// A pixel is 1/16: the nearest centre is 1/32 from the blocker's edge, and its shadow is off by at
-/// most the gap times the slope of the light.
+/// Pixels per side. A pixel is 1/16 wide: the nearest centre is 1/32 from the blocker's edge, and
+/// the blocker's shadow is off by at most the gap times the slope of the light.
 const PIXELS: u32 = 64;
 /// Distance from the floor to the surface that nearly touches it, in radii of the blocker.
 const GAP: f64 = 1e-3;
@@ -49,7 +49,7 @@ fn lights(dir: DVec3, distance: f64) -> Vec<(&'static str, Light)> {
 }
 
 /// A square of half edge `scale` just above a floor, viewed from between the two. `veil` adds a
-/// translucent surface out of sight, so that light is followed from layer to layer.
+/// translucent surface out of view, so that light is traced from layer to layer.
 fn near_contact(scale: f64, light: Light, level: Option<SimdLevel>, veil: bool) -> (Scene, Camera) {
     let s = scale as f32;
     let mut b = SceneBuilder::new();

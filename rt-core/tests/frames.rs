@@ -21,7 +21,7 @@ fn all_layers(n: u32) -> RenderOptions {
     RenderOptions { layers: Layers::ALL, ..RenderOptions::new(n, n) }
 }
 
-/// Distance in units in the last place.
+/// Distance in ulps.
 fn ulps(a: f32, b: f32) -> u32 {
     (a.to_bits() as i32).abs_diff(b.to_bits() as i32)
 }
@@ -145,7 +145,8 @@ fn near_and_far_planes_clip_as_opengl_does() {
 
 #[test]
 fn far_away_cameras_and_huge_offsets_see_the_same_picture() {
-    // The same body near zero, and 10^7 away with a mesh origin: ids must agree pixel by pixel.
+    // The same body near the origin, and 10^7 away with a mesh origin: ids must agree pixel by
+    // pixel.
     let offset = DVec3::new(1e7, -2e7, 3e6);
     let near = draw(
         &scene(
@@ -316,7 +317,7 @@ fn only_the_layers_asked_for_are_computed() {
             && o.frame.distance.is_empty()
     );
     assert_eq!((o.frame.depth.len(), o.frame.instance.len()), (1600, 1600));
-    // Nothing is shaded, so only camera rays are traced.
+    // Nothing is shaded, so only primary rays are traced.
     assert_eq!(o.report.rays.total(), o.report.rays.primary + o.report.rays.transparency);
     let names: Vec<_> = o.frame.planes().iter().map(|p| p.name).collect();
     assert_eq!(names, ["depth.Z", "id.instance", "id.primitive"]);

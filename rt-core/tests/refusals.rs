@@ -1,4 +1,4 @@
-//! Invalid scenes and options are refused, and settings without effect cause a warning. Messages
+//! Invalid scenes and options are rejected, and settings without effect cause a warning. Messages
 //! name the item, the value and a cure.
 
 use rt_core::bvh::{BuildError, BuildOptions, Geometry, World};
@@ -37,7 +37,7 @@ fn camera() -> Camera {
         .unwrap()
 }
 
-/// The check refuses the scene by name, and so does every frame.
+/// Asserts that the check rejects the scene by name, and so does every frame.
 #[track_caller]
 fn refused(change: impl FnOnce(&mut Scene), what: &str, field: &str, value: &str) {
     let mut scene = plain();
@@ -233,7 +233,7 @@ fn a_camera_whose_depth_range_is_nan_is_refused() {
     assert!(words.contains("depth_range[1]") && words.contains("NaN"), "{words}");
 }
 
-// ---- Requests that would change nothing
+// ---- Requests without effect
 
 #[test]
 fn an_instruction_set_that_the_machine_lacks_is_refused_by_name() {
@@ -255,7 +255,7 @@ fn an_instruction_set_that_the_machine_lacks_is_refused_by_name() {
         assert!(words.contains(level.name()), "{words}");
         available.iter().for_each(|a| assert!(words.contains(a.name()), "{words}"));
     }
-    // No machine has both ARM's and x86's instruction sets.
+    // No machine has the instruction sets of both ARM and x86.
     assert!(lacking > 0);
 }
 

@@ -23,10 +23,10 @@ fn path(n: u32, samples: u32) -> RenderOptions {
 
 #[test]
 fn white_furnace_returns_what_it_gets() {
-    // In a uniform environment of radiance 1, a body that absorbs nothing is invisible. Convex
-    // bodies: one bounce suffices. Tolerances: matte and mirrors are exact per sample up to
-    // rounding; glass needs many bounces, where roulette adds noise; single-scattering microfacets
-    // lose the light that would scatter twice (below 2 % at roughness 0.3).
+    // In a uniform environment of radiance 1, a body that absorbs nothing is invisible. For convex
+    // bodies, one bounce suffices. Tolerances: matte surfaces and mirrors are exact per sample up
+    // to rounding; glass needs many bounces, where roulette adds noise; single-scattering
+    // microfacets lose the light that would scatter twice (below 2 % at roughness 0.3).
     for (name, m, low, high) in [
         ("matte", Material::matte([1.0; 3]), 0.99999, 1.00001),
         ("mirror", Material::metal([1.0; 3], 0.0), 0.99999, 1.00001),
@@ -239,7 +239,7 @@ fn thin_lens_is_sharp_at_the_focus_distance_only() {
 
 #[test]
 fn several_samples_average_over_the_pixel() {
-    // An edge at a quarter of a pixel: coverage 0.25 where one sample says 0.
+    // An edge at a quarter of a pixel: coverage 0.25, where one sample gives 0.
     let s = scene(
         vec![(
             quad(Vec3::new(-4.75, 0.0, 0.0), Vec3::X * 5.0, Vec3::Y * 50.0),

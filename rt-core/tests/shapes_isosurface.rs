@@ -103,7 +103,7 @@ fn no_ray_leaves_a_closed_surface_unseen() {
             Some((prim, h)) => {
                 let p = s.surface(prim, &h, &ray);
                 assert!((value(&g, p.point.as_dvec3()) - 5.3).abs() < 5e-6);
-                // The surface of a coarse ball is only nearly round.
+                // The surface of a coarse ball is only approximately round.
                 assert!(
                     p.normal.dot((middle - p.point).normalize()) > 0.95,
                     "normals point to smaller values"
@@ -116,8 +116,8 @@ fn no_ray_leaves_a_closed_surface_unseen() {
 
 #[test]
 fn parity_of_crossings_in_noise() {
-    // Every cell of white noise has a surface, with saddles and tunnels. The number of crossings
-    // from an outside point must be even when the other end is outside too, and odd when it is
+    // Every cell of white noise has a surface, with saddles and tunnels. From an outside point, the
+    // number of crossings must be even when the other end is also outside, and odd when it is
     // inside.
     let n = 9;
     let (g, mut rng, mut total) = (noise(n, 3), Random::new(8), 0);
@@ -136,7 +136,7 @@ fn parity_of_crossings_in_noise() {
                     continue;
                 }
             }
-            // Sixteen steps away is outside the grid for all but the shortest directions.
+            // For all but the shortest directions, sixteen steps away is outside the grid.
             let origin = end - 32.0 * dir;
             let ray = Ray::new(origin, dir).with_t_max(32.0);
             let at_end = value(&g, ray.at(32.0).as_dvec3()) - f64::from(0.05f32);
@@ -144,7 +144,7 @@ fn parity_of_crossings_in_noise() {
             if at_end.abs() < 1e-5 {
                 continue; // f32 `at` may be on the other side
             }
-            // Pairs closer than one ulp of t are found as one. They have to be rare, and must not
+            // Pairs closer than one ulp of t are found as one. They must be rare, and must not
             // occur here.
             let odd = all.len() % 2 == 1;
             assert_eq!(odd, at_end < 0.0, "bricks {bricks} ray {k} {ray:?}: {all:?}");

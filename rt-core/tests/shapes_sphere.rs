@@ -56,8 +56,8 @@ fn scales_offsets_and_directions_of_any_length() {
 
 #[test]
 fn small_and_far_without_cancellation() {
-    // A radius of 1e-4 at a distance of 1000: with r² − |oc|² + b² in f32 all digits are gone
-    // (squares differ by 1e-14 relative).
+    // A radius of 1e-4 at a distance of 1000: r² − |oc|² + b² in f32 would lose all digits (squares
+    // differ by 1e-14 relative).
     let (mut rng, mut hits) = (Random::new(5), 0);
     let s = one(Vec3::ZERO, 1e-4);
     for _ in 0..1000 {

@@ -424,7 +424,7 @@ fn cylinders_side_caps_and_open_ends() {
         assert_eq!(t(c, ray([0.0, 0.0, 2.0], [1.0, 0.0, 0.0])), Some(1.0));
         assert_eq!(t(c, ray([-5.0, 0.0, 4.5], [1.0, 0.0, 0.0])), None);
     }
-    // Along the axis: caps, or nothing.
+    // Along the axis: hits the caps, or nothing.
     let along = ray([0.5, 0.0, -3.0], [0.0, 0.0, 1.0]);
     assert_eq!((t(&capped, along), t(&open, along)), (Some(3.0), None));
     assert_eq!(capped.surface(0, &capped.closest(0, &along).unwrap(), &along).normal, -Vec3::Z);

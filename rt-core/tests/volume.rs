@@ -313,7 +313,7 @@ fn overlapping_media_add_their_extinction() {
     let make = |color, sigma| volume(grid(9, 1.0, |_| 0.5), single(color), &[[0.0, sigma]]);
     let (red, blue) = (make([1.0, 0.0, 0.0], 0.1), make([0.0, 0.0, 1.0], 0.3));
     let ray = Ray::new(Vec3::new(-4.0, 4.0, 4.0), Vec3::X);
-    // At the same position: a mixture in proportion 1 : 3.
+    // At the same position: a mixture in the ratio 1 : 3.
     let s = integrate_overlapping(&[(&red, ray), (&blue, ray)], 0.0, INF, &q);
     let alpha = 1.0 - (-0.4f64 * 8.0).exp();
     assert!(worst(s.rgba, [0.25 * alpha, 0.0, 0.75 * alpha, alpha]) < 0.5 / 255.0, "{:?}", s.rgba);
@@ -375,12 +375,12 @@ fn shading_follows_the_gradient() {
         Vec3::new(0.5, 0.75f32.sqrt(), 0.0),
     );
     let ramp = || grid(9, 1.0, |p| p.x);
-    // Headlight: full along the gradient, cos 60° = ½ across.
+    // Headlight: full brightness along the gradient, cos 60° = ½ across.
     assert!((brightness(&make(None, ramp()), &along) - 1.0).abs() < 1e-4);
     assert!((brightness(&make(None, ramp()), &slanted) - 0.625).abs() < 1e-4);
-    // A fixed light across the gradient leaves the ambient part.
+    // A fixed light perpendicular to the gradient leaves the ambient part.
     assert!((brightness(&make(Some(Vec3::Y * 3.0), ramp()), &along) - 0.25).abs() < 1e-4);
-    // No gradient, no shading.
+    // Without a gradient there is no shading.
     assert!((brightness(&make(None, grid(9, 1.0, |_| 0.5)), &along) - 1.0).abs() < 1e-5);
 }
 

@@ -214,7 +214,7 @@ impl Holder<'_> {
     fn in_whole(&self, scene: &Scene, mut met: ShadingHit) -> ShadingHit {
         let geometry = scene.world.instances()[met.instance as usize].geometry;
         met.primitive = self.kept[geometry][met.primitive as usize];
-        // Hits travel as words.
+        // Hits are sent as words.
         ShadingHit::from_words(&met.to_words())
     }
 }
@@ -239,7 +239,7 @@ fn light_hits(
     for h in holders {
         h.frame.light_hits(rays, &mut met);
         for (b, m) in best.iter_mut().zip(&met) {
-            // A blocked ray has no primitive.
+            // A blocked ray has no primitive id.
             let in_whole = |m: ShadingHit| {
                 if m.is_blocked() {
                     ShadingHit::from_words(&m.to_words())
@@ -298,7 +298,7 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
 fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pass) {
     let owner = &holders[0].frame;
     tile.begin(owner, pass);
-    // ---- Camera rays.
+    // ---- Primary rays.
     let mut best = vec![None; tile.num_rays()];
     let mut colors = vec![None; tile.num_rays()];
     let mut hits = CameraHits::default();
@@ -403,8 +403,8 @@ fn frames_answered_by_parts_have_the_bits_of_frames_in_one_piece() {
 
 #[test]
 fn a_part_alone_without_the_choices_of_the_whole_would_be_noticed() {
-    // When a part far from the origin is built as a world of its own, it gets another local space,
-    // and its hits differ in their last bits.
+    // When a part far from the origin is built as its own world, it gets another local space, and
+    // its hits differ in their last bits.
     let mesh = plate(DVec3::ZERO, 24);
     let moved = TriMesh {
         positions: mesh.positions.iter().map(|p| *p + Vec3::new(900.0, 10.0, -3.0)).collect(),

@@ -139,8 +139,8 @@ fn singular_and_broken_transforms_are_refused_by_number() {
     assert_eq!(e, BuildError::NoSuchGeometry { instance: 0, geometry: 1, count: 1 });
 }
 
-/// Triangles at 2^(k/steps), each as large as its distance from zero. Splits by cost peel off one
-/// primitive at a time.
+/// Triangles at 2^(k/steps), each as large as its distance from the origin. Splits by cost separate
+/// one primitive at a time.
 fn powers_of_two(exponents: std::ops::Range<i32>, steps: f32) -> TriMesh {
     let mut mesh = TriMesh::default();
     for k in exponents {
@@ -165,7 +165,7 @@ fn adversarial_spacing_does_not_overflow_the_stack() {
         if options.robustness == Robustness::Fast {
             // Without exact decisions, a triangle smaller than the rounding of its distance
             // collapses to a point or a sliver and may be hit falsely. Whether its box is visited
-            // then depends on the tree. The fast mode only guarantees an answer.
+            // then depends on the tree. The fast mode only guarantees to return a result.
             assert!(
                 rays.iter().all(|r| w.closest(r).is_some()),
                 "{options:?}: every ray meets a large triangle"

@@ -120,7 +120,7 @@ fn rays_in_a_face_plane_hit_its_neighbours() {
                 assert!((h.t - 2.0).abs() < 1e-6, "{options:?}: {h:?}");
             }
         }
-        // Just above the face nothing is hit.
+        // Just above the face, nothing is hit.
         assert!(w.closest(&Ray::new(Vec3::new(-3.0, 0.1, 1.0f32.next_up()), Vec3::X)).is_none());
     }
 }

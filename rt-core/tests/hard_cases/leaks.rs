@@ -7,8 +7,8 @@ use rt_core::mesh::TriMesh;
 use rt_core::robustness::{LeakTest, QueryKind, RayOrigins, RayTarget};
 use rt_core::simd::SimdLevel;
 
-/// Closed meshes, with the origins of rays inside them: curved and flat, at zero and far from it,
-/// with fine and coarse triangles.
+/// Closed meshes with the origins of rays inside them: curved and flat, at the origin and far from
+/// it, with fine and coarse triangles.
 fn cases() -> Vec<(&'static str, TriMesh, RayOrigins)> {
     let far = DVec3::new(1000.0, 700.0, -1300.0);
     let ball = |center, radius| RayOrigins::Ball { center, radius };
@@ -28,8 +28,7 @@ fn cases() -> Vec<(&'static str, TriMesh, RayOrigins)> {
     ]
 }
 
-/// Rays per mode and SIMD level set, all cases together. `RT_CORE_LEAK_RAYS=100000000` runs the
-/// acceptance test.
+/// Number of rays per mode, over all cases. `RT_CORE_LEAK_RAYS=100000000` runs the acceptance test.
 fn rays_wanted() -> usize {
     std::env::var("RT_CORE_LEAK_RAYS").ok().and_then(|s| s.parse().ok()).unwrap_or(1_000_000)
 }
@@ -83,6 +82,6 @@ fn fast_mode_leaks_are_counted_and_rare() {
     let (rays, lost, lines) = shoot(Robustness::Fast, rays_wanted() / 4);
     println!("fast: {lost} of {rays} rays leaked\n{}", lines.join("\n"));
     // Zeros count as inside, and boxes are as wide as in the other mode. None of 2.5·10⁷ rays was
-    // lost, but nothing rules a leak out.
+    // lost, but leaks are not excluded.
     assert!(lost <= rays / 100_000, "{lost} of {rays} rays leaked:\n{}", lines.join("\n"));
 }

@@ -83,8 +83,8 @@ fn limits_are_exact_for_tiny_and_huge_directions() {
                 .collect();
             for (r, h) in rays.iter().zip(hits_all_ways(&w, &rays, "lengths")) {
                 let Some(h) = h else {
-                    // Misses are allowed only where the distance, 2 to 3, divided by the length is
-                    // beyond f32.
+                    // Misses are allowed only where the distance, 2 to 3, divided by the length
+                    // exceeds the range of f32.
                     assert!(length < 1e-37 || !w.occluded(r), "{options:?}: {r:?}");
                     continue;
                 };

@@ -1,4 +1,4 @@
-//! The slow reference: tests every triangle in f64, and bounds the error of an f32 result.
+//! The slow reference: tests every triangle in f64 and bounds the error of an f32 result.
 
 use rt_core::glam::DVec3;
 use rt_core::mesh::TriMesh;
@@ -47,8 +47,8 @@ pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Mee
     Some(Meeting { t, depth, t_error, depth_error, depth_per_length })
 }
 
-/// Compares `found` with the result of trying every triangle of `mesh` (`world_origin` is the
-/// origin of render space). The range is the ray's. Returns the error of t as a share of the
+/// Compares `found` with the result of testing every triangle of `mesh` (`world_origin` is the
+/// origin of render space). The range is the ray's. Returns the error of t as a fraction of the
 /// allowed error, or `None` for a miss.
 pub(crate) fn check(
     mesh: &TriMesh,

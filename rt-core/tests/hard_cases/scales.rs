@@ -84,7 +84,7 @@ fn cameras_1e6_and_1e9_away_lose_nothing() {
                 let (x, y) = ((i % 20) as f64 / 10.0 - 0.95, (i / 20) as f64 / 10.0 - 0.95);
                 let target = DVec3::new(x, y, 0.0);
                 let (ray, moved) = w.ray_from_world(eye, (target - eye) / distance);
-                // The oracle gets the moved ray. Its start is compared with the line in f64.
+                // The oracle gets the moved ray. Its origin is compared with the line in f64.
                 let o = ray.origin.as_dvec3() + w.origin();
                 let off = (o - eye).cross(target - eye).length() / (target - eye).length();
                 assert!(

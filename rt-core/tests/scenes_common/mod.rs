@@ -15,7 +15,7 @@ pub fn quad(center: Vec3, a: Vec3, b: Vec3) -> TriMesh {
     TriMesh::new(p.to_vec(), vec![[0, 1, 2], [0, 2, 3]])
 }
 
-/// A horizontal square of half edge `half` at height `z`; its outside faces up.
+/// A horizontal square of half edge `half` at height `z` whose front faces up.
 pub fn floor(z: f32, half: f32) -> TriMesh {
     quad(Vec3::new(0.0, 0.0, z), Vec3::X * half, Vec3::Y * half)
 }
@@ -62,7 +62,7 @@ pub fn top_camera(h: f64, height: f64) -> Camera {
     .unwrap()
 }
 
-/// Perspective from `eye` to the origin.
+/// A perspective camera at `eye` that looks at the origin.
 pub fn camera(eye: DVec3, fov_rad: f64) -> Camera {
     let up = if eye.x == 0.0 && eye.y == 0.0 { DVec3::Y } else { DVec3::Z };
     Camera::perspective(eye, DVec3::ZERO, up, fov_rad, 1.0, [0.01, 1000.0]).unwrap()
