@@ -102,10 +102,10 @@ pub enum CatalogueError {
     /// The surface cannot be extracted.
     #[error(transparent)]
     Isosurface(#[from] IsosurfaceError),
-    /// The wavelet cannot be made.
+    /// The wavelet cannot be generated.
     #[error(transparent)]
     Wavelet(#[from] NestedWaveletError),
-    /// The flow cannot be made.
+    /// The flow cannot be generated.
     #[error(transparent)]
     Flow(#[from] FlowError),
 }

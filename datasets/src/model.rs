@@ -25,13 +25,13 @@ pub use surface::SurfaceReport;
 
 use glam::{DMat3, DVec3};
 
-/// Why a data set cannot be converted as asked.
+/// Why a data set cannot be converted as requested.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// There is no array of this name.
     #[error("no array `{name}` in this {kind}; it has {available}")]
     NoArray {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The kind of data set.
         kind: &'static str,
@@ -61,7 +61,7 @@ pub enum ModelError {
     /// The arrays do not fit the geometry: the data set is inconsistent.
     #[error("{field}: expected {expected}, found {found}")]
     Inconsistent {
-        /// Which array or count.
+        /// Name of the array or count.
         field: String,
         /// Expected number.
         expected: u64,

@@ -151,9 +151,8 @@ fn turned(mut mesh: TriMesh, turn: DMat3, scale: f64) -> TriMesh {
 
 #[test]
 fn a_light_on_a_surface_is_not_hidden_by_it() {
-    // A room of floor and ceiling. Lights on the ceiling, of size 0 and with an area whose own
-    // geometry is in the ceiling. The sphere hangs from the ceiling; otherwise half of it would be
-    // above.
+    // A room with a floor and a ceiling. The lights are in the plane of the ceiling, of size 0 and
+    // with an area. The sphere hangs below the ceiling; otherwise half of it would be above.
     let turns = [
         DMat3::IDENTITY,
         DMat3::from_axis_angle(DVec3::new(0.6, -0.8, 0.0), 0.7) * DMat3::from_rotation_z(0.3),
@@ -161,7 +160,7 @@ fn a_light_on_a_surface_is_not_hidden_by_it() {
     for turn in turns {
         for scale in [1e-6, 1.0, 1e6] {
             for (name, light) in lights(DVec3::Z, 3.0) {
-                // Down to a thousandth of the room below the ceiling, and exactly in it.
+                // The ceiling is exactly at the light, and a thousandth above it.
                 for below in [0.0, 1e-3] {
                     let mut b = SceneBuilder::new();
                     b.mesh(turned(floor(0.0, 6.0), turn, scale), Material::matte([1.0; 3]));
@@ -198,7 +197,7 @@ fn flat_lights_are_not_hidden_by_their_own_plane_however_flat_they_fall() {
         for (name, light) in lights(DVec3::Z, 3.0) {
             let light = match light.kind {
                 LightKind::Disk { .. } | LightKind::Quad { .. } => light,
-                // As wide as a ring's cone may be. Light as flat as here is within it.
+                // The widest cone of a ring, which includes light at grazing angles.
                 LightKind::Ring { position, direction, inner_radius, radius, .. } => {
                     let (inner_rad, outer_rad) = (FRAC_PI_2, FRAC_PI_2);
                     let kind = LightKind::Ring {

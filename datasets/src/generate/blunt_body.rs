@@ -118,7 +118,7 @@ struct Layers {
 const WAKE_PRESSURE: f64 = 0.35;
 /// Temperature in the wake, over that of the reservoir.
 const WAKE_TEMPERATURE: f64 = 0.85;
-/// Radius of the wake's neck over the base's, and where it is, in base radii behind the base.
+/// Radius of the wake's neck relative to the base, and its position in base radii behind the base.
 const NECK: [f64; 2] = [0.42, 1.7];
 
 impl Layers {

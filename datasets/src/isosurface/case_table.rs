@@ -5,9 +5,9 @@
 //!    where it leaves. On an ambiguous face (two inside corners on a diagonal), this *separates the
 //!    inside corners*. Both cells at a face see the same corners and so agree, and the surface has
 //!    no holes (the flaw of the original table: Dürst 1988; Nielson and Hamann 1991).
-//! 2. **Triangulation of loops.** The segments join to closed loops; each loop of n edges becomes n
-//!    - 2 triangles. Among all triangulations, the one is chosen that has no diagonal in a face of
-//!    the cell (the neighbour might have the same diagonal, and four triangles would meet at one
+//! 2. **Triangulation of loops.** The segments join to closed loops. Each loop of n edges becomes
+//!    n - 2 triangles. Among all triangulations, the one is chosen that has no diagonal in a face
+//!    of the cell (the neighbour might have the same diagonal, and four triangles would meet at one
 //!    edge) and the shortest diagonals otherwise.
 //!
 //! The number of triangles per case equals that of VTK's `vtkMarchingCubesTriangleCases`, so counts
@@ -56,7 +56,7 @@ pub(crate) struct Case {
 pub(crate) static CASES: LazyLock<[Case; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| derive(i as u8)));
 
-/// Indexed by missing corners: the edges that touch one of them.
+/// Edges that touch a missing corner, indexed by the missing corners (one bit each).
 pub(crate) static EDGES_AT_CORNERS: LazyLock<[u16; 256]> = LazyLock::new(|| {
     std::array::from_fn(|corners| {
         let touches = |e: &usize| EDGE_CORNERS[*e].iter().any(|&c| corners >> c & 1 == 1);

@@ -2,12 +2,12 @@
 //! a time.
 //!
 //! Ids depend on position, not on the thread that computes them. Plane k has, in this order, the
-//! vertices on its x and y edges (row by row, x before y), then those on the z edges up to plane k
-//! + 1. Slab k has its triangles. Two passes therefore suffice: count every plane in parallel, take
-//! prefix sums, and emit every plane in parallel into its own part of the result. This is the
+//! vertices on its x and y edges (row by row, x before y), then those on the z edges up to plane
+//! k + 1. Slab k has its triangles. Two passes therefore suffice: count every plane in parallel,
+//! take prefix sums, and emit every plane in parallel into its own part of the result. This is the
 //! method of flying edges (Schroeder, Maynard and Geveci 2015), with planes in place of rows. The
-//! in-plane vertices come first, so slab k knows the ids on plane k + 1 without reading plane k +
-//! 2.
+//! in-plane vertices come first, so slab k knows the ids on plane k + 1 without reading plane
+//! k + 2.
 
 use super::case_table::{CASES, EDGES_AT_CORNERS};
 use super::gradient::normal_on_edge;
