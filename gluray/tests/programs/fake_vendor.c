@@ -1,4 +1,4 @@
-/* A GLVND vendor that writes down that it was asked, and is Mesa's. With FAKE_VENDOR_HAS_NO_DISPLAY it knows no EGL display. */
+/* A GLVND vendor that logs each query and forwards it to Mesa's. With FAKE_VENDOR_HAS_NO_DISPLAY it has no EGL display. */
 #include <dlfcn.h>
 #include <stdint.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* Preloaded into animated programs: time goes by from frame to frame alone, so that equal runs draw equal pictures; the frame that FRAME names is
+/* Preloaded into animated programs: time advances only from frame to frame, so that equal runs draw equal images. The frame with number FRAME is
    written to OUT as a PPM, and the program ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>

@@ -1,4 +1,4 @@
-/* A C program that draws through ANARI's loader (its path is the argument) with the device rtv: every kind of object, and misuse. Prints "done". */
+/* Draws through ANARI's loader (its path is the argument) with the device rtv: every kind of object, and misuse. Prints "done". */
 #include <dlfcn.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -89,7 +89,7 @@ static void set_object(H o, const char* name, uint32_t type, H value)
   anariSetParameter(device, o, name, type, &value);
 }
 
-/* Sets and forgets. */
+/* Sets an object as a parameter and releases it. */
 static void give(H o, const char* name, uint32_t type, H value)
 {
   set_object(o, name, type, value);
@@ -244,7 +244,7 @@ static H world(void)
   return w;
 }
 
-/* Draws what `camera` sees; gives how many different colours there are. */
+/* Draws the view of `camera`; returns the number of different colours. */
 static int draw(H w, const char* camera_type, const char* renderer_type)
 {
   const float eye[3] = { 0.2f, 0.1f, 3.0f };
@@ -312,7 +312,7 @@ static void misuse(void)
   {
     fail("arrays that cannot be");
   }
-  /* Shared memory that is freed as soon as its array is. */
+  /* Shared memory that is freed together with its array. */
   float* shared = malloc(3 * sizeof(float));
   shared[0] = shared[1] = shared[2] = 0;
   H points = anariNewArray1D(device, shared, NULL, NULL, FLOAT32_VEC3, 1);

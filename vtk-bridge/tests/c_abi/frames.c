@@ -21,7 +21,7 @@ static RtvArray array(void const* data, uint64_t tuples, uint32_t components, ui
   return made;
 }
 
-/* Copies that are freed at once: what the bridge kept a pointer to would be read after free. */
+/* Copies that are freed at once: if the bridge kept a pointer, it would read freed memory. */
 static void* copy(void const* data, size_t size)
 {
   void* made = malloc(size);
@@ -89,7 +89,7 @@ static int draw(RtvApi const* api, RtvBridge* bridge, uint64_t key, int colors, 
   const int drawn = api->render(bridge, &view, out);
   if (drawn)
   {
-    /* All of it is ours to read until the next call. */
+    /* The whole image can be read until the next call. */
     double sum = 0;
     for (int i = 0; i < WIDTH * HEIGHT; ++i)
     {
@@ -108,7 +108,7 @@ int main(void)
   CHECK(api && api->abi() == RTV_ABI);
   RtvBridge* bridges[2] = { api->new_bridge(), api->new_bridge() };
   RtvPicture picture;
-  /* The same, other colours, other arrays, translucent, keys that are not known. */
+  /* The same surface, other colours, other arrays, translucent, keys that are not cached. */
   for (uint64_t frame = 0; frame < 6; ++frame)
   {
     for (int b = 0; b < 2; ++b)
@@ -137,7 +137,7 @@ int main(void)
   api->end(bridges[1]);
   CHECK(api->bridge_option(bridges[0], "RTV_OFF") == 1 && api->bridge_option(bridges[1], "RTV_OFF") == 0);
   CHECK(api->set_bridge_option(bridges[0], "RTV_OFF", "") == 1 && api->set_bridge_option(0, "RTV_OFF", "1") == 0);
-  /* Misuse: nothing may happen. */
+  /* Misuse must have no effect. */
   CHECK(api->surfaces(bridges[0], 0, 3) == -1 && api->surfaces(0, 0, 0) == -1);
   api->free_bridge(0);
   CHECK(api->begin(0) == 0 && api->render(0, 0, 0) == 0 && api->surface(bridges[0], 0) == -1);
@@ -145,7 +145,7 @@ int main(void)
   api->pass(bridges[0], 0, 0);
   api->warn(bridges[0], 0);
   api->end(0);
-  /* Freed in another order than made, one of them within a frame. */
+  /* Bridges freed in another order than created, one of them within a frame. */
   api->begin(bridges[1]);
   api->free_bridge(bridges[0]);
   api->free_bridge(bridges[1]);

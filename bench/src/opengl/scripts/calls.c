@@ -1,5 +1,5 @@
-/* Nanoseconds per call of OpenGL functions that a program calls by the million, outside of Begin and End: what a layer before the driver costs.
-   OpenGL and X are opened at run time, so no headers are needed. Prints `name nanoseconds`, the least of several rounds. */
+/* Measures nanoseconds per call of OpenGL functions that programs call by the million, outside of Begin and End: the overhead of a layer before the driver.
+   OpenGL and X are opened at run time, so no headers are needed. Prints `name nanoseconds`, the minimum of several rounds. */
 #include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
