@@ -93,7 +93,7 @@ impl View<'_> {
     }
 }
 
-/// Contract for every caller of a [`Tracer`].
+/// Assertion message: what every caller of a [`Tracer`] must provide.
 const ONE_EACH: &str = "one block of answers for each of rays";
 
 impl Tracer for View<'_> {

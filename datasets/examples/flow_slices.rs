@@ -46,7 +46,7 @@ fn slice(flow: &Flow, field: &str, axis: usize) -> Result<Picture, Box<dyn std::
         }
     }
     let mut picture = Picture::new(dims[across], dims[up]);
-    // Invert the display's gamma, so that the grey levels appear linear.
+    // Compensate the sRGB encoding of the PNG, so that grey levels are linear in the value.
     let linear: Vec<f32> = values.iter().map(|v| v.powf(2.2)).collect();
     for channel in ["R", "G", "B"] {
         picture.add(channel, "1", linear.clone())?;

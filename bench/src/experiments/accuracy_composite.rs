@@ -357,7 +357,7 @@ mod tests {
             row.number("error").unwrap()
         };
         // 128 layers of 1/255 each sum to 0.473 of white. If every sum is rounded down, at most one
-        // of them remains.
+        // layer remains.
         assert!(of(ICET_FORMAT) > 100.0, "{}", of(ICET_FORMAT));
         assert!(of("u8") < 60.0 && of("u16") < 1.0 && of("f32") < 1e-3, "{:?}", record.rows);
         let note = describe(&record.rows).unwrap();
