@@ -26,7 +26,7 @@ pub struct ThesisMarch {
 }
 
 impl ThesisMarch {
-    /// Fills the texture. `step_voxels` is in units of the smallest spacing.
+    /// Prepares the texture. `step_voxels` is in units of the smallest spacing.
     pub fn new(field: &Field, view: View, step_voxels: f64) -> ThesisMarch {
         let dims = field.dims();
         let spacing = field.spacing_m();

@@ -157,7 +157,7 @@ pub(crate) fn gas_fields(
     all
 }
 
-/// Density and, if requested, temperature, mixture fraction and mass fractions.
+/// Computes a row of density and, if requested, temperature, mixture fraction and mass fractions.
 pub(crate) fn gas_row(table: &super::flame_sheet::Table, z: &[f32], rows: &mut [&mut [f32]]) {
     for (r, row) in rows.iter_mut().enumerate() {
         for (v, &z) in row.iter_mut().zip(z) {

@@ -165,7 +165,7 @@ struct VertexWriter<'a, 'b> {
 }
 
 impl VertexWriter<'_, '_> {
-    /// The vertex on the edge from `a` to its next point along `axis`.
+    /// Adds the vertex on the edge from `a` to its next point along `axis`.
     #[inline]
     fn push(&mut self, a: [usize; 3], axis: usize) {
         let mut b = a;

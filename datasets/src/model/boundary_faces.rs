@@ -48,7 +48,8 @@ impl BoundaryFaces {
         BoundaryFaces { first, is_boundary }
     }
 
-    /// Appends the boundary faces of a usable cell to `out`.
+    /// Replaces the contents of `out` with the boundary faces of a usable cell. Returns whether the
+    /// cell has all its points.
     pub(super) fn of_cell(
         &self,
         d: &UnstructuredGrid,
@@ -77,7 +78,7 @@ fn face_key(ids: &[u32]) -> FaceKey {
     (ids.len() as u32, smallest)
 }
 
-/// Whether a cell has all the points that its type needs.
+/// Reports whether a cell has all the points that its type needs.
 pub(super) enum Faces {
     Complete,
     TooFewPoints,
