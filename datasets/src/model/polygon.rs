@@ -89,7 +89,7 @@ fn clip_ears(flat: &[DVec2], mut emit: impl FnMut([usize; 3])) -> Division {
             emit([a, b, c]);
             ring.remove(at);
             misses = 0;
-            at = at.max(1) - 1; // the neighbours changed: test the previous corner again
+            at = at.max(1) - 1; // neighbours changed: look at the one before again
         } else {
             at += 1;
             misses += 1;

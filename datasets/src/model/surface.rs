@@ -428,7 +428,7 @@ impl Builder {
                         for high in [false, true] {
                             let sheet = dims[axis] == 1;
                             if sheet && !high {
-                                continue; // a sheet has one face, not two coincident ones
+                                continue; // a sheet has one face, not two at the same place
                             }
                             let at_rim = if high {
                                 index[axis] + 1 == cells[axis]

@@ -28,7 +28,7 @@ struct Info {
     textures: usize,
     /// Blocks of a collection, meshes of a scene, or the one data set.
     parts: Vec<Part>,
-    /// Times of a series; the rest describes the first.
+    /// Times of a series; the other fields describe the first time.
     times: Vec<f64>,
     warnings: Vec<String>,
 }
@@ -51,7 +51,7 @@ struct Array {
     scalar_type: &'static str,
     components: usize,
     tuples: usize,
-    /// Smallest and largest finite value; of a vector, of its magnitude.
+    /// Smallest and largest finite value; for a vector, those of its magnitude.
     range: Option<(f64, f64)>,
 }
 

@@ -16,7 +16,7 @@ struct Entry {
 #[derive(Serialize)]
 struct Size {
     name: &'static str,
-    /// Triangles of a mesh, segments of lines, points of a flow.
+    /// Number of triangles of a mesh, segments of lines, or points of a flow.
     elements: u64,
 }
 

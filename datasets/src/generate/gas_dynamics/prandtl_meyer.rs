@@ -39,7 +39,7 @@ pub fn mach(gamma: f64, angle: f64) -> Result<f64, GasError> {
     while unchecked_angle_rad(gamma, high) <= angle {
         high *= 2.0;
         if high > 1e15 {
-            return Ok(high); // within rounding of the vacuum limit
+            return Ok(high); // within rounding of the vacuum
         }
     }
     Ok(bisect(1.0, high, |m| unchecked_angle_rad(gamma, m) - angle))
