@@ -1,5 +1,4 @@
-//! Everything that the documents refer to must exist: linked files, chapters, named tests,
-//! experiments.
+//! What the documents say must be there: linked files, chapters, named tests, experiments.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -8,7 +7,7 @@ use std::process::Command;
 use crate::counted::exceptions;
 use crate::tree::{File, files, root, words};
 
-/// Files that documents link to but that do not exist yet, and who makes them.
+/// Files that documents link to and that are still to be made, and by what.
 const PENDING: &[(&str, &str)] = &[];
 
 fn documents() -> Vec<File> {
@@ -47,7 +46,7 @@ fn links(file: &File) -> Vec<(usize, String)> {
     found
 }
 
-/// Resolves `path` relative to `folder`, without `.` and `..`.
+/// `path` seen from `folder`, without `.` and `..`.
 fn normalized(folder: &str, path: &str) -> String {
     let mut parts: Vec<&str> = folder.split('/').filter(|p| !p.is_empty()).collect();
     for part in path.split('/') {
@@ -88,8 +87,8 @@ fn planted_dead_links_are_found() {
 }
 
 // ---- The book -----------------------------------------------------------------------------------
-/// Chapters that SUMMARY.md lists, that exist, or whose examples are compiled; all as paths
-/// relative to docs/src.
+/// Chapters that SUMMARY.md lists, or that exist, or whose examples are compiled: all by path from
+/// docs/src.
 #[test]
 fn the_book_is_complete() {
     let summary: BTreeSet<String> =
@@ -133,7 +132,7 @@ fn has_rust_examples(file: &File) -> bool {
 }
 
 // ---- Invariants and their tests -----------------------------------------------------------------
-/// The list items below headings that begin with `## Invariants`.
+/// The items of the lists below headings that begin with `## Invariants`.
 fn invariants(document: &File) -> Vec<String> {
     let mut items: Vec<String> = Vec::new();
     let (mut in_section, mut in_item) = (false, false);
@@ -176,15 +175,15 @@ fn untested_invariants(document: &File, is_test: impl Fn(&str) -> bool) -> (usiz
             faults.push(format!("{path}: `{head}...`: neither `*Test:*` nor `*Not tested yet:*`"));
         }
     }
-    // A list in an unknown format would look like one that is checked.
+    // A list that nobody reads looks like one that is kept.
     if document.text.contains("*Test:*") && items.is_empty() {
         faults.push(format!("{path}: `*Test:*` outside a list below `## Invariants`"));
     }
     (items.len(), faults)
 }
 
-/// Minimum number of invariants in ARCHITECTURE.md and the READMEs of all members, so that none is
-/// lost when they are moved.
+/// What ARCHITECTURE.md and the READMEs of all members call invariants: what moves between them is
+/// not lost.
 const FEWEST_INVARIANTS: usize = 110;
 
 #[test]
@@ -239,7 +238,7 @@ fn architecture_names_every_room() {
 }
 
 // ---- READMEs of members -------------------------------------------------------------------------
-/// The sections of every member's README, in this order; other sections may come between them.
+/// The sections of every member's README, in this order; others may stand between.
 const README_SECTIONS: &[&str] = &["## Use it", "## Read on", "## Invariants"];
 
 fn readme_faults(member: &str, text: &str) -> Vec<String> {
@@ -278,7 +277,8 @@ fn planted_readmes_out_of_order_are_found() {
 }
 
 // ---- The map of the sources ---------------------------------------------------------------------
-/// Files and folders that a document names in backticks, each with its line and section.
+/// Files and folders that a document names in backticks, each with its line and the section it
+/// stands in.
 fn named_paths(file: &File) -> Vec<(usize, &str, &str)> {
     let (mut section, mut found) = ("", Vec::new());
     for (number, line) in prose(file) {
@@ -296,15 +296,15 @@ fn named_paths(file: &File) -> Vec<(usize, &str, &str)> {
     found
 }
 
-/// Named paths that do not exist. A path must be the end of a path of the tree; a bare name must
-/// belong to the member of its section.
+/// A path is the end of a path of the tree; a bare name is one of the member whose section it
+/// stands in.
 fn lost_paths(file: &File, tree: &[String]) -> Vec<String> {
     let members: BTreeSet<&str> = tree.iter().filter_map(|p| p.split('/').next()).collect();
     let lost = named_paths(file).into_iter().filter(|(_, section, path)| {
         let path = path.trim_start_matches("../").trim_end_matches('/');
         let anywhere = path.contains('/') || !members.contains(section);
         let of_section = |p: &str| anywhere || p.split('/').next() == Some(section);
-        // Folders contain files; `a/b` may be the module `a/b.rs`.
+        // Folders are what files stand in; `a/b` may be the module `a/b.rs`.
         let (inside, folder) = (format!("/{path}"), format!("/{path}/"));
         let ends = [inside.clone(), inside.clone() + ".rs"];
         !tree.iter().any(|p| {
@@ -318,8 +318,8 @@ fn lost_paths(file: &File, tree: &[String]) -> Vec<String> {
     lost.map(|(line, _, path)| format!("{}:{line}: there is no {path}", file.path)).collect()
 }
 
-/// Number of moved paths that the map still names.
-const LOST_PATHS: &[(&str, usize)] = &[("docs/src/appendix/code_map.md", 51)];
+/// Paths that the map still names and that have moved.
+const LOST_PATHS: &[(&str, usize)] = &[];
 
 #[test]
 fn the_map_of_the_sources_names_what_is_there() {
@@ -349,7 +349,7 @@ fn experiment_ids(file: &File) -> Vec<String> {
     let id = |rest: &str| {
         rest.chars().take_while(|c| c.is_alphanumeric() || "_-".contains(*c)).collect::<String>()
     };
-    // `run ID` is a placeholder.
+    // `run ID` stands for any of them.
     commands.map(id).filter(|i| !i.is_empty() && i != "ID").collect()
 }
 
