@@ -4,7 +4,7 @@
 
 use datasets::catalogue::flows::find;
 use datasets::generate::flow::{Fields, Flow};
-use datasets::image_io::{Picture, PngDepth, write_png};
+use datasets::image_io::{LayeredImage, PngDepth, write_png};
 use std::io::Write;
 use std::path::Path;
 
@@ -32,7 +32,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// The slice across `axis` in the middle; z is up, or y for a slice across z.
-fn slice(flow: &Flow, field: &str, axis: usize) -> Result<Picture, Box<dyn std::error::Error>> {
+fn slice(
+    flow: &Flow,
+    field: &str,
+    axis: usize,
+) -> Result<LayeredImage, Box<dyn std::error::Error>> {
     let grid = flow.grid(field).ok_or("no such field")?;
     let (low, high) = grid.range().ok_or("no values")?;
     let [across, up] = [[1, 2], [0, 2], [0, 1]][axis];
@@ -45,11 +49,11 @@ fn slice(flow: &Flow, field: &str, axis: usize) -> Result<Picture, Box<dyn std::
             values.push((grid.at(at[0], at[1], at[2]) - low) / (high - low).max(f32::MIN_POSITIVE));
         }
     }
-    let mut picture = Picture::new(dims[across], dims[up]);
+    let mut image = LayeredImage::new(dims[across], dims[up]);
     // Compensate the sRGB encoding of the PNG, so that grey levels are linear in the value.
     let linear: Vec<f32> = values.iter().map(|v| v.powf(2.2)).collect();
     for channel in ["R", "G", "B"] {
-        picture.add(channel, "1", linear.clone())?;
+        image.add(channel, "1", linear.clone())?;
     }
-    Ok(picture)
+    Ok(image)
 }

@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn any_damage_is_noticed_said_and_repaired() {
+    fn any_damage_is_detected_reported_and_repaired() {
         let dir = tempfile::tempdir().unwrap();
         let cache = MeshCache::at(dir.path());
         let mesh = full_mesh();

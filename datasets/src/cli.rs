@@ -217,7 +217,7 @@ where
 
 /// Ctrl-C stopped the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted; what was finished is kept")]
+#[error("interrupted; finished results are kept")]
 pub struct Interrupted;
 
 /// A flag that Ctrl-C, TERM and HUP set. Long work checks it where it can stop safely.

@@ -39,7 +39,7 @@ pub enum ModelError {
         available: String,
     },
     /// The array does not have this component.
-    #[error("array `{name}` has {components} components; `{asked}` asks for one it does not have")]
+    #[error("array `{name}` has {components} components; `{asked}` is out of range")]
     NoComponent {
         /// Array name.
         name: String,

@@ -52,7 +52,7 @@ fn volume(m: &TriMesh) -> f64 {
 }
 
 #[test]
-fn plot3d_layouts_are_told_apart_by_size() {
+fn plot3d_layouts_are_distinguished_by_size() {
     for multi in [false, true] {
         for records in [false, true] {
             for big in [false, true] {
@@ -305,7 +305,7 @@ fn gltf_transforms_turn_mirrored_triangles_back() {
 }
 
 /// A triangle with every kind of texture; `alpha` is the material's alpha mode.
-fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> LoadedFile {
+fn gltf_with_textures(dir: &std::path::Path, alpha: serde_json::Value) -> LoadedFile {
     let mut bytes: Vec<u8> = Vec::new();
     let mut floats = |values: &[f32]| values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
     floats(&[-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0]);
@@ -349,10 +349,10 @@ fn gltf_with_pictures(dir: &std::path::Path, alpha: serde_json::Value) -> Loaded
 }
 
 #[test]
-fn gltf_materials_have_all_their_pictures_and_samplers() {
+fn gltf_materials_have_all_their_textures_and_samplers() {
     use rt_core::texture::{Filter, Wrap};
     let dir = tempfile::tempdir().unwrap();
-    let o = gltf_with_pictures(
+    let o = gltf_with_textures(
         dir.path(),
         serde_json::json!({"alphaMode": "MASK", "alphaCutoff": 0.25}),
     );
@@ -381,7 +381,7 @@ fn gltf_materials_have_all_their_pictures_and_samplers() {
         s.meshes[0].mesh.tangents.as_ref().unwrap()[0],
         glam::Vec4::new(-1.0, 0.0, 0.0, -1.0)
     );
-    let o = gltf_with_pictures(dir.path(), serde_json::json!({}));
+    let o = gltf_with_textures(dir.path(), serde_json::json!({}));
     assert_eq!(scene(o).materials[0].alpha, AlphaMode::Opaque);
 }
 

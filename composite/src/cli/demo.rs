@@ -11,7 +11,7 @@ use crate::report::Report;
 use crate::workload::{SyntheticFrame, Workload};
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, CureExt as _, Status, UsageError};
-use datasets::image_io::{Picture, PngDepth, write_png};
+use datasets::image_io::{LayeredImage, PngDepth, write_png};
 use serde::Serialize;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ pub(super) fn demo(
             std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
             let (picture, plot) =
                 (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
-            write_picture(&picture, args.size, &colors)?;
+            write_image(&picture, args.size, &colors)?;
             let title = format!(
                 "{} ranks over {transport}, {}x{} {}: {:.2} ms",
                 lines.len(),
@@ -81,7 +81,7 @@ pub(super) fn demo(
             };
             common.result(&shown, || {
                 format!(
-                    "{title}\n{}\npicture: {}\nplot:    {}",
+                    "{title}\n{}\nimage: {}\nplot:  {}",
                     phase_sums::table(&shown.ranks),
                     shown.picture.display(),
                     shown.plot.display()
@@ -93,12 +93,12 @@ pub(super) fn demo(
 }
 
 /// Colours are taken as linear light; pixels that nobody drew stay transparent.
-fn write_picture(path: &std::path::Path, size: u32, colors: &[[u8; 4]]) -> anyhow::Result<()> {
+fn write_image(path: &std::path::Path, size: u32, colors: &[[u8; 4]]) -> anyhow::Result<()> {
     let linear: Vec<[f32; 4]> =
         colors.iter().map(|c| c.map(|channel| f32::from(channel) / 255.0)).collect();
-    let mut picture = Picture::new(size, size);
-    picture.add_rgba(&linear)?;
-    write_png(path, &picture, PngDepth::Eight)?;
+    let mut image = LayeredImage::new(size, size);
+    image.add_rgba(&linear)?;
+    write_png(path, &image, PngDepth::Eight)?;
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use crate::render::demo::{Demo, PreparedDemo};
 use crate::render::{DataParallel, FrameOptions, RankReport, SecondaryRayPolicy};
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, Status, UsageError};
-use datasets::image_io::{Picture, PngDepth, write_png};
+use datasets::image_io::{LayeredImage, PngDepth, write_png};
 use rt_core::bvh::BuildOptions;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -83,7 +83,7 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Resul
     std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let (picture, plot) =
         (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
-    let mut png = Picture::new(args.size, args.size);
+    let mut png = LayeredImage::new(args.size, args.size);
     png.add_rgba(&f.colors)?;
     write_png(&picture, &png, PngDepth::Eight)?;
     let frame_ms = f.lines.iter().map(|l| l.total_ms).fold(0.0, f64::max);
@@ -110,12 +110,12 @@ fn finish(common: CommonArgs, args: &DemoArgs, f: FinishedDemo) -> anyhow::Resul
     };
     common.result(&shown, || {
         format!(
-            "{title}\nlight: {}\n{}{}\npicture: {}\nplot:    {}",
+            "{title}\nlight: {}\n{}{}\nimage: {}\nplot:  {}",
             shown.light,
             match shown.unusable {
                 0 => String::new(),
                 n => format!(
-                    "left out: {n} primitives with corners that are no places (NaN, infinite, too \
+                    "left out: {n} primitives with invalid corners (NaN, infinite, too \
                      large)\n"
                 ),
             },

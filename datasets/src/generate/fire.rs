@@ -38,7 +38,7 @@ const SHAPE: Shape = Shape {
     growth: 0.13,
     half_height: 0.7,
     rings: &[1.1, 2.5, 4.3, 6.2],
-    wildness: 0.75,
+    displacement: 0.75,
 };
 
 /// Parameters of the fire.

@@ -30,7 +30,7 @@ const SHAPE: Shape = Shape {
     growth: 0.14,
     half_height: 3.2,
     rings: &[0.9, 2.3, 4.2, 6.4],
-    wildness: 0.65,
+    displacement: 0.65,
 };
 
 /// Parameters of the plume.

@@ -140,15 +140,15 @@ mod tests {
     }
 
     #[test]
-    fn other_grids_come_close_to_the_wish() {
+    fn other_grids_come_close_to_the_target() {
         let grid = Wavelet::with_points(81).grid().unwrap();
-        for wish in [1, 100_000, 1_000_000] {
-            let isos = isovalues_for(&grid, wish).unwrap();
+        for target in [1, 100_000, 1_000_000] {
+            let isos = isovalues_for(&grid, target).unwrap();
             let counted: usize = count_triangles(&grid, &isos).unwrap().iter().sum();
             // Off by at most half a surface (one surface of 81³ has about 100,000 triangles).
             assert!(
-                isos.len() == 1 || counted.abs_diff(wish) < 60_000,
-                "{wish}: {counted} by {}",
+                isos.len() == 1 || counted.abs_diff(target) < 60_000,
+                "{target}: {counted} by {}",
                 isos.len()
             );
         }

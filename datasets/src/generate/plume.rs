@@ -24,7 +24,7 @@ pub(crate) struct Shape {
     /// Heights of the rings.
     pub(crate) rings: &'static [f64],
     /// Distance that eddies carry gas, as a fraction of the local radius.
-    pub(crate) wildness: f64,
+    pub(crate) displacement: f64,
 }
 
 /// A plume on the lattice of a flow; the source is at x = y = z = 0, up is z.
@@ -71,7 +71,7 @@ impl Plume {
         let height = self.spacing_m.z * k as f64 + self.origin_m.z;
         // The flow is calm at the floor and turbulent above the neck.
         let calm = (height / (0.8 * self.shape.neck_height * r0)).clamp(0.0, 1.0);
-        let strength = self.shape.wildness * calm * calm;
+        let strength = self.shape.displacement * calm * calm;
         let size = column_radius(&self.shape, height).max(0.3 * r0) * 1.6;
         self.turbulence.displace_row(d, j, k, |_| (size, strength));
         share.clear();

@@ -24,17 +24,17 @@ pub fn trace(
     field: impl Fn(DVec3) -> DVec3,
     seed: DVec3,
     step: impl Fn(DVec3) -> Option<f64>,
-    tracing: StreamlineOptions,
+    options: StreamlineOptions,
 ) -> Vec<DVec3> {
     let direction = |p: DVec3| -> Option<DVec3> {
-        let v = field(p) * tracing.sign;
+        let v = field(p) * options.sign;
         let speed = v.length();
         // A NaN speed also fails this comparison.
-        (speed > tracing.min_speed && speed.is_finite()).then(|| v / speed)
+        (speed > options.min_speed && speed.is_finite()).then(|| v / speed)
     };
     let mut points = Vec::new();
     let mut p = seed;
-    while points.len() < tracing.max_points {
+    while points.len() < options.max_points {
         points.push(p);
         let Some(next) = step(p).and_then(|h| rk4_step(direction, p, h)) else { break };
         p = next;

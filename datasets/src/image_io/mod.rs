@@ -1,18 +1,18 @@
 //! Reads and writes images: PNG for viewing, multi-layer OpenEXR for data.
 //!
-//! A [`Picture`] is a set of named f32 planes of equal size. Names follow the `layer.channel`
+//! A [`LayeredImage`] is a set of named f32 planes of equal size. Names follow the `layer.channel`
 //! convention by which tev, Nuke, Blender and OpenRV group channels: `R`, `G`, `B`, `A` for the
 //! colour, then `depth.Z`, `normal.X`, `deflection.X`… OpenEXR keeps every plane bit for bit with
 //! its unit and the image's metadata; PNG keeps the colour only.
 //!
 //! ```
-//! use datasets::image_io::{Picture, read_exr, write_exr};
-//! let mut picture = Picture::new(2, 1);
-//! picture.add("depth.Z", "m", vec![1.0, f32::INFINITY])?;
-//! picture.metadata.insert("samples".into(), 16.0.into());
+//! use datasets::image_io::{LayeredImage, read_exr, write_exr};
+//! let mut image = LayeredImage::new(2, 1);
+//! image.add("depth.Z", "m", vec![1.0, f32::INFINITY])?;
+//! image.metadata.insert("samples".into(), 16.0.into());
 //! let file = std::env::temp_dir().join(format!("doc-{}.exr", std::process::id()));
-//! write_exr(&file, &picture)?;
-//! assert_eq!(read_exr(&file)?, picture);
+//! write_exr(&file, &image)?;
+//! assert_eq!(read_exr(&file)?, image);
 //! # std::fs::remove_file(file).unwrap();
 //! # Ok::<(), datasets::image_io::ImageError>(())
 //! ```
@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 
 /// Named planes of equal size.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Picture {
+pub struct LayeredImage {
     /// Pixels per row.
     pub width: u32,
     /// Rows.
@@ -39,6 +39,9 @@ pub struct Picture {
     /// How the image was made: see [`Metadata`].
     pub metadata: Metadata,
 }
+
+/// Former name of [`LayeredImage`].
+pub type Picture = LayeredImage;
 
 /// One value per pixel.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -117,7 +120,7 @@ pub enum ImageError {
         reason: String,
     },
     /// A plane has the wrong number of values.
-    #[error("plane `{name}` has {found} values; a picture of {width}x{height} needs {expected}")]
+    #[error("plane `{name}` has {found} values; an image of {width}x{height} needs {expected}")]
     PlaneLength {
         /// Its name.
         name: String,
@@ -131,13 +134,13 @@ pub enum ImageError {
         expected: u64,
     },
     /// Two planes have the same name.
-    #[error("the picture already has a plane `{name}`; give each plane its own name")]
+    #[error("the image already has a plane `{name}`; give each plane its own name")]
     DuplicatePlane {
         /// The name.
         name: String,
     },
     /// A required plane is absent.
-    #[error("the picture has no plane `{name}` (it has: {present}); {cure}")]
+    #[error("the image has no plane `{name}` (it has: {present}); {cure}")]
     MissingPlane {
         /// The requested name.
         name: &'static str,
@@ -148,10 +151,10 @@ pub enum ImageError {
     },
 }
 
-impl Picture {
+impl LayeredImage {
     /// An image without planes.
     pub fn new(width: u32, height: u32) -> Self {
-        Picture { width, height, ..Default::default() }
+        LayeredImage { width, height, ..Default::default() }
     }
 
     /// Adds a plane. `name` must be new, and there must be one value per pixel.

@@ -7,7 +7,7 @@
 //! attributes, which other programs show under their own headings. Standard numbers have 32 bits,
 //! all others 64.
 
-use super::{ImageError, Metadata, MetadataValue, Picture, Plane, format_error, io_error};
+use super::{ImageError, LayeredImage, Metadata, MetadataValue, Plane, format_error, io_error};
 use crate::atomic_file::write_atomically;
 use exr::meta::attribute::AttributeValue;
 use exr::meta::header::standard_names;
@@ -23,21 +23,20 @@ const UNIT_PREFIX: &str = "unit.";
 const MAX_NAME_BYTES: usize = 255;
 
 /// Writes all planes and the metadata. The file is written atomically.
-pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
-    picture.check()?;
-    if picture.planes.is_empty() || picture.width == 0 || picture.height == 0 {
-        let size =
-            format!("{}x{} with {} planes", picture.width, picture.height, picture.planes.len());
+pub fn write_exr(path: &Path, image: &LayeredImage) -> Result<(), ImageError> {
+    image.check()?;
+    if image.planes.is_empty() || image.width == 0 || image.height == 0 {
+        let size = format!("{}x{} with {} planes", image.width, image.height, image.planes.len());
         return Err(format_error(
             path,
-            format!("OpenEXR cannot hold a picture of {size}; add pixels and a plane"),
+            format!("OpenEXR cannot hold an image of {size}; add pixels and a plane"),
         ));
     }
     let mut attributes = LayerAttributes::default();
-    let units = picture.planes.iter().filter(|p| !p.unit.is_empty());
+    let units = image.planes.iter().filter(|p| !p.unit.is_empty());
     let units =
         units.map(|p| (format!("{UNIT_PREFIX}{}", p.name), MetadataValue::Text(p.unit.clone())));
-    for (key, value) in picture.metadata.clone().into_iter().chain(units) {
+    for (key, value) in image.metadata.clone().into_iter().chain(units) {
         let attribute = name(path, &key)?;
         if !standard_names::ALL.contains(&attribute.as_slice()) {
             let value = match value {
@@ -57,10 +56,10 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
         }
     }
     let mut channels = Vec::new();
-    for p in &picture.planes {
+    for p in &image.planes {
         channels.push(AnyChannel::new(name(path, &p.name)?, FlatSamples::F32(p.samples.clone())));
     }
-    let size = (picture.width as usize, picture.height as usize);
+    let size = (image.width as usize, image.height as usize);
     let layer =
         Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels.into()));
     let mut bytes = Cursor::new(Vec::new());
@@ -69,9 +68,9 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), ImageError> {
 }
 
 /// Reads the channels of the first part that has any; 16-bit and integer channels become f32.
-/// Planes are sorted by name, as the format stores them. [`Picture`]s that differ only in the order
-/// of planes are equivalent.
-pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
+/// Planes are sorted by name, as the format stores them. [`LayeredImage`]s that differ only in the
+/// order of planes are equivalent.
+pub fn read_exr(path: &Path) -> Result<LayeredImage, ImageError> {
     let bytes = std::fs::read(path).map_err(io_error(path, "read"))?;
     let image = exr::prelude::read()
         .no_deep_data()
@@ -85,7 +84,7 @@ pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
     let size = |n: usize| {
         u32::try_from(n).map_err(|_| format_error(path, format!("{n} pixels along one side")))
     };
-    let mut picture = Picture::new(size(layer.size.0)?, size(layer.size.1)?);
+    let mut image = LayeredImage::new(size(layer.size.0)?, size(layer.size.1)?);
     let mut entries: Metadata = layer.attributes.other.iter().filter_map(metadata_entry).collect();
     entries.extend(standard_entries(layer.attributes));
     for channel in &layer.channel_data.list {
@@ -99,11 +98,11 @@ pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
             return Err(format_error(path, reason));
         }
         let samples = channel.sample_data.values_as_f32().collect();
-        picture.planes.push(Plane { name, unit, samples });
+        image.planes.push(Plane { name, unit, samples });
     }
-    picture.metadata = entries;
-    picture.check()?;
-    Ok(picture)
+    image.metadata = entries;
+    image.check()?;
+    Ok(image)
 }
 
 fn metadata_entry((key, value): (&Text, &AttributeValue)) -> Option<(String, MetadataValue)> {
@@ -210,8 +209,8 @@ fn string(t: &Text) -> String {
 mod tests {
     use super::*;
 
-    fn picture() -> Picture {
-        let mut p = Picture::new(5, 3);
+    fn image() -> LayeredImage {
+        let mut p = LayeredImage::new(5, 3);
         let ramp = |k: f32| (0..15).map(|i| i as f32 * k - 2.0).collect::<Vec<f32>>();
         p.add("R", "", ramp(0.1)).unwrap();
         p.add("deflection.X", "rad", ramp(1e-7)).unwrap();
@@ -226,10 +225,10 @@ mod tests {
     fn planes_units_and_metadata_come_back_bit_for_bit() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.exr");
-        write_exr(&path, &picture()).unwrap();
+        write_exr(&path, &image()).unwrap();
         let back = read_exr(&path).unwrap();
-        assert_eq!(back, picture());
-        for (a, b) in back.planes.iter().zip(&picture().planes) {
+        assert_eq!(back, image());
+        for (a, b) in back.planes.iter().zip(&image().planes) {
             let bits = |p: &Plane| p.samples.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(a), bits(b), "{}", a.name);
         }
@@ -240,8 +239,10 @@ mod tests {
     fn names_that_the_format_defines_become_its_own_attributes() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("standard.exr");
-        let mut p =
-            Picture { metadata: super::super::metadata_of_this_run("bench", "1.2"), ..picture() };
+        let mut p = LayeredImage {
+            metadata: super::super::metadata_of_this_run("bench", "1.2"),
+            ..image()
+        };
         for (key, _) in STANDARD_TEXTS {
             p.metadata.insert(key.into(), format!("a {key}").into());
         }
@@ -264,7 +265,7 @@ mod tests {
             ("expTime", "long".into()),
             ("channels", MetadataValue::from("R")),
         ] {
-            let mut p = picture();
+            let mut p = image();
             p.metadata.insert(key.into(), value);
             let message = write_exr(Path::new("never-written.exr"), &p).unwrap_err().to_string();
             assert!(message.contains(key) && message.contains("rename"), "{message}");
@@ -275,7 +276,7 @@ mod tests {
     fn nan_payloads_do_not_panic() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("nan.exr");
-        let mut p = Picture::new(1, 2);
+        let mut p = LayeredImage::new(1, 2);
         p.add("Y", "", vec![f32::NAN, 1.0]).unwrap();
         write_exr(&path, &p).unwrap();
         let back = read_exr(&path).unwrap();
@@ -286,7 +287,7 @@ mod tests {
     fn broken_files_are_errors_that_name_the_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.exr");
-        write_exr(&path, &picture()).unwrap();
+        write_exr(&path, &image()).unwrap();
         let whole = std::fs::read(&path).unwrap();
         for cut in [0, 3, 20, whole.len() / 2, whole.len() - 1] {
             std::fs::write(&path, &whole[..cut]).unwrap();
@@ -302,13 +303,13 @@ mod tests {
     }
 
     #[test]
-    fn impossible_pictures_are_refused() {
+    fn images_that_a_file_cannot_hold_are_rejected() {
         let path = Path::new("never-written.exr");
-        assert!(write_exr(path, &Picture::new(4, 4)).is_err(), "no planes");
-        let mut empty = Picture::new(0, 4);
+        assert!(write_exr(path, &LayeredImage::new(4, 4)).is_err(), "no planes");
+        let mut empty = LayeredImage::new(0, 4);
         empty.add("Y", "", vec![]).unwrap();
         assert!(write_exr(path, &empty).is_err(), "no pixels");
-        let mut zero = Picture::new(1, 1);
+        let mut zero = LayeredImage::new(1, 1);
         zero.add("a\0b", "", vec![0.0]).unwrap();
         assert!(write_exr(path, &zero).unwrap_err().to_string().contains("a\\0b"));
         assert!(!path.exists());

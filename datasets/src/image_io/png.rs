@@ -1,6 +1,6 @@
 //! PNG through the `image` crate: sRGB-encoded colour with straight alpha, 8 or 16 bits.
 
-use super::{ImageError, Picture, format_error, io_error};
+use super::{ImageError, LayeredImage, format_error, io_error};
 use crate::atomic_file::write_atomically;
 use image::{DynamicImage, ImageBuffer, ImageEncoder};
 use rt_core::colormap::{linear_to_srgb, srgb_to_linear};
@@ -28,14 +28,18 @@ pub struct PngReport {
 
 /// Writes the colour planes (R, G, B and optionally A, or Y). Alpha is written when the image has
 /// `A`.
-pub fn write_png(path: &Path, picture: &Picture, depth: PngDepth) -> Result<PngReport, ImageError> {
-    let pixels = picture.rgba()?;
+pub fn write_png(
+    path: &Path,
+    image: &LayeredImage,
+    depth: PngDepth,
+) -> Result<PngReport, ImageError> {
+    let pixels = image.rgba()?;
     if pixels.is_empty() {
-        return Err(format_error(path, "PNG cannot hold a picture without pixels"));
+        return Err(format_error(path, "PNG cannot hold an image without pixels"));
     }
     let mut report = PngReport::default();
     let encoded: Vec<[f32; 4]> = pixels.iter().map(|&p| encode(p, &mut report)).collect();
-    let channels = if picture.plane("A").is_some() { 4 } else { 3 };
+    let channels = if image.plane("A").is_some() { 4 } else { 3 };
     let quantized = |max: f32| {
         encoded.iter().flat_map(move |p| p[..channels].iter().map(move |v| (v * max).round()))
     };
@@ -59,28 +63,28 @@ pub fn write_png(path: &Path, picture: &Picture, depth: PngDepth) -> Result<PngR
     };
     let mut file = Cursor::new(Vec::new());
     image::codecs::png::PngEncoder::new(&mut file)
-        .write_image(&bytes, picture.width, picture.height, color)
+        .write_image(&bytes, image.width, image.height, color)
         .map_err(|e| format_error(path, e))?;
     write_atomically(path, |w| w.write_all(file.get_ref())).map_err(io_error(path, "write"))?;
     Ok(report)
 }
 
 /// Reads a PNG of any kind as linear premultiplied R, G, B (and A when the file has alpha).
-pub fn read_png(path: &Path) -> Result<Picture, ImageError> {
+pub fn read_png(path: &Path) -> Result<LayeredImage, ImageError> {
     let bytes = std::fs::read(path).map_err(io_error(path, "read"))?;
     let decoded = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
         .map_err(|e| format_error(path, format!("not a readable PNG file: {e}")))?;
     let has_alpha = decoded.color().has_alpha();
     let encoded = unit_range(decoded);
-    let mut picture = Picture::new(encoded.width(), encoded.height());
+    let mut image = LayeredImage::new(encoded.width(), encoded.height());
     let decode = |p: [f32; 4]| [0, 1, 2].map(|c| srgb_to_linear(p[c]) * p[3]);
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-        picture.add(name, "", encoded.pixels().map(|p| decode(p.0)[c]).collect())?;
+        image.add(name, "", encoded.pixels().map(|p| decode(p.0)[c]).collect())?;
     }
     if has_alpha {
-        picture.add("A", "", encoded.pixels().map(|p| p.0[3]).collect())?;
+        image.add("A", "", encoded.pixels().map(|p| p.0[3]).collect())?;
     }
-    Ok(picture)
+    Ok(image)
 }
 
 /// Normalises samples to 0..=1. (The crate's own conversion to f32 does the same but may interpret
@@ -110,17 +114,17 @@ fn encode(p: [f32; 4], report: &mut PngReport) -> [f32; 4] {
 mod tests {
     use super::*;
 
-    fn round_trip(picture: &Picture, depth: PngDepth) -> (Picture, PngReport) {
+    fn round_trip(image: &LayeredImage, depth: PngDepth) -> (LayeredImage, PngReport) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.png");
-        let report = write_png(&path, picture, depth).unwrap();
+        let report = write_png(&path, image, depth).unwrap();
         (read_png(&path).unwrap(), report)
     }
 
     #[test]
     fn all_256_codes_survive_a_round_trip() {
         let codes: Vec<f32> = (0..256).map(|i| srgb_to_linear(i as f32 / 255.0)).collect();
-        let mut p = Picture::new(16, 16);
+        let mut p = LayeredImage::new(16, 16);
         p.add("Y", "", codes.clone()).unwrap();
         let (back, report) = round_trip(&p, PngDepth::Eight);
         assert_eq!(report, PngReport::default());
@@ -133,7 +137,7 @@ mod tests {
     #[test]
     fn sixteen_bits_are_finer_than_eight() {
         let fine: Vec<f32> = (0..64).map(|i| 0.5 + i as f32 * 1e-4).collect();
-        let mut p = Picture::new(64, 1);
+        let mut p = LayeredImage::new(64, 1);
         p.add("Y", "", fine.clone()).unwrap();
         let error = |depth| {
             let back = round_trip(&p, depth).0;
@@ -147,7 +151,7 @@ mod tests {
 
     #[test]
     fn premultiplied_alpha_becomes_straight_and_back() {
-        let mut p = Picture::new(3, 1);
+        let mut p = LayeredImage::new(3, 1);
         p.add_rgba(&[[0.5, 0.25, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]]).unwrap();
         let (back, report) = round_trip(&p, PngDepth::Sixteen);
         assert_eq!(report.clamped, 0);
@@ -159,7 +163,7 @@ mod tests {
 
     #[test]
     fn nan_is_magenta_and_overflow_is_counted() {
-        let mut p = Picture::new(4, 1);
+        let mut p = LayeredImage::new(4, 1);
         p.add("Y", "", vec![f32::NAN, 2.0, f32::INFINITY, -1.0]).unwrap();
         let (back, report) = round_trip(&p, PngDepth::Eight);
         assert_eq!(report, PngReport { nan: 1, clamped: 3 });
@@ -169,7 +173,7 @@ mod tests {
 
     #[test]
     fn missing_colour_names_what_is_there() {
-        let mut p = Picture::new(1, 1);
+        let mut p = LayeredImage::new(1, 1);
         p.add("depth.Z", "m", vec![1.0]).unwrap();
         let message = write_png(Path::new("x.png"), &p, PngDepth::Eight).unwrap_err().to_string();
         assert!(message.contains("depth.Z") && message.contains("`R`"), "{message}");
@@ -178,7 +182,7 @@ mod tests {
 
     #[test]
     fn wrong_plane_length_is_refused() {
-        let mut p = Picture::new(2, 2);
+        let mut p = LayeredImage::new(2, 2);
         assert!(matches!(
             p.add("Y", "", vec![0.0; 3]),
             Err(ImageError::PlaneLength { expected: 4, found: 3, .. })

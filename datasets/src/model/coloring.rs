@@ -15,20 +15,20 @@ pub struct ColorBy {
 }
 
 impl ColorBy {
-    /// Finds `wish` in `data` (and in its blocks, if any), point arrays first. A name that contains
+    /// Finds `name` in `data` (and in its blocks, if any), point arrays first. A name that contains
     /// a colon is tried unsplit first.
-    pub fn find(data: &Dataset, wish: &str) -> Result<ColorBy, ModelError> {
+    pub fn find(data: &Dataset, name: &str) -> Result<ColorBy, ModelError> {
         let leaves = data.leaves();
         let attributes: Vec<&Attributes> = leaves.iter().filter_map(|d| d.attributes()).collect();
         let lookup = |name: &str| {
             let point = attributes.iter().find_map(|a| a.point_array(name)).map(|a| (a, true));
             point.or_else(|| attributes.iter().find_map(|a| a.cell_array(name)).map(|a| (a, false)))
         };
-        if let Some((_, per_point)) = lookup(wish) {
-            return Ok(ColorBy { name: wish.into(), component: None, per_point });
+        if let Some((_, per_point)) = lookup(name) {
+            return Ok(ColorBy { name: name.into(), component: None, per_point });
         }
-        if let Some((name, suffix)) = wish.rsplit_once(':')
-            && let Some((array, per_point)) = lookup(name)
+        if let Some((array_name, suffix)) = name.rsplit_once(':')
+            && let Some((array, per_point)) = lookup(array_name)
         {
             let component = match suffix.to_ascii_lowercase().as_str() {
                 "magnitude" => None,
@@ -38,10 +38,13 @@ impl ColorBy {
                 digits => Some(digits.parse().unwrap_or(usize::MAX)),
             };
             if component.is_some_and(|c| c >= array.components) {
-                let (name, components) = (name.to_string(), array.components);
-                return Err(ModelError::NoComponent { name, asked: wish.into(), components });
+                return Err(ModelError::NoComponent {
+                    name: array_name.to_string(),
+                    asked: name.into(),
+                    components: array.components,
+                });
             }
-            return Ok(ColorBy { name: name.into(), component, per_point });
+            return Ok(ColorBy { name: array_name.into(), component, per_point });
         }
         let mut names: Vec<String> = Vec::new();
         for a in &attributes {
@@ -55,7 +58,7 @@ impl ColorBy {
             }
         }
         let available = if names.is_empty() { "no arrays at all".into() } else { names.join(", ") };
-        Err(ModelError::NoArray { name: wish.into(), kind: data.kind(), available })
+        Err(ModelError::NoArray { name: name.into(), kind: data.kind(), available })
     }
 
     /// The array in `attributes`, if it exists and has the component.

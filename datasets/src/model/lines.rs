@@ -28,7 +28,7 @@ impl Dataset {
     /// two points or refer to points that do not exist. Lattices have no lines.
     pub fn to_lines(&self, color_by: Option<&str>) -> Result<(Vec<Polyline>, usize), ModelError> {
         self.check()?;
-        let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
+        let color = color_by.map(|name| ColorBy::find(self, name)).transpose()?;
         let (mut lines, mut dropped) = (Vec::new(), 0);
         for leaf in self.leaves() {
             let mut add = |points: &Points, attributes: &Attributes, cell: usize, ids: &[u32]| {
@@ -73,7 +73,7 @@ impl Dataset {
     /// arrays cannot colour points.
     pub fn to_points(&self, color_by: Option<&str>) -> Result<PointSet, ModelError> {
         self.check()?;
-        let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
+        let color = color_by.map(|name| ColorBy::find(self, name)).transpose()?;
         if let Some(c) = color.as_ref().filter(|c| !c.per_point) {
             let reason =
                 format!("`{}` has one value per cell; choose an array with one per point", c.name);

@@ -68,7 +68,7 @@ impl Dataset {
         color_by: Option<&str>,
     ) -> Result<(TriMesh, SurfaceReport), ModelError> {
         self.check()?;
-        let color = color_by.map(|wish| ColorBy::find(self, wish)).transpose()?;
+        let color = color_by.map(|name| ColorBy::find(self, name)).transpose()?;
         let mut out = Builder::new(color);
         for leaf in self.leaves() {
             let (points, _) = leaf.counts();

@@ -20,14 +20,14 @@ pub(super) struct ConvertArgs {
     /// A file of any format that can be read
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// The new file: .vti .vtp .vtu .vtr .vts .vtm, .ply, .obj or .glb. What has another kind
-    /// becomes its surface
+    /// The new file: .vti .vtp .vtu .vtr .vts .vtm, .ply, .obj or .glb. Other kinds of data are
+    /// converted to their surface
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// The array that surfaces keep; `velocity` is a vector's length, `velocity:x` a component
     #[arg(long, value_name = "ARRAY")]
     color_by: Option<String>,
-    /// Of image data, an isosurface with normals at this value
+    /// Extracts an isosurface with normals at this value (image data only)
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     isovalue: Option<f64>,
     /// The array of the isosurface [default: what the file marks, else the first]

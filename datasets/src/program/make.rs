@@ -32,7 +32,7 @@ pub(super) struct MakeArgs {
     /// Adds the isovalue of every vertex as a scalar to isosurfaces
     #[arg(long)]
     scalars: bool,
-    /// Of a flow, the first field only
+    /// Only the first field (flows only)
     #[arg(long)]
     first_field: bool,
     #[command(flatten)]

@@ -31,7 +31,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Names the data sets that can be generated, with their sizes
+    /// Lists the data sets that can be generated, with their sizes
     List,
     /// Generates a data set and writes it to a file
     Make(make::MakeArgs),

@@ -177,15 +177,15 @@ fn add_material(
     if let Some(name) = &m.diffuse_texture {
         // Options such as `-s 1 1 1` may come before the name.
         let file = sibling_path(path, name.split_whitespace().next_back().unwrap_or(name));
-        let picture = std::fs::read(&file)
+        let texture = std::fs::read(&file)
             .map_err(|e| e.to_string())
             .and_then(|b| decode_texture(name, &b, true));
-        match picture {
+        match texture {
             Ok(t) => {
                 material.base_color_texture = Some(scene.textures.len());
                 scene.textures.push(t);
             }
-            Err(e) => warnings.push(format!("picture {} left out: {e}", file.display())),
+            Err(e) => warnings.push(format!("texture {} skipped: {e}", file.display())),
         }
     }
     scene.materials.push(material);

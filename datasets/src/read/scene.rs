@@ -137,9 +137,9 @@ pub(crate) fn decode_texture(name: &str, bytes: &[u8], v_up: bool) -> Result<Tex
     limits.max_alloc =
         Some(MAX_TEXTURE_BYTES.min((bytes.len() as u64).saturating_mul(2048) + (1 << 20)));
     reader.limits(limits);
-    let picture = reader.decode().map_err(|e| e.to_string())?.to_rgba8();
-    let (width, height) = picture.dimensions();
-    let (pixels, _) = picture.as_raw().as_chunks::<4>();
+    let image = reader.decode().map_err(|e| e.to_string())?.to_rgba8();
+    let (width, height) = image.dimensions();
+    let (pixels, _) = image.as_raw().as_chunks::<4>();
     Ok(Texture {
         name: name.into(),
         width,

@@ -124,8 +124,9 @@ impl Lattice {
             Resolution::Auto => {
                 // In stretched meshes, the mean is dominated by the far field; the median
                 // represents the region where the cells are.
-                let wish = size.max_element() / (0.5 * typical_cell) + 1.0;
-                let longest = if wish.is_finite() { wish.clamp(64.0, 256.0).round() } else { 64.0 };
+                let nodes = size.max_element() / (0.5 * typical_cell) + 1.0;
+                let longest =
+                    if nodes.is_finite() { nodes.clamp(64.0, 256.0).round() } else { 64.0 };
                 (even(size.max_element() / (longest - 1.0)), None)
             }
             Resolution::Longest(n) => {

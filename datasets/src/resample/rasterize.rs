@@ -26,9 +26,9 @@ pub(super) struct Counts {
     /// Cells whose map folds.
     pub(super) folded: usize,
     /// Cells that contain no sample.
-    pub(super) missed: usize,
+    pub(super) without_samples: usize,
     /// Cells with corners that are not finite.
-    pub(super) nowhere: usize,
+    pub(super) non_finite: usize,
 }
 
 /// One sample of a layer: its value, its distance outside the cell, and its mark.
@@ -105,7 +105,7 @@ pub(super) fn rasterize(
             Some(((a / fine.n) as u32, (b / fine.n) as u32))
         })
         .collect();
-    let nowhere =
+    let non_finite =
         (0..mesh.num_cells()).into_par_iter().filter(|&c| cell_box(mesh, c).is_none()).count();
 
     // The cells of each layer, in order (counting sort).
@@ -161,8 +161,8 @@ pub(super) fn rasterize(
     let counts = Counts {
         in_gaps: in_gaps.into_inner(),
         folded: count(&folded),
-        missed: mesh.num_cells() - count(&seen) - nowhere,
-        nowhere,
+        without_samples: mesh.num_cells() - count(&seen) - non_finite,
+        non_finite,
     };
     (values, marks, counts)
 }
@@ -244,23 +244,23 @@ impl CellData<'_> {
                         fine.coordinate(1, y),
                         fine.coordinate(2, z),
                     );
-                    let Some(place) = shape.place(p).filter(|at| at.outside <= NEAR) else {
+                    let Some(located) = shape.locate(p).filter(|at| at.outside <= NEAR) else {
                         continue;
                     };
                     hit = true;
-                    let mark = if own_mark == Mark::Inside && !place.value.is_finite() {
+                    let mark = if own_mark == Mark::Inside && !located.value.is_finite() {
                         Mark::NotFinite
                     } else {
                         own_mark
                     };
                     let outside =
-                        if place.outside <= INSIDE_TOLERANCE { 0.0 } else { place.outside };
+                        if located.outside <= INSIDE_TOLERANCE { 0.0 } else { located.outside };
                     // Precedence: inside before near, then the more informative mark, then the
                     // smaller distance, then the first cell.
                     let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
                     let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
                     if new > old || new == old && outside < slot.outside {
-                        *slot = Sample { value: place.value, outside, mark };
+                        *slot = Sample { value: located.value, outside, mark };
                     }
                 }
             }

@@ -63,9 +63,9 @@ impl Report {
             not_finite: of(Mark::NotFinite),
             in_gaps: counts.in_gaps,
             cells: mesh.num_cells(),
-            missed_cells: counts.missed,
+            missed_cells: counts.without_samples,
             folded_cells: counts.folded,
-            left_out_cells: mesh.left_out() + counts.nowhere,
+            left_out_cells: mesh.left_out() + counts.non_finite,
             straightened_cells: mesh.higher_order(),
             back,
         }
@@ -74,18 +74,18 @@ impl Report {
     /// Warnings for the user, as sentences; empty when there are none.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
-        let mut say = |n: usize, text: &str| {
+        let mut warn = |n: usize, text: &str| {
             if n > 0 {
                 out.push(format!("{n} {text}"));
             }
         };
-        say(
+        warn(
             self.left_out_cells,
             "cells left out: not solid, or with points that do not exist or are not finite",
         );
-        say(self.straightened_cells, "higher-order cells taken with straight edges");
-        say(self.folded_cells, "cells fold or collapse and were divided into tetrahedra");
-        say(self.not_finite, "nodes are in cells whose values are not finite");
+        warn(self.straightened_cells, "higher-order cells taken with straight edges");
+        warn(self.folded_cells, "cells fold or collapse and were divided into tetrahedra");
+        warn(self.not_finite, "nodes are in cells whose values are not finite");
         if 4 * self.missed_cells > self.cells {
             out.push(format!(
                 "{} of {} cells are finer than the lattice; refine it, or average with more \

@@ -11,11 +11,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Image samples per node of the lattice, along each axis.
-const FINER: f64 = 4.0;
+const IMAGE_REFINEMENT: f64 = 4.0;
 /// An inner radius below this fraction of the outer one is not a body but the first row of cells
 /// next to the axis. The values there are extended to the axis, where their slope is zero by
 /// symmetry.
-const TO_THE_AXIS: f64 = 0.1;
+const AXIS_GAP: f64 = 0.1;
 
 /// Box of the body of revolution of a mesh whose points lie in the plane z = 0, apart from a thin
 /// extrusion.
@@ -43,7 +43,7 @@ pub fn revolve(
     let (low, high) = mesh.bounds();
 
     // The image: x and radius, slightly inside the plane's thickness.
-    let h = lattice.spacing / FINER;
+    let h = lattice.spacing / IMAGE_REFINEMENT;
     let nodes = |a: usize| ((high[a] - low[a]) / h[a]).ceil().clamp(1.0, 1e5) as usize + 1;
     let dims = [nodes(0), nodes(1), 2];
     let steps = DVec3::new((dims[0] - 1) as f64, (dims[1] - 1) as f64, 1.0);
@@ -54,7 +54,7 @@ pub fn revolve(
     let flat = resample(mesh, samples, &image, options)?;
 
     // Each node reads the image at its radius.
-    let r_low = if low.y <= TO_THE_AXIS * high.y { low.y } else { 0.0 };
+    let r_low = if low.y <= AXIS_GAP * high.y { low.y } else { 0.0 };
     let per_layer = lattice.dims[0] * lattice.dims[1];
     let mut values = vec![f32::NAN; lattice.len()];
     let mut marks = vec![Mark::Outside; lattice.len()];
@@ -63,7 +63,7 @@ pub fn revolve(
             for (n, (value, mark)) in values.iter_mut().zip(marks).enumerate() {
                 let p = lattice.node(n % lattice.dims[0], n / lattice.dims[0], k);
                 let r = p.y.hypot(p.z).max(r_low);
-                (*value, *mark) = look_up(&flat, p.x, r);
+                (*value, *mark) = sample_image(&flat, p.x, r);
             }
         },
     );
@@ -82,7 +82,7 @@ pub fn revolve(
 
 /// Bilinear interpolation in the image if all four samples have values; otherwise the mark of the
 /// nearest sample.
-fn look_up(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
+fn sample_image(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
     let Lattice { dims, origin, spacing } = &flat.lattice;
     let (u, v) = ((x - origin.x) / spacing.x, (r - origin.y) / spacing.y);
     let last = [dims[0] - 1, dims[1] - 1].map(|d| d as f64);

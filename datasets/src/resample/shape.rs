@@ -170,7 +170,7 @@ impl<'a> Cell<'a> {
     }
 
     /// Locates `p` in the cell and interpolates the value.
-    pub(super) fn place(&self, p: DVec3) -> Option<CellSample> {
+    pub(super) fn locate(&self, p: DVec3) -> Option<CellSample> {
         match self.shape {
             Shape::Tetra => {
                 let c = self.corners;
@@ -223,12 +223,12 @@ impl<'a> Cell<'a> {
             let (a, b) = (a as usize, b as usize);
             let (pa, pb) = (self.corners[a], self.corners[b]);
             let Some(w) = barycentric(centre, face, pa, pb, p, self.size) else { return };
-            let place = cell_sample(
+            let sample = cell_sample(
                 &w,
                 [centre_value, face_value, self.values[a], self.values[b]].into_iter(),
             );
-            if best.is_none_or(|b| place.outside < b.outside) {
-                best = Some(place);
+            if best.is_none_or(|b| sample.outside < b.outside) {
+                best = Some(sample);
             }
         };
         let mut each_face = |face: &mut dyn ExactSizeIterator<Item = u32>| {
@@ -343,7 +343,7 @@ mod tests {
             let mut inside = 0;
             for i in 0..1000 {
                 let p = DVec3::new((i % 10) as f64, (i / 10 % 10) as f64, (i / 100) as f64) * 0.11;
-                if let Some(at) = cell.place(p).filter(|at| at.outside == 0.0) {
+                if let Some(at) = cell.locate(p).filter(|at| at.outside == 0.0) {
                     inside += 1;
                     assert!((at.value - linear(p)).abs() < 1e-10, "{shape:?} at {p}: {at:?}");
                 }
@@ -363,10 +363,10 @@ mod tests {
             ([1.1, 0.5, 0.5], 0.1),
             ([0.5, -0.2, 1.1], 0.2),
         ] {
-            let got = cell.place(DVec3::from(p)).unwrap().outside;
+            let got = cell.locate(DVec3::from(p)).unwrap().outside;
             assert!((got - outside).abs() < 1e-12, "{p:?}: {got}");
         }
-        assert!(cell.place(DVec3::splat(50.0)).is_none_or(|at| at.outside >= 0.5));
+        assert!(cell.locate(DVec3::splat(50.0)).is_none_or(|at| at.outside >= 0.5));
     }
 
     #[test]
@@ -386,13 +386,13 @@ mod tests {
             let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
             let cell = Cell::new(&points, &values, &Shape::Hexa);
             assert_eq!(cell.is_folded(), folded);
-            let at = cell.place(p).unwrap();
+            let at = cell.locate(p).unwrap();
             assert!(at.outside < 1e-12 && (at.value - linear(p)).abs() < 1e-12, "{at:?}");
         }
         // No volume at all.
         let flat: Vec<DVec3> = corners(&CUBE).iter().map(|p| DVec3::new(p.x, p.y, 0.0)).collect();
         let cell = Cell::new(&flat, &[0.0; 8], &Shape::Hexa);
-        assert!(cell.is_folded() && cell.place(DVec3::new(0.5, 0.5, 0.0)).is_none());
+        assert!(cell.is_folded() && cell.locate(DVec3::new(0.5, 0.5, 0.0)).is_none());
     }
 
     #[test]
@@ -401,7 +401,7 @@ mod tests {
         let points: Vec<DVec3> = corners(&CUBE).iter().map(|p| far + *p * 1e-3).collect();
         let values: Vec<f64> = corners(&CUBE).iter().map(|p| linear(*p)).collect();
         let at =
-            Cell::new(&points, &values, &Shape::Hexa).place(far + DVec3::splat(0.5e-3)).unwrap();
+            Cell::new(&points, &values, &Shape::Hexa).locate(far + DVec3::splat(0.5e-3)).unwrap();
         // 1e6 has an ulp of 1.2e-10, which is 1.2e-7 of the cell.
         assert!((at.value - linear(DVec3::splat(0.5))).abs() < 1e-6);
     }

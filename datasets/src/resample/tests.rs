@@ -207,7 +207,7 @@ fn o_grids_with_a_collapsed_axis_have_no_hole() {
 }
 
 #[test]
-fn hidden_and_nan_cells_are_told_apart() {
+fn hidden_and_nan_cells_are_distinguished() {
     let mut image = ImageData::new([5, 3, 3], DVec3::ZERO, DVec3::ONE);
     let mut ghost = vec![0u8; 16];
     ghost[3] = 32;

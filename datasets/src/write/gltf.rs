@@ -153,8 +153,7 @@ fn unsupported_content(mesh: &TriMesh) -> Option<(String, &'static str)> {
         return Some((format!("its origin is {}", mesh.origin), "give it a finite origin"));
     }
     if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
-        let what =
-            format!("vertex {i} lies at {}, and glTF demands finite numbers", mesh.positions[i]);
+        let what = format!("vertex {i} is at {}; glTF requires finite numbers", mesh.positions[i]);
         return Some((what, "leave out the vertex and its triangles"));
     }
     let normals = mesh.normals.as_ref().map_or(&[][..], |a| &a.values);
@@ -169,7 +168,7 @@ fn unsupported_content(mesh: &TriMesh) -> Option<(String, &'static str)> {
     }
     let colors = mesh.colors.as_ref().map_or(&[][..], |a| &a.values);
     if let Some(i) = colors.iter().position(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
-        let what = format!("the colour of vertex {i} is {:?}, and glTF demands 0 to 1", colors[i]);
+        let what = format!("the colour of vertex {i} is {:?}; glTF requires 0 to 1", colors[i]);
         return Some((what, "clamp the colours"));
     }
     None

@@ -20,7 +20,7 @@ impl Reader {
                 if set != 0 {
                     self.warnings.push(format!(
                         "material `{name}` uses a second set of texture coordinates: {what} \
-                         picture left out"
+                         texture skipped"
                     ));
                     return None;
                 }
@@ -80,27 +80,27 @@ impl Reader {
         // The crate assumes that every image has a source.
         let has_source =
             json.uri.is_some() || json.buffer_view.is_some() && json.mime_type.is_some();
-        let picture =
-            if has_source { self.picture(path, &image) } else { Err("it names no data".into()) };
-        match picture {
-            Ok(picture) => {
+        let decoded =
+            if has_source { self.decode(path, &image) } else { Err("it names no data".into()) };
+        match decoded {
+            Ok(decoded) => {
                 let sampler = texture.sampler();
                 let nearest = sampler.mag_filter() == Some(MagFilter::Nearest);
                 self.scene.textures.push(Texture {
                     wrap: [sampler.wrap_s(), sampler.wrap_t()].map(wrap),
                     filter: if nearest { Filter::Nearest } else { Filter::Bilinear },
-                    ..picture
+                    ..decoded
                 });
                 Some(self.scene.textures.len() - 1)
             }
             Err(e) => {
-                self.warnings.push(format!("picture {} left out: {e}", image.index()));
+                self.warnings.push(format!("texture {} skipped: {e}", image.index()));
                 None
             }
         }
     }
 
-    fn picture(&self, path: &Path, image: &gltf::Image<'_>) -> Result<Texture, String> {
+    fn decode(&self, path: &Path, image: &gltf::Image<'_>) -> Result<Texture, String> {
         let name = image.name().unwrap_or("").to_string();
         match image.source() {
             gltf::image::Source::Uri { uri, .. } => {
