@@ -87,7 +87,7 @@ pub struct Gate {
 
 /// Time for the load of our own previous experiment to decay: the one-minute average contains it
 /// and loses it after two minutes.
-const OWN_LOAD_FADES: Duration = Duration::from_secs(180);
+const OWN_LOAD_DECAY: Duration = Duration::from_secs(180);
 const STEP: Duration = Duration::from_secs(5);
 
 impl Gate {
@@ -103,7 +103,7 @@ impl Gate {
         while nth > 0
             && !self.insist
             && busy(&machine)
-            && waited < OWN_LOAD_FADES
+            && waited < OWN_LOAD_DECAY
             && (self.pause)(STEP)
         {
             waited += STEP;

@@ -101,15 +101,15 @@ fn quotations_filled(root: &Path, path: &Path, text: &str) -> anyhow::Result<Vec
     let mut filled = String::new();
     let mut rest = text;
     while let Some(at) = rest.find(OPENING) {
-        let (before, quotation) = rest.split_at(at);
-        let (head, body) = quotation
+        let (before, marked) = rest.split_at(at);
+        let (head, body) = marked
             .split_once("-->")
-            .with_context(|| format!("`{}`: a comment without `-->`", first_line(quotation)))?;
+            .with_context(|| format!("`{}`: a comment without `-->`", first_line(marked)))?;
         let (_, after) = body
             .split_once(CLOSING)
-            .with_context(|| format!("`{}`: `{CLOSING}` is missing", first_line(quotation)))?;
-        let (content, plot) = quote(root, path, head[OPENING.len()..].trim())
-            .with_context(|| format!("`{}`", first_line(quotation)))?;
+            .with_context(|| format!("`{}`: `{CLOSING}` is missing", first_line(marked)))?;
+        let (content, plot) = quotation(root, path, head[OPENING.len()..].trim())
+            .with_context(|| format!("`{}`", first_line(marked)))?;
         plots.extend(plot);
         filled += &format!("{before}{head}-->\n{content}{CLOSING}");
         rest = after;
@@ -124,7 +124,11 @@ fn first_line(text: &str) -> &str {
 }
 
 /// The text for `ID: table ...` or `ID: plot ...`, and the file of the plot.
-fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Option<Quotation>)> {
+fn quotation(
+    root: &Path,
+    path: &Path,
+    request: &str,
+) -> anyhow::Result<(String, Option<Quotation>)> {
     let (id, what) =
         request.split_once(':').context("a quotation is `ID: table ...` or `ID: plot ...`")?;
     let (record, folder) = newest(root, id.trim())?;
@@ -132,7 +136,7 @@ fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Opt
     let up = "../".repeat(levels);
     let folder = folder.strip_prefix(root).unwrap_or(&folder).display().to_string();
     let machine = &record.machine;
-    let doubts = doubts_in_short(&record);
+    let doubts = doubts_summary(&record);
     let source = format!(
         "*Measured on {}, {}, {} cores: [{id}]({up}{folder}/{id}.csv).{doubts}*\n",
         machine.day(),
@@ -155,7 +159,7 @@ fn quote(root: &Path, path: &Path, request: &str) -> anyhow::Result<(String, Opt
 }
 
 /// The objections to a record, in one line.
-fn doubts_in_short(record: &Record) -> String {
+fn doubts_summary(record: &Record) -> String {
     let machine = &record.machine;
     let mut why = vec![];
     if machine.commit.is_none() || machine.is_dirty() {
@@ -329,12 +333,12 @@ mod tests {
         (record.machine.commit, record.machine.dirty) = (Some("97db1462332d".into()), Some(false));
         (record.machine.cores, record.machine.optimised) = (2, true);
         record.machine.load_1_min = Some(1.5);
-        assert_eq!(doubts_in_short(&record), "");
+        assert_eq!(doubts_summary(&record), "");
         record.machine.load_1_min = Some(3.31);
-        assert_eq!(doubts_in_short(&record), " In doubt: the load was 3.31.");
+        assert_eq!(doubts_summary(&record), " In doubt: the load was 3.31.");
         record.machine.dirty = Some(true);
         record.machine.optimised = false;
-        let all = doubts_in_short(&record);
+        let all = doubts_summary(&record);
         assert!(
             all.contains("no commit") && all.contains("3.31") && all.contains("debug"),
             "{all}"

@@ -54,7 +54,7 @@ impl Row {
 
 /// A PNG image next to the record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Picture {
+pub struct RecordImage {
     /// Short name; part of the file name.
     pub name: String,
     /// What it shows.
@@ -109,7 +109,9 @@ pub struct Record {
     /// Plots of the rows.
     pub plots: Vec<Plot>,
     /// Images.
-    pub pictures: Vec<Picture>,
+    // The key in the files of records.
+    #[serde(rename = "pictures")]
+    pub images: Vec<RecordImage>,
     /// Other files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub attachments: Vec<Attachment>,
@@ -133,7 +135,7 @@ impl Record {
             notes: vec![],
             missing: vec![],
             plots: vec![],
-            pictures: vec![],
+            images: vec![],
             attachments: vec![],
         }
     }
@@ -190,7 +192,7 @@ impl Record {
         s
     }
 
-    /// Writes `ID.json`, `ID.csv` and `ID.PICTURE.png` into a directory, which is created if
+    /// Writes `ID.json`, `ID.csv` and `ID.IMAGE.png` into a directory, which is created if
     /// necessary.
     pub fn write(&self, dir: &Path) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(dir).with_context(|| {
@@ -204,8 +206,8 @@ impl Record {
             std::fs::write(&path, bytes)
                 .with_context(|| format!("cannot write `{}`", path.display()))
         };
-        for p in &self.pictures {
-            write(self.picture_file(p), &p.png)?;
+        for p in &self.images {
+            write(self.image_file(p), &p.png)?;
         }
         for a in &self.attachments {
             write(format!("{}.{}", self.id, a.name), &a.bytes)?;
@@ -231,9 +233,9 @@ impl Record {
             r.machine.version
         );
         let dir = path.parent().unwrap_or(Path::new("."));
-        for i in 0..r.pictures.len() {
-            r.pictures[i].png =
-                std::fs::read(dir.join(r.picture_file(&r.pictures[i]))).unwrap_or_default();
+        for i in 0..r.images.len() {
+            r.images[i].png =
+                std::fs::read(dir.join(r.image_file(&r.images[i]))).unwrap_or_default();
         }
         for a in &mut r.attachments {
             a.bytes = std::fs::read(dir.join(format!("{}.{}", r.id, a.name))).unwrap_or_default();
@@ -241,7 +243,7 @@ impl Record {
         Ok(r)
     }
 
-    fn picture_file(&self, p: &Picture) -> String {
+    fn image_file(&self, p: &RecordImage) -> String {
         format!("{}.{}.png", self.id, crate::machine::slug(&p.name))
     }
 }
@@ -293,7 +295,7 @@ mod tests {
         r.rows.push(Row::new().with("mesh", "wave").with("time", f64::NAN));
         r.ratios.push(Ratio {
             name: "ours".into(),
-            rival: "theirs".into(),
+            baseline: "theirs".into(),
             value: 2.0,
             spread: 0.1,
             low: 1.9,
@@ -311,7 +313,7 @@ mod tests {
             series: vec![Series::new("a", vec![(1.0, 2.0), (10.0, 4.0)])],
             mark: Some(1.0),
         });
-        r.pictures.push(Picture {
+        r.images.push(RecordImage {
             name: "The view".into(),
             caption: "c".into(),
             png: vec![1, 2, 3],

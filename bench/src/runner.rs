@@ -128,7 +128,9 @@ pub struct Ratio {
     /// Our variant.
     pub name: String,
     /// The baseline that it is compared with.
-    pub rival: String,
+    // The key in the files of records.
+    #[serde(rename = "rival")]
+    pub baseline: String,
     /// Median over the rounds of (baseline's time / our time).
     pub value: f64,
     /// Interquartile range of the rounds' ratios.
@@ -172,13 +174,13 @@ impl Ratio {
     /// `None` without a finite one.
     pub fn of_rounds(
         name: impl Into<String>,
-        rival: impl Into<String>,
+        baseline: impl Into<String>,
         per_round: &[f64],
     ) -> Option<Ratio> {
         let s = Summary::of(per_round)?;
         Some(Ratio {
             name: name.into(),
-            rival: rival.into(),
+            baseline: baseline.into(),
             value: s.median,
             spread: s.interquartile_range(),
             low: s.low,
@@ -244,16 +246,16 @@ impl Timings {
         self.get(name).map(|v| v.summary(self.clock))
     }
 
-    /// How many times longer `rival` took than `ours`. `None` if one of them was not run.
-    pub fn ratio(&self, ours: &str, rival: &str) -> Option<Ratio> {
-        let (a, b) = (self.get(ours)?, self.get(rival)?);
+    /// How many times longer `baseline` took than `ours`. `None` if one of them was not run.
+    pub fn ratio(&self, ours: &str, baseline: &str) -> Option<Ratio> {
+        let (a, b) = (self.get(ours)?, self.get(baseline)?);
         let per_round: Vec<f64> = a
             .samples
             .iter()
             .zip(&b.samples)
             .map(|(x, y)| y.by(self.clock) / x.by(self.clock))
             .collect();
-        Ratio::of_rounds(ours, rival, &per_round)
+        Ratio::of_rounds(ours, baseline, &per_round)
     }
 }
 
@@ -335,10 +337,10 @@ pub fn interleave(schedule: &Schedule, variants: &mut [Variant<'_>]) -> Result<T
         }
         cores.pin(round);
         for i in order(variants.len(), round) {
-            let ((returned, told), sample) = clock::measure(|| (variants[i].run)());
+            let ((returned, reported), sample) = clock::measure(|| (variants[i].run)());
             let value = variants[i].result(returned);
             check(&variants[i].name, &mut firsts[i], value)?;
-            timed[i].samples.push(told.unwrap_or(sample));
+            timed[i].samples.push(reported.unwrap_or(sample));
             timed[i].check = value;
         }
     }
@@ -395,23 +397,23 @@ mod tests {
             samples: t.iter().map(|&s| Sample { wall_secs: s, ..Default::default() }).collect(),
             check: 0,
         };
-        Timings { clock: Clock::Wall, variants: vec![timed("ours", a), timed("rival", b)] }
+        Timings { clock: Clock::Wall, variants: vec![timed("ours", a), timed("baseline", b)] }
     }
 
     #[test]
     fn a_slow_round_of_the_machine_cancels_in_the_ratio() {
         // The machine was ten times slower during round 3. A ratio of means would be wrong; the
         // median of ratios is not.
-        let r = timings(&[1.0, 1.0, 10.0], &[2.0, 2.0, 20.0]).ratio("ours", "rival").unwrap();
+        let r = timings(&[1.0, 1.0, 10.0], &[2.0, 2.0, 20.0]).ratio("ours", "baseline").unwrap();
         assert_eq!((r.value, r.spread, r.rounds), (2.0, 0.0, 3));
     }
 
     #[test]
-    fn ratio_is_above_one_when_the_rival_is_slower() {
+    fn ratio_is_above_one_when_the_baseline_is_slower() {
         let t = timings(&[1.0, 1.0, 1.0], &[3.0, 4.0, 5.0]);
-        let r = t.ratio("ours", "rival").unwrap();
+        let r = t.ratio("ours", "baseline").unwrap();
         assert_eq!((r.value, r.low, r.high), (4.0, 3.0, 5.0));
-        assert!((t.ratio("rival", "ours").unwrap().value - 0.25).abs() < 1e-15);
+        assert!((t.ratio("baseline", "ours").unwrap().value - 0.25).abs() < 1e-15);
         assert_eq!(t.ratio("ours", "absent"), None);
     }
 
@@ -485,16 +487,17 @@ mod tests {
     }
 
     #[test]
-    fn times_that_the_work_tells_stand_in_place_of_ours() {
-        let told = Sample { wall_secs: 7.0, process_cpu_secs: 3.0, ..Default::default() };
-        let mut v = [Variant::timed("elsewhere", || told)];
+    fn times_that_the_work_reports_replace_ours() {
+        let reported = Sample { wall_secs: 7.0, process_cpu_secs: 3.0, ..Default::default() };
+        let mut v = [Variant::timed("elsewhere", || reported)];
         let t = interleave(&Schedule { rounds: 2, ..Schedule::all_threads() }, &mut v).unwrap();
-        assert_eq!(t.variants[0].samples, [told, told]);
+        assert_eq!(t.variants[0].samples, [reported, reported]);
     }
 
     #[test]
     fn fewer_than_five_rounds_or_no_turns_decide_nothing() {
-        let of = |n: usize, value: f64| Ratio::of_rounds("ours", "rival", &vec![value; n]).unwrap();
+        let of =
+            |n: usize, value: f64| Ratio::of_rounds("ours", "baseline", &vec![value; n]).unwrap();
         for n in 1..VERDICT_ROUNDS {
             assert_eq!(
                 (of(n, 9.0).verdict(), of(n, 0.1).verdict()),

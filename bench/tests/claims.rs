@@ -71,7 +71,7 @@ fn quick(id: &str) -> Record {
 }
 
 #[test]
-fn the_dissertation_s_noise_stands_beside_differences_between_pictures() {
+fn the_dissertation_s_noise_stands_beside_differences_between_images() {
     let record = quick("fig5.14");
     for (filter, percent) in [("none", [7.75, 2.78, 0.91]), ("cone", [0.83, 2.55, 0.176])] {
         for (from, thesis) in [1.0, 10.0, 100.0].into_iter().zip(percent) {

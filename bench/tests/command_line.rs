@@ -174,10 +174,13 @@ fn a_tree_with_uncommitted_changes_is_not_recorded_and_nothing_is_measured() {
         repository.path(),
         &["run", "accuracy-robust", "--quick", "--record", "--out", folder],
     );
-    let said = text(&out.stderr);
-    assert_eq!(out.status.code(), Some(2), "{said}");
-    assert!(said.contains("uncommitted changes") && said.contains("commit them"), "{said}");
-    assert!(said.contains("--record-despite-doubts"), "{said}");
+    let message = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{message}");
+    assert!(
+        message.contains("uncommitted changes") && message.contains("commit them"),
+        "{message}"
+    );
+    assert!(message.contains("--record-despite-doubts"), "{message}");
     assert!(out.stdout.is_empty() && !reports.path().join("index.html").exists());
     assert_eq!(std::fs::read_dir(repository.path().join("bench/runs")).unwrap().count(), 0);
 }
@@ -192,7 +195,7 @@ fn record_outside_a_repository_ends_with_2_and_measures_nothing() {
 
 #[test]
 #[cfg(unix)]
-fn ctrl_c_among_pictures_keeps_those_that_are_finished() {
+fn ctrl_c_keeps_the_finished_images() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().to_str().unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_bench"))
@@ -206,14 +209,14 @@ fn ctrl_c_among_pictures_keeps_those_that_are_finished() {
     lines
         .by_ref()
         .find(|l| l.as_ref().unwrap().contains("mixing-layer-outside: data"))
-        .expect("steps are told")
+        .expect("steps are printed")
         .unwrap();
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
     let rest: String = lines.map(|l| l.unwrap() + "\n").collect();
     let out = child.wait_with_output().unwrap();
     assert_eq!(out.status.code(), Some(130), "{rest}");
-    assert!(rest.contains("what was finished is kept"), "{rest}");
+    assert!(rest.contains("finished results are kept"), "{rest}");
 
     let record: Value = serde_json::from_slice(&out.stdout).expect("one JSON object");
     let rows = record["rows"].as_array().unwrap();

@@ -57,7 +57,7 @@ fn files(dir: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn files_of_several_formats_become_pictures_that_show_something() {
+fn files_of_several_formats_render_to_images_that_show_something() {
     let dir = tempfile::tempdir().unwrap();
     for file in files(dir.path()) {
         let (png, exr) = (file.with_extension("png"), file.with_extension("exr"));
@@ -72,9 +72,9 @@ fn files_of_several_formats_become_pictures_that_show_something() {
         assert!(object["rays"]["ambient_occlusion"].as_u64() > Some(0), "{object}");
         assert!(object["seconds"]["render"].as_f64() > Some(0.0), "{object}");
 
-        let picture = read_png(&png).unwrap();
+        let image = read_png(&png).unwrap();
         let mut colors: Vec<[u32; 4]> =
-            picture.rgba().unwrap().iter().map(|c| c.map(f32::to_bits)).collect();
+            image.rgba().unwrap().iter().map(|c| c.map(f32::to_bits)).collect();
         colors.sort_unstable();
         colors.dedup();
         assert!(colors.len() > 100, "{f}: {} colours", colors.len());
@@ -208,7 +208,7 @@ fn volumes_without_a_uniform_grid_are_refused_with_the_cure() {
 
 #[test]
 #[cfg(unix)]
-fn ctrl_c_within_a_picture_keeps_the_samples_it_has_and_ends_with_130() {
+fn ctrl_c_within_an_image_keeps_its_samples_and_ends_with_130() {
     let dir = tempfile::tempdir().unwrap();
     let (vti, png) = (dir.path().join("field.vti"), dir.path().join("field.png"));
     write_vtk(&vti, &field(), VtkOptions::default()).unwrap();
@@ -234,7 +234,7 @@ fn ctrl_c_within_a_picture_keeps_the_samples_it_has_and_ends_with_130() {
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
     assert!(pressed.elapsed() < Duration::from_secs(10), "stopped after {:?}", pressed.elapsed());
     assert!(
-        rest.contains("of 65536 samples") && rest.contains("what was finished is kept"),
+        rest.contains("of 65536 samples") && rest.contains("finished results are kept"),
         "{rest}"
     );
     assert_eq!(read_png(&png).unwrap().width, 64);

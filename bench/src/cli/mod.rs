@@ -30,20 +30,20 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Names the experiments
+    /// Lists the experiments
     List,
     /// Runs experiments, writes their records and the report
     Run(RunArgs),
-    /// Makes the report of records again
+    /// Rebuilds the report from existing records
     Report(ReportArgs),
-    /// Writes the tables and plots of the book anew from the records in bench/runs
+    /// Updates the tables and plots of the book from the records in bench/runs
     Quote,
-    /// Draws a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
+    /// Renders a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
     Render(RenderArgs),
-    /// Draws one of the report's pictures of generated data
-    Picture(PictureArgs),
-    /// Says which other ray tracers are found and how to get the others; `bench run peers` measures
-    /// them
+    /// Renders one of the report's images of generated data
+    #[command(name = "picture")]
+    Image(ImageArgs),
+    /// Lists the installed baselines and how to install the others; `bench run peers` measures them
     Peers,
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
@@ -58,11 +58,11 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// Also keep the records in bench/runs/DATE-MACHINE/. Refused where the tree has uncommitted
-    /// changes, the load of the machine is above 0.75 per core, or this is no release build
+    /// Also keep the records in bench/runs/DATE-MACHINE/. Rejected if the tree has uncommitted
+    /// changes, the load of the machine is above 0.75 per core, or this is not a release build
     #[arg(long)]
     record: bool,
-    /// As --record, whatever speaks against it: records and reports then name that
+    /// Like --record, but despite objections, which records and reports then state
     #[arg(long)]
     record_despite_doubts: bool,
     /// Folder for the records and the report [default: bench-report in the build folder]
@@ -86,10 +86,10 @@ struct RenderArgs {
     /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, OBJ, glTF,
     /// PLY, STL
     file: PathBuf,
-    /// The picture as PNG
+    /// The image as PNG
     #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]
     out: Option<PathBuf>,
-    /// The picture as OpenEXR: colour, depth, distance, normal, ids, rays per pixel
+    /// The image as OpenEXR: colour, depth, distance, normal, ids, rays per pixel
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
     /// Pixels per row and rows
@@ -100,7 +100,7 @@ struct RenderArgs {
     samples: u32,
     /// Separated by commas: shadows, soft-shadows, ao, reflections, glossy-reflections, refraction,
     /// transparency, depth-of-field, volumes (image data as a glowing medium), path-tracing
-    #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::picture::style::parse_effects)]
+    #[arg(long, default_value = "none", value_name = "LIST", value_parser = crate::image::style::parse_effects)]
     effects: Effects,
     /// A camera as TOML or JSON: eye, target, up, vertical_fov_degrees, parallel_height [default:
     /// fits the data]
@@ -116,14 +116,14 @@ struct RenderArgs {
     /// Scalars at the ends of the colour map [default: range of the data]
     #[arg(long, value_name = "LOW,HIGH", value_parser = render::range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
-    /// Of image data [default: the middle of the range; with a volume, no isosurface]
+    /// Isovalue for image data [default: the middle of the range; with a volume, no isosurface]
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     isovalue: Option<f32>,
-    /// Draws this array as a volume; `--effects volumes` alone takes the array that the file marks
+    /// Renders this array as a volume; `--effects volumes` alone takes the array marked in the file
     #[arg(long, value_name = "ARRAY")]
     volume: Option<String>,
-    /// Of a volume: SCALAR:OPACITY,..., the opacity of a stretch as long as a tenth of the volume's
-    /// diagonal, linear in between [default: a ramp from 0 to 0.5 over the range of the colours]
+    /// Opacity of a volume as SCALAR:OPACITY,..., for a path of a tenth of its diagonal, linear in
+    /// between [default: a ramp from 0 to 0.5 over the range of the colours]
     #[arg(long, value_name = "POINTS", value_parser = render::opacity, allow_hyphen_values = true)]
     opacity: Option<render::Opacity>,
     /// gradient, white, black, transparent
@@ -132,20 +132,20 @@ struct RenderArgs {
     /// fast, watertight
     #[arg(long, default_value = "watertight", value_name = "NAME", value_parser = render::robustness)]
     robustness: Robustness,
-    /// Of the acceleration structure: fast, balanced, best
+    /// Quality of the acceleration structure: fast, balanced, best
     #[arg(long, default_value = "balanced", value_name = "NAME", value_parser = render::quality)]
     quality: BuildQuality,
 }
 
 /// Options of `bench picture`.
 #[derive(Debug, Args)]
-struct PictureArgs {
+struct ImageArgs {
     /// wavelet, mixing-layer-outside, mixing-layer-inside, plasma, impact, star, glass
     name: String,
-    /// The picture as PNG
+    /// The image as PNG
     #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]
     out: Option<PathBuf>,
-    /// The picture as OpenEXR
+    /// The image as OpenEXR
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
     /// Pixels per row and rows
@@ -170,7 +170,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Report(args)) => report::report(common, &args),
         Some(Command::Quote) => quote::quote(common),
         Some(Command::Render(args)) => render::render(common, &args),
-        Some(Command::Picture(args)) => render::picture(common, &args),
+        Some(Command::Image(args)) => render::gallery_image(common, &args),
         Some(Command::Peers) => peers::peers(common),
         Some(Command::Completions(args)) => args.print::<Cli>(),
     }

@@ -1,10 +1,10 @@
 //! `bench render` and `bench picture`.
 
-use super::{PictureArgs, RenderArgs};
-use crate::picture::framing::{Framing, read_camera};
-use crate::picture::style::{BACKGROUNDS, RenderStyle};
-use crate::picture::subject::{LoadOptions, Subject, VolumeChoice};
-use crate::picture::{RenderControl, RenderRequest, RenderedImage, draw, gallery, save};
+use super::{ImageArgs, RenderArgs};
+use crate::image::framing::{Framing, read_camera};
+use crate::image::style::{BACKGROUNDS, RenderStyle};
+use crate::image::subject::{LoadOptions, Subject, VolumeChoice};
+use crate::image::{RenderControl, RenderRequest, RenderedImage, draw, gallery, save};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, Interrupted, UsageError};
 use datasets::colormaps;
@@ -75,9 +75,9 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         layers: if exr.is_some() { Layers::ALL } else { Layers::COLOR },
     };
     let bar = common.progress(u64::from(args.samples), "drawing");
-    let mut told = |samples: u32| bar.set_position(u64::from(samples));
+    let mut on_samples = |samples: u32| bar.set_position(u64::from(samples));
     let mut control =
-        RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+        RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut on_samples) };
     let rendered = draw(subject, &request, &mut control)?;
     drop(bar);
     warnings.extend(rendered.warnings.iter().cloned());
@@ -118,14 +118,14 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     ended(&rendered)
 }
 
-pub(super) fn picture(common: CommonArgs, args: &PictureArgs) -> anyhow::Result<()> {
+pub(super) fn gallery_image(common: CommonArgs, args: &ImageArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
     let entry = gallery::find(&args.name).map_err(UsageError)?;
     let (png, exr) = outputs(args.out.as_deref(), args.exr.as_deref())?;
     let bar = common.progress(u64::from(args.samples), entry.name);
-    let mut told = |samples: u32| bar.set_position(u64::from(samples));
+    let mut on_samples = |samples: u32| bar.set_position(u64::from(samples));
     let mut control =
-        RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut told) };
+        RenderControl { cancel: Some(cancel.flag().clone()), samples_done: Some(&mut on_samples) };
     let p = entry.render(args.size, args.samples, &mut control)?;
     drop(bar);
     let mut warnings = p.rendered.warnings.clone();

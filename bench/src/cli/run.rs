@@ -224,8 +224,10 @@ fn summary(r: &Record) -> String {
         let low_high = format!("{:.2} to {:.2}", x.low, x.high);
         let open =
             x.why_open().map_or(String::new(), |why| format!(", {} rounds ({why})", x.rounds));
-        text +=
-            &format!("\n  {:6.2}  ({low_high})  {}  against  {}{open}", x.value, x.name, x.rival);
+        text += &format!(
+            "\n  {:6.2}  ({low_high})  {}  against  {}{open}",
+            x.value, x.name, x.baseline
+        );
     }
     text
 }

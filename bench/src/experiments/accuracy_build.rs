@@ -23,7 +23,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("build", "s", "fastest of two builds, wall time, all threads");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
     record.notes.push(
-        "Every preset gives the same picture; only the time differs. A ratio is the time of the \
+        "Every preset gives the same image; only the time differs. A ratio is the time of the \
          fastest build’s rays \
          divided by the preset’s: above 1 the better structure pays. Embree’s medium and high \
          builds (the latter cuts \
@@ -76,16 +76,16 @@ fn scene(
     for ((_, ours), secs) in built.iter_mut().zip(fastest_secs) {
         ours.cost.wall_secs = secs;
     }
-    let mut rivals: Vec<(String, EmbreeScene)> = vec![];
+    let mut baselines: Vec<(String, EmbreeScene)> = vec![];
     for (quality, robust) in
         [Quality::Medium, Quality::High].into_iter().flat_map(|q| [(q, true), (q, false)])
     {
         let Some(e) = embree else { break };
         let options = Options { quality, robust, ..Options::default() };
         let kind = if robust { "robust" } else { "fast" };
-        let rival = format!("{} {}, {kind}", e.name(), quality.name());
-        context.report_step(format!("{name}: building {rival}"))?;
-        rivals.push((rival, EmbreeScene::build(e, mesh, &options)?));
+        let baseline = format!("{} {}, {kind}", e.name(), quality.name());
+        context.report_step(format!("{name}: building {baseline}"))?;
+        baselines.push((baseline, EmbreeScene::build(e, mesh, &options)?));
     }
     let view = View::orbit(mesh);
     let kinds = [Kind::Primary, Kind::AmbientOcclusion];
@@ -104,8 +104,8 @@ fn scene(
             })
             .collect();
         let (width, hint) = (16, if kind.coherent() { "coherent" } else { "incoherent" });
-        contenders.extend(rivals.iter().map(|(rival, scene)| Contender {
-            tracer_name: rival.clone(),
+        contenders.extend(baselines.iter().map(|(baseline, scene)| Contender {
+            tracer_name: baseline.clone(),
             mode: format!("packets of {width}, {hint}"),
             tracer: Box::new(scene.view(width, kind.coherent())),
         }));
@@ -117,7 +117,8 @@ fn scene(
             .with("view", view.name);
         let rows = compare::rows(&base.with("simd", "best"), kind, &rays, &contenders, &timings);
         let ours = built.iter().map(|(quality, o)| ("rt-core watertight", quality.name(), o.cost));
-        let theirs = rivals.iter().map(|(rival, s)| (rival.as_str(), rival.as_str(), s.cost));
+        let theirs =
+            baselines.iter().map(|(baseline, s)| (baseline.as_str(), baseline.as_str(), s.cost));
         for (row, (tracer, preset, cost)) in rows.into_iter().zip(ours.chain(theirs)) {
             let bytes = cost.bytes as f64 / mesh.num_triangles() as f64;
             let row = row.with("tracer", tracer).with("preset", preset);
@@ -128,13 +129,17 @@ fn scene(
             let best = mine.last().expect("there are presets");
             if let Some(r) = timings.ratio(&best.name(), &other.name()) {
                 let name = format!("{name}, {}: {}", kind.name(), best.tracer_name);
-                record.ratios.push(Ratio { name, rival: other.tracer_name.clone(), ..r });
+                record.ratios.push(Ratio { name, baseline: other.tracer_name.clone(), ..r });
             }
         }
         for c in &mine[1..] {
             if let Some(r) = timings.ratio(&c.name(), &contenders[0].name()) {
                 let name = format!("{name}, {}: {}", kind.name(), c.tracer_name);
-                record.ratios.push(Ratio { name, rival: contenders[0].tracer_name.clone(), ..r });
+                record.ratios.push(Ratio {
+                    name,
+                    baseline: contenders[0].tracer_name.clone(),
+                    ..r
+                });
             }
         }
     }

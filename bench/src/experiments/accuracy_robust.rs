@@ -53,7 +53,7 @@ impl Aim {
 }
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    record.column("tracer", "", "who traced the rays");
+    record.column("tracer", "", "tracer");
     record.column(
         "robustness",
         "",
@@ -72,17 +72,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
     // 12 combinations of mesh and target: 10^8 rays for each of our modes in the full form.
-    let (per_combination, rivals) =
+    let (per_combination, baseline_rays) =
         if context.quick { (4 * BATCH, 2 * BATCH) } else { (128 * BATCH, 32 * BATCH) };
     record.notes.push(format!(
         "Every ray starts inside a closed surface, so every miss is a leak. rt-core traces {} rays \
-         in each mode, its \
-         rivals {}: half from random points one at a time, half from common points as packets. The \
-         meshes are a \
+         in each mode, each \
+         baseline {}: half from random points one at a time, half from common points as packets. \
+         The meshes are a \
          sphere at the origin, the same far from it, a crumpled one, and a globe with needle \
          triangles.",
         12 * per_combination,
-        12 * rivals
+        12 * baseline_rays
     ));
 
     let level = if context.quick { 5 } else { 7 };
@@ -136,10 +136,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         for (name, robust, scene) in &embree {
             let modes: [Box<dyn Tracer + '_>; 2] =
                 [Box::new(scene.view(1, false)), Box::new(scene.view(16, true))];
-            tracers.push(TracerUnderTest { row: row(name, robust), modes, count: rivals });
+            tracers.push(TracerUnderTest { row: row(name, robust), modes, count: baseline_rays });
         }
         let modes: [Box<dyn Tracer + '_>; 2] = [Box::new(&obvhs), Box::new(&obvhs)];
-        tracers.push(TracerUnderTest { row: row("obvhs", "only"), modes, count: rivals });
+        tracers.push(TracerUnderTest { row: row("obvhs", "only"), modes, count: baseline_rays });
         context.report_step(format!("{}: {} tracers in turns", case.name, tracers.len()))?;
         record.rows.extend(count_leaks(case, &tracers));
     }

@@ -2,8 +2,8 @@
 
 use super::Context;
 use crate::clock::{self, Clock, Sample};
+use crate::image::framing::Framing;
 use crate::meshes;
-use crate::picture::framing::Framing;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
@@ -34,7 +34,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("quantity", "", "what is sampled");
     record.column("sampling", "", "how the points are spread");
     record.column("samples", "", "rays per point on the surface, or samples per pixel");
-    record.column("time", "ms", "wall time of the picture, median over the rounds");
+    record.column("time", "ms", "wall time of the image, median over the rounds");
     record.column("time_low", "ms", "fastest round");
     record.column("time_high", "ms", "slowest round");
     record.column("rounds", "", "rounds; all settings of a quantity took turns in them");
@@ -66,7 +66,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let plain =
             RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
-        let (exact, _) = picture(&quantity, &camera, &options, reference)?;
+        let (exact, _) = image(&quantity, &camera, &options, reference)?;
         // All settings of a quantity alternate, so that a slow minute of the machine affects all of
         // them.
         let counts: Vec<u32> = (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most).collect();
@@ -83,7 +83,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 let (quantity, camera, frames, failed) = (&quantity, &camera, &frames, &failed);
                 Variant::timed(format!("{}, {n}", sampling.name()), move || {
                     // After Ctrl-C, images end at once.
-                    match picture(quantity, camera, &options, n) {
+                    match image(quantity, camera, &options, n) {
                         Ok((frame, sample)) => {
                             frames.borrow_mut()[i] = Some(frame);
                             sample
@@ -179,7 +179,7 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
 }
 
 /// Renders the image; returns it with the time that the renderer took.
-fn picture(
+fn image(
     q: &Quantity,
     camera: &Camera,
     options: &RenderOptions,
@@ -219,7 +219,7 @@ mod tests {
         for q in quantities(world, &camera) {
             let draw = |sampling, seed, n| {
                 let options = RenderOptions { sampling, seed, ..RenderOptions::new(32, 32) };
-                picture(&q, &camera, &options, n).unwrap().0
+                image(&q, &camera, &options, n).unwrap().0
             };
             let exact = draw(Sampling::Sobol, REFERENCE_SEED, 1024);
             let error = |sampling, n| difference(&draw(sampling, 0, n), &exact).0;

@@ -33,7 +33,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.missing.extend(installed.missing.iter().cloned());
     record.notes.push(
         "One thread traces; every tracer gets the same rays in the same order, in turns within one \
-         process. A rival's \
+         process. A baseline's \
          time is that of its fastest mode. rt-core uses its packet entry point for rays that go \
          the same way and its \
          sorting entry point for the others, whichever is faster. obvhs is compiled for the \
@@ -117,10 +117,12 @@ fn scene(
             let base = base.clone().with("view", view.name);
             record.rows.extend(compare::rows(&base, kind, &rays, &contenders, &timings));
             let what = format!("{full_name}, {}, {}", view.name, kind.name());
-            for rival in tracers.baseline_names() {
-                let Some(best) = compare::best_mode(rival, &contenders, &timings) else { continue };
+            for baseline in tracers.baseline_names() {
+                let Some(best) = compare::best_mode(baseline, &contenders, &timings) else {
+                    continue;
+                };
                 let ours: &[&str] =
-                    if rival.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
+                    if baseline.ends_with("robust") { &[OURS] } else { &[OURS, OURS_FAST] };
                 for tracer in ours {
                     // Our mode for this kind of rays comes first. The best mode is selected for
                     // baselines only.
@@ -159,18 +161,18 @@ fn plots(record: &mut Record) {
         let mut kinds: Vec<String> = list.iter().map(|(k, _)| k.clone()).collect();
         kinds.dedup();
         let mut plot = Plot::bars(
-            &format!("{scene}: rival’s time / rt-core’s time (watertight)"),
+            &format!("{scene}: baseline’s time / rt-core’s time (watertight)"),
             Axis::linear("ratio, above 1 rt-core is faster", ""),
             kinds.clone(),
         );
         plot.mark = Some(1.0);
         for (kind, ratio) in list {
-            let rival = family(&ratio.rival);
+            let baseline = family(&ratio.baseline);
             let x = kinds.iter().position(|k| *k == kind).unwrap_or(0) as f64;
             let point = Point { x, y: ratio.value, range: Some((ratio.low, ratio.high)) };
-            match plot.series.iter_mut().find(|s| s.name == rival) {
+            match plot.series.iter_mut().find(|s| s.name == baseline) {
                 Some(s) => s.points.push(point),
-                None => plot.series.push(Series { name: rival, points: vec![point] }),
+                None => plot.series.push(Series { name: baseline, points: vec![point] }),
             }
         }
         record.plots.push(plot);
@@ -178,6 +180,6 @@ fn plots(record: &mut Record) {
 }
 
 /// A baseline's name without its mode.
-fn family(rival: &str) -> String {
-    rival.split(", ").next().unwrap_or(rival).to_string()
+fn family(baseline: &str) -> String {
+    baseline.split(", ").next().unwrap_or(baseline).to_string()
 }

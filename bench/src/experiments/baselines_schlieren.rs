@@ -33,7 +33,7 @@ struct OurMarch<'a> {
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("nodes", "", "along each side of the lattice");
     record.column("view", "", "where from: along an axis of the lattice, or 0.6 rad off");
-    record.column("march", "", "who, and how");
+    record.column("march", "", "implementation and method");
     record.column("step", "voxel", "step");
     record.column(
         "rms_error",
@@ -51,14 +51,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("our_time", "ns", "its time for a ray");
     record.notes.push(
         "A blob of eps 1e-4 and sigma 0.08 m in a cube of 1 m; the truth is an adaptive march in \
-         f64. Ratios are the rival's time by ours, in \
+         f64. Ratios are the baseline's time by ours, in \
          turns on one thread by CPU time, at an error of ours that is not larger. `traced` takes \
          every ray through the volume; `line of sight` \
          reads a projection that is made before, and `projected anew` makes it inside the time. \
          Building the dissertation's texture and our \
          spline is outside. Signs and scales that the published code of the dissertation has wrong \
          are right here. Where no traced setting \
-         reaches the rival's error the record says so."
+         reaches the baseline's error the record says so."
             .into(),
     );
     let lattices: &[usize] = if context.quick { &[64, 128] } else { &[64, 128, 256] };
@@ -80,8 +80,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 
 /// Describes the gain of the baseline from shorter steps.
 fn describe(rows: &[Row]) -> String {
-    let rival = "dissertation's scheme in our kernel";
-    let of = || rows.iter().filter(|r| r.text("march") == Some(rival));
+    let baseline = "dissertation's scheme in our kernel";
+    let of = || rows.iter().filter(|r| r.text("march") == Some(baseline));
     let mut each = vec![];
     for coarse in of().filter(|r| r.number("step") == Some(16.0)) {
         let place =
@@ -94,8 +94,8 @@ fn describe(rows: &[Row]) -> String {
         }
     }
     format!(
-        "From steps of 16 voxels to steps of half a voxel the error of the {rival} went from and \
-         to: {}. What stays is its interpolant's.",
+        "From steps of 16 voxels to steps of half a voxel the error of the {baseline} went from \
+         and to: {}. What stays is its interpolant's.",
         each.join("; ")
     )
 }
@@ -134,11 +134,11 @@ fn compare(
         let scalar = ThesisMarch::new(field, view, step);
         let options = Options { scheme: Scheme::Euler, step_voxels: step, ..Options::default() };
         let kernel = Deviational::new(field, view, Interpolant::TrilinearGradient, options);
-        let rivals: [(&str, &dyn LightPaths); 2] = [
+        let baselines: [(&str, &dyn LightPaths); 2] = [
             ("dissertation, from the text", &scalar),
             ("dissertation's scheme in our kernel", &kernel),
         ];
-        for (rival, paths) in rivals {
+        for (baseline, paths) in baselines {
             let (rms, largest) = error_of(&traced(paths, starts), truth);
             let best = traced_ours
                 .iter()
@@ -147,13 +147,13 @@ fn compare(
             let what = format!("{n}³, {view_name}, step {step}");
             let Some(best) = best else {
                 record.missing.push(format!(
-                    "{rival}, {what}: its error of {rms:.1e} is below that of every traced setting \
+                    "{baseline}, {what}: its error of {rms:.1e} is below that of every traced setting \
                      of ours"
                 ));
                 continue;
             };
             let mut variants =
-                vec![tracing("rival", paths, starts), tracing("traced", &*best.paths, starts)];
+                vec![tracing("baseline", paths, starts), tracing("traced", &*best.paths, starts)];
             if los_error <= rms {
                 variants.push(tracing("line of sight", &projected, starts));
                 variants.push(Variant::new("line of sight, projected anew", || {
@@ -166,20 +166,20 @@ fn compare(
                 |name: &str| timings.summary(name).map(|s| s.median * 1e9 / starts.len() as f64);
             record.rows.push(
                 base()
-                    .with("march", rival)
+                    .with("march", baseline)
                     .with("step", step)
                     .with("rms_error", rms)
                     .with("largest_error", largest)
-                    .with("time", ns("rival"))
+                    .with("time", ns("baseline"))
                     .with("ours", best.name.as_str())
                     .with("our_error", best.error)
                     .with("our_time", ns("traced")),
             );
             for variant in ["traced", "line of sight", "line of sight, projected anew"] {
-                if let Some(r) = timings.ratio(variant, "rival") {
+                if let Some(r) = timings.ratio(variant, "baseline") {
                     record.ratios.push(Ratio {
                         name: format!("{what}: {variant}"),
-                        rival: rival.into(),
+                        baseline: baseline.into(),
                         ..r
                     });
                 }
@@ -249,9 +249,11 @@ fn plot(record: &mut Record) {
         vec![],
     );
     bars.mark = Some(1.0);
-    for rival in [from_text, in_kernel] {
-        let mut series = Series::new(format!("against the {rival}"), vec![]);
-        for r in record.ratios.iter().filter(|r| r.rival == rival && r.name.ends_with(": traced")) {
+    for baseline in [from_text, in_kernel] {
+        let mut series = Series::new(format!("against the {baseline}"), vec![]);
+        for r in
+            record.ratios.iter().filter(|r| r.baseline == baseline && r.name.ends_with(": traced"))
+        {
             let what = r.name.split(": ").next().unwrap_or_default().to_string();
             let x = bars.categories.iter().position(|c| *c == what).unwrap_or_else(|| {
                 bars.categories.push(what);

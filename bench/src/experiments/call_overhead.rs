@@ -33,14 +33,13 @@ fn check_complete(backend: &str, calls: &[&str], reported: &[(String, f64)]) -> 
         calls.iter().copied().filter(|c| reported.iter().all(|(t, _)| t != c)).collect();
     anyhow::ensure!(
         missing.is_empty(),
-        "{backend}: the program of calls ended well, but told no time of {}; is the gluray beside \
-         bench as new as \
-         bench? `cargo build --workspace` builds both",
+        "{backend}: the program of calls ended well, but reported no time of {}; is the gluray next \
+         to bench as new as bench? `cargo build --workspace` builds both",
         missing.join(", ")
     );
     anyhow::ensure!(
         reported.len() == calls.len(),
-        "{backend}: the program of calls told {} times of {} calls",
+        "{backend}: the program of calls reported {} times of {} calls",
         reported.len(),
         calls.len()
     );
@@ -50,9 +49,9 @@ fn check_complete(backend: &str, calls: &[&str], reported: &[(String, f64)]) -> 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("call", "", "an OpenGL call outside of Begin and End");
     record.column(
-        "way",
+        "backend",
         "",
-        "straight to Mesa, or through gluray as GLVND's vendor library or by LD_PRELOAD",
+        "direct to Mesa, or through gluray as GLVND's vendor library or by LD_PRELOAD",
     );
     record.column(
         "time",
@@ -116,7 +115,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                 (&times[&(call.to_string(), backend)], &times[&(call.to_string(), 0)]);
             let more: Vec<f64> = own.iter().zip(native).map(|(o, n)| o - n).collect();
             let Some(t) = Summary::of(own) else { continue };
-            let row = Row::new().with("call", call).with("way", *name).with("time", t.median);
+            let row = Row::new().with("call", call).with("backend", *name).with("time", t.median);
             let row = row.with("time_low", t.low).with("time_high", t.high);
             record.rows.push(row.with("overhead", Summary::of(&more).map(|s| s.median)));
         }
@@ -166,7 +165,7 @@ mod tests {
         let calls = calls_of(CALLS);
         assert_eq!(calls.len(), 8, "{calls:?}");
         let mut reported: Vec<(String, f64)> = calls.iter().map(|c| (c.to_string(), 1.0)).collect();
-        check_complete("native", &calls, &reported).expect("all are told");
+        check_complete("native", &calls, &reported).expect("all are reported");
         reported.retain(|(call, _)| call != "glEnable");
         let why = check_complete("LD_PRELOAD", &calls, &reported)
             .expect_err("one is missing")

@@ -119,7 +119,7 @@ pub(super) fn explain_columns(record: &mut Record) {
     record.column("view", "", "orbit: the whole mesh; close: nearly every pixel shows it");
     record.column("rays", "", "what the rays are for");
     record.column("count", "", "number of rays");
-    record.column("tracer", "", "who traced them, with build and edge behaviour");
+    record.column("tracer", "", "tracer, with build and edge behaviour");
     record.column("mode", "", "how the rays were sent");
     record.column("simd", "", "widest instructions allowed");
     record.column("time", "ms", "median over the rounds, one thread, CPU time");

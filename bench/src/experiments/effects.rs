@@ -2,7 +2,7 @@
 //! in alternation, and the rays traced are counted.
 
 use super::Context;
-use crate::picture::framing::Framing;
+use crate::image::framing::Framing;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Ratio, Schedule, Variant, Verdict, interleave};
@@ -72,7 +72,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     context.report_step(format!("{} triangles: building", mesh.num_triangles()))?;
     let cases = cases(Scene::new(World::from_mesh(mesh, &BuildOptions::default())?), pixels)?;
 
-    context.report_step(format!("{} pictures in turns", cases.len()))?;
+    context.report_step(format!("{} images in alternation", cases.len()))?;
     let rays: RefCell<Vec<Option<(RayStats, Effects)>>> = RefCell::new(vec![None; cases.len()]);
     let failed = RefCell::new(None);
     let mut variants: Vec<Variant<'_>> = cases

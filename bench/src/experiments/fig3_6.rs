@@ -22,7 +22,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.notes.push(format!(
         "Wavelet surfaces, {size} x {size} pixels, headlight, triangles per rank as constant as \
          the named sizes allow. Every rank traces camera rays \
-         where its part is; that the picture is that of one node is for composite's tests, and not \
+         where its part is; that the image is that of one node is for composite's tests, and not \
          looked at here. The dissertation plots average and maximum render time: what \
          lies between them is waiting."
     ));

@@ -24,7 +24,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.notes.push(
         "The wavelet with a lamp’s shadows and ambient occlusion. Replicated data need a whole \
          scene’s memory on every rank, and then no ray leaves \
-         its rank; parts need a share of it, and rays travel. That both give the picture of one \
+         its rank; parts need a share of it, and rays travel. That both give the image of one \
          node is for composite's tests, and not looked at here."
             .into(),
     );

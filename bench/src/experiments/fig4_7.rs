@@ -24,7 +24,7 @@ type Builder<'a> = (String, Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>);
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("triangles", "", "triangles of the wavelet surfaces");
-    record.column("builder", "", "tracer and preset, or who draws a frame");
+    record.column("builder", "", "tracer and preset, or renderer of a frame");
     record.column("threads", "", "threads that build; empty for frames");
     record.column("time", "s", "median over the rounds, wall time");
     record.column("time_low", "s", "fastest round");
@@ -51,7 +51,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.notes.push(
         "A frame of llvmpipe is one of an unmodified program that keeps the mesh in buffers, 1024 \
          x 1024 pixels, measured in the same rounds: \
-         what a program waits for anyway each time its picture changes, and so the yardstick for a \
+         what a program waits for anyway each time its image changes, and so the yardstick for a \
          build that is needed once."
             .into(),
     );
@@ -108,7 +108,7 @@ fn measure(
         for i in order(builders.len() + 1, round) {
             match (builders.get(i), &mut drawn) {
                 (Some((_, build)), _) => costs[i].push(build()?),
-                (None, Some(frames)) => frames.take(FRAMES_A_ROUND)?,
+                (None, Some(frames)) => frames.take(FRAMES_PER_ROUND)?,
                 (None, None) => {}
             }
         }
@@ -126,7 +126,7 @@ fn measure(
 }
 
 /// Frames per round: a frame is short compared with the builds of its round.
-const FRAMES_A_ROUND: usize = 3;
+const FRAMES_PER_ROUND: usize = 3;
 
 fn builders<'a>(
     mesh: &'a Arc<TriMesh>,

@@ -85,7 +85,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     std::fs::write(file("report.json"), serde_json::to_vec(&report)?)?;
     draw(&tools.gluray, &file("report.json"), &[&file("chart.svg"), &file("trace.json")], None)?;
     // Most of the run is one build; some of the last frames show the typical frame.
-    let (from, to) = middle_frame(spans);
+    let (from, to) = last_frames_range_ms(spans);
     draw(&tools.gluray, &file("report.json"), &[&file("frames.svg")], Some((from, to)))?;
     for (name, caption) in [
         ("chart.svg", "The run: builds and frames."),
@@ -99,7 +99,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 }
 
 /// The time range of some frames at the end of the run, in milliseconds.
-fn middle_frame(spans: &[Value]) -> (f64, f64) {
+fn last_frames_range_ms(spans: &[Value]) -> (f64, f64) {
     let frame = |s: &Value| s["frame"].as_u64().unwrap_or(0);
     let last = spans.iter().map(frame).max().unwrap_or(0);
     let shown = |s: &&Value| (last.saturating_sub(5)..last).contains(&frame(s));
@@ -131,10 +131,10 @@ fn draw(
         command.args(["--from", &from.to_string(), "--to", &to.to_string()]);
     }
     let output = command.output().context("cannot start `gluray timeline`")?;
-    let told = String::from_utf8_lossy(&output.stderr);
+    let stderr = String::from_utf8_lossy(&output.stderr);
     anyhow::ensure!(
         output.status.success() && files.iter().all(|f| f.is_file()),
-        "`gluray timeline`: {told}"
+        "`gluray timeline`: {stderr}"
     );
     Ok(())
 }

@@ -4,8 +4,8 @@
 use super::Context;
 use super::fig4_7::fits_in_memory;
 use crate::clock::{Clock, Sample};
+use crate::image::framing::Framing;
 use crate::opengl::{Mesa, MesaFrames};
-use crate::picture::framing::Framing;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};

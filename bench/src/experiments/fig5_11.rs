@@ -3,7 +3,7 @@
 
 use super::Context;
 use super::test_section::{
-    GTX_280_PHOTONS_PER_SEC, check_cancelled, flow, picture, render_picture, scene,
+    GTX_280_PHOTONS_PER_SEC, check_cancelled, flow, image, render_image, scene,
 };
 use crate::clock::Clock;
 use crate::plot::{Axis, Plot, Point, Series};
@@ -89,12 +89,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column(
         "picture",
         "s",
-        "wall time of a whole picture from the field at hand: plan, \
+        "wall time of a whole image with the field in memory: plan, \
                                    projection or spline, 16 photons a pixel or beams",
     );
     let threads = rayon::current_num_threads();
     record.notes.push(format!(
-        "Everything a photon needs: low-discrepancy start, way through the gas, technique, film. \
+        "Everything a photon needs: low-discrepancy start, path through the gas, technique, film. \
          Wall time on {threads} threads; the rate per core \
          is by CPU time and is what an idle core does. The projection of line of sight and the \
          spline of the march are made once for a view and \
@@ -163,7 +163,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             );
         }
     }
-    pictures(context, record, &section)?;
+    images(context, record, &section)?;
     plot(record);
     Ok(())
 }
@@ -213,7 +213,7 @@ fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32
 
 /// Complete images by line of sight, the comparisons without photons, and one whose march is chosen
 /// by the default tolerance.
-fn pictures(
+fn images(
     context: &mut Context<'_>,
     record: &mut Record,
     section: &TestSection,
@@ -232,10 +232,10 @@ fn pictures(
         list.retain(|(name, _)| name == TECHNIQUES[1].0 || name == "slice");
     }
     for (name, toml) in list {
-        context.report_step(format!("picture: {name}"))?;
+        context.report_step(format!("image: {name}"))?;
         let scene = scene(&toml)?;
         let start = std::time::Instant::now();
-        let rendered = render_picture(context, &scene, section)?;
+        let rendered = render_image(context, &scene, section)?;
         let secs = start.elapsed().as_secs_f64();
         let march = rendered.report.march.as_str();
         record.rows.push(
@@ -243,7 +243,7 @@ fn pictures(
         );
         let march = if march.is_empty() { "no light" } else { march };
         let caption = format!("{name}: combustion jet, 512² pixels, {secs:.2} s; {march}");
-        record.pictures.push(picture(&name, caption, &rendered)?);
+        record.images.push(image(&name, caption, &rendered)?);
     }
     Ok(())
 }

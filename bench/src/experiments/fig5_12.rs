@@ -2,9 +2,9 @@
 //! tracing. Also the difference between the latter two as a function of n − 1.
 
 use super::Context;
-use super::test_section::{blob, check_cancelled, flow, picture, render_picture, scene};
+use super::test_section::{blob, check_cancelled, flow, image, render_image, scene};
 use crate::plot::{Axis, Plot, Series};
-use crate::record::{Picture, Record, Row};
+use crate::record::{Record, RecordImage, Row};
 use schlieren::field::Field;
 use schlieren::film::Framing;
 use schlieren::interpolate::Interpolant;
@@ -26,15 +26,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("path_rms", "", "rms difference of optical paths, as part of the largest");
     record.column("path_waves", "waves", "largest difference of optical paths, at 633 nm");
     record.column("stray", "voxel", "largest displacement of a ray inside the flow");
-    record.column("picture", "", "which picture");
-    record.column("time", "s", "wall time of the picture from the field at hand");
+    record.column("picture", "", "which image");
+    record.column("time", "s", "wall time of the image with the field in memory");
     record.notes.push(
         "Traced: Verlet, cubic b-spline, half a voxel a step. Line of sight leaves out that rays \
          bend. Flows are scaled to each amplitude. Volume rendering of |grad n| has no optics in \
          it and no unit: nothing can be compared but the look."
             .into(),
     );
-    pictures(context, record)?;
+    images(context, record)?;
     let size = if context.quick { "small" } else { "medium" };
     let jet = flow("combustion-jet", size)?;
     let body = flow("blunt-body", size)?;
@@ -164,7 +164,7 @@ fn difference(field: &Field, pixels: u32) -> Difference {
 
 /// The figure itself: the same jet in three renderings, and the amplified difference of the latter
 /// two.
-fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+fn images(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     let (size, pixels) = if context.quick { ("medium", 384) } else { ("thesis", 768) };
     context.report_step("combustion jet")?;
     let field = flow("combustion-jet", size)?;
@@ -185,12 +185,12 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
     let section = TestSection::of_fields(&scene(&film)?, vec![field], None)?;
     let mut painted = vec![];
     for (name, toml) in views {
-        context.report_step(format!("picture: {name}"))?;
+        context.report_step(format!("image: {name}"))?;
         let start = std::time::Instant::now();
-        let rendered = render_picture(context, &scene(&toml)?, &section)?;
+        let rendered = render_image(context, &scene(&toml)?, &section)?;
         let secs = start.elapsed().as_secs_f64();
         record.rows.push(Row::new().with("picture", name).with("time", secs));
-        record.pictures.push(picture(
+        record.images.push(image(
             name,
             format!("{name}: combustion jet, {pixels} pixels high, {secs:.1} s"),
             &rendered,
@@ -210,8 +210,8 @@ fn pictures(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()
              white, from the \
              same photons"
         );
-        let Picture { png, .. } = picture("difference", String::new(), straight)?;
-        record.pictures.push(Picture { name: "difference".into(), caption, png });
+        let RecordImage { png, .. } = image("difference", String::new(), straight)?;
+        record.images.push(RecordImage { name: "difference".into(), caption, png });
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::Context;
 use super::fig5_14::{FILTERS, NoiseCase, rms_difference};
-use super::test_section::{check_cancelled, flow, picture, render_picture, scene};
+use super::test_section::{check_cancelled, flow, image, render_image, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use schlieren::render::TestSection;
@@ -62,7 +62,7 @@ const GALLERY: [(&str, &str, &str); 12] = [
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("picture", "", "technique, or filter and photons per pixel");
-    record.column("time", "s", "wall time from the field at hand");
+    record.column("time", "s", "wall time with the field in memory");
     record.column(
         "march",
         "",
@@ -92,7 +92,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     ));
     for (name, toml, meaning) in GALLERY {
         check_cancelled(context)?;
-        context.report_step(format!("picture: {name}"))?;
+        context.report_step(format!("image: {name}"))?;
         let toml = toml.replace("FRINGE", &fringe);
         // Comparisons trace no light and reject a march. A shadowgraph of such a small flow is all
         // caustics at the default 0.5 m.
@@ -112,7 +112,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             section.fields = dispersed(single, &lines)?;
         }
         let start = std::time::Instant::now();
-        let rendered = render_picture(context, &scene, &section)?;
+        let rendered = render_image(context, &scene, &section)?;
         let secs = start.elapsed().as_secs_f64();
         if let Some(single) = single {
             section.fields = vec![single];
@@ -126,7 +126,7 @@ fn gallery(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         );
         record.notes.extend(rendered.report.warnings.iter().map(|w| format!("{name}: {w}")));
         let settings = toml.replace('\n', "; ");
-        record.pictures.push(picture(
+        record.images.push(image(
             name,
             format!("{name}: {meaning}. {secs:.2} s. [technique] {settings}"),
             &rendered,
@@ -175,7 +175,7 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
         for &samples in counts {
             check_cancelled(context)?;
             context.report_step(format!("{name}, {samples} photons"))?;
-            let (rendered, secs) = noisy.picture(context, Jitter::Random, samples, 0, filter)?;
+            let (rendered, secs) = noisy.image(context, Jitter::Random, samples, 0, filter)?;
             let rms = rms_difference(&rendered, &reference);
             points.push((f64::from(samples), rms));
             record.rows.push(
@@ -189,7 +189,7 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
             if samples == 4 {
                 let caption =
                     format!("filter {name}, 4 photons a pixel: rms error {rms:.2} % of white");
-                record.pictures.push(picture(&format!("filter {name}"), caption, &rendered)?);
+                record.images.push(image(&format!("filter {name}"), caption, &rendered)?);
             }
         }
         plot.series.push(Series::new(name, points));
@@ -209,8 +209,8 @@ fn filters(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     let least: Vec<String> = counts.iter().map(|n| least(*n)).collect();
     record.notes.push(format!(
         "Filters shrink as photons are added (radius as N^(-1/6)). The least error had, with {}. \
-         Times are those of a whole picture, field at hand, \
-         seen once.",
+         Times are those of a whole image with the field in memory, \
+         from one run.",
         least.join("; ")
     ));
     Ok(())

@@ -3,7 +3,7 @@
 //! of samples, for which the dissertation gives numbers.
 
 use super::Context;
-use super::test_section::{check_cancelled, flow, picture, render_picture, scene};
+use super::test_section::{check_cancelled, flow, image, render_image, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use schlieren::render::{RenderOutput, TestSection};
@@ -60,7 +60,7 @@ impl NoiseCase {
     }
 
     /// Renders the image with this many photons per pixel. Returns it with the time in seconds.
-    pub(super) fn picture(
+    pub(super) fn image(
         &self,
         context: &Context<'_>,
         jitter: Jitter,
@@ -71,13 +71,13 @@ impl NoiseCase {
         let sampling = Some(SamplingSpec::Photons { samples, jitter, seed, filter });
         let scene = Scene { sampling, ..self.scene.clone() };
         let start = std::time::Instant::now();
-        let rendered = render_picture(context, &scene, &self.section)?;
+        let rendered = render_image(context, &scene, &self.section)?;
         Ok((rendered, start.elapsed().as_secs_f64()))
     }
 
     /// Renders the image without visible noise.
     pub(super) fn reference(&self, context: &Context<'_>) -> anyhow::Result<(RenderOutput, f64)> {
-        self.picture(
+        self.image(
             context,
             Jitter::Sobol,
             self.reference_samples,
@@ -103,7 +103,7 @@ const SAMPLINGS: [(&str, Jitter); 2] =
 const KNIFE: &str = "schlieren, knife";
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    record.column("technique", "", "the picture");
+    record.column("technique", "", "the image");
     record.column("sampling", "", "how photons are spread over pixel and source");
     record.column("filter", "", "against noise");
     record.column("samples", "", "photons per pixel");
@@ -111,19 +111,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column(
         "samples_more",
         "",
-        "photons per pixel of the picture that this one is compared with",
+        "photons per pixel of the image that this one is compared with",
     );
     record.column(
         "difference",
         "%",
-        "root mean square over pixels of the difference between these two pictures, of white",
+        "root mean square over pixels of the difference between these two images, of white",
     );
-    record.column(
-        "thesis",
-        "%",
-        "the dissertation's difference between pictures of as many samples",
-    );
-    record.column("time", "s", "wall time of the picture from the field at hand, seen once");
+    record.column("thesis", "%", "the dissertation's difference between images of as many samples");
+    record.column("time", "s", "wall time of the image with the field in memory, one run");
     record.column(
         "order",
         "",
@@ -170,7 +166,7 @@ fn errors(
                 context.report_step(format!(
                     "{name}: {sampling}, filter {filter_name}, {samples} photons"
                 ))?;
-                let (rendered, secs) = noisy.picture(context, jitter, samples, 0, filter)?;
+                let (rendered, secs) = noisy.image(context, jitter, samples, 0, filter)?;
                 let rms = rms_difference(&rendered, &reference);
                 points.push((f64::from(samples), rms));
                 let row = Row::new().with("technique", name).with("sampling", sampling);
@@ -179,11 +175,7 @@ fn errors(
                 if samples == 16 && filter_name == "none" {
                     let caption =
                         format!("{name}, 16 photons a pixel, {sampling}: rms error {rms:.2} %");
-                    record.pictures.push(picture(
-                        &format!("{name} {sampling}"),
-                        caption,
-                        &rendered,
-                    )?);
+                    record.images.push(image(&format!("{name} {sampling}"), caption, &rendered)?);
                 }
             }
             if let Some(last) = record.rows.last_mut() {
@@ -205,7 +197,7 @@ fn differences(
     noisy: &NoiseCase,
 ) -> anyhow::Result<()> {
     let mut plot = Plot::lines(
-        &format!("Difference between pictures of N and 10 N photons: {name}"),
+        &format!("Difference between images of N and 10 N photons: {name}"),
         Axis::log("photons per pixel, N", ""),
         Axis::log("rms difference, of white", "%"),
     );
@@ -213,14 +205,14 @@ fn differences(
         let Some((_, filter)) = FILTERS.iter().find(|f| f.0 == filter_name) else { continue };
         for (sampling, jitter) in SAMPLINGS {
             let mut points = vec![];
-            let mut before = noisy.picture(context, jitter, THESIS_SAMPLES[0], 0, *filter)?.0;
+            let mut before = noisy.image(context, jitter, THESIS_SAMPLES[0], 0, *filter)?.0;
             for (samples, percent) in THESIS_SAMPLES.into_iter().zip(thesis) {
                 check_cancelled(context)?;
                 let more = 10 * samples;
                 context.report_step(format!(
                     "{name}: {sampling}, filter {filter_name}, {samples} against {more}"
                 ))?;
-                let after = noisy.picture(context, jitter, more, 0, *filter)?.0;
+                let after = noisy.image(context, jitter, more, 0, *filter)?.0;
                 let difference = rms_difference(&before, &after);
                 points.push((f64::from(samples), difference));
                 let row = Row::new().with("technique", name).with("sampling", sampling);
@@ -284,8 +276,8 @@ fn describe_errors(rows: &[Row]) -> String {
 fn describe_differences(rows: &[Row]) -> String {
     let mut words = String::from(
         "`difference` is the dissertation's quantity: it prints root mean square differences \
-         between pictures of 1 and 10, of 10 and 100, and of 100 \
-         and 1000 samples, and has no reference. The photons of each of our pictures are the first \
+         between images of 1 and 10, of 10 and 100, and of 100 \
+         and 1000 samples, and has no reference. The photons of each of our images are the first \
          ones of the next. Of independent photons without a filter each \
          such difference is sqrt(10) = 3.16 times the next. Its flow and bench are not ours, so \
          ratios compare and heights do not.",
@@ -344,7 +336,7 @@ mod tests {
         let noisy = NoiseCase { reference_samples: 512, ..NoiseCase::knife(&mut context).unwrap() };
         let (reference, _) = noisy.reference(&context).unwrap();
         let error = |jitter, n| {
-            let (r, _) = noisy.picture(&context, jitter, n, 0, FilterSpec::None {}).unwrap();
+            let (r, _) = noisy.image(&context, jitter, n, 0, FilterSpec::None {}).unwrap();
             rms_difference(&r, &reference)
         };
         let (random, even) = (error(Jitter::Random, 16), error(Jitter::Sobol, 16));

@@ -168,7 +168,7 @@ pub(super) fn cost_columns(record: &mut Record) {
     record.column(
         "frame",
         "ms",
-        "median over the frames: from the first rank's begin to the picture on rank 0",
+        "median over the frames: from the first rank's begin to the image on rank 0",
     );
     record.column("frame_low", "ms", "fastest frame");
     record.column("frame_high", "ms", "slowest frame");

@@ -148,7 +148,7 @@ pub const ALL: &[Experiment] = &[
         id: "fig4.10",
         chapter: 4,
         title: "Replicated data against data in parts, 1 to 128 ranks; and processes that make a \
-                program’s picture",
+                program’s image",
         run: fig4_10::run,
     },
     Experiment {
@@ -185,7 +185,7 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "pictures",
         chapter: 4,
-        title: "The dissertation’s data sets in pictures, with the commands that draw them",
+        title: "The dissertation’s data sets as images, with the commands that draw them",
         run: pictures::run,
     },
     Experiment {
@@ -229,7 +229,7 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "shock-angles",
         chapter: 5,
-        title: "Angles of wedge and cone shocks measured in pictures, against theta-beta-M and \
+        title: "Angles of wedge and cone shocks measured in images, against theta-beta-M and \
                 Taylor and Maccoll",
         run: shock_angles::run,
     },

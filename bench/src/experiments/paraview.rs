@@ -83,7 +83,7 @@ fn columns(record: &mut Record) {
         ("data", "", "data set of the catalogue (`datasets list`)"),
         ("view", "", "camera of the catalogue"),
         ("triangles", "", "triangles, as ParaView counts them"),
-        ("program", "", "who draws: Mesa's llvmpipe, or vtk-bridge in the same ParaView"),
+        ("program", "", "renderer: Mesa's llvmpipe, or vtk-bridge in the same ParaView"),
         ("cpu", "s", "CPU seconds of a frame, median over all rounds"),
         ("cpu_low", "s", "smallest"),
         ("cpu_high", "s", "largest"),
@@ -174,9 +174,9 @@ fn rows(record: &mut Record, data: &str, rounds: &[Vec<Value>]) -> anyhow::Resul
         }
         for name in ["cpu", "wall"] {
             let per_round = |r: &Vec<Value>| {
-                let [rival, ours] =
+                let [baseline, ours] =
                     [0, 1].map(|p| median(&list(&r[p]["views"][view.as_str()][name])));
-                rival / ours
+                baseline / ours
             };
             let what =
                 if name == "cpu" { "CPU seconds of a frame" } else { "wall time of a frame" };
@@ -270,8 +270,9 @@ impl Host {
                     .into(),
             )
         })?;
-        let said = Command::new(&pvbatch).arg("--version").output().context("pvbatch --version")?;
-        let text = [said.stdout, said.stderr].concat();
+        let output =
+            Command::new(&pvbatch).arg("--version").output().context("pvbatch --version")?;
+        let text = [output.stdout, output.stderr].concat();
         let version = String::from_utf8_lossy(&text)
             .lines()
             .next()
@@ -305,17 +306,17 @@ impl Host {
             command.env_remove(name);
         }
         let out = command.output().context("sh")?;
-        let said = String::from_utf8_lossy(&out.stdout);
+        let stdout = String::from_utf8_lossy(&out.stdout);
         let errors = String::from_utf8_lossy(&out.stderr);
         let last = || {
             errors
                 .lines()
                 .rev()
                 .find(|l| !l.trim().is_empty())
-                .unwrap_or("it said nothing")
+                .unwrap_or("it printed nothing")
                 .to_owned()
         };
-        let Some(line) = said.lines().find_map(|l| l.strip_prefix("RESULT ")) else {
+        let Some(line) = stdout.lines().find_map(|l| l.strip_prefix("RESULT ")) else {
             bail!("pvbatch with {drawn_by} ended with {}: {}", out.status, last());
         };
         let result: Value = serde_json::from_str(line)?;

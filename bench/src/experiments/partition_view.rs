@@ -14,7 +14,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column(
         "partition",
         "",
-        "triangles: the same number for each rank; view: the same expected work in this picture",
+        "triangles: the same number for each rank; view: the same expected work in this image",
     );
     record.column("imbalance", "", "slowest rank’s render time over the mean");
     record.column("most_triangles", "", "triangles of the rank that has most");

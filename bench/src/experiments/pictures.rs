@@ -1,8 +1,8 @@
 //! Images of the dissertation's data sets, each with its command and its cost.
 
 use super::Context;
-use crate::picture::{RenderControl, gallery, save};
-use crate::record::{Picture, Record, Row};
+use crate::image::{RenderControl, gallery, save};
+use crate::record::{Record, RecordImage, Row};
 use datasets::cli::Interrupted;
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -10,7 +10,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("contents", "", "what is drawn");
     record.column("data", "s", "wall time of generating the data");
     record.column("build", "s", "wall time of the acceleration structure");
-    record.column("render", "s", "wall time of the picture");
+    record.column("render", "s", "wall time of the image");
     record.column("rays", "Mray", "rays of all kinds");
     record.column("command", "", "draws it again");
     let (size, samples) = if context.quick { ([480, 270], 4) } else { ([1280, 720], 64) };
@@ -20,12 +20,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             |samples_done: u32| (n as f64 + f64::from(samples_done) / f64::from(samples)) / all;
         context.report_share(format!("{}: data", entry.name), share(0))?;
         let cancel = context.cancel.clone();
-        let mut told = |done: u32| {
+        let mut on_samples = |done: u32| {
             // The flag stops the rendering; an error of the progress report is irrelevant here.
             let _ = context
                 .report_share(format!("{}: sample {done} of {samples}", entry.name), share(done));
         };
-        let mut control = RenderControl { cancel, samples_done: Some(&mut told) };
+        let mut control = RenderControl { cancel, samples_done: Some(&mut on_samples) };
         let p = entry.render(size, samples, &mut control)?;
         if p.rendered.is_interrupted() {
             return Err(Interrupted.into());
@@ -38,7 +38,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         );
         record.notes.extend(p.rendered.warnings.iter().map(|w| format!("{}: {w}", entry.name)));
         let png = save::png_bytes(&p.rendered.frame)?;
-        record.pictures.push(Picture { name: entry.name.into(), caption, png });
+        record.images.push(RecordImage { name: entry.name.into(), caption, png });
         record.rows.push(
             Row::new()
                 .with("picture", entry.name)

@@ -77,9 +77,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             times[i].push(sessions[i].frames(frames)?.wall_secs / f64::from(frames));
         }
     }
-    let mut pictures = Vec::new();
+    let mut images = Vec::new();
     for (session, ranks) in sessions.iter_mut().zip(counts) {
-        pictures.push(session.save(&dir.path().join(format!("ranks{ranks}.ppm")))?);
+        images.push(session.save(&dir.path().join(format!("ranks{ranks}.ppm")))?);
     }
     let mut reports = Vec::new();
     for session in sessions {
@@ -94,7 +94,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         return Ok(());
     }
     for (i, (report, &ranks)) in reports.iter().zip(counts).enumerate() {
-        record.rows.push(row(ranks, &times[i], report, differing(&pictures[0], &pictures[i]))?);
+        record.rows.push(row(ranks, &times[i], report, differing(&images[0], &images[i]))?);
     }
     Ok(())
 }
@@ -168,9 +168,9 @@ mod tests {
             [Some(15.0), Some(20.0), Some(1.0)]
         );
         assert!(row(3, &[0.02], &report, 0).is_err(), "a rank without an account");
-        let picture =
+        let image =
             |head: &str| [head.as_bytes(), &vec![7; 3 * (SIZE_PX * SIZE_PX) as usize]].concat();
-        let (a, mut b) = (picture("P6 1"), picture("P6 with another head"));
+        let (a, mut b) = (image("P6 1"), image("P6 with another head"));
         assert_eq!(differing(&a, &b), 0);
         let last = b.len() - 1;
         b[last] = 8;

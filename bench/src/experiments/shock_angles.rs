@@ -2,7 +2,7 @@
 //! and finds how fine a lattice this needs.
 
 use super::Context;
-use super::test_section::{check_cancelled, picture, render_picture_with, scene};
+use super::test_section::{check_cancelled, image, render_image_with, scene};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use datasets::generate::cone_shock::Cone;
@@ -25,19 +25,19 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("flow", "", "body, half angle, Mach number");
     record.column("nodes", "", "of the lattice along the stream");
     record.column("exact", "deg", "angle of the shock by theta-beta-M or Taylor and Maccoll");
-    record.column("picture", "deg", "angle of the line fitted to the picture");
-    record.column("error", "deg", "of the picture's, without sign");
-    record.column("points", "", "columns of the picture that the line was fitted to");
+    record.column("picture", "deg", "angle of the line fitted to the image");
+    record.column("error", "deg", "absolute error of the image's angle");
+    record.column("points", "", "columns of the image that the line was fitted to");
     record.column("outliers", "", "columns that were left out as outliers");
     record.column("scatter", "pixel", "root mean square distance of the points from the line");
-    record.column("time", "s", "wall time of the picture, flow at hand");
+    record.column("time", "s", "wall time of the image with the flow in memory");
     // The number of rays grows with the square. At 400 pixels, the cones alone take most of a
     // minute in a release build.
     let width = if context.quick { 200 } else { 400 };
     record.notes.push(format!(
         "Means over cells of the exact flows, air from a reservoir of 1 bar and 300 K, through the \
          customary bench at \
-         the customary tolerance of 1e-7 rad; pictures {width} pixels wide, knife level. In each \
+         the customary tolerance of 1e-7 rad; images {width} pixels wide, knife level. In each \
          column the place \
          where brightness changes most, from the stream inwards, is the shock's; the line is \
          fitted against outliers \
@@ -70,8 +70,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let start = std::time::Instant::now();
             let rendered = photographed(context, flow, width)?;
             let secs = start.elapsed().as_secs_f64();
-            let line = shock(&rendered)
-                .ok_or_else(|| anyhow::anyhow!("{name}: no line in the picture"))?;
+            let line =
+                shock(&rendered).ok_or_else(|| anyhow::anyhow!("{name}: no line in the image"))?;
             let (got, exact) = (line.angle_rad.to_degrees(), exact_rad.to_degrees());
             let error = (got - exact).abs();
             points.push((f64::from(nodes), error));
@@ -88,10 +88,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
                     .with("time", secs),
             );
             if nodes == finest {
-                let caption = format!(
-                    "{name}: {got:.3} degrees in the picture (red line), {exact:.3} exactly"
-                );
-                record.pictures.push(picture(&name, caption, &marked(rendered, &line))?);
+                let caption =
+                    format!("{name}: {got:.3} degrees in the image (red line), {exact:.3} exactly");
+                record.images.push(image(&name, caption, &marked(rendered, &line))?);
             }
         }
         plot.series.push(Series::new(name, points));
@@ -133,7 +132,7 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
     let options = Options { wavelength_nm: 633.0, ..Options::new(Medium::density("density")) };
     let field = from_dataset(&flow.into_dataset(), &options)?.field;
     let section = TestSection::of_fields(&scene, vec![field], None)?;
-    render_picture_with(context, &scene, &section, Layers { map: true, ..Layers::NONE })
+    render_image_with(context, &scene, &section, Layers { map: true, ..Layers::NONE })
 }
 
 /// The shock above the body, without the third of the image around the tip.

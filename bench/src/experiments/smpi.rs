@@ -55,12 +55,12 @@ pub(super) fn compare_ms(
         .args(["--ranks", &ranks, "--size", &size, "--frames", &frames])
         .output()
         .map_err(|e| e.to_string())?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let value: Option<serde_json::Value> = said
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    let value: Option<serde_json::Value> = stdout
         .lines()
         .rev()
         .find_map(|l| serde_json::from_str(l).ok())
-        .or_else(|| serde_json::from_str(&said).ok());
+        .or_else(|| serde_json::from_str(&stdout).ok());
     let row = value.as_ref().map(|v| &v["rows"][0]);
     let number = |name: &str| row.and_then(|r| r[name].as_f64());
     number("ours_ms").zip(number("rival_ms")).map(|(a, b)| [a, b]).ok_or_else(|| {

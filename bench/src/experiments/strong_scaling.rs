@@ -3,9 +3,9 @@
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
-use crate::picture::save;
+use crate::image::save;
 use crate::plot::{Axis, Plot, Series};
-use crate::record::{Picture, Record, Row};
+use crate::record::{Record, RecordImage, Row};
 use anyhow::Context as _;
 use composite::render::demo::Demo;
 use composite::render::{FrameOptions, Partition, Split};
@@ -115,8 +115,8 @@ fn run(
             );
         }
     }
-    context.report_step(format!("{data} {size}: picture"))?;
-    record.pictures.push(picture(&demo)?);
+    context.report_step(format!("{data} {size}: image"))?;
+    record.images.push(image(&demo)?);
     record.notes.push(streaming(record));
     let mut plot =
         Plot::lines("Strong scaling", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
@@ -138,14 +138,14 @@ fn run(
 }
 
 /// The scene in eight parts, each in its own colour.
-fn picture(demo: &Demo) -> anyhow::Result<Picture> {
+fn image(demo: &Demo) -> anyhow::Result<RecordImage> {
     const RANKS: usize = 8;
     let demo = Demo { color_by_rank: true, global_light: true, ..demo.clone() };
     let prepared = demo.prepare(RANKS, &mut |_, _| true)?;
     let mut outputs =
         threads::run(RANKS, |mut comm| prepared.run(&mut comm, &FrameOptions::default()));
-    let frame = outputs.swap_remove(0)??.frame.context("rank 0 has the picture")?;
-    Ok(Picture {
+    let frame = outputs.swap_remove(0)??.frame.context("rank 0 has the image")?;
+    Ok(RecordImage {
         name: format!("{}-{}-parts", demo.data, demo.view.unwrap_or_default()),
         caption: format!(
             "{} in {RANKS} parts, a colour for each rank, rendered by {RANKS} ranks: shadows and \

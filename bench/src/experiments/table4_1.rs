@@ -34,7 +34,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "an unmodified program; it turns the model by a few degrees from frame to frame",
     );
     record.column("triangles", "", "triangles of the wavelet surfaces in its file");
-    record.column("way", "", "who draws: Mesa's llvmpipe, or gluray in mode match");
+    record.column("backend", "", "renderer: Mesa's llvmpipe, or gluray in mode match");
     record.column("fps", "1/s", "frames a second by the median frame");
     record.column("time", "ms", "median wall time of a frame");
     record.column("time_low", "ms", "fastest frame or group of frames");
@@ -245,8 +245,10 @@ fn each(native: &Measurement, ours: &Measurement, of: impl Fn(&Cost) -> f64) -> 
 
 fn row(program: Program, n: usize, backend: Backend, native: &Measurement, m: &Measurement) -> Row {
     let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&m.groups.iter().map(f).collect::<Vec<_>>());
-    let row =
-        Row::new().with("program", program.name()).with("triangles", n).with("way", backend.name());
+    let row = Row::new()
+        .with("program", program.name())
+        .with("triangles", n)
+        .with("backend", backend.name());
     let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
     let median = |of: &dyn Fn(&Cost) -> f64| Summary::of(&each(native, m, of)).map(|s| s.median);
     row.with("fps", 1.0 / wall.median)
@@ -283,7 +285,8 @@ fn plot(record: &Record) -> Plot {
     for program in Program::ALL {
         for backend in BACKENDS {
             let of = record.rows.iter().filter(|r| {
-                r.text("program") == Some(program.name()) && r.text("way") == Some(backend.name())
+                r.text("program") == Some(program.name())
+                    && r.text("backend") == Some(backend.name())
             });
             let points: Vec<(f64, f64)> =
                 of.filter_map(|r| r.number("triangles").zip(r.number("fps"))).collect();

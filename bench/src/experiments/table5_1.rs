@@ -53,7 +53,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "MB",
         "growth of the process's resident memory by field and march, as the kernel counts it",
     );
-    record.column("build", "s", "wall time of preparing the march, field at hand");
+    record.column("build", "s", "wall time of preparing the march, field in memory");
     record.column("per_voxel", "B", "our bytes without the film by voxels");
     record.notes.push(
         "By the `legacy` layout the dissertation's octree is the seventeenth byte of a voxel. Ours \

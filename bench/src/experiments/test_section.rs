@@ -2,7 +2,7 @@
 //! through them, and PNG images.
 
 use super::Context;
-use crate::record::Picture;
+use crate::record::RecordImage;
 use datasets::catalogue::flows;
 use datasets::cli::Interrupted;
 use datasets::generate::flow::Fields;
@@ -43,16 +43,16 @@ pub(super) fn scene(rest: &str) -> anyhow::Result<Scene> {
 }
 
 /// Renders an image. A cancelled image means an interrupted experiment.
-pub(super) fn render_picture(
+pub(super) fn render_image(
     context: &Context<'_>,
     scene: &Scene,
     section: &TestSection,
 ) -> anyhow::Result<RenderOutput> {
-    render_picture_with(context, scene, section, Layers::NONE)
+    render_image_with(context, scene, section, Layers::NONE)
 }
 
 /// [`render_picture`] with additional outputs.
-pub(super) fn render_picture_with(
+pub(super) fn render_image_with(
     context: &Context<'_>,
     scene: &Scene,
     section: &TestSection,
@@ -76,15 +76,15 @@ pub(super) fn check_cancelled(context: &Context<'_>) -> anyhow::Result<()> {
 }
 
 /// Converts an image for a record.
-pub(super) fn picture(
+pub(super) fn image(
     name: &str,
     caption: String,
     rendered: &RenderOutput,
-) -> anyhow::Result<Picture> {
+) -> anyhow::Result<RecordImage> {
     let dir = tempfile::tempdir()?;
-    let path = dir.path().join("picture.png");
+    let path = dir.path().join("image.png");
     schlieren::output::write_png(&path, rendered)?;
-    Ok(Picture { name: name.into(), caption, png: std::fs::read(&path)? })
+    Ok(RecordImage { name: name.into(), caption, png: std::fs::read(&path)? })
 }
 
 /// Rays through the middle of an image of `side_m`, in tiles of 4 by 4 in a renderer's order:

@@ -99,7 +99,7 @@ impl Program {
     }
 
     /// Commands that the program receives at the start.
-    pub(super) fn greeting(self, data: &Path, size_px: u32) -> String {
+    pub(super) fn startup_commands(self, data: &Path, size_px: u32) -> String {
         match self {
             Program::Geomview => format!(
                 "(load {})\n(window c0 {{size {size_px} {size_px}}})\n(bbox-draw g1 \

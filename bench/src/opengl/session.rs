@@ -155,7 +155,7 @@ impl Session {
                 }
             }
         });
-        input.write_all(program.greeting(data, size_px).as_bytes())?;
+        input.write_all(program.startup_commands(data, size_px).as_bytes())?;
         input.flush()?;
         let mut session = Session { program, pid: child.id(), child, input, lines, report, log };
         session.wait_for("ready")?;
@@ -177,7 +177,10 @@ impl Session {
                         RecvTimeoutError::Timeout => "does not answer",
                         RecvTimeoutError::Disconnected => "ended",
                     };
-                    anyhow::bail!("{} {what} before it said `{word}`: {tail}", self.program.name());
+                    anyhow::bail!(
+                        "{} {what} before it printed `{word}`: {tail}",
+                        self.program.name()
+                    );
                 }
             }
         }
@@ -196,15 +199,11 @@ impl Session {
 
     /// Makes VTK write the contents of its window, as raw RGB after a short header.
     pub fn save(&mut self, file: &Path) -> anyhow::Result<Vec<u8>> {
-        anyhow::ensure!(
-            self.program == Program::Vtk,
-            "{} is not made to save pictures",
-            self.program.name()
-        );
+        anyhow::ensure!(self.program == Program::Vtk, "{} cannot save images", self.program.name());
         self.input.write_all(format!("save {}\n", file.display()).as_bytes())?;
         self.input.flush()?;
         self.wait_for("saved")?;
-        std::fs::read(file).with_context(|| format!("no picture `{}`", file.display()))
+        std::fs::read(file).with_context(|| format!("no image `{}`", file.display()))
     }
 
     /// Peak memory of the program, in bytes.
@@ -238,8 +237,8 @@ impl Session {
     }
 }
 
-/// CPU seconds of a process including its threads, with a resolution of 1/100 s (`utime` and
-/// `stime` in `/proc/PID/stat`).
+/// CPU seconds of a process including its threads, with a resolution of one clock tick, usually
+/// 1/100 s (`utime` and `stime` in `/proc/PID/stat`).
 fn cpu_secs(pid: u32) -> anyhow::Result<f64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat"))
         .with_context(|| format!("process {pid} is gone"))?;
@@ -247,7 +246,7 @@ fn cpu_secs(pid: u32) -> anyhow::Result<f64> {
     let fields: Vec<&str> =
         stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
     let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).unwrap_or(0.0);
-    Ok((ticks(11) + ticks(12)) / 100.0)
+    Ok((ticks(11) + ticks(12)) / rustix::param::clock_ticks_per_second() as f64)
 }
 
 /// The child of a process with exactly one.

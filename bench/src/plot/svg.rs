@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_plots_are_still_pictures() {
+    fn empty_plots_are_valid_svg() {
         for p in [
             Plot::lines("", Axis::linear("", ""), Axis::log("y", "")),
             Plot::bars("nothing", Axis::log("y", "s"), vec![]),

@@ -34,7 +34,7 @@ pub fn page(records: &[Record]) -> String {
           Scientific \
           Visualization</cite> (Brownlee, 2012), measured again, and what accuracy costs in time. \
           Ratios are \
-          <em>rival’s time / our time</em>: above 1 we are faster.</p>\n";
+          <em>baseline’s time / our time</em>: above 1 we are faster.</p>\n";
     s += &machines(records);
     s += "<nav><h2>Contents</h2>";
     for (chapter, list) in &by_chapter {
@@ -95,10 +95,10 @@ fn section(r: &Record) -> String {
              src=\"data:image/svg+xml;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n"
         );
     }
-    for p in r.pictures.iter().filter(|p| !p.png.is_empty()) {
+    for p in r.images.iter().filter(|p| !p.png.is_empty()) {
         let (name, caption) = (escape(&p.name), escape(&p.caption));
         let data = base64::encode(&p.png);
-        s += "<figure class=\"picture\">";
+        s += "<figure class=\"image\">";
         s += &format!(
             "<img alt=\"{name}\" \
              src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption>"
@@ -115,7 +115,7 @@ fn ratios(ratios: &[Ratio]) -> String {
         return String::new();
     }
     let mut s = String::from(
-        "<div class=\"scroll\"><table><thead><tr><th>ours</th><th>rival</th><th class=\"n\">rival \
+        "<div class=\"scroll\"><table><thead><tr><th>ours</th><th>baseline</th><th class=\"n\">baseline \
          / ours</th>\
          <th class=\"n\">spread</th><th class=\"n\">lowest to highest</th><th \
          class=\"n\">rounds</th></tr></thead><tbody>",
@@ -133,7 +133,7 @@ fn ratios(ratios: &[Ratio]) -> String {
             "<tr><td>{}</td><td>{}</td><td class=\"n {class}\">{:.2}</td><td class=\"n\">{:.2}</td>\
              <td class=\"n\">{:.2} to {:.2}</td><td class=\"n\">{rounds}</td></tr>",
             escape(&r.name),
-            escape(&r.rival),
+            escape(&r.baseline),
             r.value,
             r.spread,
             r.low,
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
     use crate::machine::Machine;
     use crate::plot::{Axis, Plot, Series};
-    use crate::record::{Picture, Row};
+    use crate::record::{RecordImage, Row};
 
     fn records() -> Vec<Record> {
         let mut r =
@@ -202,7 +202,7 @@ mod tests {
         let mut p = Plot::lines("p", Axis::log("x", ""), Axis::log("y", "s"));
         p.series.push(Series::new("a", vec![(1.0, 1.0), (2.0, 3.0)]));
         r.plots.push(p);
-        r.pictures.push(Picture {
+        r.images.push(RecordImage {
             name: "v".into(),
             caption: "view".into(),
             png: b"\x89PNG".to_vec(),
@@ -248,7 +248,7 @@ mod tests {
     fn ratios_whose_rounds_contradict_each_other_are_neither_faster_nor_slower() {
         let ratio = |low: f64, value: f64, high: f64| Ratio {
             name: "ours".into(),
-            rival: "theirs".into(),
+            baseline: "theirs".into(),
             value,
             spread: 0.1,
             low,

@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn every_corner_of_any_box_is_in_a_fitted_picture_and_one_nearly_at_its_edge() {
+    fn every_corner_of_any_box_is_in_a_fitted_image_and_one_nearly_at_its_edge() {
         for (lo, hi) in [
             (DVec3::splat(-1.0), DVec3::ONE),
             (DVec3::new(1e6, 0.0, 0.0), DVec3::new(1e6 + 9.0, 1.0, 2.0)),

@@ -38,22 +38,19 @@ impl<'a> SceneMaterials<'a> {
         index: Option<usize>,
         role: Role,
     ) -> anyhow::Result<Option<Arc<Texture>>> {
-        let Some((index, picture)) = index.and_then(|i| Some((i, self.model.textures.get(i)?)))
+        let Some((index, image)) = index.and_then(|i| Some((i, self.model.textures.get(i)?)))
         else {
             return Ok(None);
         };
         if let Some(made) = self.made.get(&(index, role)) {
             return Ok(Some(made.clone()));
         }
-        let row = picture.width.max(1) as usize;
-        let rows = picture.rgba8.chunks(row);
+        let row = image.width.max(1) as usize;
+        let rows = image.rgba8.chunks(row);
         // The reader keeps the texture coordinates of the file: v = 0 is the upper edge unless
         // `v_up`.
-        let mut texels: Vec<[u8; 4]> = if picture.v_up {
-            rows.rev().flatten().copied().collect()
-        } else {
-            picture.rgba8.clone()
-        };
+        let mut texels: Vec<[u8; 4]> =
+            if image.v_up { rows.rev().flatten().copied().collect() } else { image.rgba8.clone() };
         for t in &mut texels {
             t[3] = match role {
                 Role::Color | Role::Linear => t[3],
@@ -61,14 +58,14 @@ impl<'a> SceneMaterials<'a> {
                 Role::AlphaMask(least) => 255 * u8::from(t[3] >= least),
             };
         }
-        let (width, height) = (picture.width as usize, picture.height as usize);
+        let (width, height) = (image.width as usize, image.height as usize);
         let mut made = if role == Role::Linear {
             let linear = texels.iter().map(|t| t.map(|v| f32::from(v) / 255.0)).collect();
             Texture::from_linear(width, height, linear)?
         } else {
             Texture::from_srgb8(width, height, texels.as_flattened())?
         };
-        (made.wrap, made.filter) = (picture.wrap, picture.filter);
+        (made.wrap, made.filter) = (image.wrap, image.filter);
         let made = Arc::new(made);
         self.made.insert((index, role), made.clone());
         Ok(Some(made))

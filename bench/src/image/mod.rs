@@ -125,8 +125,8 @@ pub fn draw(
     let mut progressive = ProgressiveRenderer::new(&scene, &camera, &options)?;
     loop {
         let more = progressive.step()?;
-        if let Some(told) = &mut control.samples_done {
-            told(progressive.report().samples);
+        if let Some(report) = &mut control.samples_done {
+            report(progressive.report().samples);
         }
         if !more {
             break;

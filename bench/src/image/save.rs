@@ -2,13 +2,13 @@
 //! made.
 
 use super::{RenderRequest, RenderedImage};
-use datasets::image_io::{self, Metadata, Picture, PngDepth, keys};
+use datasets::image_io::{self, LayeredImage, Metadata, PngDepth, keys};
 use rt_core::frame::{Frame, PlaneValues};
 use std::path::Path;
 
 /// Every layer of a frame as named planes. Pixels without a hit have id -1.
-pub fn picture(frame: &Frame) -> anyhow::Result<Picture> {
-    let mut p = Picture::new(frame.width, frame.height);
+pub fn layered_image(frame: &Frame) -> anyhow::Result<LayeredImage> {
+    let mut p = LayeredImage::new(frame.width, frame.height);
     for plane in frame.planes() {
         let (unit, samples) = match plane.values {
             PlaneValues::F32(v) => (plane.unit, v.into_owned()),
@@ -47,7 +47,7 @@ pub fn metadata(rendered: &RenderedImage, request: &RenderRequest) -> Metadata {
 
 /// Writes the colour as PNG, 8 bits.
 pub fn write_png(path: &Path, frame: &Frame) -> anyhow::Result<image_io::PngReport> {
-    let mut p = Picture::new(frame.width, frame.height);
+    let mut p = LayeredImage::new(frame.width, frame.height);
     let opaque = frame.color.iter().all(|c| c[3] == 1.0);
     for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate().filter(|(c, _)| *c < 3 || !opaque)
     {
@@ -62,7 +62,7 @@ pub fn write_exr(
     rendered: &RenderedImage,
     request: &RenderRequest,
 ) -> anyhow::Result<()> {
-    let mut p = picture(&rendered.frame)?;
+    let mut p = layered_image(&rendered.frame)?;
     p.metadata = metadata(rendered, request);
     Ok(image_io::write_exr(path, &p)?)
 }
@@ -70,7 +70,7 @@ pub fn write_exr(
 /// The bytes of the PNG file.
 pub fn png_bytes(frame: &Frame) -> anyhow::Result<Vec<u8>> {
     let dir = tempfile::tempdir()?;
-    let path = dir.path().join("picture.png");
+    let path = dir.path().join("image.png");
     write_png(&path, frame)?;
     Ok(std::fs::read(&path)?)
 }

@@ -163,7 +163,7 @@ pub const ALL: &[Entry] = &[
 pub fn find(name: &str) -> Result<&'static Entry, String> {
     ALL.iter().find(|e| e.name == name).ok_or_else(|| {
         let known: Vec<&str> = ALL.iter().map(|e| e.name).collect();
-        format!("there is no picture `{name}`; there are: {}", known.join(", "))
+        format!("there is no image `{name}`; there are: {}", known.join(", "))
     })
 }
 
@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_picture_shows_its_data_and_uses_its_effects() {
+    fn every_image_shows_its_data_and_uses_its_effects() {
         for e in ALL.iter().filter(|e| e.name != "wavelet") {
             // Large enough for the star's thin tubes.
             let p = e.render([144, 96], 1, &mut RenderControl::default()).unwrap();
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_pictures_list_what_there_is() {
+    fn an_unknown_image_lists_the_known_ones() {
         assert!(find("cornell-box").unwrap_err().contains("mixing-layer-inside"));
     }
 }

@@ -311,7 +311,7 @@ fn lattice(
         Err(e) => {
             subject
                 .warnings
-                .push(format!("drawn as its outer surface, without an isosurface: {e}"));
+                .push(format!("drawn as its boundary surface, without an isosurface: {e}"));
             Ok(None)
         }
     }

@@ -94,7 +94,7 @@ const NAMES: [(Effects, &[&str]); 10] = [
 /// Parses a list of effects, separated by commas; `none` and the empty string are the empty set.
 ///
 /// ```
-/// use bench::picture::style::parse_effects;
+/// use bench::image::style::parse_effects;
 /// use rt_core::effects::Effects;
 /// assert_eq!(parse_effects("shadows, ao"), Ok(Effects::SHADOWS | Effects::AMBIENT_OCCLUSION));
 /// assert!(parse_effects("shadow,caustics").unwrap_err().contains("path-tracing"));
