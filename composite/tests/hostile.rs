@@ -23,7 +23,7 @@ struct Lying<F> {
     /// All-gathers so far.
     gathered: usize,
     /// Bytes of requested receives and buffers.
-    room: usize,
+    requested_bytes: usize,
 }
 
 impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
@@ -49,7 +49,7 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
         tag: u32,
         capacity: usize,
     ) -> Result<Receive, CommError> {
-        self.room = self.room.saturating_add(capacity);
+        self.requested_bytes = self.requested_bytes.saturating_add(capacity);
         self.inner.post_recv(source, tag, capacity)
     }
 
@@ -71,12 +71,12 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
         longest: usize,
         timeout: Duration,
     ) -> Result<Vec<Vec<u8>>, CommError> {
-        let mut said = mine.to_vec();
+        let mut message = mine.to_vec();
         if self.rank() == LIAR {
-            (self.lie)(self.gathered, &mut said);
+            (self.lie)(self.gathered, &mut message);
         }
         self.gathered += 1;
-        self.inner.all_gather(&said, longest, timeout)
+        self.inner.all_gather(&message, longest, timeout)
     }
 
     fn abort(&mut self, reason: &str) {
@@ -84,7 +84,7 @@ impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
     }
 
     fn buffer(&mut self, capacity: usize) -> Vec<u8> {
-        self.room = self.room.saturating_add(capacity);
+        self.requested_bytes = self.requested_bytes.saturating_add(capacity);
         self.inner.buffer(capacity)
     }
 
@@ -98,20 +98,20 @@ type Ended = (Result<(), CompositeError>, usize);
 /// The result of each of three ranks, and the memory it requested, when rank [`LIAR`] reports
 /// `rect` instead of the rectangle where it drew.
 fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
-    let lie = move |number: usize, said: &mut Vec<u8>| {
-        if number == 0 && said.len() == 32 {
-            for (to, corner) in said[8..24].chunks_exact_mut(4).zip(rect) {
+    let lie = move |number: usize, message: &mut Vec<u8>| {
+        if number == 0 && message.len() == 32 {
+            for (to, corner) in message[8..24].chunks_exact_mut(4).zip(rect) {
                 to.copy_from_slice(&corner.to_le_bytes());
             }
         }
     };
     let results = threads::run(3, |comm| {
-        let mut comm = Lying { inner: comm, lie, gathered: 0, room: 0 };
+        let mut comm = Lying { inner: comm, lie, gathered: 0, requested_bytes: 0 };
         let (colors, depths) = ([[9_u8; 4]; PIXELS], [0.5; PIXELS]);
         let frame =
             Frame::<DepthPixel<[u8; 4]>>::with_depth(WIDTH, HEIGHT, &colors, &depths).unwrap();
         let result = Compositor::new(options.clone()).composite(&mut comm, &frame);
-        (result.map(|_| ()), comm.room)
+        (result.map(|_| ()), comm.requested_bytes)
     });
     results.into_iter().map(|result| result.expect("no rank panics")).collect()
 }
@@ -129,10 +129,10 @@ fn check_rect(rect: [u32; 4]) {
             let ends = with_rect(rect, &options);
             // Three ranks' parts, merged and collected, doubled to cover all rounds.
             let most = 3 * 2 * (PIXELS * 8 + 4096);
-            for (rank, (result, room)) in ends.iter().enumerate() {
+            for (rank, (result, requested_bytes)) in ends.iter().enumerate() {
                 assert!(
-                    *room <= most,
-                    "{strategy:?}, {rect:?}: rank {rank} made room of {room} bytes"
+                    *requested_bytes <= most,
+                    "{strategy:?}, {rect:?}: rank {rank} requested {requested_bytes} bytes"
                 );
                 if !reaches_beyond(rect) {
                     continue;
@@ -163,26 +163,26 @@ fn a_rectangle_beyond_the_image_is_refused_by_the_name_of_its_sender() {
 }
 
 #[test]
-fn more_fragments_than_pixels_can_have_are_refused_and_take_no_room() {
+fn fragment_counts_above_the_limit_are_rejected_without_allocation() {
     for announced in [u64::MAX, 1 << 62, PIXELS as u64 * (1 << 31)] {
-        let lie = move |number: usize, said: &mut Vec<u8>| {
+        let lie = move |number: usize, message: &mut Vec<u8>| {
             if number == 1 {
-                *said = announced.to_le_bytes().to_vec();
+                *message = announced.to_le_bytes().to_vec();
             }
         };
         let fragments = vec![Fragment { color: [0.1; 4], depth: 0.5 }; PIXELS];
         let ends: Vec<usize> = (1..=PIXELS).collect();
         let frame = DeepFrame::new(WIDTH, HEIGHT, &fragments, &ends).unwrap();
         let results = threads::run(3, |comm| {
-            let mut comm = Lying { inner: comm, lie, gathered: 0, room: 0 };
+            let mut comm = Lying { inner: comm, lie, gathered: 0, requested_bytes: 0 };
             let result = composite_deep(&mut comm, &frame, &Options::default());
-            (result.map(|_| ()), comm.room)
+            (result.map(|_| ()), comm.requested_bytes)
         });
         for result in results {
-            let (result, room) = result.expect("no rank panics");
+            let (result, requested_bytes) = result.expect("no rank panics");
             let text = result.unwrap_err().to_string();
             assert!(text.contains("from rank 1") && text.contains("fragments"), "{text}");
-            assert!(room < 1 << 16, "{room} bytes");
+            assert!(requested_bytes < 1 << 16, "{requested_bytes} bytes");
         }
     }
 }
@@ -191,15 +191,15 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn whatever_rectangle_a_peer_announces_nobody_panics_or_makes_room_for_it(
+    fn no_announced_rectangle_causes_a_panic_or_an_allocation(
         rect in prop::array::uniform4(prop_oneof![0_u32..24, any::<u32>()]),
     ) {
         check_rect(rect);
     }
 
     #[test]
-    fn whatever_a_peer_says_at_the_meeting_nobody_panics(
-        said in prop::collection::vec(any::<u8>(), 0..40),
+    fn no_handshake_message_of_a_peer_causes_a_panic(
+        received in prop::collection::vec(any::<u8>(), 0..40),
         keep in 0_usize..3,
     ) {
         let lie = move |number: usize, honest: &mut Vec<u8>| {
@@ -207,12 +207,12 @@ proptest! {
                 // With and without the correct fingerprint.
                 let honest_part = [0, 8, 24][keep].min(honest.len());
                 honest.truncate(honest_part);
-                honest.extend_from_slice(&said);
+                honest.extend_from_slice(&received);
                 honest.truncate(32);
             }
         };
         let results = threads::run(3, |comm| {
-            let mut comm = Lying { inner: comm, lie: &lie, gathered: 0, room: 0 };
+            let mut comm = Lying { inner: comm, lie: &lie, gathered: 0, requested_bytes: 0 };
             let colors = [[0.5_f32; 4]; PIXELS];
             let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(WIDTH, HEIGHT, &colors).unwrap();
             let options = Options { timeout: Duration::from_millis(300), ..Options::default() };

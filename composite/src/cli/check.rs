@@ -27,7 +27,7 @@ pub(super) struct CheckArgs {
     /// Groups of the first N ranks instead of all
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     counts: Vec<usize>,
-    /// Also the hard cases: equal and strange depths, every size from 1x1 to 67x5 (a share of them
+    /// Also the hard cases: equal and unusual depths, every size from 1x1 to 67x5 (a share of them
     /// for each number of ranks), empty ranks
     #[arg(long)]
     hard: bool,

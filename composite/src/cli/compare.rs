@@ -27,28 +27,28 @@ use table::{Comparison, Machine, Pixels};
 pub(super) struct CompareArgs {
     #[command(flatten)]
     ranks: RankArgs,
-    /// Width and height of the image, in pixels; or several, as 1024,2048
+    /// Width and height of the image, in pixels; several such as 1024,2048
     #[arg(long, default_value = "1024", value_name = "PIXELS", value_delimiter = ',')]
     size: Vec<u32>,
-    /// Which frames: discs, dense, frag, several of them or all
+    /// The frames: discs, dense, frag, several of them or all
     #[arg(long, default_value = "all", value_name = "SCENE", value_delimiter = ',', value_parser = workload_named)]
     scene: Vec<Workloads>,
     /// What is composited: RGBA8 with depth (depth), premultiplied RGBA f32 in order (blend), or
     /// both as depth,blend
     #[arg(long, default_value = "depth", value_delimiter = ',')]
     pixels: Vec<Pixels>,
-    /// Our strategy; auto takes the fastest by a model of the network, which is measured first
+    /// Our strategy; auto selects the fastest by a model of the network, which is measured first
     #[arg(long, default_value = "auto", value_name = "direct|tree|bswap|radix-k[:K]|auto", value_parser = strategy_named)]
     strategy: Strategy,
-    /// Send messages also between processes of one machine and between threads, which else merge in
-    /// shared memory
+    /// Also send messages between processes of one machine and between threads, which otherwise
+    /// merge in shared memory
     #[arg(long)]
     messages: bool,
-    /// Our instruction set at most: scalar, sse4.2, avx2, avx512 or neon, as far as this machine
-    /// has it; or several
+    /// Our widest instruction set: scalar, sse4.2, avx2, avx512 or neon, if this machine has it; or
+    /// several
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', value_parser = simd_named)]
     simd: Vec<SimdLevel>,
-    /// Timed frames; 7 of them, 5 simulated
+    /// Number of timed frames [default: 7; simulated: 5]
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
 }

@@ -24,25 +24,25 @@ pub(super) struct DemoArgs {
     /// One of its views; the first if not given
     #[arg(long, value_name = "VIEW")]
     pub(super) view: Option<String>,
-    /// A headlight in place of a lamp with shadows and ambient occlusion
+    /// A headlight instead of a lamp with shadows and ambient occlusion
     #[arg(long)]
     pub(super) headlight: bool,
-    /// One grey for all parts in place of a colour for each rank
+    /// One grey for all parts instead of a colour for each rank
     #[arg(long)]
     pub(super) grey: bool,
-    /// Parts of the same work for this view in place of the same number of triangles
+    /// Parts of equal work for this view instead of equal numbers of triangles
     #[arg(long)]
     pub(super) cut_by_view: bool,
     /// Width and height of the image, in pixels
     #[arg(long, default_value_t = 1024, value_name = "PIXELS")]
     pub(super) size: u32,
-    /// In place of a data set: frames made without a renderer
+    /// Frames generated without a renderer, instead of a data set
     #[arg(long, value_name = "discs|dense|frag", conflicts_with_all = ["data", "data_size", "view", "headlight", "grey", "cut_by_view"])]
     pub(super) scene: Option<Workload>,
-    /// Frames; the last is shown
+    /// Number of frames; the last is shown
     #[arg(long, default_value_t = 5, value_name = "N")]
     pub(super) frames: u64,
-    /// Folder for picture and plot
+    /// Folder for the image and the plot
     #[arg(long, default_value = ".", value_name = "FOLDER")]
     pub(super) out: PathBuf,
 }

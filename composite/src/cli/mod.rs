@@ -20,7 +20,7 @@ use clap::{Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, Status, status_of};
 use std::ffi::OsString;
 
-/// Brings the images of many ranks together into one.
+/// Composites the images of many ranks into one.
 ///
 /// Ranks are threads of this process (--threads), processes of an MPI job (--mpi) or simulated
 /// (--smpi).
@@ -35,13 +35,13 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Measures against IceT, on the same ranks and frames
+    /// Compares with IceT on the same ranks and frames
     Compare(compare::CompareArgs),
-    /// Composites partitioned frames and shows what each rank did when
+    /// Composites partitioned frames and shows the timeline of each rank
     Demo(demo_args::DemoArgs),
-    /// Checks every strategy against the serial reference on the ranks it is run on
+    /// Checks every strategy against the serial reference on these ranks
     Check(check::CheckArgs),
-    /// Tells which MPI, SimGrid and IceT there are, and what to do about those that are not
+    /// Lists the installed MPI, SimGrid and IceT, and how to install the others
     Doctor,
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),

@@ -17,8 +17,8 @@ const MODEL: sim::Network = sim::Network::QDR_AS_SMPI;
 /// What every job takes.
 #[derive(Debug, clap::Args)]
 pub(super) struct RankArgs {
-    /// Number of ranks; under an MPI launcher those it has started. `compare` takes several, as
-    /// 2,4,8
+    /// Number of ranks; under an MPI launcher those it has started. `compare` takes several, such
+    /// as 2,4,8
     #[arg(long, short = 'n', value_name = "N", value_delimiter = ',')]
     ranks: Vec<usize>,
     /// Ranks are threads of this process (the default)
@@ -40,8 +40,8 @@ pub(super) struct RankArgs {
     /// Cut messages over MPI into chunks of this many bytes, as those of more than 64 MiB are
     #[arg(long, hide = true, default_value_t = 1 << 26)]
     chunk_bytes: usize,
-    /// Has the ranks but the last wait so many milliseconds behind each meeting in shared memory,
-    /// as on a busy machine
+    /// All ranks but the last wait this many milliseconds after each collective in shared memory,
+    /// on a busy machine
     #[arg(long, hide = true, default_value_t = 0)]
     linger_ms: u64,
 }

@@ -4,7 +4,7 @@ use super::program::{peer, run};
 use std::path::Path;
 
 #[test]
-fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() {
+fn demo_rejects_impossible_input_and_renders_unusual_input() {
     let folder = std::env::temp_dir().join(format!("composite-strange-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     let file = |name: &str, text: &str| {
@@ -34,7 +34,7 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
     // ---- Rejected, with the reason.
     let known = file("known.obj", &triangle("0 0 0"));
     let missing = folder.join("missing.vtp").to_str().expect("a path in UTF-8").to_owned();
-    for (wish, words) in [
+    for (arguments, words) in [
         (vec!["-n", "3", "--data", &file("empty.obj", "")], "holds no triangle"),
         (vec!["--data", &missing], "there is no file"),
         (vec!["--data", "wavelett"], "there are: wavelet"),
@@ -46,10 +46,10 @@ fn demo_tells_data_and_wishes_that_cannot_be_from_those_that_are_only_strange() 
         (vec!["-n", "5000"], "at most 4096"),
         (vec!["-n", "2,4"], "one number of ranks"),
     ] {
-        let (code, text) = demo(&wish);
+        let (code, text) = demo(&arguments);
         assert!(
             code == Some(2) && text.contains(words) && !text.contains("error: rank"),
-            "{wish:?}: {code:?} {text}"
+            "{arguments:?}: {code:?} {text}"
         );
     }
     let nowhere = format!("{known}/below");
@@ -69,7 +69,7 @@ fn demo_draws_a_bar_for_every_rank() {
         serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
     assert_eq!(shown["ranks"].as_array().map(Vec::len), Some(5));
     let plot = std::fs::read_to_string(folder.join("composite_demo.svg")).expect("the plot");
-    let png = std::fs::read(folder.join("composite_demo.png")).expect("the picture");
+    let png = std::fs::read(folder.join("composite_demo.png")).expect("the image");
     std::fs::remove_dir_all(&folder).expect("the folder");
     for rank in 0..5 {
         assert!(plot.contains(&format!(">rank {rank}<")));
@@ -87,13 +87,13 @@ fn demo_of(data: &str, more: &[&str], variables: &[(&str, &Path)]) -> (Vec<u8>, 
     ];
     let ran = run(&[&common, more].concat(), variables);
     assert_eq!(ran.code, Some(0), "{}", ran.text);
-    let png = std::fs::read(folder.join("composite_demo.png")).expect("the picture");
+    let png = std::fs::read(folder.join("composite_demo.png")).expect("the image");
     std::fs::remove_dir_all(&folder).expect("the folder");
     (png, serde_json::from_str(ran.stdout.trim()).expect("one line of JSON"))
 }
 
 #[test]
-fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_one_rank() {
+fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_image_of_one_rank() {
     let Some(mpirun) = peer("RTSV_MPIRUN") else { return };
     let file = std::env::temp_dir().join(format!("composite-part-{}.obj", std::process::id()));
     let mut obj = String::new();
@@ -110,7 +110,7 @@ fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_on
     let (headlight, _) = demo_of(data, &["--threads", "-n", "3", "--headlight"], &[]);
     for more in [&["--threads", "-n", "64"][..], &["--model", "-n", "8", "--cut-by-view"]] {
         let (others, _) = demo_of(data, more, &[]);
-        assert!(alone == others, "{more:?}: the pictures differ");
+        assert!(alone == others, "{more:?}: the images differ");
     }
     if let Some(mpich) = peer("RTSV_MPIRUN_MPICH") {
         let (three, shown) = demo_of(data, &["--mpi", "-n", "3"], &[("COMPOSITE_MPIRUN", &mpich)]);
@@ -120,7 +120,7 @@ fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_picture_of_on
         );
     }
     std::fs::remove_file(&file).expect("the file");
-    assert!(alone == parts, "the pictures differ");
+    assert!(alone == parts, "the images differ");
     assert!(four["transport"].as_str().is_some_and(|t| t.contains("Open MPI")), "{four}");
     let triangles = |shown: &serde_json::Value| -> Vec<u64> {
         shown["ranks"]

@@ -122,13 +122,13 @@ fn assert_refused(ends: &[Option<FrameError>], words: &str) {
     };
     assert!(ends.iter().any(found), "{words}: {ends:?}");
     for end in ends {
-        let text = end.as_ref().expect("nobody gets a picture").to_string();
+        let text = end.as_ref().expect("nobody gets an image").to_string();
         assert!(text.contains("from rank 1") && text.contains(words), "{words}: {text}");
     }
 }
 
 #[test]
-fn numbers_that_are_passed_on_as_they_are_make_a_picture() {
+fn unchanged_numbers_give_an_image() {
     for policy in [SecondaryRayPolicy::GhostZones, SecondaryRayPolicy::Forward] {
         assert_eq!(frame(policy, |_| ()), vec![None; RANKS], "{policy:?}");
     }

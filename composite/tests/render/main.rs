@@ -58,7 +58,7 @@ fn bits(frame: &Frame) -> Vec<(&'static str, Vec<u32>)> {
 }
 
 fn assert_same(expected: &Frame, outputs: &[FrameOutput], what: &str) {
-    let found = outputs.last().and_then(|o| o.frame.as_ref()).expect("the root has the picture");
+    let found = outputs.last().and_then(|o| o.frame.as_ref()).expect("the root has the image");
     for ((layer, a), (_, b)) in bits(expected).into_iter().zip(bits(found)) {
         let differ = a.iter().zip(&b).filter(|(a, b)| a != b).count();
         assert_eq!((a.len(), differ), (b.len(), 0), "{what}: {layer}");
@@ -102,7 +102,7 @@ fn random_and_view_dependent_partitions_have_the_bits_of_one_node() {
 }
 
 #[test]
-fn local_geometry_alone_gives_another_picture() {
+fn local_geometry_alone_gives_another_image() {
     let case = scenes::shadows_and_occlusion(DVec3::ZERO);
     let expected = one_node(&case);
     for ranks in [8, 64] {
@@ -193,7 +193,7 @@ fn streamed_frames_have_the_bits_of_one_node_and_send_tiles_while_rays_are_trace
 
 #[test]
 fn mirrors_glass_layers_and_paths_have_the_bits_of_one_node() {
-    for case in scenes::several_waves() {
+    for case in scenes::several_bounces() {
         let expected = one_node(&case);
         for (ranks, split) in
             [(3, Split::Triangles), (8, Split::Random { seed: 9 }), (16, Split::Triangles)]
@@ -287,7 +287,7 @@ fn ghost_zones_have_the_bits_of_one_node_and_the_cheaper_way_is_taken() {
 #[test]
 fn replicated_data_have_the_bits_of_one_node() {
     for case in
-        scenes::several_waves().into_iter().chain([scenes::shadows_and_occlusion(DVec3::ZERO)])
+        scenes::several_bounces().into_iter().chain([scenes::shadows_and_occlusion(DVec3::ZERO)])
     {
         let expected = one_node(&case);
         for ranks in [1, 3, 6] {
@@ -323,7 +323,7 @@ fn spans_cover_a_frame_without_gaps_and_bytes_add_up() {
 }
 
 #[test]
-fn ranks_that_render_different_pictures_all_get_an_error() {
+fn ranks_that_render_different_images_all_get_an_error() {
     let case = scenes::shadows_and_occlusion(DVec3::ZERO);
     let partition = Partition::new(&case.scene, 3, &Split::Triangles);
     let outcomes = threads::run(3, |mut comm| {

@@ -242,7 +242,7 @@ pub(crate) fn headlight(samples: u32) -> Case {
 }
 
 /// Several bounces: mirror, gloss and glass, transparent layers, paths.
-pub(crate) fn several_waves() -> Vec<Case> {
+pub(crate) fn several_bounces() -> Vec<Case> {
     let sun = Light::directional(DVec3::new(0.4, -0.3, 1.0));
     let ambient = Light::ambient(AMBIENT);
     let small =

@@ -17,7 +17,7 @@ use rt_core::volume::{
 
 /// A box from `origin` with `size`, filled with a wave pattern on `dims` points, in the colours
 /// from `low` to `high`.
-fn waves(
+fn wave_volume(
     dims: [u32; 3],
     origin: DVec3,
     size: DVec3,
@@ -62,7 +62,7 @@ fn shaded() -> VolumeOptions {
 /// Three media: a coarse one, a fine one rotated and stretched across it, and one completely inside
 /// the first.
 fn three() -> Vec<VolumeInstance> {
-    let coarse = waves(
+    let coarse = wave_volume(
         [21, 26, 19],
         DVec3::new(-1.9, -1.7, -0.6),
         DVec3::new(3.4, 3.2, 2.2),
@@ -72,7 +72,7 @@ fn three() -> Vec<VolumeInstance> {
     );
     let nearest =
         VolumeOptions { interpolation: Interpolation::Nearest, ..VolumeOptions::default() };
-    let fine = waves(
+    let fine = wave_volume(
         [67, 40, 51],
         DVec3::new(-1.0, -0.8, -0.4),
         DVec3::new(2.6, 1.6, 1.5),
@@ -82,8 +82,14 @@ fn three() -> Vec<VolumeInstance> {
     );
     let steep = GradientOpacity { factors: vec![0.2, 1.0].into(), steepest: 3.0 };
     let inside = VolumeOptions { gradient_opacity: Some(steep), ..VolumeOptions::default() };
-    let inside =
-        waves([33, 33, 33], DVec3::new(-0.7, -0.9, 0.2), DVec3::splat(0.8), GREEN, 0.9, inside);
+    let inside = wave_volume(
+        [33, 33, 33],
+        DVec3::new(-0.7, -0.9, 0.2),
+        DVec3::splat(0.8),
+        GREEN,
+        0.9,
+        inside,
+    );
     let turned = DAffine3::from_translation(DVec3::new(0.4, 0.3, 0.2))
         * DAffine3::from_rotation_z(0.6)
         * DAffine3::from_rotation_x(0.3)
@@ -197,8 +203,8 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
 fn bricks_of_several_volumes_are_small_and_little_is_held_twice() {
     // Larger ones, whose bricks have more inside than at their sides.
     let [low, size] = [DVec3::splat(-1.0), DVec3::splat(2.0)];
-    let coarse = waves([65; 3], low, size, BLUE, 0.5, VolumeOptions::default());
-    let fine = waves([129; 3], 0.4 * low, 0.4 * size, RED, 0.5, VolumeOptions::default());
+    let coarse = wave_volume([65; 3], low, size, BLUE, 0.5, VolumeOptions::default());
+    let fine = wave_volume([129; 3], 0.4 * low, 0.4 * size, RED, 0.5, VolumeOptions::default());
     let place = |volume: Volume, turn: f64| VolumeInstance {
         volume: volume.into(),
         world_from_object: DAffine3::from_rotation_z(turn),
@@ -219,7 +225,7 @@ fn bricks_of_several_volumes_are_small_and_little_is_held_twice() {
 fn projections_are_seen_whole_and_have_the_bits_of_one_node() {
     for blend in [Blend::Maximum, Blend::Average, Blend::Isosurfaces(vec![0.4, 0.8].into())] {
         let projection = VolumeOptions { blend: blend.clone(), ..VolumeOptions::default() };
-        let projection = waves(
+        let projection = wave_volume(
             [31, 29, 27],
             DVec3::new(-1.2, -1.4, 0.0),
             DVec3::new(2.0, 2.4, 1.2),
@@ -260,7 +266,7 @@ fn projections_are_seen_whole_and_have_the_bits_of_one_node() {
 fn deals_that_cannot_be_are_refused_by_name() {
     let mut volumes = three();
     let maximum = VolumeOptions { blend: Blend::Maximum, ..VolumeOptions::default() };
-    let projection = waves([9, 9, 9], DVec3::ZERO, DVec3::ONE, GREEN, 0.6, maximum);
+    let projection = wave_volume([9, 9, 9], DVec3::ZERO, DVec3::ONE, GREEN, 0.6, maximum);
     volumes
         .push(VolumeInstance { volume: projection.into(), world_from_object: DAffine3::IDENTITY });
     let case = alone(volumes);
