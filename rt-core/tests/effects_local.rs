@@ -456,7 +456,7 @@ fn transparent_blocker_dims_light_by_its_opacity() {
 // ---- Every effect
 
 #[test]
-fn leaving_out_any_one_effect_changes_the_picture_and_zeroes_its_counter() {
+fn omitting_any_one_effect_changes_the_image_and_zeroes_its_counter() {
     let mut s = scene(
         vec![
             (floor(-1.0, 4.0), Material::pbr([0.8, 0.7, 0.6], 0.0, 0.4)),

@@ -118,7 +118,7 @@ fn compare(
 }
 
 #[test]
-fn lights_at_the_eye_give_the_picture_of_the_same_lights_in_the_world() {
+fn lights_at_the_eye_give_the_image_of_the_same_lights_in_the_world() {
     let plain = RenderOptions::new(48, 48);
     for camera in [perspective(), parallel()] {
         compare("local", square_above_floor, &camera, &plain, true);

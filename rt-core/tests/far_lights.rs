@@ -140,9 +140,9 @@ fn a_small_model_on_a_huge_ground_keeps_its_shadow() {
     expect_contact_shadow("huge ground", &b.build().unwrap(), &camera, dir);
 }
 
-/// `mesh` rotated and translated: planes in general position, whose rounded corners are not in the
+/// `mesh` rotated and scaled: planes in general position, whose rounded corners are not in the
 /// plane.
-fn turned(mut mesh: TriMesh, turn: DMat3, scale: f64) -> TriMesh {
+fn transformed_mesh(mut mesh: TriMesh, turn: DMat3, scale: f64) -> TriMesh {
     for p in &mut mesh.positions {
         *p = (turn * p.as_dvec3() * scale).as_vec3();
     }
@@ -163,11 +163,14 @@ fn a_light_on_a_surface_is_not_hidden_by_it() {
                 // The ceiling is exactly at the light, and a thousandth above it.
                 for below in [0.0, 1e-3] {
                     let mut b = SceneBuilder::new();
-                    b.mesh(turned(floor(0.0, 6.0), turn, scale), Material::matte([1.0; 3]));
+                    b.mesh(
+                        transformed_mesh(floor(0.0, 6.0), turn, scale),
+                        Material::matte([1.0; 3]),
+                    );
                     let hangs = if name == "sphere" { light.size() as f32 } else { 0.0 };
                     let ceiling = floor(3.0 + hangs + below as f32, 6.0);
-                    b.mesh(turned(ceiling, turn, scale), Material::matte([1.0; 3]));
-                    b.light(moved(light, turn, scale));
+                    b.mesh(transformed_mesh(ceiling, turn, scale), Material::matte([1.0; 3]));
+                    b.light(transformed_light(light, turn, scale));
                     let scene = b.build().unwrap();
                     let eye = turn * DVec3::new(0.0, 0.0, 1.5) * scale;
                     let camera = Camera::orthographic(
@@ -214,10 +217,10 @@ fn flat_lights_are_not_hidden_by_their_own_plane_however_flat_they_fall() {
             };
             let turn = DMat3::from_axis_angle(DVec3::new(0.6, -0.8, 0.0), 0.7);
             let mut b = SceneBuilder::new();
-            b.mesh(turned(floor(3.0, 6.0), turn, scale), Material::matte([1.0; 3]));
+            b.mesh(transformed_mesh(floor(3.0, 6.0), turn, scale), Material::matte([1.0; 3]));
             let wall = quad(Vec3::new(3.0, 0.0, 1.999), Vec3::Y, Vec3::Z);
-            b.mesh(turned(wall, turn, scale), Material::matte([1.0; 3]));
-            b.light(moved(light, turn, scale));
+            b.mesh(transformed_mesh(wall, turn, scale), Material::matte([1.0; 3]));
+            b.light(transformed_light(light, turn, scale));
             let scene = b.build().unwrap();
             let (eye, target) = (DVec3::new(2.0, 0.0, 2.9), DVec3::new(3.0, 0.0, 2.9));
             let camera = Camera::orthographic(
@@ -265,7 +268,7 @@ fn lights_beyond_single_precision_are_refused() {
 }
 
 /// The light of the rotated and scaled scene.
-fn moved(light: Light, turn: DMat3, scale: f64) -> Light {
+fn transformed_light(light: Light, turn: DMat3, scale: f64) -> Light {
     let place = |p: DVec3| turn * p * scale;
     let kind = match light.kind {
         LightKind::Point { position, radius } => {

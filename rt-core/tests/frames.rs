@@ -144,7 +144,7 @@ fn near_and_far_planes_clip_as_opengl_does() {
 }
 
 #[test]
-fn far_away_cameras_and_huge_offsets_see_the_same_picture() {
+fn far_away_cameras_and_huge_offsets_see_the_same_image() {
     // The same body near the origin, and 10^7 away with a mesh origin: ids must agree pixel by
     // pixel.
     let offset = DVec3::new(1e7, -2e7, 3e6);
@@ -389,7 +389,7 @@ fn eight_bit_conversion_is_not_premultiplied_and_encodes() {
 // ---- Determinism
 
 #[test]
-fn same_picture_for_any_number_of_threads() {
+fn same_image_for_any_number_of_threads() {
     let s = busy_scene();
     let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
     for path_tracing in [false, true] {

@@ -205,66 +205,66 @@ fn deal(scene: &Scene, parts: usize, seed: u32) -> Vec<Vec<Vec<u32>>> {
     out
 }
 
-struct Holder<'a> {
+struct DataServer<'a> {
     frame: DistributedFrame<'a>,
     kept: &'a [Vec<u32>],
 }
 
-impl Holder<'_> {
-    fn in_whole(&self, scene: &Scene, mut met: ShadingHit) -> ShadingHit {
-        let geometry = scene.world.instances()[met.instance as usize].geometry;
-        met.primitive = self.kept[geometry][met.primitive as usize];
+impl DataServer<'_> {
+    fn with_global_id(&self, scene: &Scene, mut hit: ShadingHit) -> ShadingHit {
+        let geometry = scene.world.instances()[hit.instance as usize].geometry;
+        hit.primitive = self.kept[geometry][hit.primitive as usize];
         // Hits are sent as words.
-        ShadingHit::from_words(&met.to_words())
+        ShadingHit::from_words(&hit.to_words())
     }
 }
 
-fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
-    if let Some(m) = met
-        && best.as_ref().is_none_or(|b| m.is_before(b))
+fn nearer(best: &mut Option<ShadingHit>, hit: Option<ShadingHit>) {
+    if let Some(h) = hit
+        && best.as_ref().is_none_or(|b| h.is_before(b))
     {
-        *best = Some(m);
+        *best = Some(h);
     }
 }
 
 /// Merges the hits of light rays from all data servers. A ray that one of them reports as blocked
 /// is blocked.
 fn light_hits(
-    holders: &[Holder<'_>],
+    servers: &[DataServer<'_>],
     scene: &Scene,
     rays: &[rt_core::ray::Ray],
 ) -> Vec<Option<ShadingHit>> {
     let mut best = vec![None; rays.len()];
-    let mut met = Vec::new();
-    for h in holders {
-        h.frame.light_hits(rays, &mut met);
-        for (b, m) in best.iter_mut().zip(&met) {
+    let mut hits = Vec::new();
+    for h in servers {
+        h.frame.light_hits(rays, &mut hits);
+        for (b, m) in best.iter_mut().zip(&hits) {
             // A blocked ray has no primitive id.
-            let in_whole = |m: ShadingHit| {
+            let with_global_id = |m: ShadingHit| {
                 if m.is_blocked() {
                     ShadingHit::from_words(&m.to_words())
                 } else {
-                    h.in_whole(scene, m)
+                    h.with_global_id(scene, m)
                 }
             };
-            nearer(b, m.map(in_whole));
+            nearer(b, m.map(with_global_id));
         }
     }
     best
 }
 
 fn closest(
-    holders: &[Holder<'_>],
+    servers: &[DataServer<'_>],
     scene: &Scene,
     rays: &[rt_core::ray::Ray],
     pixels: Option<&[(u32, u16)]>,
 ) -> Vec<Option<ShadingHit>> {
     let mut best = vec![None; rays.len()];
-    let mut met = Vec::new();
-    for h in holders {
-        h.frame.closest(rays, pixels, &mut met);
-        for (b, m) in best.iter_mut().zip(&met) {
-            nearer(b, m.map(|m| h.in_whole(scene, m)));
+    let mut hits = Vec::new();
+    for h in servers {
+        h.frame.closest(rays, pixels, &mut hits);
+        for (b, m) in best.iter_mut().zip(&hits) {
+            nearer(b, m.map(|m| h.with_global_id(scene, m)));
         }
     }
     best
@@ -275,43 +275,43 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
     let options = BuildOptions::default();
     let scenes: Vec<Scene> = kept.iter().map(|k| case.scene.part(k, &options).unwrap()).collect();
     let needed = Effects::required_by(&case.scene);
-    let holders: Vec<Holder<'_>> = scenes
+    let servers: Vec<DataServer<'_>> = scenes
         .iter()
         .zip(&kept)
-        .map(|(s, kept)| Holder {
+        .map(|(s, kept)| DataServer {
             frame: DistributedFrame::new(s, needed, &case.camera, &case.options).unwrap(),
             kept,
         })
         .collect();
-    let owner = &holders[0].frame;
-    let mut picture = owner.blank_frame();
+    let owner = &servers[0].frame;
+    let mut image = owner.blank_frame();
     for t in 0..owner.num_tiles() {
         let mut tile = owner.tile(t);
         for pass in owner.passes() {
-            one_pass(case, &holders, &mut tile, pass);
+            one_pass(case, &servers, &mut tile, pass);
         }
-        assert!(owner.decode_tile(&mut picture, t, &tile.encode(owner)));
+        assert!(owner.decode_tile(&mut image, t, &tile.encode(owner)));
     }
-    picture
+    image
 }
 
-fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pass) {
-    let owner = &holders[0].frame;
+fn one_pass(case: &Case, servers: &[DataServer<'_>], tile: &mut TileState, pass: Pass) {
+    let owner = &servers[0].frame;
     tile.begin(owner, pass);
     // ---- Primary rays.
     let mut best = vec![None; tile.num_rays()];
     let mut colors = vec![None; tile.num_rays()];
     let mut hits = CameraHits::default();
     let local = owner.needs_only_local_light() && pass != Pass::Geometry;
-    for h in holders {
+    for h in servers {
         if !h.frame.tiles_overlapping(h.frame.own_bounds())[tile.number()] {
             continue;
         }
         h.frame.camera_hits(tile.number(), pass, &mut hits);
         let of_hits = if local { hits.colors(&h.frame).to_vec() } else { vec![[0.0; 4]; 1024] };
         for slot in 0..1024 {
-            let met = hits.shading_hit(&h.frame, slot).map(|m| h.in_whole(&case.scene, m));
-            if let Some(m) = met
+            let hit = hits.shading_hit(&h.frame, slot).map(|m| h.with_global_id(&case.scene, m));
+            if let Some(m) = hit
                 && best[slot].as_ref().is_none_or(|b: &ShadingHit| m.is_before(b))
             {
                 (best[slot], colors[slot]) = (Some(m), Some(of_hits[slot]));
@@ -334,7 +334,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pas
                 if rays.is_empty() {
                     break;
                 }
-                tile.process_light_hits(owner, &light_hits(holders, &case.scene, &rays)).unwrap();
+                tile.process_light_hits(owner, &light_hits(servers, &case.scene, &rays)).unwrap();
             }
         } else if !tile.light_points().is_empty() {
             let mut words = Vec::new();
@@ -347,7 +347,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pas
             }
             assert_eq!(points, tile.light_points());
             let (mut all, mut bits, mut work) = (vec![], vec![], OcclusionScratch::default());
-            for h in holders {
+            for h in servers {
                 h.frame.occlusion_bits(&points, pass, &mut work, &mut bits);
                 all.resize(bits.len(), 0u64);
                 all.iter_mut().zip(&bits).for_each(|(a, b)| *a |= b);
@@ -362,8 +362,8 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pas
         let pixels: Vec<_> = waiting.iter().map(|(_, s, _)| (tile.number() as u32, *s)).collect();
         let recorded = owner.records_geometry(pass).then_some(&pixels[..]);
         let mut answers = vec![None; tile.num_rays()];
-        for ((i, ..), met) in waiting.iter().zip(closest(holders, &case.scene, &rays, recorded)) {
-            answers[*i] = met;
+        for ((i, ..), hit) in waiting.iter().zip(closest(servers, &case.scene, &rays, recorded)) {
+            answers[*i] = hit;
         }
         tile.process_hits(owner, &answers).unwrap();
     }

@@ -199,7 +199,7 @@ fn many_instances_packets_equal_single_rays_and_the_oracle() {
 }
 
 /// Checks that the hit is where the f64 reference puts it and that no other hit is certainly
-/// nearer. Both allow for the rounding error of t ([`oracle::Meeting::t_error`]), as for one mesh.
+/// nearer. Both allow for the rounding error of t ([`oracle::PlaneIntersection::t_error`]), as for one mesh.
 /// That error grows with the coordinates, the slant and the slenderness of the triangle;
 /// transforming the rays adds no more. Returns the error of t as a fraction of the allowed error,
 /// or `None` for a miss. (The largest is 0.35.)
@@ -221,7 +221,7 @@ fn check_instances(
     let (mut nearest, mut which) = (f64::INFINITY, 0);
     for (k, inst) in instances.iter().enumerate() {
         for i in 0..geometries[inst.geometry].num_triangles() {
-            let Some(x) = oracle::meet(corners(inst, i), o, d) else { continue };
+            let Some(x) = oracle::intersect_plane(corners(inst, i), o, d) else { continue };
             // Certainly inside, even when the ray moves by 10⁻⁵ (see below).
             let inside = x.depth > 1e-5 * x.depth_per_length;
             let (low, high) = (x.t - x.t_error, x.t + x.t_error);
@@ -249,7 +249,7 @@ fn check_instances(
     let off = (p - o).cross(d).length() / d.length();
     let limit = if far { 2e-5 } else { 1e-5 };
     assert!(off < limit, "{what}: {ray:?}: {h:?}: the hit point is {off} beside the ray");
-    let x = oracle::meet([a, b, c], o, d)
+    let x = oracle::intersect_plane([a, b, c], o, d)
         .unwrap_or_else(|| panic!("{what}: {ray:?}: {h:?} is parallel to the ray, or no triangle"));
     let error = (h.t as f64 - x.t).abs() / x.t_error;
     assert!(

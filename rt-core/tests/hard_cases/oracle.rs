@@ -11,7 +11,7 @@ const U: f64 = 1.0 / (1u64 << 24) as f64;
 const ROUNDINGS: f64 = 8.0;
 
 /// Intersection of a ray with one triangle's plane, in f64.
-pub(crate) struct Meeting {
+pub(crate) struct PlaneIntersection {
     pub(crate) t: f64,
     /// Smallest barycentric weight: negative outside, zero on an edge.
     pub(crate) depth: f64,
@@ -23,7 +23,11 @@ pub(crate) struct Meeting {
 }
 
 /// `None` when the ray lies in the plane, or the triangle has no area.
-pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Meeting> {
+pub(crate) fn intersect_plane(
+    corners: [DVec3; 3],
+    origin: DVec3,
+    dir: DVec3,
+) -> Option<PlaneIntersection> {
     let [a, b, c] = corners.map(|p| p - origin);
     let (e1, e2) = (b - a, c - a);
     let n = e1.cross(e2);
@@ -44,7 +48,7 @@ pub(crate) fn meet(corners: [DVec3; 3], origin: DVec3, dir: DVec3) -> Option<Mee
     let t_error = ROUNDINGS * U * (reach + length * slender) / (dir.length() * cos);
     let depth_per_length = slender / length / cos;
     let depth_error = ROUNDINGS * U * (reach + length) * depth_per_length;
-    Some(Meeting { t, depth, t_error, depth_error, depth_per_length })
+    Some(PlaneIntersection { t, depth, t_error, depth_error, depth_per_length })
 }
 
 /// Compares `found` with the result of testing every triangle of `mesh` (`world_origin` is the
@@ -63,7 +67,7 @@ pub(crate) fn check(
     // The nearest triangle that is hit with any rounding.
     let mut sure: Option<(f64, f64, usize)> = None;
     for i in (0..mesh.num_triangles()).filter(|&i| mesh.is_renderable(i)) {
-        let Some(m) = meet(at(i), o, d) else { continue };
+        let Some(m) = intersect_plane(at(i), o, d) else { continue };
         let certain =
             m.depth > m.depth_error && m.t - m.t_error >= t_min && m.t + m.t_error < t_max;
         if certain && sure.is_none_or(|(t, e, _)| m.t + m.t_error < t + e) {
@@ -78,7 +82,7 @@ pub(crate) fn check(
         return None;
     };
     assert!(h.t >= ray.t_min && h.t < ray.t_max, "{what}: {ray:?}: {h:?} is outside the range");
-    let m = meet(at(h.prim as usize), o, d);
+    let m = intersect_plane(at(h.prim as usize), o, d);
     let m = m
         .unwrap_or_else(|| panic!("{what}: {ray:?}: {h:?} is parallel to the ray, or no triangle"));
     assert!(

@@ -267,7 +267,7 @@ impl MaterialMaps for Checked {
 }
 
 #[test]
-fn detail_of_a_program_s_own_cannot_put_nan_into_a_picture() {
+fn custom_material_maps_cannot_put_nan_into_an_image() {
     let mut b = SceneBuilder::new();
     let m = b.material(Material {
         model: SurfaceModel::Metal { roughness: 0.5 },

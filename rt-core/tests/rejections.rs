@@ -328,7 +328,7 @@ fn a_light_of_highlights_alone_casts_shadows() {
 }
 
 #[test]
-fn what_changes_no_pixel_is_said_by_name() {
+fn effects_that_change_no_pixel_are_reported_by_name() {
     let warned = |scene: &Scene, options: &RenderOptions, words: &[&str]| {
         let report = render(scene, &camera(), options).unwrap().report;
         for w in words {
