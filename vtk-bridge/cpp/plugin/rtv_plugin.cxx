@@ -102,7 +102,7 @@ std::string start()
   {
     enroll();
   }
-  return vtkRtvViewOptions::Enroll(api, bridgeOf) ? "" : "this ParaView has no render views";
+  return vtkRtvViewOptions::Register(api, bridgeOf) ? "" : "this ParaView has no render views";
 }
 
 }

@@ -102,7 +102,7 @@ void enroll(vtkClientServerInterpreter* interpreter)
 }
 }
 
-bool vtkRtvViewOptions::Enroll(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObjectBase*))
+bool vtkRtvViewOptions::Register(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObjectBase*))
 {
   theApi = api;
   theBridgeOf = bridgeOf;

@@ -20,7 +20,7 @@ public:
 
   // Registers this class with ParaView. `api` contains the bridge's functions; `bridgeOf` returns a
   // renderer's bridge. Returns false when this ParaView has no render views.
-  static bool Enroll(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObjectBase* renderer));
+  static bool Register(const RtvApi* api, RtvBridge* (*bridgeOf)(vtkObjectBase* renderer));
 
   // Applies a property's command (a row of the table in the .cxx). Returns false when the command
   // is unknown.

@@ -7,9 +7,9 @@
 use crate::capture::Capture;
 use std::fmt;
 
-/// Limits of the comparison. [`Bars::STRICT`] unless a script has a reason for others.
+/// Limits of the comparison. [`Limits::STRICT`] unless a script has a reason for others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bars {
+pub(crate) struct Limits {
     /// Fraction of the pixels where only one of the images shows a surface.
     pub(crate) silhouette: f64,
     /// Limit in ulps of the window depth, away from edges, for all but [`ROUNDED`] of these pixels.
@@ -23,9 +23,9 @@ pub(crate) struct Bars {
     pub(crate) color_strays: f64,
 }
 
-impl Bars {
+impl Limits {
     /// The limits for the bridge.
-    pub(crate) const STRICT: Bars = Bars {
+    pub(crate) const STRICT: Limits = Limits {
         silhouette: 0.0002,
         depth_ulp: 4,
         depth_strays: 0.0005,
@@ -63,7 +63,7 @@ impl fmt::Display for Measured {
         let part = |n: usize| 100.0 * n as f64 / self.pixels as f64;
         write!(
             f,
-            "silhouette {} px ({:.4} %), depth median {} p99 {} worst {} ulp ({} beyond the bar, \
+            "silhouette {} px ({:.4} %), depth median {} p99 {} worst {} ulp ({} beyond the limit, \
              {} far beyond), colour mean {:.3} worst {} ({} far off), {} of {} px away from edges",
             self.silhouette,
             part(self.silhouette),
@@ -117,7 +117,11 @@ fn ulps(a: f32, b: f32) -> u32 {
 }
 
 /// Measures the difference between `ours` and `stock`. An error when they cannot be compared.
-pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Measured, String> {
+pub(crate) fn measure(
+    stock: &Capture,
+    ours: &Capture,
+    limits: &Limits,
+) -> Result<Measured, String> {
     if (stock.width, stock.height) != (ours.width, ours.height) {
         return Err(format!(
             "{} x {} pixels against {} x {}",
@@ -152,8 +156,8 @@ pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Me
     }
     m.color_mean = sum / shown.max(1) as f64;
     m.inner = depths.len();
-    m.depth_beyond = depths.iter().filter(|&&d| d > bars.depth_ulp).count();
-    m.depth_far = depths.iter().filter(|&&d| d > ROUNDING_ULP.max(bars.depth_ulp)).count();
+    m.depth_beyond = depths.iter().filter(|&&d| d > limits.depth_ulp).count();
+    m.depth_far = depths.iter().filter(|&&d| d > ROUNDING_ULP.max(limits.depth_ulp)).count();
     depths.sort_unstable();
     if let Some(&worst) = depths.last() {
         m.depth_median_ulp = depths[depths.len() / 2];
@@ -164,34 +168,34 @@ pub(crate) fn measure(stock: &Capture, ours: &Capture, bars: &Bars) -> Result<Me
 }
 
 /// The limits that are exceeded, one line each; empty when there are none.
-pub(crate) fn faults(stock: &Capture, ours: &Capture, bars: &Bars) -> Vec<String> {
-    let m = match measure(stock, ours, bars) {
+pub(crate) fn faults(stock: &Capture, ours: &Capture, limits: &Limits) -> Vec<String> {
+    let m = match measure(stock, ours, limits) {
         Ok(m) => m,
         Err(fault) => return vec![fault],
     };
     let mut faults = Vec::new();
     let part = |n: usize| n as f64 / m.pixels as f64;
-    if part(m.silhouette) > bars.silhouette {
-        faults.push(format!("silhouette beyond {} %", 100.0 * bars.silhouette));
+    if part(m.silhouette) > limits.silhouette {
+        faults.push(format!("silhouette beyond {} %", 100.0 * limits.silhouette));
     }
     if m.depth_beyond as f64 > ROUNDED * m.inner as f64 {
         faults.push(format!(
             "depth beyond {} ulp in more than {} % away from edges",
-            bars.depth_ulp,
+            limits.depth_ulp,
             100.0 * ROUNDED
         ));
     }
-    if part(m.depth_far) > bars.depth_strays {
+    if part(m.depth_far) > limits.depth_strays {
         faults.push(format!(
             "depth beyond {ROUNDING_ULP} ulp in more than {} %",
-            100.0 * bars.depth_strays
+            100.0 * limits.depth_strays
         ));
     }
-    if m.color_mean > bars.color_mean {
-        faults.push(format!("colour mean beyond {}", bars.color_mean));
+    if m.color_mean > limits.color_mean {
+        faults.push(format!("colour mean beyond {}", limits.color_mean));
     }
-    if part(m.color_strays) > bars.color_strays {
-        faults.push(format!("colours far off in more than {} %", 100.0 * bars.color_strays));
+    if part(m.color_strays) > limits.color_strays {
+        faults.push(format!("colours far off in more than {} %", 100.0 * limits.color_strays));
     }
     if stock.facts != ours.facts {
         faults.push(format!(
@@ -229,11 +233,11 @@ mod tests {
     fn change(edit: impl FnOnce(&mut Capture)) -> Vec<String> {
         let (stock, mut ours) = (disk(), disk());
         edit(&mut ours);
-        faults(&stock, &ours, &Bars::STRICT)
+        faults(&stock, &ours, &Limits::STRICT)
     }
 
     #[test]
-    fn a_picture_passes_against_itself() {
+    fn an_image_passes_against_itself() {
         assert_eq!(change(|_| ()), Vec::<String>::new());
     }
 

@@ -36,12 +36,12 @@ fn rays(picture: &Capture, kind: &str) -> u64 {
 }
 
 #[test]
-fn without_options_no_effect_runs_and_the_picture_is_stock() {
+fn without_options_no_effect_runs_and_the_image_is_stock() {
     let (Some([room, _]), Some([stock, _])) = (plain(), pictures(With::Stock, "stock", &[])) else {
         return;
     };
-    let bars = crate::compare::Bars::STRICT;
-    assert_eq!(crate::compare::faults(&stock, &room, &bars), Vec::<String>::new());
+    let limits = crate::compare::Limits::STRICT;
+    assert_eq!(crate::compare::faults(&stock, &room, &limits), Vec::<String>::new());
     for kind in ["shadow", "ambient occlusion", "reflection", "refraction"] {
         assert_eq!(rays(&room, kind), 0, "{kind}");
     }

@@ -2,7 +2,7 @@
 //! and the options of the view's panel change the image.
 
 use crate::capture::{Capture, bright};
-use crate::compare::{Bars, faults};
+use crate::compare::{Limits, faults};
 use crate::peers::{find, scripts, skip};
 use crate::session::{Launch, Program, With, installed, output};
 
@@ -59,5 +59,5 @@ fn options_of_the_panel_change_what_paraviews_window_shows() {
     );
     assert!(back.rgb == plain.rgb, "switched off again, the picture is another");
     assert_eq!(off.traced_elements(), 0, "without ray tracing everything is OpenGL's");
-    assert_eq!(faults(&off, &plain, &Bars::STRICT), Vec::<String>::new());
+    assert_eq!(faults(&off, &plain, &Limits::STRICT), Vec::<String>::new());
 }

@@ -2,7 +2,7 @@
 //! `VTK_AUTOLOAD_PATH`, and its options are set as a user sets them.
 
 use crate::capture::{Capture, bright};
-use crate::compare::{Bars, faults};
+use crate::compare::{Limits, faults};
 use crate::peers::{pvbatch, scripts, skip};
 use crate::session::{Launch, Program, Run, With, installed, interpreter, output};
 use std::path::PathBuf;
@@ -68,13 +68,13 @@ fn names_are_those_of_ospray_where_there_is_one() {
 }
 
 #[test]
-fn the_plugin_alone_traces_and_the_picture_is_stock() {
+fn the_plugin_alone_traces_and_the_image_is_stock() {
     let (Some(plain), Some(off)) = (picture("plain"), picture("off")) else { return };
     assert!(plain.traced_elements() > 0, "{:?}", plain.report);
     assert_eq!(off.traced_elements(), 0, "EnableRayTracing=0 must leave everything to OpenGL");
     let mut off = off;
     off.facts = plain.facts.clone();
-    assert_eq!(faults(&off, &plain, &Bars::STRICT), Vec::<String>::new());
+    assert_eq!(faults(&off, &plain, &Limits::STRICT), Vec::<String>::new());
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn options_go_back_and_views_do_not_share_them() {
     };
     let mut back = back;
     back.facts = plain.facts.clone();
-    assert_eq!(faults(&plain, &back, &Bars::STRICT), Vec::<String>::new());
+    assert_eq!(faults(&plain, &back, &Limits::STRICT), Vec::<String>::new());
     assert_eq!(other.facts["shadows"], 0);
 }
 

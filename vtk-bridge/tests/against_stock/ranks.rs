@@ -37,16 +37,16 @@ fn run(
 /// Number of pixels that differ by more than `levels` of 255 from the pixel at the same position in
 /// the other image and from all its neighbours. Edges may therefore be one pixel off; all other
 /// differences count.
-fn strangers(a: &Capture, b: &Capture, levels: u8) -> usize {
+fn unmatched_pixels(a: &Capture, b: &Capture, levels: u8) -> usize {
     let (w, h) = (a.width, a.height);
     assert_eq!((w, h), (b.width, b.height));
     let near = |p: [u8; 3], q: [u8; 3]| (0..3).all(|c| p[c].abs_diff(q[c]) <= levels);
-    let strange = |a: &Capture, b: &Capture, x: usize, y: usize| {
+    let unmatched = |a: &Capture, b: &Capture, x: usize, y: usize| {
         let around = (y.saturating_sub(1)..(y + 2).min(h))
             .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(w)).map(move |u| v * w + u));
         !around.into_iter().any(|i| near(a.rgb[y * w + x], b.rgb[i]))
     };
-    (0..w * h).filter(|i| strange(a, b, i % w, i / w) || strange(b, a, i % w, i / w)).count()
+    (0..w * h).filter(|i| unmatched(a, b, i % w, i / w) || unmatched(b, a, i % w, i / w)).count()
 }
 
 /// Number of pixels that differ by more than 1 of 255 at the same position.
@@ -61,7 +61,7 @@ fn difference(a: &Capture, b: &Capture) -> f64 {
 }
 
 #[test]
-fn pictures_do_not_depend_on_the_number_of_ranks() {
+fn images_do_not_depend_on_the_number_of_ranks() {
     let start = |n: usize| run(n, With::Bridge, &format!("ranks-{n}"), &[]);
     let (one, outcome) = match start(1) {
         Ok(run) => run,
@@ -74,14 +74,14 @@ fn pictures_do_not_depend_on_the_number_of_ranks() {
         let outcome = outcome.expect_success(&format!("{ranks} ranks"));
         for name in ["opaque", "translucent", "mixed", "annotated"] {
             let [a, b] = [&one, &folder].map(|f| Capture::read(f, name).unwrap());
-            let (strange, different) = (strangers(&a, &b, 1), different(&a, &b));
+            let (unmatched, different) = (unmatched_pixels(&a, &b, 1), different(&a, &b));
             let pixels = a.width * a.height;
             // OpenGL draws lines and text of the axes, which also move by a pixel in stock
             // ParaView.
             let allowed = if name == "annotated" { pixels / 2000 } else { pixels / 5000 };
-            if strange > allowed || different * 200 > pixels {
+            if unmatched > allowed || different * 200 > pixels {
                 found.push(format!(
-                    "{ranks} ranks, {name}: {strange} of {pixels} pixels are not within 1/255 \
+                    "{ranks} ranks, {name}: {unmatched} of {pixels} pixels are not within 1/255 \
                      edges aside, {different} are not within 1 at their place"
                 ));
             }
@@ -110,11 +110,11 @@ fn one_rank_with_the_bridge_is_as_stock() {
     for name in ["opaque", "translucent", "mixed", "annotated"] {
         let [a, b] = [&stock, &ours].map(|f| Capture::read(f, name).unwrap());
         // OpenGL stores peeled layers of translucent surfaces as bytes.
-        let strange = strangers(&a, &b, if name == "opaque" { 1 } else { 3 });
+        let unmatched = unmatched_pixels(&a, &b, if name == "opaque" { 1 } else { 3 });
         let (mean, pixels) = (difference(&a, &b), a.width * a.height);
         assert!(
-            strange * 5000 <= pixels && mean <= 0.5,
-            "{name}: {strange} of {pixels} pixels are not as in stock ParaView, mean difference \
+            unmatched * 5000 <= pixels && mean <= 0.5,
+            "{name}: {unmatched} of {pixels} pixels are not as in stock ParaView, mean difference \
              {mean}"
         );
     }
@@ -128,13 +128,13 @@ fn effects_across_ranks_are_warned_about() {
         Err(reason) => return skip(&reason),
     };
     let outcome = outcome.expect_success("two ranks with ambient occlusion");
-    let told = outcome.stderr.lines().any(|l| l.contains("vtk-bridge") && l.contains("rank"));
-    assert!(told, "no warning that secondary rays see only one rank's data:\n{}", outcome.stderr);
+    let warned = outcome.stderr.lines().any(|l| l.contains("vtk-bridge") && l.contains("rank"));
+    assert!(warned, "no warning that secondary rays see only one rank's data:\n{}", outcome.stderr);
 }
 
 #[test]
 fn planted_differences_between_ranks_are_noticed() {
-    let picture = |edit: &dyn Fn(usize, usize) -> [u8; 3]| Capture {
+    let image = |edit: &dyn Fn(usize, usize) -> [u8; 3]| Capture {
         width: 60,
         height: 40,
         rgb: (0..2400).map(|i| edit(i % 60, i / 60)).collect(),
@@ -143,10 +143,10 @@ fn planted_differences_between_ranks_are_noticed() {
         report: None,
     };
     let plain = |x: usize, _: usize| if x < 30 { [200, 40, 40] } else { [40, 40, (60 + x) as u8] };
-    let (a, moved) = (picture(&plain), picture(&|x, y| plain(x + 1, y)));
-    assert_eq!(strangers(&a, &a, 1), 0);
-    assert_eq!(strangers(&a, &moved, 1), 0, "an edge may lie one pixel beside");
-    let seam = picture(&|x, y| if x == 12 { [190, 40, 40] } else { plain(x, y) });
-    assert_eq!(strangers(&a, &seam, 1), 40, "a seam of one pixel is a fault");
+    let (a, moved) = (image(&plain), image(&|x, y| plain(x + 1, y)));
+    assert_eq!(unmatched_pixels(&a, &a, 1), 0);
+    assert_eq!(unmatched_pixels(&a, &moved, 1), 0, "an edge may lie one pixel beside");
+    let seam = image(&|x, y| if x == 12 { [190, 40, 40] } else { plain(x, y) });
+    assert_eq!(unmatched_pixels(&a, &seam, 1), 40, "a seam of one pixel is a fault");
     assert!(different(&a, &moved) > 0);
 }

@@ -1,10 +1,10 @@
 //! Compares all images of a script rendered with and without the bridge.
 
-use crate::compare::{Bars, faults};
+use crate::compare::{Limits, faults};
 use crate::session::Run;
 
 /// An image (script, name) with its own limits, or without limits, and the reason.
-pub(crate) type Exception = (&'static str, &'static str, Option<Bars>, &'static str);
+pub(crate) type Exception = (&'static str, &'static str, Option<Limits>, &'static str);
 
 /// Differences in our images of `script`, one line each. The images in `untraced` contain nothing
 /// to trace.
@@ -28,10 +28,11 @@ pub(crate) fn differences(
             found.push(format!("{}: nothing was ray traced: {:?}", path.display(), b.report));
         }
         let exception = exceptions.iter().copied().flatten().find(|(s, p, ..)| (*s, *p) == place);
-        let Some(bars) = exception.map_or(Some(Bars::STRICT), |(_, _, bars, _)| *bars) else {
+        let Some(limits) = exception.map_or(Some(Limits::STRICT), |(_, _, limits, _)| *limits)
+        else {
             continue;
         };
-        found.extend(faults(&a, &b, &bars).iter().map(|f| format!("{}: {f}", path.display())));
+        found.extend(faults(&a, &b, &limits).iter().map(|f| format!("{}: {f}", path.display())));
     }
     found
 }

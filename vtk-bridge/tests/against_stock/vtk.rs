@@ -1,7 +1,7 @@
 //! The same unmodified scripts in Debian's VTK 9.1, without and with the bridge.
 
 use crate::capture::Capture;
-use crate::compare::{Bars, faults};
+use crate::compare::{Limits, faults};
 use crate::peers::skip;
 use crate::scripts::{Exception, differences};
 use crate::session::{Program, Run, With, output, scripts_in};
@@ -30,11 +30,11 @@ fn both() -> Option<&'static Both> {
 }
 
 /// Limits for shaded volumes.
-const SHADED: Bars = Bars { color_mean: 1.5, ..Bars::STRICT };
+const SHADED: Limits = Limits { color_mean: 1.5, ..Limits::STRICT };
 /// Limits for volumes with gradient opacity.
-const STEEP: Bars = Bars { color_mean: 2.5, color_strays: 0.002, ..Bars::STRICT };
+const GRADIENT_OPACITY: Limits = Limits { color_mean: 2.5, color_strays: 0.002, ..Limits::STRICT };
 /// Limits for isosurfaces of volumes.
-const GRAZED: Bars = Bars { color_strays: 0.005, ..SHADED };
+const ISOSURFACES: Limits = Limits { color_strays: 0.005, ..SHADED };
 
 const LEFT_BEHIND: &str = "OpenGL's light does not follow a turned volume; ours does \
                            (`turning_a_volume_or_camera_and_light_is_the_same`)";
@@ -44,15 +44,15 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
         "volume_blends",
         "gradient_opacity",
-        Some(STEEP),
+        Some(GRADIENT_OPACITY),
         "OpenGL takes differences over a twentieth more than the distance of points, and half of \
          them at the bounds",
     ),
-    ("volume_blends", "gradient_opacity_shaded", Some(STEEP), "as gradient opacity"),
+    ("volume_blends", "gradient_opacity_shaded", Some(GRADIENT_OPACITY), "as gradient opacity"),
     (
         "edges",
         "edges",
-        Some(Bars { depth_strays: 0.003, ..Bars::STRICT }),
+        Some(Limits { depth_strays: 0.003, ..Limits::STRICT }),
         "where moved triangles overlap inside a surface, OpenGL shows the one in front, we the one \
          that the ray meets",
     ),
@@ -66,7 +66,7 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
         "projections",
         "sheared",
-        Some(Bars { color_mean: 255.0, color_strays: 1.0, ..Bars::STRICT }),
+        Some(Limits { color_mean: 255.0, color_strays: 1.0, ..Limits::STRICT }),
         "OpenGL shades in sheared coordinates, where right angles are none: its light is wrong",
     ),
     (
@@ -79,10 +79,10 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
         "volume_blends",
         "isosurfaces",
-        Some(GRAZED),
+        Some(ISOSURFACES),
         "OpenGL's steps pass by where a ray only grazes a surface",
     ),
-    ("volume_blends", "isosurfaces_shaded", Some(GRAZED), "as isosurfaces and shaded volumes"),
+    ("volume_blends", "isosurfaces_shaded", Some(ISOSURFACES), "as isosurfaces and shaded volumes"),
     ("volume_lights", "three", Some(SHADED), "as shaded volumes"),
     ("volume_lights", "one_beside", Some(SHADED), "as shaded volumes"),
     ("volume_lights", "colored_headlight", Some(SHADED), "as shaded volumes"),
@@ -94,20 +94,20 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     (
         "volumes",
         "translucent_inside",
-        Some(Bars { color_mean: 3.0, color_strays: 0.2, ..Bars::STRICT }),
+        Some(Limits { color_mean: 3.0, color_strays: 0.2, ..Limits::STRICT }),
         "OpenGL blends volumes over all translucent surfaces, also over those in front of them and \
          inside",
     ),
     (
         "windows",
         "one_pixel",
-        Some(Bars { color_mean: 1.0, ..Bars::STRICT }),
+        Some(Limits { color_mean: 1.0, ..Limits::STRICT }),
         "one level of one pixel is more than half a level",
     ),
     (
         "textures",
         "transparent",
-        Some(Bars { silhouette: 1.0, depth_ulp: u32::MAX, ..Bars::STRICT }),
+        Some(Limits { silhouette: 1.0, depth_ulp: u32::MAX, ..Limits::STRICT }),
         "OpenGL writes no depth for a surface with a translucent texture; we write it where the \
          texture is opaque",
     ),
@@ -135,7 +135,7 @@ macro_rules! scripts {
 }
 
 scripts! {
-    annotations_stay_opengl_in_the_same_picture: "annotations",
+    annotations_stay_opengl_in_the_same_image: "annotations",
     back_faces_are_as_in_stock_vtk: "backfaces",
     data_that_changes_is_drawn_as_it_is_now: "changing",
     clipping_planes_cut_as_in_stock_vtk: "clipping",
@@ -191,18 +191,22 @@ fn stock_against_stock_passes_and_planted_faults_do_not() {
     };
     for (script, name) in [("contours", "turned"), ("contours", "flat"), ("opacity", "opacity")] {
         let [stock, second] = [&first, &again].map(|r| r.capture(script, name).unwrap());
-        assert_eq!(faults(&stock, &second, &Bars::STRICT), Vec::<String>::new(), "{script}/{name}");
+        assert_eq!(
+            faults(&stock, &second, &Limits::STRICT),
+            Vec::<String>::new(),
+            "{script}/{name}"
+        );
         let mut shifted = second.clone();
         shifted.rgb.rotate_right(1);
         shifted.depth.rotate_right(1);
         assert!(
-            !faults(&stock, &shifted, &Bars::STRICT).is_empty(),
+            !faults(&stock, &shifted, &Limits::STRICT).is_empty(),
             "{script}/{name}: a shift by a pixel passed"
         );
         let mut brighter = second.clone();
         brighter.rgb.iter_mut().flatten().for_each(|c| *c = c.saturating_add(2));
         assert!(
-            !faults(&stock, &brighter, &Bars::STRICT).is_empty(),
+            !faults(&stock, &brighter, &Limits::STRICT).is_empty(),
             "{script}/{name}: two of 255 brighter passed"
         );
     }
@@ -222,15 +226,15 @@ fn one_bad_point_costs_only_its_own_triangles() {
 /// OpenGL's own images differ in the last digit between sizes. Ours must show the same scene at
 /// every size.
 #[test]
-fn size_and_place_do_not_change_our_picture() {
+fn size_and_position_do_not_change_our_image() {
     let Some(both) = both() else { return };
     let names = both.ours.pictures("domains").unwrap();
     let reference = both.ours.capture("domains", "size_1_at_0").unwrap();
     for name in names {
         let other = both.ours.capture("domains", &name).unwrap();
         // At 1e9 the corners of a sphere of size 1 are rounded to 1e-7.
-        let bars = Bars { depth_ulp: 40, ..Bars::STRICT };
-        let found = faults(&reference, &other, &bars);
+        let limits = Limits { depth_ulp: 40, ..Limits::STRICT };
+        let found = faults(&reference, &other, &limits);
         assert!(found.is_empty(), "{name}: {found:?}");
     }
 }
@@ -243,9 +247,9 @@ fn turning_a_volume_or_camera_and_light_is_the_same() {
     let [volume, camera] = pictures.map(|p| both.ours.capture("volume_lights", p).unwrap());
     let [stock_volume, stock_camera] =
         pictures.map(|p| both.stock.capture("volume_lights", p).unwrap());
-    let bars = Bars { color_mean: 0.05, ..Bars::STRICT };
-    assert_eq!(faults(&volume, &camera, &bars), Vec::<String>::new());
-    let stock_differs = faults(&stock_volume, &stock_camera, &Bars { color_mean: 5.0, ..SHADED });
+    let limits = Limits { color_mean: 0.05, ..Limits::STRICT };
+    assert_eq!(faults(&volume, &camera, &limits), Vec::<String>::new());
+    let stock_differs = faults(&stock_volume, &stock_camera, &Limits { color_mean: 5.0, ..SHADED });
     assert!(!stock_differs.is_empty(), "stock VTK's light follows now: hold turned volumes to it");
 }
 

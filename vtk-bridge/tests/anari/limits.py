@@ -27,7 +27,7 @@ def parameters(d, kind, subtype):
     return found
 
 
-def picture_is_finite(d, f, why):
+def image_is_finite(d, f, why):
     p = draw(d, f)
     assert p is None or np.isfinite(p).all(), why
 
@@ -60,14 +60,14 @@ def numbers_that_are_none_are_named_and_never_reach_a_pixel(d):
             if name == "background" and not np.isfinite(v):
                 draw(d, f)  # The program's own colour fills uncovered pixels.
             else:
-                picture_is_finite(d, f, f"{subtype} {name} {v}")
+                image_is_finite(d, f, f"{subtype} {name} {v}")
             o.release()
     said(d, "`roughness` is NaN", "warning")
     said(d, "light `directional`: its strength is NaN", "error")
     said(d, "camera `perspective`: the frame is not drawn", "error")
 
 
-def pictures_do_not_depend_on_the_unit_of_length(d):
+def images_do_not_depend_on_the_unit_of_length(d):
     def scene(s):
         points, triangles, _, normals = scenes.grid_mesh()
         g = d.new("Geometry", "triangle", vertex__position=d.array(FLOAT32_VEC3, (points * s).astype(F)), primitive__index=d.array(UINT32_VEC3, triangles),
@@ -128,7 +128,7 @@ def what_moves_is_refused_by_name(d):
     for subtype in ("motionTransform", "motionScaleRotationTranslation"):
         i = d.new("Instance", subtype, group=group)
         said(d, f"there is no instance `{subtype}`; this device has [\"transform\"]", "error")
-        picture_is_finite(d, scenes.view(d, dict(instance=[i])), subtype)
+        image_is_finite(d, scenes.view(d, dict(instance=[i])), subtype)
     for kind, subtype in (("SpatialField", "unstructured"), ("SpatialField", "nanovdb"), ("Camera", "stereo"), ("Volume", "scivis"), ("Sampler", "compressedImage2D")):
         d.new(kind, subtype)
         said(d, f"`{subtype}`; this device has", "error")
@@ -150,10 +150,10 @@ def arrays_of_wrong_elements_and_lengths_are_named(d):
     g.set("vertex.tangent", ARRAY1D, d.array(FLOAT32_VEC3, F([[np.nan, 0, 0]]))).commit()
     bend = d.new("Sampler", "image2D", image=d.array(FLOAT32_VEC3, F([[[np.nan, 1, 0]]]), 2))
     m = d.new("Material", "physicallyBased", normal=bend, metallic="attribute3", roughness="attribute2")
-    picture_is_finite(d, ball(d, ambient=1.0).put(world=d.new("World", surface=scenes.surface(d, g, m), light=[scenes.directional(d)])), "short arrays")
+    image_is_finite(d, ball(d, ambient=1.0).put(world=d.new("World", surface=scenes.surface(d, g, m), light=[scenes.directional(d)])), "short arrays")
     said(d, "`vertex.normal` has 1 elements, 4 are needed", "warning")
     bad = d.new("Material", "physicallyBased", emissive="colour")
-    picture_is_finite(d, ball(d, material=bad), "an attribute that is none")
+    image_is_finite(d, ball(d, material=bad), "an attribute that is none")
     said(d, "`emissive` is \"colour\", which is no attribute", "error")
 
 
@@ -226,7 +226,7 @@ def any_value_of_any_parameter_is_survived(d):
 if __name__ == "__main__":
     failed = 0
     for name, test in list(globals().items()):
-        helpers = ("parameters", "picture_is_finite", "draw_again", "random_value")
+        helpers = ("parameters", "image_is_finite", "draw_again", "random_value")
         if callable(test) and getattr(test, "__module__", "") == "__main__" and name not in helpers and name != "Entry":
             d = Device("rtv")
             try:

@@ -98,14 +98,14 @@ def rows_begin_at_the_bottom(d):
     assert p[10, 50, 0] > 0.4 and p[90, 50, 0] < 0.2, "a camera above the ball sees it below"
 
 
-def image_region_is_a_part_of_the_picture(d):
+def image_region_is_a_part_of_the_image(d):
     f = ball(d, light=scenes.directional(d))
     whole = draw(d, f.put(size=(202, 202)))
     c = d.new("Camera", "orthographic", position=[0.0, 0.0, 10.0], direction=[0.0, 0.0, -1.0], up=[0.0, 1.0, 0.0], height=2.02, aspect=1.0, imageRegion=[0.5, 0.0, 1.0, 0.5])
     close(draw(d, f.put(size=(101, 101), camera=c)), whole[:101, 101:], 1e-4)
 
 
-def background_pictures_fill_what_is_free(d):
+def background_images_fill_what_is_free(d):
     image = d.array(FLOAT32_VEC4, F([[[1, 0, 0, 1], [0, 1, 0, 1]], [[0, 0, 1, 1], [1, 1, 1, 1]]]), 2)
     f = ball(d, ambient=1.0)
     r = d.new("Renderer", "default", background=image, ambientRadiance=1.0)
@@ -220,7 +220,7 @@ def parameters_take_effect_when_they_are_committed(d):
     close(draw(d, f)[50, 50, :3], [0.8] * 3)
 
 
-def changed_arrays_change_the_picture_when_unmapped(d):
+def changed_arrays_change_the_image_when_unmapped(d):
     points = d.array(FLOAT32_VEC3, F([[0, 0, 0]]))
     g = d.new("Geometry", "sphere", vertex__position=points, radius=0.5)
     s = d.new("Surface", geometry=g, material=d.new("Material", "matte"))

@@ -63,7 +63,7 @@ def metallic_roughness_and_specular_are_the_material_with_those_numbers(d):
     close(draw(d, f.put(world=world)), expected, 1e-5)
 
 
-def one_picture_serves_several_channels_through_transforms(d):
+def one_image_serves_several_channels_through_transforms(d):
     """Channels as glTF packs them: occlusion in red, roughness in green, metalness in blue."""
     packed = d.array(UFIXED8_VEC3, np.uint8([[[255, 102, 204]]]), 2)
 
@@ -107,7 +107,7 @@ def normal_maps_bend_along_tangents_or_along_their_own_coordinates(d):
     assert any("`normal` is left out on geometry `sphere`" in t for _, t in d.messages), d.messages
 
 
-def pictures_end_at_their_border(d):
+def images_end_at_their_border(d):
     texels = d.array(FLOAT32_VEC4, F([[[1, 0, 0, 1], [0, 1, 0, 1]], [[0, 0, 1, 1], [1, 1, 0, 1]]]), 2)
     uv = d.array(FLOAT32_VEC2, F(UNIT * 2 - 0.5))
     s = d.new("Sampler", "image2D", image=texels, filter="nearest", wrapMode1="clampToBorder", wrapMode2="clampToEdge", borderColor=[0.25, 0.5, 0.75, 1.0])

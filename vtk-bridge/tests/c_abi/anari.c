@@ -90,7 +90,7 @@ static void set_object(H o, const char* name, uint32_t type, H value)
 }
 
 /* Sets an object as a parameter and releases it. */
-static void give(H o, const char* name, uint32_t type, H value)
+static void set_and_release(H o, const char* name, uint32_t type, H value)
 {
   set_object(o, name, type, value);
   anariRelease(device, value);
@@ -116,8 +116,8 @@ static H surface(H geometry, H material)
   anariCommitParameters(device, geometry);
   anariCommitParameters(device, material);
   H s = anariNewSurface(device);
-  give(s, "geometry", GEOMETRY, geometry);
-  give(s, "material", MATERIAL, material);
+  set_and_release(s, "geometry", GEOMETRY, geometry);
+  set_and_release(s, "material", MATERIAL, material);
   anariCommitParameters(device, s);
   return s;
 }
@@ -126,7 +126,7 @@ static H round_thing(const char* subtype)
 {
   const float points[][3] = { { -0.5f, 0, 0.2f }, { 0.4f, 0.3f, 0.1f } };
   H g = anariNewGeometry(device, subtype);
-  give(g, "vertex.position", ARRAY1D, array(FLOAT32_VEC3, points, sizeof points, 2, 0, 0));
+  set_and_release(g, "vertex.position", ARRAY1D, array(FLOAT32_VEC3, points, sizeof points, 2, 0, 0));
   number(g, "radius", 0.2f);
   return g;
 }
@@ -135,7 +135,7 @@ static H sampler(const char* subtype, const char* attribute)
 {
   const unsigned char texels[4][4] = { { 128, 128, 255, 255 }, { 200, 128, 220, 255 }, { 128, 60, 200, 255 }, { 150, 128, 250, 255 } };
   H s = anariNewSampler(device, subtype);
-  give(s, "image", ARRAY2D, array(UFIXED8_VEC4, texels, sizeof texels, 2, 2, 0));
+  set_and_release(s, "image", ARRAY2D, array(UFIXED8_VEC4, texels, sizeof texels, 2, 2, 0));
   text(s, "inAttribute", attribute);
   text(s, "wrapMode1", "clampToBorder");
   anariCommitParameters(device, s);
@@ -148,9 +148,9 @@ static H sheet(void)
   const float uv[][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 } };
   const uint32_t index[][3] = { { 0, 1, 2 }, { 0, 2, 3 }, { 0, 2, 77 } };
   H g = anariNewGeometry(device, "triangle");
-  give(g, "vertex.position", ARRAY1D, array(FLOAT32_VEC3, points, sizeof points, 4, 0, 0));
-  give(g, "vertex.attribute0", ARRAY1D, array(FLOAT32_VEC2, uv, sizeof uv, 4, 0, 0));
-  give(g, "primitive.index", ARRAY1D, array(UINT32_VEC3, index, sizeof index, 3, 0, 0));
+  set_and_release(g, "vertex.position", ARRAY1D, array(FLOAT32_VEC3, points, sizeof points, 4, 0, 0));
+  set_and_release(g, "vertex.attribute0", ARRAY1D, array(FLOAT32_VEC2, uv, sizeof uv, 4, 0, 0));
+  set_and_release(g, "primitive.index", ARRAY1D, array(UINT32_VEC3, index, sizeof index, 3, 0, 0));
   return g;
 }
 
@@ -160,7 +160,7 @@ static H pictured(void)
   const char* channels[] = { "baseColor", "metallic", "roughness", "normal", "emissive", "occlusion", "opacity" };
   for (int i = 0; i < 7; ++i)
   {
-    give(m, channels[i], SAMPLER, sampler("image2D", i == 6 ? "worldPosition" : "attribute0"));
+    set_and_release(m, channels[i], SAMPLER, sampler("image2D", i == 6 ? "worldPosition" : "attribute0"));
   }
   text(m, "alphaMode", "blend");
   return m;
@@ -175,12 +175,12 @@ static H volume(void)
   }
   const float colors[][4] = { { 1, 0, 0, 0 }, { 0, 1, 1, 0.6f } };
   H f = anariNewSpatialField(device, "structuredRegular");
-  give(f, "data", ARRAY3D, array(FLOAT32, data, sizeof data, 3, 3, 3));
+  set_and_release(f, "data", ARRAY3D, array(FLOAT32, data, sizeof data, 3, 3, 3));
   text(f, "filter", "nearest");
   anariCommitParameters(device, f);
   H v = anariNewVolume(device, "transferFunction1D");
-  give(v, "value", SPATIAL_FIELD, f);
-  give(v, "color", ARRAY1D, array(FLOAT32_VEC4, colors, sizeof colors, 2, 0, 0));
+  set_and_release(v, "value", SPATIAL_FIELD, f);
+  set_and_release(v, "color", ARRAY1D, array(FLOAT32_VEC4, colors, sizeof colors, 2, 0, 0));
   anariCommitParameters(device, v);
   return v;
 }
@@ -189,10 +189,10 @@ static H isosurface(void)
 {
   const float data[8] = { 0, 1, 0, 1, 0, 1, 1, 1 };
   H f = anariNewSpatialField(device, "structuredRegular");
-  give(f, "data", ARRAY3D, array(FLOAT32, data, sizeof data, 2, 2, 2));
+  set_and_release(f, "data", ARRAY3D, array(FLOAT32, data, sizeof data, 2, 2, 2));
   anariCommitParameters(device, f);
   H g = anariNewGeometry(device, "isosurface");
-  give(g, "field", SPATIAL_FIELD, f);
+  set_and_release(g, "field", SPATIAL_FIELD, f);
   number(g, "isovalue", 0.5f);
   return g;
 }
@@ -214,9 +214,9 @@ static H world(void)
     anariCommitParameters(device, lights[i]);
   }
   H group = anariNewGroup(device);
-  give(group, "surface", ARRAY1D, list(SURFACE, surfaces, 7));
-  give(group, "volume", ARRAY1D, list(VOLUME, volumes, 1));
-  give(group, "light", ARRAY1D, list(LIGHT, lights, 5));
+  set_and_release(group, "surface", ARRAY1D, list(SURFACE, surfaces, 7));
+  set_and_release(group, "volume", ARRAY1D, list(VOLUME, volumes, 1));
+  set_and_release(group, "light", ARRAY1D, list(LIGHT, lights, 5));
   anariCommitParameters(device, group);
   const float matrix[16] = { 0.9f, 0, 0, 0, 0, 0.9f, 0, 0, 0, 0, 0.9f, 0, 0.1f, 0, 0, 1 };
   H instances[] = { anariNewInstance(device, "transform"), anariNewInstance(device, "motionTransform") };
@@ -227,7 +227,7 @@ static H world(void)
     anariCommitParameters(device, instances[i]);
   }
   H w = anariNewWorld(device);
-  give(w, "instance", ARRAY1D, list(INSTANCE, instances, 2));
+  set_and_release(w, "instance", ARRAY1D, list(INSTANCE, instances, 2));
   anariCommitParameters(device, w);
   for (int i = 0; i < 7; ++i)
   {
@@ -258,8 +258,8 @@ static int draw(H w, const char* camera_type, const char* renderer_type)
   anariCommitParameters(device, renderer);
   H frame = anariNewFrame(device);
   set_object(frame, "world", WORLD, w);
-  give(frame, "camera", CAMERA, camera);
-  give(frame, "renderer", RENDERER, renderer);
+  set_and_release(frame, "camera", CAMERA, camera);
+  set_and_release(frame, "renderer", RENDERER, renderer);
   anariSetParameter(device, frame, "size", UINT32_VEC2, size);
   const char* names[] = { "channel.color", "channel.depth", "channel.normal", "channel.albedo", "channel.objectId" };
   const uint32_t types[] = { UFIXED8_VEC4, FLOAT32, FLOAT32_VEC3, FLOAT32_VEC3, UINT32 };
@@ -323,7 +323,7 @@ static void misuse(void)
   free(shared);
   H s = surface(g, anariNewMaterial(device, "matte"));
   H w = anariNewWorld(device);
-  give(w, "surface", ARRAY1D, list(SURFACE, &s, 1));
+  set_and_release(w, "surface", ARRAY1D, list(SURFACE, &s, 1));
   anariRelease(device, s);
   anariCommitParameters(device, w);
   if (draw(w, "orthographic", "default") < 10)

@@ -78,7 +78,7 @@ vtkSmartPointer<Array> Filled(const std::vector<int64_t>& values)
 }
 
 template <class Array>
-void Whole(const char* name)
+void IdsFrom(const char* name)
 {
   RtvKeep keep;
   RtvArray out = {};
@@ -108,20 +108,20 @@ void Polygons(vtkCellArray* cells, const char* name)
 int main()
 {
   // ---- Arrays alone.
-  Whole<vtkIntArray>("int");
-  Whole<vtkLongArray>("long");
-  Whole<vtkLongLongArray>("long long");
-  Whole<vtkIdTypeArray>("vtkIdType");
-  Whole<vtkShortArray>("short");
-  Whole<vtkSignedCharArray>("signed char");
-  Whole<vtkUnsignedCharArray>("unsigned char");
-  Whole<vtkUnsignedShortArray>("unsigned short");
-  Whole<vtkUnsignedIntArray>("unsigned int");
-  Whole<vtkUnsignedLongLongArray>("unsigned long long");
-  Whole<vtkFloatArray>("float");
-  Whole<vtkDoubleArray>("double");
-  Whole<vtkSOADataArrayTemplate<int>>("int, an array per component");
-  Whole<vtkSOADataArrayTemplate<long long>>("long long, an array per component");
+  IdsFrom<vtkIntArray>("int");
+  IdsFrom<vtkLongArray>("long");
+  IdsFrom<vtkLongLongArray>("long long");
+  IdsFrom<vtkIdTypeArray>("vtkIdType");
+  IdsFrom<vtkShortArray>("short");
+  IdsFrom<vtkSignedCharArray>("signed char");
+  IdsFrom<vtkUnsignedCharArray>("unsigned char");
+  IdsFrom<vtkUnsignedShortArray>("unsigned short");
+  IdsFrom<vtkUnsignedIntArray>("unsigned int");
+  IdsFrom<vtkUnsignedLongLongArray>("unsigned long long");
+  IdsFrom<vtkFloatArray>("float");
+  IdsFrom<vtkDoubleArray>("double");
+  IdsFrom<vtkSOADataArrayTemplate<int>>("int, an array per component");
+  IdsFrom<vtkSOADataArrayTemplate<long long>>("long long, an array per component");
   {
     RtvKeep keep;
     RtvArray out = {};
