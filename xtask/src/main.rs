@@ -19,7 +19,8 @@ Set-up and checks of the workspace.
 
 cargo xtask test [--require-peers] [--no-install] [--only NAME,...]
     Installs what is missing (see `setup`), then runs every check and every test.
-    Without peers the tests that need them say so and pass; the summary repeats what was not run.
+    Without peers, the tests that need them print a note and pass; the summary lists what was not \
+    run.
       --require-peers   a missing peer is an error, and no test may skip itself (what CI uses)
       --no-install      install nothing; use what is there
       --only NAME,...   run only these steps (names as in `ci-list`)
@@ -27,7 +28,7 @@ cargo xtask test [--require-peers] [--no-install] [--only NAME,...]
 cargo xtask setup
     Installs the peers: Debian packages with apt-get (as root or through sudo), Python wheels in \
     target/peers/venv.
-    Where it may not install, it says what it would have installed.
+    Without permission to install, prints what it would install.
 
 cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
     Builds vtk-bridge from this checkout and installs it for the VTK and ParaView of this machine; \
@@ -38,7 +39,7 @@ cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
       --prefix FOLDER, --include FOLDER, --plugin    as of `vtk-bridge install`
 
 cargo xtask book
-    Writes the tables and plots that the book quotes anew from the records in bench/runs.
+    Updates the tables and plots of the book from the records in bench/runs.
 
 cargo xtask ci-list
     Prints the steps and their commands without running them.

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_build_folder_is_the_one_that_cargo_is_told() {
+    fn the_build_folder_is_the_configured_one() {
         let root = Path::new("/r");
         assert_eq!(build_folder(root, None), Path::new("/r/target"));
         assert_eq!(build_folder(root, Some("b".into())), Path::new("/r/b"));
