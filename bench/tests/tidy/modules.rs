@@ -9,7 +9,7 @@ use crate::tree::{File, files, words};
 
 /// Number of imports between the modules of a folder that are part of a cycle. Code that two
 /// modules need from each other belongs into a third.
-const CIRCLES: &[(&str, usize)] = &[
+const CYCLES: &[(&str, usize)] = &[
     ("composite/src", 4),
     ("datasets/src/model", 2),
     ("datasets/src/read", 2),
@@ -172,7 +172,7 @@ fn is_for_tests(modules: &Modules<'_>, module: &[&str]) -> bool {
 }
 
 /// The imports of a member that are part of a cycle: the folder, and the import with its place.
-fn circles(member: &str, files: &[File]) -> Vec<(String, String)> {
+fn import_cycles(member: &str, files: &[File]) -> Vec<(String, String)> {
     let source = format!("{member}/src/");
     let mut modules: Modules<'_> = files
         .iter()
@@ -202,9 +202,10 @@ fn modules_of_a_folder_import_in_one_direction() {
         .map(File::member)
         .collect();
     assert!(members.len() > 7, "{members:?}");
-    let found: Vec<(String, String)> = members.iter().flat_map(|m| circles(m, &all)).collect();
-    let faults = exceptions("CIRCLES", CIRCLES, &found);
-    assert!(faults.is_empty(), "modules import each other in a circle\n{}", faults.join("\n"));
+    let found: Vec<(String, String)> =
+        members.iter().flat_map(|m| import_cycles(m, &all)).collect();
+    let faults = exceptions("CYCLES", CYCLES, &found);
+    assert!(faults.is_empty(), "modules import each other in a cycle\n{}", faults.join("\n"));
 }
 
 #[test]
@@ -216,10 +217,10 @@ fn planted_imports_are_read() {
 }
 
 #[test]
-fn planted_circles_are_found() {
+fn planted_cycles_are_found() {
     let found = |files: &[(&str, &str)]| {
         let files: Vec<File> = files.iter().map(|(path, text)| File::new(path, text)).collect();
-        circles("m", &files).into_iter().map(|(folder, _)| folder).collect::<Vec<_>>()
+        import_cycles("m", &files).into_iter().map(|(folder, _)| folder).collect::<Vec<_>>()
     };
     let (lib, b) = (("m/src/lib.rs", "use crate::a::A;"), ("m/src/b.rs", "use crate::c::C;"));
     let inner = ("m/src/a/inner.rs", "use crate::b::B;");
