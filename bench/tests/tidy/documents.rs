@@ -229,7 +229,7 @@ fn planted_untested_invariants_are_found() {
 #[test]
 fn architecture_names_every_room() {
     let page = document("ARCHITECTURE.md").text;
-    for (room, _) in crate::sources::UNSAFE_ROOMS {
+    for (room, _) in crate::sources::UNSAFE_MODULES {
         assert!(
             page.contains(&format!("`{room}`")),
             "ARCHITECTURE.md does not say why {room} needs `unsafe`"

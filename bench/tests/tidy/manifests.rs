@@ -15,7 +15,7 @@ enum May {
 }
 
 /// The allowed dependencies of ARCHITECTURE.md. A new line here is a decision; record it there.
-const ARROWS: &[(&str, May, &[&str])] = &[
+const ALLOWED_DEPENDENCIES: &[(&str, May, &[&str])] = &[
     ("rt-core", May::Use, &[]),
     ("datasets", May::Use, &["rt-core"]),
     ("schlieren", May::Use, &["rt-core", "datasets"]),
@@ -28,7 +28,7 @@ const ARROWS: &[(&str, May, &[&str])] = &[
 
 /// A dependency of one member on another.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Arrow {
+pub(crate) struct Dependency {
     from: String,
     to: String,
     /// Whether the dependency is optional, or for tests only.
@@ -36,7 +36,7 @@ pub(crate) struct Arrow {
 }
 
 /// The members with their dependencies on each other, according to cargo.
-pub(crate) fn members() -> BTreeMap<String, Vec<Arrow>> {
+pub(crate) fn members() -> BTreeMap<String, Vec<Dependency>> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
         .current_dir(root())
@@ -47,7 +47,7 @@ pub(crate) fn members() -> BTreeMap<String, Vec<Arrow>> {
         serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON");
     let packages = metadata["packages"].as_array().expect("packages");
     let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_owned();
-    let arrow = |from: &str, d: &serde_json::Value| Arrow {
+    let dependency = |from: &str, d: &serde_json::Value| Dependency {
         from: from.to_owned(),
         to: text(&d["name"]),
         weak: d["optional"] == true || d["kind"] == "dev",
@@ -58,52 +58,62 @@ pub(crate) fn members() -> BTreeMap<String, Vec<Arrow>> {
         .map(|p| {
             let name = text(&p["name"]);
             let dependencies = p["dependencies"].as_array().expect("dependencies");
-            let arrows = dependencies.iter().filter(own).map(|d| arrow(&name, d)).collect();
-            (name, arrows)
+            let own_dependencies =
+                dependencies.iter().filter(own).map(|d| dependency(&name, d)).collect();
+            (name, own_dependencies)
         })
         .collect()
 }
 
-fn fault(arrow: &Arrow) -> Option<String> {
-    let Arrow { from, to, weak } = arrow;
-    let rules =
-        || ARROWS.iter().filter(|(f, _, targets)| f == from && targets.contains(&to.as_str()));
+fn fault(dependency: &Dependency) -> Option<String> {
+    let Dependency { from, to, weak } = dependency;
+    let rules = || {
+        ALLOWED_DEPENDENCIES
+            .iter()
+            .filter(|(f, _, targets)| f == from && targets.contains(&to.as_str()))
+    };
     if rules().any(|(_, may, _)| *may == May::Use || *weak) {
         return None;
     }
     Some(match rules().next() {
         Some(_) => format!("{from} may use {to} only behind a feature (`optional = true`)"),
-        None => format!("{from} may not use {to}: ARCHITECTURE.md has no such arrow"),
+        None => format!("{from} may not use {to}: ARCHITECTURE.md does not allow it"),
     })
 }
 
 #[test]
-fn arrows_point_down() {
+fn dependencies_point_down() {
     let members = members();
-    let known: Vec<&str> = ARROWS.iter().map(|(f, ..)| *f).collect();
+    let known: Vec<&str> = ALLOWED_DEPENDENCIES.iter().map(|(f, ..)| *f).collect();
     for name in members.keys() {
         assert!(
             known.contains(&name.as_str()),
-            "member {name} has no line in ARROWS and none in ARCHITECTURE.md"
+            "member {name} has no line in ALLOWED_DEPENDENCIES and none in ARCHITECTURE.md"
         );
     }
     let faults: Vec<_> = members.values().flatten().filter_map(fault).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
-    assert!(members["bench"].iter().any(|a| a.to == "rt-core"), "bench's arrows were not read");
+    assert!(
+        members["bench"].iter().any(|a| a.to == "rt-core"),
+        "bench's dependencies were not read"
+    );
 }
 
 #[test]
-fn planted_arrows_are_found() {
-    let arrow =
-        |from: &str, to: &str, weak| Arrow { from: from.to_owned(), to: to.to_owned(), weak };
+fn planted_dependencies_are_found() {
+    let dependency =
+        |from: &str, to: &str, weak| Dependency { from: from.to_owned(), to: to.to_owned(), weak };
     assert!(
-        fault(&arrow("rt-core", "datasets", false)).is_some_and(|f| f.contains("no such arrow"))
+        fault(&dependency("rt-core", "datasets", false))
+            .is_some_and(|f| f.contains("does not allow"))
     );
-    assert!(fault(&arrow("rt-core", "datasets", true)).is_some(), "not even in its tests");
-    assert!(fault(&arrow("datasets", "bench", true)).is_some(), "nothing depends on bench");
-    assert!(fault(&arrow("composite", "rt-core", false)).is_some_and(|f| f.contains("feature")));
-    assert_eq!(fault(&arrow("composite", "rt-core", true)), None);
-    assert_eq!(fault(&arrow("gluray", "composite", false)), None);
+    assert!(fault(&dependency("rt-core", "datasets", true)).is_some(), "not even in its tests");
+    assert!(fault(&dependency("datasets", "bench", true)).is_some(), "nothing depends on bench");
+    assert!(
+        fault(&dependency("composite", "rt-core", false)).is_some_and(|f| f.contains("feature"))
+    );
+    assert_eq!(fault(&dependency("composite", "rt-core", true)), None);
+    assert_eq!(fault(&dependency("gluray", "composite", false)), None);
 }
 
 // ---- Versions, lints and licences are defined once, in the root ---------------------------------

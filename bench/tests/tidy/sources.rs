@@ -4,7 +4,7 @@ use crate::tree::{File, files, words};
 
 /// The only places where `unsafe` is allowed, and why it cannot be avoided there. ARCHITECTURE.md
 /// explains each.
-pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
+pub(crate) const UNSAFE_MODULES: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
     ("gluray/src/interpose/symbols", "exported OpenGL symbols, called by programs we do not know"),
     ("gluray/src/interpose/driver", "calls into the real OpenGL library"),
@@ -19,7 +19,7 @@ pub(crate) const UNSAFE_ROOMS: &[(&str, &str)] = &[
     ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
     (
         "composite/src/icet",
-        "calls into IceT, found at run time; a measurement against a rival is a call into it",
+        "calls into IceT, found at run time; a comparison with IceT is a call into it",
     ),
     ("bench/src/baselines", "calls into C libraries that we measure against"),
 ];
@@ -41,19 +41,21 @@ fn assert_none(faults: &[String]) {
 }
 
 // ---- unsafe -------------------------------------------------------------------------------------
-fn in_a_room(path: &str) -> bool {
-    UNSAFE_ROOMS.iter().any(|(room, _)| {
-        path.strip_prefix(room)
+fn may_be_unsafe(path: &str) -> bool {
+    UNSAFE_MODULES.iter().any(|(module, _)| {
+        path.strip_prefix(module)
             .is_some_and(|rest| rest.is_empty() || rest.starts_with('/') || rest == ".rs")
     })
 }
 
 fn unsafe_outside(file: &File) -> Vec<String> {
-    if in_a_room(&file.path) {
+    if may_be_unsafe(&file.path) {
         return vec![];
     }
     let places = words(&file.code, "unsafe").map(|at| file.place(at));
-    places.map(|p| format!("{p}: `unsafe` outside the rooms that ARCHITECTURE.md lists")).collect()
+    places
+        .map(|p| format!("{p}: `unsafe` outside the modules that ARCHITECTURE.md lists"))
+        .collect()
 }
 
 fn unguarded_root(file: &File) -> Vec<String> {
@@ -63,16 +65,16 @@ fn unguarded_root(file: &File) -> Vec<String> {
     if !is_root || file.member() == "xtask" || file.code.contains("#![forbid(unsafe_code)]") {
         return vec![];
     }
-    let has_room =
-        UNSAFE_ROOMS.iter().any(|(room, _)| room.starts_with(&format!("{}/", file.member())));
-    match has_room && file.code.contains("#![deny(unsafe_code)]") {
+    let has_unsafe_module =
+        UNSAFE_MODULES.iter().any(|(module, _)| module.starts_with(&format!("{}/", file.member())));
+    match has_unsafe_module && file.code.contains("#![deny(unsafe_code)]") {
         true => vec![],
         false => vec![format!("{}: begin with `#![forbid(unsafe_code)]`", file.path)],
     }
 }
 
 #[test]
-fn unsafe_stays_in_its_rooms() {
+fn unsafe_stays_in_its_modules() {
     assert_none(&all_faults(unsafe_outside));
     assert_none(&all_faults(unguarded_root));
 }
@@ -89,12 +91,12 @@ fn planted_unsafe_is_found() {
     assert_eq!(
         faults("rt-core/src/simd_tables.rs", "unsafe { g() }").len(),
         1,
-        "a room is not a prefix"
+        "a module is not a prefix"
     );
     assert_eq!(
         faults("datasets/src/lib.rs", "#![deny(unsafe_code)]").len(),
         1,
-        "no room, so forbid"
+        "no unsafe module, so forbid"
     );
     assert_eq!(faults("bench/src/lib.rs", "#![deny(unsafe_code)]"), Vec::<String>::new());
     assert_eq!(
