@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_in_one_corner_is_shared_by_all_ranks() {
+    fn an_image_in_one_corner_is_shared_by_all_ranks() {
         // One rank draws everything and the others in a corner of a tenth of it.
         let all = Rect::of_size(1000, 1000);
         let corner = Rect { x0: 900, y0: 900, x1: 1000, y1: 1000 };

@@ -62,7 +62,7 @@ fn off(a: &str, b: &str) -> usize {
 }
 
 #[test]
-fn a_fault_in_any_function_that_programs_call_leaves_them_the_drivers_pictures_and_errors() {
+fn a_fault_in_any_function_that_programs_call_leaves_them_the_drivers_images_and_errors() {
     let Some(python) = peer("RTSV_SYSTEM_PYTHON") else { return };
     let Some(x) = Xvfb::start() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/faults.py");

@@ -239,7 +239,7 @@ fn a_lens_blurs_what_is_out_of_focus_and_is_refused_by_name_without_perspective(
 }
 
 #[test]
-fn a_setting_that_changes_nothing_in_the_mode_is_told_by_name() {
+fn a_setting_that_changes_nothing_in_the_mode_is_reported_by_name() {
     let options = ["--mode", "match", "--set", "material.mirror=0.5"];
     let Some((_, report)) = draw("plain", Some(&options)) else { return };
     let told =
@@ -278,7 +278,7 @@ fn a_shader_that_bends_positions_is_the_drivers_and_named() {
 }
 
 #[test]
-fn a_fault_of_ours_leaves_the_program_the_drivers_picture_and_is_logged() {
+fn a_fault_of_ours_leaves_the_program_the_drivers_image_and_is_logged() {
     let Some(python) = peer("RTSV_SYSTEM_PYTHON") else { return };
     let Some(x) = Xvfb::start() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/hard_cases.py");

@@ -80,7 +80,7 @@ fn a_change_on_the_page_reaches_the_program_and_ends_with_the_panel() {
 }
 
 #[test]
-fn strangers_other_hosts_and_other_sites_are_told_nothing() {
+fn unknown_clients_other_hosts_and_other_sites_get_no_answer() {
     let p = Panel::start();
     let own = format!("Host: {}\r\n", p.address);
     let port = p.address.split(':').next_back().unwrap();

@@ -145,7 +145,7 @@ fn program(variable: &str) -> Option<PathBuf> {
 }
 
 #[test]
-fn gmsh_draws_the_drivers_picture() {
+fn gmsh_draws_the_drivers_image() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
     let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=768; General.GraphicsHeight=768; \
                  General.MenuWidth=0;\nGeneral.Trackball=0; \
@@ -163,7 +163,7 @@ fn gmsh_draws_the_drivers_picture() {
 }
 
 #[test]
-fn geomview_draws_the_drivers_picture() {
+fn geomview_draws_the_drivers_image() {
     let Some(geomview) = program("RTSV_GEOMVIEW") else { return };
     let lines = "(load s.off)\n(window c0 {size 768 768})\n(bbox-draw g1 no)\n(backcolor c0 0.1 \
                  0.1 0.2)\n(normalization g1 none)\n\
@@ -183,7 +183,7 @@ fn geomview_draws_the_drivers_picture() {
 }
 
 #[test]
-fn openscad_draws_the_drivers_picture() {
+fn openscad_draws_the_drivers_image() {
     let Some(openscad) = program("RTSV_OPENSCAD") else { return };
     let scene = "$fn=32;\ndifference(){ sphere(r=20); cylinder(r=8,h=50,center=true); \
                  }\ntranslate([30,0,0]) cube([10,20,30],center=true);\n";
@@ -196,7 +196,7 @@ fn openscad_draws_the_drivers_picture() {
 }
 
 #[test]
-fn octave_draws_the_drivers_picture() {
+fn octave_draws_the_drivers_image() {
     let Some(octave) = program("RTSV_OCTAVE") else { return };
     let file = script("octave.m");
     let arguments = ["--no-gui", "--quiet", "--no-init-file", file.as_str()];
@@ -207,7 +207,7 @@ fn octave_draws_the_drivers_picture() {
 }
 
 #[test]
-fn pymol_without_shaders_draws_the_drivers_picture() {
+fn pymol_without_shaders_draws_the_drivers_image() {
     let Some(pymol) = program("RTSV_PYMOL") else { return };
     let lines = "set internal_gui, 0\nfragment trp\nviewport 768,768\nhide everything\nshow \
                  sticks\nshow spheres\nset use_shaders, 0\n\
@@ -220,7 +220,7 @@ fn pymol_without_shaders_draws_the_drivers_picture() {
 }
 
 #[test]
-fn paraview_draws_the_drivers_picture() {
+fn paraview_draws_the_drivers_image() {
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
     let file = script("paraview_scene.py");
     // Corresponds to three of its four frames, without the lines, which the driver draws.
@@ -230,7 +230,7 @@ fn paraview_draws_the_drivers_picture() {
 }
 
 #[test]
-fn vtk_in_python_draws_the_drivers_picture() {
+fn vtk_in_python_draws_the_drivers_image() {
     let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else {
         return;
     };
@@ -272,7 +272,7 @@ fn assert_peeled(report: &Report) {
 }
 
 #[test]
-fn translucent_surfaces_that_vtk_peels_are_traced_in_one_go_and_are_the_drivers_picture() {
+fn translucent_surfaces_that_vtk_peels_are_traced_in_one_pass_and_give_the_drivers_image() {
     let (Some(python), Some(_)) = (program("RTSV_SYSTEM_PYTHON"), program("RTSV_PVBATCH")) else {
         return;
     };
@@ -285,10 +285,10 @@ fn translucent_surfaces_that_vtk_peels_are_traced_in_one_go_and_are_the_drivers_
 }
 
 #[test]
-fn paraviews_translucent_contours_are_traced_in_one_go_and_are_the_drivers_picture() {
+fn paraviews_translucent_contours_are_traced_in_one_pass_and_give_the_drivers_image() {
     let Some(pvbatch) = program("RTSV_PVBATCH") else { return };
     let file = script("paraview_translucent.py");
-    // As in `paraview_draws_the_drivers_picture`.
+    // As in `paraview_draws_the_drivers_image`.
     if let Some((m, report)) =
         both(&pvbatch, &[file.as_str()], "out.png", share(0.41, 0.72), |_| ())
     {
@@ -317,7 +317,7 @@ fn lines_among_translucent_surfaces_leave_the_whole_peeling_to_the_driver() {
 }
 
 #[test]
-fn vtk_by_egl_draws_the_drivers_picture() {
+fn vtk_by_egl_draws_the_drivers_image() {
     let (Some(python), Some(_)) = (program("RTSV_PYTHON"), program("RTSV_XVFB")) else { return };
     let file = script("egl_scene.py");
     if let Some((m, _)) = both(&python, &[file.as_str()], "out.png", ALL, |_| ()) {
@@ -458,7 +458,7 @@ fn surfaces_that_are_moved_back_for_lines_are_the_drivers() {
 }
 
 /// All surfaces of scenes with textures are traced in both VTKs.
-fn pictures(kinds: &[&[&str]], least: u64) {
+fn textures(kinds: &[&[&str]], least: u64) {
     for report in scenes(kinds, true, least) {
         let passed: Vec<_> =
             report.passed_reasons.keys().filter(|why| why.contains("picture")).collect();
@@ -467,33 +467,33 @@ fn pictures(kinds: &[&[&str]], least: u64) {
 }
 
 #[test]
-fn pictures_on_surfaces_are_the_drivers() {
-    pictures(&[&["pictures"], &["pictures", "4"], &["pictures_under_lamps"]], 4);
+fn textures_on_surfaces_are_the_drivers() {
+    textures(&[&["pictures"], &["pictures", "4"], &["pictures_under_lamps"]], 4);
 }
 
 #[test]
-fn pictures_over_colours_have_coordinates_of_their_own() {
-    pictures(&[&["pictures_over_colors"]], 4);
+fn textures_over_colours_have_coordinates_of_their_own() {
+    textures(&[&["pictures_over_colors"]], 4);
 }
 
 #[test]
-fn pictures_made_smaller_are_the_drivers() {
-    pictures(&[&["pictures_smaller"]], 2);
+fn minified_textures_are_the_drivers() {
+    textures(&[&["pictures_smaller"]], 2);
 }
 
 #[test]
-fn pictures_that_let_something_through_are_summed_up_with_other_layers() {
-    pictures(&[&["translucent_pictures"]], 5);
+fn translucent_textures_are_blended_with_other_layers() {
+    textures(&[&["translucent_pictures"]], 5);
 }
 
 #[test]
-fn colours_of_physically_based_materials_come_from_pictures() {
-    pictures(&[&["physical_pictures"]], 4);
+fn colours_of_physically_based_materials_come_from_textures() {
+    textures(&[&["physical_pictures"]], 4);
 }
 
 #[test]
-fn slices_of_images_are_pictures_on_planes() {
-    pictures(&[&["images"]], 4);
+fn slices_of_images_are_textures_on_planes() {
+    textures(&[&["images"]], 4);
 }
 
 #[test]

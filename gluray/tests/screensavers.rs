@@ -42,7 +42,7 @@ fn clock(place: &Path) -> PathBuf {
 }
 
 #[test]
-fn screensavers_draw_the_drivers_pictures() {
+fn screensavers_draw_the_drivers_images() {
     let (Some(gears), Some(_)) = (peer("RTSV_XSCREENSAVER"), peer("RTSV_XSCREENSAVER_EXTRA"))
     else {
         return;

@@ -43,7 +43,7 @@ fn a_thread_without_a_context_does_nothing_to_the_primitive_of_another() {
 }
 
 #[test]
-fn contexts_that_threads_make_current_in_turns_keep_their_own_pictures() {
+fn contexts_that_threads_make_current_in_turns_keep_their_own_images() {
     draw("contexts_made_current_in_turns");
     draw_with("contexts_made_current_in_turns", &["--via", "preload"]);
 }

@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn libraries_are_told_apart_by_what_they_call_themselves() {
+    fn libraries_are_distinguished_by_their_version_strings() {
         let open = "Open MPI v4.1.4, package: Debian OpenMPI, ident: 4.1.4, repo rev: v4.1.4, May \
                     26, 2022";
         assert_eq!(Abi::of_version(open).ok(), Some(Abi::OpenMpi));

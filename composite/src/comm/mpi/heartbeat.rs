@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rank_that_asked_is_told_of_new_steps_once() {
+    fn a_rank_that_asked_is_notified_of_new_steps_once() {
         let mut heartbeats = Heartbeats::new(2, 3);
         heartbeats.requested_by(0);
         heartbeats.requested_by(0);

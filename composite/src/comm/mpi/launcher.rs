@@ -92,10 +92,10 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_that_is_not_utf_8_is_a_wish() {
+    fn a_library_name_that_is_not_utf_8_is_used() {
         use std::os::unix::ffi::OsStringExt as _;
-        let wish = text(OsString::from_vec(b"/opt/m\xffi.so".to_vec()));
-        let choice = with(&[(CHOICE_VARIABLE, &wish)]).unwrap();
+        let library = text(OsString::from_vec(b"/opt/m\xffi.so".to_vec()));
+        let choice = with(&[(CHOICE_VARIABLE, &library)]).unwrap();
         assert_eq!(choice.libraries, ["/opt/m\u{fffd}i.so"]);
     }
 

@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_said_can_be_read_until_the_next_meeting_but_one() {
+    fn gathered_messages_stay_readable_during_the_next_collective() {
         let nodes = three();
         for number in 0..5_u8 {
             for node in &nodes {
