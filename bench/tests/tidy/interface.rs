@@ -92,7 +92,7 @@ fn is_offered(path: &str) -> bool {
 }
 
 #[test]
-fn planted_items_are_told_from_what_is_shown() {
+fn planted_items_are_distinguished_from_what_is_shown() {
     let source = "//! `Kept` and\n//! ```\n//! shown_here();\n//! ```\npub struct A<T>(T);\n\
                   pub const fn b() {}\npub const C_1: u8 = 0;\npub mod m;\npub(crate) fn d() {}\n\
                   impl A {\n    pub fn e() {}\n}\n// pub fn f() {}\n";

@@ -278,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edges_follow_the_version_of_vtk_unless_told_otherwise() {
+    fn edges_follow_the_version_of_vtk_unless_set() {
         let of = |major: u64, minor: u64| {
             host_options(major << 32 | minor).map(|(name, value)| format!("{name}={value}"))
         };

@@ -133,7 +133,7 @@ fn a_frame_through_the_c_abi() {
 }
 
 #[test]
-fn nothing_to_draw_gives_an_empty_picture() {
+fn nothing_to_draw_gives_an_empty_image() {
     assert_eq!(frame(&surface(&[], &[], &[])), (0, 1));
 }
 
@@ -179,7 +179,7 @@ fn point_numbers_that_do_not_exist_draw_nothing() {
 }
 
 #[test]
-fn sizes_that_cannot_be_drawn_are_told_and_left_to_opengl() {
+fn sizes_that_cannot_be_drawn_are_reported_and_left_to_opengl() {
     let bridge = rtv_new();
     let mut picture = NO_PICTURE;
     // SAFETY: as in `frame`.

@@ -25,11 +25,11 @@ impl Capture {
     /// Reads `NAME.png` and the files that belong to it in the same folder.
     pub(crate) fn read(folder: &Path, name: &str) -> Result<Capture, String> {
         let file = |extension: &str| folder.join(format!("{name}.{extension}"));
-        let picture = image::open(file("png"))
+        let decoded = image::open(file("png"))
             .map_err(|e| format!("{}: {e}", file("png").display()))?
             .into_rgb8();
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
-        let rows = picture.as_raw().chunks_exact(3 * width).rev();
+        let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+        let rows = decoded.as_raw().chunks_exact(3 * width).rev();
         let rgb = rows.flat_map(|row| row.chunks_exact(3).map(|p| [p[0], p[1], p[2]])).collect();
         let depth =
             if file("npy").is_file() { read_npy(&file("npy"), width * height)? } else { vec![] };

@@ -10,7 +10,7 @@ use std::sync::{Mutex, OnceLock};
 type Pictures = Result<[Capture; 2], String>;
 
 /// The images of `scripts/effects` with some variables set. Each combination is rendered once.
-fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option<[Capture; 2]> {
+fn images(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option<[Capture; 2]> {
     static MADE: OnceLock<Mutex<BTreeMap<&str, Pictures>>> = OnceLock::new();
     let made = MADE.get_or_init(Mutex::default);
     let mut made = made.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -19,7 +19,7 @@ fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option
         let run =
             Run::new(Program::Vtk, with, &scripts, output(&format!("effects-{name}")), settings)?;
         for script in ["room", "ball"] {
-            run.pictures(script)?;
+            run.images(script)?;
         }
         Ok([run.capture("room", "room")?, run.capture("ball", "ball")?])
     });
@@ -27,17 +27,17 @@ fn pictures(with: With, name: &'static str, settings: &[(&str, &str)]) -> Option
 }
 
 fn plain() -> Option<[Capture; 2]> {
-    pictures(With::Bridge, "plain", &[])
+    images(With::Bridge, "plain", &[])
 }
 
-fn rays(picture: &Capture, kind: &str) -> u64 {
-    let lists = picture.renderers().iter().filter_map(|r| r["rays"].as_array());
+fn rays(image: &Capture, kind: &str) -> u64 {
+    let lists = image.renderers().iter().filter_map(|r| r["rays"].as_array());
     lists.flatten().filter(|r| r[0] == kind).filter_map(|r| r[1].as_u64()).sum()
 }
 
 #[test]
 fn without_options_no_effect_runs_and_the_image_is_stock() {
-    let (Some([room, _]), Some([stock, _])) = (plain(), pictures(With::Stock, "stock", &[])) else {
+    let (Some([room, _]), Some([stock, _])) = (plain(), images(With::Stock, "stock", &[])) else {
         return;
     };
     let limits = crate::compare::Limits::STRICT;
@@ -50,7 +50,7 @@ fn without_options_no_effect_runs_and_the_image_is_stock() {
 #[test]
 fn off_leaves_everything_to_opengl() {
     let (Some(off), Some(stock)) =
-        (pictures(With::Bridge, "off", &[("RTV_OFF", "1")]), pictures(With::Stock, "stock", &[]))
+        (images(With::Bridge, "off", &[("RTV_OFF", "1")]), images(With::Stock, "stock", &[]))
     else {
         return;
     };
@@ -66,7 +66,7 @@ fn off_leaves_everything_to_opengl() {
 #[test]
 fn shadows_fall_where_the_light_does_not_reach() {
     let (Some([plain, _]), Some([shadows, _])) =
-        (plain(), pictures(With::Bridge, "shadows", &[("RTV_SHADOWS", "1")]))
+        (plain(), images(With::Bridge, "shadows", &[("RTV_SHADOWS", "1")]))
     else {
         return;
     };
@@ -82,10 +82,9 @@ fn shadows_fall_where_the_light_does_not_reach() {
 
 #[test]
 fn large_lights_soften_the_shadow_s_edge() {
-    let hard = pictures(With::Bridge, "shadows", &[("RTV_SHADOWS", "1")]);
+    let hard = images(With::Bridge, "shadows", &[("RTV_SHADOWS", "1")]);
     let settings = [("RTV_SHADOWS", "1"), ("RTV_LIGHT_SIZE", "6"), ("RTV_SAMPLES", "16")];
-    let (Some([hard, _]), Some([soft, _])) = (hard, pictures(With::Bridge, "soft", &settings))
-    else {
+    let (Some([hard, _]), Some([soft, _])) = (hard, images(With::Bridge, "soft", &settings)) else {
         return;
     };
     // Floor pixels between light and shadow.
@@ -111,14 +110,13 @@ fn large_lights_soften_the_shadow_s_edge() {
 #[test]
 fn ambient_occlusion_darkens_concave_corners_only() {
     let settings = [("RTV_AO", "64"), ("RTV_AO_RADIUS", "1")];
-    let (Some([plain, _]), Some([occluded, _])) =
-        (plain(), pictures(With::Bridge, "ao", &settings))
+    let (Some([plain, _]), Some([occluded, _])) = (plain(), images(With::Bridge, "ao", &settings))
     else {
         return;
     };
     assert!(rays(&occluded, "ambient occlusion") > 0);
     let none = [("RTV_AO", "64"), ("RTV_AO_RADIUS", "0.001")];
-    let Some([unoccluded, _]) = pictures(With::Bridge, "ao-short", &none) else { return };
+    let Some([unoccluded, _]) = images(With::Bridge, "ao-short", &none) else { return };
     let ratio = |place: &str| bright(occluded.at(place)) / bright(unoccluded.at(place));
     let (concave, convex, open) = (ratio("concave"), ratio("convex"), ratio("open"));
     assert!(concave < 0.9, "where box and floor meet: {concave}");
@@ -131,7 +129,7 @@ fn ambient_occlusion_darkens_concave_corners_only() {
 fn mirrors_show_what_stands_on_them() {
     let (Some([plain, _]), Some([mirror, _])) = (
         plain(),
-        pictures(With::Bridge, "mirror", &[("RTV_MIRROR", "0.5"), ("RTV_REFLECTIONS", "1")]),
+        images(With::Bridge, "mirror", &[("RTV_MIRROR", "0.5"), ("RTV_REFLECTIONS", "1")]),
     ) else {
         return;
     };
@@ -152,7 +150,7 @@ fn mirrors_show_what_stands_on_them() {
 #[test]
 fn glass_turns_the_background_upside_down() {
     let (Some([_, plain]), Some([_, glass])) =
-        (plain(), pictures(With::Bridge, "glass", &[("RTV_MATERIAL", "glass")]))
+        (plain(), images(With::Bridge, "glass", &[("RTV_MATERIAL", "glass")]))
     else {
         return;
     };
@@ -178,8 +176,8 @@ fn glass_turns_the_background_upside_down() {
 #[test]
 fn depth_of_field_blurs_what_is_not_in_focus() {
     let settings = [("RTV_APERTURE", "0.15"), ("RTV_SAMPLES", "64")];
-    let sharp = pictures(With::Bridge, "sharp", &[("RTV_SAMPLES", "64")]);
-    let (Some([sharp, _]), Some([blurred, _])) = (sharp, pictures(With::Bridge, "lens", &settings))
+    let sharp = images(With::Bridge, "sharp", &[("RTV_SAMPLES", "64")]);
+    let (Some([sharp, _]), Some([blurred, _])) = (sharp, images(With::Bridge, "lens", &settings))
     else {
         return;
     };
@@ -197,7 +195,7 @@ fn depth_of_field_blurs_what_is_not_in_focus() {
 #[test]
 fn samples_smooth_silhouettes() {
     let (Some([plain, _]), Some([smooth, _])) =
-        (plain(), pictures(With::Bridge, "sharp", &[("RTV_SAMPLES", "64")]))
+        (plain(), images(With::Bridge, "sharp", &[("RTV_SAMPLES", "64")]))
     else {
         return;
     };
@@ -217,7 +215,7 @@ fn samples_smooth_silhouettes() {
 #[test]
 fn paths_carry_color_from_surface_to_surface() {
     let settings = [("RTV_MODE", "path"), ("RTV_SAMPLES", "256"), ("RTV_SHADOWS", "1")];
-    let Some([room, _]) = pictures(With::Bridge, "paths", &settings) else { return };
+    let Some([room, _]) = images(With::Bridge, "paths", &settings) else { return };
     let red_part = |place: &str| room.at(place)[0] / bright(room.at(place));
     assert!(
         red_part("concave") > red_part("open") + 0.03,

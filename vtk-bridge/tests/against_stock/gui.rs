@@ -8,7 +8,7 @@ use crate::session::{Launch, Program, With, installed, output};
 
 /// Runs the script in ParaView's window and returns its images, or the reason why it cannot run
 /// here.
-fn pictures() -> Result<[Capture; 4], String> {
+fn images() -> Result<[Capture; 4], String> {
     let paraview = find("RTSV_PARAVIEW", &["/usr/bin/paraview"])
         .ok_or("paraview, the program with the window, was not found (set RTSV_PARAVIEW)")?;
     let folder = output("gui");
@@ -44,8 +44,8 @@ fn pictures() -> Result<[Capture; 4], String> {
 
 #[test]
 fn options_of_the_panel_change_what_paraviews_window_shows() {
-    let [plain, shadows, back, off] = match pictures() {
-        Ok(pictures) => pictures,
+    let [plain, shadows, back, off] = match images() {
+        Ok(images) => images,
         Err(reason) => return skip(&reason),
     };
     let window = plain.facts["kind"].as_str().unwrap_or_default();
@@ -57,7 +57,7 @@ fn options_of_the_panel_change_what_paraviews_window_shows() {
         shadow < 0.3 && (lit - 1.0).abs() < 0.01,
         "with shadows: {shadow} where one falls, {lit} beside"
     );
-    assert!(back.rgb == plain.rgb, "switched off again, the picture is another");
+    assert!(back.rgb == plain.rgb, "switched off again, the image differs");
     assert_eq!(off.traced_elements(), 0, "without ray tracing everything is OpenGL's");
     assert_eq!(faults(&off, &plain, &Limits::STRICT), Vec::<String>::new());
 }

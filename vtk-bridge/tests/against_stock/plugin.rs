@@ -15,7 +15,7 @@ fn plugin_folder() -> PathBuf {
 }
 
 /// The script's images, rendered once.
-fn pictures() -> Option<&'static Run> {
+fn images() -> Option<&'static Run> {
     static RUN: OnceLock<Result<Run, String>> = OnceLock::new();
     let run = RUN.get_or_init(|| {
         pvbatch().ok_or("pvbatch was not found (set RTSV_PVBATCH)")?;
@@ -38,15 +38,15 @@ fn pictures() -> Option<&'static Run> {
     run.as_ref().map_err(|reason| skip(reason)).ok()
 }
 
-fn picture(name: &str) -> Option<Capture> {
-    let run = pictures()?;
-    run.pictures(SCRIPT).unwrap_or_else(|e| panic!("{e}"));
+fn image(name: &str) -> Option<Capture> {
+    let run = images()?;
+    run.images(SCRIPT).unwrap_or_else(|e| panic!("{e}"));
     Some(run.capture(SCRIPT, name).unwrap_or_else(|e| panic!("{name}: {e}\n{}", run.stderr)))
 }
 
 #[test]
 fn names_are_those_of_ospray_where_there_is_one() {
-    let Some(plain) = picture("plain") else { return };
+    let Some(plain) = image("plain") else { return };
     let names: Vec<&str> =
         plain.facts["names"].as_array().expect("names").iter().filter_map(|n| n.as_str()).collect();
     // As paraview.simple names the properties of a view in a ParaView with OSPRay.
@@ -69,7 +69,7 @@ fn names_are_those_of_ospray_where_there_is_one() {
 
 #[test]
 fn the_plugin_alone_traces_and_the_image_is_stock() {
-    let (Some(plain), Some(off)) = (picture("plain"), picture("off")) else { return };
+    let (Some(plain), Some(off)) = (image("plain"), image("off")) else { return };
     assert!(plain.traced_elements() > 0, "{:?}", plain.report);
     assert_eq!(off.traced_elements(), 0, "EnableRayTracing=0 must leave everything to OpenGL");
     let mut off = off;
@@ -79,9 +79,9 @@ fn the_plugin_alone_traces_and_the_image_is_stock() {
 
 #[test]
 fn the_panel_switches_every_effect() {
-    let Some(plain) = picture("plain") else { return };
+    let Some(plain) = image("plain") else { return };
     let ratio = |name: &str, place: &str| {
-        let other = picture(name).expect("the run is there");
+        let other = image(name).expect("the run is there");
         bright(other.at(place)) / bright(plain.at(place))
     };
     assert!(ratio("shadows", "shadow") < 0.3 && (ratio("shadows", "lit") - 1.0).abs() < 0.01);
@@ -90,7 +90,7 @@ fn the_panel_switches_every_effect() {
         concave < 0.93 * convex,
         "ambient occlusion: where box and floor meet {concave}, on top of the box {convex}"
     );
-    let mirror = picture("mirror").expect("the run is there");
+    let mirror = image("mirror").expect("the run is there");
     // Half of the reflection on the floor in front of the box shows the box, which is red; the rest
     // shows the background, which is blue.
     let redder = |c: &Capture| {
@@ -101,12 +101,12 @@ fn the_panel_switches_every_effect() {
     for (name, kind) in
         [("glass", "refraction"), ("metal", "reflection"), ("transparent", "transparency")]
     {
-        let other = picture(name).expect("the run is there");
+        let other = image(name).expect("the run is there");
         let rays = other.report.clone().unwrap_or_default().to_string();
         assert!(rays.contains(kind), "{name}: no {kind} rays: {rays}");
         assert!(other.rgb != plain.rgb, "{name} changes nothing");
     }
-    let lens = picture("lens").expect("the run is there");
+    let lens = image("lens").expect("the run is there");
     let colors = |c: &Capture| c.rgb.iter().collect::<std::collections::BTreeSet<_>>().len();
     assert!(
         colors(&lens) > colors(&plain) + 40,
@@ -118,8 +118,7 @@ fn the_panel_switches_every_effect() {
 
 #[test]
 fn options_go_back_and_views_do_not_share_them() {
-    let (Some(plain), Some(back), Some(other)) =
-        (picture("plain"), picture("back"), picture("other"))
+    let (Some(plain), Some(back), Some(other)) = (image("plain"), image("back"), image("other"))
     else {
         return;
     };

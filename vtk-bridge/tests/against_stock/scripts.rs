@@ -15,9 +15,9 @@ pub(crate) fn differences(
     exceptions: &[&[Exception]],
     untraced: &[(&str, &str)],
 ) -> Vec<String> {
-    let names = stock.pictures(script).unwrap_or_else(|e| panic!("stock: {e}"));
-    let same = ours.pictures(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
-    assert_eq!(names, same, "{script}: other pictures than stock's");
+    let names = stock.images(script).unwrap_or_else(|e| panic!("stock: {e}"));
+    let same = ours.images(script).unwrap_or_else(|e| panic!("with the bridge: {e}"));
+    assert_eq!(names, same, "{script}: other images than stock's");
     let mut found = Vec::new();
     // ParaView's writer briefly creates a file with this in its name.
     for name in names.iter().filter(|n| !n.contains(".tmp")) {

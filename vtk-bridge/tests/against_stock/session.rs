@@ -238,7 +238,7 @@ impl Run {
     }
 
     /// Names of all images of a script, sorted.
-    pub(crate) fn pictures(&self, script: &str) -> Result<Vec<String>, String> {
+    pub(crate) fn images(&self, script: &str) -> Result<Vec<String>, String> {
         if let Some(how) = self.failed.get(script) {
             return Err(format!("{script}: {how}"));
         }
@@ -250,20 +250,20 @@ impl Run {
         let mut names: Vec<String> = names.collect();
         names.sort();
         if names.is_empty() {
-            Err(format!("{script} saved no picture:\n{}", self.stderr))
+            Err(format!("{script} saved no image:\n{}", self.stderr))
         } else {
             Ok(names)
         }
     }
 
     /// One image of a script.
-    pub(crate) fn capture(&self, script: &str, picture: &str) -> Result<Capture, String> {
-        Capture::read(&self.folder.join(script), picture)
+    pub(crate) fn capture(&self, script: &str, image: &str) -> Result<Capture, String> {
+        Capture::read(&self.folder.join(script), image)
     }
 
     /// The path of an image.
-    pub(crate) fn path(&self, script: &str, picture: &str) -> PathBuf {
-        self.folder.join(script).join(format!("{picture}.png"))
+    pub(crate) fn path(&self, script: &str, image: &str) -> PathBuf {
+        self.folder.join(script).join(format!("{image}.png"))
     }
 }
 

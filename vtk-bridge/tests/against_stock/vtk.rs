@@ -215,12 +215,12 @@ fn stock_against_stock_passes_and_planted_faults_do_not() {
 #[test]
 fn one_bad_point_costs_only_its_own_triangles() {
     let Some(both) = both() else { return };
-    let pictures = ["odd", "not_a_number"].map(|p| both.ours.capture("odd_inputs", p).unwrap());
+    let images = ["odd", "not_a_number"].map(|p| both.ours.capture("odd_inputs", p).unwrap());
     let shown = |c: &Capture| c.depth.iter().filter(|d| **d < 1.0).count();
-    let [whole, torn] = [shown(&pictures[0]), shown(&pictures[1])];
+    let [whole, torn] = [shown(&images[0]), shown(&images[1])];
     assert!(torn > whole / 2, "{torn} of {whole} pixels are left");
-    let told = pictures[1].warnings();
-    assert!(told.iter().any(|w| w.contains("not a number")), "{told:?}");
+    let warnings = images[1].warnings();
+    assert!(warnings.iter().any(|w| w.contains("not a number")), "{warnings:?}");
 }
 
 /// OpenGL's own images differ in the last digit between sizes. Ours must show the same scene at
@@ -228,7 +228,7 @@ fn one_bad_point_costs_only_its_own_triangles() {
 #[test]
 fn size_and_position_do_not_change_our_image() {
     let Some(both) = both() else { return };
-    let names = both.ours.pictures("domains").unwrap();
+    let names = both.ours.images("domains").unwrap();
     let reference = both.ours.capture("domains", "size_1_at_0").unwrap();
     for name in names {
         let other = both.ours.capture("domains", &name).unwrap();
@@ -243,10 +243,10 @@ fn size_and_position_do_not_change_our_image() {
 #[test]
 fn turning_a_volume_or_camera_and_light_is_the_same() {
     let Some(both) = both() else { return };
-    let pictures = ["turned", "camera_turned"];
-    let [volume, camera] = pictures.map(|p| both.ours.capture("volume_lights", p).unwrap());
+    let images = ["turned", "camera_turned"];
+    let [volume, camera] = images.map(|p| both.ours.capture("volume_lights", p).unwrap());
     let [stock_volume, stock_camera] =
-        pictures.map(|p| both.stock.capture("volume_lights", p).unwrap());
+        images.map(|p| both.stock.capture("volume_lights", p).unwrap());
     let limits = Limits { color_mean: 0.05, ..Limits::STRICT };
     assert_eq!(faults(&volume, &camera, &limits), Vec::<String>::new());
     let stock_differs = faults(&stock_volume, &stock_camera, &Limits { color_mean: 5.0, ..SHADED });
@@ -265,18 +265,17 @@ fn what_stays_opengl_is_in_the_report_with_its_reason() {
 #[test]
 fn colors_and_matrices_do_not_rebuild() {
     let Some(both) = both() else { return };
-    let rebuilt = |script: &str, picture: &str| -> u64 {
-        let capture = both.ours.capture(script, picture).unwrap();
+    let rebuilt = |script: &str, image: &str| -> u64 {
+        let capture = both.ours.capture(script, image).unwrap();
         // The last renderer is this script's; renderers of earlier scripts may still exist.
         capture.renderers().last().and_then(|r| r["rebuilt"].as_u64()).expect("a report")
     };
-    for (script, picture) in
-        [("colors", "recolored"), ("changing", "moved"), ("contours", "turned")]
+    for (script, image) in [("colors", "recolored"), ("changing", "moved"), ("contours", "turned")]
     {
         assert_eq!(
-            rebuilt(script, picture),
+            rebuilt(script, image),
             0,
-            "{script}/{picture} built an acceleration structure again"
+            "{script}/{image} built an acceleration structure again"
         );
     }
     assert!(rebuilt("changing", "deformed") > 0, "points that moved must be built again");

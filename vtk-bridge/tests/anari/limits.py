@@ -5,7 +5,7 @@ import traceback
 
 import scenes
 from anari_c import *
-from robust import said
+from robust import expect_message
 from spec import F, ball, close
 
 BAD = [float("nan"), float("inf"), float("-inf"), -1.0, 0.0, 1e38, -1e38, 1e-38]
@@ -62,9 +62,9 @@ def numbers_that_are_none_are_named_and_never_reach_a_pixel(d):
             else:
                 image_is_finite(d, f, f"{subtype} {name} {v}")
             o.release()
-    said(d, "`roughness` is NaN", "warning")
-    said(d, "light `directional`: its strength is NaN", "error")
-    said(d, "camera `perspective`: the frame is not drawn", "error")
+    expect_message(d, "`roughness` is NaN", "warning")
+    expect_message(d, "light `directional`: its strength is NaN", "error")
+    expect_message(d, "camera `perspective`: the frame is not drawn", "error")
 
 
 def images_do_not_depend_on_the_unit_of_length(d):
@@ -116,10 +116,10 @@ def frames_of_no_size_are_refused_and_the_next_one_is_drawn(d):
     f = ball(d, ambient=1.0)
     for size in ((0, 0), (0, 5), (5, 0), (2**20, 2**20)):
         assert draw(d, f.put(size=size)) is None, size
-    said(d, "`size` is [0, 0]; it must be 1 to 65536 each way", "error")
+    expect_message(d, "`size` is [0, 0]; it must be 1 to 65536 each way", "error")
     f.set("size", FLOAT32_VEC2, F([5, 5])).commit()
     assert draw(d, f) is None
-    said(d, "`size` is a FLOAT32_VEC2; it must be UINT32_VEC2", "error")
+    expect_message(d, "`size` is a FLOAT32_VEC2; it must be UINT32_VEC2", "error")
     assert draw(d, f.put(size=(1, 1))).shape == (1, 1, 4)
 
 
@@ -127,34 +127,34 @@ def what_moves_is_refused_by_name(d):
     group = d.new("Group", **scenes.sphere(d))
     for subtype in ("motionTransform", "motionScaleRotationTranslation"):
         i = d.new("Instance", subtype, group=group)
-        said(d, f"there is no instance `{subtype}`; this device has [\"transform\"]", "error")
+        expect_message(d, f"there is no instance `{subtype}`; this device has [\"transform\"]", "error")
         image_is_finite(d, scenes.view(d, dict(instance=[i])), subtype)
     for kind, subtype in (("SpatialField", "unstructured"), ("SpatialField", "nanovdb"), ("Camera", "stereo"), ("Volume", "scivis"), ("Sampler", "compressedImage2D")):
         d.new(kind, subtype)
-        said(d, f"`{subtype}`; this device has", "error")
+        expect_message(d, f"`{subtype}`; this device has", "error")
     for kind, subtype, name in (("Geometry", "triangle", "motion.vertex.position"), ("Camera", "perspective", "shutter"), ("Camera", "perspective", "stereoMode"),
                                 ("Material", "physicallyBased", "clearcoat"), ("Material", "physicallyBased", "specularColor"), ("Material", "physicallyBased", "sheenColor"),
                                 ("Material", "physicallyBased", "iridescence"), ("Material", "physicallyBased", "thickness"), ("Light", "quad", "intensityDistribution"),
                                 ("Light", "ring", "c0"), ("Light", "point", "visible"), ("Renderer", "default", "denoise")):
         d.new(kind, subtype).set(name, FLOAT32, F(1)).commit()
-        said(d, f"`{subtype}`: there is no parameter `{name}` on this device: it changes nothing", "warning")
+        expect_message(d, f"`{subtype}`: there is no parameter `{name}` on this device: it changes nothing", "warning")
     m = d.new("Material", "physicallyBased").set("transmission", SAMPLER, d.new("Sampler", "primitive"))
     m.commit()
-    said(d, "`transmission` is a SAMPLER; it must be FLOAT32: it is ignored", "error")
+    expect_message(d, "`transmission` is a SAMPLER; it must be FLOAT32: it is ignored", "error")
 
 
 def arrays_of_wrong_elements_and_lengths_are_named(d):
     g = d.new("Geometry", "quad", vertex__position=d.array(FLOAT32_VEC3, F([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])), vertex__normal=d.array(FLOAT32_VEC3, F([[0, 0, 1]])))
     g.set("vertex.tangent", ARRAY1D, d.array(FLOAT32_VEC2, F([[1, 0]] * 4))).commit()
-    said(d, "`vertex.tangent` is an array of FLOAT32_VEC2; its elements must be FLOAT32_VEC4", "error")
+    expect_message(d, "`vertex.tangent` is an array of FLOAT32_VEC2; its elements must be FLOAT32_VEC4", "error")
     g.set("vertex.tangent", ARRAY1D, d.array(FLOAT32_VEC3, F([[np.nan, 0, 0]]))).commit()
     bend = d.new("Sampler", "image2D", image=d.array(FLOAT32_VEC3, F([[[np.nan, 1, 0]]]), 2))
     m = d.new("Material", "physicallyBased", normal=bend, metallic="attribute3", roughness="attribute2")
     image_is_finite(d, ball(d, ambient=1.0).put(world=d.new("World", surface=scenes.surface(d, g, m), light=[scenes.directional(d)])), "short arrays")
-    said(d, "`vertex.normal` has 1 elements, 4 are needed", "warning")
+    expect_message(d, "`vertex.normal` has 1 elements, 4 are needed", "warning")
     bad = d.new("Material", "physicallyBased", emissive="colour")
     image_is_finite(d, ball(d, material=bad), "an attribute that is none")
-    said(d, "`emissive` is \"colour\", which is no attribute", "error")
+    expect_message(d, "`emissive` is \"colour\", which is no attribute", "error")
 
 
 def random_value(d, r, kind):

@@ -10,23 +10,23 @@ from anari_c import *
 F = np.float32
 
 
-def said(d, text, severity=None):
+def expect_message(d, text, severity=None):
     found = [m for m in d.messages if text in m[1] and severity in (None, m[0])]
-    assert found, f"nothing said {text!r}: {d.messages}"
+    assert found, f"no message contains {text!r}: {d.messages}"
 
 
 def wrong_types_are_named_and_ignored(d):
     g = d.new("Geometry", "sphere", vertex__position=d.array(FLOAT32_VEC3, F([[0, 0, 0]])))
     g.set("radius", INT32, np.int32(3)).commit()
-    said(d, "`radius` is a INT32; it must be FLOAT32", "error")
+    expect_message(d, "`radius` is a INT32; it must be FLOAT32", "error")
     g.set("vertex.position", ARRAY1D, d.array(UINT32, np.uint32([1, 2, 3]))).commit()
-    said(d, "array of UINT32; its elements must be FLOAT32_VEC3", "error")
+    expect_message(d, "array of UINT32; its elements must be FLOAT32_VEC3", "error")
     d.new("Material", "matte", alphaMode="sometimes")
-    said(d, '`alphaMode` is "sometimes"', "error")
+    expect_message(d, '`alphaMode` is "sometimes"', "error")
     f = d.new("Frame", channel__color=FLOAT32_VEC3)
-    said(d, "`channel.color` is FLOAT32_VEC3; it must be one of", "error")
+    expect_message(d, "`channel.color` is FLOAT32_VEC3; it must be one of", "error")
     g.set("material", MATERIAL, f)
-    said(d, "is given as MATERIAL, but it is a FRAME", "error")
+    expect_message(d, "is given as MATERIAL, but it is a FRAME", "error")
 
 
 def unknown_names_are_told_once(d):
@@ -35,28 +35,28 @@ def unknown_names_are_told_once(d):
     m = d.new("Material", "matte")
     for _ in range(5):
         m.set("shininess", FLOAT32, F(3))
-    said(d, "did you mean `pixelSamples`?", "warning")
+    expect_message(d, "did you mean `pixelSamples`?", "warning")
     assert sum("shininess" in t for _, t in d.messages) == 1, d.messages
 
 
 def unknown_subtypes_draw_nothing_and_are_named(d):
     g = d.new("Geometry", "teapot").set("lid", FLOAT32, F(1)).commit()
-    said(d, "there is no geometry `teapot`", "error")
+    expect_message(d, "there is no geometry `teapot`", "error")
     s = d.new("Surface", geometry=g, material=d.new("Material", "matte"))
     p = draw(d, scenes.view(d, dict(surface=[s] + scenes.triangle(d)["surface"])))
     assert p.std() > 5, "the rest is drawn"
-    said(d, "this device has no geometry `teapot`")
+    expect_message(d, "this device has no geometry `teapot`")
     assert draw(d, scenes.view(d, {}, camera=d.new("Camera", "fisheye"))) is None
 
 
 def frames_without_world_or_commit_are_refused(d):
     f = d.new("Frame")
     assert draw(d, f) is None
-    said(d, '["world", "camera", "renderer", "size"] not set', "error")
+    expect_message(d, '["world", "camera", "renderer", "size"] not set', "error")
     f = scenes.view(d, scenes.triangle(d))
     f.put(size=(0, 7))
     assert draw(d, f) is None
-    said(d, "`size` is [0, 7]", "error")
+    expect_message(d, "`size` is [0, 7]", "error")
     assert f.property("duration", FLOAT32) is None and d.property("nothing", FLOAT32) is None
 
 
@@ -80,7 +80,7 @@ def objects_can_be_released_in_any_order(d):
     f.release()
     for o in made:
         o.release()
-    said(d, "is no object of this device; it was released", "error")
+    expect_message(d, "is no object of this device; it was released", "error")
     assert map_frame(d.handle, f.handle, b"channel.color", U32(), U32(), U32()) is None
 
 
@@ -123,7 +123,7 @@ def mapped_parameter_arrays_are_the_devices_own(d):
     s = d.new("Surface", geometry=g, material=d.new("Material", "matte"))
     assert draw(d, scenes.view(d, dict(surface=[s]))).std() > 5
     unmap_parameter(d.handle, g.handle, b"vertex.radius")
-    said(d, "`vertex.radius` is not set to an array", "error")
+    expect_message(d, "`vertex.radius` is not set to an array", "error")
 
 
 def nan_and_empty_geometry_is_left_out_and_counted(d):
@@ -133,32 +133,32 @@ def nan_and_empty_geometry_is_left_out_and_counted(d):
     triangles[3] = [0, 1, 4_000_000_000]
     g = d.new("Geometry", "triangle", vertex__position=d.array(FLOAT32_VEC3, points), primitive__index=d.array(UINT32_VEC3, triangles))
     assert draw(d, scenes.view(d, dict(surface=scenes.surface(d, g)))).std() > 2
-    said(d, "29 of 144 vertices are NaN or infinite", "warning")
-    said(d, "1 of 242 primitives name vertices past the last one", "warning")
+    expect_message(d, "29 of 144 vertices are NaN or infinite", "warning")
+    expect_message(d, "1 of 242 primitives name vertices past the last one", "warning")
     assert new_array1d(d.handle, None, None, None, FLOAT32_VEC3, 0) is None
-    said(d, "an array must have at least one", "error")
+    expect_message(d, "an array must have at least one", "error")
     assert new_array3d(d.handle, None, None, None, FLOAT32, 2**40, 2**40, 2**40) is None
-    said(d, "are more than fit into memory", "error")
+    expect_message(d, "are more than fit into memory", "error")
     empty = d.new("Geometry", "curve")
     assert draw(d, scenes.view(d, dict(surface=scenes.surface(d, empty)), lights=[])) is not None
-    said(d, "`vertex.position` is not set", "error")
+    expect_message(d, "`vertex.position` is not set", "error")
 
 
 def bad_cameras_and_matrices_are_named(d):
     f = scenes.view(d, scenes.triangle(d), camera=d.new("Camera", "perspective", direction=[0.0, 1.0, 0.0], up=[0.0, 1.0, 0.0]))
     assert draw(d, f) is None
-    said(d, "camera `perspective`: the frame is not drawn", "error")
+    expect_message(d, "camera `perspective`: the frame is not drawn", "error")
     group = d.new("Group", **scenes.triangle(d))
     i = d.new("Instance", "transform", group=group, transform=np.zeros((4, 4), F))
     assert draw(d, scenes.view(d, dict(instance=[i]))) is not None
-    said(d, "1 of 1 matrices are singular", "warning")
+    expect_message(d, "1 of 1 matrices are singular", "warning")
 
 
 def two_devices_do_not_mix(d):
     other = Device("rtv")
     foreign = other.new("Material", "matte")
     d.new("Surface").set("material", MATERIAL, foreign)
-    said(d, "belongs to another device", "error")
+    expect_message(d, "belongs to another device", "error")
     a, b = draw(d, scenes.view(d, scenes.cone(d))), draw(other, scenes.view(other, scenes.cone(other)))
     assert (a == b).all()
     other.close()
@@ -213,7 +213,7 @@ def the_device_can_be_released_with_everything_in_use(d):
 if __name__ == "__main__":
     failed = 0
     for name, test in list(globals().items()):
-        if callable(test) and getattr(test, "__module__", "") == "__main__" and name != "said":
+        if callable(test) and getattr(test, "__module__", "") == "__main__" and name != "expect_message":
             d = Device("rtv")
             try:
                 test(d)

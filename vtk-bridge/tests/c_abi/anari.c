@@ -53,7 +53,7 @@ enum { DATA_TYPE = 100, STRING = 101, ARRAY1D = 504, ARRAY2D = 505, ARRAY3D = 50
 static H device;
 static int errors, warnings, made, deleted;
 
-static void told(const void* user, H d, H source, int type, int severity, int code, const char* text)
+static void on_status(const void* user, H d, H source, int type, int severity, int code, const char* text)
 {
   (void)user, (void)d, (void)source, (void)type, (void)code;
   errors += severity <= 2 && strlen(text) > 0;
@@ -154,7 +154,7 @@ static H sheet(void)
   return g;
 }
 
-static H pictured(void)
+static H textured_material(void)
 {
   H m = anariNewMaterial(device, "physicallyBased");
   const char* channels[] = { "baseColor", "metallic", "roughness", "normal", "emissive", "occlusion", "opacity" };
@@ -199,7 +199,7 @@ static H isosurface(void)
 
 static H world(void)
 {
-  H surfaces[] = { surface(sheet(), pictured()), surface(round_thing("sphere"), anariNewMaterial(device, "matte")), surface(round_thing("cylinder"), anariNewMaterial(device, "matte")),
+  H surfaces[] = { surface(sheet(), textured_material()), surface(round_thing("sphere"), anariNewMaterial(device, "matte")), surface(round_thing("cylinder"), anariNewMaterial(device, "matte")),
     surface(round_thing("cone"), anariNewMaterial(device, "matte")), surface(round_thing("curve"), anariNewMaterial(device, "matte")), surface(isosurface(), anariNewMaterial(device, "matte")),
     surface(round_thing("teapot"), anariNewMaterial(device, "velvet")) };
   H volumes[] = { volume() };
@@ -333,7 +333,7 @@ static void misuse(void)
   anariRelease(device, w);
   if (errors < before + 6)
   {
-    fail("errors that were not told");
+    fail("errors that were not reported");
   }
 }
 
@@ -346,7 +346,7 @@ int main(int count, char** arguments)
   }
 #define FIND(result, name, arguments) *(void**)&anari##name = dlsym(loader, "anari" #name);
   FUNCTIONS(FIND)
-  H library = anariLoadLibrary("rtv", told, NULL);
+  H library = anariLoadLibrary("rtv", on_status, NULL);
   device = library ? anariNewDevice(library, "default") : NULL;
   if (!device)
   {
