@@ -16,7 +16,7 @@ enum Kind {
     Always,
 }
 
-/// What a call may change; see `symbols::class`.
+/// What a call may change; see `interpose::calls::class`.
 fn class(name: &str) -> u32 {
     const PURE: u32 = 0;
     if writes_buffers(name) {
@@ -288,8 +288,6 @@ fn flushes(name: &str) -> bool {
         "glXWaitGL",
         "glXSwapBuffersMscOML",
         "eglSwapBuffers",
-        "eglSwapBuffersWithDamageKHR",
-        "eglSwapBuffersWithDamageEXT",
         "eglCopyBuffers",
         "eglWaitGL",
         "eglWaitClient",
@@ -341,6 +339,11 @@ fn flushes(name: &str) -> bool {
         "glDeleteRenderbuffers",
     ];
     NAMES.contains(&name) || is_other_draw(name)
+}
+
+/// Calls by which a program, or the driver for it, may look at what was drawn.
+fn reads_pixels(name: &str) -> bool {
+    ["Read", "Copy", "Blit", "GetTex", "Accum", "Query"].iter().any(|part| name.contains(part))
 }
 
 /// Draws that we do not take apart: the driver draws them over what was traced before.
@@ -433,6 +436,34 @@ fn hand_written() -> Vec<String> {
     functions.chain(addresses).filter(named).map(str::to_owned).collect()
 }
 
+/// The tables of `interpose::calls`.
+fn table_of_calls(names: &[&str]) -> String {
+    let mut s = String::new();
+    writeln!(s, "/// The number of calls.\npub(crate) const COUNT: usize = {};", names.len())
+        .unwrap();
+    writeln!(s, "/// Their names, sorted.\npub(crate) static NAMES: [&CStr; COUNT] = [").unwrap();
+    names.iter().for_each(|x| writeln!(s, "c\"{x}\",").unwrap());
+    writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
+    names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
+    let tables: [(&str, fn(&str) -> bool); 3] =
+        [("FLUSHES", flushes), ("OTHER_DRAWS", is_other_draw), ("READS_PIXELS", reads_pixels)];
+    for (table, holds) in tables {
+        writeln!(s, "];\nstatic {table}: [bool; COUNT] = [").unwrap();
+        names.iter().for_each(|x| write!(s, "{},", holds(x)).unwrap());
+    }
+    writeln!(
+        s,
+        "];\n/// The number of each call.\n#[allow(dead_code, non_upper_case_globals, reason = \
+         \"a table of OpenGL's names\")]\npub(crate) mod at {{"
+    )
+    .unwrap();
+    for (i, x) in names.iter().enumerate() {
+        writeln!(s, "pub(crate) const {x}: usize = {i};").unwrap();
+    }
+    writeln!(s, "}}").unwrap();
+    s
+}
+
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=src/interpose/symbols/names.txt");
@@ -455,19 +486,13 @@ fn main() {
     for h in by_hand.iter().chain(hot.iter().map(|h| &h.name)) {
         assert!(names.contains(&h.as_str()), "hook {h} is not in names.txt");
     }
+    let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    let write = |file: &str, text: String| {
+        std::fs::write(Path::new(&out).join(file), text).expect("OUT_DIR can be written");
+    };
+    write("calls.rs", table_of_calls(&names));
     let mut s = String::new();
-    let n = names.len();
-    writeln!(s, "/// How many entry points there are.\npub(crate) const COUNT: usize = {n};")
-        .unwrap();
-    writeln!(s, "/// Their names, sorted.\npub(crate) static NAMES: [&CStr; COUNT] = [").unwrap();
-    names.iter().for_each(|x| writeln!(s, "c\"{x}\",").unwrap());
-    writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
-    names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
-    writeln!(s, "];\nstatic FLUSHES: [u8; COUNT] = [").unwrap();
-    names.iter().for_each(|x| {
-        write!(s, "{},", u8::from(flushes(x)) + 2 * u8::from(is_other_draw(x))).unwrap()
-    });
-    writeln!(s, "];\nstatic HOOKS: [Option<Target>; COUNT] = [").unwrap();
+    writeln!(s, "static HOOKS: [Option<Target>; COUNT] = [").unwrap();
     for x in &names {
         match hooked(x) {
             true if by_hand.iter().any(|h| h == x) => {
@@ -570,18 +595,6 @@ fn main() {
         )
         .unwrap();
     }
-    writeln!(
-        s,
-        "}}\n/// Indices of the entry points that have hooks by \
-                 hand.\n#[allow(non_upper_case_globals, reason = \"the names of OpenGL\")] mod at \
-                 {{"
-    )
-    .unwrap();
-    for name in &by_hand {
-        let index = names.binary_search(&name.as_str()).expect("checked above");
-        writeln!(s, "pub(super) const {name}: usize = {index};").unwrap();
-    }
     writeln!(s, "}}").unwrap();
-    let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
-    std::fs::write(Path::new(&out).join("trampolines.rs"), s).expect("OUT_DIR can be written");
+    write("trampolines.rs", s);
 }

@@ -1,10 +1,10 @@
 //! When buffer objects were written: geometry in buffers is read once, and again only after
 //! somebody wrote to them.
 
+use crate::interpose::calls::class;
 use crate::interpose::client_memory::ArraySource;
 use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
-use crate::interpose::symbols::class;
 use crate::state::enums::*;
 use std::collections::HashMap;
 

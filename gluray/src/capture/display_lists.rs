@@ -13,9 +13,10 @@ mod recording;
 pub(crate) use recording::ListRecording;
 
 use crate::capture::evaluators::MapKind;
+use crate::interpose::calls::class;
 use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
-use crate::interpose::symbols::{self, class};
+use crate::interpose::symbols;
 use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
 use std::collections::HashMap;

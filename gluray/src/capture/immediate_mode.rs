@@ -1,8 +1,9 @@
 //! Immediate mode: Begin and End, and the attributes that vertices take with them.
 
 use crate::classify::rules::{self, Classification};
+use crate::interpose::calls::class;
 use crate::interpose::context::{Context, ImmediateModeTarget};
-use crate::interpose::symbols::{self, class};
+use crate::interpose::symbols;
 use crate::state::current_attributes::{set_material, stale};
 use crate::state::enums::*;
 use crate::state::material_properties::MaterialProperties;

@@ -468,7 +468,7 @@ impl Context {
     /// Hands a finished draw to the frame.
     pub(crate) fn mark_current(&mut self) {
         if !self.capabilities.core {
-            self.dirty |= crate::interpose::symbols::class::CURRENT;
+            self.dirty |= crate::interpose::calls::class::CURRENT;
         }
     }
 

@@ -19,9 +19,10 @@ use crate::classify::rules::{self, Classification};
 use crate::classify::vtk::VtkPrograms;
 use crate::host::config::Config;
 use crate::host::report::Counters;
+use crate::interpose::calls::{self, class};
 use crate::interpose::driver::gl;
 use crate::interpose::share_group::{ShareGroup, TextureWrites};
-use crate::interpose::symbols::{self, class};
+use crate::interpose::symbols;
 use crate::present::frame::Frame;
 use crate::present::framebuffer_pass::Presenter;
 use crate::state::current_attributes::CurrentAttributes;
@@ -241,37 +242,10 @@ fn install_current(context: Box<Context>) {
 }
 
 /// A watched call is about to run.
-pub(crate) fn on_watched_call(index: usize, class: u8, flushes: bool, draws: bool) {
+pub(crate) fn on_watched_call(index: usize) {
+    let (class, flushes) = (calls::class_of(index), calls::flushes(index));
+    let draws = calls::is_other_draw(index);
     symbols::with_context(|c| c.watched_call(index, class, flushes, draws));
-}
-
-fn indices_of(names: &[&str]) -> Vec<usize> {
-    names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect()
-}
-
-/// Calls that end a frame for the one who looks at the screen.
-fn swaps() -> &'static [usize] {
-    static SWAPS: OnceLock<Vec<usize>> = OnceLock::new();
-    SWAPS.get_or_init(|| {
-        let damage = ["eglSwapBuffersWithDamageKHR", "eglSwapBuffersWithDamageEXT"];
-        indices_of(
-            &[&["glXSwapBuffers", "eglSwapBuffers", "glXSwapBuffersMscOML"][..], &damage].concat(),
-        )
-    })
-}
-
-/// Calls by which a program looks at what it drew.
-fn reads() -> &'static [usize] {
-    static READS: OnceLock<Vec<usize>> = OnceLock::new();
-    READS.get_or_init(|| {
-        indices_of(&["glReadPixels", "glReadnPixels", "glReadnPixelsARB", "glGetTexImage"])
-    })
-}
-
-/// Calls that show something only when the front buffer is drawn to.
-fn front_only() -> &'static [usize] {
-    static FRONT_ONLY: OnceLock<Vec<usize>> = OnceLock::new();
-    FRONT_ONLY.get_or_init(|| indices_of(&["glFlush", "glFinish"]))
 }
 
 impl Drop for Context {
@@ -396,7 +370,7 @@ impl Context {
             r.note_driver_call(class, flushes, draws);
         }
         if flushes {
-            let invisible = front_only().contains(&index)
+            let invisible = calls::shows_front_buffer(index)
                 && self.capabilities.double_buffered
                 && !self.draws_to_front();
             if !invisible && self.recording.is_none() {
@@ -405,9 +379,9 @@ impl Context {
             if draws && self.recording.is_none() {
                 self.counters.count_driver_draws("a draw call that is not followed", 1);
             }
-            if swaps().contains(&index) {
+            if calls::swaps_buffers(index) {
                 self.frame_done();
-            } else if reads().contains(&index) {
+            } else if calls::reads_frame(index) {
                 if self.capabilities.version >= 21 && gl::word(PIXEL_PACK_BUFFER_BINDING) != 0 {
                     self.writes().any();
                 }

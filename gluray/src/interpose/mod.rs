@@ -2,6 +2,7 @@
 //! is current on a thread, the driver behind us, the program's memory, and the guard that keeps our
 //! panics from the program.
 
+pub(crate) mod calls;
 pub(crate) mod client_memory;
 pub(crate) mod context;
 pub(crate) mod driver;

@@ -5,6 +5,7 @@
 //! no fault. After one each thread hands over what its context has swallowed and not drawn
 //! ([`Context::stop_tracing`]), at once or at its next call.
 
+use crate::interpose::calls;
 use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
@@ -58,7 +59,7 @@ static CALLS_BEFORE: AtomicU32 = AtomicU32::new(0);
 fn plan_injection() {
     let Some(text) = asked_for() else { return };
     let (name, call) = text.split_once(':').unwrap_or((text, "1"));
-    if let (Some(index), Ok(call)) = (symbols::index_of(name.as_bytes()), call.parse::<u32>()) {
+    if let (Some(index), Ok(call)) = (calls::index_of(name.as_bytes()), call.parse::<u32>()) {
         CALLS_BEFORE.store(call.saturating_sub(1), Relaxed);
         ENTRY.store(index, Relaxed);
     }
@@ -77,7 +78,7 @@ pub(crate) fn inject_at(index: usize) {
 fn inject_now(index: usize) {
     if CALLS_BEFORE.fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1)).is_err() {
         ENTRY.store(usize::MAX, Relaxed);
-        panic!("a fault in {:?}, as GLURAY_INJECT_FAULT asks", symbols::NAMES[index]);
+        panic!("a fault in {:?}, as GLURAY_INJECT_FAULT asks", calls::NAMES[index]);
     }
 }
 

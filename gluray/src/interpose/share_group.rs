@@ -14,12 +14,12 @@
 
 use crate::capture::buffer_writes::BufferWrites;
 use crate::capture::display_lists::DisplayLists;
+use crate::interpose::calls::{self, class};
 use crate::interpose::context::{Context, ImmediateModeTarget};
 use crate::interpose::driver::gl;
-use crate::interpose::symbols;
 use crate::state::enums::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 /// What the contexts of a share group have in common.
 #[derive(Clone, Default)]
@@ -52,38 +52,6 @@ impl TextureWrites {
 /// the image alone): nobody tells of writes.
 static FOREIGN_TEXELS: AtomicBool = AtomicBool::new(false);
 
-/// Calls that give textures such texels.
-fn foreign(index: usize) -> bool {
-    static FOREIGN: OnceLock<Vec<usize>> = OnceLock::new();
-    let names = [
-        "glEGLImageTargetTexture2DOES",
-        "glEGLImageTargetTexStorageEXT",
-        "glEGLImageTargetTextureStorageEXT",
-        "glTexStorageMem2DEXT",
-        "glTextureStorageMem2DEXT",
-        "glVDPAURegisterVideoSurfaceNV",
-        "glVDPAURegisterOutputSurfaceNV",
-    ];
-    let find = || names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect();
-    FOREIGN.get_or_init(find).contains(&index)
-}
-
-/// Calls after which a context sees what others have done.
-fn waits(index: usize) -> bool {
-    static WAITS: OnceLock<Vec<usize>> = OnceLock::new();
-    let names = [
-        "glWaitSync",
-        "glClientWaitSync",
-        "eglWaitSync",
-        "eglWaitSyncKHR",
-        "eglClientWaitSync",
-        "eglClientWaitSyncKHR",
-        "glWaitSemaphoreEXT",
-    ];
-    let find = || names.iter().filter_map(|n| symbols::index_of(n.as_bytes())).collect();
-    WAITS.get_or_init(find).contains(&index)
-}
-
 impl Context {
     /// Textures of the share group may be others from now on.
     pub(crate) fn invalidate_textures(&mut self) {
@@ -97,12 +65,12 @@ impl Context {
     }
 
     /// A call that other contexts, or what comes from elsewhere, may have to do with.
-    pub(crate) fn observe_other_contexts(&mut self, index: usize, class: u8) {
-        if class & symbols::class::TEXTURE != 0 && foreign(index) {
+    pub(crate) fn observe_other_contexts(&mut self, index: usize, classes: u8) {
+        if classes & class::TEXTURE != 0 && calls::imports_texels(index) {
             FOREIGN_TEXELS.store(true, Ordering::Relaxed);
         }
         if FOREIGN_TEXELS.load(Ordering::Relaxed)
-            || self.texture_writes.are_shared() && waits(index)
+            || self.texture_writes.are_shared() && calls::waits_for_others(index)
         {
             self.texture_writes.change();
         }

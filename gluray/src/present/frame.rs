@@ -430,7 +430,7 @@ impl Context {
         if !Arc::ptr_eq(&config, &self.config) {
             self.config = config;
             // Classifications depend on settings.
-            self.dirty = crate::interpose::symbols::class::ALL;
+            self.dirty = crate::interpose::calls::class::ALL;
             crate::interpose::symbols::arm();
         }
     }

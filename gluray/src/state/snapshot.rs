@@ -1,7 +1,7 @@
 //! The state that decides how filled primitives look, as the driver tells it.
 
+use crate::interpose::calls::class;
 use crate::interpose::driver::gl;
-use crate::interpose::symbols::class;
 use crate::state::enums::*;
 
 /// A light source; places and directions in eye space, as OpenGL keeps them.

@@ -1,8 +1,8 @@
 //! A display list while it is compiled.
 
 use super::{DisplayList, ListOp};
+use crate::interpose::calls::class;
 use crate::interpose::driver::gl;
-use crate::interpose::symbols::class;
 
 /// A list while it is compiled.
 pub(crate) struct ListRecording {

@@ -10,7 +10,7 @@
 pub(crate) mod feedback;
 pub(crate) mod gl;
 
-use crate::interpose::symbols::{NAMES, hooks::no_context};
+use crate::interpose::calls::{COUNT, NAMES, index_of};
 use core::ffi::{CStr, c_char, c_int, c_void};
 use std::ffi::CString;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::Relaxed};
@@ -24,8 +24,12 @@ static LIB_GL: AtomicPtr<c_void> = AtomicPtr::new(core::ptr::null_mut());
 static LIB_EGL: AtomicPtr<c_void> = AtomicPtr::new(core::ptr::null_mut());
 /// The vendor's `getProcAddress`, GLX and EGL.
 static VENDOR: [AtomicUsize; 2] = [AtomicUsize::new(0), AtomicUsize::new(0)];
-static FOUND: [AtomicPtr<()>; crate::interpose::symbols::COUNT] =
-    [const { AtomicPtr::new(core::ptr::null_mut()) }; crate::interpose::symbols::COUNT];
+static FOUND: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(core::ptr::null_mut()) }; COUNT];
+
+/// What is called when the driver lacks a function: nothing happens, zero comes back.
+pub(crate) extern "C" fn no_context() -> usize {
+    0
+}
 
 /// libc's own `dlsym`.
 pub(crate) fn dlsym_address() -> *const () {
@@ -214,7 +218,7 @@ fn cached(slot: &AtomicPtr<()>, name: &str) -> *const () {
 
 #[cold]
 fn look_up(slot: &AtomicPtr<()>, name: &str) -> *const () {
-    let index = crate::interpose::symbols::index_of(name.as_bytes());
+    let index = index_of(name.as_bytes());
     let p = index.map_or(no_context as *const (), forward);
     slot.store(p.cast_mut(), Relaxed);
     p

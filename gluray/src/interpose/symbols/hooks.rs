@@ -4,20 +4,16 @@
 //! The build script reads this file: a line that begins with `fn gl…(` or `fn egl…(` is a hook.
 
 use super::lookup::replaced;
-use super::{at, current_context, with_context};
+use super::{current_context, with_context};
 use crate::capture::display_lists::names::width;
 use crate::capture::evaluators::MapKind;
 use crate::capture::immediate_mode::FastPathResult;
+use crate::interpose::calls::at;
 use crate::interpose::client_memory::{self, ActiveCall, DrawArguments};
 use crate::interpose::context;
 use crate::interpose::driver::Int;
 use crate::interpose::panic_guard::caught;
 use core::ffi::{c_char, c_void};
-
-/// What is called when the driver lacks a function: nothing happens, zero comes back.
-pub(crate) extern "C" fn no_context() -> usize {
-    0
-}
 
 /// Calls the driver's function of the same name.
 macro_rules! driver {

@@ -1,7 +1,8 @@
 //! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main`,
 //! `__egl_Main`.
 
-use super::{index_of, trampoline};
+use super::trampoline;
+use crate::interpose::calls::index_of;
 use crate::interpose::driver;
 use crate::interpose::panic_guard::caught;
 use core::ffi::{CStr, c_char, c_int, c_void};

@@ -15,37 +15,15 @@
 #![allow(non_snake_case, reason = "the names of OpenGL")]
 
 mod current_context;
-pub(crate) mod hooks;
+mod hooks;
 mod lookup;
 
 pub(crate) use current_context::{install, take, with_context};
 
+use crate::interpose::calls::{COUNT, NAMES, at, index_of};
 use crate::interpose::driver;
 use std::ffi::CStr;
 use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering::Relaxed};
-
-/// Classes of state that a call can change; the driver is asked again about those only.
-#[allow(dead_code, reason = "some classes are only told apart by the build script")]
-pub(crate) mod class {
-    /// Matrices.
-    pub(crate) const MATRIX: u8 = 1;
-    /// Lights and the lighting model.
-    pub(crate) const LIGHT: u8 = 2;
-    /// Everything about rasters, enables, framebuffers.
-    pub(crate) const RASTER: u8 = 4;
-    /// Textures and their environment.
-    pub(crate) const TEXTURE: u8 = 8;
-    /// Current colour, normal, texture coordinate, material.
-    pub(crate) const CURRENT: u8 = 16;
-    /// Contents of buffers.
-    pub(crate) const BUFFER: u8 = 32;
-    /// Uniforms.
-    pub(crate) const UNIFORM: u8 = 64;
-    /// Vertex arrays and buffer bindings.
-    pub(crate) const ARRAYS: u8 = 128;
-    /// All of it.
-    pub(crate) const ALL: u8 = 255;
-}
 
 #[derive(Clone, Copy)]
 struct Target(*const ());
@@ -96,17 +74,17 @@ pub(crate) fn thread_leaves() {
 /// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists,
 /// since those that we compiled are ours to play.
 fn stays_hooked(index: usize) -> bool {
-    let name = NAMES[index].to_bytes();
-    let kept: [&[u8]; 7] = [
-        b"glCallList",
-        b"glCallLists",
-        b"glNewList",
-        b"glEndList",
-        b"glDeleteLists",
-        b"glGenLists",
-        b"glGetError",
+    const KEPT: [usize; 7] = [
+        at::glCallList,
+        at::glCallLists,
+        at::glNewList,
+        at::glEndList,
+        at::glDeleteLists,
+        at::glGenLists,
+        at::glGetError,
     ];
-    name.starts_with(b"glX") || name.starts_with(b"egl") || kept.contains(&name)
+    let name = NAMES[index].to_bytes();
+    name.starts_with(b"glX") || name.starts_with(b"egl") || KEPT.contains(&index)
 }
 
 /// After a fault of ours every entry point becomes the driver's, thread by thread: see [`leaving`].
@@ -116,11 +94,6 @@ pub(crate) fn retire() {
             slot.store(leaving as *mut (), Relaxed);
         }
     }
-}
-
-/// Index of an entry point.
-pub(crate) fn index_of(name: &[u8]) -> Option<usize> {
-    NAMES.binary_search_by(|n| n.to_bytes().cmp(name)).ok()
 }
 
 /// The trampoline of an entry point.
@@ -157,7 +130,7 @@ extern "C" fn resolve(index: usize) -> *const () {
 /// After a fault in the search for a function of the driver's: found, or nothing is called.
 fn forward_plainly(index: usize) -> *const () {
     crate::interpose::panic_guard::caught(|| driver::forward(index))
-        .unwrap_or(hooks::no_context as *const ())
+        .unwrap_or(driver::no_context as *const ())
 }
 
 extern "C" fn on_state_call(index: usize) {
@@ -165,10 +138,9 @@ extern "C" fn on_state_call(index: usize) {
         crate::interpose::panic_guard::hand_over_to_driver();
         return;
     }
-    let (class, flush) = (CLASSES[index], FLUSHES[index]);
     crate::interpose::panic_guard::caught(|| {
         crate::interpose::panic_guard::inject_at(index);
-        crate::interpose::context::on_watched_call(index, class, flush & 1 != 0, flush & 2 != 0);
+        crate::interpose::context::on_watched_call(index);
     });
 }
 
@@ -184,7 +156,7 @@ fn leave_at(index: usize) {
     crate::interpose::panic_guard::hand_over_to_driver();
     let over = crate::interpose::panic_guard::caught(|| {
         let tracing_stopped = with_context(|c| {
-            if NAMES[index] == c"glEnd"
+            if index == at::glEnd
                 && c.immediate_target == crate::interpose::context::ImmediateModeTarget::Pass
             {
                 // The driver's primitive ends now, and with the next call all is handed over.
@@ -270,6 +242,7 @@ unsafe extern "C" fn slow() {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interpose::calls::{class, class_of};
 
     #[test]
     fn calls_that_come_with_each_vertex_are_not_told_of_for_the_sake_of_textures() {
@@ -289,7 +262,7 @@ mod tests {
         for (i, name) in NAMES.iter().enumerate().filter(|(_, n)| starts(n.to_bytes())) {
             seen += 1;
             assert!(
-                CLASSES[i] & always == 0 || HOOKS[i].is_some(),
+                class_of(i) & always == 0 || HOOKS[i].is_some(),
                 "{name:?} costs ten nanoseconds"
             );
         }
@@ -318,7 +291,7 @@ mod tests {
             c"glBindFramebuffer",
         ] {
             let i = index_of(name.to_bytes()).expect("a call of OpenGL's");
-            assert!(CLASSES[i] & class::TEXTURE != 0 || HOOKS[i].is_some(), "{name:?}");
+            assert!(class_of(i) & class::TEXTURE != 0 || HOOKS[i].is_some(), "{name:?}");
         }
     }
 }
