@@ -20,8 +20,6 @@ use maps::{EvaluatedVertex, EvaluatorMaps};
 
 /// Points in a row of a mesh; with more the driver is left alone.
 const MOST_IN_ROW: i64 = 1 << 20;
-const POINT: u32 = 0x1b00;
-const LINE: u32 = 0x1b01;
 
 /// The grid that `glEvalPoint` and `glEvalMesh` count in.
 #[derive(Debug, Clone, Copy, Default)]

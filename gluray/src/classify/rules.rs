@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn selection_is_never_traced() {
-        let s = Snapshot { render_mode: 0x1c02, ..surface() };
+        let s = Snapshot { render_mode: SELECT, ..surface() };
         assert_eq!(classify(&s, TraceFilter::All), Classification::Pass("selection or feedback"));
     }
 }

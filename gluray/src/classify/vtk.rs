@@ -105,7 +105,7 @@ impl Context {
         let [mut vertex, mut geometry, mut fragment] = [const { String::new() }; 3];
         let mut other = false;
         for shader in gl::attached(program) {
-            match gl::shader_i::<1>(shader, 0x8b4f)[0].cast_unsigned() {
+            match gl::shader_i::<1>(shader, SHADER_TYPE)[0].cast_unsigned() {
                 VERTEX_SHADER => vertex = gl::source_of(shader),
                 FRAGMENT_SHADER => fragment = gl::source_of(shader),
                 GEOMETRY_SHADER => geometry = gl::source_of(shader),

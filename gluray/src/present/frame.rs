@@ -482,7 +482,7 @@ impl Context {
         if self.programs.weighted.has_draws() {
             self.flush("glClear");
         }
-        const COLOR_AND_DEPTH: u32 = 0x4100;
+        const COLOR_AND_DEPTH: u32 = COLOR_BUFFER_BIT | DEPTH_BUFFER_BIT;
         if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
             self.end_unswapped_frame();
         }

@@ -363,7 +363,7 @@ impl Context {
         let core = self.capabilities.core;
         let kept = SavedState::keep(core, self.capabilities.version);
         if !core {
-            gl::push_attrib(0x000f_ffff);
+            gl::push_attrib(ALL_ATTRIB_BITS);
             gl::reset_pixel_transfer();
         }
         UNPACK

@@ -151,7 +151,7 @@ impl DriverCapabilities {
         let version = next() * 10 + next().min(9);
         let core = !es && version >= 32 && gl::int(CONTEXT_PROFILE_MASK) & 1 != 0;
         let legacy = !core && !es;
-        let extensions = if legacy { gl::string(0x1f03) } else { String::new() };
+        let extensions = if legacy { gl::string(EXTENSIONS) } else { String::new() };
         let has = |e: &str| extensions.split(' ').any(|x| x == e);
         DriverCapabilities {
             version,
@@ -206,8 +206,9 @@ impl Snapshot {
         self.depth_mask = gl::int(DEPTH_WRITEMASK) != 0;
         self.depth_clamp = capabilities.depth_clamp && gl::is_enabled(DEPTH_CLAMP);
         self.blend = gl::is_enabled(BLEND);
-        self.blend_is_over =
-            self.blend && gl::word(BLEND_SRC_RGB) == 0x0302 && gl::word(BLEND_DST_RGB) == 0x0303;
+        self.blend_is_over = self.blend
+            && gl::word(BLEND_SRC_RGB) == SRC_ALPHA
+            && gl::word(BLEND_DST_RGB) == ONE_MINUS_SRC_ALPHA;
         if self.blend_is_over && capabilities.version >= 14 {
             self.blend_is_over = gl::word(BLEND_EQUATION) == FUNC_ADD;
         }
@@ -243,11 +244,12 @@ impl Snapshot {
             true => gl::int(SAMPLES),
             false => 0,
         };
-        const MASKS: [u32; 4] = [0x809e, 0x809f, 0x80a0, 0x8e51];
+        const MASKS: [u32; 4] =
+            [SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE, SAMPLE_COVERAGE, SAMPLE_MASK];
         self.masked_samples = self.samples > 1
             && MASKS
                 .iter()
-                .any(|c| (*c != 0x8e51 || capabilities.version >= 32) && gl::is_enabled(*c));
+                .any(|c| (*c != SAMPLE_MASK || capabilities.version >= 32) && gl::is_enabled(*c));
         self.discard = capabilities.version >= 30 && gl::is_enabled(RASTERIZER_DISCARD);
         self.feedback_active =
             capabilities.version >= 40 && gl::int(TRANSFORM_FEEDBACK_ACTIVE) != 0;
@@ -259,8 +261,8 @@ impl Snapshot {
         }
         self.alpha_test = gl::is_enabled(ALPHA_TEST);
         self.alpha_test_passes_one = self.alpha_test && {
-            let reference = gl::floats::<1>(0x0bc2)[0];
-            match gl::word(0x0bc1) {
+            let reference = gl::floats::<1>(ALPHA_TEST_REF)[0];
+            match gl::word(ALPHA_TEST_FUNC) {
                 GREATER | NOTEQUAL => reference < 1.0,
                 GEQUAL | ALWAYS => true,
                 EQUAL | LEQUAL => reference >= 1.0,
@@ -268,7 +270,7 @@ impl Snapshot {
             }
         };
         self.alpha_test_of_equality =
-            self.alpha_test && matches!(gl::word(0x0bc1), EQUAL | NOTEQUAL);
+            self.alpha_test && matches!(gl::word(ALPHA_TEST_FUNC), EQUAL | NOTEQUAL);
         self.stipple = gl::is_enabled(POLYGON_STIPPLE);
         self.render_mode = gl::word(RENDER_MODE);
         self.arb_program = capabilities.arb_programs
@@ -398,7 +400,7 @@ fn unit_0(target: u32) -> TextureUnit {
             if !gl::is_enabled(generate[i]) {
                 return (0, [0.0; 4]);
             }
-            let coord = 0x2000 + i as u32;
+            let coord = S + i as u32;
             let mode = gl::tex_gen_i::<1>(coord, TEXTURE_GEN_MODE)[0].cast_unsigned();
             let plane = if mode == EYE_LINEAR { EYE_PLANE } else { OBJECT_PLANE };
             (mode, gl::tex_gen_f(coord, plane))

@@ -29,11 +29,8 @@ pub(crate) fn check_sampling(target: u32) -> Result<(), &'static str> {
 /// The reason why the fixed-function sampling of the bound texture cannot be reproduced. `None`
 /// when it can, or when the texture is incomplete and therefore disabled.
 pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static str> {
-    const TEXTURE_BASE_LEVEL: u32 = 0x813c;
-    const TEXTURE_MAX_ANISOTROPY: u32 = 0x84fe;
-    const TEXTURE_SWIZZLE: [u32; 4] = [0x8e42, 0x8e43, 0x8e44, 0x8e45];
-    const SAMPLER_BINDING: u32 = 0x8919;
-    const IN_ORDER: [i32; 4] = [0x1903, 0x1904, 0x1905, 0x1906];
+    const SWIZZLE: [u32; 4] =
+        [TEXTURE_SWIZZLE_R, TEXTURE_SWIZZLE_G, TEXTURE_SWIZZLE_B, TEXTURE_SWIZZLE_A];
     let parameter = |what| gl::tex_parameter_i::<1>(target, what)[0];
     let base = parameter(TEXTURE_BASE_LEVEL).clamp(0, 31);
     let level = |what| gl::tex_level_i::<1>(target, base, what)[0];
@@ -45,16 +42,21 @@ pub(crate) fn unsupported_sampling(target: u32, version: u32) -> Option<&'static
         return Some("a texture too large to read");
     }
     match level(TEXTURE_INTERNAL_FORMAT).cast_unsigned() {
-        0x1902 | 0x84f9 | 0x81a5..=0x81a7 | 0x88f0 | 0x8cac | 0x8cad => {
-            return Some("a texture of depths");
-        }
-        0x8d70..=0x8d8f => return Some("a texture of integers"),
+        DEPTH_COMPONENT
+        | DEPTH_STENCIL
+        | DEPTH_COMPONENT16..=DEPTH_COMPONENT32
+        | DEPTH24_STENCIL8
+        | DEPTH_COMPONENT32F
+        | DEPTH32F_STENCIL8 => return Some("a texture of depths"),
+        RGBA32UI..=RGB8I => return Some("a texture of integers"),
         _ => {}
     }
     if gl::tex_parameter_f::<1>(target, TEXTURE_MAX_ANISOTROPY)[0] > 1.0 {
         return Some("a texture with anisotropic filtering");
     }
-    if version >= 33 && TEXTURE_SWIZZLE.map(parameter) != IN_ORDER {
+    if version >= 33
+        && SWIZZLE.map(|what| parameter(what).cast_unsigned()) != [RED, GREEN, BLUE, ALPHA]
+    {
         return Some("a texture with its components in another order");
     }
     if version >= 33 && gl::word(SAMPLER_BINDING) != 0 {

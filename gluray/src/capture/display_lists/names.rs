@@ -53,9 +53,9 @@ impl Context {
 pub(crate) fn width(kind: u32) -> Option<usize> {
     match kind {
         BYTE | UNSIGNED_BYTE => Some(1),
-        SHORT | UNSIGNED_SHORT | 0x1407 => Some(2),
-        INT | UNSIGNED_INT | FLOAT | 0x1409 => Some(4),
-        0x1408 => Some(3),
+        SHORT | UNSIGNED_SHORT | TWO_BYTES => Some(2),
+        INT | UNSIGNED_INT | FLOAT | FOUR_BYTES => Some(4),
+        THREE_BYTES => Some(3),
         _ => None,
     }
 }
@@ -69,7 +69,7 @@ pub(super) fn decode(kind: u32, bytes: &[u8]) -> Option<Vec<u32>> {
         (UNSIGNED_SHORT, &[a, b]) => u32::from(u16::from_ne_bytes([a, b])),
         (FLOAT, &[a, b, c, d]) => (f32::from_ne_bytes([a, b, c, d]) as i32).cast_unsigned(),
         (INT | UNSIGNED_INT, &[a, b, c, d]) => u32::from_ne_bytes([a, b, c, d]),
-        // The types GL_2_BYTES and so on: the high byte first.
+        // The types `GL_2_BYTES` to `GL_4_BYTES` have the high byte first.
         (_, b) => b.iter().fold(0, |h, x| h << 8 | u32::from(*x)),
     };
     Some(bytes.chunks_exact(width).map(name).collect())
@@ -83,8 +83,8 @@ mod tests {
     fn names_of_lists_are_read_in_every_type() {
         let bytes = [1, 2, 3, 4];
         assert_eq!(decode(UNSIGNED_BYTE, &bytes), Some(vec![1, 2, 3, 4]));
-        assert_eq!(decode(0x1407, &bytes), Some(vec![0x0102, 0x0304]));
-        assert_eq!(decode(0x1409, &bytes), Some(vec![0x0102_0304]));
+        assert_eq!(decode(TWO_BYTES, &bytes), Some(vec![0x0102, 0x0304]));
+        assert_eq!(decode(FOUR_BYTES, &bytes), Some(vec![0x0102_0304]));
         assert_eq!(decode(0x1234, &bytes), None);
         assert_eq!(decode(BYTE, &[255]), Some(vec![u32::MAX]));
     }

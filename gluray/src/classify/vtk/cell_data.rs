@@ -6,11 +6,6 @@ use crate::state::enums::*;
 use crate::trace::texturing::Image;
 use std::sync::Arc;
 
-const TEXTURE_BINDING_BUFFER: u32 = 0x8c2c;
-const TEXTURE_BUFFER_DATA_STORE_BINDING: u32 = 0x8c2d;
-const RGBA32F: u32 = 0x8814;
-const R8: u32 = 0x8229;
-
 /// The buffer behind the buffer texture that a program's sampler has.
 pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<ArraySource, &'static str> {
     let at = gl::uniform_location(program, sampler);

@@ -53,7 +53,6 @@ void main() {
     sums[1] = weight;
 }
 ";
-const RGBA32F: u32 = 0x8814;
 
 impl Context {
     /// Whether a draw into such sums can be taken: the reason when not.

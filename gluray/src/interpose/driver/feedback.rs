@@ -2,6 +2,7 @@
 //! of pointers.
 
 use super::driver;
+use crate::state::enums::{ACTIVE_ATTRIBUTES, ACTIVE_UNIFORMS, INTERLEAVED_ATTRIBS, STREAM_READ};
 use core::ffi::{CStr, c_char, c_void};
 use std::ffi::CString;
 use std::sync::atomic::AtomicPtr;
@@ -23,14 +24,13 @@ driver! {
 /// The vertex shader's output that later links capture.
 pub(crate) fn feedback_varying(program: u32, name: &str) {
     let Ok(name) = CString::new(name) else { return };
-    const INTERLEAVED_ATTRIBS: u32 = 0x8c8c;
     let names = [name.as_ptr()];
     transform_feedback_varyings(program, 1, names.as_ptr(), INTERLEAVED_ATTRIBS);
 }
 
 /// Nothing is captured from the next link on.
 pub(crate) fn no_feedback_varyings(program: u32) {
-    transform_feedback_varyings(program, 0, core::ptr::null(), 0x8c8c);
+    transform_feedback_varyings(program, 0, core::ptr::null(), INTERLEAVED_ATTRIBS);
 }
 
 /// Draws by the bound element buffer.
@@ -52,7 +52,6 @@ pub(crate) fn delete_two_buffers(names: [u32; 2]) {
 
 /// The bound buffer's contents.
 pub(crate) fn buffer_data(target: u32, bytes: &[u8]) {
-    const STREAM_READ: u32 = 0x88e1;
     buffer_data_raw(target, bytes.len() as isize, bytes.as_ptr().cast(), STREAM_READ);
 }
 
@@ -89,12 +88,12 @@ fn named(get: Getter, program: u32, count: u32) -> Vec<(String, u32)> {
 
 /// Uniforms of a program with their types.
 pub(crate) fn active_uniforms(program: u32) -> Vec<(String, u32)> {
-    let n = super::gl::program_i::<1>(program, 0x8b86)[0].max(0);
+    let n = super::gl::program_i::<1>(program, ACTIVE_UNIFORMS)[0].max(0);
     named(get_active_uniform, program, n.cast_unsigned())
 }
 
 /// Names of a program's attributes.
 pub(crate) fn active_attributes(program: u32) -> Vec<String> {
-    let n = super::gl::program_i::<1>(program, 0x8b89)[0].max(0);
+    let n = super::gl::program_i::<1>(program, ACTIVE_ATTRIBUTES)[0].max(0);
     named(get_active_attrib, program, n.cast_unsigned()).into_iter().map(|(name, _)| name).collect()
 }

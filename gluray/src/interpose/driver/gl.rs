@@ -3,6 +3,7 @@
 //! All of them act on the context that is current on the thread, as all of OpenGL.
 
 use super::driver;
+use crate::state::enums::*;
 use core::ffi::{c_char, c_void};
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering::Relaxed};
 
@@ -116,7 +117,7 @@ const ROOM: usize = 32;
 /// True when the answer may be longer than [`ROOM`]: formats of compressed textures, program
 /// binaries and shader binaries.
 fn is_of_a_list(what: u32) -> bool {
-    matches!(what, 0x86a3 | 0x87ff | 0x8df8)
+    matches!(what, COMPRESSED_TEXTURE_FORMATS | PROGRAM_BINARY_FORMATS | SHADER_BINARY_FORMATS)
 }
 
 /// `N` floats of state (at most 16).
@@ -206,14 +207,14 @@ queries! {
 /// The domain of an evaluator's map: two numbers of a curve, four of a surface.
 pub(crate) fn map_domain(target: u32) -> [f32; 4] {
     let mut out = [0.0; ROOM];
-    get_map_f(target, crate::state::enums::MAP_DOMAIN, out.as_mut_ptr());
+    get_map_f(target, MAP_DOMAIN, out.as_mut_ptr());
     [out[0], out[1], out[2], out[3]]
 }
 
 /// The orders of an evaluator's map: one number of a curve, two of a surface.
 fn map_orders(target: u32) -> [i32; 2] {
     let mut out = [0; ROOM];
-    get_map_i(target, crate::state::enums::MAP_ORDER, out.as_mut_ptr());
+    get_map_i(target, MAP_ORDER, out.as_mut_ptr());
     [out[0], out[1]]
 }
 
@@ -226,7 +227,7 @@ pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2]
     let orders = [u, if surface { v } else { 1 }];
     let points = orders[0] * orders[1];
     let mut out = vec![0.0; points * MOST];
-    get_map_f(target, crate::state::enums::MAP_POINTS, out.as_mut_ptr());
+    get_map_f(target, MAP_POINTS, out.as_mut_ptr());
     out.truncate(points * size);
     (orders, out)
 }
@@ -234,9 +235,7 @@ pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2]
 /// What kind of numbers the colour buffer of the framebuffer object in use has that `attachment`
 /// names; 0 when nobody knows.
 pub(crate) fn component_type(attachment: u32) -> u32 {
-    let (target, what) =
-        (crate::state::enums::DRAW_FRAMEBUFFER, crate::state::enums::ATTACHMENT_COMPONENT_TYPE);
-    attachment_i::<1>(target, attachment, what)[0].cast_unsigned()
+    attachment_i::<1>(DRAW_FRAMEBUFFER, attachment, ATTACHMENT_COMPONENT_TYPE)[0].cast_unsigned()
 }
 
 /// `glMaterialfv`.
@@ -247,7 +246,7 @@ pub(crate) fn materialfv(face: u32, what: u32, values: &[f32; 4]) {
 /// Address or offset of a generic attribute's array.
 pub(crate) fn vertex_attrib_address(at: u32) -> usize {
     let mut out = core::ptr::null_mut();
-    get_vertex_attrib_pointer(at, 0x8645, &raw mut out);
+    get_vertex_attrib_pointer(at, VERTEX_ATTRIB_ARRAY_POINTER, &raw mut out);
     out as usize
 }
 
@@ -272,13 +271,12 @@ pub(crate) fn gen_vertex_array() -> u32 {
 
 /// Gives the bound 2-D texture its size. `None` leaves its texels open.
 pub(crate) fn tex_image(inner: i32, w: i32, h: i32, format: u32, kind: u32) {
-    tex_image_2d(0x0de1, 0, inner, w, h, 0, format, kind, core::ptr::null());
+    tex_image_2d(TEXTURE_2D, 0, inner, w, h, 0, format, kind, core::ptr::null());
 }
 
 /// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels,
 /// or of a kind that we do not know.
 pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8]) {
-    use crate::state::enums::{FLOAT, RED, RGBA, UNSIGNED_BYTE};
     let bytes = match (format, kind) {
         (RGBA, UNSIGNED_BYTE) | (RED, FLOAT) => 4,
         (RGBA, FLOAT) => 16,
@@ -287,20 +285,23 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
     let (w, h) = (w.max(0), h.max(0));
     assert!(data.len() as i64 >= i64::from(w) * i64::from(h) * bytes, "too few texels");
     // Whatever rows the program has: those of `data` follow one another, and lie in our memory.
-    // Alignment, row length, skipped rows and pixels.
-    const UNPACK: [(u32, i32); 4] = [(0x0cf5, 1), (0x0cf2, 0), (0x0cf3, 0), (0x0cf4, 0)];
-    const PIXEL_UNPACK_BUFFER: u32 = 0x88ec;
+    const UNPACK: [(u32, i32); 4] = [
+        (UNPACK_ALIGNMENT, 1),
+        (UNPACK_ROW_LENGTH, 0),
+        (UNPACK_SKIP_ROWS, 0),
+        (UNPACK_SKIP_PIXELS, 0),
+    ];
     let before = UNPACK.map(|(what, _)| int(what));
     UNPACK
         .into_iter()
         .zip(before)
         .filter(|(u, b)| u.1 != *b)
         .for_each(|(u, _)| pixel_storei(u.0, u.1));
-    let buffer = word(0x88ef);
+    let buffer = word(PIXEL_UNPACK_BUFFER_BINDING);
     if buffer != 0 {
         bind_buffer(PIXEL_UNPACK_BUFFER, 0);
     }
-    tex_sub_image_2d(0x0de1, 0, 0, 0, w, h, format, kind, data.as_ptr().cast());
+    tex_sub_image_2d(TEXTURE_2D, 0, 0, 0, w, h, format, kind, data.as_ptr().cast());
     if buffer != 0 {
         bind_buffer(PIXEL_UNPACK_BUFFER, buffer);
     }
@@ -318,7 +319,6 @@ pub(crate) struct RawPixelTransfer(());
 /// Texels of a level of the bound 1-D or 2-D texture: what the driver is going to write, whatever a
 /// caller thinks. `None` for other targets and from 2^26 texels on.
 fn texels_of(target: u32, level: i32) -> Option<usize> {
-    use crate::state::enums::{TEXTURE_1D, TEXTURE_2D, TEXTURE_HEIGHT, TEXTURE_WIDTH};
     if !matches!(target, TEXTURE_1D | TEXTURE_2D) {
         return None;
     }
@@ -332,7 +332,7 @@ fn texels_of(target: u32, level: i32) -> Option<usize> {
 pub(crate) fn tex_image_rgba(_: &RawPixelTransfer, target: u32, level: i32) -> Vec<[f32; 4]> {
     let Some(texels) = texels_of(target, level) else { return Vec::new() };
     let mut out = vec![[0.0_f32; 4]; texels];
-    get_tex_image(target, level, 0x1908, 0x1406, out.as_mut_ptr().cast());
+    get_tex_image(target, level, RGBA, FLOAT, out.as_mut_ptr().cast());
     out
 }
 
@@ -345,7 +345,7 @@ pub(crate) fn tex_image_bytes(
 ) -> Vec<[u8; 4]> {
     memory.resize(texels_of(target, level).unwrap_or(0), [0; 4]);
     if !memory.is_empty() {
-        get_tex_image(target, level, 0x1908, 0x1401, memory.as_mut_ptr().cast());
+        get_tex_image(target, level, RGBA, UNSIGNED_BYTE, memory.as_mut_ptr().cast());
     }
     memory
 }
@@ -353,16 +353,14 @@ pub(crate) fn tex_image_bytes(
 /// Where sample `i` of the framebuffer's pixels lies, from the lower left corner of the pixel.
 pub(crate) fn sample_place(i: u32) -> [f32; 2] {
     let mut out = [0.5; ROOM];
-    get_multisample(0x8e50, i, out.as_mut_ptr());
+    get_multisample(SAMPLE_POSITION, i, out.as_mut_ptr());
     [out[0], out[1]]
 }
-
-const SAMPLE_MASK: u32 = 0x8e51;
 
 /// Has only sample `i` of each pixel written; gives the mask that was set.
 pub(crate) fn only_sample(i: u32) -> u32 {
     let mut before = [-1; ROOM];
-    get_integeri(0x8e52, 0, before.as_mut_ptr());
+    get_integeri(SAMPLE_MASK_VALUE, 0, before.as_mut_ptr());
     enable(SAMPLE_MASK);
     sample_maski(0, 1 << i);
     before[0].cast_unsigned()
@@ -377,15 +375,15 @@ pub(crate) fn all_samples(mask: u32) {
 
 /// Colours through maps; scale and bias of red, green, blue, alpha.
 const TRANSFER: [(u32, f32); 9] = [
-    (0x0d10, 0.0),
-    (0x0d14, 1.0),
-    (0x0d15, 0.0),
-    (0x0d18, 1.0),
-    (0x0d19, 0.0),
-    (0x0d1a, 1.0),
-    (0x0d1b, 0.0),
-    (0x0d1c, 1.0),
-    (0x0d1d, 0.0),
+    (MAP_COLOR, 0.0),
+    (RED_SCALE, 1.0),
+    (RED_BIAS, 0.0),
+    (GREEN_SCALE, 1.0),
+    (GREEN_BIAS, 0.0),
+    (BLUE_SCALE, 1.0),
+    (BLUE_BIAS, 0.0),
+    (ALPHA_SCALE, 1.0),
+    (ALPHA_BIAS, 0.0),
 ];
 
 /// Pixels go as they are, without the program's scales and biases, until attributes are popped.
@@ -396,15 +394,20 @@ pub(crate) fn reset_pixel_transfer() {
 /// Runs `f` while texels are read as they are: rows that follow one another, into memory and not
 /// into a buffer, without the program's scales and biases.
 pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) -> R {
-    // Swapped bytes, row length, skipped rows and pixels, alignment; of volumes nothing is read.
-    const PACK: [(u32, i32); 5] = [(0x0d00, 0), (0x0d02, 0), (0x0d03, 0), (0x0d04, 0), (0x0d05, 4)];
-    const PIXEL_PACK_BUFFER: u32 = 0x88eb;
+    // Volumes have more parameters, and are not read.
+    const PACK: [(u32, i32); 5] = [
+        (PACK_SWAP_BYTES, 0),
+        (PACK_ROW_LENGTH, 0),
+        (PACK_SKIP_ROWS, 0),
+        (PACK_SKIP_PIXELS, 0),
+        (PACK_ALIGNMENT, 4),
+    ];
     let pack = PACK.map(|(what, plain)| (what, plain, int(what)));
     let transfer = TRANSFER.map(|(what, plain)| (what, plain, floats::<1>(what)[0]));
     // A context without fixed function has none of these and says 0 for all.
     let none = transfer.iter().all(|t| t.2 == 0.0);
     let transfer = transfer.map(|(what, plain, now)| (what, if none { now } else { plain }, now));
-    let buffer = word(0x88ed);
+    let buffer = word(PIXEL_PACK_BUFFER_BINDING);
     pack.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_storei(p.0, p.1));
     transfer.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_transferf(p.0, p.1));
     if buffer != 0 {
@@ -432,7 +435,7 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
 pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
     let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
     with_raw_pixel_reads(|_| {
-        read_pixels(0, 0, w.max(0), h.max(0), 0x1902, 0x1406, out.as_mut_ptr().cast())
+        read_pixels(0, 0, w.max(0), h.max(0), DEPTH_COMPONENT, FLOAT, out.as_mut_ptr().cast())
     });
     out
 }
@@ -460,14 +463,13 @@ pub(crate) fn shader_log(shader: u32) -> String {
 /// True when the driver takes 2-D textures of this kind. Changes nothing but what is remembered of
 /// questions like this one.
 pub(crate) fn has_texture_format(inner: i32, format: u32, kind: u32) -> bool {
-    const PROXY_TEXTURE_2D: u32 = 0x8064;
     tex_image_2d(PROXY_TEXTURE_2D, 0, inner, 16, 16, 0, format, kind, core::ptr::null());
-    tex_level_i::<1>(PROXY_TEXTURE_2D, 0, crate::state::enums::TEXTURE_WIDTH)[0] == 16
+    tex_level_i::<1>(PROXY_TEXTURE_2D, 0, TEXTURE_WIDTH)[0] == 16
 }
 
 /// Source of a shader of the program.
 pub(crate) fn source_of(shader: u32) -> String {
-    let room = shader_i::<1>(shader, 0x8b88)[0].max(0);
+    let room = shader_i::<1>(shader, SHADER_SOURCE_LENGTH)[0].max(0);
     let mut out = vec![0_u8; room as usize + 1];
     let mut n = 0;
     get_shader_source_raw(shader, room, &raw mut n, out.as_mut_ptr().cast());
@@ -500,7 +502,6 @@ pub(crate) fn attrib_location(program: u32, name: &str) -> i32 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::state::enums::{TEXTURE_2D, TEXTURE_HEIGHT, TEXTURE_WIDTH};
     use std::cell::Cell;
 
     thread_local! {
@@ -537,7 +538,7 @@ pub(super) mod tests {
         // SAFETY: memory of a vector's is the allocator's.
         let room = unsafe { libc::malloc_usable_size(out) };
         ROOM_FOR_TEXELS.set(room);
-        let bytes = (SIZE[0] * SIZE[1]) as usize * if kind == 0x1406 { 16 } else { 4 };
+        let bytes = (SIZE[0] * SIZE[1]) as usize * if kind == FLOAT { 16 } else { 4 };
         if room >= bytes {
             // SAFETY: there is room, as the allocator says.
             unsafe { out.cast::<u8>().write_bytes(1, bytes) };
@@ -588,7 +589,7 @@ pub(super) mod tests {
         assert!(ROOM_FOR_TEXELS.get() >= 4 * n, "{}", ROOM_FOR_TEXELS.get());
         assert_eq!(bytes, vec![[1; 4]; n]);
         // One number is asked for, and sixteen are written.
-        assert_eq!((int(0x0ba2), ints::<4>(0x0ba2)), (7, [7, 8, 9, 10]));
+        assert_eq!((int(VIEWPORT), ints::<4>(VIEWPORT)), (7, [7, 8, 9, 10]));
         // Lengths that are lies.
         assert_eq!(source_of(1).len(), 6);
         assert_eq!(shader_log(1).len(), 999);

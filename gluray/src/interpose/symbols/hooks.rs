@@ -13,6 +13,7 @@ use crate::interpose::client_memory::{self, ActiveCall, DrawArguments};
 use crate::interpose::context;
 use crate::interpose::driver::Int;
 use crate::interpose::panic_guard::caught;
+use crate::state::enums::{COLOR_INDEXES, SHININESS};
 use core::ffi::{c_char, c_void};
 
 /// Calls the driver's function of the same name.
@@ -66,8 +67,8 @@ type Address = *const c_void;
 /// The program has called `glMaterial` with these.
 unsafe fn material_values(what: u32, address: Address, integers: bool) -> [f32; 4] {
     let count = match what {
-        0x1601 => 1,
-        0x1603 => 3,
+        SHININESS => 1,
+        COLOR_INDEXES => 3,
         _ => 4,
     };
     let mut out = [0.0; 4];

@@ -194,12 +194,15 @@ fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image>
     image
 }
 
-const TEXTURE_BASE_LEVEL: u32 = 0x813c;
-const TEXTURE_MAX_LEVEL: u32 = 0x813d;
-const TEXTURE_SRGB_DECODE: u32 = 0x8a48;
-const SKIP_DECODE: u32 = 0x8a4a;
 /// Sizes of red, green, blue, alpha, luminance, intensity.
-const COMPONENT_SIZES: [u32; 6] = [0x805c, 0x805d, 0x805e, 0x805f, 0x8060, 0x8061];
+const COMPONENT_SIZES: [u32; 6] = [
+    TEXTURE_RED_SIZE,
+    TEXTURE_GREEN_SIZE,
+    TEXTURE_BLUE_SIZE,
+    TEXTURE_ALPHA_SIZE,
+    TEXTURE_LUMINANCE_SIZE,
+    TEXTURE_INTENSITY_SIZE,
+];
 
 fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let of_level = |n: i32, what| gl::tex_level_i::<1>(target, n, what)[0];
@@ -232,12 +235,12 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
         return None;
     }
     // Signed components have other quantisation steps.
-    let signed = matches!(format, 0x8f90..=0x8f9b | 0x9010..=0x901b);
+    let signed = matches!(format, RED_SNORM..=RGBA16_SNORM | ALPHA_SNORM..=INTENSITY16_SNORM);
     let sizes = COMPONENT_SIZES.map(|what| of_level(first, what));
     let whole = !signed && sizes.iter().all(|bits| matches!(bits, 0 | 8));
     // Decoded before filtering, as in the driver.
-    let encoded =
-        matches!(format, 0x8c40..=0x8c4f) && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
+    let encoded = matches!(format, SRGB..=COMPRESSED_SRGB_ALPHA_S3TC_DXT5)
+        && parameter(TEXTURE_SRGB_DECODE) != SKIP_DECODE;
     let levels = (first..=last).map(|n| {
         let [width, height] = halved(n);
         let texels = if whole && !encoded {

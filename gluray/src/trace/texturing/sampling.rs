@@ -34,10 +34,6 @@ pub(crate) struct Filters {
 crate::cluster::codec::wire_enum!(Mip { None, Nearest, Linear });
 crate::cluster::codec::wire_struct!(Filters { mag_linear, min_linear, mip, bias, lod });
 
-const TEXTURE_MIN_LOD: u32 = 0x813a;
-const TEXTURE_MAX_LOD: u32 = 0x813b;
-const TEXTURE_FILTER_CONTROL: u32 = 0x8500;
-const TEXTURE_LOD_BIAS: u32 = 0x8501;
 /// The driver's limit for levels of detail that it does not look at.
 const DEEPEST: f32 = 14.0;
 
@@ -59,10 +55,10 @@ impl Filters {
         let one = |what| gl::tex_parameter_f::<1>(target, what)[0];
         Filters {
             mag_linear: mag == LINEAR,
-            min_linear: matches!(min, LINEAR | 0x2701 | 0x2703),
+            min_linear: matches!(min, LINEAR | LINEAR_MIPMAP_NEAREST | LINEAR_MIPMAP_LINEAR),
             mip: match min {
                 NEAREST | LINEAR => Mip::None,
-                0x2700 | 0x2701 => Mip::Nearest,
+                NEAREST_MIPMAP_NEAREST | LINEAR_MIPMAP_NEAREST => Mip::Nearest,
                 _ => Mip::Linear,
             },
             bias: one(TEXTURE_LOD_BIAS)
