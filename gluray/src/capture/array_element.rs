@@ -1,18 +1,20 @@
 //! `glArrayElement`: a vertex of the arrays between Begin and End.
 
+use crate::capture::ImmediateModeTarget;
 use crate::capture::vertex_arrays::VertexArrays;
 use crate::interpose::client_memory::{ActiveCall, ArraySource, Elements};
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 
 impl Context {
     /// Values of element `i` become current, and a vertex of the primitive that is recorded or
     /// compiled.
     pub(crate) fn array_element(&mut self, call: &ActiveCall<'_>) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace => {}
-            ImmediateModeTarget::List if self.recording.as_ref().is_some_and(|r| r.is_open()) => {}
+            ImmediateModeTarget::List
+                if self.capture.recording.as_ref().is_some_and(|r| r.is_open()) => {}
             ImmediateModeTarget::List => {
-                if let Some(r) = &mut self.recording {
+                if let Some(r) = &mut self.capture.recording {
                     r.note_driver_call(0, false, true);
                 }
                 return false;
@@ -28,10 +30,10 @@ impl Context {
             Ok(taken) => return taken,
             Err(why) => why,
         };
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.replay_to_driver(why),
             _ => {
-                if let Some(r) = &mut self.recording {
+                if let Some(r) = &mut self.capture.recording {
                     r.note_driver_call(0, false, true);
                 }
             }
@@ -42,9 +44,11 @@ impl Context {
     fn take_element(&mut self, call: &ActiveCall<'_>) -> Result<bool, &'static str> {
         let element = Elements::of(call, None)?;
         // Nothing about arrays can change before End.
-        let arrays = match self.element_arrays {
+        let arrays = match self.capture.element_arrays {
             Some(arrays) => arrays,
-            None => *self.element_arrays.insert(VertexArrays::query(self.capabilities.version)?),
+            None => {
+                *self.capture.element_arrays.insert(VertexArrays::query(self.capabilities.version)?)
+            }
         };
         let [normal, color, tex] = [arrays.normal, arrays.color, arrays.tex];
         let position = value(arrays.position, &element)?;

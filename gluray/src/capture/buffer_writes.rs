@@ -1,9 +1,10 @@
 //! When buffer objects were written: geometry in buffers is read once, and again only after
 //! somebody wrote to them.
 
+use crate::capture::ImmediateModeTarget;
 use crate::interpose::calls::class;
 use crate::interpose::client_memory::ArraySource;
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use std::collections::HashMap;
@@ -50,7 +51,7 @@ impl Context {
     pub(crate) fn buffer_written(&mut self, target: u32) -> bool {
         self.watched_call(0, 0, false, false);
         let binding = match target {
-            _ if self.immediate_target == ImmediateModeTarget::Pass => 0,
+            _ if self.capture.immediate_target == ImmediateModeTarget::Pass => 0,
             ARRAY_BUFFER => ARRAY_BUFFER_BINDING,
             ELEMENT_ARRAY_BUFFER => ELEMENT_ARRAY_BUFFER_BINDING,
             // The name of the target is that of its binding; OpenGL 3.1.
@@ -61,7 +62,7 @@ impl Context {
             0 => self.writes().any(),
             buffer => self.writes().to(buffer),
         }
-        self.dirty |= class::BUFFER;
+        self.state.dirty |= class::BUFFER;
         false
     }
 
@@ -73,7 +74,7 @@ impl Context {
             writes.to(u32::from_ne_bytes([b[0], b[1], b[2], b[3]]));
         }
         drop(writes);
-        self.dirty |= class::BUFFER;
+        self.state.dirty |= class::BUFFER;
         false
     }
 }

@@ -12,9 +12,10 @@ mod recording;
 
 pub(crate) use recording::ListRecording;
 
+use crate::capture::ImmediateModeTarget;
 use crate::capture::evaluators::MapKind;
 use crate::interpose::calls::class;
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
 use crate::state::current_attributes::CurrentAttributes;
@@ -83,27 +84,27 @@ impl Context {
     pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
         if crate::interpose::panic_guard::happened() {
             // The driver's from now on.
-            self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
+            self.shared.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
             return false;
         }
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glNewList between Begin and End");
         }
         let wrong = name == 0
-            || self.recording.is_some()
-            || self.immediate_target == ImmediateModeTarget::Pass;
+            || self.capture.recording.is_some()
+            || self.capture.immediate_target == ImmediateModeTarget::Pass;
         if wrong || !(mode == COMPILE || mode == COMPILE_AND_EXECUTE) || self.capabilities.core {
             return false;
         }
         self.sync();
         gl::new_list(name, COMPILE);
         {
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
             lists.greatest = lists.greatest.max(name);
             lists.next_segment = lists.next_segment.max(name.saturating_sub(FIRST_SEGMENT));
         }
         let execute = mode == COMPILE_AND_EXECUTE;
-        self.recording = Some(ListRecording {
+        self.capture.recording = Some(ListRecording {
             name,
             execute,
             list: DisplayList::default(),
@@ -115,25 +116,25 @@ impl Context {
             open: false,
             mode: 0,
         });
-        self.immediate_target = ImmediateModeTarget::List;
+        self.capture.immediate_target = ImmediateModeTarget::List;
         symbols::arm();
         true
     }
 
     pub(crate) fn end_list(&mut self) -> bool {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glEndList between Begin and End");
         }
-        if self.recording.as_ref().is_some_and(|r| r.execute && r.open) {
+        if self.capture.recording.as_ref().is_some_and(|r| r.execute && r.open) {
             // What is compiled is also executed, and there a primitive is open.
             self.errors.push(INVALID_OPERATION);
             return true;
         }
-        let Some(mut r) = self.recording.take() else { return false };
+        let Some(mut r) = self.capture.recording.take() else { return false };
         r.end_segment();
-        self.immediate_target = ImmediateModeTarget::Outside;
+        self.capture.immediate_target = ImmediateModeTarget::Outside;
         let old = {
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
             lists.lists.insert(r.name, Arc::new(r.list))
         };
         delete_segments(old);
@@ -145,25 +146,25 @@ impl Context {
 
     /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
     pub(crate) fn list_op(&mut self, op: ListOp) -> bool {
-        if self.recording.as_ref().is_some_and(|r| r.used) {
+        if self.capture.recording.as_ref().is_some_and(|r| r.used) {
             self.close_segment();
             self.open_segment();
         }
-        let Some(r) = &mut self.recording else { return false };
+        let Some(r) = &mut self.capture.recording else { return false };
         r.list.ops.push(op);
         true
     }
 
     /// The driver's piece of the list that is compiled ends here.
     fn close_segment(&mut self) {
-        if let Some(r) = &mut self.recording {
+        if let Some(r) = &mut self.capture.recording {
             r.end_segment();
         }
     }
 
     fn open_segment(&mut self) {
-        let Some(r) = &mut self.recording else { return };
-        let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+        let Some(r) = &mut self.capture.recording else { return };
+        let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
         lists.next_segment += 1;
         r.segment = FIRST_SEGMENT + lists.next_segment;
         r.list.segments.push(r.segment);
@@ -171,18 +172,18 @@ impl Context {
     }
 
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
-        if let Some(r) = &mut self.recording {
+        if let Some(r) = &mut self.capture.recording {
             (r.open, r.mode) = (true, mode);
         }
-        self.element_arrays = None;
+        self.capture.element_arrays = None;
         self.list_op(ListOp::Begin(mode))
     }
 
     /// `glPrimitiveRestartNV`: an End, and a Begin of the same mode.
     pub(crate) fn primitive_restart(&mut self) -> bool {
-        let mode = match self.immediate_target {
-            ImmediateModeTarget::Trace => self.recorder.mode(),
-            ImmediateModeTarget::List => match &self.recording {
+        let mode = match self.capture.immediate_target {
+            ImmediateModeTarget::Trace => self.capture.recorder.mode(),
+            ImmediateModeTarget::List => match &self.capture.recording {
                 Some(r) if r.open => r.mode,
                 _ => return false,
             },
@@ -197,7 +198,7 @@ impl Context {
     }
 
     pub(crate) fn list_end(&mut self) -> bool {
-        if let Some(r) = &mut self.recording {
+        if let Some(r) = &mut self.capture.recording {
             r.open = false;
         }
         self.list_op(ListOp::End)
@@ -220,7 +221,7 @@ impl Context {
     }
 
     pub(crate) fn list_material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
-        let Some(r) = &mut self.recording else { return false };
+        let Some(r) = &mut self.capture.recording else { return false };
         let at = r.list.materials.len() as u32;
         r.list.materials.push((face, what, v));
         self.list_op(ListOp::Material(at))
@@ -232,45 +233,49 @@ impl Context {
     }
 
     pub(crate) fn call_list(&mut self, name: u32) -> bool {
-        if self.recording.is_some() {
+        if self.capture.recording.is_some() {
             return self.list_op(ListOp::Call(name));
         }
         if crate::interpose::panic_guard::happened() {
             return self.execute_in_driver(name);
         }
-        let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
+        let known =
+            self.shared.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
         let Some(list) = known else {
             // Not compiled by calls that we saw (fonts of glXUseXFont), or not there.
             self.call_driver(name, true, true);
             return true;
         };
-        if self.depth_of_lists >= DEEPEST {
+        if self.capture.depth_of_lists >= DEEPEST {
             return true;
         }
         // Quads in lists are split in another way than others: they are batches of their own.
-        if self.depth_of_lists == 0
-            && self.recorder.quads
-            && self.immediate_target == ImmediateModeTarget::Outside
+        if self.capture.depth_of_lists == 0
+            && self.capture.recorder.quads
+            && self.capture.immediate_target == ImmediateModeTarget::Outside
         {
             self.end_batch();
         }
-        self.depth_of_lists += 1;
+        self.capture.depth_of_lists += 1;
         self.execute(&list);
-        if self.depth_of_lists == 1
-            && self.recorder.quads
-            && self.immediate_target == ImmediateModeTarget::Outside
+        if self.capture.depth_of_lists == 1
+            && self.capture.recorder.quads
+            && self.capture.immediate_target == ImmediateModeTarget::Outside
         {
             self.end_batch();
         }
-        self.depth_of_lists -= 1;
+        self.capture.depth_of_lists -= 1;
         true
     }
 
     /// After a fault of ours: a list of ours into the driver as it is.
     fn execute_in_driver(&mut self, name: u32) -> bool {
-        let known = self.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
-        let Some(list) = known.filter(|_| self.depth_of_lists < DEEPEST) else { return false };
-        self.depth_of_lists += 1;
+        let known =
+            self.shared.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
+        let Some(list) = known.filter(|_| self.capture.depth_of_lists < DEEPEST) else {
+            return false;
+        };
+        self.capture.depth_of_lists += 1;
         for op in &list.ops {
             match *op {
                 ListOp::Begin(mode) | ListOp::BeginArrays(mode) => gl::begin(mode),
@@ -294,7 +299,7 @@ impl Context {
                 }
             }
         }
-        self.depth_of_lists -= 1;
+        self.capture.depth_of_lists -= 1;
         true
     }
 
@@ -315,20 +320,20 @@ impl Context {
 
     /// The driver is about to play lists of its own.
     fn before_driver_list(&mut self, draws: bool, textures: bool) {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("a list between Begin and End");
         }
         self.end_batch();
-        if draws && self.immediate_target == ImmediateModeTarget::Outside {
+        if draws && self.capture.immediate_target == ImmediateModeTarget::Outside {
             self.refresh();
-            if crate::classify::rules::commutes(&self.state) {
-                self.frame.driver_drew();
+            if crate::classify::rules::commutes(&self.state.snapshot) {
+                self.presentation.frame.driver_drew();
             } else {
                 self.flush("a display list of the driver's");
             }
         }
         self.sync();
-        self.dirty = class::ALL;
+        self.state.dirty = class::ALL;
         if textures {
             self.invalidate_textures();
         }
@@ -348,14 +353,17 @@ impl Context {
                 continue;
             }
             match *op {
-                ListOp::BeginArrays(_) if self.immediate_target != ImmediateModeTarget::Outside => {
+                ListOp::BeginArrays(_)
+                    if self.capture.immediate_target != ImmediateModeTarget::Outside =>
+                {
                     self.errors.push(INVALID_OPERATION);
                     left_out = true;
                 }
                 ListOp::Begin(mode) | ListOp::BeginArrays(mode) => {
                     let swallowed = self.begin(mode);
                     // Not earlier: Begin asks the driver what is current.
-                    before_arrays = matches!(op, ListOp::BeginArrays(_)).then_some(self.current);
+                    before_arrays =
+                        matches!(op, ListOp::BeginArrays(_)).then_some(self.attributes.current);
                     if !swallowed {
                         match self.execute_quads(mode, list, &list.ops[i + 1..]) {
                             Some(n) => {
@@ -409,8 +417,8 @@ impl Context {
                     self.call_list(name);
                 }
                 ListOp::CallFromBase(name) => {
-                    let base = if self.immediate_target == ImmediateModeTarget::Pass {
-                        self.state.list_base
+                    let base = if self.capture.immediate_target == ImmediateModeTarget::Pass {
+                        self.state.snapshot.list_base
                     } else {
                         gl::word(LIST_BASE)
                     };
@@ -443,13 +451,13 @@ impl Context {
     /// Current values are what they were before arrays.
     fn restore_current_attributes(&mut self, before: Option<CurrentAttributes>) {
         let Some(b) = before else { return };
-        if b.normal != self.current.normal && !self.normal(b.normal) {
+        if b.normal != self.attributes.current.normal && !self.normal(b.normal) {
             gl::normal3f(b.normal[0], b.normal[1], b.normal[2]);
         }
-        if b.color != self.current.color && !self.color(b.color) {
+        if b.color != self.attributes.current.color && !self.color(b.color) {
             gl::color4f(b.color[0], b.color[1], b.color[2], b.color[3]);
         }
-        if b.tex != self.current.tex && !self.tex_coord(b.tex) {
+        if b.tex != self.attributes.current.tex && !self.tex_coord(b.tex) {
             gl::tex_coord4f(b.tex[0], b.tex[1], b.tex[2], b.tex[3]);
         }
     }
@@ -458,11 +466,11 @@ impl Context {
     /// splits those of immediate mode along the other diagonal. Gives how many steps that were;
     /// `None` where a quad is more than two filled triangles, or more than vertices come.
     fn execute_quads(&mut self, mode: u32, list: &DisplayList, ops: &[ListOp]) -> Option<usize> {
-        let filled = self.state.polygon_mode == [FILL; 2];
+        let filled = self.state.snapshot.polygon_mode == [FILL; 2];
         if mode != QUADS
             || !filled
-            || self.immediate_target != ImmediateModeTarget::Pass
-            || self.state.program != 0
+            || self.capture.immediate_target != ImmediateModeTarget::Pass
+            || self.state.snapshot.program != 0
         {
             return None;
         }
@@ -479,17 +487,17 @@ impl Context {
         let n = ops.iter().position(|op| !plain(op)).filter(|n| ops[*n] == ListOp::End)?;
         gl::begin(TRIANGLES);
         let mut corners = Vec::with_capacity(4);
-        let mut sent = self.current;
+        let mut sent = self.attributes.current;
         for op in &ops[..n] {
             match *op {
-                ListOp::Normal(v) => self.current.normal = v,
-                ListOp::Color(v) => self.current.color = v,
-                ListOp::Tex(v) => self.current.tex = v,
+                ListOp::Normal(v) => self.attributes.current.normal = v,
+                ListOp::Color(v) => self.attributes.current.color = v,
+                ListOp::Tex(v) => self.attributes.current.tex = v,
                 ListOp::Material(at) => {
                     let (face, what, v) = list.materials[at as usize];
                     self.material(face, what, v);
                 }
-                ListOp::Vertex(v) => corners.push((v, self.current)),
+                ListOp::Vertex(v) => corners.push((v, self.attributes.current)),
                 _ => {}
             }
             if let [a, b, c, d] = corners[..] {
@@ -501,7 +509,7 @@ impl Context {
                 corners.clear();
             }
         }
-        self.current.send_changes(&sent);
+        self.attributes.current.send_changes(&sent);
         gl::end();
         self.end();
         Some(n + 1)
@@ -514,20 +522,20 @@ impl Context {
             names.into_iter().for_each(|n| self.execute_in_driver_or_call(base.wrapping_add(n)));
             return true;
         }
-        if self.recording.is_some() {
+        if self.capture.recording.is_some() {
             for name in names {
                 self.list_op(ListOp::CallFromBase(name));
             }
             return true;
         }
         // Between Begin and End of a primitive that the driver draws it answers no questions.
-        let base = if self.immediate_target == ImmediateModeTarget::Pass {
-            self.state.list_base
+        let base = if self.capture.immediate_target == ImmediateModeTarget::Pass {
+            self.state.snapshot.list_base
         } else {
             gl::word(LIST_BASE)
         };
         let ours = {
-            let lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
             names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))
         };
         if !ours {
@@ -543,12 +551,12 @@ impl Context {
 
     /// Forgets our part; the driver then deletes its own.
     pub(crate) fn delete_lists(&mut self, first: u32, n: i32) -> bool {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glDeleteLists between Begin and End");
         }
         let range = first..first.saturating_add(n.max(0).cast_unsigned());
         let gone: Vec<_> = {
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
             // Few steps, whether the program names few lists or many that are not there.
             match lists.lists.len() < range.len() {
                 true => lists

@@ -9,9 +9,10 @@ mod bernstein;
 mod casteljau;
 mod maps;
 
+use crate::capture::ImmediateModeTarget;
 use crate::capture::display_lists::ListOp;
 use crate::classify::rules::Classification;
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
 use crate::state::enums::*;
@@ -71,30 +72,30 @@ impl Evaluators {
 impl Context {
     /// `glMap` and `glMapGrid`.
     pub(crate) fn invalidate_maps(&mut self) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             // An error, which the driver is to report.
             ImmediateModeTarget::Trace => self.replay_to_driver("a map between Begin and End"),
             ImmediateModeTarget::List => {
-                if let Some(r) = &mut self.recording {
+                if let Some(r) = &mut self.capture.recording {
                     r.note_map();
                 }
             }
             ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => {}
         }
-        self.evaluators.forget();
+        self.capture.evaluators.forget();
         false
     }
 
     /// The draw that comes goes into the driver's piece of the list that is compiled.
     fn put_into_driver_segment(&mut self) {
-        if let Some(r) = &mut self.recording {
+        if let Some(r) = &mut self.capture.recording {
             r.note_driver_call(0, true, true);
         }
     }
 
     /// `glEvalCoord`.
     pub(crate) fn eval_coord(&mut self, kind: MapKind, at: [f32; 2]) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.eval_vertex(kind, at),
             ImmediateModeTarget::List => self.list_op(ListOp::EvalCoord(kind, at)),
             ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => false,
@@ -103,9 +104,9 @@ impl Context {
 
     /// `glEvalPoint`.
     pub(crate) fn eval_point(&mut self, kind: MapKind, places: [i32; 2]) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace => {
-                let at = self.evaluators.grid(kind).at(places);
+                let at = self.capture.evaluators.grid(kind).at(places);
                 self.eval_vertex(kind, at)
             }
             ImmediateModeTarget::List => self.list_op(ListOp::EvalPoint(kind, places)),
@@ -115,7 +116,7 @@ impl Context {
 
     /// A vertex of a primitive that is traced.
     fn eval_vertex(&mut self, kind: MapKind, at: [f32; 2]) -> bool {
-        let maps = self.evaluators.maps(kind);
+        let maps = self.capture.evaluators.maps(kind);
         if let Some(why) = maps.unsupported() {
             self.replay_to_driver(why);
             return false;
@@ -125,15 +126,15 @@ impl Context {
             return false;
         }
         // The next `glVertex` has what is current.
-        let c = self.current;
+        let c = self.attributes.current;
         if e.normal.is_some() {
-            self.recorder.set_normal(c.normal);
+            self.capture.recorder.set_normal(c.normal);
         }
         if e.color.is_some() {
-            self.recorder.set_color(c.color);
+            self.capture.recorder.set_color(c.color);
         }
         if e.tex.is_some() {
-            self.recorder.set_tex(c.tex);
+            self.capture.recorder.set_tex(c.tex);
         }
         true
     }
@@ -142,7 +143,7 @@ impl Context {
     /// false comes back.
     fn take_evaluated(&mut self, e: &EvaluatedVertex) -> bool {
         let [x, y, z, w] = e.position;
-        let mut with = self.current;
+        let mut with = self.attributes.current;
         with.color = e.color.unwrap_or(with.color);
         with.normal = e.normal.unwrap_or(with.normal);
         with.tex = e.tex.unwrap_or(with.tex);
@@ -150,28 +151,30 @@ impl Context {
             self.replay_to_driver("vertices with w not positive");
             return false;
         }
-        if let Classification::TraceIfOpaque(why) = self.classification
+        if let Classification::TraceIfOpaque(why) = self.classifier.classification
             && !self.is_opaque_with(with.color)
         {
             self.replay_to_driver(why);
             return false;
         }
         if e.normal.is_some() {
-            self.recorder.set_normal(with.normal);
+            self.capture.recorder.set_normal(with.normal);
         }
         if e.color.is_some() {
-            self.recorder.set_color(with.color);
+            self.capture.recorder.set_color(with.color);
         }
         if e.tex.is_some() {
-            self.recorder.set_tex(with.tex);
+            self.capture.recorder.set_tex(with.tex);
         }
-        self.recorder.vertex(if w == 1.0 { [x, y, z] } else { [x / w, y / w, z / w] }, &with);
+        self.capture
+            .recorder
+            .vertex(if w == 1.0 { [x, y, z] } else { [x / w, y / w, z / w] }, &with);
         true
     }
 
     /// `glEvalMesh1`: points or lines, which are the driver's.
     pub(crate) fn eval_mesh_1(&mut self, mode: u32) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.replay_to_driver("a mesh between Begin and End"),
             ImmediateModeTarget::List => self.put_into_driver_segment(),
             ImmediateModeTarget::Outside => {
@@ -190,13 +193,13 @@ impl Context {
             return false;
         }
         self.refresh();
-        self.evaluators.maps(kind).has_vertices()
+        self.capture.evaluators.maps(kind).has_vertices()
     }
 
     /// `glEvalMesh2` from `i1` to `i2` and `j1` to `j2`.
     pub(crate) fn eval_mesh_2(&mut self, mode: u32, range: [i32; 4]) -> bool {
         let filled = mode == FILL;
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace => {
                 // An error, which the driver is to report.
                 self.replay_to_driver("a mesh between Begin and End");
@@ -220,12 +223,12 @@ impl Context {
         }
         let classification = self.classification();
         let opaque = self.is_opaque_now();
-        let maps = self.evaluators.maps(MapKind::Surface);
+        let maps = self.capture.evaluators.maps(MapKind::Surface);
         let why = match classification {
             _ if !filled => Some("lines and points"),
             Classification::Pass(why) => Some(why),
             Classification::TraceIfOpaque(why) if !maps.has_colors() && !opaque => Some(why),
-            _ if self.state.program != 0 => Some("evaluators with a program"),
+            _ if self.state.snapshot.program != 0 => Some("evaluators with a program"),
             _ if i2 - i1 > MOST_IN_ROW => Some("a mesh with too many points in a row"),
             _ => maps.unsupported(),
         };
@@ -247,7 +250,7 @@ impl Context {
     /// Rows of a mesh as Mesa draws them: parameters are summed up, and quads are split as strips
     /// of triangles are.
     fn trace_mesh(&mut self, [i1, i2, j1, j2]: [i32; 4]) {
-        let EvaluatorGrid { first, step } = self.evaluators.grid(MapKind::Surface);
+        let EvaluatorGrid { first, step } = self.capture.evaluators.grid(MapKind::Surface);
         let mut along = Vec::new();
         let mut u = first[0] + i1 as f32 * step[0];
         for _ in i1..=i2 {
@@ -263,28 +266,30 @@ impl Context {
             v += step[1];
         }
         // The next Begin takes up what is current.
-        self.recorder.behind = true;
+        self.capture.recorder.behind = true;
     }
 
     fn row(&mut self, along: &[f32], v: f32) -> Vec<EvaluatedVertex> {
-        let maps = self.evaluators.maps(MapKind::Surface);
+        let maps = self.capture.evaluators.maps(MapKind::Surface);
         along.iter().filter_map(|u| maps.at([*u, v])).collect()
     }
 
     fn trace_strip(&mut self, along: &[f32], across: [f32; 2], rows: [&[EvaluatedVertex]; 2]) {
-        self.recorder.begin(TRIANGLE_STRIP, &self.current);
-        self.immediate_target = ImmediateModeTarget::Trace;
+        self.capture.recorder.begin(TRIANGLE_STRIP, &self.attributes.current);
+        self.capture.immediate_target = ImmediateModeTarget::Trace;
         for ((u, lower), upper) in along.iter().zip(rows[0]).zip(rows[1]) {
             for (v, e) in across.iter().zip([lower, upper]) {
-                if self.immediate_target != ImmediateModeTarget::Trace || !self.take_evaluated(e) {
+                if self.capture.immediate_target != ImmediateModeTarget::Trace
+                    || !self.take_evaluated(e)
+                {
                     gl::eval_coord2f(*u, *v);
                 }
             }
         }
-        match self.immediate_target {
-            ImmediateModeTarget::Trace => self.recorder.end(),
+        match self.capture.immediate_target {
+            ImmediateModeTarget::Trace => self.capture.recorder.end(),
             _ => gl::end(),
         }
-        self.immediate_target = ImmediateModeTarget::Outside;
+        self.capture.immediate_target = ImmediateModeTarget::Outside;
     }
 }

@@ -1,8 +1,9 @@
 //! Immediate mode: Begin and End, and the attributes that vertices take with them.
 
+use crate::capture::ImmediateModeTarget;
 use crate::classify::rules::{self, Classification};
 use crate::interpose::calls::class;
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::symbols;
 use crate::state::current_attributes::{set_material, stale};
 use crate::state::enums::*;
@@ -27,16 +28,17 @@ impl Context {
     pub(crate) fn begin_fast(&mut self, mode: u32) -> FastPathResult {
         const DRAWS: u8 =
             class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
-        let ready =
-            self.immediate_target == ImmediateModeTarget::Outside && self.dirty & DRAWS == 0;
+        let ready = self.capture.immediate_target == ImmediateModeTarget::Outside
+            && self.state.dirty & DRAWS == 0;
         if ready
-            && self.classification == Classification::Trace
-            && self.state.program == 0
+            && self.classifier.classification == Classification::Trace
+            && self.state.snapshot.program == 0
             && (TRIANGLES..=POLYGON).contains(&mode)
         {
-            self.recorder.begin(mode, &self.current);
-            self.immediate_target = ImmediateModeTarget::Trace;
-            (self.set_since_draw, self.element_arrays) = (MaterialProperties::default(), None);
+            self.capture.recorder.begin(mode, &self.attributes.current);
+            self.capture.immediate_target = ImmediateModeTarget::Trace;
+            (self.attributes.set_since_draw, self.capture.element_arrays) =
+                (MaterialProperties::default(), None);
             return FastPathResult::Done;
         }
         FastPathResult::Slow
@@ -52,17 +54,19 @@ impl Context {
     /// True when a vertex now would have alpha 1.
     #[inline]
     pub(crate) fn is_opaque_now(&self) -> bool {
-        self.is_opaque_with(self.current.color)
+        self.is_opaque_with(self.attributes.current.color)
     }
 
     /// The same with another colour than the current one.
     #[inline]
     pub(crate) fn is_opaque_with(&self, color: [f32; 4]) -> bool {
-        let s = &*self.state;
+        let s = &*self.state.snapshot;
         let tracked =
             s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
         match s.lighting {
-            true if !tracked => self.current.materials.iter().all(|m| m.diffuse[3] == 1.0),
+            true if !tracked => {
+                self.attributes.current.materials.iter().all(|m| m.diffuse[3] == 1.0)
+            }
             _ => color[3] == 1.0,
         }
     }
@@ -70,8 +74,8 @@ impl Context {
     /// Alpha left 1 while that was what a draw was traced for.
     #[inline]
     fn watch_alpha(&mut self) {
-        if self.immediate_target == ImmediateModeTarget::Trace
-            && let Classification::TraceIfOpaque(why) = self.classification
+        if self.capture.immediate_target == ImmediateModeTarget::Trace
+            && let Classification::TraceIfOpaque(why) = self.classifier.classification
             && !self.is_opaque_now()
         {
             self.replay_to_driver(why);
@@ -80,7 +84,7 @@ impl Context {
 
     #[cold]
     fn begin_slow(&mut self, mode: u32) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::List => return self.list_begin(mode),
             // An error, which the driver is to report.
             ImmediateModeTarget::Trace => {
@@ -92,7 +96,7 @@ impl Context {
         }
         let classification = self.classification();
         let filled = crate::capture::primitives::is_filled(mode);
-        let fixed = self.state.program == 0;
+        let fixed = self.state.snapshot.program == 0;
         let classification = match classification {
             Classification::TraceIfOpaque(why) if !self.is_opaque_now() => {
                 Classification::Pass(why)
@@ -108,9 +112,9 @@ impl Context {
                 if classification == Classification::TraceInOrder {
                     self.flush("a draw whose order matters");
                 }
-                self.recorder.begin(mode, &self.current);
-                self.immediate_target = ImmediateModeTarget::Trace;
-                self.element_arrays = None;
+                self.capture.recorder.begin(mode, &self.attributes.current);
+                self.capture.immediate_target = ImmediateModeTarget::Trace;
+                self.capture.element_arrays = None;
                 symbols::arm();
                 true
             }
@@ -121,7 +125,7 @@ impl Context {
                     _ => "immediate mode with a program",
                 };
                 self.before_driver_draw(why, filled);
-                self.immediate_target = ImmediateModeTarget::Pass;
+                self.capture.immediate_target = ImmediateModeTarget::Pass;
                 false
             }
         }
@@ -130,8 +134,8 @@ impl Context {
     /// The driver is about to draw something.
     pub(crate) fn before_driver_draw(&mut self, why: &'static str, filled: bool) {
         self.end_batch();
-        if rules::commutes(&self.state) && !filled {
-            self.frame.driver_drew();
+        if rules::commutes(&self.state.snapshot) && !filled {
+            self.presentation.frame.driver_drew();
         } else {
             self.flush(crate::present::frame::ORDER_MATTERS);
         }
@@ -142,11 +146,11 @@ impl Context {
     /// The short way of `glEnd`.
     #[inline(always)]
     pub(crate) fn end_fast(&mut self) -> FastPathResult {
-        if self.immediate_target == ImmediateModeTarget::Trace
-            && self.classification != Classification::TraceInOrder
+        if self.capture.immediate_target == ImmediateModeTarget::Trace
+            && self.classifier.classification != Classification::TraceInOrder
         {
-            self.recorder.end();
-            self.immediate_target = ImmediateModeTarget::Outside;
+            self.capture.recorder.end();
+            self.capture.immediate_target = ImmediateModeTarget::Outside;
             return FastPathResult::Done;
         }
         FastPathResult::Slow
@@ -161,15 +165,15 @@ impl Context {
 
     #[cold]
     fn end_slow(&mut self) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::List => self.list_end(),
             ImmediateModeTarget::Pass => {
-                self.immediate_target = ImmediateModeTarget::Outside;
+                self.capture.immediate_target = ImmediateModeTarget::Outside;
                 false
             }
             ImmediateModeTarget::Trace => {
-                self.recorder.end();
-                self.immediate_target = ImmediateModeTarget::Outside;
+                self.capture.recorder.end();
+                self.capture.immediate_target = ImmediateModeTarget::Outside;
                 self.end_batch();
                 true
             }
@@ -179,8 +183,8 @@ impl Context {
 
     /// The primitive that is being recorded goes to the driver after all.
     pub(crate) fn replay_to_driver(&mut self, why: &'static str) {
-        self.immediate_target = ImmediateModeTarget::Pass;
-        let (mode, vertices) = self.recorder.take_open_primitive();
+        self.capture.immediate_target = ImmediateModeTarget::Pass;
+        let (mode, vertices) = self.capture.recorder.take_open_primitive();
         self.before_driver_draw(why, true);
         self.replay_primitive(mode, vertices);
     }
@@ -188,9 +192,9 @@ impl Context {
     /// The short way of `glVertex`.
     #[inline(always)]
     pub(crate) fn vertex_fast(&mut self, v: [f32; 4]) -> FastPathResult {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Trace if v[3] == 1.0 => {
-                self.recorder.vertex([v[0], v[1], v[2]], &self.current);
+                self.capture.recorder.vertex([v[0], v[1], v[2]], &self.attributes.current);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => FastPathResult::Driver,
@@ -207,10 +211,12 @@ impl Context {
 
     #[cold]
     fn vertex_slow(&mut self, v: [f32; 4]) -> bool {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::List => self.list_vertex(v),
             ImmediateModeTarget::Trace if v[3] > 0.0 && v[3].is_finite() => {
-                self.recorder.vertex([v[0] / v[3], v[1] / v[3], v[2] / v[3]], &self.current);
+                self.capture
+                    .recorder
+                    .vertex([v[0] / v[3], v[1] / v[3], v[2] / v[3]], &self.attributes.current);
                 true
             }
             ImmediateModeTarget::Trace => {
@@ -225,21 +231,21 @@ impl Context {
     /// take counts, and the next Begin looks.
     #[inline(always)]
     pub(crate) fn normal_fast(&mut self, v: [f32; 3]) -> FastPathResult {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Outside => {
-                self.current.normal = v;
-                self.recorder.behind = true;
+                self.attributes.current.normal = v;
+                self.capture.recorder.behind = true;
                 self.mark_stale(stale::NORMAL);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Trace => {
-                self.current.normal = v;
-                self.recorder.set_normal(v);
+                self.attributes.current.normal = v;
+                self.capture.recorder.set_normal(v);
                 self.mark_stale(stale::NORMAL);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => {
-                self.current.normal = v;
+                self.attributes.current.normal = v;
                 FastPathResult::Driver
             }
             ImmediateModeTarget::List => FastPathResult::Slow,
@@ -256,23 +262,23 @@ impl Context {
     /// The short way of `glColor`.
     #[inline(always)]
     pub(crate) fn color_fast(&mut self, v: [f32; 4]) -> FastPathResult {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Outside => {
-                self.current.color = v;
-                self.recorder.behind = true;
+                self.attributes.current.color = v;
+                self.capture.recorder.behind = true;
                 self.mark_stale(stale::COLOR);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Trace
-                if !matches!(self.classification, Classification::TraceIfOpaque(_)) =>
+                if !matches!(self.classifier.classification, Classification::TraceIfOpaque(_)) =>
             {
-                self.current.color = v;
-                self.recorder.set_color(v);
+                self.attributes.current.color = v;
+                self.capture.recorder.set_color(v);
                 self.mark_stale(stale::COLOR);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => {
-                self.current.color = v;
+                self.attributes.current.color = v;
                 FastPathResult::Driver
             }
             _ => FastPathResult::Slow,
@@ -281,12 +287,12 @@ impl Context {
 
     pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
         match self.color_fast(v) {
-            FastPathResult::Slow if self.immediate_target == ImmediateModeTarget::List => {
+            FastPathResult::Slow if self.capture.immediate_target == ImmediateModeTarget::List => {
                 self.list_color(v)
             }
             FastPathResult::Slow => {
-                self.current.color = v;
-                self.recorder.set_color(v);
+                self.attributes.current.color = v;
+                self.capture.recorder.set_color(v);
                 self.mark_stale(stale::COLOR);
                 self.watch_alpha();
                 true
@@ -298,21 +304,21 @@ impl Context {
     /// The short way of `glTexCoord`.
     #[inline(always)]
     pub(crate) fn tex_coord_fast(&mut self, v: [f32; 4]) -> FastPathResult {
-        match self.immediate_target {
+        match self.capture.immediate_target {
             ImmediateModeTarget::Outside => {
-                self.current.tex = v;
-                self.recorder.behind = true;
+                self.attributes.current.tex = v;
+                self.capture.recorder.behind = true;
                 self.mark_stale(stale::TEX);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Trace => {
-                self.current.tex = v;
-                self.recorder.set_tex(v);
+                self.attributes.current.tex = v;
+                self.capture.recorder.set_tex(v);
                 self.mark_stale(stale::TEX);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => {
-                self.current.tex = v;
+                self.attributes.current.tex = v;
                 FastPathResult::Driver
             }
             ImmediateModeTarget::List => FastPathResult::Slow,
@@ -327,31 +333,33 @@ impl Context {
     }
 
     pub(crate) fn material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
-        if self.immediate_target == ImmediateModeTarget::List {
+        if self.capture.immediate_target == ImmediateModeTarget::List {
             return self.list_material(face, what, v);
         }
-        let mut materials = self.current.materials;
+        let mut materials = self.attributes.current.materials;
         if !set_material(&mut materials, face, what, v) {
             // An error, which the driver is to report.
-            if self.immediate_target == ImmediateModeTarget::Trace {
+            if self.capture.immediate_target == ImmediateModeTarget::Trace {
                 self.replay_to_driver("an invalid material");
             }
             return false;
         }
         let properties = MaterialProperties::of(face, what);
-        if self.immediate_target == ImmediateModeTarget::Outside {
-            self.set_since_draw.add(properties);
+        if self.capture.immediate_target == ImmediateModeTarget::Outside {
+            self.attributes.set_since_draw.add(properties);
         }
         // Ours may be behind the driver's (after PopAttrib, say): then the driver alone is told.
-        if self.immediate_target == ImmediateModeTarget::Pass || self.dirty & class::CURRENT != 0 {
-            self.current.materials = materials;
+        if self.capture.immediate_target == ImmediateModeTarget::Pass
+            || self.state.dirty & class::CURRENT != 0
+        {
+            self.attributes.current.materials = materials;
             return false;
         }
-        if materials != self.current.materials {
-            self.current.materials = materials;
-            self.recorder.set_materials(&materials);
+        if materials != self.attributes.current.materials {
+            self.attributes.current.materials = materials;
+            self.capture.recorder.set_materials(&materials);
             self.mark_stale(stale::MATERIAL);
-            self.stale_properties.add(properties);
+            self.attributes.stale_properties.add(properties);
             self.watch_alpha();
         }
         true
@@ -359,27 +367,31 @@ impl Context {
 
     #[inline(always)]
     fn mark_stale(&mut self, bit: u8) {
-        if self.stale == 0 {
+        if self.attributes.stale == 0 {
             symbols::arm();
         }
-        self.stale |= bit;
+        self.attributes.stale |= bit;
     }
 
     pub(crate) fn rect(&mut self, [x, y, x2, y2]: [f32; 4]) -> bool {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             // An error, which the driver is to report.
             self.replay_to_driver("a rectangle between Begin and End");
         }
-        if self.immediate_target == ImmediateModeTarget::Pass {
+        if self.capture.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
-        if self.immediate_target == ImmediateModeTarget::List {
+        if self.capture.immediate_target == ImmediateModeTarget::List {
             return self.list_rect([x, y, x2, y2]);
         }
         {
             let traced = match self.classification() {
-                Classification::Trace | Classification::TraceInOrder => self.state.program == 0,
-                Classification::TraceIfOpaque(_) => self.state.program == 0 && self.is_opaque_now(),
+                Classification::Trace | Classification::TraceInOrder => {
+                    self.state.snapshot.program == 0
+                }
+                Classification::TraceIfOpaque(_) => {
+                    self.state.snapshot.program == 0 && self.is_opaque_now()
+                }
                 Classification::Pass(_) => false,
             };
             if !traced {

@@ -3,6 +3,7 @@
 //! The driver is asked which arrays are on when the draw comes. Client memory is copied then and
 //! there, because the program may change it as soon as the call returns.
 
+use crate::capture::ImmediateModeTarget;
 use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
 use crate::capture::geometry_cache::hash;
 use crate::capture::primitives::{QuadSplit, is_filled, triangulate};
@@ -11,7 +12,7 @@ use crate::classify::vtk::DrawCall;
 use crate::interpose::client_memory::{
     ActiveCall, ArraySource, ComponentCount, DrawArguments, Elements,
 };
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
@@ -319,7 +320,7 @@ impl Context {
                 let key = DrawCall { first, count: count.max(0) as usize, kind, at };
                 (
                     key,
-                    if self.immediate_target == ImmediateModeTarget::List {
+                    if self.capture.immediate_target == ImmediateModeTarget::List {
                         self.restart_index(kind)
                     } else {
                         None
@@ -341,14 +342,14 @@ impl Context {
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> bool {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("a draw call between Begin and End");
             return false;
         }
-        if self.immediate_target == ImmediateModeTarget::List {
+        if self.capture.immediate_target == ImmediateModeTarget::List {
             return self.array_into_list(mode, elements);
         }
-        if self.immediate_target == ImmediateModeTarget::Pass {
+        if self.capture.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
         let classification = self.classification();
@@ -356,11 +357,14 @@ impl Context {
         let taken = match classification {
             _ if !is_filled(mode) => Err("lines and points"),
             _ if self.restarts() => Err("primitive restart"),
-            _ if self.state.program != 0 && self.config.settings.enabled && self.is_refused() => {
+            _ if self.state.snapshot.program != 0
+                && self.config.settings.enabled
+                && self.is_refused() =>
+            {
                 Err(crate::present::framebuffer_pass::REFUSED)
             }
             // Recognised programs decide for themselves what blending means.
-            _ if self.state.program != 0 => self.take_program_arrays(mode, call, elements),
+            _ if self.state.snapshot.program != 0 => self.take_program_arrays(mode, call, elements),
             Classification::Pass(why) => Err(why),
             v => self.take_arrays(mode, elements, v).map(|()| ArrayDrawOutcome::Traced),
         };
@@ -408,27 +412,32 @@ impl Context {
         let elements = elements()?;
         let (_, count) = elements.span();
         let seen = arrays.position.view(&elements)?;
-        let split = elements.split(mode, &self.state, &arrays.position, &seen);
+        let split = elements.split(mode, &self.state.snapshot, &arrays.position, &seen);
         let key = elements.key(mode, &seen, arrays.position.layout(), &split);
-        let geometry = match self.geometry_cache.known(key) {
+        let geometry = match self.capture.geometry_cache.known(key) {
             Some(geometry) => geometry,
             None => {
                 let positions = positions(&arrays.position.pack(seen))?;
                 let triangles = elements.triangles(mode, &split);
-                self.geometry_cache.put(key, &positions, triangles)
+                self.capture.geometry_cache.put(key, &positions, triangles)
             }
         };
         let mut read = |s: &Option<ArraySource>| -> Result<Option<Arc<PackedArray>>, &'static str> {
             let Some(s) = s else { return Ok(None) };
             let bytes = s.view(&elements)?;
-            Ok(Some(self.attribute_cache.get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes)))))
+            Ok(Some(
+                self.capture
+                    .attribute_cache
+                    .get(&bytes, s.layout(), || s.pack(Cow::Borrowed(&bytes))),
+            ))
         };
         let (normal, color, tex) =
             (read(&arrays.normal)?, read(&arrays.color)?, read(&arrays.tex)?);
         if let Classification::TraceIfOpaque(why) = classification {
-            let by_color = !self.state.lighting
+            let by_color = !self.state.snapshot.lighting
                 || self
                     .state
+                    .snapshot
                     .color_material
                     .is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
             let opaque = match &color {
@@ -444,7 +453,7 @@ impl Context {
             self.flush("a draw whose order matters");
         }
         self.end_batch();
-        let mut attributes = Attributes::constant(&self.current);
+        let mut attributes = Attributes::constant(&self.attributes.current);
         if let Some(p) = normal {
             attributes.normals = Values::Packed(p);
         }
@@ -454,7 +463,7 @@ impl Context {
         if let Some(p) = tex {
             attributes.tex = Values::Packed(p);
         }
-        let state = self.state.clone();
+        let state = self.state.snapshot.clone();
         let clip_from_object =
             crate::trace::lighting::product(&state.projection, &state.model_view);
         let (attributes, shading, ray_material) =
@@ -468,7 +477,7 @@ impl Context {
     /// Hands a finished draw to the frame.
     pub(crate) fn mark_current(&mut self) {
         if !self.capabilities.core {
-            self.dirty |= crate::interpose::calls::class::CURRENT;
+            self.state.dirty |= crate::interpose::calls::class::CURRENT;
         }
     }
 
@@ -480,7 +489,7 @@ impl Context {
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> bool {
         if !is_filled(mode) {
-            if let Some(r) = &mut self.recording {
+            if let Some(r) = &mut self.capture.recording {
                 r.note_driver_call(0, false, true);
             }
             return false;
@@ -499,7 +508,7 @@ impl Context {
             ))
         };
         let Ok((position, normal, color, tex, elements)) = read() else {
-            if let Some(r) = &mut self.recording {
+            if let Some(r) = &mut self.capture.recording {
                 r.note_driver_call(0, false, true);
             }
             return false;

@@ -115,11 +115,11 @@ impl Context {
             if gl::program_i::<1>(program, LINK_STATUS)[0] == 0 {
                 feedback::no_feedback_varyings(program);
                 gl::link_program(program);
-                self.probes.ready.insert(program, false);
+                self.classifier.probes.ready.insert(program, false);
                 return;
             }
         }
-        self.probes.ready.insert(program, free);
+        self.classifier.probes.ready.insert(program, free);
     }
 
     /// Takes the shape of a draw that the driver is about to draw with a program that is not
@@ -130,16 +130,16 @@ impl Context {
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<(), &'static str> {
-        let program = self.state.program;
+        let program = self.state.snapshot.program;
         if self.capabilities.es {
             return Err("OpenGL ES");
         }
-        match self.probes.ready.get(&program) {
+        match self.classifier.probes.ready.get(&program) {
             Some(true) => {}
             Some(false) => return Err("a program whose positions cannot be captured"),
             None => return Err("a program linked before mode enhance"),
         }
-        match rules::classify(&self.state, rules::TraceFilter::Surfaces) {
+        match rules::classify(&self.state.snapshot, rules::TraceFilter::Surfaces) {
             Classification::Trace => {}
             Classification::TraceIfOpaque(why) | Classification::Pass(why) => return Err(why),
             Classification::TraceInOrder => return Err("a draw whose order matters"),
@@ -165,15 +165,15 @@ impl Context {
             let key = hash(&[
                 format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()
             ]);
-            let geometry = match self.probes.made.get(&key) {
+            let geometry = match self.classifier.probes.made.get(&key) {
                 // Client memory may have other contents by now.
                 Some(made) if source.buffer != 0 => made.clone(),
                 _ => {
                     let Ok(packed) = source.read(&elements) else { continue };
                     let Ok(positions) = positions(&packed) else { continue };
-                    let split = elements.plain_split(self.state.first_vertex_provokes);
+                    let split = elements.plain_split(self.state.snapshot.first_vertex_provokes);
                     let triangles = elements.triangles(mode, &split);
-                    self.geometry_cache.of_indices(&positions, &triangles)
+                    self.capture.geometry_cache.of_indices(&positions, &triangles)
                 }
             };
             let of =
@@ -184,21 +184,22 @@ impl Context {
                 None => by_uniforms(program, &points, &clip),
             };
             let Some(m) = found else { continue };
-            if self.probes.made.len() > MOST_KEPT {
-                self.probes.made.clear();
+            if self.classifier.probes.made.len() > MOST_KEPT {
+                self.classifier.probes.made.clear();
             }
-            self.probes.made.insert(key, geometry.clone());
-            self.geometry_cache.touch(&geometry);
+            self.classifier.probes.made.insert(key, geometry.clone());
+            self.capture.geometry_cache.touch(&geometry);
             return self.add_shape(geometry, m);
         }
         Err("a vertex shader that is no matrix times a position")
     }
 
     fn add_shape(&mut self, geometry: Arc<Geometry>, m: DMat4) -> Result<(), &'static str> {
-        let Some(view) = crate::trace::view::eye_from_clip(m, self.probes.reference) else {
+        let Some(view) = crate::trace::view::eye_from_clip(m, self.classifier.probes.reference)
+        else {
             return Err("a matrix that rays cannot be made for");
         };
-        let reference = *self.probes.reference.get_or_insert((m, view));
+        let reference = *self.classifier.probes.reference.get_or_insert((m, view));
         // The same for all that the first one places, to the last bit.
         let own = m * view.inverse();
         let shared = reference.0 * reference.1.inverse();
@@ -222,7 +223,7 @@ impl Context {
             fog: None,
             clip_planes: Vec::new(),
             color_material: None,
-            ..(*self.state).clone()
+            ..(*self.state.snapshot).clone()
         };
         let white =
             Material { emission: [1.0; 4], diffuse: [0.0, 0.0, 0.0, 1.0], ..Material::default() };
@@ -232,7 +233,7 @@ impl Context {
             ..CurrentAttributes::default()
         };
         self.end_batch();
-        self.probes.draws.push(Draw {
+        self.classifier.probes.draws.push(Draw {
             geometry,
             attributes: Arc::new(Attributes::constant(&current)),
             state: Arc::new(state),
@@ -247,8 +248,8 @@ impl Context {
 
     /// Makes what the driver drew darker where rays find corners and shadows.
     pub(crate) fn darken(&mut self) {
-        let draws = std::mem::take(&mut self.probes.draws);
-        self.probes.reference = None;
+        let draws = std::mem::take(&mut self.classifier.probes.draws);
+        self.classifier.probes.reference = None;
         if draws.is_empty() {
             return;
         }

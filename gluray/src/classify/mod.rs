@@ -5,3 +5,25 @@ pub(crate) mod affine_probe;
 pub mod reasons;
 pub(crate) mod rules;
 pub(crate) mod vtk;
+
+use affine_probe::AffineProbes;
+use rules::Classification;
+use vtk::VtkPrograms;
+
+/// What is known of the draws in the present state, and of the programs of a context.
+pub(crate) struct Classifier {
+    /// What becomes of filled primitives in the state of the last snapshot.
+    pub(crate) classification: Classification,
+    pub(crate) probes: AffineProbes,
+    pub(crate) programs: VtkPrograms,
+}
+
+impl Default for Classifier {
+    fn default() -> Classifier {
+        Classifier {
+            classification: Classification::Pass("nothing drawn yet"),
+            probes: AffineProbes::default(),
+            programs: VtkPrograms::default(),
+        }
+    }
+}

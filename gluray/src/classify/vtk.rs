@@ -121,7 +121,7 @@ impl Context {
             self.prepare_probe(program);
             self.drop_errors();
         }
-        self.programs.signatures.insert(program, signature);
+        self.classifier.programs.signatures.insert(program, signature);
         true
     }
 
@@ -132,8 +132,9 @@ impl Context {
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<ArrayDrawOutcome, &'static str> {
-        let program = self.state.program;
+        let program = self.state.snapshot.program;
         let signature = self
+            .classifier
             .programs
             .signatures
             .get(&program)
@@ -188,8 +189,8 @@ impl Context {
             first,
             written: self.writes().last(&sources, (call.first >> 32) as u32),
         };
-        let now = self.programs.frame;
-        let known = self.programs.made.get_mut(&key).map(|m| {
+        let now = self.classifier.programs.frame;
+        let known = self.classifier.programs.made.get_mut(&key).map(|m| {
             m.used = now;
             (m.geometry.clone(), m.attributes.clone(), m.cells.clone())
         });
@@ -201,21 +202,21 @@ impl Context {
                 let same = |k: &DrawCacheKey| {
                     (&k.sources, k.elements, k.first) == (&key.sources, key.elements, first)
                 };
-                self.programs.made.retain(|k, _| !same(k));
+                self.classifier.programs.made.retain(|k, _| !same(k));
                 let made = CachedDraw {
                     geometry: geometry.clone(),
                     attributes: attributes.clone(),
                     cells: cells.clone(),
                     used: now,
                 };
-                self.programs.made.insert(key, made);
+                self.classifier.programs.made.insert(key, made);
                 (geometry, attributes, cells)
             }
         };
         let recognised = recognised.with_cells(&cells);
-        self.geometry_cache.touch(&geometry);
+        self.capture.geometry_cache.touch(&geometry);
         // VTK leaves blending on; without transparency it changes nothing.
-        let mut state = (*self.state).clone();
+        let mut state = (*self.state.snapshot).clone();
         if signature.depth_offset {
             if state.polygon_offset.is_some() {
                 return Err("polygon offset of OpenGL's and of VTK's");
@@ -260,7 +261,7 @@ impl Context {
         self.end_batch();
         let (clip_from_object, shading) =
             (recognised.clip_from_object, Shading::Program(Arc::new(recognised)));
-        let (mut state, ray_material) = (self.state.clone(), RayMaterial::default());
+        let (mut state, ray_material) = (self.state.snapshot.clone(), RayMaterial::default());
         if signature.depth_offset {
             let state = Arc::make_mut(&mut state);
             (state.polygon_offset, state.offset_by_length) = offset;
@@ -304,7 +305,7 @@ impl Context {
         let name = gl::word(TEXTURE_BINDING_2D);
         let followed = followed(TEXTURE_2D);
         let version = self.texture_version();
-        let image = self.presenter.images.get(TEXTURE_2D, name, version);
+        let image = self.capture.images.get(TEXTURE_2D, name, version);
         gl::active_texture(active);
         followed?;
         image.ok_or("a texture without an image")
@@ -321,9 +322,9 @@ impl Context {
         let read = |s: &Option<ArraySource>| s.map(|s| s.read(&elements)).transpose();
         let [position, normal, color, tex, _, _, picture] = sources;
         let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
-        let triangles =
-            elements.triangles(mode, &elements.plain_split(self.state.first_vertex_provokes));
-        let geometry = self.geometry_cache.of_indices(&positions, &triangles);
+        let triangles = elements
+            .triangles(mode, &elements.plain_split(self.state.snapshot.first_vertex_provokes));
+        let geometry = self.capture.geometry_cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&CurrentAttributes::default());
         if let Some(p) = read(normal)? {
             attributes.normals = Values::Packed(Arc::new(p));

@@ -7,91 +7,44 @@
 //! It goes into the register before the driver lets go of it, and out of it after the driver has
 //! taken it: in between another thread may make it current, and must find it.
 
-use crate::capture::attribute_cache::AttributeCache;
 use crate::capture::buffer_writes::BufferWrites;
-use crate::capture::display_lists::{DisplayLists, ListRecording};
-use crate::capture::evaluators::Evaluators;
-use crate::capture::geometry_cache::GeometryCache;
-use crate::capture::vertex_arrays::VertexArrays;
-use crate::capture::vertex_recorder::VertexRecorder;
-use crate::classify::affine_probe::AffineProbes;
+use crate::capture::{Capture, ImmediateModeTarget};
+use crate::classify::Classifier;
 use crate::classify::rules::{self, Classification};
-use crate::classify::vtk::VtkPrograms;
 use crate::host::config::Config;
 use crate::host::report::Counters;
 use crate::interpose::calls::{self, class};
 use crate::interpose::driver::gl;
-use crate::interpose::share_group::{ShareGroup, TextureWrites};
+use crate::interpose::share_group::{ShareGroup, SharedObjects, TextureWrites};
 use crate::interpose::symbols;
-use crate::present::frame::Frame;
-use crate::present::framebuffer_pass::Presenter;
-use crate::state::current_attributes::CurrentAttributes;
+use crate::present::Presentation;
+use crate::state::StateCache;
+use crate::state::current_attributes::{AttributeState, CurrentAttributes};
 use crate::state::enums::*;
 use crate::state::material_properties::MaterialProperties;
-use crate::state::snapshot::{DriverCapabilities, Snapshot};
-use crate::trace::path_tracing::PathTracer;
+use crate::state::snapshot::DriverCapabilities;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, OnceLock};
 
-/// Where the calls of immediate mode go.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ImmediateModeTarget {
-    /// Not between Begin and End.
-    Outside,
-    /// Between Begin and End of a traced primitive.
-    Trace,
-    /// Between Begin and End of a primitive that the driver draws.
-    Pass,
-    /// Into a display list.
-    List,
-}
-
-/// What we know of one OpenGL context.
+/// One OpenGL context: its state, and one struct for each step of a frame.
 pub(crate) struct Context {
     handle: usize,
     destroyed_while_current: bool,
-    pub(crate) capabilities: DriverCapabilities,
-    pub(crate) config: Arc<Config>,
-    pub(crate) immediate_target: ImmediateModeTarget,
-    /// Classes of state to ask the driver about again.
-    pub(crate) dirty: u8,
-    pub(crate) state: Arc<Snapshot>,
-    pub(crate) classification: Classification,
-    pub(crate) current: CurrentAttributes,
-    /// A colour that colour material did not take over (see `CurrentAttributes::untracked_color`).
-    pub(crate) untracked_color: Option<[f32; 4]>,
-    /// What of `current` the driver does not know yet.
-    pub(crate) stale: u8,
-    /// Of its materials, these.
-    pub(crate) stale_properties: MaterialProperties,
-    /// What `glMaterial` set since the last draw.
-    pub(crate) set_since_draw: MaterialProperties,
-    pub(crate) recorder: VertexRecorder,
-    pub(crate) evaluators: Evaluators,
-    /// The arrays that `glArrayElement` takes the vertices of the open primitive from.
-    pub(crate) element_arrays: Option<VertexArrays>,
-    pub(crate) lists: Arc<Mutex<DisplayLists>>,
-    pub(crate) writes: Arc<Mutex<BufferWrites>>,
-    pub(crate) recording: Option<ListRecording>,
-    pub(crate) depth_of_lists: u32,
-    pub(crate) geometry_cache: GeometryCache,
-    pub(crate) attribute_cache: AttributeCache,
-    pub(crate) frame: Frame,
-    pub(crate) presenter: Presenter,
-    pub(crate) path_tracer: PathTracer,
-    pub(crate) probes: AffineProbes,
-    pub(crate) programs: VtkPrograms,
-    pub(crate) counters: Counters,
+    /// Watched calls since the last draw.
+    watched_calls: u32,
     /// Errors that came up behind the program's back or were kept for it.
     pub(crate) errors: Vec<u32>,
-    pub(crate) texture_writes: TextureWrites,
-    /// This context may have written a texture since it last let others see what it wrote.
-    pub(crate) wrote_textures: bool,
-    /// We saw it created, so we know with whom it shares.
-    pub(crate) seen_created: bool,
     /// A fault of ours has ended the tracing, and the driver knows what it was not told before.
     pub(crate) tracing_stopped: bool,
-    on_watched_call: u32,
+    pub(crate) capabilities: DriverCapabilities,
+    pub(crate) config: Arc<Config>,
+    pub(crate) state: StateCache,
+    pub(crate) attributes: AttributeState,
+    pub(crate) capture: Capture,
+    pub(crate) shared: SharedObjects,
+    pub(crate) classifier: Classifier,
+    pub(crate) presentation: Presentation,
+    pub(crate) counters: Counters,
 }
 
 struct ContextRegistry {
@@ -174,7 +127,7 @@ pub(crate) fn release_current() -> PreviousContext {
     }
     let left = PreviousContext::Idle(
         old.handle,
-        (wrote == Some(true)).then(|| old.texture_writes.clone()),
+        (wrote == Some(true)).then(|| old.shared.texture_writes.clone()),
     );
     let before = registry().idle.insert(old.handle, old);
     drop(before);
@@ -190,7 +143,7 @@ pub(crate) fn restore_current(left: PreviousContext) {
         PreviousContext::Doomed(context) => Some(context),
     };
     if let Some(mut context) = context {
-        context.dirty = class::ALL;
+        context.state.dirty = class::ALL;
         install_current(context);
     }
 }
@@ -256,43 +209,22 @@ impl Drop for Context {
 }
 
 impl Context {
-    fn new(handle: usize, shared: ShareGroup, seen_created: bool) -> Context {
-        let ShareGroup { lists, writes, texture_writes } = shared;
+    fn new(handle: usize, group: ShareGroup, seen_created: bool) -> Context {
         Context {
             handle,
             destroyed_while_current: false,
+            watched_calls: 0,
+            errors: Vec::new(),
+            tracing_stopped: false,
             capabilities: DriverCapabilities::default(),
             config: crate::host::config::current(),
-            immediate_target: ImmediateModeTarget::Outside,
-            dirty: class::ALL,
-            state: Arc::default(),
-            classification: Classification::Pass("nothing drawn yet"),
-            current: CurrentAttributes::default(),
-            untracked_color: None,
-            stale: 0,
-            stale_properties: MaterialProperties::default(),
-            set_since_draw: MaterialProperties::default(),
-            recorder: VertexRecorder::default(),
-            evaluators: Evaluators::default(),
-            element_arrays: None,
-            lists,
-            writes,
-            recording: None,
-            depth_of_lists: 0,
-            geometry_cache: GeometryCache::default(),
-            attribute_cache: AttributeCache::default(),
-            frame: Frame::default(),
-            presenter: Presenter::default(),
-            path_tracer: PathTracer::default(),
-            probes: AffineProbes::default(),
-            programs: VtkPrograms::default(),
+            state: StateCache::default(),
+            attributes: AttributeState::default(),
+            capture: Capture::default(),
+            shared: SharedObjects::new(group, seen_created),
+            classifier: Classifier::default(),
+            presentation: Presentation::default(),
             counters: Counters::default(),
-            errors: Vec::new(),
-            texture_writes,
-            wrote_textures: false,
-            seen_created,
-            tracing_stopped: false,
-            on_watched_call: 0,
         }
     }
 
@@ -315,16 +247,16 @@ impl Context {
 
     /// Current again: the driver may have been told anything meanwhile.
     fn on_made_current(&mut self) {
-        self.dirty = class::ALL;
+        self.state.dirty = class::ALL;
         self.invalidate_shared_textures();
-        self.stale = 0;
-        (self.stale_properties, self.set_since_draw) =
+        self.attributes.stale = 0;
+        (self.attributes.stale_properties, self.attributes.set_since_draw) =
             (MaterialProperties::default(), MaterialProperties::default());
         if self.capabilities.version == 0 {
             self.keep_errors();
             self.capabilities = DriverCapabilities::query();
             // As large as the window until the program says otherwise.
-            self.frame.set_initial_height(gl::ints(SCISSOR_BOX));
+            self.presentation.frame.set_initial_height(gl::ints(SCISSOR_BOX));
             self.drop_errors();
             self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
         }
@@ -353,7 +285,7 @@ impl Context {
 
     /// An error kept for the program; the driver is asked when there is none.
     pub(crate) fn take_error(&mut self) -> Option<u32> {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glGetError between Begin and End");
         }
         if self.errors.is_empty() { None } else { Some(self.errors.remove(0)) }
@@ -361,22 +293,22 @@ impl Context {
 
     // ---- Watched calls --------------------------------------------------------------------------
     pub(crate) fn watched_call(&mut self, index: usize, class: u8, flushes: bool, draws: bool) {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("another call between Begin and End");
         }
         self.finish_redraw();
         self.observe_other_contexts(index, class);
-        if let Some(r) = &mut self.recording {
+        if let Some(r) = &mut self.capture.recording {
             r.note_driver_call(class, flushes, draws);
         }
         if flushes {
             let invisible = calls::shows_front_buffer(index)
                 && self.capabilities.double_buffered
                 && !self.draws_to_front();
-            if !invisible && self.recording.is_none() {
+            if !invisible && self.capture.recording.is_none() {
                 self.flush(symbols::NAMES[index].to_str().unwrap_or("a call"));
             }
-            if draws && self.recording.is_none() {
+            if draws && self.capture.recording.is_none() {
                 self.counters.count_driver_draws("a draw call that is not followed", 1);
             }
             if calls::swaps_buffers(index) {
@@ -389,15 +321,15 @@ impl Context {
             }
         }
         // A program that sets much state between draws pays for the first calls only.
-        let watched_enough = self.on_watched_call >= 12;
-        if class & class::TEXTURE != 0 && self.state.texture.is_some() {
+        let watched_enough = self.watched_calls >= 12;
+        if class & class::TEXTURE != 0 && self.state.snapshot.texture.is_some() {
             // What was drawn with a texture is drawn with what it is now.
             self.end_batch();
         }
         self.sync();
         self.mark(class);
-        self.on_watched_call += 1;
-        if watched_enough && self.recording.is_none() && symbols::is_alone() {
+        self.watched_calls += 1;
+        if watched_enough && self.capture.recording.is_none() && symbols::is_alone() {
             // Of buffers and textures that are written we are told all the same.
             self.mark(class::ALL & !(class::BUFFER | class::TEXTURE));
             symbols::disarm();
@@ -406,11 +338,11 @@ impl Context {
 
     /// What was written to the buffers of the share group.
     pub(crate) fn writes(&self) -> std::sync::MutexGuard<'_, BufferWrites> {
-        self.writes.lock().unwrap_or_else(|e| e.into_inner())
+        self.shared.writes.lock().unwrap_or_else(|e| e.into_inner())
     }
 
     fn mark(&mut self, class: u8) {
-        self.dirty |= class;
+        self.state.dirty |= class;
         if class & class::BUFFER != 0 {
             self.writes().any();
         }
@@ -420,16 +352,18 @@ impl Context {
     }
 
     fn draws_to_front(&self) -> bool {
-        self.state.draw_buffer != BACK
-            && self.state.draw_buffer != BACK_LEFT
-            && self.state.framebuffer == 0
+        self.state.snapshot.draw_buffer != BACK
+            && self.state.snapshot.draw_buffer != BACK_LEFT
+            && self.state.snapshot.framebuffer == 0
     }
 
     /// Tells the driver the current attributes it does not know.
     pub(crate) fn sync(&mut self) {
-        if self.stale != 0 {
-            let bits = std::mem::take(&mut self.stale);
-            self.current.send(bits, std::mem::take(&mut self.stale_properties));
+        if self.attributes.stale != 0 {
+            let bits = std::mem::take(&mut self.attributes.stale);
+            self.attributes
+                .current
+                .send(bits, std::mem::take(&mut self.attributes.stale_properties));
         }
     }
 
@@ -438,59 +372,61 @@ impl Context {
     pub(crate) fn refresh(&mut self) {
         const DRAWS: u8 =
             class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
-        self.on_watched_call = 0;
+        self.watched_calls = 0;
         symbols::arm();
         self.finish_redraw();
-        if self.state.texture.as_ref().is_some_and(|t| t.version != self.texture_version()) {
+        if self.state.snapshot.texture.as_ref().is_some_and(|t| t.version != self.texture_version())
+        {
             // Another context of the share group may have written it.
-            self.dirty |= class::TEXTURE;
+            self.state.dirty |= class::TEXTURE;
         }
-        if self.dirty & DRAWS == 0 {
+        if self.state.dirty & DRAWS == 0 {
             return;
         }
-        if self.dirty & class::RASTER != 0 {
-            self.evaluators.forget();
+        if self.state.dirty & class::RASTER != 0 {
+            self.capture.evaluators.forget();
         }
         self.sync();
         self.keep_errors();
-        let mut fresh = (*self.state).clone();
-        fresh.refresh(self.dirty, &self.capabilities);
-        fresh.window_height = self.frame.window_height(&fresh);
+        let mut fresh = (*self.state.snapshot).clone();
+        fresh.refresh(self.state.dirty, &self.capabilities);
+        fresh.window_height = self.presentation.frame.window_height(&fresh);
         if let Some(t) = &mut fresh.texture {
             t.version = self.texture_version();
         }
-        if self.dirty & class::CURRENT != 0 && !self.capabilities.core {
+        if self.state.dirty & class::CURRENT != 0 && !self.capabilities.core {
             let now = CurrentAttributes::query();
-            self.untracked_color =
+            self.attributes.untracked_color =
                 now.untracked_color(fresh.color_material.filter(|_| fresh.lighting));
-            if now != self.current {
+            if now != self.attributes.current {
                 self.end_batch();
-                self.current = now;
+                self.attributes.current = now;
             }
         }
         self.drop_errors();
-        self.dirty &= !DRAWS;
-        if fresh != *self.state {
+        self.state.dirty &= !DRAWS;
+        if fresh != *self.state.snapshot {
             self.end_batch();
-            self.state = Arc::new(fresh);
+            self.state.snapshot = Arc::new(fresh);
         }
-        self.classification = rules::classify(&self.state, self.config.trace());
-        if !matches!(self.classification, Classification::Pass(_)) && self.is_refused() {
-            self.classification = Classification::Pass(crate::present::framebuffer_pass::REFUSED);
+        self.classifier.classification = rules::classify(&self.state.snapshot, self.config.trace());
+        if !matches!(self.classifier.classification, Classification::Pass(_)) && self.is_refused() {
+            self.classifier.classification =
+                Classification::Pass(crate::present::framebuffer_pass::REFUSED);
         }
-        if let Some(t) = &self.state.texture
-            && !matches!(self.classification, Classification::Pass(_))
+        if let Some(t) = &self.state.snapshot.texture
+            && !matches!(self.classifier.classification, Classification::Pass(_))
         {
             // Now, as it is bound now: when a batch of immediate mode ends another may be.
-            self.presenter.images.get(t.target, t.name, t.version);
+            self.capture.images.get(t.target, t.name, t.version);
         }
     }
 
     /// What becomes of filled primitives in the state now.
     pub(crate) fn classification(&mut self) -> Classification {
         self.refresh();
-        self.set_since_draw = MaterialProperties::default();
-        match self.classification {
+        self.attributes.set_since_draw = MaterialProperties::default();
+        match self.classifier.classification {
             _ if crate::trace::thread_pool::forked() => Classification::Pass("a forked process"),
             v => v,
         }

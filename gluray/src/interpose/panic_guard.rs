@@ -5,8 +5,9 @@
 //! no fault. After one each thread hands over what its context has swallowed and not drawn
 //! ([`Context::stop_tracing`]), at once or at its next call.
 
+use crate::capture::ImmediateModeTarget;
 use crate::interpose::calls;
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::interpose::symbols;
 use crate::state::current_attributes::{CurrentAttributes, stale};
@@ -161,22 +162,23 @@ impl Context {
     /// can be sent, and the driver gets to know what it was not told. Between Begin and End of a
     /// primitive that the driver draws nothing of this is possible; then it waits.
     pub(crate) fn stop_tracing(&mut self) {
-        if self.tracing_stopped || self.immediate_target == ImmediateModeTarget::Pass {
+        if self.tracing_stopped || self.capture.immediate_target == ImmediateModeTarget::Pass {
             return;
         }
         self.tracing_stopped = true;
-        self.depth_of_lists = 0;
-        let open = self.immediate_target == ImmediateModeTarget::Trace;
-        self.immediate_target = ImmediateModeTarget::Outside;
-        if let Some(r) = &mut self.recording {
+        self.capture.depth_of_lists = 0;
+        let open = self.capture.immediate_target == ImmediateModeTarget::Trace;
+        self.capture.immediate_target = ImmediateModeTarget::Outside;
+        if let Some(r) = &mut self.capture.recording {
             r.stop_tracing();
             // What was swallowed before the list cannot be drawn while the driver compiles it: the
             // first call after its end does.
             self.tracing_stopped = false;
         } else {
-            let mode = self.recorder.mode();
+            let mode = self.capture.recorder.mode();
             let primitive = open.then(|| {
-                attempt(|| self.recorder.take_open_primitive()).unwrap_or((mode, Vec::new()))
+                attempt(|| self.capture.recorder.take_open_primitive())
+                    .unwrap_or((mode, Vec::new()))
             });
             attempt(|| self.flush_now("a fault of ours"));
             attempt(|| self.sync());
@@ -194,7 +196,7 @@ impl Context {
         mode: u32,
         vertices: Vec<([f32; 3], CurrentAttributes)>,
     ) {
-        let end = self.current;
+        let end = self.attributes.current;
         if let Some((_, first)) = vertices.first() {
             first.send(0xf, MaterialProperties::ALL);
         }
@@ -208,6 +210,7 @@ impl Context {
             before = Some(c);
         }
         end.send(0xf, MaterialProperties::ALL);
-        (self.stale, self.stale_properties) = (0, MaterialProperties::default());
+        (self.attributes.stale, self.attributes.stale_properties) =
+            (0, MaterialProperties::default());
     }
 }

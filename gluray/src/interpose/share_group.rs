@@ -12,10 +12,11 @@
 //! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound
 //! those same points count it.
 
+use crate::capture::ImmediateModeTarget;
 use crate::capture::buffer_writes::BufferWrites;
 use crate::capture::display_lists::DisplayLists;
 use crate::interpose::calls::{self, class};
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -27,6 +28,24 @@ pub(crate) struct ShareGroup {
     pub(crate) lists: Arc<Mutex<DisplayLists>>,
     pub(crate) writes: Arc<Mutex<BufferWrites>>,
     pub(crate) texture_writes: TextureWrites,
+}
+
+/// The objects that a context shares with others.
+pub(crate) struct SharedObjects {
+    pub(crate) lists: Arc<Mutex<DisplayLists>>,
+    pub(crate) writes: Arc<Mutex<BufferWrites>>,
+    pub(crate) texture_writes: TextureWrites,
+    /// This context may have written a texture since it last let others see what it wrote.
+    pub(crate) wrote_textures: bool,
+    /// The creation of this context was seen, so it is known which contexts share with it.
+    pub(crate) seen_created: bool,
+}
+
+impl SharedObjects {
+    pub(crate) fn new(group: ShareGroup, seen_created: bool) -> SharedObjects {
+        let ShareGroup { lists, writes, texture_writes } = group;
+        SharedObjects { lists, writes, texture_writes, wrote_textures: false, seen_created }
+    }
 }
 
 /// Counts what may have changed a texture of the group.
@@ -55,13 +74,13 @@ static FOREIGN_TEXELS: AtomicBool = AtomicBool::new(false);
 impl Context {
     /// Textures of the share group may be others from now on.
     pub(crate) fn invalidate_textures(&mut self) {
-        self.texture_writes.change();
-        self.wrote_textures = true;
+        self.shared.texture_writes.change();
+        self.shared.wrote_textures = true;
     }
 
     /// While it is the same, so are the textures of the share group.
     pub(crate) fn texture_version(&self) -> u64 {
-        self.texture_writes.now()
+        self.shared.texture_writes.now()
     }
 
     /// A call that other contexts, or what comes from elsewhere, may have to do with.
@@ -70,31 +89,33 @@ impl Context {
             FOREIGN_TEXELS.store(true, Ordering::Relaxed);
         }
         if FOREIGN_TEXELS.load(Ordering::Relaxed)
-            || self.texture_writes.are_shared() && calls::waits_for_others(index)
+            || self.shared.texture_writes.are_shared() && calls::waits_for_others(index)
         {
-            self.texture_writes.change();
+            self.shared.texture_writes.change();
         }
     }
 
     /// What this context has written, others can see from now on. True when it has written
     /// anything.
     pub(crate) fn publish_textures(&mut self) -> bool {
-        if self.immediate_target == ImmediateModeTarget::Pass || !self.texture_writes.are_shared() {
+        if self.capture.immediate_target == ImmediateModeTarget::Pass
+            || !self.shared.texture_writes.are_shared()
+        {
             return false;
         }
         let drawing = || self.capabilities.version >= 30 && gl::word(FRAMEBUFFER_BINDING) != 0;
-        let wrote = self.wrote_textures || drawing();
+        let wrote = self.shared.wrote_textures || drawing();
         if wrote {
-            self.texture_writes.change();
+            self.shared.texture_writes.change();
         }
-        self.wrote_textures = false;
+        self.shared.wrote_textures = false;
         wrote
     }
 
     /// Current again, and others may have written meanwhile whom we do not know.
     pub(crate) fn invalidate_shared_textures(&mut self) {
-        if !self.seen_created || FOREIGN_TEXELS.load(Ordering::Relaxed) {
-            self.texture_writes.change();
+        if !self.shared.seen_created || FOREIGN_TEXELS.load(Ordering::Relaxed) {
+            self.shared.texture_writes.change();
         }
     }
 }

@@ -84,7 +84,7 @@ impl Context {
         self.drop_errors();
         let (mut structures, mut primary) = (BuildCounts::default(), 0);
         let groups = views(pending.iter().map(|(d, _)| d));
-        let path_tracer = &mut self.path_tracer;
+        let path_tracer = &mut self.presentation.path_tracer;
         let mut made: Vec<ViewImage> = Vec::new();
         let mut warnings = Vec::new();
         thread_pool::on_pool(|| {

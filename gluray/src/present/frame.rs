@@ -77,34 +77,35 @@ impl Context {
     /// Converts the recorded immediate mode to a draw.
     pub(crate) fn end_batch(&mut self) {
         let start = Instant::now();
-        self.recorder.flush_ring();
-        if self.recorder.runs.is_empty() {
+        self.capture.recorder.flush_ring();
+        if self.capture.recorder.runs.is_empty() {
             return;
         }
         let kind = &self.split_of_batch();
-        let geometry = match self.recorder.take_followed_geometry(kind) {
+        let geometry = match self.capture.recorder.take_followed_geometry(kind) {
             Some(geometry) => {
-                self.geometry_cache.hits += 1;
-                self.geometry_cache.touch(&geometry);
+                self.capture.geometry_cache.hits += 1;
+                self.capture.geometry_cache.touch(&geometry);
                 geometry
             }
             None => {
-                self.recorder.copy_followed_vertices();
-                let geometry = self.geometry_cache.of_runs(
-                    &self.recorder.positions,
-                    &self.recorder.runs,
+                self.capture.recorder.copy_followed_vertices();
+                let geometry = self.capture.geometry_cache.of_runs(
+                    &self.capture.recorder.positions,
+                    &self.capture.recorder.runs,
                     kind,
                 );
-                self.recorder.remember_batch(&geometry, kind);
+                self.capture.recorder.remember_batch(&geometry, kind);
                 geometry
             }
         };
-        let attributes = Arc::new(self.recorder.take_attributes(&geometry));
-        let clip_from_object = product(&self.state.projection, &self.state.model_view);
-        let calls = self.recorder.runs.iter().map(|r| u64::from(r.times)).sum();
-        self.recorder.positions.clear();
-        self.recorder.runs.clear();
-        let state = self.state.clone();
+        let attributes = Arc::new(self.capture.recorder.take_attributes(&geometry));
+        let clip_from_object =
+            product(&self.state.snapshot.projection, &self.state.snapshot.model_view);
+        let calls = self.capture.recorder.runs.iter().map(|r| u64::from(r.times)).sum();
+        self.capture.recorder.positions.clear();
+        self.capture.recorder.runs.clear();
+        let state = self.state.snapshot.clone();
         let in_order = matches!(
             crate::classify::rules::classify(&state, self.config.trace()),
             crate::classify::rules::Classification::TraceInOrder
@@ -126,18 +127,18 @@ impl Context {
 
     /// How the driver would split the batch's quads into triangles.
     fn split_of_batch(&mut self) -> QuadSplit {
-        let s = &self.state;
+        let s = &self.state.snapshot;
         // Lists end batches with quads before and after them.
-        let all_turned = s.flat || self.depth_of_lists > 0;
+        let all_turned = s.flat || self.capture.depth_of_lists > 0;
         let mut split =
             QuadSplit { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
-        if std::mem::take(&mut self.recorder.quads) && !all_turned {
-            let clipped = self.state.clips();
-            let outside = |from, to| self.recorder.any_position(from, to, &clipped);
+        if std::mem::take(&mut self.capture.recorder.quads) && !all_turned {
+            let clipped = self.state.snapshot.clips();
+            let outside = |from, to| self.capture.recorder.any_position(from, to, &clipped);
             // Begin and End after Begin and End of quads is one draw for the driver.
             let (mut at, mut first) = (0, 0);
-            for (i, r) in self.recorder.runs.iter().enumerate() {
-                let next = self.recorder.runs.get(i + 1).map(|r| r.mode);
+            for (i, r) in self.capture.recorder.runs.iter().enumerate() {
+                let next = self.capture.recorder.runs.get(i + 1).map(|r| r.mode);
                 let end = at + r.count * r.times;
                 if r.mode == QUADS && next != Some(QUADS) {
                     split.find_clipped_quads(first, end, outside);
@@ -156,7 +157,7 @@ impl Context {
         if draw.geometry.mesh.indices.is_empty() {
             return;
         }
-        if let Some(color) = self.untracked_color
+        if let Some(color) = self.attributes.untracked_color
             && draw.state.color_material.is_some()
             && matches!(&draw.attributes.colors, crate::capture::draw::Values::Constant(c) if *c == color)
         {
@@ -174,7 +175,7 @@ impl Context {
         }
         let image = draw.state.texture.and_then(|t| {
             self.keep_errors();
-            let image = self.presenter.images.get(t.target, t.name, t.version);
+            let image = self.capture.images.get(t.target, t.name, t.version);
             self.drop_errors();
             image
         });
@@ -182,10 +183,16 @@ impl Context {
             self.trace_ordered(&draw, image);
         } else {
             let samples = |d: &Draw| d.state.samples.max(1);
-            if self.frame.pending.first().is_some_and(|(d, _)| samples(d) != samples(&draw)) {
+            if self
+                .presentation
+                .frame
+                .pending
+                .first()
+                .is_some_and(|(d, _)| samples(d) != samples(&draw))
+            {
                 self.flush("a draw with more or fewer samples");
             }
-            self.frame.pending.push((draw, image));
+            self.presentation.frame.pending.push((draw, image));
         }
     }
 
@@ -210,7 +217,7 @@ impl Context {
         state.model_view = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
         draw.clip_from_object = state.projection;
         draw.state = Arc::new(state);
-        draw.geometry = self.geometry_cache.of_indices(&positions, &indices);
+        draw.geometry = self.capture.geometry_cache.of_indices(&positions, &indices);
     }
 
     /// Draws the pending draws into the framebuffer.
@@ -224,33 +231,36 @@ impl Context {
     pub(crate) fn flush_now(&mut self, before: &str) {
         crate::interpose::panic_guard::injected("flush");
         self.end_batch();
-        if self.programs.peeling.has_draws() && matches!(before, "glBeginQuery" | ORDER_MATTERS) {
+        if self.classifier.programs.peeling.has_draws()
+            && matches!(before, "glBeginQuery" | ORDER_MATTERS)
+        {
             self.composite_peeled();
         }
-        if self.programs.weighted.has_draws() {
+        if self.classifier.programs.weighted.has_draws() {
             self.sum_weighted();
         }
-        let pending = std::mem::take(&mut self.frame.pending);
-        let others = std::mem::take(&mut self.frame.others);
-        if !self.probes.draws.is_empty() {
+        let pending = std::mem::take(&mut self.presentation.frame.pending);
+        let others = std::mem::take(&mut self.presentation.frame.others);
+        if !self.classifier.probes.draws.is_empty() {
             self.counters.count_flush(before);
-            self.frame.traced = true;
+            self.presentation.frame.traced = true;
             self.darken();
         }
         if pending.is_empty() {
             return;
         }
-        self.frame.traced = true;
+        self.presentation.frame.traced = true;
         for (d, _) in &pending {
             let place = (d.state.framebuffer, d.state.viewport);
-            if !self.frame.places.contains(&place) {
-                self.frame.places.push(place);
+            if !self.presentation.frame.places.contains(&place) {
+                self.presentation.frame.places.push(place);
             }
         }
         self.counters.count_flush(before);
         // Contexts that never end a frame need this count, too.
-        self.counters.report.textures_read = self.presenter.images.read;
-        self.frame
+        self.counters.report.textures_read = self.capture.images.read;
+        self.presentation
+            .frame
             .telemetry
             .traced(self.counters.report.frames + 1, pending.iter().map(|(d, _)| d));
         // What the driver drew after a traced surface wins ties with it, as LEQUAL says; what it
@@ -278,14 +288,14 @@ impl Context {
         if self.may_be_pipelined(before) {
             return self.flush_pipelined(pending, func);
         }
-        if let Some(layer) = self.frame.reuse.find(&pending, &self.config) {
+        if let Some(layer) = self.presentation.frame.reuse.find(&pending, &self.config) {
             return self.present_reused(pending, layer, func);
         }
         let settings = &self.config.settings;
         let drawn = frame_reuse::DrawKey::of(&pending, settings);
         let traced = thread_pool::on_pool(|| pipelined::trace(pending, settings));
         let layer = self.present_traced(traced, CompositeMode::Surface(func), None);
-        self.frame.reuse.keep(drawn, &self.config, layer);
+        self.presentation.frame.reuse.keep(drawn, &self.config, layer);
     }
 
     /// Warns that one ray stands for all samples of a pixel.
@@ -329,22 +339,25 @@ impl Context {
             self.present(std::slice::from_ref(&layer), CompositeMode::Surface(func));
         }
         self.counters.add_time("present", start.elapsed());
-        self.frame.reuse.put_back(layer);
+        self.presentation.frame.reuse.put_back(layer);
         self.recycle(draws);
     }
 
     fn recycle(&mut self, draws: Vec<Pending>) {
         for (draw, _) in draws {
             if let Some(attributes) = Arc::into_inner(draw.attributes) {
-                self.recorder.recycle(attributes, &draw.geometry);
+                self.capture.recorder.recycle(attributes, &draw.geometry);
             }
         }
     }
 
     fn trace_ordered(&mut self, draw: &Draw, image: Option<Arc<Image>>) {
-        self.frame.traced = true;
+        self.presentation.frame.traced = true;
         self.counters.count_flush("in order");
-        self.frame.telemetry.traced(self.counters.report.frames + 1, std::iter::once(draw));
+        self.presentation
+            .frame
+            .telemetry
+            .traced(self.counters.report.frames + 1, std::iter::once(draw));
         let samples = match self.sample_places([draw]) {
             Some(places) => Context::each_sample(draw, &places),
             None => {
@@ -353,7 +366,8 @@ impl Context {
             }
         };
         for (draw, sample) in samples {
-            let before = self.frame.reuse.find_ordered(&draw, image.as_ref(), &self.config);
+            let before =
+                self.presentation.frame.reuse.find_ordered(&draw, image.as_ref(), &self.config);
             if let Some(layers) = before {
                 self.counters.report.pictures_again += 1;
                 self.present_ordered(&draw, image.as_ref(), layers, sample);
@@ -388,36 +402,37 @@ impl Context {
             self.present_sample(&layers, CompositeMode::AsDrawn, sample);
         }
         self.counters.add_time("present", start.elapsed());
-        self.frame.reuse.keep_ordered(draw, image, &self.config, layers);
+        self.presentation.frame.reuse.keep_ordered(draw, image, &self.config, layers);
     }
 
     /// Ends a frame: its image is now visible on the screen.
     pub(crate) fn frame_done(&mut self) {
         self.counters.report.frames += 1;
-        self.frame.traced = false;
-        self.frame.places.clear();
-        if self.frame.tops[1] > 0 {
-            self.frame.tops = [self.frame.tops[1], 0];
+        self.presentation.frame.traced = false;
+        self.presentation.frame.places.clear();
+        if self.presentation.frame.tops[1] > 0 {
+            self.presentation.frame.tops = [self.presentation.frame.tops[1], 0];
         }
-        self.frame.pipelined.frame_done();
+        self.presentation.frame.pipelined.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
-            (self.geometry_cache.hits, self.geometry_cache.misses);
-        self.counters.report.textures_read = self.presenter.images.read;
-        self.path_tracer.frame_done();
+            (self.capture.geometry_cache.hits, self.capture.geometry_cache.misses);
+        self.counters.report.textures_read = self.capture.images.read;
+        self.presentation.path_tracer.frame_done();
         let fast = self.config.settings.quality == crate::host::config::Quality::Fast;
-        self.programs.frame_done();
-        self.attribute_cache.frame_done();
-        self.recorder.frame_done();
-        self.frame.reuse.frame_done();
-        self.geometry_cache.frame_done(|g| {
+        self.classifier.programs.frame_done();
+        self.capture.attribute_cache.frame_done();
+        self.capture.recorder.frame_done();
+        self.presentation.frame.reuse.frame_done();
+        self.capture.geometry_cache.frame_done(|g| {
             if !fast {
                 thread_pool::in_background(move || g.improve());
             }
             !fast
         });
-        let size = [2, 3].map(|i| self.state.viewport[i].max(0).cast_unsigned());
-        self.counters.report.objects = self.frame.telemetry.frame_done(&self.counters.report, size);
-        if let Some(problem) = self.frame.telemetry.take_problem() {
+        let size = [2, 3].map(|i| self.state.snapshot.viewport[i].max(0).cast_unsigned());
+        self.counters.report.objects =
+            self.presentation.frame.telemetry.frame_done(&self.counters.report, size);
+        if let Some(problem) = self.presentation.frame.telemetry.take_problem() {
             self.counters.warn(problem);
         }
         self.apply_new_settings();
@@ -430,15 +445,15 @@ impl Context {
         if !Arc::ptr_eq(&config, &self.config) {
             self.config = config;
             // Classifications depend on settings.
-            self.dirty = crate::interpose::calls::class::ALL;
+            self.state.dirty = crate::interpose::calls::class::ALL;
             crate::interpose::symbols::arm();
         }
     }
 
     /// The program reads the framebuffer. This also ends a frame when something was traced for it.
     pub(crate) fn read_back(&mut self) {
-        self.frame.pipelined.read();
-        if self.frame.traced {
+        self.presentation.frame.pipelined.read();
+        if self.presentation.frame.traced {
             self.frame_done();
         }
     }
@@ -448,18 +463,18 @@ impl Context {
     fn end_unswapped_frame(&mut self) {
         // Only then is the state asked for: windows have their frames when they are swapped, and to
         // ask for materials heals what Mesa holds of them (osgbillboard, osgtessellate).
-        if !self.frame.pending.is_empty()
-            || self.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0)
+        if !self.presentation.frame.pending.is_empty()
+            || self.presentation.frame.places.iter().all(|(framebuffer, _)| *framebuffer == 0)
         {
             return;
         }
         self.refresh();
-        let [x, y, w, h] = self.state.scissor.unwrap_or(self.state.viewport);
-        let target = self.state.framebuffer;
+        let [x, y, w, h] = self.state.snapshot.scissor.unwrap_or(self.state.snapshot.viewport);
+        let target = self.state.snapshot.framebuffer;
         let meets = |&(f, [a, b, c, d]): &(u32, [i32; 4])| {
             f == target && a < x + w && x < a + c && b < y + h && y < b + d
         };
-        if target != 0 && self.frame.places.iter().any(meets) {
+        if target != 0 && self.presentation.frame.places.iter().any(meets) {
             self.frame_done();
         }
     }
@@ -467,40 +482,41 @@ impl Context {
     /// `glClear`. A clear of everything makes what is pending invisible; a clear of a part comes
     /// after it.
     pub(crate) fn clear(&mut self, mask: u32) -> bool {
-        if self.recording.is_some() {
-            if let Some(r) = &mut self.recording {
+        if self.capture.recording.is_some() {
+            if let Some(r) = &mut self.capture.recording {
                 r.note_driver_call(0, true, true);
             }
             return false;
         }
-        if self.immediate_target == crate::interpose::context::ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == crate::capture::ImmediateModeTarget::Trace {
             self.replay_to_driver("glClear between Begin and End");
             return false;
         }
         self.end_batch();
-        self.programs.peeling.cleared(self.counters.report.passed_draws);
-        if self.programs.weighted.has_draws() {
+        self.classifier.programs.peeling.cleared(self.counters.report.passed_draws);
+        if self.classifier.programs.weighted.has_draws() {
             self.flush("glClear");
         }
         const COLOR_AND_DEPTH: u32 = COLOR_BUFFER_BIT | DEPTH_BUFFER_BIT;
-        if self.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
+        if self.presentation.frame.traced && mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH {
             self.end_unswapped_frame();
         }
-        if !self.frame.pending.is_empty() || !self.probes.draws.is_empty() {
+        if !self.presentation.frame.pending.is_empty() || !self.classifier.probes.draws.is_empty() {
             self.refresh();
             let whole = mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH
-                && self.state.scissor.is_none()
-                && self.state.color_mask
-                && self.state.depth_mask
+                && self.state.snapshot.scissor.is_none()
+                && self.state.snapshot.color_mask
+                && self.state.snapshot.depth_mask
                 && self
+                    .presentation
                     .frame
                     .pending
                     .iter()
-                    .all(|(d, _)| d.state.framebuffer == self.state.framebuffer);
+                    .all(|(d, _)| d.state.framebuffer == self.state.snapshot.framebuffer);
             if whole {
-                self.frame.pending.clear();
-                self.probes.draws.clear();
-                self.frame.others = false;
+                self.presentation.frame.pending.clear();
+                self.classifier.probes.draws.clear();
+                self.presentation.frame.others = false;
             } else {
                 self.flush("glClear of a part");
             }

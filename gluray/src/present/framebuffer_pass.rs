@@ -8,7 +8,6 @@
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
-use crate::trace::texturing::Images;
 use crate::trace::{Layer, Rect};
 
 /// How fragments are composited with the framebuffer.
@@ -33,7 +32,6 @@ pub(crate) enum CompositeMode {
 /// The OpenGL objects of the pass.
 #[derive(Default)]
 pub(crate) struct Presenter {
-    pub(crate) images: Images,
     program: u32,
     /// The part of the textures that a layer uses.
     part: i32,
@@ -318,14 +316,14 @@ impl Context {
     /// it is first asked for, which is before anything of the context is swallowed; programs of
     /// which nothing is traced pay nothing. Not to be asked between Begin and End.
     pub(crate) fn is_refused(&mut self) -> bool {
-        if self.presenter.support == PassSupport::NotYet {
+        if self.presentation.presenter.support == PassSupport::NotYet {
             self.keep_errors();
-            if let Err(words) = self.presenter.check_support(self.capabilities.core) {
+            if let Err(words) = self.presentation.presenter.check_support(self.capabilities.core) {
                 self.counters.warn(format!("{REFUSED}, so nothing is traced: {words}"));
             }
             self.drop_errors();
         }
-        self.presenter.support == PassSupport::Refused
+        self.presentation.presenter.support == PassSupport::Refused
     }
 
     /// Draws the layers over one another.
@@ -342,7 +340,7 @@ impl Context {
     ) {
         self.with_saved_state(|c| {
             let mask = sample.map(gl::only_sample);
-            if c.presenter.prepare(c.capabilities.core) {
+            if c.presentation.presenter.prepare(c.capabilities.core) {
                 c.draw_pass(layers, composite_mode);
             } else {
                 c.counters.count_driver_draws(
@@ -380,15 +378,15 @@ impl Context {
             gl::pop_attrib();
         }
         kept.restore();
-        if !core && !self.set_since_draw.is_empty() {
-            self.set_since_draw.set_again();
+        if !core && !self.attributes.set_since_draw.is_empty() {
+            self.attributes.set_since_draw.set_again();
         }
         self.drop_errors();
     }
 
     fn draw_pass(&mut self, layers: &[Layer], composite_mode: CompositeMode) {
         let core = self.capabilities.core;
-        let p = &mut self.presenter;
+        let p = &mut self.presentation.presenter;
         gl::use_program(p.program);
         OFF.into_iter()
             .filter(|c| *c != RASTERIZER_DISCARD || self.capabilities.version >= 30)

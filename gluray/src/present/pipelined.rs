@@ -79,8 +79,8 @@ impl Context {
     pub(crate) fn may_be_pipelined(&self, before: &str) -> bool {
         let reads = ["Read", "Copy", "Blit", "GetTex", "Accum", "Query"];
         self.config.settings.asynchronous
-            && self.frame.pipelined.reads == 0
-            && self.state.framebuffer == 0
+            && self.presentation.frame.pipelined.reads == 0
+            && self.state.snapshot.framebuffer == 0
             && !reads.iter().any(|r| before.contains(r))
             && !thread_pool::forked()
     }
@@ -92,8 +92,8 @@ impl Context {
         let settings = self.config.settings.clone();
         let start = Instant::now();
         // Waits for the previous job first. Two jobs at once would only compete for threads.
-        let place = self.frame.pipelined.place;
-        let before = self.frame.pipelined.jobs.get(place).and_then(|r| r.recv().ok());
+        let place = self.presentation.frame.pipelined.place;
+        let before = self.presentation.frame.pipelined.jobs.get(place).and_then(|r| r.recv().ok());
         thread_pool::spawn(move || {
             // There is no receiver when the context is gone.
             sender.send(trace(draws, &settings)).ok();
@@ -114,12 +114,12 @@ impl Context {
             }
         };
         self.counters.add_time("wait", start.elapsed());
-        if place < self.frame.pipelined.jobs.len() {
-            self.frame.pipelined.jobs[place] = next;
+        if place < self.presentation.frame.pipelined.jobs.len() {
+            self.presentation.frame.pipelined.jobs[place] = next;
         } else {
-            self.frame.pipelined.jobs.push(next);
+            self.presentation.frame.pipelined.jobs.push(next);
         }
-        self.frame.pipelined.place += 1;
+        self.presentation.frame.pipelined.place += 1;
         if let Some(traced) = shown {
             drop(self.present_traced(traced, CompositeMode::Surface(func), None));
         }

@@ -65,6 +65,21 @@ pub(crate) mod stale {
     pub(crate) const MATERIAL: u8 = 8;
 }
 
+/// The current attributes, and which of them the driver has not been told yet.
+#[derive(Default)]
+pub(crate) struct AttributeState {
+    pub(crate) current: CurrentAttributes,
+    /// A colour that colour material did not take over (see
+    /// [`CurrentAttributes::untracked_color`]).
+    pub(crate) untracked_color: Option<[f32; 4]>,
+    /// The attributes that the driver does not know yet: bits of [`stale`].
+    pub(crate) stale: u8,
+    /// The properties of materials that the driver does not know yet.
+    pub(crate) stale_properties: MaterialProperties,
+    /// The properties that `glMaterial` has set since the last draw.
+    pub(crate) set_since_draw: MaterialProperties,
+}
+
 impl CurrentAttributes {
     /// The driver's values.
     pub(crate) fn query() -> CurrentAttributes {

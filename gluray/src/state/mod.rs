@@ -1,9 +1,28 @@
-//! What OpenGL's state is when something is drawn.
+//! OpenGL's state at a draw.
 //!
-//! The driver keeps all state; we ask it (`snapshot`) when a draw comes and something may have
-//! changed since we asked last. Only what changes from vertex to vertex is kept here (`current`).
+//! The driver keeps all state. When a draw comes, it is asked for what may have changed since it
+//! was asked last ([`StateCache`], `snapshot`). Only the attributes that change from vertex to
+//! vertex are kept here (`current_attributes`).
 
 pub(crate) mod current_attributes;
 pub(crate) mod enums;
 pub(crate) mod material_properties;
 pub(crate) mod snapshot;
+
+use crate::interpose::calls::class;
+use snapshot::Snapshot;
+use std::sync::Arc;
+
+/// What is known of the driver's state.
+pub(crate) struct StateCache {
+    /// The classes of state to ask the driver about again.
+    pub(crate) dirty: u8,
+    /// The driver's last answers.
+    pub(crate) snapshot: Arc<Snapshot>,
+}
+
+impl Default for StateCache {
+    fn default() -> StateCache {
+        StateCache { dirty: class::ALL, snapshot: Arc::default() }
+    }
+}

@@ -2,7 +2,8 @@
 //! OpenGL's types.
 
 use super::FIRST_SEGMENT;
-use crate::interpose::context::{Context, ImmediateModeTarget};
+use crate::capture::ImmediateModeTarget;
+use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
@@ -15,18 +16,18 @@ impl Context {
     /// the names after the greatest of their own, as Mesa gives them, and an empty list of the
     /// driver's for each. `None` leaves the call to the driver.
     pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
-        if self.immediate_target == ImmediateModeTarget::Trace {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glGenLists between Begin and End");
         }
         if !(1..=MOST_NAMES).contains(&n)
-            || self.immediate_target == ImmediateModeTarget::Pass
+            || self.capture.immediate_target == ImmediateModeTarget::Pass
             || self.capabilities.core
             || crate::interpose::panic_guard::happened()
         {
             return None;
         }
         let first = {
-            let mut lists = self.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
             let last = lists
                 .greatest
                 .checked_add(n.cast_unsigned())
@@ -34,7 +35,7 @@ impl Context {
             std::mem::replace(&mut lists.greatest, last) + 1
         };
         // Where a list is compiled its piece ends before.
-        let compiling = self.recording.is_some();
+        let compiling = self.capture.recording.is_some();
         if compiling {
             self.close_segment();
         }

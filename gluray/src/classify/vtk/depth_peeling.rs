@@ -67,7 +67,7 @@ impl Context {
         if pass == TranslucencyPass::Weighted {
             return self.check_weighted_pass();
         }
-        let peeling = &mut self.programs.peeling;
+        let peeling = &mut self.classifier.programs.peeling;
         let settings = &self.config.settings;
         let traced =
             settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
@@ -82,7 +82,7 @@ impl Context {
             }
             TranslucencyPass::Layers => {
                 let first = peeling.taken.is_empty();
-                let here = self.state.framebuffer;
+                let here = self.state.snapshot.framebuffer;
                 let untouched = self.counters.report.passed_draws == peeling.at_clear;
                 let same = first || peeling.framebuffer == here;
                 if !(traced && peeling.whole && untouched && same && here != 0) {
@@ -90,9 +90,9 @@ impl Context {
                 }
                 if first {
                     peeling.framebuffer = here;
-                    peeling.limit = limit(self.state.program);
+                    peeling.limit = limit(self.state.snapshot.program);
                 }
-                if self.programs.peeling.limit.is_some() { Ok(()) } else { Err(PEELED) }
+                if self.classifier.programs.peeling.limit.is_some() { Ok(()) } else { Err(PEELED) }
             }
         }
     }
@@ -114,17 +114,17 @@ impl Context {
         crate::trace::overrides::apply(&mut draw, &self.config.settings);
         self.counters.report.traced_draws += draw.calls;
         self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
-        self.programs.peeling.taken.push((draw, None));
+        self.classifier.programs.peeling.taken.push((draw, None));
     }
 
     /// VTK is about to gather what the pass has peeled.
     pub(crate) fn composite_peeled(&mut self) {
-        let mut taken = std::mem::take(&mut self.programs.peeling.taken);
-        let limit = self.programs.peeling.limit.take();
-        self.programs.peeling.whole = false;
+        let mut taken = std::mem::take(&mut self.classifier.programs.peeling.taken);
+        let limit = self.classifier.programs.peeling.limit.take();
+        self.classifier.programs.peeling.whole = false;
         self.refresh();
         let Some(limit) = limit else { return };
-        self.frame.record_peeled(self.counters.report.frames + 1, &taken);
+        self.presentation.frame.record_peeled(self.counters.report.frames + 1, &taken);
         self.counters.count_flush("depth peeling");
         let buffers = [0, 1, 2, 3].map(|i| gl::word(DRAW_BUFFER0 + i));
         let there = match buffers {
@@ -134,7 +134,7 @@ impl Context {
             [a, front, c, 0] => Some((vec![front], vec![a, front, c])),
             _ => None,
         };
-        let same = self.state.framebuffer == self.programs.peeling.framebuffer;
+        let same = self.state.snapshot.framebuffer == self.classifier.programs.peeling.framebuffer;
         let Some((target, before)) = there.filter(|_| same) else {
             self.counters.warn(
                 "depth peeling did not go as VTK's does: translucent surfaces are lost".into(),

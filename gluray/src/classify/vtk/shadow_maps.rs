@@ -35,8 +35,8 @@ impl Context {
         &mut self,
         signature: &Result<T, &'static str>,
     ) -> Result<(), &'static str> {
-        let now = self.programs.frame;
-        let maps = &mut self.programs.shadow_maps;
+        let now = self.classifier.programs.frame;
+        let maps = &mut self.classifier.programs.shadow_maps;
         match signature {
             Err(why) if *why == SHADOW_MAP => maps.until = now + IN_USE_FRAMES,
             Ok(_) if now < maps.until && maps.last_traced != Some(now) => {
@@ -50,10 +50,10 @@ impl Context {
 
     /// The driver is about to draw something filled.
     pub(crate) fn begin_redraw(&mut self) {
-        let now = self.programs.frame;
-        let maps = &mut self.programs.shadow_maps;
-        let s = &self.state;
-        let is_map = self.programs.signatures.get(&s.program) == Some(&Err(SHADOW_MAP));
+        let now = self.classifier.programs.frame;
+        let maps = &mut self.classifier.programs.shadow_maps;
+        let s = &self.state.snapshot;
+        let is_map = self.classifier.programs.signatures.get(&s.program) == Some(&Err(SHADOW_MAP));
         let again = maps.last_traced == Some(now) && now < maps.until && s.program != 0 && !is_map;
         if !again || !s.depth_test || !s.depth_mask || s.depth_func != LEQUAL || maps.kept.is_some()
         {
@@ -68,7 +68,9 @@ impl Context {
 
     /// It has drawn, and the program goes on.
     pub(crate) fn finish_redraw(&mut self) {
-        let Some((on, [factor, units])) = self.programs.shadow_maps.kept.take() else { return };
+        let Some((on, [factor, units])) = self.classifier.programs.shadow_maps.kept.take() else {
+            return;
+        };
         gl::polygon_offset(factor, units);
         if !on {
             gl::disable(POLYGON_OFFSET_FILL);

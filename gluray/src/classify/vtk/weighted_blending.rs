@@ -57,7 +57,7 @@ void main() {
 impl Context {
     /// Whether a draw into such sums can be taken: the reason when not.
     pub(super) fn check_weighted_pass(&self) -> Result<(), &'static str> {
-        let (s, settings) = (&self.state, &self.config.settings);
+        let (s, settings) = (&self.state.snapshot, &self.config.settings);
         let traced =
             settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         let adds = [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA].map(gl::word)
@@ -88,13 +88,13 @@ impl Context {
         crate::trace::overrides::apply(&mut draw, &self.config.settings);
         self.counters.report.traced_draws += draw.calls;
         self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
-        self.programs.weighted.taken.push((draw, None));
+        self.classifier.programs.weighted.taken.push((draw, None));
     }
 
     /// Adds what was taken to the framebuffer's sums.
     pub(crate) fn sum_weighted(&mut self) {
-        let mut taken = std::mem::take(&mut self.programs.weighted.taken);
-        self.frame.record_peeled(self.counters.report.frames + 1, &taken);
+        let mut taken = std::mem::take(&mut self.classifier.programs.weighted.taken);
+        self.presentation.frame.record_peeled(self.counters.report.frames + 1, &taken);
         self.counters.count_flush("translucent sums");
         if self.config.settings.mode != Mode::Match {
             crate::trace::view::assign_eye_spaces(&mut taken);
@@ -133,12 +133,12 @@ impl Context {
     }
 
     fn add_sums(&mut self, sums: &WeightedSums) {
-        if !self.programs.weighted.prepare(self.presenter.vertex_array()) {
+        if !self.classifier.programs.weighted.prepare(self.presentation.presenter.vertex_array()) {
             self.counters
                 .count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
             return;
         }
-        let p = &mut self.programs.weighted;
+        let p = &mut self.classifier.programs.weighted;
         gl::use_program(p.program);
         let r = sums.rect;
         let grow = r.w > p.size[0] || r.h > p.size[1];
@@ -168,9 +168,9 @@ impl Context {
         gl::blend_func_separate(ONE, ONE, ZERO, ONE_MINUS_SRC_ALPHA);
         gl::blend_equation(FUNC_ADD);
         gl::color_mask(1, 1, 1, 1);
-        gl::bind_vertex_array(self.presenter.vertex_array());
+        gl::bind_vertex_array(self.presentation.presenter.vertex_array());
         gl::viewport(r.x, r.y, r.w, r.h);
-        gl::uniform4f(self.programs.weighted.window, r.x as f32, r.y as f32, 0.0, 0.0);
+        gl::uniform4f(self.classifier.programs.weighted.window, r.x as f32, r.y as f32, 0.0, 0.0);
         gl::draw_arrays(TRIANGLE_STRIP, 0, 4);
     }
 }

@@ -20,6 +20,7 @@ mod lookup;
 
 pub(crate) use current_context::{install, take, with_context};
 
+use crate::capture::ImmediateModeTarget;
 use crate::interpose::calls::{COUNT, NAMES, at, index_of};
 use crate::interpose::driver;
 use std::ffi::CStr;
@@ -156,11 +157,9 @@ fn leave_at(index: usize) {
     crate::interpose::panic_guard::hand_over_to_driver();
     let over = crate::interpose::panic_guard::caught(|| {
         let tracing_stopped = with_context(|c| {
-            if index == at::glEnd
-                && c.immediate_target == crate::interpose::context::ImmediateModeTarget::Pass
-            {
+            if index == at::glEnd && c.capture.immediate_target == ImmediateModeTarget::Pass {
                 // The driver's primitive ends now, and with the next call all is handed over.
-                c.immediate_target = crate::interpose::context::ImmediateModeTarget::Outside;
+                c.capture.immediate_target = ImmediateModeTarget::Outside;
             }
             c.tracing_stopped
         });
