@@ -14,15 +14,13 @@ impl Context {
             ImmediateModeTarget::List
                 if self.capture.recording.as_ref().is_some_and(|r| r.is_open()) => {}
             ImmediateModeTarget::List => {
-                if let Some(r) = &mut self.capture.recording {
-                    r.note_driver_call(0, false, true);
-                }
+                self.capture.list_driver_call(false, true);
                 return false;
             }
             ImmediateModeTarget::Pass => return false,
             // Values become current, and that is all.
             ImmediateModeTarget::Outside => {
-                self.mark_current();
+                self.state.mark_current(&self.capabilities);
                 return false;
             }
         }
@@ -32,11 +30,7 @@ impl Context {
         };
         match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.replay_to_driver(why),
-            _ => {
-                if let Some(r) = &mut self.capture.recording {
-                    r.note_driver_call(0, false, true);
-                }
-            }
+            _ => self.capture.list_driver_call(false, true),
         }
         false
     }

@@ -59,8 +59,8 @@ impl Context {
             _ => 0,
         };
         match if binding == 0 { 0 } else { gl::word(binding) } {
-            0 => self.writes().any(),
-            buffer => self.writes().to(buffer),
+            0 => self.shared.writes().any(),
+            buffer => self.shared.writes().to(buffer),
         }
         self.state.dirty |= class::BUFFER;
         false
@@ -69,7 +69,7 @@ impl Context {
     /// Names of buffers, four bytes each, that may come again for others.
     pub(crate) fn buffers_deleted(&mut self, names: &[u8]) -> bool {
         self.watched_call(0, class::ARRAYS, false, false);
-        let mut writes = self.writes();
+        let mut writes = self.shared.writes();
         for b in names.chunks_exact(4) {
             writes.to(u32::from_ne_bytes([b[0], b[1], b[2], b[3]]));
         }

@@ -17,6 +17,7 @@ use crate::capture::evaluators::MapKind;
 use crate::interpose::calls::class;
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
+use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::symbols;
 use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
@@ -75,7 +76,7 @@ pub(crate) struct DisplayLists {
     greatest: u32,
 }
 
-/// Names of our pieces begin here: no program counts its lists so far.
+/// The names of our segments begin here. No program counts its lists so far.
 const FIRST_SEGMENT: u32 = 0x4000_0000;
 
 const DEEPEST: u32 = 64;
@@ -84,7 +85,7 @@ impl Context {
     pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
         if crate::interpose::panic_guard::happened() {
             // The driver's from now on.
-            self.shared.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.remove(&name);
+            self.shared.lists().lists.remove(&name);
             return false;
         }
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
@@ -96,26 +97,16 @@ impl Context {
         if wrong || !(mode == COMPILE || mode == COMPILE_AND_EXECUTE) || self.capabilities.core {
             return false;
         }
-        self.sync();
+        self.attributes.sync();
         gl::new_list(name, COMPILE);
         {
-            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists();
             lists.greatest = lists.greatest.max(name);
             lists.next_segment = lists.next_segment.max(name.saturating_sub(FIRST_SEGMENT));
         }
         let execute = mode == COMPILE_AND_EXECUTE;
-        self.capture.recording = Some(ListRecording {
-            name,
-            execute,
-            list: DisplayList::default(),
-            segment: name,
-            used: false,
-            draws: false,
-            more: false,
-            textures: false,
-            open: false,
-            mode: 0,
-        });
+        let lists = self.shared.lists_of_group();
+        self.capture.recording = Some(ListRecording::new(name, execute, lists));
         self.capture.immediate_target = ImmediateModeTarget::List;
         symbols::arm();
         true
@@ -134,7 +125,7 @@ impl Context {
         r.end_segment();
         self.capture.immediate_target = ImmediateModeTarget::Outside;
         let old = {
-            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists();
             lists.lists.insert(r.name, Arc::new(r.list))
         };
         delete_segments(old);
@@ -142,41 +133,6 @@ impl Context {
             self.call_list(r.name);
         }
         true
-    }
-
-    /// Puts a step of ours into the list; calls that went to the driver before it end their piece.
-    pub(crate) fn list_op(&mut self, op: ListOp) -> bool {
-        if self.capture.recording.as_ref().is_some_and(|r| r.used) {
-            self.close_segment();
-            self.open_segment();
-        }
-        let Some(r) = &mut self.capture.recording else { return false };
-        r.list.ops.push(op);
-        true
-    }
-
-    /// The driver's piece of the list that is compiled ends here.
-    fn close_segment(&mut self) {
-        if let Some(r) = &mut self.capture.recording {
-            r.end_segment();
-        }
-    }
-
-    fn open_segment(&mut self) {
-        let Some(r) = &mut self.capture.recording else { return };
-        let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
-        lists.next_segment += 1;
-        r.segment = FIRST_SEGMENT + lists.next_segment;
-        r.list.segments.push(r.segment);
-        gl::new_list(r.segment, COMPILE);
-    }
-
-    pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
-        if let Some(r) = &mut self.capture.recording {
-            (r.open, r.mode) = (true, mode);
-        }
-        self.capture.element_arrays = None;
-        self.list_op(ListOp::Begin(mode))
     }
 
     /// `glPrimitiveRestartNV`: an End, and a Begin of the same mode.
@@ -192,55 +148,14 @@ impl Context {
         self.end() && self.begin(mode)
     }
 
-    /// Vertices of arrays follow.
-    pub(crate) fn list_begin_arrays(&mut self, mode: u32) -> bool {
-        self.list_op(ListOp::BeginArrays(mode))
-    }
-
-    pub(crate) fn list_end(&mut self) -> bool {
-        if let Some(r) = &mut self.capture.recording {
-            r.open = false;
-        }
-        self.list_op(ListOp::End)
-    }
-
-    pub(crate) fn list_vertex(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(ListOp::Vertex(v))
-    }
-
-    pub(crate) fn list_normal(&mut self, v: [f32; 3]) -> bool {
-        self.list_op(ListOp::Normal(v))
-    }
-
-    pub(crate) fn list_color(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(ListOp::Color(v))
-    }
-
-    pub(crate) fn list_tex(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(ListOp::Tex(v))
-    }
-
-    pub(crate) fn list_material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
-        let Some(r) = &mut self.capture.recording else { return false };
-        let at = r.list.materials.len() as u32;
-        r.list.materials.push((face, what, v));
-        self.list_op(ListOp::Material(at))
-    }
-
-    /// A rectangle, a primitive of its own.
-    pub(crate) fn list_rect(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(ListOp::Rect(v))
-    }
-
     pub(crate) fn call_list(&mut self, name: u32) -> bool {
         if self.capture.recording.is_some() {
-            return self.list_op(ListOp::Call(name));
+            return self.capture.list_op(ListOp::Call(name));
         }
         if crate::interpose::panic_guard::happened() {
             return self.execute_in_driver(name);
         }
-        let known =
-            self.shared.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
+        let known = self.shared.lists().lists.get(&name).cloned();
         let Some(list) = known else {
             // Not compiled by calls that we saw (fonts of glXUseXFont), or not there.
             self.call_driver(name, true, true);
@@ -270,8 +185,7 @@ impl Context {
 
     /// After a fault of ours: a list of ours into the driver as it is.
     fn execute_in_driver(&mut self, name: u32) -> bool {
-        let known =
-            self.shared.lists.lock().unwrap_or_else(|e| e.into_inner()).lists.get(&name).cloned();
+        let known = self.shared.lists().lists.get(&name).cloned();
         let Some(list) = known.filter(|_| self.capture.depth_of_lists < DEEPEST) else {
             return false;
         };
@@ -329,13 +243,13 @@ impl Context {
             if crate::classify::rules::commutes(&self.state.snapshot) {
                 self.presentation.frame.driver_drew();
             } else {
-                self.flush("a display list of the driver's");
+                self.flush(FlushReason::DriverList);
             }
         }
-        self.sync();
+        self.attributes.sync();
         self.state.dirty = class::ALL;
         if textures {
-            self.invalidate_textures();
+            self.shared.invalidate_textures();
         }
     }
 
@@ -524,7 +438,7 @@ impl Context {
         }
         if self.capture.recording.is_some() {
             for name in names {
-                self.list_op(ListOp::CallFromBase(name));
+                self.capture.list_op(ListOp::CallFromBase(name));
             }
             return true;
         }
@@ -535,7 +449,7 @@ impl Context {
             gl::word(LIST_BASE)
         };
         let ours = {
-            let lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let lists = self.shared.lists();
             names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))
         };
         if !ours {
@@ -549,6 +463,35 @@ impl Context {
         true
     }
 
+    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is
+    /// that of a segment of ours. Programs that count their lists (Survex's aven) end there. So they
+    /// get the names after the greatest of their own, as Mesa gives them, and an empty list of the
+    /// driver's for each. `None` leaves the call to the driver.
+    pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("glGenLists between Begin and End");
+        }
+        if self.capture.immediate_target == ImmediateModeTarget::Pass
+            || self.capabilities.core
+            || crate::interpose::panic_guard::happened()
+        {
+            return None;
+        }
+        let first = self.shared.lists().reserve_names(n)?;
+        // Where a list is compiled its segment ends before.
+        if let Some(r) = &mut self.capture.recording {
+            r.end_segment();
+        }
+        for name in first..first + n.cast_unsigned() {
+            gl::new_list(name, COMPILE);
+            gl::end_list();
+        }
+        if let Some(r) = &mut self.capture.recording {
+            r.begin_segment();
+        }
+        Some(first)
+    }
+
     /// Forgets our part; the driver then deletes its own.
     pub(crate) fn delete_lists(&mut self, first: u32, n: i32) -> bool {
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
@@ -556,7 +499,7 @@ impl Context {
         }
         let range = first..first.saturating_add(n.max(0).cast_unsigned());
         let gone: Vec<_> = {
-            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
+            let mut lists = self.shared.lists();
             // Few steps, whether the program names few lists or many that are not there.
             match lists.lists.len() < range.len() {
                 true => lists

@@ -2,10 +2,12 @@
 
 use crate::capture::geometry_cache::Geometry;
 use crate::classify::vtk::VtkProgram;
-use crate::state::current_attributes::{CurrentAttributes, Materials};
+use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
+use crate::state::material::Materials;
 use crate::state::snapshot::Snapshot;
 use crate::trace::overrides::RayMaterial;
+use crate::trace::texturing::Image;
 use std::sync::Arc;
 
 /// An attribute of `N` components.
@@ -145,6 +147,9 @@ pub(crate) struct Draw {
     pub(crate) ray_material: RayMaterial,
 }
 
+/// A draw and the image of its texture.
+pub(crate) type TexturedDraw = (Draw, Option<Arc<Image>>);
+
 impl Draw {
     /// True when no part of the draw lets light through.
     pub(crate) fn has_full_alpha(&self) -> bool {
@@ -165,14 +170,6 @@ impl Draw {
             }
         }
     }
-}
-
-/// Primitives of one kind and size that follow one another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct PrimitiveRun {
-    pub(crate) mode: u32,
-    pub(crate) count: u32,
-    pub(crate) times: u32,
 }
 
 #[cfg(test)]

@@ -10,10 +10,10 @@ mod casteljau;
 mod maps;
 
 use crate::capture::ImmediateModeTarget;
-use crate::capture::display_lists::ListOp;
 use crate::classify::rules::Classification;
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
+use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::symbols;
 use crate::state::enums::*;
 pub(crate) use maps::MapKind;
@@ -86,18 +86,11 @@ impl Context {
         false
     }
 
-    /// The draw that comes goes into the driver's piece of the list that is compiled.
-    fn put_into_driver_segment(&mut self) {
-        if let Some(r) = &mut self.capture.recording {
-            r.note_driver_call(0, true, true);
-        }
-    }
-
     /// `glEvalCoord`.
     pub(crate) fn eval_coord(&mut self, kind: MapKind, at: [f32; 2]) -> bool {
         match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.eval_vertex(kind, at),
-            ImmediateModeTarget::List => self.list_op(ListOp::EvalCoord(kind, at)),
+            ImmediateModeTarget::List => self.capture.list_eval_coord(kind, at),
             ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => false,
         }
     }
@@ -109,7 +102,7 @@ impl Context {
                 let at = self.capture.evaluators.grid(kind).at(places);
                 self.eval_vertex(kind, at)
             }
-            ImmediateModeTarget::List => self.list_op(ListOp::EvalPoint(kind, places)),
+            ImmediateModeTarget::List => self.capture.list_eval_point(kind, places),
             ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => false,
         }
     }
@@ -152,7 +145,7 @@ impl Context {
             return false;
         }
         if let Classification::TraceIfOpaque(why) = self.classifier.classification
-            && !self.is_opaque_with(with.color)
+            && !self.attributes.is_opaque_with(&self.state.snapshot, with.color)
         {
             self.replay_to_driver(why);
             return false;
@@ -176,7 +169,7 @@ impl Context {
     pub(crate) fn eval_mesh_1(&mut self, mode: u32) -> bool {
         match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.replay_to_driver("a mesh between Begin and End"),
-            ImmediateModeTarget::List => self.put_into_driver_segment(),
+            ImmediateModeTarget::List => self.capture.list_driver_call(true, true),
             ImmediateModeTarget::Outside => {
                 if matches!(mode, POINT | LINE) && self.has_vertices(MapKind::Curve) {
                     self.before_driver_draw("lines and points", false);
@@ -206,9 +199,11 @@ impl Context {
                 return false;
             }
             ImmediateModeTarget::Pass => return false,
-            ImmediateModeTarget::List if filled => return self.list_op(ListOp::EvalMesh(range)),
+            ImmediateModeTarget::List if filled => {
+                return self.capture.list_eval_mesh(range);
+            }
             ImmediateModeTarget::List => {
-                self.put_into_driver_segment();
+                self.capture.list_driver_call(true, true);
                 return false;
             }
             ImmediateModeTarget::Outside => {}
@@ -221,8 +216,8 @@ impl Context {
         {
             return false;
         }
-        let classification = self.classification();
-        let opaque = self.is_opaque_now();
+        let classification = self.classify_draw();
+        let opaque = self.attributes.is_opaque(&self.state.snapshot);
         let maps = self.capture.evaluators.maps(MapKind::Surface);
         let why = match classification {
             _ if !filled => Some("lines and points"),
@@ -237,7 +232,7 @@ impl Context {
             return false;
         }
         if classification == Classification::TraceInOrder {
-            self.flush("a draw whose order matters");
+            self.flush(FlushReason::OrderedDraw);
         }
         symbols::arm();
         self.trace_mesh(range);

@@ -4,7 +4,7 @@
 
 mod refit;
 
-use crate::capture::draw::PrimitiveRun;
+use crate::capture::primitives::PrimitiveRun;
 use crate::capture::primitives::{QuadSplit, triangulate};
 use rt_core::bvh::{BuildOptions, BuildQuality, World};
 use rt_core::glam::Vec3;

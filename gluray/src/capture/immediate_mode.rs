@@ -1,12 +1,14 @@
 //! Immediate mode: Begin and End, and the attributes that vertices take with them.
 
 use crate::capture::ImmediateModeTarget;
-use crate::classify::rules::{self, Classification};
+use crate::classify::rules::Classification;
 use crate::interpose::calls::class;
 use crate::interpose::context::Context;
+use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::symbols;
-use crate::state::current_attributes::{set_material, stale};
+use crate::state::current_attributes::stale;
 use crate::state::enums::*;
+use crate::state::material::set_material;
 use crate::state::material_properties::MaterialProperties;
 
 /// What the short way of a call came to. It takes values and calls nothing, so that they stay in
@@ -26,10 +28,8 @@ impl Context {
     /// The short way of `glBegin`.
     #[inline(always)]
     pub(crate) fn begin_fast(&mut self, mode: u32) -> FastPathResult {
-        const DRAWS: u8 =
-            class::MATRIX | class::LIGHT | class::RASTER | class::TEXTURE | class::CURRENT;
         let ready = self.capture.immediate_target == ImmediateModeTarget::Outside
-            && self.state.dirty & DRAWS == 0;
+            && self.state.dirty & class::DRAWS == 0;
         if ready
             && self.classifier.classification == Classification::Trace
             && self.state.snapshot.program == 0
@@ -51,32 +51,12 @@ impl Context {
         }
     }
 
-    /// True when a vertex now would have alpha 1.
-    #[inline]
-    pub(crate) fn is_opaque_now(&self) -> bool {
-        self.is_opaque_with(self.attributes.current.color)
-    }
-
-    /// The same with another colour than the current one.
-    #[inline]
-    pub(crate) fn is_opaque_with(&self, color: [f32; 4]) -> bool {
-        let s = &*self.state.snapshot;
-        let tracked =
-            s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
-        match s.lighting {
-            true if !tracked => {
-                self.attributes.current.materials.iter().all(|m| m.diffuse[3] == 1.0)
-            }
-            _ => color[3] == 1.0,
-        }
-    }
-
     /// Alpha left 1 while that was what a draw was traced for.
     #[inline]
     fn watch_alpha(&mut self) {
         if self.capture.immediate_target == ImmediateModeTarget::Trace
             && let Classification::TraceIfOpaque(why) = self.classifier.classification
-            && !self.is_opaque_now()
+            && !self.attributes.is_opaque(&self.state.snapshot)
         {
             self.replay_to_driver(why);
         }
@@ -85,7 +65,7 @@ impl Context {
     #[cold]
     fn begin_slow(&mut self, mode: u32) -> bool {
         match self.capture.immediate_target {
-            ImmediateModeTarget::List => return self.list_begin(mode),
+            ImmediateModeTarget::List => return self.capture.list_begin(mode),
             // An error, which the driver is to report.
             ImmediateModeTarget::Trace => {
                 self.replay_to_driver("Begin between Begin and End");
@@ -94,11 +74,13 @@ impl Context {
             ImmediateModeTarget::Pass => return false,
             ImmediateModeTarget::Outside => {}
         }
-        let classification = self.classification();
+        let classification = self.classify_draw();
         let filled = crate::capture::primitives::is_filled(mode);
         let fixed = self.state.snapshot.program == 0;
         let classification = match classification {
-            Classification::TraceIfOpaque(why) if !self.is_opaque_now() => {
+            Classification::TraceIfOpaque(why)
+                if !self.attributes.is_opaque(&self.state.snapshot) =>
+            {
                 Classification::Pass(why)
             }
             v => v,
@@ -110,7 +92,7 @@ impl Context {
                 if filled && fixed =>
             {
                 if classification == Classification::TraceInOrder {
-                    self.flush("a draw whose order matters");
+                    self.flush(FlushReason::OrderedDraw);
                 }
                 self.capture.recorder.begin(mode, &self.attributes.current);
                 self.capture.immediate_target = ImmediateModeTarget::Trace;
@@ -129,18 +111,6 @@ impl Context {
                 false
             }
         }
-    }
-
-    /// The driver is about to draw something.
-    pub(crate) fn before_driver_draw(&mut self, why: &'static str, filled: bool) {
-        self.end_batch();
-        if rules::commutes(&self.state.snapshot) && !filled {
-            self.presentation.frame.driver_drew();
-        } else {
-            self.flush(crate::present::frame::ORDER_MATTERS);
-        }
-        self.sync();
-        self.counters.count_driver_draws(why, 1);
     }
 
     /// The short way of `glEnd`.
@@ -166,7 +136,7 @@ impl Context {
     #[cold]
     fn end_slow(&mut self) -> bool {
         match self.capture.immediate_target {
-            ImmediateModeTarget::List => self.list_end(),
+            ImmediateModeTarget::List => self.capture.list_end(),
             ImmediateModeTarget::Pass => {
                 self.capture.immediate_target = ImmediateModeTarget::Outside;
                 false
@@ -179,14 +149,6 @@ impl Context {
             }
             ImmediateModeTarget::Outside => false,
         }
-    }
-
-    /// The primitive that is being recorded goes to the driver after all.
-    pub(crate) fn replay_to_driver(&mut self, why: &'static str) {
-        self.capture.immediate_target = ImmediateModeTarget::Pass;
-        let (mode, vertices) = self.capture.recorder.take_open_primitive();
-        self.before_driver_draw(why, true);
-        self.replay_primitive(mode, vertices);
     }
 
     /// The short way of `glVertex`.
@@ -212,7 +174,7 @@ impl Context {
     #[cold]
     fn vertex_slow(&mut self, v: [f32; 4]) -> bool {
         match self.capture.immediate_target {
-            ImmediateModeTarget::List => self.list_vertex(v),
+            ImmediateModeTarget::List => self.capture.list_vertex(v),
             ImmediateModeTarget::Trace if v[3] > 0.0 && v[3].is_finite() => {
                 self.capture
                     .recorder
@@ -235,13 +197,13 @@ impl Context {
             ImmediateModeTarget::Outside => {
                 self.attributes.current.normal = v;
                 self.capture.recorder.behind = true;
-                self.mark_stale(stale::NORMAL);
+                self.attributes.mark_stale(stale::NORMAL);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Trace => {
                 self.attributes.current.normal = v;
                 self.capture.recorder.set_normal(v);
-                self.mark_stale(stale::NORMAL);
+                self.attributes.mark_stale(stale::NORMAL);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => {
@@ -254,7 +216,7 @@ impl Context {
 
     pub(crate) fn normal(&mut self, v: [f32; 3]) -> bool {
         match self.normal_fast(v) {
-            FastPathResult::Slow => self.list_normal(v),
+            FastPathResult::Slow => self.capture.list_normal(v),
             step => step == FastPathResult::Done,
         }
     }
@@ -266,7 +228,7 @@ impl Context {
             ImmediateModeTarget::Outside => {
                 self.attributes.current.color = v;
                 self.capture.recorder.behind = true;
-                self.mark_stale(stale::COLOR);
+                self.attributes.mark_stale(stale::COLOR);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Trace
@@ -274,7 +236,7 @@ impl Context {
             {
                 self.attributes.current.color = v;
                 self.capture.recorder.set_color(v);
-                self.mark_stale(stale::COLOR);
+                self.attributes.mark_stale(stale::COLOR);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => {
@@ -288,12 +250,12 @@ impl Context {
     pub(crate) fn color(&mut self, v: [f32; 4]) -> bool {
         match self.color_fast(v) {
             FastPathResult::Slow if self.capture.immediate_target == ImmediateModeTarget::List => {
-                self.list_color(v)
+                self.capture.list_color(v)
             }
             FastPathResult::Slow => {
                 self.attributes.current.color = v;
                 self.capture.recorder.set_color(v);
-                self.mark_stale(stale::COLOR);
+                self.attributes.mark_stale(stale::COLOR);
                 self.watch_alpha();
                 true
             }
@@ -308,13 +270,13 @@ impl Context {
             ImmediateModeTarget::Outside => {
                 self.attributes.current.tex = v;
                 self.capture.recorder.behind = true;
-                self.mark_stale(stale::TEX);
+                self.attributes.mark_stale(stale::TEX);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Trace => {
                 self.attributes.current.tex = v;
                 self.capture.recorder.set_tex(v);
-                self.mark_stale(stale::TEX);
+                self.attributes.mark_stale(stale::TEX);
                 FastPathResult::Done
             }
             ImmediateModeTarget::Pass => {
@@ -327,14 +289,14 @@ impl Context {
 
     pub(crate) fn tex_coord(&mut self, v: [f32; 4]) -> bool {
         match self.tex_coord_fast(v) {
-            FastPathResult::Slow => self.list_tex(v),
+            FastPathResult::Slow => self.capture.list_tex(v),
             step => step == FastPathResult::Done,
         }
     }
 
     pub(crate) fn material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
         if self.capture.immediate_target == ImmediateModeTarget::List {
-            return self.list_material(face, what, v);
+            return self.capture.list_material(face, what, v);
         }
         let mut materials = self.attributes.current.materials;
         if !set_material(&mut materials, face, what, v) {
@@ -358,19 +320,11 @@ impl Context {
         if materials != self.attributes.current.materials {
             self.attributes.current.materials = materials;
             self.capture.recorder.set_materials(&materials);
-            self.mark_stale(stale::MATERIAL);
+            self.attributes.mark_stale(stale::MATERIAL);
             self.attributes.stale_properties.add(properties);
             self.watch_alpha();
         }
         true
-    }
-
-    #[inline(always)]
-    fn mark_stale(&mut self, bit: u8) {
-        if self.attributes.stale == 0 {
-            symbols::arm();
-        }
-        self.attributes.stale |= bit;
     }
 
     pub(crate) fn rect(&mut self, [x, y, x2, y2]: [f32; 4]) -> bool {
@@ -382,15 +336,16 @@ impl Context {
             return false;
         }
         if self.capture.immediate_target == ImmediateModeTarget::List {
-            return self.list_rect([x, y, x2, y2]);
+            return self.capture.list_rect([x, y, x2, y2]);
         }
         {
-            let traced = match self.classification() {
+            let traced = match self.classify_draw() {
                 Classification::Trace | Classification::TraceInOrder => {
                     self.state.snapshot.program == 0
                 }
                 Classification::TraceIfOpaque(_) => {
-                    self.state.snapshot.program == 0 && self.is_opaque_now()
+                    self.state.snapshot.program == 0
+                        && self.attributes.is_opaque(&self.state.snapshot)
                 }
                 Classification::Pass(_) => false,
             };

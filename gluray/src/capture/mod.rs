@@ -3,6 +3,7 @@
 
 mod array_element;
 pub(crate) mod attribute_cache;
+mod batch;
 pub(crate) mod buffer_writes;
 pub(crate) mod display_lists;
 pub(crate) mod draw;

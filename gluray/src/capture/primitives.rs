@@ -4,6 +4,14 @@
 
 use crate::state::enums::*;
 
+/// Primitives of one kind and size that follow one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct PrimitiveRun {
+    pub(crate) mode: u32,
+    pub(crate) count: u32,
+    pub(crate) times: u32,
+}
+
 /// True for what covers area.
 pub(crate) fn is_filled(mode: u32) -> bool {
     (TRIANGLES..=POLYGON).contains(&mode)

@@ -14,6 +14,8 @@ use crate::interpose::client_memory::{
 };
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
+use crate::interpose::flush_reason::FlushReason;
+use crate::interpose::kept_errors::KeptErrors;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::overrides::RayMaterial;
@@ -352,38 +354,32 @@ impl Context {
         if self.capture.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
-        let classification = self.classification();
-        self.keep_errors();
+        let classification = self.classify_draw();
+        self.errors.keep();
         let taken = match classification {
             _ if !is_filled(mode) => Err("lines and points"),
             _ if self.restarts() => Err("primitive restart"),
-            _ if self.state.snapshot.program != 0
-                && self.config.settings.enabled
-                && self.is_refused() =>
-            {
-                Err(crate::present::framebuffer_pass::REFUSED)
-            }
             // Recognised programs decide for themselves what blending means.
             _ if self.state.snapshot.program != 0 => self.take_program_arrays(mode, call, elements),
             Classification::Pass(why) => Err(why),
             v => self.take_arrays(mode, elements, v).map(|()| ArrayDrawOutcome::Traced),
         };
-        self.drop_errors();
+        KeptErrors::drop_ours();
         match taken {
             Ok(ArrayDrawOutcome::Traced) => true,
             // The driver draws it, and rays darken it when the frame ends.
             Ok(ArrayDrawOutcome::Shape) => {
-                self.sync();
-                self.mark_current();
+                self.attributes.sync();
+                self.state.mark_current(&self.capabilities);
                 false
             }
             Err(why) => {
                 self.before_driver_draw(why, is_filled(mode));
                 if is_filled(mode) {
-                    self.begin_redraw();
+                    self.classifier.programs.begin_redraw(&self.state.snapshot);
                 }
                 // The arrays of the driver's draw leave some current values undefined.
-                self.mark_current();
+                self.state.mark_current(&self.capabilities);
                 false
             }
         }
@@ -442,15 +438,15 @@ impl Context {
                     .is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
             let opaque = match &color {
                 Some(p) if by_color => (0..count).all(|i| p.at::<4>(i, [1.0; 4])[3] == 1.0),
-                _ => self.is_opaque_now(),
+                _ => self.attributes.is_opaque(&self.state.snapshot),
             };
             if !opaque {
                 return Err(why);
             }
         }
-        self.sync();
+        self.attributes.sync();
         if classification == Classification::TraceInOrder {
-            self.flush("a draw whose order matters");
+            self.flush(FlushReason::OrderedDraw);
         }
         self.end_batch();
         let mut attributes = Attributes::constant(&self.attributes.current);
@@ -474,13 +470,6 @@ impl Context {
         Ok(())
     }
 
-    /// Hands a finished draw to the frame.
-    pub(crate) fn mark_current(&mut self) {
-        if !self.capabilities.core {
-            self.state.dirty |= crate::interpose::calls::class::CURRENT;
-        }
-    }
-
     /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of
     /// it.
     fn array_into_list<'c>(
@@ -489,9 +478,7 @@ impl Context {
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> bool {
         if !is_filled(mode) {
-            if let Some(r) = &mut self.capture.recording {
-                r.note_driver_call(0, false, true);
-            }
+            self.capture.list_driver_call(false, true);
             return false;
         }
         let read = || -> Result<_, &'static str> {
@@ -508,30 +495,28 @@ impl Context {
             ))
         };
         let Ok((position, normal, color, tex, elements)) = read() else {
-            if let Some(r) = &mut self.capture.recording {
-                r.note_driver_call(0, false, true);
-            }
+            self.capture.list_driver_call(false, true);
             return false;
         };
         let end = [0.0, 0.0, 0.0, 1.0];
-        self.list_begin_arrays(mode);
+        self.capture.list_begin_arrays(mode);
         for i in elements.order() {
             let Some(i) = i else {
-                self.list_end();
-                self.list_begin_arrays(mode);
+                self.capture.list_end();
+                self.capture.list_begin_arrays(mode);
                 continue;
             };
             if let Some(p) = &normal {
-                self.list_normal(p.at(i, [0.0; 3]));
+                self.capture.list_normal(p.at(i, [0.0; 3]));
             }
             if let Some(p) = &color {
-                self.list_color(p.at(i, end));
+                self.capture.list_color(p.at(i, end));
             }
             if let Some(p) = &tex {
-                self.list_tex(p.at(i, end));
+                self.capture.list_tex(p.at(i, end));
             }
-            self.list_vertex(position.at(i, end));
+            self.capture.list_vertex(position.at(i, end));
         }
-        self.list_end()
+        self.capture.list_end()
     }
 }

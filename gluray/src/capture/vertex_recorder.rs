@@ -8,10 +8,12 @@
 mod attribute_stream;
 mod earlier_frames;
 
-use crate::capture::draw::{Attributes, PrimitiveRun, Values};
+use crate::capture::draw::{Attributes, Values};
 use crate::capture::geometry_cache::Geometry;
-use crate::state::current_attributes::{CurrentAttributes, Materials};
+use crate::capture::primitives::PrimitiveRun;
+use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::QUADS;
+use crate::state::material::Materials;
 use attribute_stream::AttributeStream;
 pub(crate) use attribute_stream::same_bits;
 use earlier_frames::EarlierBatch;

@@ -16,9 +16,10 @@ use crate::host::config::{Mode, Settings};
 use crate::interpose::client_memory::{ArraySource, Elements};
 use crate::interpose::context::Context;
 use crate::interpose::driver::{feedback, gl};
-use crate::state::current_attributes::{CurrentAttributes, Material};
+use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
-use crate::state::snapshot::{GlLight, Snapshot};
+use crate::state::material::Material;
+use crate::state::snapshot::{DriverCapabilities, GlLight, Snapshot};
 use crate::trace::overrides::RayMaterial;
 use rt_core::glam::{DMat4, DVec3, DVec4};
 use std::collections::HashMap;
@@ -42,7 +43,51 @@ pub(crate) struct AffineProbes {
     /// Matrix and eye space of the first draw of the frame; the others are placed by it.
     reference: Option<(DMat4, DMat4)>,
     /// Draws of this frame.
-    pub(crate) draws: Vec<Draw>,
+    draws: Vec<Draw>,
+}
+
+impl AffineProbes {
+    /// Links `program` once more so that its positions can be captured, where nobody captures
+    /// anything else.
+    pub(super) fn prepare(
+        &mut self,
+        program: u32,
+        settings: &Settings,
+        capabilities: &DriverCapabilities,
+    ) {
+        let possible =
+            settings.mode == Mode::Enhance && capabilities.version >= 30 && !capabilities.es;
+        let free = possible
+            && gl::program_i::<1>(program, LINK_STATUS)[0] != 0
+            && gl::program_i::<1>(program, TRANSFORM_FEEDBACK_VARYINGS)[0] == 0;
+        if free {
+            feedback::feedback_varying(program, "gl_Position");
+            gl::link_program(program);
+            if gl::program_i::<1>(program, LINK_STATUS)[0] == 0 {
+                feedback::no_feedback_varyings(program);
+                gl::link_program(program);
+                self.ready.insert(program, false);
+                return;
+            }
+        }
+        self.ready.insert(program, free);
+    }
+
+    /// True when draws of this frame wait to be darkened.
+    pub(crate) fn has_draws(&self) -> bool {
+        !self.draws.is_empty()
+    }
+
+    /// The draws of this frame whose image of the driver is to be darkened.
+    pub(crate) fn take_draws(&mut self) -> Vec<Draw> {
+        self.reference = None;
+        std::mem::take(&mut self.draws)
+    }
+
+    /// The draws are cleared before anybody sees them.
+    pub(crate) fn drop_draws(&mut self) {
+        self.draws.clear();
+    }
 }
 
 /// Finds `clip = M (x, y, z, 1)` by least squares; the residual is relative to the largest clip
@@ -100,28 +145,6 @@ fn by_uniforms(program: u32, points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<D
 }
 
 impl Context {
-    /// Links `program` once more so that its positions can be captured, where nobody captures
-    /// anything else.
-    pub(crate) fn prepare_probe(&mut self, program: u32) {
-        let possible = self.config.settings.mode == Mode::Enhance
-            && self.capabilities.version >= 30
-            && !self.capabilities.es;
-        let free = possible
-            && gl::program_i::<1>(program, LINK_STATUS)[0] != 0
-            && gl::program_i::<1>(program, TRANSFORM_FEEDBACK_VARYINGS)[0] == 0;
-        if free {
-            feedback::feedback_varying(program, "gl_Position");
-            gl::link_program(program);
-            if gl::program_i::<1>(program, LINK_STATUS)[0] == 0 {
-                feedback::no_feedback_varyings(program);
-                gl::link_program(program);
-                self.classifier.probes.ready.insert(program, false);
-                return;
-            }
-        }
-        self.classifier.probes.ready.insert(program, free);
-    }
-
     /// Takes the shape of a draw that the driver is about to draw with a program that is not
     /// understood; why not, in words.
     pub(crate) fn take_shape<'c>(
@@ -160,8 +183,10 @@ impl Context {
             return Err("positions that are not finite");
         }
         for source in sources {
-            let written =
-                self.writes().last(&[Some(source), None, None, None, None, None, None], indices);
+            let written = self
+                .shared
+                .writes()
+                .last(&[Some(source), None, None, None, None, None, None], indices);
             let key = hash(&[
                 format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()
             ]);
@@ -244,16 +269,6 @@ impl Context {
         });
         self.counters.report.traced_draws += 1;
         Ok(())
-    }
-
-    /// Makes what the driver drew darker where rays find corners and shadows.
-    pub(crate) fn darken(&mut self) {
-        let draws = std::mem::take(&mut self.classifier.probes.draws);
-        self.classifier.probes.reference = None;
-        if draws.is_empty() {
-            return;
-        }
-        self.darken_drawn(&draws, &self.config.settings.clone());
     }
 }
 

@@ -1,6 +1,7 @@
 //! Which draws are traced, and which the driver draws: by state, never by the type of projection
 //! (an orthographic main view is the rule in scientific programs).
 
+use crate::host::config::{Settings, Trace};
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 
@@ -32,6 +33,18 @@ pub(crate) enum TraceFilter {
     All,
     /// None: everything is passed.
     Nothing,
+}
+
+impl TraceFilter {
+    /// The filter that the settings ask for.
+    pub(crate) fn of(settings: &Settings) -> TraceFilter {
+        match (settings.enabled, settings.trace) {
+            (false, _) => TraceFilter::Nothing,
+            (true, Trace::All) => TraceFilter::All,
+            (true, Trace::Scene) if settings.sees_through() => TraceFilter::Translucent,
+            (true, Trace::Scene) => TraceFilter::Surfaces,
+        }
+    }
 }
 
 /// Pixels of a viewport from which on pictures would cost gigabytes.

@@ -21,14 +21,16 @@ mod weighted_blending;
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
 use crate::capture::geometry_cache::Geometry;
 use crate::capture::vertex_arrays::{ArrayDrawOutcome, positions};
-use crate::classify::rules::{self, Classification};
+use crate::classify::rules::{self, Classification, TraceFilter};
 use crate::host::config::Mode;
 use crate::interpose::client_memory::{ArraySource, Elements};
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
+use crate::interpose::flush_reason::FlushReason;
+use crate::interpose::kept_errors::KeptErrors;
 use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
-use crate::trace::overrides::RayMaterial;
+use crate::trace::overrides::{self, RayMaterial};
 use crate::trace::texturing::{self, Image};
 pub(crate) use color::FragmentSample;
 use depth_peeling::DepthPeeling;
@@ -89,6 +91,41 @@ impl VtkPrograms {
     }
 }
 
+/// The sources of a program's shaders, and whether it has shaders of other kinds.
+#[derive(Default)]
+struct AttachedSources {
+    vertex: String,
+    geometry: String,
+    fragment: String,
+    other: bool,
+}
+
+impl AttachedSources {
+    fn query(program: u32) -> AttachedSources {
+        let mut sources = AttachedSources::default();
+        for shader in gl::attached(program) {
+            match gl::shader_i::<1>(shader, SHADER_TYPE)[0].cast_unsigned() {
+                VERTEX_SHADER => sources.vertex = gl::source_of(shader),
+                FRAGMENT_SHADER => sources.fragment = gl::source_of(shader),
+                GEOMETRY_SHADER => sources.geometry = gl::source_of(shader),
+                _ => sources.other = true,
+            }
+        }
+        sources
+    }
+
+    fn signature(&self) -> Result<VtkShaderSignature, &'static str> {
+        match self.other {
+            true => Err("a geometry or tessellation shader"),
+            false => VtkShaderSignature::read(&self.vertex, &self.geometry, &self.fragment),
+        }
+    }
+
+    fn is_vertex_and_fragment(&self) -> bool {
+        !self.other && self.geometry.is_empty()
+    }
+}
+
 /// A generic attribute's array by name; `None` when the program has no such attribute or its array
 /// is off.
 pub(crate) fn attribute(program: u32, name: &str) -> Option<ArraySource> {
@@ -99,27 +136,13 @@ pub(crate) fn attribute(program: u32, name: &str) -> Option<ArraySource> {
 impl Context {
     /// `glLinkProgram`: the shaders are attached now, and perhaps never again.
     pub(crate) fn link_program(&mut self, program: u32) -> bool {
-        self.sync();
+        self.attributes.sync();
         gl::link_program(program);
-        self.keep_errors();
-        let [mut vertex, mut geometry, mut fragment] = [const { String::new() }; 3];
-        let mut other = false;
-        for shader in gl::attached(program) {
-            match gl::shader_i::<1>(shader, SHADER_TYPE)[0].cast_unsigned() {
-                VERTEX_SHADER => vertex = gl::source_of(shader),
-                FRAGMENT_SHADER => fragment = gl::source_of(shader),
-                GEOMETRY_SHADER => geometry = gl::source_of(shader),
-                _ => other = true,
-            }
-        }
-        self.drop_errors();
-        let signature = match other {
-            true => Err("a geometry or tessellation shader"),
-            false => VtkShaderSignature::read(&vertex, &geometry, &fragment),
-        };
-        if signature.is_err() && !other && geometry.is_empty() {
-            self.prepare_probe(program);
-            self.drop_errors();
+        let sources = self.errors.hiding(|| AttachedSources::query(program));
+        let signature = sources.signature();
+        if signature.is_err() && sources.is_vertex_and_fragment() {
+            self.classifier.probes.prepare(program, &self.config.settings, &self.capabilities);
+            KeptErrors::drop_ours();
         }
         self.classifier.programs.signatures.insert(program, signature);
         true
@@ -132,6 +155,9 @@ impl Context {
         call: DrawCall,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<ArrayDrawOutcome, &'static str> {
+        if self.config.settings.enabled {
+            self.check_presenter()?;
+        }
         let program = self.state.snapshot.program;
         let signature = self
             .classifier
@@ -147,10 +173,22 @@ impl Context {
             return self.take_shape(mode, call, elements).map(|()| ArrayDrawOutcome::Shape);
         }
         if !matches!(signature, Ok(t) if t.peel != TranslucencyPass::No) {
-            self.is_drawn_once(&signature)?;
+            self.classifier.programs.is_drawn_once(&signature)?;
         }
         let signature = signature?;
-        self.check_peeling_pass(signature.peel)?;
+        match signature.peel {
+            TranslucencyPass::Weighted => weighted_blending::check_pass(
+                &self.state.snapshot,
+                &self.config.settings,
+                self.capabilities.core,
+            )?,
+            pass => self.classifier.programs.peeling.check_pass(
+                pass,
+                &self.state.snapshot,
+                &self.config.settings,
+                self.counters.report.passed_draws,
+            )?,
+        }
         let position = attribute(program, "vertexMC").ok_or("a program without positions")?;
         let cells = |wanted: bool, sampler: &str| -> Result<Option<ArraySource>, &'static str> {
             wanted.then(|| cell_data::buffer_texture(program, sampler)).transpose()
@@ -187,7 +225,7 @@ impl Context {
             sources,
             elements: (mode, call.first, call.count, call.kind, call.at),
             first,
-            written: self.writes().last(&sources, (call.first >> 32) as u32),
+            written: self.shared.writes().last(&sources, (call.first >> 32) as u32),
         };
         let now = self.classifier.programs.frame;
         let known = self.classifier.programs.made.get_mut(&key).map(|m| {
@@ -215,6 +253,7 @@ impl Context {
         };
         let recognised = recognised.with_cells(&cells);
         self.capture.geometry_cache.touch(&geometry);
+        let filter = TraceFilter::of(&self.config.settings);
         // VTK leaves blending on; without transparency it changes nothing.
         let mut state = (*self.state.snapshot).clone();
         if signature.depth_offset {
@@ -226,13 +265,13 @@ impl Context {
         }
         if matches!(signature.peel, TranslucencyPass::Layers | TranslucencyPass::Weighted) {
             match signature.peel {
-                TranslucencyPass::Weighted => self.check_weighted_surface(&mut state)?,
-                _ => self.check_peeled_surface(&mut state)?,
+                TranslucencyPass::Weighted => weighted_blending::check_surface(&mut state, filter)?,
+                _ => depth_peeling::check_surface(&mut state, filter)?,
             }
             let clip_from_object = recognised.clip_from_object;
             let shading = Shading::Program(Arc::new(recognised));
             let (state, ray_material) = (Arc::new(state), RayMaterial::default());
-            let draw = Draw {
+            let mut draw = Draw {
                 geometry,
                 attributes,
                 state,
@@ -241,9 +280,11 @@ impl Context {
                 calls: 1,
                 ray_material,
             };
+            overrides::apply(&mut draw, &self.config.settings);
+            self.counters.count_traced(draw.calls, draw.geometry.mesh.num_triangles());
             match signature.peel {
-                TranslucencyPass::Weighted => self.take_weighted(draw),
-                _ => self.take_peeled(draw),
+                TranslucencyPass::Weighted => self.classifier.programs.weighted.take(draw),
+                _ => self.classifier.programs.peeling.take(draw),
             }
             return Ok(ArrayDrawOutcome::Traced);
         }
@@ -251,12 +292,12 @@ impl Context {
         if state.blend_is_over && recognised.is_opaque(&attributes, geometry.mesh.positions.len()) {
             state.blend = false;
         }
-        let in_order = match rules::classify(&state, self.config.trace()) {
+        let in_order = match rules::classify(&state, filter) {
             Classification::Pass(why) | Classification::TraceIfOpaque(why) => return Err(why),
             v => v == Classification::TraceInOrder,
         };
         if in_order {
-            self.flush("a draw whose order matters");
+            self.flush(FlushReason::OrderedDraw);
         }
         self.end_batch();
         let (clip_from_object, shading) =
@@ -304,7 +345,7 @@ impl Context {
         gl::active_texture(TEXTURE0 + unit as u32);
         let name = gl::word(TEXTURE_BINDING_2D);
         let followed = followed(TEXTURE_2D);
-        let version = self.texture_version();
+        let version = self.shared.texture_version();
         let image = self.capture.images.get(TEXTURE_2D, name, version);
         gl::active_texture(active);
         followed?;

@@ -6,7 +6,7 @@ use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, compo
 use crate::capture::geometry_cache::hash;
 use crate::classify::vtk::VtkProgram;
 use crate::host::config::Surface;
-use crate::state::current_attributes::Material;
+use crate::state::material::Material;
 use crate::state::snapshot::{Fog, GlLight, Snapshot, TextureUnit};
 use crate::trace::occlusion::MOST_LIGHTS;
 use crate::trace::overrides::RayMaterial;

@@ -230,6 +230,19 @@ impl Counters {
         self.report.driver = format!("{renderer}, {version}");
     }
 
+    /// Rays draw so many calls of the program, of so many triangles.
+    pub(crate) fn count_traced(&mut self, calls: u64, triangles: usize) {
+        self.report.traced_draws += calls;
+        self.report.triangles += triangles as u64;
+    }
+
+    /// Adds primary rays, shadow rays and rays of ambient occlusion.
+    pub(crate) fn add_rays_of_modes(&mut self, rays: [u64; 3]) {
+        for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
+            self.add_rays(kind, n);
+        }
+    }
+
     /// Acceleration structures were made.
     pub(crate) fn count_builds(&mut self, structures: crate::capture::geometry_cache::BuildCounts) {
         self.report.builds += structures.built;

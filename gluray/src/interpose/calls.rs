@@ -29,6 +29,8 @@ pub(crate) mod class {
     pub(crate) const ARRAYS: u8 = 128;
     /// All of it.
     pub(crate) const ALL: u8 = 255;
+    /// The classes that draws of filled primitives depend on.
+    pub(crate) const DRAWS: u8 = MATRIX | LIGHT | RASTER | TEXTURE | CURRENT;
 }
 
 /// The number of a call.

@@ -3,15 +3,10 @@
 //!
 //! Everything that the program can call is run under [`caught`], which costs nothing while there is
 //! no fault. After one each thread hands over what its context has swallowed and not drawn
-//! ([`Context::stop_tracing`]), at once or at its next call.
+//! (`Context::stop_tracing`), at once or at its next call.
 
-use crate::capture::ImmediateModeTarget;
 use crate::interpose::calls;
-use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
 use crate::interpose::symbols;
-use crate::state::current_attributes::{CurrentAttributes, stale};
-use crate::state::material_properties::MaterialProperties;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, Once, OnceLock};
@@ -136,7 +131,8 @@ pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
     out
 }
 
-fn attempt<R>(f: impl FnOnce() -> R) -> Option<R> {
+/// Runs `f` after a fault. When it panics as well: `None`.
+pub(super) fn attempt<R>(f: impl FnOnce() -> R) -> Option<R> {
     catch_unwind(AssertUnwindSafe(f)).map_err(std::mem::forget).ok()
 }
 
@@ -153,64 +149,6 @@ fn end() {
 /// so.
 pub(crate) fn hand_over_to_driver() {
     if happened() {
-        attempt(|| symbols::with_context(Context::stop_tracing));
-    }
-}
-
-impl Context {
-    /// A fault of ours has ended the tracing: what was swallowed is drawn, by rays if they still
-    /// can be sent, and the driver gets to know what it was not told. Between Begin and End of a
-    /// primitive that the driver draws nothing of this is possible; then it waits.
-    pub(crate) fn stop_tracing(&mut self) {
-        if self.tracing_stopped || self.capture.immediate_target == ImmediateModeTarget::Pass {
-            return;
-        }
-        self.tracing_stopped = true;
-        self.capture.depth_of_lists = 0;
-        let open = self.capture.immediate_target == ImmediateModeTarget::Trace;
-        self.capture.immediate_target = ImmediateModeTarget::Outside;
-        if let Some(r) = &mut self.capture.recording {
-            r.stop_tracing();
-            // What was swallowed before the list cannot be drawn while the driver compiles it: the
-            // first call after its end does.
-            self.tracing_stopped = false;
-        } else {
-            let mode = self.capture.recorder.mode();
-            let primitive = open.then(|| {
-                attempt(|| self.capture.recorder.take_open_primitive())
-                    .unwrap_or((mode, Vec::new()))
-            });
-            attempt(|| self.flush_now("a fault of ours"));
-            attempt(|| self.sync());
-            if let Some((mode, vertices)) = primitive {
-                self.replay_primitive(mode, vertices);
-            }
-        }
-        attempt(|| self.sync());
-        attempt(|| self.counters.publish(true));
-    }
-
-    /// Begin, and the vertices that were recorded since, for the driver.
-    pub(crate) fn replay_primitive(
-        &mut self,
-        mode: u32,
-        vertices: Vec<([f32; 3], CurrentAttributes)>,
-    ) {
-        let end = self.attributes.current;
-        if let Some((_, first)) = vertices.first() {
-            first.send(0xf, MaterialProperties::ALL);
-        }
-        gl::begin(mode);
-        let mut before: Option<CurrentAttributes> = None;
-        for (p, c) in vertices {
-            let changed = before.is_none_or(|b| b.materials != c.materials);
-            let bits = stale::NORMAL | stale::COLOR | stale::TEX;
-            c.send(bits | if changed { stale::MATERIAL } else { 0 }, MaterialProperties::ALL);
-            gl::vertex4f(p[0], p[1], p[2], 1.0);
-            before = Some(c);
-        }
-        end.send(0xf, MaterialProperties::ALL);
-        (self.attributes.stale, self.attributes.stale_properties) =
-            (0, MaterialProperties::default());
+        attempt(|| symbols::with_context(|context| context.stop_tracing()));
     }
 }

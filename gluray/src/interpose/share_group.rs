@@ -12,15 +12,11 @@
 //! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound
 //! those same points count it.
 
-use crate::capture::ImmediateModeTarget;
 use crate::capture::buffer_writes::BufferWrites;
 use crate::capture::display_lists::DisplayLists;
 use crate::interpose::calls::{self, class};
-use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// What the contexts of a share group have in common.
 #[derive(Clone, Default)]
@@ -28,24 +24,6 @@ pub(crate) struct ShareGroup {
     pub(crate) lists: Arc<Mutex<DisplayLists>>,
     pub(crate) writes: Arc<Mutex<BufferWrites>>,
     pub(crate) texture_writes: TextureWrites,
-}
-
-/// The objects that a context shares with others.
-pub(crate) struct SharedObjects {
-    pub(crate) lists: Arc<Mutex<DisplayLists>>,
-    pub(crate) writes: Arc<Mutex<BufferWrites>>,
-    pub(crate) texture_writes: TextureWrites,
-    /// This context may have written a texture since it last let others see what it wrote.
-    pub(crate) wrote_textures: bool,
-    /// The creation of this context was seen, so it is known which contexts share with it.
-    pub(crate) seen_created: bool,
-}
-
-impl SharedObjects {
-    pub(crate) fn new(group: ShareGroup, seen_created: bool) -> SharedObjects {
-        let ShareGroup { lists, writes, texture_writes } = group;
-        SharedObjects { lists, writes, texture_writes, wrote_textures: false, seen_created }
-    }
 }
 
 /// Counts what may have changed a texture of the group.
@@ -71,51 +49,94 @@ impl TextureWrites {
 /// the image alone): nobody tells of writes.
 static FOREIGN_TEXELS: AtomicBool = AtomicBool::new(false);
 
-impl Context {
-    /// Textures of the share group may be others from now on.
+/// The objects that a context shares with others.
+pub(crate) struct SharedObjects {
+    lists: Arc<Mutex<DisplayLists>>,
+    writes: Arc<Mutex<BufferWrites>>,
+    texture_writes: TextureWrites,
+    /// This context may have written a texture since it last let others see what it wrote.
+    wrote_textures: bool,
+    /// The creation of this context was seen, so it is known which contexts share with it.
+    seen_created: bool,
+}
+
+impl SharedObjects {
+    pub(crate) fn new(group: ShareGroup, seen_created: bool) -> SharedObjects {
+        let ShareGroup { lists, writes, texture_writes } = group;
+        SharedObjects { lists, writes, texture_writes, wrote_textures: false, seen_created }
+    }
+
+    /// The display lists of the group.
+    pub(crate) fn lists(&self) -> MutexGuard<'_, DisplayLists> {
+        self.lists.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// The same for a recording, which outlives the call.
+    pub(crate) fn lists_of_group(&self) -> Arc<Mutex<DisplayLists>> {
+        self.lists.clone()
+    }
+
+    /// The writes to the buffers of the group.
+    pub(crate) fn writes(&self) -> MutexGuard<'_, BufferWrites> {
+        self.writes.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// The counter of writes to textures, for the time after this context has been left.
+    pub(crate) fn texture_writes(&self) -> TextureWrites {
+        self.texture_writes.clone()
+    }
+
+    /// A call may have changed these classes of state.
+    pub(crate) fn mark(&mut self, classes: u8) {
+        if classes & class::BUFFER != 0 {
+            self.writes().any();
+        }
+        if classes & class::TEXTURE != 0 {
+            self.invalidate_textures();
+        }
+    }
+
+    /// Textures of the group may be others from now on.
     pub(crate) fn invalidate_textures(&mut self) {
-        self.shared.texture_writes.change();
-        self.shared.wrote_textures = true;
+        self.texture_writes.change();
+        self.wrote_textures = true;
     }
 
-    /// While it is the same, so are the textures of the share group.
+    /// While it is the same, so are the textures of the group.
     pub(crate) fn texture_version(&self) -> u64 {
-        self.shared.texture_writes.now()
+        self.texture_writes.now()
     }
 
-    /// A call that other contexts, or what comes from elsewhere, may have to do with.
-    pub(crate) fn observe_other_contexts(&mut self, index: usize, classes: u8) {
+    /// A call that other contexts, or texels from elsewhere, may have to do with.
+    pub(crate) fn observe_call(&self, index: usize, classes: u8) {
         if classes & class::TEXTURE != 0 && calls::imports_texels(index) {
             FOREIGN_TEXELS.store(true, Ordering::Relaxed);
         }
         if FOREIGN_TEXELS.load(Ordering::Relaxed)
-            || self.shared.texture_writes.are_shared() && calls::waits_for_others(index)
+            || self.texture_writes.are_shared() && calls::waits_for_others(index)
         {
-            self.shared.texture_writes.change();
+            self.texture_writes.change();
         }
     }
 
-    /// What this context has written, others can see from now on. True when it has written
-    /// anything.
-    pub(crate) fn publish_textures(&mut self) -> bool {
-        if self.capture.immediate_target == ImmediateModeTarget::Pass
-            || !self.shared.texture_writes.are_shared()
-        {
+    /// Other contexts can see what this one has written from now on. True when it has written
+    /// anything; `draws_into_texture` says whether its framebuffer may be a texture.
+    pub(crate) fn publish_textures(&mut self, draws_into_texture: impl FnOnce() -> bool) -> bool {
+        if !self.texture_writes.are_shared() {
             return false;
         }
-        let drawing = || self.capabilities.version >= 30 && gl::word(FRAMEBUFFER_BINDING) != 0;
-        let wrote = self.shared.wrote_textures || drawing();
+        let wrote = self.wrote_textures || draws_into_texture();
         if wrote {
-            self.shared.texture_writes.change();
+            self.texture_writes.change();
         }
-        self.shared.wrote_textures = false;
+        self.wrote_textures = false;
         wrote
     }
 
-    /// Current again, and others may have written meanwhile whom we do not know.
-    pub(crate) fn invalidate_shared_textures(&mut self) {
-        if !self.shared.seen_created || FOREIGN_TEXELS.load(Ordering::Relaxed) {
-            self.shared.texture_writes.change();
+    /// The context is current again. Contexts that we do not know may have written meanwhile.
+    pub(crate) fn on_made_current(&self) {
+        if !self.seen_created || FOREIGN_TEXELS.load(Ordering::Relaxed) {
+            self.texture_writes.change();
         }
     }
 }

@@ -5,25 +5,19 @@
 //! intersect the same surfaces as in every mode. Colours are premultiplied and composited over the
 //! framebuffer.
 
-use crate::capture::draw::{Draw, Shading};
+use crate::capture::draw::{Draw, Shading, TexturedDraw};
 use crate::capture::geometry_cache::BuildCounts;
 use crate::cluster;
 use crate::host::config::{Mode, Settings};
-use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
 use crate::present::framebuffer_pass::CompositeMode;
-use crate::state::enums::*;
 use crate::state::snapshot::Fog;
-use crate::trace::path_tracing::fog;
-use crate::trace::texturing::Image;
+use crate::trace::path_tracing::{PathTracer, fog};
 use crate::trace::thread_pool;
 use crate::trace::view::{View, views};
 use crate::trace::whitted::{self, ColorImage};
 use crate::trace::{Layer, Prepared, Rect, UNCOVERED};
 use std::borrow::Cow;
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
-use std::time::Instant;
 
 /// True when the mode may need such images.
 pub(crate) fn is_needed(settings: &Settings) -> bool {
@@ -49,7 +43,7 @@ pub(crate) fn with_samples(settings: &Settings, samples: u32) -> Cow<'_, Setting
 }
 
 /// The image of one view of a frame.
-enum ViewImage {
+pub(crate) enum ViewImage {
     /// Only the nearest surfaces are needed.
     Surfaces(Layer, Vec<(&'static str, u64)>),
     /// Colours to composite over the framebuffer, with the depths of opaque surfaces and of all
@@ -69,116 +63,97 @@ fn depths(draws: &[Prepared<'_>], settings: &Settings) -> Layer {
     cluster::nearest(draws, &cheap).0
 }
 
-impl Context {
-    /// Draws the pending draws as an image, or into one sample of each pixel.
-    pub(crate) fn draw_effect_image(
-        &mut self,
-        pending: &[(Draw, Option<Arc<Image>>)],
-        func: u32,
-        settings: &Settings,
-        sample: Option<u32>,
-    ) {
-        let start = Instant::now();
-        self.keep_errors();
-        let [r, g, b, _] = gl::floats::<4>(COLOR_CLEAR_VALUE);
-        self.drop_errors();
-        let (mut structures, mut primary) = (BuildCounts::default(), 0);
-        let groups = views(pending.iter().map(|(d, _)| d));
-        let path_tracer = &mut self.presentation.path_tracer;
-        let mut made: Vec<ViewImage> = Vec::new();
-        let mut warnings = Vec::new();
-        thread_pool::on_pool(|| {
-            for (number, (view, members)) in groups.iter().enumerate() {
-                let ready: Vec<Prepared<'_>> = members
-                    .iter()
-                    .filter_map(|i| {
-                        Prepared::new(&pending[*i].0, pending[*i].1.clone(), &mut structures)
-                    })
-                    .collect();
-                if ready.is_empty() {
-                    continue;
-                }
-                made.push(make(
-                    &ready,
-                    view,
-                    number,
-                    settings,
-                    [r, g, b],
-                    path_tracer,
-                    &mut warnings,
-                ));
-                primary += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
+impl ViewImage {
+    /// The rays that were traced for the image, by kind.
+    pub(crate) fn rays(&self) -> &[(&'static str, u64)] {
+        match self {
+            ViewImage::Surfaces(_, rays) => rays,
+            ViewImage::Over { colors, .. } => &colors.rays,
+        }
+    }
+
+    /// What is drawn into the framebuffer, in this order, with the depth function `func`.
+    pub(crate) fn layers(self, func: u32) -> Vec<(Layer, CompositeMode)> {
+        match self {
+            ViewImage::Surfaces(layer, _) => vec![(layer, CompositeMode::Surface(func))],
+            ViewImage::Over { colors, opaque, all } => {
+                let [solid, fringe] = split(&colors, &opaque, &all);
+                vec![(solid, CompositeMode::Over(func)), (fringe, CompositeMode::Fringe(func))]
             }
-        });
-        self.counters.add_time("trace", start.elapsed());
-        self.counters.add_rays("primary", primary);
-        self.counters.count_builds(structures);
-        warnings.into_iter().for_each(|w| self.counters.warn(w));
-        for part in made {
-            let start = Instant::now();
-            match part {
-                ViewImage::Surfaces(layer, rays) => {
-                    rays.into_iter().for_each(|(kind, n)| self.counters.add_rays(kind, n));
-                    self.counters.report.pixels += layer.covered as u64;
-                    if layer.covered > 0 {
-                        self.present_sample(&[layer], CompositeMode::Surface(func), sample);
-                    }
-                }
-                ViewImage::Over { colors, opaque, all } => {
-                    colors.rays.iter().for_each(|(kind, n)| self.counters.add_rays(kind, *n));
-                    let [solid, fringe] = split(&colors, &opaque, &all);
-                    self.counters.report.pixels += (solid.covered + fringe.covered) as u64;
-                    if solid.covered > 0 {
-                        self.present_sample(&[solid], CompositeMode::Over(func), sample);
-                    }
-                    if fringe.covered > 0 {
-                        self.present_sample(&[fringe], CompositeMode::Fringe(func), sample);
-                    }
-                }
-            }
-            self.counters.add_time("present", start.elapsed());
         }
     }
 }
 
-impl Context {
-    /// Multiplies the driver's image of these draws by their visibility.
-    pub(crate) fn darken_drawn(&mut self, draws: &[Draw], settings: &Settings) {
-        let start = Instant::now();
-        let settings = crate::classify::affine_probe::factor_settings(settings);
-        let (mut structures, mut rays) = (BuildCounts::default(), [0; 3]);
-        let groups = views(draws.iter());
-        let mut layers = Vec::new();
-        thread_pool::on_pool(|| {
-            for (_, members) in &groups {
-                let ready: Vec<Prepared<'_>> = members
-                    .iter()
-                    .filter_map(|i| Prepared::new(&draws[*i], None, &mut structures))
-                    .collect();
-                let (mut layer, extra) = cluster::nearest(&ready, &settings);
-                // The driver's own depth may be nearer by some rounding errors.
-                layer
-                    .depth
-                    .iter_mut()
-                    .filter(|d| **d < 1.5)
-                    .for_each(|d| *d = (*d - DEPTH_ROUNDINGS).max(0.0));
-                rays[0] += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
-                (rays[1], rays[2]) = (rays[1] + extra[0], rays[2] + extra[1]);
-                layers.push(layer);
+/// The images of a frame, and what they cost.
+#[derive(Default)]
+pub(crate) struct EffectImages {
+    pub(crate) images: Vec<ViewImage>,
+    /// The number of primary rays.
+    pub(crate) primary: u64,
+    pub(crate) structures: BuildCounts,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Traces the pending draws, view by view.
+pub(crate) fn trace(
+    pending: &[TexturedDraw],
+    settings: &Settings,
+    background: [f32; 3],
+    path_tracer: &mut PathTracer,
+) -> EffectImages {
+    let groups = views(pending.iter().map(|(d, _)| d));
+    let mut made = EffectImages::default();
+    thread_pool::on_pool(|| {
+        let EffectImages { images, primary, structures, warnings } = &mut made;
+        for (number, (view, members)) in groups.iter().enumerate() {
+            let ready: Vec<Prepared<'_>> = members
+                .iter()
+                .filter_map(|i| Prepared::new(&pending[*i].0, pending[*i].1.clone(), structures))
+                .collect();
+            if ready.is_empty() {
+                continue;
             }
-        });
-        self.counters.add_time("trace", start.elapsed());
-        self.counters.count_builds(structures);
-        for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
-            self.counters.add_rays(kind, n);
+            images.push(make(&ready, view, number, settings, background, path_tracer, warnings));
+            *primary += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
         }
-        let start = Instant::now();
-        for layer in layers.into_iter().filter(|l| l.covered > 0) {
-            self.counters.report.pixels += layer.covered as u64;
-            self.present(&[layer], CompositeMode::Multiply);
+    });
+    made
+}
+
+/// The visibility of draws that the driver has drawn, and what it cost.
+#[derive(Default)]
+pub(crate) struct Darkening {
+    /// Factors for the driver's image, view by view.
+    pub(crate) layers: Vec<Layer>,
+    /// Primary rays, shadow rays and rays of ambient occlusion.
+    pub(crate) rays: [u64; 3],
+    pub(crate) structures: BuildCounts,
+}
+
+/// Traces the visibility of draws by which the driver's image of them is multiplied.
+pub(crate) fn trace_darkening(draws: &[Draw], settings: &Settings) -> Darkening {
+    let groups = views(draws.iter());
+    let mut made = Darkening::default();
+    thread_pool::on_pool(|| {
+        let Darkening { layers, rays, structures } = &mut made;
+        for (_, members) in &groups {
+            let ready: Vec<Prepared<'_>> = members
+                .iter()
+                .filter_map(|i| Prepared::new(&draws[*i], None, structures))
+                .collect();
+            let (mut layer, extra) = cluster::nearest(&ready, settings);
+            // The driver's own depth may be nearer by some rounding errors.
+            layer
+                .depth
+                .iter_mut()
+                .filter(|d| **d < 1.5)
+                .for_each(|d| *d = (*d - DEPTH_ROUNDINGS).max(0.0));
+            rays[0] += ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
+            (rays[1], rays[2]) = (rays[1] + extra[0], rays[2] + extra[1]);
+            layers.push(layer);
         }
-        self.counters.add_time("present", start.elapsed());
-    }
+    });
+    made
 }
 
 /// Sixteen steps of a 24-bit depth buffer.
@@ -190,7 +165,7 @@ fn make(
     number: usize,
     settings: &Settings,
     background: [f32; 3],
-    path_tracer: &mut crate::trace::path_tracing::PathTracer,
+    path_tracer: &mut PathTracer,
     warnings: &mut Vec<String>,
 ) -> ViewImage {
     if settings.mode != Mode::Path && !whitted::is_needed(ready, settings) {

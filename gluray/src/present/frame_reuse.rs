@@ -11,11 +11,10 @@
 //! colour. Where the draw depends only on that colour (no light, texture or fog), the layers get
 //! the new one.
 
-use crate::capture::draw::{Attributes, Draw, Shading, Values};
+use crate::capture::draw::{Attributes, Draw, Shading, TexturedDraw, Values};
 use crate::capture::vertex_recorder::same_bits;
 use crate::host::config::{Config, Mode, Settings};
 use crate::present::effect_image::bytes as bytes_of;
-use crate::present::frame::Pending;
 use crate::state::snapshot::Snapshot;
 use crate::trace::overrides::RayMaterial;
 use crate::trace::texturing::Image;
@@ -63,7 +62,7 @@ fn plain_color(d: &Draw) -> Option<[u8; 4]> {
 
 impl DrawKey {
     /// What draws are made of; `None` when that cannot be compared, or costs too much.
-    pub(crate) fn of(draws: &[Pending], settings: &Settings) -> Option<Vec<DrawKey>> {
+    pub(crate) fn of(draws: &[TexturedDraw], settings: &Settings) -> Option<Vec<DrawKey>> {
         if settings.mode != Mode::Match {
             return None;
         }
@@ -176,7 +175,7 @@ pub(crate) struct FrameReuse {
 
 impl FrameReuse {
     /// The image of these draws, lent until [`FrameReuse::put_back`].
-    pub(crate) fn find(&mut self, draws: &[Pending], config: &Arc<Config>) -> Option<Layer> {
+    pub(crate) fn find(&mut self, draws: &[TexturedDraw], config: &Arc<Config>) -> Option<Layer> {
         let is = |p: &ReusableImage| {
             p.drawn.len() == draws.len()
                 && Arc::ptr_eq(&p.config, config)

@@ -5,9 +5,9 @@
 //! draws whose order matters). The driver therefore composites them with everything that it drew
 //! before and after, in any kind of framebuffer, without reading anything back.
 
-use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
+use crate::state::snapshot::DriverCapabilities;
 use crate::trace::{Layer, Rect};
 
 /// How fragments are composited with the framebuffer.
@@ -117,7 +117,7 @@ impl Presenter {
 
     /// Compiles the shader and asks for the kinds of its textures, without changing what is
     /// current, bound or compiled into a list. The driver's words when it refuses.
-    fn check_support(&mut self, core: bool) -> Result<(), String> {
+    pub(crate) fn check_support(&mut self, core: bool) -> Result<(), String> {
         self.support = PassSupport::Refused;
         let (vertex, mut fragment) =
             if core { (VERTEX_150, FRAGMENT_150) } else { (VERTEX_120, FRAGMENT_120) };
@@ -146,6 +146,16 @@ impl Presenter {
         self.program = program;
         self.support = PassSupport::Linked;
         Ok(())
+    }
+
+    /// True until the driver has been asked for what the pass needs.
+    pub(crate) fn is_unchecked(&self) -> bool {
+        self.support == PassSupport::NotYet
+    }
+
+    /// True when the driver has refused the pass.
+    pub(crate) fn is_refused(&self) -> bool {
+        self.support == PassSupport::Refused
     }
 
     /// Makes the rest of the objects; false when the driver has refused the shader.
@@ -311,89 +321,35 @@ impl SavedState {
     }
 }
 
-impl Context {
-    /// True when the driver has refused the pass: then nothing may be swallowed. It is tried when
-    /// it is first asked for, which is before anything of the context is swallowed; programs of
-    /// which nothing is traced pay nothing. Not to be asked between Begin and End.
-    pub(crate) fn is_refused(&mut self) -> bool {
-        if self.presentation.presenter.support == PassSupport::NotYet {
-            self.keep_errors();
-            if let Err(words) = self.presentation.presenter.check_support(self.capabilities.core) {
-                self.counters.warn(format!("{REFUSED}, so nothing is traced: {words}"));
-            }
-            self.drop_errors();
-        }
-        self.presentation.presenter.support == PassSupport::Refused
-    }
-
-    /// Draws the layers over one another.
-    pub(crate) fn present(&mut self, layers: &[Layer], composite_mode: CompositeMode) {
-        self.present_sample(layers, composite_mode, None);
-    }
-
-    /// The same into one sample of each pixel alone.
-    pub(crate) fn present_sample(
+impl Presenter {
+    /// Draws the layers over one another. False when the driver refuses the pass.
+    pub(crate) fn present(
         &mut self,
         layers: &[Layer],
         composite_mode: CompositeMode,
-        sample: Option<u32>,
+        capabilities: &DriverCapabilities,
+    ) -> bool {
+        let prepared = self.prepare(capabilities.core);
+        if prepared {
+            self.draw_pass(layers, composite_mode, capabilities);
+        }
+        prepared
+    }
+
+    fn draw_pass(
+        &mut self,
+        layers: &[Layer],
+        composite_mode: CompositeMode,
+        capabilities: &DriverCapabilities,
     ) {
-        self.with_saved_state(|c| {
-            let mask = sample.map(gl::only_sample);
-            if c.presentation.presenter.prepare(c.capabilities.core) {
-                c.draw_pass(layers, composite_mode);
-            } else {
-                c.counters.count_driver_draws(
-                    "the driver refuses our shader: what was traced is lost",
-                    1,
-                );
-            }
-            if let Some(mask) = mask {
-                gl::all_samples(mask);
-            }
-        });
-    }
-
-    /// Runs `f` with plain unpacking of pixels, and leaves no trace of what it does to the driver's
-    /// state.
-    pub(crate) fn with_saved_state(&mut self, f: impl FnOnce(&mut Context)) {
-        self.keep_errors();
-        let core = self.capabilities.core;
-        let kept = SavedState::keep(core, self.capabilities.version);
-        if !core {
-            gl::push_attrib(ALL_ATTRIB_BITS);
-            gl::reset_pixel_transfer();
-        }
-        UNPACK
-            .into_iter()
-            .for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
-        if kept.unpack_buffer != 0 {
-            gl::bind_buffer(PIXEL_UNPACK_BUFFER, 0);
-        }
-        if kept.samplers_exist {
-            (0..2).for_each(|unit| gl::bind_sampler(unit, 0));
-        }
-        f(self);
-        if !core {
-            gl::pop_attrib();
-        }
-        kept.restore();
-        if !core && !self.attributes.set_since_draw.is_empty() {
-            self.attributes.set_since_draw.set_again();
-        }
-        self.drop_errors();
-    }
-
-    fn draw_pass(&mut self, layers: &[Layer], composite_mode: CompositeMode) {
-        let core = self.capabilities.core;
-        let p = &mut self.presentation.presenter;
-        gl::use_program(p.program);
+        let core = capabilities.core;
+        gl::use_program(self.program);
         OFF.into_iter()
-            .filter(|c| *c != RASTERIZER_DISCARD || self.capabilities.version >= 30)
+            .filter(|c| *c != RASTERIZER_DISCARD || capabilities.version >= 30)
             .for_each(gl::disable);
         if !core {
-            (0..self.capabilities.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));
-            let vp = self.capabilities.arb_programs;
+            (0..capabilities.clip_planes).for_each(|i| gl::disable(CLIP_PLANE0 + i));
+            let vp = capabilities.arb_programs;
             LEGACY.into_iter().filter(|c| *c != VERTEX_PROGRAM_ARB || vp).for_each(gl::disable);
             if vp {
                 gl::disable(FRAGMENT_PROGRAM_ARB);
@@ -445,19 +401,25 @@ impl Context {
             gl::color_mask(1, 1, 1, 1);
         }
         if core {
-            gl::bind_vertex_array(p.vertex_array);
+            gl::bind_vertex_array(self.vertex_array);
         }
         for layer in layers {
             let Rect { x, y, w, h } = layer.rect;
-            p.upload(layer);
+            self.upload(layer);
             // One pixel of the viewport is one texel: the viewport is the rectangle itself.
             gl::viewport(x, y, w, h);
             let [wide, high] = [w as f32, h as f32];
             if core {
-                gl::uniform4f(p.part, wide, high, 0.0, 0.0);
+                gl::uniform4f(self.part, wide, high, 0.0, 0.0);
                 gl::draw_arrays(TRIANGLE_STRIP, 0, 4);
             } else {
-                gl::uniform4f(p.part, wide / p.size[0] as f32, high / p.size[1] as f32, 0.0, 0.0);
+                gl::uniform4f(
+                    self.part,
+                    wide / self.size[0] as f32,
+                    high / self.size[1] as f32,
+                    0.0,
+                    0.0,
+                );
                 gl::begin(TRIANGLE_STRIP);
                 for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
                     gl::vertex4f(x, y, 0.0, 1.0);
@@ -466,4 +428,26 @@ impl Context {
             }
         }
     }
+}
+
+/// Runs `f` with plain unpacking of pixels, and restores the driver's state.
+pub(crate) fn with_saved_state(capabilities: &DriverCapabilities, f: impl FnOnce()) {
+    let core = capabilities.core;
+    let kept = SavedState::keep(core, capabilities.version);
+    if !core {
+        gl::push_attrib(ALL_ATTRIB_BITS);
+        gl::reset_pixel_transfer();
+    }
+    UNPACK.into_iter().for_each(|what| gl::pixel_storei(what, i32::from(what == UNPACK_ALIGNMENT)));
+    if kept.unpack_buffer != 0 {
+        gl::bind_buffer(PIXEL_UNPACK_BUFFER, 0);
+    }
+    if kept.samplers_exist {
+        (0..2).for_each(|unit| gl::bind_sampler(unit, 0));
+    }
+    f();
+    if !core {
+        gl::pop_attrib();
+    }
+    kept.restore();
 }

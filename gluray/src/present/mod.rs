@@ -5,7 +5,7 @@ pub(crate) mod effect_image;
 pub(crate) mod frame;
 pub(crate) mod frame_reuse;
 pub(crate) mod framebuffer_pass;
-mod multisample;
+pub(crate) mod multisample;
 pub(crate) mod pipelined;
 
 use crate::trace::path_tracing::PathTracer;

@@ -7,20 +7,15 @@
 //! of a triangle.
 
 use crate::capture::draw::{Draw, Shading};
-use crate::host::config::Settings;
-use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
-use crate::present::frame::Pending;
-use crate::present::framebuffer_pass::CompositeMode;
-use crate::present::pipelined;
-use crate::trace::thread_pool;
+use crate::state::snapshot::DriverCapabilities;
 use std::sync::Arc;
 
 /// More samples than any driver supports.
 const MOST_SAMPLES: i32 = 32;
 
 /// The draw, shifted by part of a pixel to the left and down.
-fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
+pub(crate) fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
     let mut draw = draw.clone();
     let [_, _, w, h] = draw.state.viewport.map(|v| v as f32);
     let (dx, dy) = (-2.0 * x / w, -2.0 * y / h);
@@ -41,47 +36,27 @@ fn moved(draw: &Draw, [x, y]: [f32; 2]) -> Draw {
     draw
 }
 
-impl Context {
-    /// The sample positions of the framebuffer of `draws`, relative to the pixel centre. `None` for
-    /// a single sample, and where samples cannot be written separately: before OpenGL 3.2 there is
-    /// no sample mask.
-    pub(crate) fn sample_places<'a>(
-        &mut self,
-        draws: impl IntoIterator<Item = &'a Draw>,
-    ) -> Option<Vec<[f32; 2]>> {
-        let mut all = draws.into_iter().map(|d| d.state.samples);
-        let n = all.next()?;
-        if !(2..=MOST_SAMPLES).contains(&n)
-            || all.any(|m| m != n)
-            || self.capabilities.version < 32
-            || self.capabilities.es
-        {
-            return None;
-        }
-        self.keep_errors();
-        let places = (0..n as u32).map(|i| gl::sample_place(i).map(|v| v - 0.5)).collect();
-        self.drop_errors();
-        Some(places)
-    }
+/// The number of samples of the framebuffer of `draws`. `None` for a single sample, and where
+/// samples cannot be written separately: before OpenGL 3.2 there is no sample mask.
+pub(crate) fn separate_samples<'a>(
+    draws: impl IntoIterator<Item = &'a Draw>,
+    capabilities: &DriverCapabilities,
+) -> Option<u32> {
+    let mut all = draws.into_iter().map(|d| d.state.samples);
+    let n = all.next()?;
+    let separate = (2..=MOST_SAMPLES).contains(&n)
+        && all.all(|m| m == n)
+        && capabilities.version >= 32
+        && !capabilities.es;
+    separate.then_some(n.cast_unsigned())
+}
 
-    /// Traces the pending draws for each sample separately.
-    pub(crate) fn flush_samples(&mut self, pending: &[Pending], func: u32, places: &[[f32; 2]]) {
-        // The samples already provide the requested number of rays.
-        let settings = &Settings { samples: 1, ..self.config.settings.clone() };
-        for (i, place) in places.iter().enumerate() {
-            let draws: Vec<Pending> =
-                pending.iter().map(|(d, image)| (moved(d, *place), image.clone())).collect();
-            if crate::present::effect_image::is_needed(settings) {
-                self.draw_effect_image(&draws, func, settings, Some(i as u32));
-                continue;
-            }
-            let traced = thread_pool::on_pool(|| pipelined::trace(draws, settings));
-            self.present_traced(traced, CompositeMode::Surface(func), Some(i as u32));
-        }
-    }
+/// The positions of the framebuffer's samples, relative to the pixel centre.
+pub(crate) fn places(samples: u32) -> Vec<[f32; 2]> {
+    (0..samples).map(|i| gl::sample_place(i).map(|v| v - 0.5)).collect()
+}
 
-    /// The same for a draw whose order matters.
-    pub(crate) fn each_sample(draw: &Draw, places: &[[f32; 2]]) -> Vec<(Draw, Option<u32>)> {
-        places.iter().enumerate().map(|(i, p)| (moved(draw, *p), Some(i as u32))).collect()
-    }
+/// The draw for each sample, with the number of the sample.
+pub(crate) fn each_sample(draw: &Draw, places: &[[f32; 2]]) -> Vec<(Draw, Option<u32>)> {
+    places.iter().enumerate().map(|(i, p)| (moved(draw, *p), Some(i as u32))).collect()
 }

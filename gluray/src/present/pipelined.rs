@@ -7,10 +7,9 @@
 //! are delayed. Content of framebuffer objects is needed at once, and a program that reads its
 //! window must not read an old image twice.
 
+use crate::capture::draw::TexturedDraw;
 use crate::capture::geometry_cache::BuildCounts;
-use crate::interpose::context::Context;
-use crate::present::frame::Pending;
-use crate::present::framebuffer_pass::CompositeMode;
+use crate::host::config::Settings;
 use crate::trace::thread_pool;
 use crate::trace::{Layer, Prepared};
 use std::sync::atomic::Ordering::Relaxed;
@@ -27,11 +26,11 @@ pub(crate) struct TracedFrame {
     pub(crate) structures: BuildCounts,
     pub(crate) took: Duration,
     /// The draws, whose memory is reused.
-    pub(crate) draws: Vec<Pending>,
+    pub(crate) draws: Vec<TexturedDraw>,
 }
 
 /// Traces draws on the threads of the pool. The caller is one of them.
-pub(crate) fn trace(draws: Vec<Pending>, settings: &crate::host::config::Settings) -> TracedFrame {
+pub(crate) fn trace(draws: Vec<TexturedDraw>, settings: &Settings) -> TracedFrame {
     let start = Instant::now();
     let mut structures = BuildCounts::default();
     let (layer, extra, primary) = {
@@ -72,28 +71,22 @@ impl PipelinedPresent {
         self.reads = READING_FRAMES;
         self.jobs.clear();
     }
-}
 
-impl Context {
-    /// True when the pending draws may be shown in the next frame.
-    pub(crate) fn may_be_pipelined(&self, before: &str) -> bool {
-        let reads = ["Read", "Copy", "Blit", "GetTex", "Accum", "Query"];
-        self.config.settings.asynchronous
-            && self.presentation.frame.pipelined.reads == 0
-            && self.state.snapshot.framebuffer == 0
-            && !reads.iter().any(|r| before.contains(r))
-            && !thread_pool::forked()
+    /// False while the program reads its window.
+    pub(crate) fn is_allowed(&self) -> bool {
+        self.reads == 0
     }
 
-    /// Starts tracing `draws` and presents the result of the last frame. Without such a result, it
+    /// Starts tracing `draws`, and gives the result of the last frame. Without such a result, it
     /// waits for these draws.
-    pub(crate) fn flush_pipelined(&mut self, draws: Vec<Pending>, func: u32) {
+    pub(crate) fn exchange(
+        &mut self,
+        draws: Vec<TexturedDraw>,
+        settings: Settings,
+    ) -> Option<TracedFrame> {
         let (sender, receiver) = channel();
-        let settings = self.config.settings.clone();
-        let start = Instant::now();
         // Waits for the previous job first. Two jobs at once would only compete for threads.
-        let place = self.presentation.frame.pipelined.place;
-        let before = self.presentation.frame.pipelined.jobs.get(place).and_then(|r| r.recv().ok());
+        let before = self.jobs.get(self.place).and_then(|r| r.recv().ok());
         thread_pool::spawn(move || {
             // There is no receiver when the context is gone.
             sender.send(trace(draws, &settings)).ok();
@@ -113,15 +106,11 @@ impl Context {
                 (first, again)
             }
         };
-        self.counters.add_time("wait", start.elapsed());
-        if place < self.presentation.frame.pipelined.jobs.len() {
-            self.presentation.frame.pipelined.jobs[place] = next;
-        } else {
-            self.presentation.frame.pipelined.jobs.push(next);
+        match self.jobs.get_mut(self.place) {
+            Some(job) => *job = next,
+            None => self.jobs.push(next),
         }
-        self.presentation.frame.pipelined.place += 1;
-        if let Some(traced) = shown {
-            drop(self.present_traced(traced, CompositeMode::Surface(func), None));
-        }
+        self.place += 1;
+        shown
     }
 }

@@ -1,52 +1,11 @@
 //! Current normal, colour, texture coordinate and material: what a vertex takes with it.
 
+use super::material::{Materials, set_material};
 use super::material_properties::MaterialProperties;
 use crate::interpose::driver::gl;
+use crate::interpose::symbols;
 use crate::state::enums::*;
-
-/// One side's material.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Material {
-    pub(crate) ambient: [f32; 4],
-    pub(crate) diffuse: [f32; 4],
-    pub(crate) specular: [f32; 4],
-    pub(crate) emission: [f32; 4],
-    pub(crate) shininess: f32,
-}
-
-/// Front and back.
-pub(crate) type Materials = [Material; 2];
-
-/// Which of front and back a face argument names.
-pub(crate) fn sides(face: u32) -> &'static [usize] {
-    match face {
-        FRONT => &[0],
-        BACK => &[1],
-        FRONT_AND_BACK => &[0, 1],
-        _ => &[],
-    }
-}
-
-/// Sets a parameter of `glMaterial`; false when OpenGL would refuse it.
-pub(crate) fn set_material(materials: &mut Materials, face: u32, what: u32, v: [f32; 4]) -> bool {
-    let ok = !sides(face).is_empty() && (what != SHININESS || (0.0..=128.0).contains(&v[0]));
-    if !ok {
-        return false;
-    }
-    for &side in sides(face) {
-        let m = &mut materials[side];
-        match what {
-            AMBIENT => m.ambient = v,
-            DIFFUSE => m.diffuse = v,
-            SPECULAR => m.specular = v,
-            EMISSION => m.emission = v,
-            SHININESS => m.shininess = v[0],
-            AMBIENT_AND_DIFFUSE => (m.ambient, m.diffuse) = (v, v),
-            _ => return false,
-        }
-    }
-    true
-}
+use crate::state::snapshot::Snapshot;
 
 /// What the next vertex takes with it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -63,6 +22,7 @@ pub(crate) mod stale {
     pub(crate) const COLOR: u8 = 2;
     pub(crate) const TEX: u8 = 4;
     pub(crate) const MATERIAL: u8 = 8;
+    pub(crate) const ALL: u8 = NORMAL | COLOR | TEX | MATERIAL;
 }
 
 /// The current attributes, and which of them the driver has not been told yet.
@@ -78,6 +38,67 @@ pub(crate) struct AttributeState {
     pub(crate) stale_properties: MaterialProperties,
     /// The properties that `glMaterial` has set since the last draw.
     pub(crate) set_since_draw: MaterialProperties,
+}
+
+impl AttributeState {
+    /// Remembers that the driver does not know an attribute.
+    #[inline(always)]
+    pub(crate) fn mark_stale(&mut self, bit: u8) {
+        if self.stale == 0 {
+            symbols::arm();
+        }
+        self.stale |= bit;
+    }
+
+    /// Tells the driver the current attributes that it does not know.
+    pub(crate) fn sync(&mut self) {
+        if self.stale != 0 {
+            let bits = std::mem::take(&mut self.stale);
+            self.current.send(bits, std::mem::take(&mut self.stale_properties));
+        }
+    }
+
+    /// The context is current again: nothing is held back from the driver.
+    pub(crate) fn on_made_current(&mut self) {
+        self.stale = 0;
+        (self.stale_properties, self.set_since_draw) =
+            (MaterialProperties::default(), MaterialProperties::default());
+    }
+
+    /// True when a vertex now would have alpha 1 in state `s`.
+    #[inline]
+    pub(crate) fn is_opaque(&self, s: &Snapshot) -> bool {
+        self.is_opaque_with(s, self.current.color)
+    }
+
+    /// The same with another colour than the current one.
+    #[inline]
+    pub(crate) fn is_opaque_with(&self, s: &Snapshot, color: [f32; 4]) -> bool {
+        let tracked =
+            s.color_material.is_some_and(|(_, what)| matches!(what, DIFFUSE | AMBIENT_AND_DIFFUSE));
+        match s.lighting {
+            true if !tracked => self.current.materials.iter().all(|m| m.diffuse[3] == 1.0),
+            _ => color[3] == 1.0,
+        }
+    }
+
+    /// Sends Begin and recorded vertices to the driver, which knows all current attributes then.
+    pub(crate) fn replay(&mut self, mode: u32, vertices: Vec<([f32; 3], CurrentAttributes)>) {
+        if let Some((_, first)) = vertices.first() {
+            first.send(stale::ALL, MaterialProperties::ALL);
+        }
+        gl::begin(mode);
+        let mut before: Option<CurrentAttributes> = None;
+        for (p, c) in vertices {
+            let changed = before.is_none_or(|b| b.materials != c.materials);
+            let bits = stale::NORMAL | stale::COLOR | stale::TEX;
+            c.send(bits | if changed { stale::MATERIAL } else { 0 }, MaterialProperties::ALL);
+            gl::vertex4f(p[0], p[1], p[2], 1.0);
+            before = Some(c);
+        }
+        self.current.send(stale::ALL, MaterialProperties::ALL);
+        (self.stale, self.stale_properties) = (0, MaterialProperties::default());
+    }
 }
 
 impl CurrentAttributes {
@@ -153,16 +174,5 @@ mod tests {
         assert_eq!(now.untracked_color(follows), Some([0.8; 4]));
         assert_eq!(now.untracked_color(Some((FRONT, DIFFUSE))), None);
         assert_eq!(now.untracked_color(None), None);
-    }
-
-    #[test]
-    fn materials_refuse_what_opengl_refuses() {
-        let mut m = Materials::default();
-        assert!(set_material(&mut m, FRONT, DIFFUSE, [0.5, 0.25, 1.0, 1.0]));
-        assert_eq!((m[0].diffuse[1], m[1].diffuse[1]), (0.25, 0.0));
-        assert!(!set_material(&mut m, FRONT, SHININESS, [129.0, 0.0, 0.0, 0.0]));
-        assert!(!set_material(&mut m, 7, DIFFUSE, [0.0; 4]));
-        assert!(set_material(&mut m, FRONT_AND_BACK, AMBIENT_AND_DIFFUSE, [1.0; 4]));
-        assert_eq!((m[1].ambient, m[1].diffuse), ([1.0; 4], [1.0; 4]));
     }
 }

@@ -7,7 +7,7 @@
 //! (OpenSceneGraph), is drawn with the material. Whoever asks or draws in between takes that away
 //! from it; and so does one who tells Mesa of more than the program set.
 
-use super::current_attributes::{Materials, sides};
+use super::material::{Materials, sides};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
@@ -89,7 +89,7 @@ fn value(materials: &Materials, i: usize) -> [f32; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::current_attributes::set_material;
+    use super::super::material::set_material;
     use super::*;
 
     #[test]

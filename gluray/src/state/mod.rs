@@ -6,11 +6,13 @@
 
 pub(crate) mod current_attributes;
 pub(crate) mod enums;
+pub(crate) mod material;
 pub(crate) mod material_properties;
 pub(crate) mod snapshot;
 
 use crate::interpose::calls::class;
-use snapshot::Snapshot;
+use enums::{BACK, BACK_LEFT};
+use snapshot::{DriverCapabilities, Snapshot};
 use std::sync::Arc;
 
 /// What is known of the driver's state.
@@ -24,5 +26,21 @@ pub(crate) struct StateCache {
 impl Default for StateCache {
     fn default() -> StateCache {
         StateCache { dirty: class::ALL, snapshot: Arc::default() }
+    }
+}
+
+impl StateCache {
+    /// True when the program draws to the window's front buffer.
+    pub(crate) fn draws_to_front(&self) -> bool {
+        self.snapshot.draw_buffer != BACK
+            && self.snapshot.draw_buffer != BACK_LEFT
+            && self.snapshot.framebuffer == 0
+    }
+
+    /// The driver's current attributes are undefined after its draws of arrays.
+    pub(crate) fn mark_current(&mut self, capabilities: &DriverCapabilities) {
+        if !capabilities.core {
+            self.dirty |= class::CURRENT;
+        }
     }
 }

@@ -6,8 +6,8 @@ mod powers;
 mod vertices;
 
 use crate::capture::draw::Attributes;
-use crate::state::current_attributes::{Material, sides};
 use crate::state::enums::*;
+use crate::state::material::{Material, sides};
 use crate::state::snapshot::{GlLight, Snapshot};
 use crate::trace::occlusion::{LightPosition, Visibility, vector};
 

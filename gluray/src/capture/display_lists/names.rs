@@ -1,52 +1,22 @@
 //! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of
 //! OpenGL's types.
 
-use super::FIRST_SEGMENT;
-use crate::capture::ImmediateModeTarget;
-use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
+use super::{DisplayLists, FIRST_SEGMENT};
 use crate::state::enums::*;
 
 /// Names in one go that programs may want; nobody waits for more.
 const MOST_NAMES: i32 = 1 << 20;
 
-impl Context {
-    /// `glGenLists`. The driver would give the names after the greatest that is in use, which is
-    /// one of our pieces; programs that count their lists (Survex's aven) end there. So they get
-    /// the names after the greatest of their own, as Mesa gives them, and an empty list of the
-    /// driver's for each. `None` leaves the call to the driver.
-    pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
-        if self.capture.immediate_target == ImmediateModeTarget::Trace {
-            self.replay_to_driver("glGenLists between Begin and End");
-        }
-        if !(1..=MOST_NAMES).contains(&n)
-            || self.capture.immediate_target == ImmediateModeTarget::Pass
-            || self.capabilities.core
-            || crate::interpose::panic_guard::happened()
-        {
+impl DisplayLists {
+    /// The first of `n` names after the greatest of the program's own, which are in use from now
+    /// on. `None` when the program asks for too many or too few.
+    pub(super) fn reserve_names(&mut self, n: i32) -> Option<u32> {
+        if !(1..=MOST_NAMES).contains(&n) {
             return None;
         }
-        let first = {
-            let mut lists = self.shared.lists.lock().unwrap_or_else(|e| e.into_inner());
-            let last = lists
-                .greatest
-                .checked_add(n.cast_unsigned())
-                .filter(|last| *last < FIRST_SEGMENT)?;
-            std::mem::replace(&mut lists.greatest, last) + 1
-        };
-        // Where a list is compiled its piece ends before.
-        let compiling = self.capture.recording.is_some();
-        if compiling {
-            self.close_segment();
-        }
-        for name in first..first + n.cast_unsigned() {
-            gl::new_list(name, COMPILE);
-            gl::end_list();
-        }
-        if compiling {
-            self.open_segment();
-        }
-        Some(first)
+        let last =
+            self.greatest.checked_add(n.cast_unsigned()).filter(|last| *last < FIRST_SEGMENT)?;
+        Some(std::mem::replace(&mut self.greatest, last) + 1)
     }
 }
 

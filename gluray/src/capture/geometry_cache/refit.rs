@@ -32,8 +32,8 @@ pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<Wo
 
 #[cfg(test)]
 mod tests {
-    use crate::capture::draw::PrimitiveRun;
     use crate::capture::geometry_cache::{BuildCounts, GeometryCache};
+    use crate::capture::primitives::PrimitiveRun;
     use crate::capture::primitives::QuadSplit;
     use crate::state::enums::TRIANGLES;
     use rt_core::glam::Vec3;

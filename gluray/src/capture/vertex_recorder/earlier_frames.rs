@@ -2,10 +2,11 @@
 
 use super::VertexRecorder;
 use super::attribute_stream::same_bits;
-use crate::capture::draw::{Attributes, PrimitiveRun, Values};
+use crate::capture::draw::{Attributes, Values};
 use crate::capture::geometry_cache::Geometry;
+use crate::capture::primitives::PrimitiveRun;
 use crate::capture::primitives::QuadSplit;
-use crate::state::current_attributes::Materials;
+use crate::state::material::Materials;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 

@@ -11,19 +11,13 @@
 //! second. Text, lines or volumes among them leave the whole to the driver.
 
 use super::signature::TranslucencyPass;
-use crate::capture::geometry_cache::BuildCounts;
-use crate::classify::rules::{self, Classification};
-use crate::host::config::Mode;
-use crate::interpose::context::Context;
+use crate::capture::draw::{Draw, TexturedDraw};
+use crate::classify::rules::{self, Classification, TraceFilter};
+use crate::host::config::{Mode, Settings};
 use crate::interpose::driver::gl;
-use crate::present::frame::Pending;
-use crate::present::framebuffer_pass::CompositeMode;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
-use crate::trace::thread_pool;
-use crate::trace::{DepthLimits, Prepared, depth_sorted};
-use std::sync::atomic::Ordering::Relaxed;
-use std::time::Instant;
+use crate::trace::DepthLimits;
 
 /// Where VTK is with it.
 #[derive(Default)]
@@ -35,7 +29,7 @@ pub(crate) struct DepthPeeling {
     /// Nothing else was in the first pass.
     whole: bool,
     /// What was taken out of the second pass, and the framebuffer it was drawn into.
-    taken: Vec<Pending>,
+    taken: Vec<TexturedDraw>,
     limit: Option<DepthLimits>,
     framebuffer: u32,
 }
@@ -54,119 +48,79 @@ impl DepthPeeling {
     pub(crate) fn has_draws(&self) -> bool {
         !self.taken.is_empty()
     }
-}
 
-impl Context {
-    /// What becomes of a draw of a pass for translucency; the reason when the driver draws it.
-    /// `Ok`: it is to be taken.
-    pub(super) fn check_peeling_pass(
+    /// Whether a draw of a pass of peeling is to be taken; the reason when the driver draws it. The
+    /// driver drew `passed` draws until now.
+    pub(super) fn check_pass(
         &mut self,
         pass: TranslucencyPass,
+        s: &Snapshot,
+        settings: &Settings,
+        passed: u64,
     ) -> Result<(), &'static str> {
         const PEELED: &str = "translucent surfaces that VTK peels";
-        if pass == TranslucencyPass::Weighted {
-            return self.check_weighted_pass();
-        }
-        let peeling = &mut self.classifier.programs.peeling;
-        let settings = &self.config.settings;
         let traced =
             settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
         match pass {
             TranslucencyPass::No | TranslucencyPass::Weighted => Ok(()),
             TranslucencyPass::Depths => {
-                if peeling.depths == 0 {
-                    peeling.whole = false;
+                if self.depths == 0 {
+                    self.whole = false;
                 }
-                peeling.depths += 1;
+                self.depths += 1;
                 Err("depths of translucent surfaces that VTK peels")
             }
             TranslucencyPass::Layers => {
-                let first = peeling.taken.is_empty();
-                let here = self.state.snapshot.framebuffer;
-                let untouched = self.counters.report.passed_draws == peeling.at_clear;
-                let same = first || peeling.framebuffer == here;
-                if !(traced && peeling.whole && untouched && same && here != 0) {
+                let first = self.taken.is_empty();
+                let untouched = passed == self.at_clear;
+                let same = first || self.framebuffer == s.framebuffer;
+                if !(traced && self.whole && untouched && same && s.framebuffer != 0) {
                     return Err(PEELED);
                 }
                 if first {
-                    peeling.framebuffer = here;
-                    peeling.limit = limit(self.state.snapshot.program);
+                    self.framebuffer = s.framebuffer;
+                    self.limit = limit(s.program);
                 }
-                if self.classifier.programs.peeling.limit.is_some() { Ok(()) } else { Err(PEELED) }
+                if self.limit.is_some() { Ok(()) } else { Err(PEELED) }
             }
-        }
-    }
-
-    /// Whether a peeled surface can be traced: but for what peeling itself sets, its state is that
-    /// of any surface.
-    pub(super) fn check_peeled_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
-        (state.more_draw_buffers, state.blend, state.depth_test) = (false, false, true);
-        (state.depth_mask, state.depth_func) = (true, LEQUAL);
-        match rules::classify(state, self.config.trace()) {
-            Classification::Trace => Ok(()),
-            Classification::Pass(why) | Classification::TraceIfOpaque(why) => Err(why),
-            Classification::TraceInOrder => Err("a peeled surface whose order matters"),
         }
     }
 
     /// Takes a draw out of the pass.
-    pub(super) fn take_peeled(&mut self, mut draw: crate::capture::draw::Draw) {
-        crate::trace::overrides::apply(&mut draw, &self.config.settings);
-        self.counters.report.traced_draws += draw.calls;
-        self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
-        self.classifier.programs.peeling.taken.push((draw, None));
+    pub(super) fn take(&mut self, draw: Draw) {
+        self.taken.push((draw, None));
     }
 
-    /// VTK is about to gather what the pass has peeled.
-    pub(crate) fn composite_peeled(&mut self) {
-        let mut taken = std::mem::take(&mut self.classifier.programs.peeling.taken);
-        let limit = self.classifier.programs.peeling.limit.take();
-        self.classifier.programs.peeling.whole = false;
-        self.refresh();
-        let Some(limit) = limit else { return };
-        self.presentation.frame.record_peeled(self.counters.report.frames + 1, &taken);
-        self.counters.count_flush("depth peeling");
+    /// The draws that were taken out of the pass, and the depths up to which they count.
+    pub(crate) fn take_draws(&mut self) -> (Vec<TexturedDraw>, Option<DepthLimits>) {
+        self.whole = false;
+        (std::mem::take(&mut self.taken), self.limit.take())
+    }
+
+    /// The buffers in which VTK gathers layers, and the draw buffers as they are now. `None` when
+    /// VTK does not peel as it did.
+    pub(crate) fn gather_buffers(&self, s: &Snapshot) -> Option<(Vec<u32>, Vec<u32>)> {
         let buffers = [0, 1, 2, 3].map(|i| gl::word(DRAW_BUFFER0 + i));
-        let there = match buffers {
+        let found = match buffers {
             // What is farthest back: gathered there from layer to layer, blended over.
             [back, 0, ..] => Some((vec![back], vec![back])),
             // Nothing was gathered yet, and what is nearest is the second of three.
             [a, front, c, 0] => Some((vec![front], vec![a, front, c])),
             _ => None,
         };
-        let same = self.state.snapshot.framebuffer == self.classifier.programs.peeling.framebuffer;
-        let Some((target, before)) = there.filter(|_| same) else {
-            self.counters.warn(
-                "depth peeling did not go as VTK's does: translucent surfaces are lost".into(),
-            );
-            return;
-        };
-        let start = Instant::now();
-        if self.config.settings.mode != Mode::Match {
-            crate::trace::view::assign_eye_spaces(&mut taken);
-        }
-        let settings = &self.config.settings;
-        let (layer, rays, structures) = thread_pool::on_pool(|| {
-            let mut structures = BuildCounts::default();
-            let ready: Vec<Prepared<'_>> =
-                taken.iter().filter_map(|(d, _)| Prepared::new(d, None, &mut structures)).collect();
-            let (layer, extra) = depth_sorted(&ready, &limit, settings);
-            let primary = ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
-            (layer, [primary, extra[0], extra[1]], structures)
-        });
-        self.counters.add_time("trace", start.elapsed());
-        for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
-            self.counters.add_rays(kind, n);
-        }
-        self.counters.count_builds(structures);
-        self.counters.report.pixels += layer.covered as u64;
-        let start = Instant::now();
-        if layer.covered > 0 {
-            gl::draw_buffers(&target);
-            self.present(&[layer], CompositeMode::OverIgnoringDepth);
-            gl::draw_buffers(&before);
-        }
-        self.counters.add_time("present", start.elapsed());
+        found.filter(|_| s.framebuffer == self.framebuffer)
+    }
+}
+
+/// Whether a peeled surface can be traced: but for what peeling itself sets, its state is that of
+/// any surface.
+pub(super) fn check_surface(state: &mut Snapshot, filter: TraceFilter) -> Result<(), &'static str> {
+    (state.more_draw_buffers, state.blend, state.depth_test) = (false, false, true);
+    (state.depth_mask, state.depth_func) = (true, LEQUAL);
+    match rules::classify(state, filter) {
+        Classification::Trace => Ok(()),
+        Classification::Pass(why) | Classification::TraceIfOpaque(why) => Err(why),
+        Classification::TraceInOrder => Err("a peeled surface whose order matters"),
     }
 }
 

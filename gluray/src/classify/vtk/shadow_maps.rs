@@ -6,10 +6,11 @@
 //! surfaces were traced before the first map was drawn. There the driver's second draw is moved a
 //! little to the viewer.
 
+use super::VtkPrograms;
 use super::signature::SHADOW_MAP;
-use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
+use crate::state::snapshot::Snapshot;
 
 /// Frames for which a shadow map is taken to be in use.
 const IN_USE_FRAMES: u64 = 3;
@@ -28,15 +29,15 @@ pub(super) struct ShadowMaps {
     kept: Option<(bool, [f32; 2])>,
 }
 
-impl Context {
+impl VtkPrograms {
     /// Whether a surface can be traced that VTK may draw again; `signature` is what is known of its
     /// program.
     pub(super) fn is_drawn_once<T>(
         &mut self,
         signature: &Result<T, &'static str>,
     ) -> Result<(), &'static str> {
-        let now = self.classifier.programs.frame;
-        let maps = &mut self.classifier.programs.shadow_maps;
+        let now = self.frame;
+        let maps = &mut self.shadow_maps;
         match signature {
             Err(why) if *why == SHADOW_MAP => maps.until = now + IN_USE_FRAMES,
             Ok(_) if now < maps.until && maps.last_traced != Some(now) => {
@@ -49,11 +50,10 @@ impl Context {
     }
 
     /// The driver is about to draw something filled.
-    pub(crate) fn begin_redraw(&mut self) {
-        let now = self.classifier.programs.frame;
-        let maps = &mut self.classifier.programs.shadow_maps;
-        let s = &self.state.snapshot;
-        let is_map = self.classifier.programs.signatures.get(&s.program) == Some(&Err(SHADOW_MAP));
+    pub(crate) fn begin_redraw(&mut self, s: &Snapshot) {
+        let now = self.frame;
+        let maps = &mut self.shadow_maps;
+        let is_map = self.signatures.get(&s.program) == Some(&Err(SHADOW_MAP));
         let again = maps.last_traced == Some(now) && now < maps.until && s.program != 0 && !is_map;
         if !again || !s.depth_test || !s.depth_mask || s.depth_func != LEQUAL || maps.kept.is_some()
         {
@@ -68,7 +68,7 @@ impl Context {
 
     /// It has drawn, and the program goes on.
     pub(crate) fn finish_redraw(&mut self) {
-        let Some((on, [factor, units])) = self.classifier.programs.shadow_maps.kept.take() else {
+        let Some((on, [factor, units])) = self.shadow_maps.kept.take() else {
             return;
         };
         gl::polygon_offset(factor, units);

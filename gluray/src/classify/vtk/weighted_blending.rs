@@ -5,23 +5,19 @@
 //! through the program's own blending: what the driver draws into the same sums (lines, text, what
 //! is not known) is added as it would be.
 
-use crate::capture::draw::Draw;
-use crate::capture::geometry_cache::BuildCounts;
-use crate::host::config::Mode;
-use crate::interpose::context::Context;
+use super::depth_peeling;
+use crate::capture::draw::{Draw, TexturedDraw};
+use crate::classify::rules::TraceFilter;
+use crate::host::config::{Mode, Settings};
 use crate::interpose::driver::gl;
-use crate::present::frame::Pending;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
-use crate::trace::thread_pool;
-use crate::trace::{DepthLimits, Prepared, WeightedSums, weighted_sums};
-use std::sync::atomic::Ordering::Relaxed;
-use std::time::Instant;
+use crate::trace::WeightedSums;
 
 /// What waits to be summed.
 #[derive(Default)]
 pub(crate) struct WeightedBlending {
-    taken: Vec<Pending>,
+    taken: Vec<TexturedDraw>,
     /// Program and textures of the pass that writes sums.
     program: u32,
     window: i32,
@@ -33,6 +29,16 @@ pub(crate) struct WeightedBlending {
 impl WeightedBlending {
     pub(crate) fn has_draws(&self) -> bool {
         !self.taken.is_empty()
+    }
+
+    /// Takes a draw.
+    pub(super) fn take(&mut self, draw: Draw) {
+        self.taken.push((draw, None));
+    }
+
+    /// The draws that wait to be summed.
+    pub(crate) fn take_draws(&mut self) -> Vec<TexturedDraw> {
+        std::mem::take(&mut self.taken)
     }
 }
 
@@ -54,125 +60,35 @@ void main() {
 }
 ";
 
-impl Context {
-    /// Whether a draw into such sums can be taken: the reason when not.
-    pub(super) fn check_weighted_pass(&self) -> Result<(), &'static str> {
-        let (s, settings) = (&self.state.snapshot, &self.config.settings);
-        let traced =
-            settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
-        let adds = [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA].map(gl::word)
-            == [ONE, ONE, ZERO, ONE_MINUS_SRC_ALPHA]
-            && [BLEND_EQUATION, BLEND_EQUATION_ALPHA].map(gl::word) == [FUNC_ADD; 2];
-        let buffers = [0, 1, 2].map(|i| gl::word(DRAW_BUFFER0 + i));
-        let two = buffers[0] != 0 && buffers[1] != 0 && buffers[2] == 0;
-        let tested = s.depth_test && !s.depth_mask && matches!(s.depth_func, LESS | LEQUAL);
-        let readable = s.framebuffer != 0
-            && gl::word(READ_FRAMEBUFFER_BINDING) == s.framebuffer
-            && s.samples <= 1
-            && self.capabilities.core;
-        if traced && s.blend && adds && two && tested && readable {
-            Ok(())
-        } else {
-            Err("translucent surfaces that VTK sums up")
-        }
+/// Whether a draw into such sums can be taken; the reason when not.
+pub(super) fn check_pass(
+    s: &Snapshot,
+    settings: &Settings,
+    core: bool,
+) -> Result<(), &'static str> {
+    let traced =
+        settings.enabled && matches!(settings.mode, Mode::Match | Mode::Phong | Mode::Rich);
+    let adds = [BLEND_SRC_RGB, BLEND_DST_RGB, BLEND_SRC_ALPHA, BLEND_DST_ALPHA].map(gl::word)
+        == [ONE, ONE, ZERO, ONE_MINUS_SRC_ALPHA]
+        && [BLEND_EQUATION, BLEND_EQUATION_ALPHA].map(gl::word) == [FUNC_ADD; 2];
+    let buffers = [0, 1, 2].map(|i| gl::word(DRAW_BUFFER0 + i));
+    let two = buffers[0] != 0 && buffers[1] != 0 && buffers[2] == 0;
+    let tested = s.depth_test && !s.depth_mask && matches!(s.depth_func, LESS | LEQUAL);
+    let readable = s.framebuffer != 0
+        && gl::word(READ_FRAMEBUFFER_BINDING) == s.framebuffer
+        && s.samples <= 1
+        && core;
+    if traced && s.blend && adds && two && tested && readable {
+        Ok(())
+    } else {
+        Err("translucent surfaces that VTK sums up")
     }
+}
 
-    /// Whether such a surface can be traced: but for what summing sets, its state is that of any.
-    pub(super) fn check_weighted_surface(&self, state: &mut Snapshot) -> Result<(), &'static str> {
-        state.unclamped_colors = false;
-        self.check_peeled_surface(state)
-    }
-
-    /// Takes a draw.
-    pub(super) fn take_weighted(&mut self, mut draw: Draw) {
-        crate::trace::overrides::apply(&mut draw, &self.config.settings);
-        self.counters.report.traced_draws += draw.calls;
-        self.counters.report.triangles += draw.geometry.mesh.num_triangles() as u64;
-        self.classifier.programs.weighted.taken.push((draw, None));
-    }
-
-    /// Adds what was taken to the framebuffer's sums.
-    pub(crate) fn sum_weighted(&mut self) {
-        let mut taken = std::mem::take(&mut self.classifier.programs.weighted.taken);
-        self.presentation.frame.record_peeled(self.counters.report.frames + 1, &taken);
-        self.counters.count_flush("translucent sums");
-        if self.config.settings.mode != Mode::Match {
-            crate::trace::view::assign_eye_spaces(&mut taken);
-        }
-        // As far as the viewport reaches, opaque surfaces hide what is behind them.
-        let [x, y, w, h] = taken.first().map_or([0; 4], |(d, _)| d.state.viewport);
-        let (width, height) = ((x + w).max(0) as usize, (y + h).max(0) as usize);
-        if width * height == 0 || width * height > 1 << 26 {
-            return;
-        }
-        self.keep_errors();
-        let depth = gl::depths(width as i32, height as i32);
-        self.drop_errors();
-        let limit = DepthLimits { width, height, depth, exact: true };
-        let start = Instant::now();
-        let settings = &self.config.settings;
-        let (sums, rays, structures) = thread_pool::on_pool(|| {
-            let mut structures = BuildCounts::default();
-            let ready: Vec<Prepared<'_>> =
-                taken.iter().filter_map(|(d, _)| Prepared::new(d, None, &mut structures)).collect();
-            let (sums, extra) = weighted_sums(&ready, &limit, settings);
-            let primary = ready.iter().map(|p| p.rays.load(Relaxed)).sum::<u64>();
-            (sums, [primary, extra[0], extra[1]], structures)
-        });
-        self.counters.add_time("trace", start.elapsed());
-        for (kind, n) in ["primary", "shadow", "ambient occlusion"].into_iter().zip(rays) {
-            self.counters.add_rays(kind, n);
-        }
-        self.counters.count_builds(structures);
-        self.counters.report.pixels += sums.covered as u64;
-        let start = Instant::now();
-        if sums.covered > 0 {
-            self.with_saved_state(|c| c.add_sums(&sums));
-        }
-        self.counters.add_time("present", start.elapsed());
-    }
-
-    fn add_sums(&mut self, sums: &WeightedSums) {
-        if !self.classifier.programs.weighted.prepare(self.presentation.presenter.vertex_array()) {
-            self.counters
-                .count_driver_draws("the driver refuses our shader: what was traced is lost", 1);
-            return;
-        }
-        let p = &mut self.classifier.programs.weighted;
-        gl::use_program(p.program);
-        let r = sums.rect;
-        let grow = r.w > p.size[0] || r.h > p.size[1];
-        if grow {
-            p.size = [r.w.max(p.size[0]), r.h.max(p.size[1])];
-        }
-        let formats = [(RGBA32F, RGBA), (R32F, RED)];
-        let data: [&[u8]; 2] =
-            [bytemuck::cast_slice(&sums.colors), bytemuck::cast_slice(&sums.weights)];
-        for (unit, (inner, format)) in formats.into_iter().enumerate() {
-            gl::active_texture(TEXTURE0 + unit as u32);
-            gl::bind_texture(TEXTURE_2D, p.textures[unit]);
-            if grow {
-                gl::tex_image(inner.cast_signed(), p.size[0], p.size[1], format, FLOAT);
-                for what in [TEXTURE_MIN_FILTER, TEXTURE_MAG_FILTER] {
-                    gl::tex_parameteri(TEXTURE_2D, what, NEAREST.cast_signed());
-                }
-            }
-            gl::tex_sub_image(r.w, r.h, format, FLOAT, data[unit]);
-        }
-        // Depths were compared for each layer, and blending stays the program's.
-        for off in [CULL_FACE, POLYGON_OFFSET_FILL, DEPTH_TEST, SCISSOR_TEST] {
-            gl::disable(off);
-        }
-        gl::polygon_mode(FRONT_AND_BACK, FILL);
-        gl::enable(BLEND);
-        gl::blend_func_separate(ONE, ONE, ZERO, ONE_MINUS_SRC_ALPHA);
-        gl::blend_equation(FUNC_ADD);
-        gl::color_mask(1, 1, 1, 1);
-        gl::bind_vertex_array(self.presentation.presenter.vertex_array());
-        gl::viewport(r.x, r.y, r.w, r.h);
-        gl::uniform4f(self.classifier.programs.weighted.window, r.x as f32, r.y as f32, 0.0, 0.0);
-        gl::draw_arrays(TRIANGLE_STRIP, 0, 4);
-    }
+/// Whether such a surface can be traced: but for what summing sets, its state is that of any.
+pub(super) fn check_surface(state: &mut Snapshot, filter: TraceFilter) -> Result<(), &'static str> {
+    state.unclamped_colors = false;
+    depth_peeling::check_surface(state, filter)
 }
 
 impl WeightedBlending {
@@ -199,6 +115,47 @@ impl WeightedBlending {
         gl::uniform1i(gl::uniform_location(program, "colors"), 0);
         gl::uniform1i(gl::uniform_location(program, "weights"), 1);
         self.textures = [gl::gen_texture(true), gl::gen_texture(true)];
+        true
+    }
+
+    /// Adds sums to those in the framebuffer. False when the driver refuses the shader.
+    pub(crate) fn add_sums(&mut self, sums: &WeightedSums, vertex_array: u32) -> bool {
+        if !self.prepare(vertex_array) {
+            return false;
+        }
+        gl::use_program(self.program);
+        let r = sums.rect;
+        let grow = r.w > self.size[0] || r.h > self.size[1];
+        if grow {
+            self.size = [r.w.max(self.size[0]), r.h.max(self.size[1])];
+        }
+        let formats = [(RGBA32F, RGBA), (R32F, RED)];
+        let data: [&[u8]; 2] =
+            [bytemuck::cast_slice(&sums.colors), bytemuck::cast_slice(&sums.weights)];
+        for (unit, (inner, format)) in formats.into_iter().enumerate() {
+            gl::active_texture(TEXTURE0 + unit as u32);
+            gl::bind_texture(TEXTURE_2D, self.textures[unit]);
+            if grow {
+                gl::tex_image(inner.cast_signed(), self.size[0], self.size[1], format, FLOAT);
+                for what in [TEXTURE_MIN_FILTER, TEXTURE_MAG_FILTER] {
+                    gl::tex_parameteri(TEXTURE_2D, what, NEAREST.cast_signed());
+                }
+            }
+            gl::tex_sub_image(r.w, r.h, format, FLOAT, data[unit]);
+        }
+        // Depths were compared for each layer, and blending stays the program's.
+        for off in [CULL_FACE, POLYGON_OFFSET_FILL, DEPTH_TEST, SCISSOR_TEST] {
+            gl::disable(off);
+        }
+        gl::polygon_mode(FRONT_AND_BACK, FILL);
+        gl::enable(BLEND);
+        gl::blend_func_separate(ONE, ONE, ZERO, ONE_MINUS_SRC_ALPHA);
+        gl::blend_equation(FUNC_ADD);
+        gl::color_mask(1, 1, 1, 1);
+        gl::bind_vertex_array(vertex_array);
+        gl::viewport(r.x, r.y, r.w, r.h);
+        gl::uniform4f(self.window, r.x as f32, r.y as f32, 0.0, 0.0);
+        gl::draw_arrays(TRIANGLE_STRIP, 0, 4);
         true
     }
 }

@@ -3,8 +3,7 @@
 
 use super::fields::{FIELDS, Field};
 use super::load::Sources;
-use super::settings::{Mode, Settings, Trace};
-use crate::classify::rules;
+use super::settings::{Mode, Settings};
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -22,16 +21,6 @@ pub(crate) struct Config {
 }
 
 impl Config {
-    /// What filled primitives are looked at for.
-    pub(crate) fn trace(&self) -> rules::TraceFilter {
-        match (self.settings.enabled, self.settings.trace) {
-            (false, _) => rules::TraceFilter::Nothing,
-            (true, Trace::All) => rules::TraceFilter::All,
-            (true, Trace::Scene) if self.settings.sees_through() => rules::TraceFilter::Translucent,
-            (true, Trace::Scene) => rules::TraceFilter::Surfaces,
-        }
-    }
-
     fn of_this_process() -> Config {
         let sources = Sources::of_this_process();
         let loaded = sources.load();

@@ -8,8 +8,8 @@
 use super::LightingSetup;
 use super::powers::powers;
 use crate::capture::draw::{Attributes, PackedArray, Values};
-use crate::state::current_attributes::{Material, sides};
 use crate::state::enums::*;
+use crate::state::material::{Material, sides};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 use rt_core::ray::LANES;
 

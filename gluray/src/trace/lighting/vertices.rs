@@ -74,7 +74,8 @@ fn rows<S: Simd>((primary, secondary): gouraud::LaneColors<S>) -> ([F; 4], [F; 3
 mod tests {
     use super::*;
     use crate::capture::draw::Values;
-    use crate::state::current_attributes::{CurrentAttributes, Material};
+    use crate::state::current_attributes::CurrentAttributes;
+    use crate::state::material::Material;
     use crate::state::snapshot::{GlLight, Snapshot};
 
     #[test]
