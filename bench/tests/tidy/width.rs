@@ -22,7 +22,6 @@ const WIDE_LINES: &[(&str, usize)] = &[
     ("gluray/src/host/panel/protocol.rs", 1),
     ("gluray/src/interpose/symbols/current_context.rs", 1),
     ("gluray/src/interpose/symbols/hooks.rs", 28),
-    ("gluray/src/present/frame.rs", 1),
     ("gluray/src/trace/fragment_batch.rs", 1),
     ("gluray/src/trace/lighting/gouraud.rs", 1),
     ("gluray/src/trace/lighting/powers.rs", 1),

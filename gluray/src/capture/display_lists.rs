@@ -464,9 +464,9 @@ impl Context {
     }
 
     /// `glGenLists`. The driver would give the names after the greatest that is in use, which is
-    /// that of a segment of ours. Programs that count their lists (Survex's aven) end there. So they
-    /// get the names after the greatest of their own, as Mesa gives them, and an empty list of the
-    /// driver's for each. `None` leaves the call to the driver.
+    /// that of a segment of ours. Programs that count their lists (Survex's aven) end there. So
+    /// they get the names after the greatest of their own, as Mesa gives them, and an empty list of
+    /// the driver's for each. `None` leaves the call to the driver.
     pub(crate) fn gen_lists(&mut self, n: i32) -> Option<u32> {
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glGenLists between Begin and End");
