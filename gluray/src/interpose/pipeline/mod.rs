@@ -208,8 +208,9 @@ impl Context {
     }
 
     /// Whether the driver takes the pass that presents; the reason when not. Then nothing may be
-    /// kept from it. The driver is asked the first time, before anything of the context is kept from
-    /// it. Programs of which nothing is traced pay nothing. Not to be called between Begin and End.
+    /// kept from it. The driver is asked the first time, before anything of the context is kept
+    /// from it. Programs of which nothing is traced pay nothing. Not to be called between Begin and
+    /// End.
     pub(crate) fn check_presenter(&mut self) -> Result<(), &'static str> {
         let presenter = &mut self.presentation.presenter;
         if presenter.is_unchecked() {
