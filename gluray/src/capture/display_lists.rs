@@ -14,10 +14,8 @@ pub(crate) use recording::ListRecording;
 
 use crate::capture::ImmediateModeTarget;
 use crate::capture::evaluators::MapKind;
-use crate::interpose::calls::class;
 use crate::interpose::context::Context;
 use crate::interpose::driver::gl;
-use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::symbols;
 use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
@@ -230,27 +228,6 @@ impl Context {
         }
         self.before_driver_list(draws, textures);
         gl::call_list(list);
-    }
-
-    /// The driver is about to play lists of its own.
-    fn before_driver_list(&mut self, draws: bool, textures: bool) {
-        if self.capture.immediate_target == ImmediateModeTarget::Trace {
-            self.replay_to_driver("a list between Begin and End");
-        }
-        self.end_batch();
-        if draws && self.capture.immediate_target == ImmediateModeTarget::Outside {
-            self.refresh();
-            if crate::classify::rules::commutes(&self.state.snapshot) {
-                self.presentation.frame.driver_drew();
-            } else {
-                self.flush(FlushReason::DriverList);
-            }
-        }
-        self.attributes.sync();
-        self.state.dirty = class::ALL;
-        if textures {
-            self.shared.invalidate_textures();
-        }
     }
 
     fn execute(&mut self, list: &DisplayList) {

@@ -280,6 +280,27 @@ impl Context {
         self.counters.count_driver_draws(why, 1);
     }
 
+    /// The driver is about to execute lists of its own, which may draw or change textures.
+    pub(crate) fn before_driver_list(&mut self, draws: bool, textures: bool) {
+        if self.capture.immediate_target == ImmediateModeTarget::Trace {
+            self.replay_to_driver("a list between Begin and End");
+        }
+        self.end_batch();
+        if draws && self.capture.immediate_target == ImmediateModeTarget::Outside {
+            self.refresh();
+            if rules::commutes(&self.state.snapshot) {
+                self.presentation.frame.driver_drew();
+            } else {
+                self.flush(FlushReason::DriverList);
+            }
+        }
+        self.attributes.sync();
+        self.state.dirty = class::ALL;
+        if textures {
+            self.shared.invalidate_textures();
+        }
+    }
+
     /// The driver draws the primitive that is being recorded after all.
     pub(crate) fn replay_to_driver(&mut self, why: &'static str) {
         self.capture.immediate_target = ImmediateModeTarget::Pass;
