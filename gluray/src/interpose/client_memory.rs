@@ -1,16 +1,16 @@
-//! The program's own memory: vertex arrays, index arrays, parameters behind pointers.
+//! Reads the program's own memory: vertex arrays, index arrays, parameters behind pointers.
 //!
-//! A program that calls OpenGL promises that what the call names can be read; the driver would read
-//! it just so. Two things have to come together before anything is read, and neither can be made
-//! outside of the rooms for unsafe code:
+//! A program that calls OpenGL guarantees that the memory which the call names can be read, since
+//! the driver would read it. A read needs two things, and safe code can make neither:
 //!
-//! - [`ActiveCall`], with the arguments of the draw call that the program is in. Hooks make it.
-//!   [`Elements`] come from it alone, so they are the vertices which that call names, and what is
+//! - [`ActiveCall`] has the arguments of the draw call that the program is in. Hooks make it.
+//!   [`Elements`] come from it alone, so they are the vertices that the call names, and what is
 //!   read of them lives as long as the call.
-//! - [`ArraySource`], an array as the driver has it, asked of the driver here. Nobody else can make
-//!   one of client memory, or change one.
 //!
-//! This is a room for unsafe code.
+//! - [`ArraySource`] is an array as the driver describes it. It is queried here. No other module
+//!   can make one of client memory, or change one.
+//!
+//! This module is a room for unsafe code.
 #![allow(unsafe_code, reason = "a room: vertex arrays live in the program's memory")]
 
 use crate::capture::draw::{PackedArray, component_bytes};
@@ -65,7 +65,7 @@ pub(crate) unsafe fn ints<const N: usize>(address: usize) -> [i32; N] {
 }
 
 // ---- The vertices that a call names -------------------------------------------------------------
-/// What a draw call names.
+/// The arguments of a draw call.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum DrawArguments {
     /// `glDrawArrays`.
@@ -95,7 +95,7 @@ impl ActiveCall<'_> {
     }
 }
 
-/// The vertices that a call names, as [`VertexSelection`] has them.
+/// The vertices that a call names, as a [`VertexSelection`].
 pub(crate) struct Elements<'c>(VertexSelection, PhantomData<&'c ()>);
 
 impl Deref for Elements<'_> {
@@ -106,7 +106,7 @@ impl Deref for Elements<'_> {
 }
 
 impl<'c> Elements<'c> {
-    /// Of a call, and the index that restarts primitives.
+    /// The elements of a call. `restart` is the index that restarts primitives.
     pub(crate) fn of(
         call: &'c ActiveCall<'_>,
         restart: Option<u32>,
@@ -145,7 +145,7 @@ impl<'c> Elements<'c> {
 }
 
 // ---- Arrays -------------------------------------------------------------------------------------
-/// Where an array is.
+/// The layout of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ArrayLayout {
     pub(crate) size: usize,
@@ -167,12 +167,12 @@ impl ArrayLayout {
         if self.stride == 0 { self.element() } else { self.stride }
     }
 
-    /// What makes the same bytes another array.
+    /// Everything that gives the same bytes another meaning.
     pub(crate) fn layout(&self) -> (usize, u32, usize, bool) {
         (self.step(), self.kind, self.size, self.normalized)
     }
 
-    /// Bytes of [`ArraySource::view`] tightly packed.
+    /// Packs the bytes of [`ArraySource::view`] tightly.
     pub(crate) fn pack(&self, bytes: Cow<'_, [u8]>) -> PackedArray {
         let (element, step) = (self.element(), self.step());
         let bytes = match step == element {
@@ -189,7 +189,7 @@ impl ArrayLayout {
         PackedArray { bytes, kind: self.kind, size: self.size, normalized: self.normalized }
     }
 
-    /// Offset and length of vertices `first..first + count`; an error in words when they cannot be
+    /// The offset and length of vertices `first..first + count`, or the reason why they cannot be
     /// read.
     fn range(&self, first: usize, count: usize) -> Result<(usize, usize), &'static str> {
         const FAR: &str = "arrays beyond the end of memory";
@@ -212,16 +212,16 @@ impl ArrayLayout {
     }
 }
 
-/// How many components the elements of a fixed-function array have.
+/// The number of components of a fixed-function array.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum ComponentCount {
-    /// As OpenGL has it: normals have three.
+    /// Always three, as for normals.
     Three,
-    /// What the driver says to this.
+    /// The driver's answer to this query.
     Asked(u32),
 }
 
-/// An array as the driver has it, or in a buffer. Its fields can be read and not changed.
+/// An array as the driver describes it, or in a buffer. Its fields can be read but not changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ArraySource(ArrayLayout);
 
@@ -233,8 +233,8 @@ impl Deref for ArraySource {
 }
 
 impl ArraySource {
-    /// A fixed-function array, asked of the driver by these names. Where there are no buffers all
-    /// arrays are in client memory.
+    /// A fixed-function array, queried by these names. Without buffer objects, all arrays are in
+    /// client memory.
     pub(crate) fn of_fixed(
         size: ComponentCount,
         [kind, stride, pointer, buffer]: [u32; 4],
@@ -255,7 +255,7 @@ impl ArraySource {
         })
     }
 
-    /// The array of a generic attribute, where that is on.
+    /// The array of a generic attribute, if it is enabled.
     pub(crate) fn of_attribute(at: u32) -> Option<ArraySource> {
         let get = |what| gl::vertex_attrib_i::<1>(at, what)[0];
         (get(VERTEX_ATTRIB_ARRAY_ENABLED) != 0).then(|| {
@@ -270,13 +270,13 @@ impl ArraySource {
         })
     }
 
-    /// Anything in a buffer, which the driver keeps readers within; `None` without one.
+    /// Any array in a buffer, within which the driver keeps reads. `None` without a buffer.
     pub(crate) fn in_buffer(layout: ArrayLayout) -> Option<ArraySource> {
         (layout.buffer != 0).then_some(ArraySource(layout))
     }
 
-    /// The vertices that a call names where they are, with gaps; an error in words when they cannot
-    /// be read.
+    /// The vertices that a call names, in place and with gaps, or the reason why they cannot be
+    /// read.
     pub(crate) fn view<'c>(&self, elements: &Elements<'c>) -> Result<Cow<'c, [u8]>, &'static str> {
         let (first, count) = elements.span();
         let (start, length) = self.range(first, count)?;

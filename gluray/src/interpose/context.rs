@@ -1,11 +1,11 @@
-//! The books of contexts: which is current where, and what each knows.
+//! Contexts: the state of one, and the register of those that are current nowhere.
 //!
-//! A context is owned by the thread it is current on (see `symbols/current_context.rs`) or, while
-//! it is current nowhere, by the register. So no call needs a lock, and a context that is destroyed
-//! in flight lives on until its thread leaves it, as OpenGL says.
+//! A context is owned by the thread on which it is current (see `symbols/current_context.rs`).
+//! While it is current nowhere, the register owns it. So no call needs a lock. A context that is
+//! destroyed while it is current lives until its thread leaves it, as OpenGL specifies.
 //!
-//! It goes into the register before the driver lets go of it, and out of it after the driver has
-//! taken it: in between another thread may make it current, and must find it.
+//! A context enters the register before the driver releases it, and leaves it after the driver has
+//! taken it. In between, another thread may make it current and must find it.
 
 use crate::capture::Capture;
 use crate::classify::Classifier;
@@ -30,7 +30,7 @@ pub(crate) struct Context {
     /// Watched calls since the last draw.
     pub(super) watched_calls: u32,
     pub(crate) errors: KeptErrors,
-    /// A fault of ours has ended the tracing, and the driver knows what it was not told before.
+    /// A fault of ours has ended the tracing, and the driver knows everything that was held back.
     pub(crate) tracing_stopped: bool,
     pub(crate) capabilities: DriverCapabilities,
     pub(crate) config: Arc<Config>,
@@ -63,7 +63,7 @@ fn registry() -> std::sync::MutexGuard<'static, ContextRegistry> {
     CONTEXT_REGISTRY.get_or_init(new).lock().unwrap_or_else(|e| e.into_inner())
 }
 
-/// A context was created; `share` is one whose lists it shares.
+/// A context was created. It shares the lists of `share`.
 pub(crate) fn created(handle: usize, share: usize) {
     if handle == 0 {
         return;
@@ -73,20 +73,20 @@ pub(crate) fn created(handle: usize, share: usize) {
         if share == 0 { ShareGroup::default() } else { r.shared.entry(share).or_default().clone() };
     r.shared.insert(handle, shared);
     r.seen.insert(handle);
-    // The address of a context that was destroyed may come again.
+    // The address of a destroyed context may be used again.
     let gone = r.idle.remove(&handle);
     drop(r);
     drop(gone);
 }
 
-/// A context was destroyed; when it is current it lives until it is left.
+/// A context was destroyed. When it is current, it lives until its thread leaves it.
 pub(crate) fn destroyed(handle: usize) {
     let here = symbols::with_context(|c| {
         let mine = c.handle == handle;
         c.destroyed_while_current |= mine;
         mine
     });
-    // Programs destroy their contexts before they end, whatever way they do.
+    // Programs destroy their contexts before they end, however they end.
     crate::host::report::write_final_report();
     let mut r = registry();
     let gone = if here == Some(true) { None } else { r.idle.remove(&handle) };
@@ -96,18 +96,18 @@ pub(crate) fn destroyed(handle: usize) {
     drop(gone);
 }
 
-/// What was current before another context is made current.
+/// The context that was current before another one is made current.
 pub(crate) enum PreviousContext {
     /// None.
     Nothing,
-    /// This one, which is in the register; and the textures of its group, when it has written any.
+    /// This one, which is in the register, and the textures of its group when it has written any.
     Idle(usize, Option<TextureWrites>),
-    /// One that is destroyed, and current nowhere else.
+    /// A destroyed one, which is current nowhere else.
     Doomed(Box<Context>),
 }
 
-/// Before the current context changes: what is pending is drawn, and the context is there for other
-/// threads.
+/// Called before the current context changes: pending draws are presented, and the context enters
+/// the register for other threads.
 pub(crate) fn release_current() -> PreviousContext {
     crate::interpose::panic_guard::hand_over_to_driver();
     let wrote = symbols::with_context(|c| {
@@ -130,11 +130,11 @@ pub(crate) fn release_current() -> PreviousContext {
     left
 }
 
-/// The change was refused: all stays as it was.
+/// The driver refused the change: everything stays as it was.
 pub(crate) fn restore_current(left: PreviousContext) {
     let context = match left {
         PreviousContext::Nothing => None,
-        // It is current here still, so no other thread can have taken it.
+        // It is still current here, so no other thread can have taken it.
         PreviousContext::Idle(handle, _) => registry().idle.remove(&handle),
         PreviousContext::Doomed(context) => Some(context),
     };
@@ -144,15 +144,15 @@ pub(crate) fn restore_current(left: PreviousContext) {
     }
 }
 
-/// `handle` is current on this thread now (0: none), and what was `left` is not.
+/// `handle` is now current on this thread (0: none), and the context of `left` is not.
 pub(crate) fn make_current(handle: usize, left: PreviousContext) {
     if let PreviousContext::Idle(_, Some(textures)) = &left {
-        // Changing contexts flushes, so others see now what it wrote.
+        // A change of contexts flushes, so other contexts now see its writes.
         textures.change();
     }
     drop(left);
     if let Some(old) = symbols::take() {
-        // A fault kept it from being left in order.
+        // A fault kept it from being released properly.
         symbols::thread_leaves();
         if !old.destroyed_while_current {
             let before = registry().idle.insert(old.handle, old);
@@ -168,7 +168,8 @@ pub(crate) fn make_current(handle: usize, left: PreviousContext) {
         let seen = r.seen.contains(&handle);
         r.idle.remove(&handle).unwrap_or_else(|| Box::new(Context::new(handle, shared, seen)))
     };
-    // After a fault the books are kept all the same: lists that we compiled are ours to play.
+    // The register is kept after a fault, too, because only we can execute the lists that we
+    // compiled.
     if !crate::interpose::panic_guard::happened() {
         context.on_made_current();
     }
@@ -176,12 +177,12 @@ pub(crate) fn make_current(handle: usize, left: PreviousContext) {
 }
 
 fn install_current(context: Box<Context>) {
-    // Before it is there, so that its thread is told of all calls from the first on.
+    // Called first, so that all calls of the thread are reported from the first one on.
     symbols::thread_enters();
     match symbols::install(context) {
         Ok(()) => symbols::arm(),
-        // Some programs change contexts in exit handlers, when the thread's storage is gone
-        // already.
+        // Some programs change contexts in exit handlers, when the thread's storage is already
+        // gone.
         Err(context) => {
             symbols::thread_leaves();
             let before = registry().idle.insert(context.handle, context);
@@ -198,7 +199,7 @@ pub(crate) fn on_watched_call(index: usize) {
 }
 
 impl Drop for Context {
-    /// Also when a thread or the program ends with its context current.
+    /// Also called when a thread or the program ends with its context current.
     fn drop(&mut self) {
         crate::interpose::panic_guard::guard(|| self.counters.publish(true));
     }
@@ -224,13 +225,13 @@ impl Context {
         }
     }
 
-    /// One that no driver knows.
+    /// A context that no driver knows.
     #[cfg(test)]
     pub(crate) fn for_tests(handle: usize) -> Context {
         Context::new(handle, ShareGroup::default(), true)
     }
 
-    /// As the driver calls it.
+    /// The driver's handle.
     #[cfg(test)]
     pub(crate) fn handle(&self) -> usize {
         self.handle

@@ -1,9 +1,9 @@
-//! A fault of ours must never become a fault of the program: it is logged, and from then on the
-//! driver draws everything.
+//! Keeps faults of this library from becoming faults of the program. A fault is logged, and from
+//! then on the driver draws everything.
 //!
-//! Everything that the program can call is run under [`caught`], which costs nothing while there is
-//! no fault. After one each thread hands over what its context has swallowed and not drawn
-//! (`Context::stop_tracing`), at once or at its next call.
+//! Everything that the program can call runs under [`caught`], which costs nothing without a fault.
+//! After a fault, each thread draws what its context has held back (`Context::stop_tracing`), at
+//! once or at its next call.
 
 use crate::interpose::calls;
 use crate::interpose::symbols;
@@ -12,19 +12,19 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, Once, OnceLock};
 
 static HAPPENED: AtomicBool = AtomicBool::new(false);
-/// We are in somebody's program: all panics of this library are ours.
+/// The library runs inside a program, so all panics of its own standard library are ours.
 static IN_PROGRAM: AtomicBool = AtomicBool::new(false);
-/// Calls of [`guard`] that are running, in programs of our own.
+/// The number of running calls of [`guard`], in our own programs.
 static GUARDED: AtomicUsize = AtomicUsize::new(0);
 static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// True once there was one.
+/// True after a fault.
 #[inline]
 pub(crate) fn happened() -> bool {
     HAPPENED.load(Relaxed)
 }
 
-/// What happened, for the report.
+/// The messages of faults, for the report.
 pub(crate) fn messages() -> Vec<String> {
     MESSAGES.lock().map_or_else(|e| e.into_inner().clone(), |m| m.clone())
 }
@@ -35,7 +35,7 @@ fn asked_for() -> Option<&'static str> {
     PLACE.get_or_init(|| crate::host::folders::variable("GLURAY_INJECT_FAULT")).as_deref()
 }
 
-/// Panics when `GLURAY_INJECT_FAULT` names this place: so that tests see what programs get when
+/// Panics when `GLURAY_INJECT_FAULT` names this place. Tests check what the program gets when
 /// something of ours breaks.
 pub(crate) fn injected(place: &str) {
     assert!(!is_asked_for(place), "a fault in {place}, as GLURAY_INJECT_FAULT asks");
@@ -46,12 +46,12 @@ pub(crate) fn is_asked_for(place: &str) -> bool {
     asked_for() == Some(place)
 }
 
-/// The entry point that is to fail, and how many of its calls may pass before.
+/// The entry point that is to fail, and the number of its calls that succeed before.
 static ENTRY: AtomicUsize = AtomicUsize::new(usize::MAX);
 static CALLS_BEFORE: AtomicU32 = AtomicU32::new(0);
 
-/// `GLURAY_INJECT_FAULT=glEnd` fails in the first call of `glEnd` that is run by us, `glEnd:3` in
-/// the third.
+/// `GLURAY_INJECT_FAULT=glEnd` fails in the first call of `glEnd` that we handle, `glEnd:3` in the
+/// third.
 fn plan_injection() {
     let Some(text) = asked_for() else { return };
     let (name, call) = text.split_once(':').unwrap_or((text, "1"));
@@ -79,7 +79,7 @@ fn inject_now(index: usize) {
 }
 
 // ---- Catching -----------------------------------------------------------------------------------
-/// The program has called us for the first time.
+/// The program calls the library for the first time.
 #[cold]
 pub(crate) fn in_program() {
     static ONCE: Once = Once::new();
@@ -95,11 +95,11 @@ pub(crate) fn in_program() {
 pub(crate) fn silence() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        // The library has a standard library of its own, so no panic of the program comes here.
+        // The library has its own standard library, so no panic of the program arrives here.
         if IN_PROGRAM.load(Relaxed) || GUARDED.load(Relaxed) > 0 {
             let (mut messages, text) =
                 (MESSAGES.lock().unwrap_or_else(|e| e.into_inner()), info.to_string());
-            // What is tried again may fail again.
+            // A retry may fail again.
             if !messages.contains(&text) {
                 messages.push(text);
             }
@@ -109,13 +109,13 @@ pub(crate) fn silence() {
     }));
 }
 
-/// Runs `f`, a part of a call of the program's. When it panics: `None`, and the tracing ends.
+/// Runs `f`, a part of a call of the program. When it panics, returns `None` and ends the tracing.
 #[inline(always)]
 pub(crate) fn caught<R>(f: impl FnOnce() -> R) -> Option<R> {
     match catch_unwind(AssertUnwindSafe(f)) {
         Ok(r) => Some(r),
         Err(payload) => {
-            // It may be anything, and its destructor may panic.
+            // The payload may be anything, and its destructor may panic.
             std::mem::forget(payload);
             end();
             None
@@ -123,7 +123,7 @@ pub(crate) fn caught<R>(f: impl FnOnce() -> R) -> Option<R> {
     }
 }
 
-/// The same for work that no program has called for.
+/// The same for work that is not part of a call of the program.
 pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
     GUARDED.fetch_add(1, Relaxed);
     let out = caught(f);
@@ -131,7 +131,7 @@ pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
     out
 }
 
-/// Runs `f` after a fault. When it panics as well: `None`.
+/// Runs `f` after a fault. Returns `None` when it panics as well.
 pub(super) fn attempt<R>(f: impl FnOnce() -> R) -> Option<R> {
     catch_unwind(AssertUnwindSafe(f)).map_err(std::mem::forget).ok()
 }
@@ -145,8 +145,7 @@ fn end() {
     hand_over_to_driver();
 }
 
-/// After a fault: the context of this thread hands over what it has swallowed, unless it has done
-/// so.
+/// After a fault, the context of this thread draws what it has held back, unless it has done so.
 pub(crate) fn hand_over_to_driver() {
     if happened() {
         attempt(|| symbols::with_context(|context| context.stop_tracing()));

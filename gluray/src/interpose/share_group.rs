@@ -1,16 +1,16 @@
-//! What the contexts of a share group have in common, and when one of them sees what another has
-//! done to a texture.
+//! The objects that the contexts of a share group have in common, and when one context sees
+//! another's writes to a texture.
 //!
-//! Images of textures are read again when the group's count of writes is another. A context counts
-//! before the driver makes a write. That is enough for itself, but not for the others: one of them
-//! may read between the count and the write, or before the write has got out of the writer's queue.
-//! OpenGL promises a write to another context after the writer has finished (or flushed, or the
-//! reader has waited for a fence) and the reader has bound the texture again (OpenGL 4.6, section
-//! 5.3), so at these points the writer (or the reader that waited) counts once more: what was read
-//! before has another number then.
+//! Texture images are read again when the group's count of writes has changed. A context counts
+//! before the driver makes a write. That is enough for the context itself, but not for the others.
+//! One of them may read between the count and the write, or while the write is still in the
+//! writer's queue. OpenGL guarantees that another context sees a write after the writer has
+//! finished or flushed, or the reader has waited for a fence, and the reader has bound the texture
+//! again (OpenGL 4.6, section 5.3). At these points the writer, or the reader that waited, counts
+//! once more, so images that were read before have another number.
 //!
-//! What is drawn into a texture is not told of draw by draw. While a framebuffer object is bound
-//! those same points count it.
+//! Draws into a texture are not reported one by one. While a framebuffer object is bound, the same
+//! points count its writes.
 
 use crate::capture::buffer_writes::BufferWrites;
 use crate::capture::display_lists::DisplayLists;
@@ -18,7 +18,7 @@ use crate::interpose::calls::{self, class};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// What the contexts of a share group have in common.
+/// The objects of a share group.
 #[derive(Clone, Default)]
 pub(crate) struct ShareGroup {
     pub(crate) lists: Arc<Mutex<DisplayLists>>,
@@ -26,7 +26,7 @@ pub(crate) struct ShareGroup {
     pub(crate) texture_writes: TextureWrites,
 }
 
-/// Counts what may have changed a texture of the group.
+/// Counts the calls that may have changed a texture of the group.
 #[derive(Clone, Default)]
 pub(crate) struct TextureWrites(Arc<AtomicU64>);
 
@@ -39,14 +39,15 @@ impl TextureWrites {
         self.0.load(Ordering::Acquire)
     }
 
-    /// Other contexts have the same textures: each has its count here and in the register.
+    /// True when other contexts use the same textures. Each context and the register hold one
+    /// reference.
     fn are_shared(&self) -> bool {
         Arc::strong_count(&self.0) > 2
     }
 }
 
-/// Some texture has its texels from elsewhere (another API, another process, a group that shares
-/// the image alone): nobody tells of writes.
+/// True when a texture has texels from elsewhere: another API, another process, or a group that
+/// shares the image alone. Their writes are not reported.
 static FOREIGN_TEXELS: AtomicBool = AtomicBool::new(false);
 
 /// The objects that a context shares with others.
@@ -102,12 +103,13 @@ impl SharedObjects {
         self.wrote_textures = true;
     }
 
-    /// While it is the same, so are the textures of the group.
+    /// The textures of the group are unchanged while this number is the same.
     pub(crate) fn texture_version(&self) -> u64 {
         self.texture_writes.now()
     }
 
-    /// A call that other contexts, or texels from elsewhere, may have to do with.
+    /// Observes a call by which other contexts' writes, or texels from elsewhere, may become
+    /// visible.
     pub(crate) fn observe_call(&self, index: usize, classes: u8) {
         if classes & class::TEXTURE != 0 && calls::imports_texels(index) {
             FOREIGN_TEXELS.store(true, Ordering::Relaxed);

@@ -1,13 +1,13 @@
-//! The OpenGL library that programs see: one trampoline per entry point, a table of where each
-//! goes, and the hooks.
+//! The OpenGL library that programs see: one trampoline per entry point, a table of their targets,
+//! and the hooks.
 //!
-//! A trampoline has no prototype: it jumps through [`TABLE`] with all registers as the program left
-//! them. Calls that may change state are *watched*: while [`ARMED`] is set we are told before they
-//! run (`slow`), at a price of some ten nanoseconds; as soon as nobody needs to know, they cost one
-//! comparison. This is what lets the driver keep all state: we ask it when a draw comes, and only
-//! again after a watched call.
+//! A trampoline has no prototype: it jumps through [`TABLE`] and leaves all registers as the
+//! program set them. Calls that may change state are *watched*. While [`ARMED`] is set, they are
+//! reported before they run (`slow`), which costs some ten nanoseconds. As soon as no report is
+//! needed, they cost one comparison. So the driver can keep all state: it is asked at a draw, and
+//! again only after a watched call.
 //!
-//! This is a room for unsafe code: everything here is called by programs we do not know.
+//! This is a room for unsafe code: programs that we do not know call everything here.
 #![allow(
     unsafe_code,
     reason = "a room: exported OpenGL symbols are called by programs we do not know"
@@ -33,16 +33,17 @@ unsafe impl Sync for Target {}
 
 include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
 
-/// Where each trampoline goes: `lazy` at first, then our hook or the driver's function.
+/// The target of each trampoline: first `lazy`, then our hook or the driver's function.
 static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
-/// Zero while watched calls need not be reported: exactly one thread has a context, and nobody
-/// asked. Bit 0 says that somebody asked; above it are the threads that have a context, less one.
-/// In one word, so that none of the two changes unseen while the other is looked at.
+/// Zero while watched calls need not be reported: exactly one thread has a context, and no report
+/// was requested. Bit 0 is set by a request. The bits above it count the threads that have a
+/// context, less one. Both are in one word, so that neither can change unseen while the other is
+/// read.
 static ARMED: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
 /// Watched calls that went straight to the driver.
 static CALLS: AtomicU64 = AtomicU64::new(0);
 
-/// Asks to be told of the next watched call.
+/// Requests a report of the next watched call.
 #[inline]
 pub(crate) fn arm() {
     if ARMED.load(Relaxed) & 1 == 0 {
@@ -50,19 +51,19 @@ pub(crate) fn arm() {
     }
 }
 
-/// Lets watched calls pass without a word, unless another thread has a context, too.
+/// Ends the reports of watched calls, unless another thread has a context, too.
 pub(crate) fn disarm() {
-    // Refused when a second thread has come since somebody looked.
+    // This fails when a second thread has got a context since the caller checked.
     ARMED.compare_exchange(1, 0, Relaxed, Relaxed).ok();
 }
 
-/// One thread alone has a context.
+/// True when only one thread has a context.
 pub(crate) fn is_alone() -> bool {
     ARMED.load(Relaxed) & !1 == 0
 }
 
-/// A thread gets a context. From now on, and until as many have left, all watched calls are
-/// reported when it is not the only one.
+/// A thread gets a context. Until as many threads have left, all watched calls are reported when it
+/// is not the only one.
 pub(crate) fn thread_enters() {
     ARMED.fetch_add(2, Relaxed);
 }
@@ -72,8 +73,8 @@ pub(crate) fn thread_leaves() {
     ARMED.fetch_sub(2, Relaxed);
 }
 
-/// What stays ours after a fault: books of contexts, addresses, errors that we kept, and lists,
-/// since those that we compiled are ours to play.
+/// Entry points that we keep after a fault: contexts, addresses, errors that we kept, and lists,
+/// because only we can execute those that we compiled.
 fn stays_hooked(index: usize) -> bool {
     const KEPT: [usize; 7] = [
         at::glCallList,
@@ -88,7 +89,7 @@ fn stays_hooked(index: usize) -> bool {
     name.starts_with(b"glX") || name.starts_with(b"egl") || KEPT.contains(&index)
 }
 
-/// After a fault of ours every entry point becomes the driver's, thread by thread: see [`leaving`].
+/// After a fault, every entry point becomes the driver's, thread by thread: see [`leaving`].
 pub(crate) fn retire() {
     for (i, slot) in TABLE.iter().enumerate() {
         if HOOKS[i].is_some() && !stays_hooked(i) {
@@ -102,7 +103,7 @@ fn trampoline(name: &CStr) -> Option<*const ()> {
     index_of(name.to_bytes()).map(|i| TRAMPOLINES[i] as *const ())
 }
 
-/// Has the report brought up to date when the program ends in order.
+/// Registers the last update of the report for a normal exit of the program.
 pub(crate) fn at_exit() {
     extern "C" fn at_exit() {
         crate::interpose::panic_guard::guard(crate::host::report::write_final_report);
@@ -113,7 +114,7 @@ pub(crate) fn at_exit() {
 
 extern "C" fn resolve(index: usize) -> *const () {
     crate::interpose::panic_guard::in_program();
-    // Also what is called for the first time after a fault.
+    // This also applies to entry points that are called for the first time after a fault.
     let hook =
         HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || stays_hooked(index));
     let target = crate::interpose::panic_guard::caught(|| match hook {
@@ -128,7 +129,7 @@ extern "C" fn resolve(index: usize) -> *const () {
     target
 }
 
-/// After a fault in the search for a function of the driver's: found, or nothing is called.
+/// The driver's function, or one that does nothing when the search for it fails.
 fn forward_plainly(index: usize) -> *const () {
     crate::interpose::panic_guard::caught(|| driver::forward(index))
         .unwrap_or(driver::no_context as *const ())
@@ -145,8 +146,8 @@ extern "C" fn on_state_call(index: usize) {
     });
 }
 
-/// Entry `index` of those that were ours before a fault: the thread's context hands over what it
-/// has swallowed, and the driver is called.
+/// A call of entry `index`, which was ours before a fault: the thread's context draws what it has
+/// held back, then the driver's function is called.
 extern "C" fn left(index: usize) -> *const () {
     leave_at(index);
     forward_plainly(index)
@@ -158,7 +159,8 @@ fn leave_at(index: usize) {
     let over = crate::interpose::panic_guard::caught(|| {
         let tracing_stopped = with_context(|c| {
             if index == at::glEnd && c.capture.immediate_target == ImmediateModeTarget::Pass {
-                // The driver's primitive ends now, and with the next call all is handed over.
+                // The driver's primitive ends now. With the next call, the context draws what it
+                // has held back.
                 c.capture.immediate_target = ImmediateModeTarget::Outside;
             }
             c.tracing_stopped
@@ -171,7 +173,7 @@ fn leave_at(index: usize) {
     }
 }
 
-/// Finds the target of entry r11 and goes there, with all argument registers as they were.
+/// Finds the target of entry r11 and jumps to it, with all argument registers unchanged.
 #[unsafe(naked)]
 unsafe extern "C" fn lazy() {
     core::arch::naked_asm!(
@@ -193,7 +195,7 @@ unsafe extern "C" fn lazy() {
     )
 }
 
-/// The target of what was a hook before a fault: see [`left`].
+/// The target of former hooks after a fault: see [`left`].
 #[unsafe(naked)]
 unsafe extern "C" fn leaving() {
     core::arch::naked_asm!(
@@ -215,7 +217,7 @@ unsafe extern "C" fn leaving() {
     )
 }
 
-/// Reports entry r11, then goes where the table says, with all argument registers as they were.
+/// Reports entry r11, then jumps to its target, with all argument registers unchanged.
 #[unsafe(naked)]
 unsafe extern "C" fn slow() {
     core::arch::naked_asm!(
