@@ -1,6 +1,6 @@
-//! Between a program and its OpenGL driver: the entry points that programs call, the context that
-//! is current on a thread, the driver behind us, the program's memory, and the guard that keeps our
-//! panics from the program. `pipeline` has the calls between the steps of a frame.
+//! Everything between a program and its OpenGL driver: the entry points that programs call, the
+//! context that is current on a thread, the driver, the program's memory, and the guard that keeps
+//! our panics from the program. `pipeline` has the calls between the steps of a frame.
 
 pub(crate) mod calls;
 pub(crate) mod client_memory;

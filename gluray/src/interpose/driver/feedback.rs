@@ -1,4 +1,4 @@
-//! The driver's functions of transform feedback and of looking into programs, with slices in place
+//! The driver's functions for transform feedback and for queries of programs, with slices in place
 //! of pointers.
 
 use super::driver;
@@ -21,19 +21,19 @@ driver! {
     fn get_active_attrib = "glGetActiveAttrib"(program: u32, i: u32, room: i32, length: *mut i32, size: *mut i32, kind: *mut u32, name: *mut c_char);
 }
 
-/// The vertex shader's output that later links capture.
+/// Sets the output of the vertex shader that later links capture.
 pub(crate) fn feedback_varying(program: u32, name: &str) {
     let Ok(name) = CString::new(name) else { return };
     let names = [name.as_ptr()];
     transform_feedback_varyings(program, 1, names.as_ptr(), INTERLEAVED_ATTRIBS);
 }
 
-/// Nothing is captured from the next link on.
+/// Later links capture nothing.
 pub(crate) fn no_feedback_varyings(program: u32) {
     transform_feedback_varyings(program, 0, core::ptr::null(), INTERLEAVED_ATTRIBS);
 }
 
-/// Draws by the bound element buffer.
+/// Draws with the bound element buffer.
 pub(crate) fn draw_elements(mode: u32, n: i32, kind: u32, at: usize) {
     draw_elements_raw(mode, n, kind, at as *const c_void);
 }
@@ -45,12 +45,12 @@ pub(crate) fn gen_two_buffers() -> [u32; 2] {
     out
 }
 
-/// Gives them back.
+/// Deletes two buffers.
 pub(crate) fn delete_two_buffers(names: [u32; 2]) {
     delete_buffers(2, names.as_ptr());
 }
 
-/// The bound buffer's contents.
+/// Sets the contents of the bound buffer.
 pub(crate) fn buffer_data(target: u32, bytes: &[u8]) {
     buffer_data_raw(target, bytes.len() as isize, bytes.as_ptr().cast(), STREAM_READ);
 }
@@ -86,13 +86,13 @@ fn named(get: Getter, program: u32, count: u32) -> Vec<(String, u32)> {
         .collect()
 }
 
-/// Uniforms of a program with their types.
+/// The uniforms of a program with their types.
 pub(crate) fn active_uniforms(program: u32) -> Vec<(String, u32)> {
     let n = super::gl::program_i::<1>(program, ACTIVE_UNIFORMS)[0].max(0);
     named(get_active_uniform, program, n.cast_unsigned())
 }
 
-/// Names of a program's attributes.
+/// The names of a program's attributes.
 pub(crate) fn active_attributes(program: u32) -> Vec<String> {
     let n = super::gl::program_i::<1>(program, ACTIVE_ATTRIBUTES)[0].max(0);
     named(get_active_attrib, program, n.cast_unsigned()).into_iter().map(|(name, _)| name).collect()

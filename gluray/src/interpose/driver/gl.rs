@@ -1,6 +1,6 @@
 //! The driver's functions that we call, with slices in place of pointers.
 //!
-//! All of them act on the context that is current on the thread, as all of OpenGL.
+//! Like all of OpenGL, they act on the context that is current on the thread.
 
 use super::driver;
 use crate::state::enums::*;
@@ -110,8 +110,8 @@ pub(crate) fn is_enabled(cap: u32) -> bool {
     is_enabled_raw(cap) != 0
 }
 
-// More than the answer to any query has, but for those of lists that no standard limits: they are
-// not asked for.
+// More values than any query returns, except for those of lists without a standard limit, which are
+// never queried.
 const ROOM: usize = 32;
 
 /// True when the answer may be longer than [`ROOM`]: formats of compressed textures, program
@@ -157,7 +157,7 @@ pub(crate) fn word(what: u32) -> u32 {
     int(what).cast_unsigned()
 }
 
-/// An address kept as state.
+/// An address that is kept as state.
 pub(crate) fn pointer(what: u32) -> usize {
     let mut out = core::ptr::null_mut();
     get_pointerv(what, &raw mut out);
@@ -218,10 +218,10 @@ fn map_orders(target: u32) -> [i32; 2] {
     [out[0], out[1]]
 }
 
-/// Orders in both parameters of an evaluator's map, and the values of its control points, of which
-/// each has `size`. A curve's second order is 1.
+/// The orders of an evaluator's map in both parameters, and its control points with `size` values
+/// each. A curve's second order is 1.
 pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2], Vec<f32>) {
-    // No map has more values a point.
+    // No map has more values per point.
     const MOST: usize = 4;
     let [u, v] = map_orders(target).map(|n| n.max(1) as usize);
     let orders = [u, if surface { v } else { 1 }];
@@ -232,8 +232,8 @@ pub(crate) fn map_points(target: u32, size: usize, surface: bool) -> ([usize; 2]
     (orders, out)
 }
 
-/// What kind of numbers the colour buffer of the framebuffer object in use has that `attachment`
-/// names; 0 when nobody knows.
+/// The component type of the colour buffer that `attachment` names in the current framebuffer
+/// object; 0 when it is unknown.
 pub(crate) fn component_type(attachment: u32) -> u32 {
     attachment_i::<1>(DRAW_FRAMEBUFFER, attachment, ATTACHMENT_COMPONENT_TYPE)[0].cast_unsigned()
 }
@@ -250,8 +250,8 @@ pub(crate) fn vertex_attrib_address(at: u32) -> usize {
     out as usize
 }
 
-/// A new texture. Where programs may choose names themselves, as many do, ours is one that they do
-/// not choose: a generated one could be a program's next.
+/// A new texture. Where programs may choose names themselves, as many do, we use a name that
+/// programs do not choose: a generated name could be a program's next one.
 pub(crate) fn gen_texture(core: bool) -> u32 {
     static NAMES: AtomicU32 = AtomicU32::new(0x6c75_7261);
     if !core {
@@ -269,13 +269,13 @@ pub(crate) fn gen_vertex_array() -> u32 {
     out
 }
 
-/// Gives the bound 2-D texture its size. `None` leaves its texels open.
+/// Sets the size of the bound 2-D texture. The texels are undefined.
 pub(crate) fn tex_image(inner: i32, w: i32, h: i32, format: u32, kind: u32) {
     tex_image_2d(TEXTURE_2D, 0, inner, w, h, 0, format, kind, core::ptr::null());
 }
 
 /// Fills the corner of the bound 2-D texture. Panics when `data` is too short for `w` x `h` texels,
-/// or of a kind that we do not know.
+/// or of an unknown kind.
 pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8]) {
     let bytes = match (format, kind) {
         (RGBA, UNSIGNED_BYTE) | (RED, FLOAT) => 4,
@@ -284,7 +284,7 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
     };
     let (w, h) = (w.max(0), h.max(0));
     assert!(data.len() as i64 >= i64::from(w) * i64::from(h) * bytes, "too few texels");
-    // Whatever rows the program has: those of `data` follow one another, and lie in our memory.
+    // The rows of `data` follow one another and lie in our memory, whatever the program has set.
     const UNPACK: [(u32, i32); 4] = [
         (UNPACK_ALIGNMENT, 1),
         (UNPACK_ROW_LENGTH, 0),
@@ -312,23 +312,23 @@ pub(crate) fn tex_sub_image(w: i32, h: i32, format: u32, kind: u32, data: &[u8])
         .for_each(|(u, b)| pixel_storei(u.0, b));
 }
 
-/// Proof that texels are read as they are: [`with_raw_pixel_reads`] alone gives it, for the time of
-/// its call.
+/// Proof that texels are read without conversion. Only [`with_raw_pixel_reads`] makes it, for the
+/// time of its call.
 pub(crate) struct RawPixelTransfer(());
 
-/// Texels of a level of the bound 1-D or 2-D texture: what the driver is going to write, whatever a
-/// caller thinks. `None` for other targets and from 2^26 texels on.
+/// The number of texels of a level of the bound 1-D or 2-D texture that the driver will write.
+/// `None` for other targets and from 2^26 texels on.
 fn texels_of(target: u32, level: i32) -> Option<usize> {
     if !matches!(target, TEXTURE_1D | TEXTURE_2D) {
         return None;
     }
     let size = |what| usize::try_from(tex_level_i::<1>(target, level, what)[0]).ok();
     let texels = size(TEXTURE_WIDTH)?.checked_mul(size(TEXTURE_HEIGHT)?)?;
-    // A border of texels, which levels of old programs may have, counts in both.
+    // The border of texels, which levels of old programs may have, is counted in both.
     (texels <= 1 << 26).then_some(texels)
 }
 
-/// A level of the bound texture as floats, RGBA; empty where it cannot be read.
+/// A level of the bound texture as RGBA floats. Empty when it cannot be read.
 pub(crate) fn tex_image_rgba(_: &RawPixelTransfer, target: u32, level: i32) -> Vec<[f32; 4]> {
     let Some(texels) = texels_of(target, level) else { return Vec::new() };
     let mut out = vec![[0.0_f32; 4]; texels];
@@ -336,7 +336,7 @@ pub(crate) fn tex_image_rgba(_: &RawPixelTransfer, target: u32, level: i32) -> V
     out
 }
 
-/// The same as bytes, in memory that served before.
+/// The same as bytes, in reused memory.
 pub(crate) fn tex_image_bytes(
     _: &RawPixelTransfer,
     target: u32,
@@ -350,14 +350,14 @@ pub(crate) fn tex_image_bytes(
     memory
 }
 
-/// Where sample `i` of the framebuffer's pixels lies, from the lower left corner of the pixel.
+/// The position of sample `i` of the framebuffer's pixels, from the lower left corner of the pixel.
 pub(crate) fn sample_place(i: u32) -> [f32; 2] {
     let mut out = [0.5; ROOM];
     get_multisample(SAMPLE_POSITION, i, out.as_mut_ptr());
     [out[0], out[1]]
 }
 
-/// Has only sample `i` of each pixel written; gives the mask that was set.
+/// Restricts writes to sample `i` of each pixel. Returns the previous mask.
 pub(crate) fn only_sample(i: u32) -> u32 {
     let mut before = [-1; ROOM];
     get_integeri(SAMPLE_MASK_VALUE, 0, before.as_mut_ptr());
@@ -366,14 +366,14 @@ pub(crate) fn only_sample(i: u32) -> u32 {
     before[0].cast_unsigned()
 }
 
-/// Has all samples written again. Masks of the program's own are not traced, so there is none to
-/// switch on.
+/// Restores writes to all samples. Draws with the program's own masks are not traced, so no mask is
+/// switched on again.
 pub(crate) fn all_samples(mask: u32) {
     disable(SAMPLE_MASK);
     sample_maski(0, mask);
 }
 
-/// Colours through maps; scale and bias of red, green, blue, alpha.
+/// The colour maps, then scale and bias of red, green, blue and alpha.
 const TRANSFER: [(u32, f32); 9] = [
     (MAP_COLOR, 0.0),
     (RED_SCALE, 1.0),
@@ -386,15 +386,15 @@ const TRANSFER: [(u32, f32); 9] = [
     (ALPHA_BIAS, 0.0),
 ];
 
-/// Pixels go as they are, without the program's scales and biases, until attributes are popped.
+/// Pixels are transferred without the program's scales and biases until attributes are popped.
 pub(crate) fn reset_pixel_transfer() {
     TRANSFER.into_iter().for_each(|(what, plain)| pixel_transferf(what, plain));
 }
 
-/// Runs `f` while texels are read as they are: rows that follow one another, into memory and not
-/// into a buffer, without the program's scales and biases.
+/// Runs `f` while texels are read without conversion: in consecutive rows, into memory and not into
+/// a buffer, without the program's scales and biases.
 pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) -> R {
-    // Volumes have more parameters, and are not read.
+    // Volumes have more parameters and are not read.
     const PACK: [(u32, i32); 5] = [
         (PACK_SWAP_BYTES, 0),
         (PACK_ROW_LENGTH, 0),
@@ -404,7 +404,7 @@ pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) ->
     ];
     let pack = PACK.map(|(what, plain)| (what, plain, int(what)));
     let transfer = TRANSFER.map(|(what, plain)| (what, plain, floats::<1>(what)[0]));
-    // A context without fixed function has none of these and says 0 for all.
+    // A context without fixed function has none of these and answers 0 for all.
     let none = transfer.iter().all(|t| t.2 == 0.0);
     let transfer = transfer.map(|(what, plain, now)| (what, if none { now } else { plain }, now));
     let buffer = word(PIXEL_PACK_BUFFER_BINDING);
@@ -422,7 +422,7 @@ pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) ->
     out
 }
 
-/// A part of the buffer bound to `target`.
+/// A range of the buffer bound to `target`.
 pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
     let mut out = vec![0_u8; bytes];
     if bytes > 0 {
@@ -431,7 +431,7 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
     out
 }
 
-/// Depths of the framebuffer from its lower left corner on, row by row.
+/// The depths of the framebuffer from its lower left corner, row by row.
 pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
     let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
     with_raw_pixel_reads(|_| {
@@ -440,18 +440,18 @@ pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
     out
 }
 
-/// What colours are drawn into.
+/// Sets the draw buffers.
 pub(crate) fn draw_buffers(buffers: &[u32]) {
     draw_buffers_raw(buffers.len() as i32, buffers.as_ptr());
 }
 
-/// Source of a shader of ours.
+/// Sets the source of our own shader.
 pub(crate) fn shader_source(shader: u32, text: &str) {
     let (p, n) = (text.as_ptr().cast::<c_char>(), text.len() as i32);
     shader_source_raw(shader, 1, &raw const p, &raw const n);
 }
 
-/// What the driver says of a shader: its first thousand bytes.
+/// The first thousand bytes of a shader's log.
 pub(crate) fn shader_log(shader: u32) -> String {
     const MOST: usize = 1000;
     let mut out = [0_u8; MOST];
@@ -460,14 +460,14 @@ pub(crate) fn shader_log(shader: u32) -> String {
     String::from_utf8_lossy(&out[..n.clamp(0, MOST as i32 - 1) as usize]).into_owned()
 }
 
-/// True when the driver takes 2-D textures of this kind. Changes nothing but what is remembered of
-/// questions like this one.
+/// True when the driver supports 2-D textures of this kind. This changes only the state of proxy
+/// textures.
 pub(crate) fn has_texture_format(inner: i32, format: u32, kind: u32) -> bool {
     tex_image_2d(PROXY_TEXTURE_2D, 0, inner, 16, 16, 0, format, kind, core::ptr::null());
     tex_level_i::<1>(PROXY_TEXTURE_2D, 0, TEXTURE_WIDTH)[0] == 16
 }
 
-/// Source of a shader of the program.
+/// The source of a shader of the program.
 pub(crate) fn source_of(shader: u32) -> String {
     let room = shader_i::<1>(shader, SHADER_SOURCE_LENGTH)[0].max(0);
     let mut out = vec![0_u8; room as usize + 1];
@@ -512,7 +512,7 @@ pub(super) mod tests {
 
     const SIZE: [i32; 2] = [16, 8];
 
-    /// A driver that writes as much as its own state is long, whatever the caller thinks.
+    /// A driver that writes its complete answer, whatever size the caller expects.
     pub(in crate::interpose::driver) fn fake(name: &str) -> Option<*const ()> {
         if !IS_FAKED.get() {
             return None;
@@ -545,7 +545,7 @@ pub(super) mod tests {
         }
     }
 
-    /// The longest answers that any query of state has.
+    /// The longest answer of any query of state.
     extern "C" fn integers(_: u32, out: *mut i32) {
         (0..16).for_each(|i| {
             // SAFETY: callers have room for any answer but those of lists.
@@ -558,7 +558,7 @@ pub(super) mod tests {
         unsafe { out.write(5) };
     }
 
-    /// Says that it has written more than it was told there is room for.
+    /// Claims to have written more than the caller has room for.
     extern "C" fn text(_: u32, room: i32, length: *mut i32, out: *mut c_char) {
         (0..room.max(0) as usize).for_each(|i| {
             // SAFETY: as far as the caller says.
@@ -584,13 +584,13 @@ pub(super) mod tests {
         let raw = RawPixelTransfer(());
         let floats = tex_image_rgba(&raw, TEXTURE_2D, 0);
         assert!(floats.len() == n && ROOM_FOR_TEXELS.get() >= 16 * n, "{}", ROOM_FOR_TEXELS.get());
-        // Memory that served a smaller texture before.
+        // Memory that was used for a smaller texture.
         let bytes = tex_image_bytes(&raw, TEXTURE_2D, 0, vec![[0; 4]; 2]);
         assert!(ROOM_FOR_TEXELS.get() >= 4 * n, "{}", ROOM_FOR_TEXELS.get());
         assert_eq!(bytes, vec![[1; 4]; n]);
-        // One number is asked for, and sixteen are written.
+        // One number is queried, and sixteen are written.
         assert_eq!((int(VIEWPORT), ints::<4>(VIEWPORT)), (7, [7, 8, 9, 10]));
-        // Lengths that are lies.
+        // Wrong lengths.
         assert_eq!(source_of(1).len(), 6);
         assert_eq!(shader_log(1).len(), 999);
         assert_eq!(attached(1).len(), 16);

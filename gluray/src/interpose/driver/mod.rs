@@ -1,8 +1,8 @@
-//! The driver: finding its functions, and calling them.
+//! Finds the driver's functions and calls them.
 //!
 //! Under `LD_PRELOAD` the driver is `libGL.so.1` (`libEGL.so.1`), opened by name: `RTLD_NEXT` finds
-//! nothing when the program itself opened it with `dlopen`. As a GLVND vendor library it is the
-//! vendor that we stand in front of.
+//! nothing when the program itself opened it with `dlopen`. When the library is a GLVND vendor
+//! library, the driver is the vendor behind it.
 //!
 //! This is a room for unsafe code.
 #![allow(unsafe_code, reason = "a room: calls into a C library that is found at run time")]
@@ -22,11 +22,11 @@ unsafe extern "C" {
 static DLSYM: AtomicUsize = AtomicUsize::new(0);
 static LIB_GL: AtomicPtr<c_void> = AtomicPtr::new(core::ptr::null_mut());
 static LIB_EGL: AtomicPtr<c_void> = AtomicPtr::new(core::ptr::null_mut());
-/// The vendor's `getProcAddress`, GLX and EGL.
+/// The vendor's `getProcAddress` for GLX and EGL.
 static VENDOR: [AtomicUsize; 2] = [AtomicUsize::new(0), AtomicUsize::new(0)];
 static FOUND: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(core::ptr::null_mut()) }; COUNT];
 
-/// What is called when the driver lacks a function: nothing happens, zero comes back.
+/// Called when the driver lacks a function. It does nothing and returns zero.
 pub(crate) extern "C" fn no_context() -> usize {
     0
 }
@@ -47,7 +47,7 @@ pub(crate) fn dlsym_address() -> *const () {
     p as *const ()
 }
 
-/// libc's `dlsym`, called.
+/// Calls libc's `dlsym`.
 ///
 /// # Safety
 /// `handle` must be one that `dlsym` takes.
@@ -68,7 +68,7 @@ pub(crate) fn is_vendor() -> bool {
     VENDOR.iter().any(|v| v.load(Relaxed) != 0)
 }
 
-/// Keeps the vendor's `getProcAddress`.
+/// Stores the vendor's `getProcAddress`.
 pub(crate) fn set_vendor(address: *const (), egl: bool) {
     VENDOR[usize::from(egl)].store(address as usize, Relaxed);
 }
@@ -90,17 +90,17 @@ fn open(library: &CStr) -> *mut c_void {
     unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_LOCAL) }
 }
 
-/// Puts GLVND's functions before Mesa's where libraries that are opened later look for OpenGL's.
-/// When a first context is made Mesa puts its own there (those of libglapi): calls of plugins, and
-/// of libraries that a script opens (libGLU), would go past GLVND, and so past us. Our own would
-/// not do in their place, because GLVND has to hear of `glXMakeCurrent`.
+/// Puts GLVND's functions before Mesa's in the scope where libraries that are opened later look for
+/// OpenGL's. When the first context is created, Mesa puts its own there (those of libglapi). Calls
+/// of plugins, and of libraries that a script opens (libGLU), would then bypass GLVND and this
+/// library. Our own functions cannot take their place, because GLVND must see `glXMakeCurrent`.
 pub(crate) fn put_glvnd_first() {
     let open = |library: &CStr, how| {
         // SAFETY: a C string.
         !unsafe { libc::dlopen(library.as_ptr(), libc::RTLD_LAZY | libc::RTLD_GLOBAL | how) }
             .is_null()
     };
-    // One that is there already, else the one without GLX.
+    // A library that is already loaded, else the one without GLX.
     let _ = [
         (c"libGL.so.1", libc::RTLD_NOLOAD),
         (c"libOpenGL.so.0", libc::RTLD_NOLOAD),
@@ -110,8 +110,8 @@ pub(crate) fn put_glvnd_first() {
     .any(|(library, how)| open(library, how));
 }
 
-/// `__glx_Main` or `__egl_Main` of those vendors that GLVND would have taken without us, the first
-/// first; of GLX's one alone.
+/// `__glx_Main` or `__egl_Main` of the vendors that GLVND would have taken without us, in its
+/// order. GLX has only one.
 pub(crate) fn vendor_mains(egl: bool) -> Vec<*const ()> {
     let get = crate::host::folders::variable;
     let (libraries, main): (Vec<String>, _) = match egl {
@@ -183,14 +183,14 @@ fn find(name: &CStr) -> *const () {
     unsafe { get(name.as_ptr()) }
 }
 
-/// The driver's function of entry `index`, when it has been looked up.
+/// The driver's function of entry `index`, if it has been looked up.
 #[inline(always)]
 pub(crate) fn found(index: usize) -> Option<*const ()> {
     let p = FOUND[index].load(Relaxed);
     (!p.is_null()).then_some(p.cast_const())
 }
 
-/// The driver's function of entry `index`; one that does nothing when there is none.
+/// The driver's function of entry `index`, or one that does nothing.
 pub(crate) fn forward(index: usize) -> *const () {
     let p = FOUND[index].load(Relaxed);
     if !p.is_null() {
@@ -224,7 +224,7 @@ fn look_up(slot: &AtomicPtr<()>, name: &str) -> *const () {
     p
 }
 
-/// Functions of the driver with their signatures. Those that take pointers are for this room only.
+/// The driver's functions with their signatures. Those that take pointers are private to this room.
 macro_rules! driver {
     ($($vis:vis fn $name:ident = $gl:literal ($($a:ident: $t:ty),*) $(-> $r:ty)?;)*) => { $(
         #[doc = concat!("The driver's `", $gl, "`.")]

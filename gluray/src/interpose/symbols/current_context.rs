@@ -1,8 +1,9 @@
-//! Who owns a context, and the way from a hook to the one that is current on its thread.
+//! The owner of each context, and the path from a hook to the context that is current on its
+//! thread.
 //!
-//! A context is owned by the slot of the thread it is current on ([`install`], [`take`]) or by
-//! whoever holds its box. Nothing else in the library has its address, so the argument that nobody
-//! gets two `&mut Context` is in this file alone:
+//! A context is owned by the slot of the thread on which it is current ([`install`], [`take`]) or
+//! by the holder of its box. Nothing else in the library has its address, so this file alone
+//! contains the argument that there are never two `&mut Context`:
 //!
 //! 1. *One thread.* The address stands in the thread's own [`SLOT`], and, for the one thread that
 //!    got hold of [`OWNER`], in [`HOT`] as well: a thread-local look-up in a shared library costs
@@ -125,11 +126,11 @@ pub(crate) fn take() -> Option<Box<Context>> {
     (!context.is_null()).then(|| unsafe { Box::from_raw(context) })
 }
 
-/// The short way of a call, with the current context; [`FastPathResult::Slow`] when the context has
-/// to be looked up, and after a fault.
+/// The fast path of a call, with the current context. Returns [`FastPathResult::Slow`] when the
+/// context must be looked up, and after a fault.
 ///
-/// `f` must not be handed on to anything that is not inlined: see [`FastPathResult`]. It must not
-/// call anything that may call us.
+/// `f` must not be passed to anything that is not inlined: see [`FastPathResult`]. It must not call
+/// anything that may call us.
 #[inline(always)]
 pub(super) fn fast_call(
     index: usize,
@@ -141,7 +142,7 @@ pub(super) fn fast_call(
     let hot = HOT.load(Relaxed);
     let call = || {
         if cfg!(debug_assertions) {
-            // In builds for tests alone: here a load would be felt.
+            // Only in test builds: here a load would be measurable.
             crate::interpose::panic_guard::inject_at(index);
         }
         // SAFETY: this thread owns it and it is not lent, for that is what `OWNER` says (1 and 2
@@ -151,8 +152,9 @@ pub(super) fn fast_call(
     crate::interpose::panic_guard::caught(call).unwrap_or(FastPathResult::Slow)
 }
 
-/// The long way of a call: `f` with the current context, whose answer says whether that was all.
-/// False also without a context and after a fault: then the driver is to be called.
+/// The slow path of a call: runs `f` with the current context. `f` returns whether it has handled
+/// the call. Without a context and after a fault the result is false, and the driver is to be
+/// called.
 #[inline(always)]
 pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
     if crate::interpose::panic_guard::happened() {
@@ -172,7 +174,7 @@ pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
     }
 }
 
-/// The same for what is ours to do after a fault, too: it is tried once more.
+/// The same for calls that we handle after a fault, too. It is tried once more.
 #[inline(always)]
 pub(super) fn with_even_after_fault(index: usize, f: impl Fn(&mut Context) -> bool) -> bool {
     let call = || {

@@ -1,5 +1,5 @@
-//! Hooks of the calls that are taken apart. Each hands its arguments to the current context, whose
-//! method says whether that was all; if not, the driver gets the call as it came.
+//! Hooks of the calls that are taken apart. Each passes its arguments to the current context. The
+//! method returns whether it has handled the call; if not, the driver gets the call unchanged.
 //!
 //! The build script reads this file: a line that begins with `fn gl…(` or `fn egl…(` is a hook.
 
@@ -27,7 +27,7 @@ macro_rules! driver {
     }};
 }
 
-/// Hooks whose method says whether the driver is still to be called.
+/// Hooks whose method returns whether it has handled the call.
 macro_rules! hooks {
     ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
         $(#[$m])*
@@ -39,7 +39,7 @@ macro_rules! hooks {
     )* };
 }
 
-/// The same for calls that come by the million: first the short way, then the long one.
+/// The same for the most frequent calls: first the fast path, then the slow one.
 macro_rules! hot_hooks {
     ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $step:expr, $body:expr;)*) => { $(
         $(#[$m])*
@@ -61,7 +61,7 @@ macro_rules! hot_hooks {
 
 type Address = *const c_void;
 
-/// Values that `glMaterial` reads for a parameter.
+/// The values that `glMaterial` reads for a parameter.
 ///
 /// # Safety
 /// The program has called `glMaterial` with these.
@@ -89,7 +89,7 @@ hot_hooks! {
     fn glEnd() => |c| c.end_fast(), c.end();
 }
 
-/// The same for calls that have no short way.
+/// The same for calls without a fast path.
 macro_rules! long_hooks {
     ($($(#[$m:meta])* fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
         $(#[$m])*
@@ -221,7 +221,7 @@ hooks! {
     fn glLinkProgram(program: u32) => |c| c.link_program(program);
 }
 
-/// The same for lists, which stay ours after a fault.
+/// The same for lists, which we keep handling after a fault.
 macro_rules! book_hooks {
     ($(fn $name:ident($($a:ident: $t:ty),*) => |$c:ident| $body:expr;)*) => { $(
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name($($a: $t),*) {
@@ -245,8 +245,8 @@ book_hooks! {
     fn glDeleteLists(first: u32, n: Int) => |c| c.delete_lists(first, n);
 }
 
-/// The same for calls after which others see what this context has written to textures: told of
-/// like others before they run, and again after.
+/// The same for calls after which other contexts see this context's writes to textures. They are
+/// reported before they run, like others, and again afterwards.
 macro_rules! publishing_hooks {
     ($(fn $name:ident();)*) => { $(
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name() {
@@ -301,14 +301,14 @@ get_proc_address! { glXGetProcAddress glXGetProcAddressARB eglGetProcAddress }
 // ---- Contexts -----------------------------------------------------------------------------------
 type Handle = *mut c_void;
 
-/// Brackets a change of the current context: what is pending is drawn with the old one, then the
-/// books follow.
+/// Brackets a change of the current context: pending draws are presented with the old one, then the
+/// register is updated.
 fn making_current(index: usize, context: Handle, real: impl FnOnce() -> u32) -> u32 {
     let leave = || {
         crate::interpose::panic_guard::inject_at(index);
         context::release_current()
     };
-    // After a fault once more: whose context is current must be known.
+    // Tried again after a fault, because the register must know whose context is current.
     let left = caught(leave).or_else(|| caught(leave)).unwrap_or(context::PreviousContext::Nothing);
     let done = real();
     caught(|| match done {

@@ -1,4 +1,4 @@
-//! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main`,
+//! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main` and
 //! `__egl_Main`.
 
 use super::trampoline;
@@ -9,10 +9,10 @@ use core::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::Relaxed};
 
-/// libc's `dlsym`, for the jump below.
+/// libc's `dlsym`, the target of the jump below.
 static REAL_DLSYM: AtomicPtr<()> = AtomicPtr::new(core::ptr::null_mut());
 
-/// Our address for what a program looks up itself, or null for libc's answer.
+/// Our address for a name that a program looks up itself, or null for libc's answer.
 unsafe extern "C" fn ours(handle: *mut c_void, name: *const c_char) -> *const () {
     // SAFETY: the program's own arguments of dlsym.
     caught(|| unsafe { looked_up(handle, name) }).unwrap_or(core::ptr::null())
@@ -31,16 +31,16 @@ unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
     if !(bytes.starts_with(b"gl") || bytes.starts_with(b"egl")) || index_of(bytes).is_none() {
         return core::ptr::null();
     }
-    // Not earlier: other names are looked up by allocators before anything can be allocated.
+    // Not earlier: allocators look up other names before anything can be allocated.
     crate::interpose::panic_guard::injected("dlsym");
-    // What the program's library lacks stays lacking.
+    // A name that the program's library lacks is not found here either.
     // SAFETY: the program's own arguments.
     let there = unsafe { driver::call_dlsym(handle, name) };
     if there.is_null() { there } else { trampoline(name).unwrap_or(core::ptr::null()) }
 }
 
-/// Seen by programs only under LD_PRELOAD. It jumps on, so that libc sees the program's return
-/// address (RTLD_NEXT depends on it).
+/// Programs see this only under LD_PRELOAD. It jumps to libc's function, so that libc sees the
+/// program's return address, on which RTLD_NEXT depends.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn dlsym() {
@@ -51,8 +51,8 @@ unsafe extern "C" fn dlsym() {
     )
 }
 
-/// The driver's answer, replaced by our trampoline where there is one: a null answer stays null
-/// (feature detection).
+/// The driver's answer, replaced by our trampoline if there is one. A null answer stays null, for
+/// feature detection.
 pub(super) fn replaced(name: *const c_char, driver: *const ()) -> *const () {
     if driver.is_null() || name.is_null() {
         return driver;
@@ -88,8 +88,8 @@ unsafe extern "C" fn egl_address(name: *const c_char) -> *const () {
     let ours = || {
         crate::interpose::panic_guard::injected("address");
         if driver.is_null() && EGL_CHOSEN.load(Relaxed) == NOBODY {
-            // GLVND asks before there is a display; our trampoline finds the function of whoever
-            // has it then.
+            // GLVND asks before there is a display. Our trampoline then finds the function of the
+            // driver that has it.
             let of_any = egl_drivers().iter().map(|d| of_driver(d, name)).find(|f| !f.is_null());
             driver = of_any.unwrap_or(driver);
         }
@@ -111,7 +111,7 @@ unsafe extern "C" fn __glx_Main(
         crate::interpose::panic_guard::injected("__glx_Main");
         driver::put_glvnd_first();
     };
-    // After a fault the vendor that there would be without us is found all the same.
+    // After a fault, the vendor that GLVND would take without us is still found.
     caught(find);
     let mains = caught(|| driver::vendor_mains(false)).unwrap_or_default();
     let Some(main) = mains.into_iter().next() else { return 0 };
@@ -123,7 +123,7 @@ unsafe extern "C" fn __glx_Main(
         }
         driver::set_vendor((*imports)[1], false);
         (*imports)[1] = glx_address as *const ();
-        // No patching of entry points behind our back.
+        // This prevents GLVND from patching our entry points.
         (5..9).for_each(|i| (*imports)[i] = core::ptr::null());
     }
     1
@@ -142,7 +142,7 @@ unsafe extern "C" fn __egl_Main(
         crate::interpose::panic_guard::injected("__egl_Main");
         driver::put_glvnd_first();
     };
-    // After a fault the vendors that there would be without us are found all the same.
+    // After a fault, the vendors that GLVND would take without us are still found.
     caught(find);
     let mut all = Vec::new();
     for main in caught(|| driver::vendor_mains(true)).unwrap_or_default() {
@@ -168,7 +168,7 @@ unsafe extern "C" fn __egl_Main(
     driver::set_vendor(first.0[egl::GET_PROC_ADDRESS], true);
     let several = all.len() > 1;
     if EGL_DRIVERS.set(all).is_err() {
-        // A second GLVND in one process; the first one's drivers stay.
+        // A second GLVND in one process keeps the first one's drivers.
         return 0;
     }
     // SAFETY: GLVND's table.
@@ -179,7 +179,7 @@ unsafe extern "C" fn __egl_Main(
             (*imports)[egl::SET_DISPATCH_INDEX] = egl_dispatch_index as *const ();
             (*imports)[egl::SUPPORTS_API] = egl_supports_api as *const ();
             (*imports)[egl::VENDOR_STRING] = egl_vendor_string as *const ();
-            // Another driver's entry points may be the ones in the end.
+            // The entry points may belong to another driver in the end.
             (egl::PATCHES).for_each(|i| (*imports)[i] = core::ptr::null());
         }
     }
@@ -198,16 +198,16 @@ mod egl {
 
 /// A driver's table of functions.
 struct Driver(EglImports);
-/// GLVND's table for EGL has eleven members today; later ones are added at its end.
+/// GLVND's table for EGL has eleven members today. Later versions add members at its end.
 type EglImports = [*const (); 16];
 // SAFETY: addresses of functions, which are never written again.
 unsafe impl Send for Driver {}
 // SAFETY: as above.
 unsafe impl Sync for Driver {}
 
-/// Drivers that GLVND would have asked for displays, in its order.
+/// The drivers that GLVND would have asked for displays, in its order.
 static EGL_DRIVERS: OnceLock<Vec<Driver>> = OnceLock::new();
-/// The one that has the program's displays; none yet when it is [`NOBODY`].
+/// The driver that has the program's displays, or [`NOBODY`].
 static EGL_CHOSEN: AtomicUsize = AtomicUsize::new(NOBODY);
 const NOBODY: usize = usize::MAX;
 
@@ -229,15 +229,15 @@ fn of_driver(driver: &Driver, name: *const c_char) -> *const () {
     }
 }
 
-/// The function of the driver that was chosen, or of the first.
+/// The function of the chosen driver, or of the first one.
 fn egl_function(member: usize) -> *const () {
     let chosen = EGL_CHOSEN.load(Relaxed);
     let driver = egl_drivers().get(if chosen == NOBODY { 0 } else { chosen });
     driver.map_or(core::ptr::null(), |d| d.0[member])
 }
 
-/// Asks the drivers for a display as GLVND would. The first that knows one has all: calls go on to
-/// one driver.
+/// Asks the drivers for a display, as GLVND would. The first that accepts one gets all displays,
+/// because calls go to one driver.
 unsafe extern "C" fn egl_display(
     platform: u32,
     native: *mut c_void,
@@ -285,7 +285,8 @@ unsafe extern "C" fn egl_vendor_string(name: c_int) -> *const c_char {
     }
 }
 
-/// Every driver keeps the number of a function: it is not known yet whose displays there will be.
+/// Every driver keeps the number of a function, because the driver of the displays is not known
+/// yet.
 unsafe extern "C" fn egl_dispatch_index(name: *const c_char, index: c_int) {
     for driver in egl_drivers() {
         let f = driver.0[egl::SET_DISPATCH_INDEX];
