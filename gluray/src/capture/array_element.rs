@@ -6,8 +6,8 @@ use crate::interpose::client_memory::{ActiveCall, ArraySource, Elements};
 use crate::interpose::context::Context;
 
 impl Context {
-    /// Values of element `i` become current, and a vertex of the primitive that is recorded or
-    /// compiled.
+    /// The values of element `i` become current. They also make a vertex of the primitive that is
+    /// recorded or compiled.
     pub(crate) fn array_element(&mut self, call: &ActiveCall<'_>) -> bool {
         match self.capture.immediate_target {
             ImmediateModeTarget::Trace => {}
@@ -18,7 +18,7 @@ impl Context {
                 return false;
             }
             ImmediateModeTarget::Pass => return false,
-            // Values become current, and that is all.
+            // Only the current values change.
             ImmediateModeTarget::Outside => {
                 self.state.mark_current(&self.capabilities);
                 return false;

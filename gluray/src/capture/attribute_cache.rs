@@ -1,8 +1,8 @@
-//! Vertex attributes that are there already: arrays in the program's memory come again each frame
-//! and rarely with other contents.
+//! Caches attribute arrays by content. Arrays in the program's memory come again in each frame,
+//! rarely with other contents.
 //!
-//! Reading an array is half the price of copying it, and the copy's fresh memory costs as much
-//! again; so arrays are hashed where they are.
+//! Reading an array costs half as much as copying it, and the copy's new memory costs as much
+//! again. So arrays are hashed in place.
 
 use crate::capture::draw::PackedArray;
 use crate::capture::geometry_cache::hash;
@@ -16,16 +16,16 @@ pub(crate) struct AttributeCache {
     frame: u64,
 }
 
-/// Bytes from which a hash is worth it.
+/// The size in bytes from which hashing is worthwhile.
 const WORTH_HASHING: usize = 4096;
 
-/// Whether the same content is the same memory; shorter arrays are copied for each draw.
+/// True when the same content has the same memory. Shorter arrays are copied for each draw.
 pub(crate) fn is_shared(packed: &PackedArray) -> bool {
     packed.bytes.len() >= WORTH_HASHING
 }
 
 impl AttributeCache {
-    /// `bytes` as an array of such components; `copy` makes the same bytes tightly packed.
+    /// `bytes` as an array of such components. `copy` packs the same bytes tightly.
     pub(crate) fn get(
         &mut self,
         bytes: &[u8],
@@ -44,7 +44,7 @@ impl AttributeCache {
         pack.clone()
     }
 
-    /// A frame is over: what no draw used goes.
+    /// Ends a frame and drops what no draw used.
     pub(crate) fn frame_done(&mut self) {
         const KEPT_FRAMES: u64 = 3;
         self.frame += 1;

@@ -1,5 +1,4 @@
-//! When buffer objects were written: geometry in buffers is read once, and again only after
-//! somebody wrote to them.
+//! Counts writes to buffer objects. Geometry in buffers is read once, and again only after a write.
 
 use crate::capture::ImmediateModeTarget;
 use crate::interpose::calls::class;
@@ -9,18 +8,18 @@ use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use std::collections::HashMap;
 
-/// The writes to the buffers of a share group, counted.
+/// The numbers of the writes to the buffers of a share group.
 #[derive(Debug, Default)]
 pub(crate) struct BufferWrites {
     count: u64,
-    /// The last one to each buffer that was named.
+    /// The last write to each buffer that was named.
     named: HashMap<u32, u64>,
-    /// The last one to a buffer that was not.
+    /// The last write to a buffer that was not named.
     unnamed: u64,
 }
 
 impl BufferWrites {
-    /// A buffer was written, and nobody said which.
+    /// An unknown buffer was written.
     pub(crate) fn any(&mut self) {
         self.count += 1;
         self.unnamed = self.count;
@@ -28,8 +27,7 @@ impl BufferWrites {
     }
 
     fn to(&mut self, buffer: u32) {
-        /// Names of buffers come again; a program that counts them upwards must not fill our
-        /// memory.
+        /// Buffer names are reused. A program with ever higher names must not fill our memory.
         const MOST: usize = 1 << 16;
         if self.named.len() >= MOST {
             return self.any();
@@ -38,7 +36,7 @@ impl BufferWrites {
         self.named.insert(buffer, self.count);
     }
 
-    /// When the buffers of arrays and indices were written last.
+    /// The numbers of the last writes to the buffers of arrays and indices.
     pub(crate) fn last(&self, arrays: &[Option<ArraySource>; 7], indices: u32) -> [u64; 8] {
         let of = |buffer: u32| self.named.get(&buffer).copied().unwrap_or(self.unnamed);
         let array = |i: usize| arrays[i].map_or(0, |s| of(s.buffer));
@@ -47,14 +45,14 @@ impl BufferWrites {
 }
 
 impl Context {
-    /// The buffer bound to `target` is about to be written. The driver does it.
+    /// The driver is about to write the buffer bound to `target`.
     pub(crate) fn buffer_written(&mut self, target: u32) -> bool {
         self.watched_call(0, 0, false, false);
         let binding = match target {
             _ if self.capture.immediate_target == ImmediateModeTarget::Pass => 0,
             ARRAY_BUFFER => ARRAY_BUFFER_BINDING,
             ELEMENT_ARRAY_BUFFER => ELEMENT_ARRAY_BUFFER_BINDING,
-            // The name of the target is that of its binding; OpenGL 3.1.
+            // The name of the target is also that of its binding (OpenGL 3.1).
             TEXTURE_BUFFER if self.capabilities.version >= 31 => TEXTURE_BUFFER,
             _ => 0,
         };
@@ -66,7 +64,7 @@ impl Context {
         false
     }
 
-    /// Names of buffers, four bytes each, that may come again for others.
+    /// These buffers are deleted. Their names, of four bytes each, may be used again.
     pub(crate) fn buffers_deleted(&mut self, names: &[u8]) -> bool {
         self.watched_call(0, class::ARRAYS, false, false);
         let mut writes = self.shared.writes();

@@ -1,11 +1,11 @@
-//! Display lists: our own streams of immediate mode, with the driver's lists for everything else
-//! between them.
+//! Display lists: our own streams of immediate mode, alternating with lists of the driver's for all
+//! other calls.
 //!
 //! While a list is compiled, attribute and vertex calls go into our stream and all other calls into
-//! a list of the driver's. Where they alternate, the driver's list is closed and another begun;
-//! calling the list plays both in order, through the same methods that the program calls. So state
-//! is what it is at the time of the call, nested lists work, and the driver gets a primitive only
-//! when it is to draw it.
+//! a list of the driver's. Where they alternate, the driver's list is closed and another one begun.
+//! A call of the list executes both in order, through the same methods that the program calls. So
+//! the state is that at the time of the call, nested lists work, and the driver gets a primitive
+//! only when it must draw it.
 
 pub(crate) mod names;
 mod recording;
@@ -26,18 +26,18 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ListOp {
     Begin(u32),
-    /// The beginning of a draw of arrays, which is an error between Begin and End: then nothing of
-    /// it is drawn.
+    /// The beginning of a draw of arrays. Between Begin and End it is an error, and nothing of the
+    /// draw is drawn.
     BeginArrays(u32),
     End,
     Vertex([f32; 4]),
     Normal([f32; 3]),
     Color([f32; 4]),
     Tex([f32; 4]),
-    /// Index into the list's materials.
+    /// An index into the list's materials.
     Material(u32),
-    /// A list of the driver's, whether it draws things whose order matters, and whether it sets
-    /// maps of evaluators and nothing else.
+    /// A list of the driver's, with two flags: it draws things whose order matters, and it only
+    /// sets maps of evaluators.
     Driver {
         list: u32,
         draws: bool,
@@ -46,10 +46,10 @@ pub(crate) enum ListOp {
         textures: bool,
     },
     Call(u32),
-    /// Names relative to the list base at the time of the call.
+    /// A name relative to the list base at the time of the call.
     CallFromBase(u32),
     Rect([f32; 4]),
-    /// `glEvalCoord` of a curve, whose second parameter is nothing, or of a surface.
+    /// `glEvalCoord` of a curve, whose second parameter is unused, or of a surface.
     EvalCoord(MapKind, [f32; 2]),
     EvalPoint(MapKind, [i32; 2]),
     /// A filled mesh.
@@ -61,7 +61,7 @@ pub(crate) enum ListOp {
 pub(crate) struct DisplayList {
     ops: Vec<ListOp>,
     materials: Vec<(u32, u32, [f32; 4])>,
-    /// The driver's lists beside the one of the same name.
+    /// The driver's lists other than the one of the same name.
     segments: Vec<u32>,
 }
 
@@ -82,7 +82,7 @@ const DEEPEST: u32 = 64;
 impl Context {
     pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
         if crate::interpose::panic_guard::happened() {
-            // The driver's from now on.
+            // The name now belongs to the driver.
             self.shared.lists().lists.remove(&name);
             return false;
         }
@@ -115,7 +115,7 @@ impl Context {
             self.replay_to_driver("glEndList between Begin and End");
         }
         if self.capture.recording.as_ref().is_some_and(|r| r.execute && r.open) {
-            // What is compiled is also executed, and there a primitive is open.
+            // The list is also executed while it is compiled, and there a primitive is open.
             self.errors.push(INVALID_OPERATION);
             return true;
         }
@@ -155,14 +155,15 @@ impl Context {
         }
         let known = self.shared.lists().lists.get(&name).cloned();
         let Some(list) = known else {
-            // Not compiled by calls that we saw (fonts of glXUseXFont), or not there.
+            // Unknown, or compiled by calls that we did not see (fonts of glXUseXFont).
             self.call_driver(name, true, true);
             return true;
         };
         if self.capture.depth_of_lists >= DEEPEST {
             return true;
         }
-        // Quads in lists are split in another way than others: they are batches of their own.
+        // Quads in lists are split along the other diagonal than other quads, so they are batches
+        // of their own.
         if self.capture.depth_of_lists == 0
             && self.capture.recorder.quads
             && self.capture.immediate_target == ImmediateModeTarget::Outside
@@ -181,7 +182,7 @@ impl Context {
         true
     }
 
-    /// After a fault of ours: a list of ours into the driver as it is.
+    /// Sends one of our lists to the driver, after a fault.
     fn execute_in_driver(&mut self, name: u32) -> bool {
         let known = self.shared.lists().lists.get(&name).cloned();
         let Some(list) = known.filter(|_| self.capture.depth_of_lists < DEEPEST) else {
@@ -233,7 +234,7 @@ impl Context {
     fn execute(&mut self, list: &DisplayList) {
         let mut left_out = false;
         let mut done = 0;
-        // Arrays leave current values undefined, and Mesa as they were.
+        // After a draw of arrays the current values are undefined. Mesa leaves them as they were.
         let mut before_arrays: Option<CurrentAttributes> = None;
         for (i, op) in list.ops.iter().enumerate() {
             if i < done {
@@ -252,7 +253,7 @@ impl Context {
                 }
                 ListOp::Begin(mode) | ListOp::BeginArrays(mode) => {
                     let swallowed = self.begin(mode);
-                    // Not earlier: Begin asks the driver what is current.
+                    // Not earlier: Begin queries the current values.
                     before_arrays =
                         matches!(op, ListOp::BeginArrays(_)).then_some(self.attributes.current);
                     if !swallowed {
@@ -339,7 +340,7 @@ impl Context {
         }
     }
 
-    /// Current values are what they were before arrays.
+    /// Restores the current values from before a draw of arrays.
     fn restore_current_attributes(&mut self, before: Option<CurrentAttributes>) {
         let Some(b) = before else { return };
         if b.normal != self.attributes.current.normal && !self.normal(b.normal) {
@@ -353,9 +354,10 @@ impl Context {
         }
     }
 
-    /// Quads of a list that the driver draws, as the triangles that it makes of quads in lists: it
-    /// splits those of immediate mode along the other diagonal. Gives how many steps that were;
-    /// `None` where a quad is more than two filled triangles, or more than vertices come.
+    /// Sends the quads of a list to the driver as the triangles that it makes of quads in lists. In
+    /// immediate mode it splits quads along the other diagonal. Returns the number of steps, or
+    /// `None` when a quad is not just two filled triangles, or when other calls than vertices and
+    /// attributes come.
     fn execute_quads(&mut self, mode: u32, list: &DisplayList, ops: &[ListOp]) -> Option<usize> {
         let filled = self.state.snapshot.polygon_mode == [FILL; 2];
         if mode != QUADS
@@ -419,7 +421,7 @@ impl Context {
             }
             return true;
         }
-        // Between Begin and End of a primitive that the driver draws it answers no questions.
+        // Between Begin and End of a primitive that the driver draws, it answers no queries.
         let base = if self.capture.immediate_target == ImmediateModeTarget::Pass {
             self.state.snapshot.list_base
         } else {
@@ -430,7 +432,7 @@ impl Context {
             names.iter().any(|n| lists.lists.contains_key(&base.wrapping_add(*n)))
         };
         if !ours {
-            // A line of text in a font of glXUseXFont: one call for the driver.
+            // A line of text in a font of glXUseXFont is one call for the driver.
             self.before_driver_list(true, true);
             return false;
         }
@@ -455,7 +457,7 @@ impl Context {
             return None;
         }
         let first = self.shared.lists().reserve_names(n)?;
-        // Where a list is compiled its segment ends before.
+        // While a list is compiled, its segment ends first.
         if let Some(r) = &mut self.capture.recording {
             r.end_segment();
         }
@@ -469,7 +471,7 @@ impl Context {
         Some(first)
     }
 
-    /// Forgets our part; the driver then deletes its own.
+    /// Removes our part. The driver then deletes its own.
     pub(crate) fn delete_lists(&mut self, first: u32, n: i32) -> bool {
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glDeleteLists between Begin and End");
@@ -477,7 +479,8 @@ impl Context {
         let range = first..first.saturating_add(n.max(0).cast_unsigned());
         let gone: Vec<_> = {
             let mut lists = self.shared.lists();
-            // Few steps, whether the program names few lists or many that are not there.
+            // Takes the shorter loop, whether the program names few lists or many that do not
+            // exist.
             match lists.lists.len() < range.len() {
                 true => lists
                     .lists
@@ -492,7 +495,7 @@ impl Context {
     }
 }
 
-/// A step by evaluators, for the driver.
+/// Sends a step of evaluators to the driver.
 fn evaluate_in_driver(op: &ListOp) {
     match *op {
         ListOp::EvalCoord(MapKind::Curve, [u, _]) => gl::eval_coord1f(u),

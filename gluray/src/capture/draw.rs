@@ -1,4 +1,4 @@
-//! Draw calls as meshes: what is drawn, with which attributes, under which state.
+//! Draw calls as meshes, with their attributes and state.
 
 use crate::capture::geometry_cache::Geometry;
 use crate::classify::vtk::VtkProgram;
@@ -17,11 +17,11 @@ pub(crate) enum Values<const N: usize> {
     Constant([f32; N]),
     /// One per vertex.
     PerVertex(Vec<[f32; N]>),
-    /// One per vertex, as the program's arrays have them.
+    /// One per vertex, in the format of the program's arrays.
     Packed(Arc<PackedArray>),
 }
 
-/// A tightly packed array as the program gave it.
+/// A tightly packed array in the program's format.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PackedArray {
     pub(crate) bytes: Vec<u8>,
@@ -30,7 +30,7 @@ pub(crate) struct PackedArray {
     pub(crate) normalized: bool,
 }
 
-/// Bytes of one component of a type; 0 for types that we do not read.
+/// The number of bytes of one component of a type; 0 for types that are not read.
 pub(crate) fn component_bytes(kind: u32) -> usize {
     match kind {
         BYTE | UNSIGNED_BYTE => 1,
@@ -42,7 +42,7 @@ pub(crate) fn component_bytes(kind: u32) -> usize {
 }
 
 /// One component. Signed normalised values are c / (2^(b-1) - 1), at least -1 (OpenGL 4.2, equation
-/// 2.2), as Mesa's arrays have it.
+/// 2.2), as in Mesa's arrays.
 pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
     let signed =
         |v: f64, most: f64| if normalized { (v / most).max(-1.0) as f32 } else { v as f32 };
@@ -65,7 +65,7 @@ pub(crate) fn component(b: &[u8], kind: u32, normalized: bool) -> f32 {
 }
 
 impl PackedArray {
-    /// The value of vertex `i`; components that are not there come from `fill`.
+    /// The value of vertex `i`. Missing components come from `fill`.
     pub(crate) fn at<const N: usize>(&self, i: usize, fill: [f32; N]) -> [f32; N] {
         let one = component_bytes(self.kind);
         let start = i * one * self.size;
@@ -91,21 +91,21 @@ impl<const N: usize> Values<N> {
     }
 }
 
-/// Attributes of a draw.
+/// The attributes of a draw.
 #[derive(Debug, Clone)]
 pub(crate) struct Attributes {
     pub(crate) normals: Values<3>,
     pub(crate) colors: Values<4>,
     pub(crate) tex: Values<4>,
-    /// The materials that occur, and which a vertex has (empty: all the first).
+    /// The materials of the draw, and the index of each vertex's material (empty: all the first).
     pub(crate) materials: Vec<Materials>,
     pub(crate) material_of: Vec<u32>,
-    /// Of one geometry, attributes of the same version are the same; 0 says nothing.
+    /// For one geometry, attributes with the same version are equal. 0 means unknown.
     pub(crate) version: u64,
 }
 
 impl Attributes {
-    /// The same for all vertices.
+    /// The same attributes for all vertices.
     pub(crate) fn constant(current: &CurrentAttributes) -> Attributes {
         Attributes {
             normals: Values::Constant(current.normal),
@@ -117,18 +117,18 @@ impl Attributes {
         }
     }
 
-    /// Materials of vertex `i`.
+    /// The materials of vertex `i`.
     pub(crate) fn materials_at(&self, i: usize) -> &Materials {
         &self.materials[self.material_of.get(i).map_or(0, |m| *m as usize)]
     }
 }
 
-/// Who gives a draw its colours.
+/// What computes a draw's colours.
 #[derive(Debug, Clone)]
 pub(crate) enum Shading {
     /// OpenGL's fixed function.
     Fixed,
-    /// A shader that we know.
+    /// A recognised shader.
     Program(Arc<VtkProgram>),
 }
 
@@ -139,11 +139,11 @@ pub(crate) struct Draw {
     pub(crate) attributes: Arc<Attributes>,
     pub(crate) state: Arc<Snapshot>,
     pub(crate) shading: Shading,
-    /// Clip from object, column by column, as the driver has it in f32.
+    /// The matrix from object to clip space, column by column, as the driver has it in f32.
     pub(crate) clip_from_object: [f32; 16],
-    /// Counts the program's draw calls in it.
+    /// The number of the program's draw calls in it.
     pub(crate) calls: u64,
-    /// What the user makes of it.
+    /// The material that the user has set.
     pub(crate) ray_material: RayMaterial,
 }
 

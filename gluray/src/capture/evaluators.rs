@@ -1,9 +1,9 @@
-//! Evaluators: vertices that the driver makes of maps of control points (OpenGL 1.1, section 5.1),
-//! made by us.
+//! Evaluators: vertices from maps of control points (OpenGL 1.1, section 5.1), which the driver
+//! would otherwise compute.
 //!
-//! The driver keeps the maps. It is asked for those that are on when vertices come of them, and
-//! again after calls that may have changed them. What comes out goes the way of other vertices of
-//! immediate mode, and leaves what is current alone.
+//! The driver keeps the maps. The enabled ones are queried when vertices are evaluated, and again
+//! after calls that may have changed them. The results are recorded like other vertices of
+//! immediate mode and leave the current values alone.
 
 mod bernstein;
 mod casteljau;
@@ -19,10 +19,10 @@ use crate::state::enums::*;
 pub(crate) use maps::MapKind;
 use maps::{EvaluatedVertex, EvaluatorMaps};
 
-/// Points in a row of a mesh; with more the driver is left alone.
+/// The most points in a row of a mesh. The driver draws longer rows.
 const MOST_IN_ROW: i64 = 1 << 20;
 
-/// The grid that `glEvalPoint` and `glEvalMesh` count in.
+/// The grid of `glEvalPoint` and `glEvalMesh`.
 #[derive(Debug, Clone, Copy, Default)]
 struct EvaluatorGrid {
     first: [f32; 2],
@@ -47,7 +47,7 @@ impl EvaluatorGrid {
     }
 }
 
-/// What we know of the driver's maps and grids: curves, and surfaces.
+/// The driver's maps and grids as far as they are known: of curves, and of surfaces.
 #[derive(Default)]
 pub(crate) struct Evaluators {
     maps: [Option<EvaluatorMaps>; 2],
@@ -55,7 +55,7 @@ pub(crate) struct Evaluators {
 }
 
 impl Evaluators {
-    /// Maps may be others from now on.
+    /// The maps may have changed.
     pub(crate) fn forget(&mut self) {
         *self = Evaluators::default();
     }
@@ -73,7 +73,7 @@ impl Context {
     /// `glMap` and `glMapGrid`.
     pub(crate) fn invalidate_maps(&mut self) -> bool {
         match self.capture.immediate_target {
-            // An error, which the driver is to report.
+            // An error, which the driver reports.
             ImmediateModeTarget::Trace => self.replay_to_driver("a map between Begin and End"),
             ImmediateModeTarget::List => {
                 if let Some(r) = &mut self.capture.recording {
@@ -118,7 +118,7 @@ impl Context {
         if !self.take_evaluated(&e) {
             return false;
         }
-        // The next `glVertex` has what is current.
+        // The next `glVertex` has the current values.
         let c = self.attributes.current;
         if e.normal.is_some() {
             self.capture.recorder.set_normal(c.normal);
@@ -132,8 +132,8 @@ impl Context {
         true
     }
 
-    /// Records a vertex. When that cannot be, the driver has what there is of the primitive, and
-    /// false comes back.
+    /// Records a vertex. When that is not possible, the driver gets the primitive so far, and the
+    /// result is false.
     fn take_evaluated(&mut self, e: &EvaluatedVertex) -> bool {
         let [x, y, z, w] = e.position;
         let mut with = self.attributes.current;
@@ -165,7 +165,7 @@ impl Context {
         true
     }
 
-    /// `glEvalMesh1`: points or lines, which are the driver's.
+    /// `glEvalMesh1`: points or lines, which the driver draws.
     pub(crate) fn eval_mesh_1(&mut self, mode: u32) -> bool {
         match self.capture.immediate_target {
             ImmediateModeTarget::Trace => self.replay_to_driver("a mesh between Begin and End"),
@@ -180,7 +180,7 @@ impl Context {
         false
     }
 
-    /// Something comes out of `glEvalMesh`.
+    /// True when `glEvalMesh` gives vertices.
     fn has_vertices(&mut self, kind: MapKind) -> bool {
         if self.capabilities.core || self.capabilities.es {
             return false;
@@ -194,7 +194,7 @@ impl Context {
         let filled = mode == FILL;
         match self.capture.immediate_target {
             ImmediateModeTarget::Trace => {
-                // An error, which the driver is to report.
+                // An error, which the driver reports.
                 self.replay_to_driver("a mesh between Begin and End");
                 return false;
             }
@@ -242,8 +242,8 @@ impl Context {
         true
     }
 
-    /// Rows of a mesh as Mesa draws them: parameters are summed up, and quads are split as strips
-    /// of triangles are.
+    /// Traces the rows of a mesh as Mesa draws them: parameters are accumulated, and quads are
+    /// split like triangle strips.
     fn trace_mesh(&mut self, [i1, i2, j1, j2]: [i32; 4]) {
         let EvaluatorGrid { first, step } = self.capture.evaluators.grid(MapKind::Surface);
         let mut along = Vec::new();
@@ -260,7 +260,7 @@ impl Context {
             lower = upper;
             v += step[1];
         }
-        // The next Begin takes up what is current.
+        // The next Begin takes the current values.
         self.capture.recorder.behind = true;
     }
 

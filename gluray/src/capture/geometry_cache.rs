@@ -1,6 +1,5 @@
-//! Geometry that is there already: keyed by positions and connectivity alone, so that a moved
-//! camera, other colours or flipped normals (geomview turns them to the viewer each frame) rebuild
-//! nothing.
+//! Caches geometry by positions and connectivity alone. A moved camera, other colours or flipped
+//! normals (geomview turns them to the viewer in each frame) cause no rebuild.
 
 mod refit;
 
@@ -13,25 +12,25 @@ use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
-/// A mesh with the structure that rays need, made when the first ray comes.
+/// A mesh with its acceleration structure, which is built for the first ray.
 pub(crate) struct Geometry {
     /// Triangles; the provoking vertex of each comes last.
     pub(crate) mesh: Arc<TriMesh>,
-    /// Names the content.
+    /// The hash of the content.
     pub(crate) key: u128,
     world: Mutex<Option<Arc<World>>>,
     best: OnceLock<Arc<World>>,
     bounds: OnceLock<Aabb>,
-    /// The same triangles where they were before.
+    /// The same triangles in an earlier frame, at their former positions.
     before: Weak<Geometry>,
 }
 
-/// How structures came to be.
+/// The numbers of structures that were built and refitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct BuildCounts {
     /// Built.
     pub(crate) built: u64,
-    /// Taken over from where the triangles were before.
+    /// Refitted from the triangles' former positions.
     pub(crate) refitted: u64,
 }
 
@@ -57,7 +56,7 @@ impl Geometry {
         *self.bounds.get_or_init(|| self.mesh.bounds())
     }
 
-    /// The structure, built now if need be; `None` when the mesh cannot be built.
+    /// The structure, built now if necessary. `None` when the mesh cannot be built.
     pub(crate) fn world(&self, made: &mut BuildCounts) -> Option<Arc<World>> {
         if let Some(best) = self.best.get() {
             return Some(best.clone());
@@ -70,15 +69,15 @@ impl Geometry {
         if let Some(world) = self.kept().clone() {
             return Some(world);
         }
-        // Nothing is locked meanwhile. Several frames' jobs are on the pool that builds: a thread
-        // of it which waits for a part of the build takes another job, and that may want the same
+        // Nothing is locked meanwhile. The pool that builds also has jobs of several frames. A
+        // thread that waits for a part of the build takes another job, which may need the same
         // structure.
         let moved = self.before.upgrade().and_then(|before| refit::structure(&before, &self.mesh));
         let refitted = moved.is_some();
         let world = moved.or_else(|| build(&self.mesh, BuildQuality::Fast));
         let mut kept = self.kept();
-        // Another may have come first: all take that one. A mesh that cannot be built is tried
-        // again.
+        // Another thread may have been first: all take its structure. A mesh that cannot be built
+        // is tried again.
         if kept.is_none() {
             made.refitted += u64::from(refitted);
             made.built += u64::from(!refitted);
@@ -87,18 +86,18 @@ impl Geometry {
         kept.clone()
     }
 
-    /// What there is of the quick structures. To be held for an instant, and not while rays are
+    /// The quick structures so far. The lock is held only for an instant, never while rays are
     /// traced or trees are built.
     fn kept(&self) -> MutexGuard<'_, Option<Arc<World>>> {
         self.world.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The structure, if there is one.
+    /// The structure, if it exists.
     fn structure_now(&self) -> Option<Arc<World>> {
         self.best.get().cloned().or_else(|| self.kept().clone())
     }
 
-    /// Builds the best structure and keeps it: for geometry that rests, in the background.
+    /// Builds the best structure and keeps it. This runs in the background for geometry that rests.
     pub(crate) fn improve(&self) {
         if self.best.get().is_none()
             && let Some(world) = build(&self.mesh, BuildQuality::Best)
@@ -122,7 +121,7 @@ fn build(mesh: &Arc<TriMesh>, quality: BuildQuality) -> Option<Arc<World>> {
 
 struct CacheEntry {
     geometry: Arc<Geometry>,
-    /// Frame in which it was used last, and in how many frames it was.
+    /// The last frame that used it, and the number of frames that did.
     last_used: u64,
     frames: u32,
     improving: bool,
@@ -133,20 +132,20 @@ struct CacheEntry {
 pub(crate) struct GeometryCache {
     entries: HashMap<u128, CacheEntry>,
     frame: u64,
-    /// Look-ups that found something, and those that did not.
+    /// The numbers of look-ups that succeeded and failed.
     pub(crate) hits: u64,
     pub(crate) misses: u64,
 }
 
-/// Frames after which unused geometry goes.
+/// The number of frames after which unused geometry is dropped.
 const KEPT_FRAMES: u64 = 3;
-/// Frames after which geometry counts as resting.
+/// The number of frames after which geometry counts as resting.
 const RESTING_FRAMES: u32 = 4;
-/// Triangles from which a better structure is worth a thread.
+/// The number of triangles from which a better structure is worth a thread.
 const WORTH_IMPROVING: usize = 20_000;
 
 impl GeometryCache {
-    /// The geometry of primitives in a row.
+    /// The geometry of consecutive primitives.
     pub(crate) fn of_runs(
         &mut self,
         positions: &[[f32; 3]],
@@ -196,7 +195,7 @@ impl GeometryCache {
         }
     }
 
-    /// Geometry of a name, if it is there.
+    /// The geometry with this key, if it is known.
     pub(crate) fn known(&mut self, key: u128) -> Option<Arc<Geometry>> {
         let frame = self.frame;
         let e = self.entries.get_mut(&key)?;
@@ -206,7 +205,7 @@ impl GeometryCache {
         Some(e.geometry.clone())
     }
 
-    /// New geometry that the caller named.
+    /// New geometry with a key of the caller's.
     pub(crate) fn put(
         &mut self,
         key: u128,
@@ -230,7 +229,7 @@ impl GeometryCache {
         geometry
     }
 
-    /// What new geometry was in the frames before: the same triangles, not drawn in this frame.
+    /// Finds what new geometry was in earlier frames: the same triangles, not drawn in this frame.
     fn before(&self, mesh: &TriMesh) -> Weak<Geometry> {
         const WORTH_REFITTING: usize = 1000;
         if mesh.num_triangles() < WORTH_REFITTING {
@@ -241,15 +240,15 @@ impl GeometryCache {
             .entries
             .iter()
             .filter(|(_, e)| e.last_used < self.frame && size(&e.geometry.mesh) == size(mesh));
-        // Indices are compared with those of one alone: a program may have a thousand shapes of one
-        // size.
+        // The indices are compared with those of one candidate alone, because a program may have a
+        // thousand shapes of one size.
         match was.max_by_key(|(key, e)| (e.last_used, **key)) {
             Some((_, e)) if e.geometry.mesh.indices == mesh.indices => Arc::downgrade(&e.geometry),
             _ => Weak::new(),
         }
     }
 
-    /// Geometry that was found another way is in use.
+    /// Marks geometry as used that was found without a look-up.
     pub(crate) fn touch(&mut self, geometry: &Arc<Geometry>) {
         let frame = self.frame;
         let fresh = || CacheEntry {
@@ -263,7 +262,7 @@ impl GeometryCache {
         e.last_used = frame;
     }
 
-    /// A frame is over: what was not used for long goes, what rests gets a better structure.
+    /// Ends a frame: drops what was unused for long, and improves the structures of what rests.
     pub(crate) fn frame_done(&mut self, improve: impl Fn(Arc<Geometry>) -> bool) {
         self.frame += 1;
         let now = self.frame;
@@ -296,8 +295,8 @@ fn mix(h: u128, v: u64) -> u128 {
     u128::from(a2 ^ b.rotate_left(17)) | u128::from(b2 ^ a.rotate_left(31)) << 64
 }
 
-/// A 128-bit hash of the arrays' bytes, on all threads. Not meant against malice: a collision shows
-/// another frame's shape.
+/// A 128-bit hash of the arrays' bytes, on all threads. It is not safe against malice: a collision
+/// shows another frame's shape.
 pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
     use rayon::prelude::*;
     const CHUNK: usize = 1 << 18;
@@ -309,7 +308,7 @@ pub(crate) fn hash(arrays: &[&[u8]]) -> u128 {
             continue;
         }
         let parts: Vec<u128> = match crate::host::config::current().settings.asynchronous {
-            // The pool is busy with the frame before.
+            // The pool is busy with the previous frame.
             true => a.chunks(CHUNK).map(hash_chunk).collect(),
             false => {
                 crate::trace::thread_pool::on_pool(|| a.par_chunks(CHUNK).map(hash_chunk).collect())

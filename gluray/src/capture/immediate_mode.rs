@@ -1,4 +1,4 @@
-//! Immediate mode: Begin and End, and the attributes that vertices take with them.
+//! Immediate mode: Begin and End, vertices, and the attributes that vertices take.
 
 use crate::capture::ImmediateModeTarget;
 use crate::classify::rules::Classification;
@@ -11,21 +11,21 @@ use crate::state::enums::*;
 use crate::state::material::set_material;
 use crate::state::material_properties::MaterialProperties;
 
-/// What the short way of a call came to. It takes values and calls nothing, so that they stay in
-/// registers: a value that has been put into memory in parts and is read back whole costs more than
-/// all the rest of a call.
+/// The result of the fast path of a call. The fast path takes values and calls nothing, so that
+/// they stay in registers: a value that is stored in parts and loaded as a whole costs more than
+/// the rest of the call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FastPathResult {
-    /// That was all.
+    /// The call is handled.
     Done,
-    /// The driver draws what is between Begin and End.
+    /// The driver draws the primitive between Begin and End.
     Driver,
-    /// The long way has to be taken. Nothing has happened that it may not do again.
+    /// The slow path must be taken. It may do everything again.
     Slow,
 }
 
 impl Context {
-    /// The short way of `glBegin`.
+    /// The fast path of `glBegin`.
     #[inline(always)]
     pub(crate) fn begin_fast(&mut self, mode: u32) -> FastPathResult {
         let ready = self.capture.immediate_target == ImmediateModeTarget::Outside
@@ -51,7 +51,7 @@ impl Context {
         }
     }
 
-    /// Alpha left 1 while that was what a draw was traced for.
+    /// Passes a primitive to the driver that is traced only while alpha is 1.
     #[inline]
     fn watch_alpha(&mut self) {
         if self.capture.immediate_target == ImmediateModeTarget::Trace
@@ -66,7 +66,7 @@ impl Context {
     fn begin_slow(&mut self, mode: u32) -> bool {
         match self.capture.immediate_target {
             ImmediateModeTarget::List => return self.capture.list_begin(mode),
-            // An error, which the driver is to report.
+            // An error, which the driver reports.
             ImmediateModeTarget::Trace => {
                 self.replay_to_driver("Begin between Begin and End");
                 return false;
@@ -113,7 +113,7 @@ impl Context {
         }
     }
 
-    /// The short way of `glEnd`.
+    /// The fast path of `glEnd`.
     #[inline(always)]
     pub(crate) fn end_fast(&mut self) -> FastPathResult {
         if self.capture.immediate_target == ImmediateModeTarget::Trace
@@ -151,7 +151,7 @@ impl Context {
         }
     }
 
-    /// The short way of `glVertex`.
+    /// The fast path of `glVertex`.
     #[inline(always)]
     pub(crate) fn vertex_fast(&mut self, v: [f32; 4]) -> FastPathResult {
         match self.capture.immediate_target {
@@ -189,8 +189,8 @@ impl Context {
         }
     }
 
-    /// The short way of `glNormal`. Outside of Begin and End it is only remembered: what vertices
-    /// take counts, and the next Begin looks.
+    /// The fast path of `glNormal`. Outside of Begin and End the value is only stored, because only
+    /// the values at vertices count. The next Begin reads it.
     #[inline(always)]
     pub(crate) fn normal_fast(&mut self, v: [f32; 3]) -> FastPathResult {
         match self.capture.immediate_target {
@@ -221,7 +221,7 @@ impl Context {
         }
     }
 
-    /// The short way of `glColor`.
+    /// The fast path of `glColor`.
     #[inline(always)]
     pub(crate) fn color_fast(&mut self, v: [f32; 4]) -> FastPathResult {
         match self.capture.immediate_target {
@@ -263,7 +263,7 @@ impl Context {
         }
     }
 
-    /// The short way of `glTexCoord`.
+    /// The fast path of `glTexCoord`.
     #[inline(always)]
     pub(crate) fn tex_coord_fast(&mut self, v: [f32; 4]) -> FastPathResult {
         match self.capture.immediate_target {
@@ -300,7 +300,7 @@ impl Context {
         }
         let mut materials = self.attributes.current.materials;
         if !set_material(&mut materials, face, what, v) {
-            // An error, which the driver is to report.
+            // An error, which the driver reports.
             if self.capture.immediate_target == ImmediateModeTarget::Trace {
                 self.replay_to_driver("an invalid material");
             }
@@ -310,7 +310,8 @@ impl Context {
         if self.capture.immediate_target == ImmediateModeTarget::Outside {
             self.attributes.set_since_draw.add(properties);
         }
-        // Ours may be behind the driver's (after PopAttrib, say): then the driver alone is told.
+        // Our value may be older than the driver's (after PopAttrib, for example), so the driver
+        // gets the call.
         if self.capture.immediate_target == ImmediateModeTarget::Pass
             || self.state.dirty & class::CURRENT != 0
         {
@@ -329,7 +330,7 @@ impl Context {
 
     pub(crate) fn rect(&mut self, [x, y, x2, y2]: [f32; 4]) -> bool {
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
-            // An error, which the driver is to report.
+            // An error, which the driver reports.
             self.replay_to_driver("a rectangle between Begin and End");
         }
         if self.capture.immediate_target == ImmediateModeTarget::Pass {

@@ -1,6 +1,6 @@
-//! From OpenGL's primitives to triangles, split and turned as the driver does it: colours across a
-//! quad, and the flat colour of a triangle, depend on it (compatibility profile specification,
-//! section 10.1; Mesa's vertex order).
+//! Converts OpenGL's primitives to triangles, split and rotated as in the driver. The colours
+//! across a quad and the flat colour of a triangle depend on it (compatibility profile
+//! specification, section 10.1; Mesa's vertex order).
 
 use crate::state::enums::*;
 
@@ -12,24 +12,24 @@ pub(crate) struct PrimitiveRun {
     pub(crate) times: u32,
 }
 
-/// True for what covers area.
+/// True for primitives that cover an area.
 pub(crate) fn is_filled(mode: u32) -> bool {
     (TRIANGLES..=POLYGON).contains(&mode)
 }
 
 /// How primitives become triangles.
 ///
-/// OpenGL leaves open along which diagonal a quad is split, and Mesa does it along either: from the
-/// second vertex to the fourth when the quads are flat, indexed, or in a display list, and when it
-/// has to clip any vertex of the up to 4096 that it draws at once; else from the first to the
-/// third. Colours and bent quads show which.
+/// OpenGL does not specify the diagonal along which a quad is split, and Mesa uses either. It
+/// splits from the second vertex to the fourth when the quads are flat, indexed, or in a display
+/// list, and when it must clip any vertex of the up to 4096 that it draws at once. Otherwise it
+/// splits from the first to the third. Colours and non-planar quads show the difference.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(crate) struct QuadSplit {
     /// The convention for the vertex of the flat colour.
     pub(crate) first_provokes: bool,
     /// All quads are split from the second vertex to the fourth.
     pub(crate) all_turned: bool,
-    /// Ranges of vertices (first, end) of which the quads are.
+    /// The vertex ranges (first, end) of these quads.
     pub(crate) turned: Vec<[u32; 2]>,
 }
 
@@ -38,16 +38,15 @@ impl QuadSplit {
         self.all_turned || self.turned.iter().any(|[first, end]| (*first..*end).contains(&vertex))
     }
 
-    /// Finds what is clipped: `outside` says for a range of vertices whether any of them is.
-    /// `first..end` is one draw of quads to the driver.
+    /// Finds the clipped quads. `outside` returns whether any vertex of a range is clipped. The
+    /// driver draws `first..end` as one draw of quads.
     pub(crate) fn find_clipped_quads(
         &mut self,
         first: u32,
         end: u32,
         outside: impl Fn(u32, u32) -> bool,
     ) {
-        // Beyond, geometry would be built anew for what nobody sees: quads of that number are
-        // small.
+        // With more quads, geometry would be rebuilt for a difference that is too small to see.
         const MOST: u32 = 1 << 16;
         const AT_ONCE: u32 = 4096;
         if self.all_turned || end - first > MOST {
@@ -62,8 +61,8 @@ impl QuadSplit {
     }
 }
 
-/// The triangles of a primitive whose vertices are numbered `first..first + count`; the vertex that
-/// gives the flat colour comes last. Incomplete primitives give nothing, as OpenGL has it.
+/// The triangles of a primitive whose vertices are numbered `first..first + count`. The vertex that
+/// gives the flat colour comes last. Incomplete primitives give nothing, as in OpenGL.
 pub(crate) fn triangulate(
     mode: u32,
     first: u32,
@@ -73,7 +72,7 @@ pub(crate) fn triangulate(
 ) {
     let v = |i: u32| first + i;
     let first_provokes = split.first_provokes;
-    // Rotates so that vertex 0 (the first) comes last; the orientation stays.
+    // Rotates so that vertex 0 (the first) comes last. The orientation stays.
     let provoked = |t: [u32; 3]| if first_provokes { [t[1], t[2], t[0]] } else { t };
     match mode {
         TRIANGLES => {
@@ -100,7 +99,7 @@ pub(crate) fn triangulate(
             let [a, b, c, d] = [0, 1, 2, 3].map(|k| v(2 * i + k));
             [[c, a, d], [a, b, d]]
         })),
-        // A polygon's flat colour is that of its first vertex, whatever the convention.
+        // The first vertex of a polygon gives its flat colour, whatever the convention.
         POLYGON => out.extend((1..count.saturating_sub(1)).map(|i| [v(i), v(i + 1), v(0)])),
         _ => {}
     }

@@ -1,7 +1,7 @@
-//! Vertex arrays: client memory or buffer objects, indexed or not, to meshes.
+//! Converts vertex arrays to meshes: client memory or buffer objects, indexed or not.
 //!
-//! The driver is asked which arrays are on when the draw comes. Client memory is copied then and
-//! there, because the program may change it as soon as the call returns.
+//! The driver is asked at the draw which arrays are enabled. Client memory is copied immediately,
+//! because the program may change it as soon as the call returns.
 
 use crate::capture::ImmediateModeTarget;
 use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
@@ -22,11 +22,11 @@ use crate::trace::overrides::RayMaterial;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// What the driver is asked about the array of positions.
+/// The queries for the array of positions.
 const POSITION: [u32; 4] =
     [VERTEX_ARRAY_TYPE, VERTEX_ARRAY_STRIDE, VERTEX_ARRAY_POINTER, VERTEX_ARRAY_BUFFER_BINDING];
 
-/// The fixed-function arrays that are on.
+/// The enabled fixed-function arrays.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct VertexArrays {
     pub(crate) position: ArraySource,
@@ -36,7 +36,7 @@ pub(crate) struct VertexArrays {
 }
 
 impl VertexArrays {
-    /// The array of positions alone.
+    /// Only the array of positions.
     pub(crate) fn query_position() -> Result<ArraySource, &'static str> {
         if !gl::is_enabled(VERTEX_ARRAY) {
             return Err("no vertex array");
@@ -44,7 +44,7 @@ impl VertexArrays {
         Ok(ArraySource::of_fixed(ComponentCount::Asked(VERTEX_ARRAY_SIZE), POSITION, false, true))
     }
 
-    /// As the driver has them; an error in words when rays cannot stand for them.
+    /// The driver's arrays, or the reason why rays cannot replace a draw of them.
     pub(crate) fn query(version: u32) -> Result<VertexArrays, &'static str> {
         let buffers = version >= 15;
         if !gl::is_enabled(VERTEX_ARRAY) {
@@ -118,27 +118,27 @@ impl VertexArrays {
     }
 }
 
-/// What became of a draw that is not left to the driver alone.
+/// The result of a draw that is not the driver's alone.
 pub(crate) enum ArrayDrawOutcome {
-    /// Rays make its pixels.
+    /// Rays compute its pixels.
     Traced,
-    /// The driver makes its colours, rays its shadows.
+    /// The driver computes its colours, and rays its shadows.
     Shape,
 }
 
-/// Which vertices a draw takes.
+/// The vertices of a draw.
 pub(crate) enum VertexSelection {
-    /// Neighbours in the arrays.
+    /// Consecutive vertices of the arrays.
     Range { first: usize, count: usize },
-    /// By index; `least` is the smallest, `count` the span.
+    /// Vertices by index. `least` is the smallest index, `count` the span.
     Indexed { indices: Vec<u32>, least: usize, count: usize },
 }
 
 impl VertexSelection {
-    /// Stands for the index at which a primitive ends and another begins.
+    /// The index at which a primitive ends and another one begins.
     const RESTART: u32 = u32::MAX;
 
-    /// From indices of `width` bytes each, and the one that restarts primitives.
+    /// Decodes indices of `width` bytes each, with the index that restarts primitives.
     pub(crate) fn indexed(
         bytes: &[u8],
         width: usize,
@@ -162,15 +162,14 @@ impl VertexSelection {
             return Ok(VertexSelection::Indexed { indices, least: 0, count: 0 });
         };
         let count = (most - least) as usize + 1;
-        // Client arrays of unknown length: an index that is out of order must not make us read
-        // gigabytes.
+        // The length of client arrays is unknown: a wrong index must not make us read gigabytes.
         if count > 1 << 28 {
             return Err("indices that are too far apart");
         }
         Ok(VertexSelection::Indexed { indices, least: least as usize, count })
     }
 
-    /// Names the geometry of these elements of an array of positions, whose bytes are given.
+    /// The key of the geometry of these elements of an array of positions, whose bytes are given.
     fn key(
         &self,
         mode: u32,
@@ -194,7 +193,7 @@ impl VertexSelection {
         }
     }
 
-    /// First vertex, and how many there are from it on.
+    /// The first vertex, and the number of vertices from it on.
     pub(crate) fn span(&self) -> (usize, usize) {
         match self {
             VertexSelection::Range { first, count } => (*first, *count),
@@ -220,7 +219,7 @@ impl VertexSelection {
         out
     }
 
-    /// How the driver splits quads where nobody knows what it clips.
+    /// How the driver splits quads when it is unknown what it clips.
     pub(crate) fn plain_split(&self, first_provokes: bool) -> QuadSplit {
         QuadSplit {
             first_provokes,
@@ -229,7 +228,7 @@ impl VertexSelection {
         }
     }
 
-    /// How the driver would split quads: see [`QuadSplit`].
+    /// How the driver splits quads: see [`QuadSplit`].
     pub(crate) fn split(
         &self,
         mode: u32,
@@ -261,7 +260,7 @@ impl VertexSelection {
         split
     }
 
-    /// Triangles, in vertex numbers of the span.
+    /// The triangles, as vertex numbers of the span.
     pub(crate) fn triangles(&self, mode: u32, split: &QuadSplit) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
         match self {
@@ -277,8 +276,7 @@ impl VertexSelection {
         out
     }
 
-    /// Vertex numbers of the span in the order they are drawn; `None` where a primitive ends and
-    /// another begins.
+    /// The vertex numbers of the span in drawing order. `None` separates primitives.
     fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
         match self {
             VertexSelection::Range { count, .. } => Box::new((0..*count).map(Some)),
@@ -294,7 +292,7 @@ impl VertexSelection {
     }
 }
 
-/// Positions as x, y, z; points with w > 0 are divided by it.
+/// Positions as x, y, z. Points with w > 0 are divided by it.
 pub(crate) fn positions(p: &PackedArray) -> Result<Vec<[f32; 3]>, &'static str> {
     if p.kind == FLOAT && p.size == 3 {
         return Ok(bytemuck::pod_collect_to_vec(&p.bytes));
@@ -313,7 +311,7 @@ pub(crate) fn positions(p: &PackedArray) -> Result<Vec<[f32; 3]>, &'static str> 
 }
 
 impl Context {
-    /// A draw call of arrays, by their order or by indices.
+    /// A draw call of arrays, in order or by indices.
     pub(crate) fn draw(&mut self, mode: u32, call: &ActiveCall<'_>) -> bool {
         let (key, restart) = match call.named() {
             DrawArguments::Elements { count, kind, at, base } => {
@@ -359,7 +357,7 @@ impl Context {
         let taken = match classification {
             _ if !is_filled(mode) => Err("lines and points"),
             _ if self.restarts() => Err("primitive restart"),
-            // Recognised programs decide for themselves what blending means.
+            // Recognised programs have their own rules for blending.
             _ if self.state.snapshot.program != 0 => self.take_program_arrays(mode, call, elements),
             Classification::Pass(why) => Err(why),
             v => self.take_arrays(mode, elements, v).map(|()| ArrayDrawOutcome::Traced),
@@ -367,7 +365,7 @@ impl Context {
         KeptErrors::drop_ours();
         match taken {
             Ok(ArrayDrawOutcome::Traced) => true,
-            // The driver draws it, and rays darken it when the frame ends.
+            // The driver draws it, and rays darken it at the end of the frame.
             Ok(ArrayDrawOutcome::Shape) => {
                 self.attributes.sync();
                 self.state.mark_current(&self.capabilities);
@@ -378,7 +376,7 @@ impl Context {
                 if is_filled(mode) {
                     self.classifier.programs.begin_redraw(&self.state.snapshot);
                 }
-                // The arrays of the driver's draw leave some current values undefined.
+                // After the driver's draw of arrays some current values are undefined.
                 self.state.mark_current(&self.capabilities);
                 false
             }
@@ -390,7 +388,7 @@ impl Context {
             || self.capabilities.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX)
     }
 
-    /// The index that restarts primitives, if one does.
+    /// The index that restarts primitives, if any.
     fn restart_index(&self, kind: u32) -> Option<u32> {
         if self.capabilities.version >= 43 && gl::is_enabled(PRIMITIVE_RESTART_FIXED_INDEX) {
             return Some(u32::MAX >> (32 - 8 * component_bytes(kind).clamp(1, 4)));
@@ -470,8 +468,8 @@ impl Context {
         Ok(())
     }
 
-    /// While a list is compiled the arrays are read at once, as OpenGL says, and become steps of
-    /// it.
+    /// While a list is compiled, the arrays are read immediately, as OpenGL specifies, and become
+    /// steps of the list.
     fn array_into_list<'c>(
         &mut self,
         mode: u32,

@@ -1,9 +1,9 @@
-//! Immediate mode, recorded: positions, attributes that cost nothing while they do not change, and
-//! how vertices make primitives.
+//! Records immediate mode: positions, attributes that cost nothing while they do not change, and
+//! the primitives.
 //!
-//! A call only puts its values into a ring. Whenever it is full, its vertices are compared, all at
-//! once and bit for bit, with those that came at the same place of the frame before, and written
-//! down where they are others.
+//! A call only puts its values into a ring. When the ring is full, its vertices are compared, all
+//! at once and bit for bit, with those at the same position of the previous frame. They are stored
+//! where they differ.
 
 mod attribute_stream;
 mod earlier_frames;
@@ -21,14 +21,14 @@ use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Vertices of the ring.
+/// The number of vertices in the ring.
 const RING: usize = 64;
 
-/// The latest vertices, which nobody has looked at.
+/// The latest vertices, which have not been compared yet.
 struct VertexRing {
     positions: [[f32; 3]; RING],
     normals: [[f32; 3]; RING],
-    /// Vertices that came with a normal of their own: bit by bit.
+    /// The vertices that came with a normal of their own, as bits.
     set: u64,
 }
 
@@ -40,44 +40,44 @@ impl Default for VertexRing {
 
 const NO_RUN: PrimitiveRun = PrimitiveRun { mode: 0, count: u32::MAX, times: 0 };
 
-/// Immediate mode: the vertices since the state changed last.
+/// The vertices of immediate mode since the last change of state.
 pub(crate) struct VertexRecorder {
-    /// Vertices so far. Those from `flushed` on are in the ring alone.
+    /// The number of vertices so far. Those from `flushed` on are only in the ring.
     count: usize,
-    /// At this count a vertex takes the long way.
+    /// At this count a vertex takes the slow path.
     limit: usize,
     flushed: usize,
     ring: VertexRing,
-    /// First vertex of the primitive between Begin and End, and its mode.
+    /// The first vertex of the primitive between Begin and End, and its mode.
     open: usize,
     mode: u32,
     /// Primitives of one kind and size that are not in `runs` yet.
     run: PrimitiveRun,
-    /// Current values were set outside of Begin and End, and the streams do not know.
+    /// Current values were set outside of Begin and End, and the streams do not have them.
     pub(crate) behind: bool,
-    /// An attribute besides positions and normals is written down for each vertex.
+    /// An attribute besides positions and normals is stored for each vertex.
     more: bool,
-    /// Positions, unless they are those of `expected` so far.
+    /// Positions, unless they equal those of `expected` so far.
     pub(crate) positions: Vec<[f32; 3]>,
-    /// What this batch seems to be. While it is right no position is written down, and in the end
-    /// nothing has to be hashed.
+    /// The batch that this one seems to repeat. While it does, no position is stored, and at the
+    /// end nothing has to be hashed.
     expected: Option<Arc<TriMesh>>,
     /// Batches of earlier frames by their first position.
     earlier: HashMap<[u32; 3], EarlierBatch>,
     frame: u64,
     normals: AttributeStream<3>,
-    /// The values of `normals` are those of a whole earlier batch: of this version, unless one was
+    /// The values of `normals` are those of a whole earlier batch with this version, unless one was
     /// changed.
     kept: Option<u64>,
     changed: bool,
-    /// The latest vertex' normal.
+    /// The normal of the latest vertex.
     last_normal: [f32; 3],
     colors: AttributeStream<4>,
     tex: AttributeStream<4>,
     materials: Vec<Materials>,
     material_of: Vec<u32>,
     pub(crate) runs: Vec<PrimitiveRun>,
-    /// There are quads in the batch.
+    /// True when there are quads in the batch.
     pub(crate) quads: bool,
     versions: u64,
 }
@@ -124,12 +124,12 @@ impl VertexRecorder {
         }
     }
 
-    /// The mode of the primitive that is open, or was last.
+    /// The mode of the primitive that is open, or of the last one.
     pub(crate) fn mode(&self) -> u32 {
         self.mode
     }
 
-    /// A batch begins, or what was set between its primitives counts from now on.
+    /// Begins a batch, or takes the values that were set between its primitives.
     #[cold]
     #[inline(never)]
     fn take_up(&mut self, current: &CurrentAttributes) {
@@ -171,7 +171,7 @@ impl VertexRecorder {
         }
     }
 
-    /// The next vertex has another normal.
+    /// Sets the normal of the next vertex.
     #[inline(always)]
     pub(crate) fn set_normal(&mut self, v: [f32; 3]) {
         let at = self.count % RING;
@@ -203,7 +203,7 @@ impl VertexRecorder {
         self.limit = self.count + 1;
     }
 
-    /// The material is another from the next vertex on.
+    /// The next vertices have another material.
     pub(crate) fn set_materials(&mut self, m: &Materials) {
         let n = self.count;
         if n == 0 {
@@ -217,7 +217,7 @@ impl VertexRecorder {
         self.materials.push(*m);
     }
 
-    /// A vertex with what is current.
+    /// Adds a vertex with the current attributes.
     #[inline(always)]
     pub(crate) fn vertex(&mut self, v: [f32; 3], current: &CurrentAttributes) {
         self.ring.positions[self.count % RING] = v;
@@ -248,7 +248,7 @@ impl VertexRecorder {
         self.limit = if self.more { self.count + 1 } else { (self.count / RING + 1) * RING };
     }
 
-    /// Looks at what is in the ring.
+    /// Compares the vertices in the ring.
     fn empty_ring(&mut self) {
         let n = self.count - self.flushed;
         if n == 0 {
@@ -285,7 +285,7 @@ impl VertexRecorder {
 
     fn flush_normals(&mut self, new: std::ops::Range<usize>) {
         let ring = &mut self.ring;
-        // Only what was set before one of these vertices counts.
+        // Only values that were set before one of these vertices count.
         let of_these = (u64::MAX >> (RING - new.len())) << new.start;
         let set = ring.set & of_these;
         if set == 0 && !self.normals.varying {
@@ -323,13 +323,13 @@ impl VertexRecorder {
         }
     }
 
-    /// All that came is looked at, and all primitives are in `runs`.
+    /// Compares all vertices, and puts all primitives into `runs`.
     pub(crate) fn flush_ring(&mut self) {
         self.empty_ring();
         self.put_run();
     }
 
-    /// Whether any position of a range of the batch is what `is` looks for.
+    /// True when `is` holds for any position of a range of the batch.
     pub(crate) fn any_position(&self, from: u32, to: u32, is: impl Fn([f32; 3]) -> bool) -> bool {
         let range = from as usize..to as usize;
         match &self.expected {
@@ -338,7 +338,7 @@ impl VertexRecorder {
         }
     }
 
-    /// The vertices that were followed become our own.
+    /// Copies the vertices that were followed so far.
     pub(crate) fn copy_followed_vertices(&mut self) {
         if let Some(mesh) = self.expected.take() {
             self.positions.clear();
@@ -349,7 +349,7 @@ impl VertexRecorder {
         }
     }
 
-    /// The vertices of the open primitive with their attributes, taken out again: for the driver.
+    /// Takes out the vertices of the open primitive with their attributes, for the driver.
     pub(crate) fn take_open_primitive(&mut self) -> (u32, Vec<([f32; 3], CurrentAttributes)>) {
         self.empty_ring();
         self.copy_followed_vertices();
@@ -401,9 +401,8 @@ impl VertexRecorder {
         }
     }
 
-    /// All attributes of the batch, which is of this geometry; the recorder is empty then but for
-    /// positions and runs, which stay for the caller to look at and clear. The batch must be
-    /// settled.
+    /// All attributes of the batch, whose geometry is given. Then the recorder is empty except for
+    /// positions and runs, which the caller clears. The ring must be flushed.
     pub(crate) fn take_attributes(&mut self, geometry: &Arc<Geometry>) -> Attributes {
         let version = self.version(geometry);
         self.more = false;

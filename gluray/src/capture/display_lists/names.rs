@@ -1,10 +1,10 @@
-//! Names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of
+//! The names of lists: those that `glGenLists` gives, and those that `glCallLists` gets in any of
 //! OpenGL's types.
 
 use super::{DisplayLists, FIRST_SEGMENT};
 use crate::state::enums::*;
 
-/// Names in one go that programs may want; nobody waits for more.
+/// The most names in one request. No program needs more.
 const MOST_NAMES: i32 = 1 << 20;
 
 impl DisplayLists {
@@ -20,7 +20,7 @@ impl DisplayLists {
     }
 }
 
-/// Bytes of a name of `glCallLists`; `None` for a type that OpenGL refuses.
+/// The number of bytes of a name of `glCallLists`; `None` for a type that OpenGL refuses.
 pub(crate) fn width(kind: u32) -> Option<usize> {
     match kind {
         BYTE | UNSIGNED_BYTE => Some(1),
