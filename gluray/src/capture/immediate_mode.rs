@@ -20,7 +20,7 @@ pub(crate) enum FastPathResult {
     Done,
     /// The driver draws the primitive between Begin and End.
     Driver,
-    /// The slow path must be taken. It may do everything again.
+    /// The slow path must be taken. Nothing was done that may not be repeated.
     Slow,
 }
 

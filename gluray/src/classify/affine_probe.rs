@@ -1,11 +1,10 @@
-//! Programs whose shaders are not understood, in mode `enhance`: what their vertex shader does to
-//! positions is found by asking it.
+//! Finds what an unknown vertex shader does to positions, in mode `enhance`.
 //!
 //! The program is linked so that `gl_Position` can be captured. At a draw, some of its vertices go
-//! through its own vertex shader with rasterization off; the attribute of which clip coordinates
-//! are an affine function is the position, and that function is the matrix. So positions stay in
-//! object space, hierarchies are used again, and no shader has to be read. The driver draws the
-//! colours; rays find out how dark corners and shadows make them.
+//! through its own vertex shader with rasterization off. The attribute of which the clip
+//! coordinates are an affine function is the position, and that function is the matrix. So
+//! positions stay in object space, hierarchies are reused, and no shader is parsed. The driver
+//! draws the colours, and rays compute by how much corners and shadows darken them.
 
 use crate::capture::draw::{Attributes, Draw, Shading};
 use crate::capture::geometry_cache::{Geometry, hash};
@@ -25,30 +24,31 @@ use rt_core::glam::{DMat4, DVec3, DVec4};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Vertices that are asked about.
+/// The number of vertices that are captured.
 const ASKED: usize = 48;
-/// Share of the largest clip coordinate by which an affine function may miss the shader's: a few
+/// The largest residual of an affine function, as a share of the largest clip coordinate: a few
 /// roundings of f32.
 const RESIDUAL: f64 = 3e-5;
 
-/// Draws whose shapes are kept.
+/// The number of draws whose shapes are kept.
 const MOST_KEPT: usize = 4096;
 
-/// What is kept of the programs that were asked.
+/// The programs that were probed, and their shapes.
 #[derive(Default)]
 pub(crate) struct AffineProbes {
-    /// Programs whose positions can be captured.
+    /// The programs, and whether their positions can be captured.
     ready: HashMap<u32, bool>,
     made: HashMap<u128, Arc<Geometry>>,
-    /// Matrix and eye space of the first draw of the frame; the others are placed by it.
+    /// The matrix and eye space of the first draw of the frame. The others are placed relative to
+    /// it.
     reference: Option<(DMat4, DMat4)>,
     /// Draws of this frame.
     draws: Vec<Draw>,
 }
 
 impl AffineProbes {
-    /// Links `program` once more so that its positions can be captured, where nobody captures
-    /// anything else.
+    /// Links `program` once more so that its positions can be captured, unless it captures
+    /// something itself.
     pub(super) fn prepare(
         &mut self,
         program: u32,
@@ -78,19 +78,19 @@ impl AffineProbes {
         !self.draws.is_empty()
     }
 
-    /// The draws of this frame whose image of the driver is to be darkened.
+    /// The draws of this frame that are to be darkened in the driver's image.
     pub(crate) fn take_draws(&mut self) -> Vec<Draw> {
         self.reference = None;
         std::mem::take(&mut self.draws)
     }
 
-    /// The draws are cleared before anybody sees them.
+    /// Drops the draws, because they are cleared before anybody sees them.
     pub(crate) fn drop_draws(&mut self) {
         self.draws.clear();
     }
 }
 
-/// Finds `clip = M (x, y, z, 1)` by least squares; the residual is relative to the largest clip
+/// Finds `clip = M (x, y, z, 1)` by least squares. The residual is relative to the largest clip
 /// coordinate. `None` when the points lie in a plane.
 fn fit(points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<(DMat4, f64)> {
     let vector = |p: &[f32; 3]| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
@@ -100,7 +100,7 @@ fn fit(points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<(DMat4, f64)> {
     if size <= 0.0 || !size.is_finite() {
         return None;
     }
-    // Centred and scaled, so that the normal equations are well conditioned whatever the units.
+    // Centred and scaled, so that the normal equations are well conditioned in any unit.
     let local = |p: &[f32; 3]| ((vector(p) - center) / size).extend(1.0);
     let (mut normal, mut right) = (DMat4::ZERO, [DVec4::ZERO; 4]);
     for (p, c) in points.iter().zip(clip) {
@@ -119,7 +119,7 @@ fn fit(points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<(DMat4, f64)> {
     Some((m, residual(&m, points, clip)))
 }
 
-/// How far `m` misses, relative to the largest clip coordinate.
+/// The residual of `m`, relative to the largest clip coordinate.
 fn residual(m: &DMat4, points: &[[f32; 3]], clip: &[[f32; 4]]) -> f64 {
     let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
     for (p, c) in points.iter().zip(clip) {
@@ -131,7 +131,7 @@ fn residual(m: &DMat4, points: &[[f32; 3]], clip: &[[f32; 4]]) -> f64 {
     if scale > 0.0 && worst.is_finite() { worst / scale } else { f64::INFINITY }
 }
 
-/// The program's own matrices, for points in a plane, which do not tell a matrix.
+/// Finds the matrix among the program's uniforms, for points in a plane, which do not determine it.
 fn by_uniforms(program: u32, points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<DMat4> {
     feedback::active_uniforms(program)
         .into_iter()
@@ -145,8 +145,8 @@ fn by_uniforms(program: u32, points: &[[f32; 3]], clip: &[[f32; 4]]) -> Option<D
 }
 
 impl Context {
-    /// Takes the shape of a draw that the driver is about to draw with a program that is not
-    /// understood; why not, in words.
+    /// Takes the shape of a draw that the driver is about to draw with an unknown program. The
+    /// error is the reason why this is not possible.
     pub(crate) fn take_shape<'c>(
         &mut self,
         mode: u32,
@@ -191,7 +191,7 @@ impl Context {
                 format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()
             ]);
             let geometry = match self.classifier.probes.made.get(&key) {
-                // Client memory may have other contents by now.
+                // Client memory may have changed.
                 Some(made) if source.buffer != 0 => made.clone(),
                 _ => {
                     let Ok(packed) = source.read(&elements) else { continue };
@@ -225,7 +225,7 @@ impl Context {
             return Err("a matrix that rays cannot be made for");
         };
         let reference = *self.classifier.probes.reference.get_or_insert((m, view));
-        // The same for all that the first one places, to the last bit.
+        // Equal to the last bit for all draws that the first one places.
         let own = m * view.inverse();
         let shared = reference.0 * reference.1.inverse();
         let same = (own - shared).to_cols_array().iter().all(|v| v.abs() < 1e-4);
@@ -237,7 +237,7 @@ impl Context {
             model_view: f32s(view),
             projection: f32s(projection),
             lighting: true,
-            // White by itself, so that what is left is what rays find out.
+            // White itself, so that the result is what the rays contribute.
             lights: vec![GlLight {
                 position: [x, y, z, 0.0],
                 spot_cutoff_deg: 180.0,
@@ -272,19 +272,19 @@ impl Context {
     }
 }
 
-/// Settings under which a probed draw comes out as the factor on its colours.
+/// Settings under which the result of a probed draw is the factor on its colours.
 pub(crate) fn factor_settings(settings: &Settings) -> Settings {
     Settings { mode: Mode::Enhance, samples: 1, ..settings.clone() }
 }
 
-/// Arrays that may be positions: three or four floating-point components, or two.
+/// The arrays that may be positions: three or four floating-point components, or two.
 fn candidates(program: u32, core: bool) -> Vec<ArraySource> {
     let mut out: Vec<ArraySource> = feedback::active_attributes(program)
         .into_iter()
         .filter_map(|name| crate::classify::vtk::attribute(program, &name))
         .filter(|s| matches!(s.kind, FLOAT | DOUBLE | SHORT | HALF_FLOAT) && s.size >= 2)
         .collect();
-    // Positions mostly come first, and have more components than texture coordinates.
+    // Positions usually come first and have more components than texture coordinates.
     out.sort_by_key(|s| s.size < 3);
     if !core && let Ok(arrays) = crate::capture::vertex_arrays::VertexArrays::query_position() {
         out.insert(0, arrays);
@@ -292,7 +292,7 @@ fn candidates(program: u32, core: bool) -> Vec<ArraySource> {
     out
 }
 
-/// Clip coordinates of vertices, by the program's own vertex shader.
+/// The clip coordinates of vertices, computed by the program's own vertex shader.
 fn ask(numbers: &[u32]) -> Vec<[f32; 4]> {
     let elements = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
     let generic = gl::word(TRANSFORM_FEEDBACK_BUFFER_BINDING);

@@ -1,5 +1,5 @@
-//! Which draws are traced and which the driver draws: rules on the state, VTK's shader programs,
-//! and the probe that finds out whether an unknown vertex shader is an affine map.
+//! Decides which draws are traced and which the driver draws: rules on the state, VTK's shader
+//! programs, and the probe that finds out whether an unknown vertex shader is an affine map.
 
 pub(crate) mod affine_probe;
 pub mod reasons;
@@ -10,9 +10,9 @@ use affine_probe::AffineProbes;
 use rules::Classification;
 use vtk::VtkPrograms;
 
-/// What is known of the draws in the present state, and of the programs of a context.
+/// The classification of draws in the present state, and the programs of a context.
 pub(crate) struct Classifier {
-    /// What becomes of filled primitives in the state of the last snapshot.
+    /// The classification of filled primitives in the state of the last snapshot.
     pub(crate) classification: Classification,
     pub(crate) probes: AffineProbes,
     pub(crate) programs: VtkPrograms,

@@ -1,19 +1,19 @@
-//! Which draws are traced, and which the driver draws: by state, never by the type of projection
-//! (an orthographic main view is the rule in scientific programs).
+//! Decides by the state which draws are traced and which the driver draws. The type of projection
+//! does not matter: an orthographic main view is common in scientific programs.
 
 use crate::host::config::{Settings, Trace};
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 
-/// What becomes of a draw.
+/// The classification of a draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Classification {
-    /// Traced with the frame's others; the nearest wins, as with any depth test.
+    /// Traced with the other draws of the frame. The nearest fragment wins, as with any depth test.
     Trace,
-    /// Traced as long as every vertex has alpha 1: blending and alpha test then change nothing.
-    /// Otherwise passed, for the reason.
+    /// Traced as long as every vertex has alpha 1, because blending and alpha test then change
+    /// nothing. Otherwise passed, for the reason.
     TraceIfOpaque(&'static str),
-    /// Traced at once, every layer in the order of the primitives: for states in which order
+    /// Traced at once, every layer in the order of the primitives, for states in which order
     /// matters.
     TraceInOrder,
     /// The driver draws it, for the reason given.
@@ -26,10 +26,10 @@ pub(crate) enum TraceFilter {
     /// Opaque surfaces with a depth test: see the rules below.
     #[default]
     Surfaces,
-    /// Those, and translucent ones whose order a depth test and blending over decide: rays sort
-    /// them.
+    /// The same, and translucent ones whose order is decided by a depth test and blending over.
+    /// Rays sort them.
     Translucent,
-    /// Every filled primitive that can be.
+    /// Every filled primitive that can be traced.
     All,
     /// None: everything is passed.
     Nothing,
@@ -47,16 +47,16 @@ impl TraceFilter {
     }
 }
 
-/// Pixels of a viewport from which on pictures would cost gigabytes.
+/// The number of pixels of a viewport from which images would take gigabytes.
 pub(crate) const MOST_PIXELS: i32 = 1 << 26;
 
-/// The verdict over filled primitives in state `s`.
+/// Classifies filled primitives in state `s`.
 pub(crate) fn classify(s: &Snapshot, trace: TraceFilter) -> Classification {
     use Classification::Pass;
     if trace == TraceFilter::Nothing {
         return Pass("tracing is off");
     }
-    // ---- What rays cannot stand for ----
+    // ---- What rays cannot replace ----
     if s.render_mode != RENDER && s.render_mode != 0 {
         return Pass("selection or feedback");
     }
@@ -111,7 +111,7 @@ pub(crate) fn classify(s: &Snapshot, trace: TraceFilter) -> Classification {
     if s.viewport[2] > MOST_PIXELS / s.viewport[3] {
         return Pass("a viewport too large to trace");
     }
-    // ---- What has to happen in order ----
+    // ---- What must be drawn in order ----
     let why = if s.stencil_test {
         "stencil test"
     } else if s.logic_op {
@@ -139,7 +139,7 @@ pub(crate) fn classify(s: &Snapshot, trace: TraceFilter) -> Classification {
         }
         why
     } else if s.texture.is_some() && !s.lighting {
-        // Text and pictures; surfaces with colour maps are lit.
+        // Text and images. Surfaces with colour maps are lit.
         return if trace == TraceFilter::All {
             Classification::Trace
         } else {
@@ -149,15 +149,15 @@ pub(crate) fn classify(s: &Snapshot, trace: TraceFilter) -> Classification {
         return Classification::Trace;
     };
     match trace {
-        // The test is the driver's, of alphas in eight bits.
+        // The driver's test compares alphas of eight bits.
         TraceFilter::All if s.alpha_test_of_equality => Pass("an alpha test for equality"),
         TraceFilter::All => Classification::TraceInOrder,
         _ => Pass(why),
     }
 }
 
-/// True when lines and points drawn now may come before or after traced surfaces: the depth test
-/// decides.
+/// True when lines and points that are drawn now may come before or after traced surfaces, because
+/// the depth test decides.
 pub(crate) fn commutes(s: &Snapshot) -> bool {
     s.depth_test
         && s.depth_mask

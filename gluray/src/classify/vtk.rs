@@ -1,10 +1,10 @@
-//! Programs with shaders: VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) is recognised,
-//! all others are the driver's.
+//! Programs with shaders. Those of VTK's family (ParaView, PyVista, Slicer, VisIt, Mayavi) are
+//! recognised. The driver draws all others.
 //!
-//! VTK assembles its shaders from pieces. A program counts as recognised only when its sources are
-//! such pieces, whose meaning is written down in `blocks` and `signature`, in VTK's order and with
-//! nothing else among them: a shader with anything else in it (picking, lights from pictures, what
-//! a script has replaced) is left to the driver.
+//! VTK assembles its shaders from blocks. A program is recognised only when its sources consist of
+//! such blocks, whose meaning `blocks` and `signature` describe, in VTK's order and with nothing
+//! else among them. The driver draws with any other shader, for example for picking, for lights
+//! from images, or after a script has replaced something.
 
 mod actor_texture;
 mod blocks;
@@ -47,19 +47,19 @@ pub(crate) fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<
     VtkShaderSignature::read(vertex, geometry, fragment).map(|_| ())
 }
 
-/// Which buffers a draw reads: while none was written, what was made of them serves again.
+/// The buffers that a draw reads. Until one of them is written, the results are reused.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct DrawCacheKey {
     sources: Sources,
     elements: (u32, usize, usize, u32, usize),
     /// The number of the first triangle in buffer textures.
     first: i32,
-    /// When each of them was written last.
+    /// The numbers of their last writes.
     written: [u64; 8],
 }
 
-/// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of
-/// pictures where they are apart.
+/// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of the
+/// actor's texture where they are separate.
 type Sources = [Option<ArraySource>; 7];
 
 /// The programs of a context.
@@ -73,7 +73,7 @@ pub(crate) struct VtkPrograms {
     shadow_maps: ShadowMaps,
 }
 
-/// What was made of a draw's buffers, and the frame that used it last.
+/// The data that was made of a draw's buffers, and the frame that used it last.
 struct CachedDraw {
     geometry: Arc<Geometry>,
     attributes: Arc<Attributes>,
@@ -82,7 +82,7 @@ struct CachedDraw {
 }
 
 impl VtkPrograms {
-    /// A frame is over: what no draw asked for goes.
+    /// Ends a frame and drops what no draw used.
     pub(crate) fn frame_done(&mut self) {
         const KEPT_FRAMES: u64 = 3;
         self.frame += 1;
@@ -126,15 +126,15 @@ impl AttachedSources {
     }
 }
 
-/// A generic attribute's array by name; `None` when the program has no such attribute or its array
-/// is off.
+/// The array of a generic attribute by name. `None` when the program has no such attribute or its
+/// array is disabled.
 pub(crate) fn attribute(program: u32, name: &str) -> Option<ArraySource> {
     let at = u32::try_from(gl::attrib_location(program, name)).ok()?;
     ArraySource::of_attribute(at)
 }
 
 impl Context {
-    /// `glLinkProgram`: the shaders are attached now, and perhaps never again.
+    /// `glLinkProgram`: the shaders are attached now, perhaps for the last time.
     pub(crate) fn link_program(&mut self, program: u32) -> bool {
         self.attributes.sync();
         gl::link_program(program);
@@ -197,7 +197,7 @@ impl Context {
             Some(position),
             attribute(program, "normalMC"),
             attribute(program, "scalarColor"),
-            // VTK 9.7 names the coordinates of colour maps apart from those of pictures.
+            // VTK 9.7 separates the coordinates of colour maps from those of the actor's texture.
             attribute(program, "colorTCoord").or_else(|| attribute(program, "tcoord")),
             cells(signature.colors == ColorSource::PerCell, "textureC")?,
             cells(signature.edges, "edgeTexture")?,
@@ -254,7 +254,7 @@ impl Context {
         let recognised = recognised.with_cells(&cells);
         self.capture.geometry_cache.touch(&geometry);
         let filter = TraceFilter::of(&self.config.settings);
-        // VTK leaves blending on; without transparency it changes nothing.
+        // VTK leaves blending enabled. Without transparency it changes nothing.
         let mut state = (*self.state.snapshot).clone();
         if signature.depth_offset {
             if state.polygon_offset.is_some() {
@@ -328,11 +328,11 @@ impl Context {
                     None => Ok(()),
                 }
             })?;
-        // Only there do all samplers see what is stored.
+        // Only these formats give the same components in all samplers.
         if image.is_of_colors() { Ok(image) } else { Err("a picture of luminance or alpha alone") }
     }
 
-    /// The image that a program's sampler has, if rays can follow its filters.
+    /// The image of a program's sampler, if rays can reproduce its filters.
     fn image_of(
         &mut self,
         program: u32,
@@ -389,7 +389,7 @@ impl Context {
     }
 }
 
-/// Factor and units of polygon offset that move depths as VTK's shader does.
+/// The factor and units of polygon offset that move depths as VTK's shader does.
 fn polygon_offset_of(program: u32) -> (f32, f32) {
     let one = |name: &str| match gl::uniform_location(program, name) {
         -1 => 0.0,
@@ -400,7 +400,8 @@ fn polygon_offset_of(program: u32) -> (f32, f32) {
     (one("cFactor"), units as f32)
 }
 
-/// What buffer textures have for the triangles of a draw, of which the first has number `first`.
+/// The contents of buffer textures for the triangles of a draw. The first triangle has number
+/// `first`.
 fn read_cells(sources: &Sources, first: i32, triangles: usize) -> Result<CellData, &'static str> {
     let first = usize::try_from(first).map_err(|_| "a negative number of a cell")?;
     let [.., colors, sides, _] = sources;

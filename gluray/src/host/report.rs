@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// The account of one process.
+/// The report of one process.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Report {
@@ -23,15 +23,15 @@ pub struct Report {
     pub mode: String,
     /// The driver's renderer and version.
     pub driver: String,
-    /// Frames: buffer swaps, and read-backs of what was traced.
+    /// Frames: buffer swaps, and read-backs of traced draws.
     pub frames: u64,
     /// Draw calls traced (a Begin/End pair is one).
     pub traced_draws: u64,
     /// Draw calls that the driver drew.
     pub passed_draws: u64,
-    /// Why, with counts.
+    /// The reasons for it, with counts.
     pub passed_reasons: BTreeMap<String, u64>,
-    /// How often what was pending was drawn, and before which calls.
+    /// How often pending draws were presented, and before which calls.
     pub flushes: BTreeMap<String, u64>,
     /// Rays sent.
     pub rays: BTreeMap<String, u64>,
@@ -39,35 +39,35 @@ pub struct Report {
     pub triangles: u64,
     /// Acceleration structures built.
     pub builds: u64,
-    /// Acceleration structures taken over from where the same triangles were in an earlier frame.
+    /// Acceleration structures refitted from where the same triangles were in an earlier frame.
     pub refits: u64,
-    /// Geometry found again, and not.
+    /// Look-ups of geometry that was known.
     pub cache_hits: u64,
-    /// Geometry seen for the first time.
+    /// Look-ups of geometry that was new.
     pub cache_misses: u64,
-    /// Pictures that were shown once more without a ray, because nothing had changed.
+    /// Images that were shown again without a ray, because nothing had changed.
     pub pictures_again: u64,
-    /// Images of textures read from the driver: one for each texture that is drawn with after it
-    /// changed.
+    /// Images of textures read from the driver: one for each texture that is drawn with after a
+    /// change.
     pub textures_read: u64,
     /// Pixels that traced surfaces covered.
     pub pixels: u64,
-    /// Milliseconds, by phase, summed.
+    /// Milliseconds by phase, summed.
     pub milliseconds: BTreeMap<String, f64>,
-    /// Errors of ours; the driver drew from then on.
+    /// Errors of ours. The driver drew from then on.
     pub faults: Vec<String>,
-    /// Settings that made no sense and were not taken.
+    /// Settings that were invalid and were not applied.
     pub problems: Vec<String>,
-    /// What each rank did, where helpers trace as well; 0 is the program.
+    /// Statistics of each rank, where helpers trace as well. Rank 0 is the program.
     pub ranks: Vec<crate::cluster::RankStats>,
     /// Objects of the last frame, largest first.
     pub objects: Vec<crate::host::panel::ObjectInfo>,
-    /// When each phase ran, in the order in which they ended: the first two hundred thousand.
+    /// When each phase ran, in the order of their ends: the first two hundred thousand.
     pub timeline: Vec<crate::host::timeline::Span>,
 }
 
 impl Report {
-    /// Adds another process' account.
+    /// Adds the report of another process.
     pub fn add(&mut self, other: &Report) {
         fn sum<V: Copy + Default + std::ops::Add<Output = V>>(
             a: &mut BTreeMap<String, V>,
@@ -109,48 +109,48 @@ impl Report {
     }
 }
 
-/// When the file is to be written.
+/// Decides when the file is written.
 #[derive(Debug, Default)]
 struct WriteSchedule {
-    /// The first change.
+    /// The time of the first change.
     begun: Option<Instant>,
     written: Option<Instant>,
-    /// Something has changed since.
+    /// Something has changed since the last write.
     behind: bool,
-    /// The process that has a thread which writes when the time has come. A child that was forked
-    /// has none of its parent's threads.
+    /// The process that has a thread which waits for the next write. A forked child has none of its
+    /// parent's threads.
     waiting: Option<u32>,
 }
 
-/// What becomes of a change.
+/// What to do after a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum WriteDecision {
-    /// The file is written.
+    /// Write the file now.
     Write,
-    /// After this time, by somebody who waits for it.
+    /// Write it after this time. The caller starts a thread that waits.
     Wait(Duration),
-    /// Somebody waits already.
+    /// Nothing: a thread waits already.
     Leave,
 }
 
 impl WriteSchedule {
-    /// Longest time between two writings.
+    /// The longest time between two writes.
     const LONGEST: Duration = Duration::from_secs(1);
-    /// Shortest time, but for writings at an end.
+    /// The shortest time between two writes, except at an end.
     const SHORTEST: Duration = Duration::from_millis(20);
 
     const fn new() -> WriteSchedule {
         WriteSchedule { begun: None, written: None, behind: false, waiting: None }
     }
 
-    /// Time between two writings: a tenth of the program's life so far, within the limits. Nothing
-    /// of ours runs in a program that is killed, and this is what its report lacks then.
+    /// The time between two writes: a tenth of the program's life so far, within the limits. A
+    /// program that is killed runs no exit handler, so its report lacks at most this time.
     fn pause(&self, now: Instant) -> Duration {
         let life = self.begun.map_or(Duration::ZERO, |b| now.saturating_duration_since(b));
         (life / 10).clamp(Self::SHORTEST, Self::LONGEST)
     }
 
-    /// Something has changed; `at_once` when the process or a context may be at its end.
+    /// Something has changed. `at_once` means that the process or a context may be at its end.
     fn changed(&mut self, now: Instant, at_once: bool, process: u32) -> WriteDecision {
         self.behind = true;
         self.begun.get_or_insert(now);
@@ -166,7 +166,7 @@ impl WriteSchedule {
         WriteDecision::Wait(pause - since)
     }
 
-    /// Whoever waited has waited; true when there still is something to write.
+    /// The waiting thread is done. True when there still is something to write.
     fn waited(&mut self) -> bool {
         self.waiting = None;
         self.behind
@@ -177,39 +177,39 @@ impl WriteSchedule {
     }
 }
 
-/// The process that drew: a child that was forked and draws nothing has its parent's numbers, and
-/// nothing to tell.
+/// The process that drew. A forked child that draws nothing has its parent's numbers, and nothing
+/// to report.
 static DRAWING: AtomicU32 = AtomicU32::new(0);
 static SCHEDULE: Mutex<WriteSchedule> = Mutex::new(WriteSchedule::new());
-/// One writing at a time.
+/// Only one thread writes at a time.
 static WRITING: Mutex<()> = Mutex::new(());
 
 fn schedule() -> std::sync::MutexGuard<'static, WriteSchedule> {
     SCHEDULE.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-/// Counters of one context.
+/// The counters of one context.
 #[derive(Default)]
 pub(crate) struct Counters {
     pub(crate) report: Report,
-    /// Which slot of the process' sum this context has.
+    /// The slot of this context in the sum of the process.
     slot: Option<usize>,
 }
 
-/// Phases that have ended since the last writing.
+/// The phases that have ended since the last write.
 static SPANS: Mutex<SpanRecorder> = Mutex::new(SpanRecorder::new(20_000));
-/// Lines of phases in the file; a run of hours must not fill a disk.
+/// The number of phases in the file. A run of hours must not fill a disk.
 static SPANS_WRITTEN: AtomicUsize = AtomicUsize::new(0);
 const MOST_SPANS: usize = 200_000;
 
-/// A phase ended just now that took so long; `track` says on which thread.
+/// A phase ended now, after this time. `track` names the thread.
 pub(crate) fn span(track: &str, phase: &str, frame: u64, took: Duration) {
     if crate::host::config::current().run_dir.is_some() {
         SPANS.lock().unwrap_or_else(|e| e.into_inner()).ended(track, phase, frame, took);
     }
 }
 
-/// Appends what is new; a program that ends without a word loses nothing that way.
+/// Appends new phases, so that a program that is killed loses none.
 fn write_spans(file: &Path) {
     let new = SPANS.lock().unwrap_or_else(|e| e.into_inner()).take();
     if new.is_empty() || SPANS_WRITTEN.fetch_add(new.len(), Relaxed) > MOST_SPANS {
@@ -217,7 +217,7 @@ fn write_spans(file: &Path) {
     }
     let lines =
         new.iter().filter_map(|s| Some(serde_json::to_string(s).ok()? + "\n")).collect::<String>();
-    // A report that cannot be written must not trouble the program.
+    // A report that cannot be written must not disturb the program.
     if let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(file) {
         file.write_all(lines.as_bytes()).ok();
     }
@@ -230,7 +230,7 @@ impl Counters {
         self.report.driver = format!("{renderer}, {version}");
     }
 
-    /// Rays draw so many calls of the program, of so many triangles.
+    /// Rays draw this many calls of the program, with this many triangles.
     pub(crate) fn count_traced(&mut self, calls: u64, triangles: usize) {
         self.report.traced_draws += calls;
         self.report.triangles += triangles as u64;
@@ -249,7 +249,7 @@ impl Counters {
         self.report.refits += structures.refitted;
     }
 
-    /// Something that was asked for could not be done; said once.
+    /// Reports, once, that something could not be done as it was asked for.
     pub(crate) fn warn(&mut self, text: String) {
         if !self.report.problems.contains(&text) && self.report.problems.len() < 100 {
             self.report.problems.push(text);
@@ -282,7 +282,7 @@ impl Counters {
         *self.report.milliseconds.entry(phase.to_owned()).or_default() += time.as_secs_f64() * 1e3;
     }
 
-    /// Brings the file up to date: at once when this may be the end, else within a second.
+    /// Updates the file: at once when this may be the end, otherwise within a second.
     pub(crate) fn publish(&mut self, at_once: bool) {
         let Some(dir) = crate::host::config::current().run_dir.clone() else { return };
         {
@@ -296,7 +296,7 @@ impl Counters {
             }
         }
         DRAWING.store(std::process::id(), Relaxed);
-        // Bound, so that the lock is not held while the file is written.
+        // A variable, so that the lock is not held while the file is written.
         let step = schedule().changed(Instant::now(), at_once, std::process::id());
         match step {
             WriteDecision::Write => write(&dir),
@@ -320,7 +320,7 @@ impl Counters {
     }
 }
 
-/// The process ends: what has not been written yet is.
+/// The process ends: writes what has not been written yet.
 pub(crate) fn write_final_report() {
     if DRAWING.load(Relaxed) != std::process::id() {
         return;
@@ -334,7 +334,7 @@ pub(crate) fn write_final_report() {
 /// Writes the file.
 fn write(dir: &Path) {
     let _one = WRITING.lock().unwrap_or_else(|e| e.into_inner());
-    // Before the numbers are looked at: what changes from here on is written next time.
+    // Before the numbers are read: later changes are part of the next write.
     schedule().wrote(Instant::now());
     let mut sum = Report::default();
     SLOTS.lock().unwrap_or_else(|e| e.into_inner()).iter().for_each(|s| sum.add(s));
@@ -351,7 +351,7 @@ fn write(dir: &Path) {
     write_spans(&dir.join(format!("{}.spans", sum.pid)));
     let (file, fresh) =
         (dir.join(format!("{}.json", sum.pid)), dir.join(format!("{}.new", sum.pid)));
-    // A report that cannot be written must not trouble the program.
+    // A report that cannot be written must not disturb the program.
     if let Ok(text) = serde_json::to_vec(&sum)
         && std::fs::write(&fresh, text).is_ok()
     {

@@ -1,4 +1,4 @@
-//! Current normal, colour, texture coordinate and material: what a vertex takes with it.
+//! The current normal, colour, texture coordinate and material, which a vertex takes.
 
 use super::material::{Materials, set_material};
 use super::material_properties::MaterialProperties;
@@ -7,7 +7,7 @@ use crate::interpose::symbols;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 
-/// What the next vertex takes with it.
+/// The values that the next vertex takes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct CurrentAttributes {
     pub(crate) normal: [f32; 3],
@@ -16,7 +16,7 @@ pub(crate) struct CurrentAttributes {
     pub(crate) materials: Materials,
 }
 
-/// Bits of what the driver has not been told yet.
+/// Bits of the attributes that the driver has not been told yet.
 pub(crate) mod stale {
     pub(crate) const NORMAL: u8 = 1;
     pub(crate) const COLOR: u8 = 2;
@@ -25,7 +25,7 @@ pub(crate) mod stale {
     pub(crate) const ALL: u8 = NORMAL | COLOR | TEX | MATERIAL;
 }
 
-/// The current attributes, and which of them the driver has not been told yet.
+/// The current attributes, and those that the driver has not been told yet.
 #[derive(Default)]
 pub(crate) struct AttributeState {
     pub(crate) current: CurrentAttributes,
@@ -120,9 +120,9 @@ impl CurrentAttributes {
         }
     }
 
-    /// The colour, where the driver's material is not what colour material makes of it. Mesa
-    /// compares colours: set the same colour again after `glMaterial`, and the material stays,
-    /// which then lights what has no colours of its own.
+    /// The colour, if the driver's material is not what colour material makes of it. Mesa compares
+    /// colours: when the same colour is set again after `glMaterial`, the material stays, and then
+    /// lights draws without colours of their own.
     pub(crate) fn untracked_color(&self, color_material: Option<(u32, u32)>) -> Option<[f32; 4]> {
         let (face, what) = color_material?;
         let mut followed = self.materials;
@@ -130,13 +130,13 @@ impl CurrentAttributes {
         (followed != self.materials).then_some(self.color)
     }
 
-    /// Tells the driver what `bits` name; of materials, these properties.
+    /// Sends the attributes in `bits` to the driver; of materials, these properties.
     pub(crate) fn send(&self, bits: u8, of_materials: MaterialProperties) {
         let [r, g, b, a] = self.color;
         if bits & stale::MATERIAL != 0 {
             of_materials.send(&self.materials);
         }
-        // After the materials: with colour material the colour is one of them.
+        // After the materials, because colour material makes the colour one of them.
         if bits & stale::COLOR != 0 {
             gl::color4f(r, g, b, a);
         }
@@ -148,7 +148,7 @@ impl CurrentAttributes {
         }
     }
 
-    /// Tells the driver, which knows `before`, what is new.
+    /// Sends what has changed since `before` to the driver.
     pub(crate) fn send_changes(&self, before: &CurrentAttributes) {
         let bit = |changed: bool, bits: u8| if changed { bits } else { 0 };
         // Materials may replace what colour material made of the colour.

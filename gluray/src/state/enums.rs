@@ -153,8 +153,8 @@ constants! {
     STENCIL_BACK_VALUE_MASK = 0x8ca4, STENCIL_BACK_WRITEMASK = 0x8ca5,
 }
 
-/// What a stencil test asks and does, for front and for back faces: function, reference, masks, and
-/// the three outcomes.
+/// The stencil test for front and for back faces: function, reference, masks, and the three
+/// operations.
 pub(crate) const STENCIL_FRONT_AND_BACK: [(u32, u32); 7] = [
     (STENCIL_FUNC, STENCIL_BACK_FUNC),
     (STENCIL_REF, STENCIL_BACK_REF),

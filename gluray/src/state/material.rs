@@ -2,7 +2,7 @@
 
 use crate::state::enums::*;
 
-/// One side's material.
+/// The material of one side.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Material {
     pub(crate) ambient: [f32; 4],
@@ -12,10 +12,10 @@ pub(crate) struct Material {
     pub(crate) shininess: f32,
 }
 
-/// Front and back.
+/// The materials of front and back.
 pub(crate) type Materials = [Material; 2];
 
-/// Which of front and back a face argument names.
+/// The sides that a face argument names.
 pub(crate) fn sides(face: u32) -> &'static [usize] {
     match face {
         FRONT => &[0],
@@ -25,7 +25,7 @@ pub(crate) fn sides(face: u32) -> &'static [usize] {
     }
 }
 
-/// Sets a parameter of `glMaterial`; false when OpenGL would refuse it.
+/// Sets a parameter of `glMaterial`. False when OpenGL would refuse it.
 pub(crate) fn set_material(materials: &mut Materials, face: u32, what: u32, v: [f32; 4]) -> bool {
     let ok = !sides(face).is_empty() && (what != SHININESS || (0.0..=128.0).contains(&v[0]));
     if !ok {

@@ -1,27 +1,27 @@
-//! Sets of the ten properties of both sides' materials: which of them a program set, and which of
-//! them the driver has to be told.
+//! Sets of the ten properties of both sides' materials: those that a program has set, and those
+//! that the driver must be told.
 //!
-//! Mesa keeps what `glMaterial` sets back until it has to know it, at a draw or a query, and then
-//! writes it over whatever colour material made of the colour meanwhile. So a program that sets a
-//! material at the end of a frame, and switches colour material on at the beginning of the next
-//! (OpenSceneGraph), is drawn with the material. Whoever asks or draws in between takes that away
-//! from it; and so does one who tells Mesa of more than the program set.
+//! Mesa defers what `glMaterial` sets until it needs it, at a draw or a query. Then it overwrites
+//! whatever colour material made of the colour meanwhile. So a program that sets a material at the
+//! end of a frame, and enables colour material at the beginning of the next (OpenSceneGraph), is
+//! drawn with the material. A query or draw in between changes that, and so does setting more than
+//! the program has set.
 
 use super::material::{Materials, sides};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
-/// Properties in the order of the bits; those of the back come after those of the front.
+/// The properties in the order of the bits. Those of the back follow those of the front.
 const NAMES: [u32; 5] = [AMBIENT, DIFFUSE, SPECULAR, EMISSION, SHININESS];
 
-/// A set.
+/// A set of properties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct MaterialProperties(u16);
 
 impl MaterialProperties {
     pub(crate) const ALL: MaterialProperties = MaterialProperties(0x3ff);
 
-    /// What a call of `glMaterial` sets.
+    /// The properties that a call of `glMaterial` sets.
     pub(crate) fn of(face: u32, what: u32) -> MaterialProperties {
         let one = |name: u32| NAMES.iter().position(|n| *n == name).map_or(0, |i| 1_u16 << i);
         let bits = match what {
@@ -31,7 +31,7 @@ impl MaterialProperties {
         MaterialProperties(sides(face).iter().fold(0, |all, side| all | bits << (5 * side)))
     }
 
-    /// Those that differ.
+    /// The properties that differ.
     pub(crate) fn changed(a: &Materials, b: &Materials) -> MaterialProperties {
         let differs = |i: &usize| value(a, *i) != value(b, *i);
         MaterialProperties((0..10).filter(differs).fold(0, |bits, i| bits | 1 << i))
@@ -49,7 +49,7 @@ impl MaterialProperties {
         (0..10).filter(move |i| self.0 >> i & 1 == 1)
     }
 
-    /// Tells the driver what `materials` have.
+    /// Sends these properties of `materials` to the driver.
     pub(crate) fn send(self, materials: &Materials) {
         for i in self.each() {
             let (face, name) = place(i);
@@ -57,14 +57,14 @@ impl MaterialProperties {
         }
     }
 
-    /// Sets what the driver has once more, so that it keeps it back as it did before we drew.
+    /// Sets the driver's values again, so that it defers them as it did before we drew.
     pub(crate) fn set_again(self) {
         let values: Vec<_> = self.each().map(|i| (i, place(i))).collect();
         let asked = values.into_iter().map(|(i, (face, name))| match i % 5 {
             4 => (face, name, [gl::material::<1>(face, name)[0], 0.0, 0.0, 0.0]),
             _ => (face, name, gl::material::<4>(face, name)),
         });
-        // All questions first: each makes the driver write down what it kept back.
+        // All queries first, because each makes the driver apply what it has deferred.
         let asked: Vec<_> = asked.collect();
         for (face, name, v) in asked {
             gl::materialfv(face, name, &v);

@@ -1,10 +1,10 @@
-//! The state that decides how filled primitives look, as the driver tells it.
+//! A snapshot of the state that decides how filled primitives look, as the driver reports it.
 
 use crate::interpose::calls::class;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
-/// A light source; places and directions in eye space, as OpenGL keeps them.
+/// A light source. Positions and directions are in eye space, as OpenGL stores them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct GlLight {
     pub(crate) ambient: [f32; 4],
@@ -27,27 +27,27 @@ pub(crate) struct Fog {
     pub(crate) color: [f32; 4],
 }
 
-/// Texture unit 0, where it is all there is.
+/// Texture unit 0, when it is the only one in use.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TextureUnit {
     pub(crate) target: u32,
     pub(crate) name: u32,
     pub(crate) env_mode: u32,
     pub(crate) env_color: [f32; 4],
-    /// Generation of s, t, r, q: mode (0 for none) and plane.
+    /// Coordinate generation of s, t, r, q: mode (0 for none) and plane.
     pub(crate) generate: [(u32, [f32; 4]); 4],
     pub(crate) matrix: [f32; 16],
-    /// Counts the calls that may have changed a texture.
+    /// The number of calls so far that may have changed a texture.
     pub(crate) version: u64,
 }
 
-/// Everything at one draw.
+/// The state at one draw.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Snapshot {
     pub(crate) model_view: [f32; 16],
     pub(crate) projection: [f32; 16],
     pub(crate) viewport: [i32; 4],
-    /// Rows of the window, as far as viewports tell.
+    /// The rows of the window, as far as viewports show.
     pub(crate) window_height: i32,
     pub(crate) depth_range: [f64; 2],
     pub(crate) cull: Option<u32>,
@@ -66,29 +66,29 @@ pub(crate) struct Snapshot {
     /// Eye-space planes.
     pub(crate) clip_planes: Vec<[f64; 4]>,
     pub(crate) polygon_offset: Option<(f32, f32)>,
-    /// The slope that the factor multiplies is the gradient's length, as in VTK's shaders; else the
-    /// greater of its components, as OpenGL has it.
+    /// The slope that the factor multiplies is the length of the gradient, as in VTK's shaders.
+    /// Otherwise it is the greater component, as in OpenGL.
     pub(crate) offset_by_length: bool,
     pub(crate) depth_test: bool,
     pub(crate) depth_func: u32,
     pub(crate) depth_mask: bool,
     pub(crate) depth_clamp: bool,
     pub(crate) blend: bool,
-    /// Blending that leaves a fragment of alpha 1 as it is.
+    /// Blending leaves a fragment with alpha 1 unchanged.
     pub(crate) blend_is_over: bool,
     pub(crate) alpha_test: bool,
-    /// An alpha test that a fragment of alpha 1 passes.
+    /// A fragment with alpha 1 passes the alpha test.
     pub(crate) alpha_test_passes_one: bool,
-    /// An alpha test for the reference itself, which eight bits may miss.
+    /// The alpha test compares with the reference itself, which eight bits may miss.
     pub(crate) alpha_test_of_equality: bool,
     pub(crate) stencil_test: bool,
-    /// `glClipControl` has set another origin or depth than OpenGL's old ones.
+    /// `glClipControl` has set another origin or depth range than the default.
     pub(crate) clip_control: bool,
-    /// The colour buffer keeps what is below 0 or above 1.
+    /// The colour buffer stores values below 0 or above 1.
     pub(crate) unclamped_colors: bool,
     /// Colours are encoded when they are written (`GL_FRAMEBUFFER_SRGB`).
     pub(crate) encoded_colors: bool,
-    /// Front and back faces are masked differently.
+    /// Front and back faces have different stencil masks.
     pub(crate) two_sided_stencil: bool,
     pub(crate) logic_op: bool,
     pub(crate) color_mask: bool,
@@ -99,13 +99,13 @@ pub(crate) struct Snapshot {
     pub(crate) render_mode: u32,
     pub(crate) program: u32,
     pub(crate) arb_program: bool,
-    /// Shaders of a program pipeline, while no program is in use.
+    /// A program pipeline is bound and no program is in use.
     pub(crate) pipeline: bool,
     pub(crate) framebuffer: u32,
     pub(crate) draw_buffer: u32,
     pub(crate) more_draw_buffers: bool,
     pub(crate) samples: i32,
-    /// Where the sample lies that is traced, from the middle of the pixel.
+    /// The position of the traced sample, relative to the pixel centre.
     pub(crate) sample_place: [f32; 2],
     /// Masks, coverage or alpha decide which samples are written.
     pub(crate) masked_samples: bool,
@@ -115,16 +115,16 @@ pub(crate) struct Snapshot {
     pub(crate) color_sum: bool,
     pub(crate) list_base: u32,
     pub(crate) texture: Option<TextureUnit>,
-    /// Texturing that we do not follow, in words.
+    /// The reason why texturing cannot be reproduced.
     pub(crate) foreign_texturing: Option<&'static str>,
 }
 
-/// What a context can be asked.
+/// The capabilities of a context.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct DriverCapabilities {
-    /// Version times ten.
+    /// The version times ten.
     pub(crate) version: u32,
-    /// No fixed function.
+    /// There is no fixed function.
     pub(crate) core: bool,
     pub(crate) es: bool,
     pub(crate) texture_units: i32,
@@ -286,8 +286,8 @@ impl Snapshot {
             .map(|i| gl::clip_plane(CLIP_PLANE0 + i))
             .collect();
         self.fog = gl::is_enabled(FOG).then(|| Fog {
-            // Fog by coordinates is the driver's: `decide` knows it by mode 0.
-            // Likewise by distances in space: `GL_NV_fog_distance`, but for its plain form.
+            // Mode 0 stands for fog that the driver must draw: by coordinates, or by distances in
+            // space (`GL_NV_fog_distance`, except its plain form).
             mode: match capabilities.version >= 14 && gl::word(FOG_COORD_SRC) == FOG_COORD
                 || capabilities.fog_distance && gl::word(FOG_DISTANCE_MODE) != EYE_PLANE_ABSOLUTE
             {
@@ -301,8 +301,8 @@ impl Snapshot {
         });
     }
 
-    /// Says of points in object space whether they are outside of what is seen, so that the driver
-    /// has to clip.
+    /// Returns whether points in object space are outside of the view volume, so that the driver
+    /// must clip.
     pub(crate) fn clips(&self) -> impl Fn([f32; 3]) -> bool {
         let m = crate::trace::lighting::product(&self.projection, &self.model_view);
         let (model_view, planes) = (self.model_view, self.clip_planes.clone());
@@ -368,8 +368,7 @@ impl Snapshot {
                 self.foreign_texturing = Some("several texture units");
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
-                // The names say what is bound; where its image comes from is asked for when it is
-                // used.
+                // The names say what is bound. The source of its image is queried when it is used.
                 self.foreign_texturing = self.foreign_texturing.or(
                     crate::trace::texturing::unsupported_sampling(target, capabilities.version),
                 );

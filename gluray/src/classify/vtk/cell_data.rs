@@ -1,4 +1,4 @@
-//! Buffer textures: what VTK has for each cell, by the number of the triangle.
+//! Reads buffer textures: VTK's data for each cell, by the number of the triangle.
 
 use crate::interpose::client_memory::{ArrayLayout, ArraySource};
 use crate::interpose::driver::gl;
@@ -6,7 +6,7 @@ use crate::state::enums::*;
 use crate::trace::texturing::Image;
 use std::sync::Arc;
 
-/// The buffer behind the buffer texture that a program's sampler has.
+/// The buffer behind the buffer texture of a program's sampler.
 pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<ArraySource, &'static str> {
     let at = gl::uniform_location(program, sampler);
     let unit = if at < 0 { 0 } else { gl::uniform_i::<1>(program, at)[0].max(0) };
@@ -29,7 +29,7 @@ pub(super) fn buffer_texture(program: u32, sampler: &str) -> Result<ArraySource,
     ArraySource::in_buffer(layout).ok_or("a buffer texture without a buffer")
 }
 
-/// Colours of `count` triangles from number `first` on.
+/// The colours of `count` triangles from number `first` on.
 pub(super) fn colors(
     source: &ArraySource,
     first: usize,
@@ -45,7 +45,7 @@ pub(super) fn colors(
     }))
 }
 
-/// Which sides of `count` triangles from number `first` on are edges of their cells.
+/// For `count` triangles from number `first` on, which sides are edges of their cells.
 pub(super) fn sides(
     source: &ArraySource,
     first: usize,

@@ -1,14 +1,14 @@
-//! VTK's dual depth peeling (Bavoil and Myers 2008), which draws translucent surfaces six times or
-//! more, as one draw of ours.
+//! Replaces VTK's dual depth peeling (Bavoil and Myers 2008), which draws translucent surfaces six
+//! times or more, by one draw.
 //!
-//! The driver draws the first pass, which finds how far surfaces reach; the texture it makes is
-//! also the depth of what is opaque. In the pass that would peel the first layers nothing is drawn:
-//! all surfaces are traced, blended by depth, and put where VTK gathers the layers that are
-//! nearest. It asks how many pixels that pass changed farther back, hears that there were none, and
-//! is done. So all of VTK's own steps after that are right as they are.
+//! The driver draws the first pass, which finds the range of depths. The texture of this pass is
+//! also the depth of the opaque surfaces. In the pass that would peel the first layers nothing is
+//! drawn. Instead all surfaces are traced, blended by depth, and put where VTK gathers the nearest
+//! layers. VTK then queries how many pixels that pass changed farther back, gets zero, and stops.
+//! So all of VTK's later steps are right without changes.
 //!
-//! Only when every draw of the first pass was a surface that we know is anything taken out of the
-//! second. Text, lines or volumes among them leave the whole to the driver.
+//! Draws are taken out of the second pass only when every draw of the first pass was a known
+//! surface. With text, lines or volumes among them, the driver draws everything.
 
 use super::signature::TranslucencyPass;
 use crate::capture::draw::{Draw, TexturedDraw};
@@ -19,26 +19,26 @@ use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::DepthLimits;
 
-/// Where VTK is with it.
+/// The progress of VTK's peeling.
 #[derive(Default)]
 pub(crate) struct DepthPeeling {
-    /// Draws of the driver's when something was cleared last.
+    /// The number of the driver's draws at the last clear.
     at_clear: u64,
-    /// Draws of the first pass so far that we know.
+    /// The number of known draws of the first pass so far.
     depths: u64,
-    /// Nothing else was in the first pass.
+    /// The first pass had no other draws.
     whole: bool,
-    /// What was taken out of the second pass, and the framebuffer it was drawn into.
+    /// The draws that were taken out of the second pass. The framebuffer below is theirs.
     taken: Vec<TexturedDraw>,
     limit: Option<DepthLimits>,
     framebuffer: u32,
 }
 
 impl DepthPeeling {
-    /// Something is cleared; the driver drew so many draws until now.
+    /// A buffer is cleared. The driver drew `passed` draws until now.
     pub(crate) fn cleared(&mut self, passed: u64) {
         if self.depths > 0 {
-            // One draw copies the depths of what is opaque before surfaces come.
+            // One draw copies the depths of the opaque surfaces before the translucent ones come.
             self.whole = passed == self.at_clear + 1 + self.depths;
             self.depths = 0;
         }
@@ -112,8 +112,8 @@ impl DepthPeeling {
     }
 }
 
-/// Whether a peeled surface can be traced: but for what peeling itself sets, its state is that of
-/// any surface.
+/// Whether a peeled surface can be traced. Apart from what peeling itself sets, its state must be
+/// that of any traced surface.
 pub(super) fn check_surface(state: &mut Snapshot, filter: TraceFilter) -> Result<(), &'static str> {
     (state.more_draw_buffers, state.blend, state.depth_test) = (false, false, true);
     (state.depth_mask, state.depth_func) = (true, LEQUAL);
@@ -124,7 +124,7 @@ pub(super) fn check_surface(state: &mut Snapshot, filter: TraceFilter) -> Result
     }
 }
 
-/// How deep surfaces count: the second component of the texture that the first pass made.
+/// The depths up to which surfaces count: the second component of the texture of the first pass.
 fn limit(program: u32) -> Option<DepthLimits> {
     let at = gl::uniform_location(program, "lastDepthPeel");
     if at < 0 {
@@ -137,7 +137,7 @@ fn limit(program: u32) -> Option<DepthLimits> {
     let (width, height) = (size(TEXTURE_WIDTH), size(TEXTURE_HEIGHT));
     let fits = width * height > 0 && width * height <= 1 << 26;
     let depth = fits.then(|| {
-        // However the program wants its own pixels packed.
+        // The program may want its own pixels packed in any way.
         let texels = gl::with_raw_pixel_reads(|plainly| gl::tex_image_rgba(plainly, TEXTURE_2D, 0));
         texels.into_iter().map(|t| t[1]).collect::<Vec<f32>>()
     });

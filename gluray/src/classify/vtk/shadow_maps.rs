@@ -1,10 +1,10 @@
-//! VTK's own shadows: it draws surfaces as ever, then depths as lights see them, then all surfaces
-//! again over themselves, with shadows.
+//! Leaves surfaces to the driver while VTK draws shadows: it draws surfaces as usual, then depths
+//! as lights see them, then all surfaces again over themselves, with shadows.
 //!
-//! Drawing over needs depths that are equal to the last bit, which rays and the driver do not have.
-//! So surfaces are the driver's where shadow maps are in use. The first frame tells that too late:
-//! surfaces were traced before the first map was drawn. There the driver's second draw is moved a
-//! little to the viewer.
+//! Drawing surfaces again needs depths that are equal to the last bit, and those of rays and the
+//! driver are not. So the driver draws surfaces while shadow maps are in use. The first frame shows
+//! this too late, because surfaces were traced before the first map was drawn. In that frame the
+//! driver's second draw is moved a little towards the viewer.
 
 use super::VtkPrograms;
 use super::signature::SHADOW_MAP;
@@ -12,26 +12,26 @@ use crate::interpose::driver::gl;
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 
-/// Frames for which a shadow map is taken to be in use.
+/// The number of frames for which a shadow map counts as in use.
 const IN_USE_FRAMES: u64 = 3;
 /// How much nearer surfaces are drawn over traced ones: factor and units of polygon offset. A whole
-/// factor would bring back faces before front faces at silhouettes.
+/// factor would show back faces in front of front faces at silhouettes.
 const NEARER: (f32, f32) = (-1.0 / 64.0, -8.0);
 
-/// Shadow maps of a context.
+/// The shadow maps of a context.
 #[derive(Default)]
 pub(super) struct ShadowMaps {
-    /// The frame after which none is in use.
+    /// The frame from which on none is in use.
     until: u64,
-    /// A surface was traced since.
+    /// The last frame in which a surface was traced.
     last_traced: Option<u64>,
-    /// Polygon offset of the program's, while that of ours is set.
+    /// The program's polygon offset, while ours is set.
     kept: Option<(bool, [f32; 2])>,
 }
 
 impl VtkPrograms {
-    /// Whether a surface can be traced that VTK may draw again; `signature` is what is known of its
-    /// program.
+    /// Whether a surface can be traced although VTK may draw it again. `signature` is that of its
+    /// program, as far as it is known.
     pub(super) fn is_drawn_once<T>(
         &mut self,
         signature: &Result<T, &'static str>,
@@ -66,7 +66,7 @@ impl VtkPrograms {
         gl::polygon_offset(offset[0] + NEARER.0, offset[1] + NEARER.1);
     }
 
-    /// It has drawn, and the program goes on.
+    /// The driver has drawn, and the program goes on.
     pub(crate) fn finish_redraw(&mut self) {
         let Some((on, [factor, units])) = self.shadow_maps.kept.take() else {
             return;

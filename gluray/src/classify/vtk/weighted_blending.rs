@@ -1,9 +1,10 @@
-//! VTK's translucency without peeling (weighted sums after McGuire and Bavoil 2013): each layer is
-//! added up, whatever its order, and a pass of the program's divides.
+//! Replaces VTK's translucency without peeling, weighted blended order-independent transparency
+//! (McGuire and Bavoil 2013): all layers are summed in any order, and a pass of the program
+//! divides.
 //!
-//! All layers before the opaque surfaces are found by rays, as for depth peeling, and their sums go
-//! through the program's own blending: what the driver draws into the same sums (lines, text, what
-//! is not known) is added as it would be.
+//! Rays find all layers in front of the opaque surfaces, as for depth peeling. Their sums go
+//! through the program's own blending. So whatever the driver draws into the same sums (lines,
+//! text, unknown surfaces) is added as usual.
 
 use super::depth_peeling;
 use crate::capture::draw::{Draw, TexturedDraw};
@@ -14,11 +15,11 @@ use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::WeightedSums;
 
-/// What waits to be summed.
+/// The draws that wait to be summed.
 #[derive(Default)]
 pub(crate) struct WeightedBlending {
     taken: Vec<TexturedDraw>,
-    /// Program and textures of the pass that writes sums.
+    /// The program and textures of the pass that writes sums.
     program: u32,
     window: i32,
     textures: [u32; 2],
@@ -85,14 +86,15 @@ pub(super) fn check_pass(
     }
 }
 
-/// Whether such a surface can be traced: but for what summing sets, its state is that of any.
+/// Whether such a surface can be traced. Apart from what summing sets, its state must be that of
+/// any traced surface.
 pub(super) fn check_surface(state: &mut Snapshot, filter: TraceFilter) -> Result<(), &'static str> {
     state.unclamped_colors = false;
     depth_peeling::check_surface(state, filter)
 }
 
 impl WeightedBlending {
-    /// Makes the objects; false when the driver refuses them.
+    /// Creates the objects. False when the driver refuses them.
     fn prepare(&mut self, vertex_array: u32) -> bool {
         if self.program != 0 || self.failed || vertex_array == 0 {
             return self.program != 0 && vertex_array != 0;
@@ -143,7 +145,7 @@ impl WeightedBlending {
             }
             gl::tex_sub_image(r.w, r.h, format, FLOAT, data[unit]);
         }
-        // Depths were compared for each layer, and blending stays the program's.
+        // The depths of all layers were compared already, and the program's blending stays.
         for off in [CULL_FACE, POLYGON_OFFSET_FILL, DEPTH_TEST, SCISSOR_TEST] {
             gl::disable(off);
         }

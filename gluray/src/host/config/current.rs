@@ -7,16 +7,16 @@ use super::settings::{Mode, Settings};
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// What the library goes by.
+/// The configuration of the library in this process.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Config {
-    /// What can be set.
+    /// The settings.
     pub(crate) settings: Settings,
-    /// What was wrong with it.
+    /// The problems with the settings.
     pub(crate) problems: Vec<String>,
-    /// Where reports are written; `None` writes none.
+    /// The folder of reports. `None` writes none.
     pub(crate) run_dir: Option<PathBuf>,
-    /// What people call the program.
+    /// The name of the program, as users know it.
     pub(crate) program: String,
 }
 
@@ -25,7 +25,7 @@ impl Config {
         let sources = Sources::of_this_process();
         let loaded = sources.load();
         let run_dir = crate::host::folders::variable("GLURAY_RUN_DIR").map(PathBuf::from);
-        // The last is the one that people know it by: `view.py`, not `python3.11`.
+        // Users know the program by the last name: `view.py`, not `python3.11`.
         let program = sources.program.last().cloned().unwrap_or_default();
         let mut problems = loaded.problems;
         problems.extend(unsupported_settings(&loaded.settings));
@@ -33,8 +33,8 @@ impl Config {
     }
 }
 
-/// Paths of settings that the library obeys today. The panel disables the others, and whoever sets
-/// one is told in the report.
+/// Paths of the settings that this library supports. The panel disables the others, and the report
+/// names those that were set.
 pub(crate) const SUPPORTED_SETTINGS: &[&str] = &[
     "asynchronous",
     "enabled",
@@ -70,7 +70,7 @@ pub(crate) const SUPPORTED_SETTINGS: &[&str] = &[
     "material.emission",
 ];
 
-/// What was set in vain.
+/// The settings that have no effect.
 fn unsupported_settings(settings: &Settings) -> Vec<String> {
     let tree = |s: &Settings| serde_json::to_value(s).unwrap_or_default();
     let (now, usual) = (tree(settings), tree(&Settings::default()));
@@ -87,7 +87,8 @@ fn unsupported_settings(settings: &Settings) -> Vec<String> {
             format!("`{}` is set, and this version of the library does not obey it yet", f.path)
         })
         .collect();
-    // What changes nothing in this mode is said, too, and in which it would.
+    // Settings without an effect in this mode are reported, too, with the modes in which they have
+    // one.
     let elsewhere = |f: &&Field| {
         f.modes.len() < Mode::ALL.len()
             && !f.matters_in(settings.mode.name())
@@ -113,7 +114,7 @@ fn unsupported_settings(settings: &Settings) -> Vec<String> {
 
 static CURRENT: RwLock<Option<Arc<Config>>> = RwLock::new(None);
 
-/// The settings now.
+/// The current settings.
 pub(crate) fn current() -> Arc<Config> {
     if let Some(config) = CURRENT.read().unwrap_or_else(PoisonError::into_inner).as_ref() {
         return config.clone();
@@ -122,13 +123,13 @@ pub(crate) fn current() -> Arc<Config> {
     slot.get_or_insert_with(|| Arc::new(Config::of_this_process())).clone()
 }
 
-/// Other settings from now on. Contexts take them up at the end of their frame.
+/// Replaces the settings. Contexts apply them at the end of their frame.
 pub(crate) fn replace(settings: Settings) {
     let config = Config { settings, ..Config::clone(&current()) };
     *CURRENT.write().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(config));
 }
 
-/// What people call this program.
+/// The name of this program, as users know it.
 pub(crate) fn program_name() -> String {
     current().program.clone()
 }
