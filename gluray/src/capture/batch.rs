@@ -4,8 +4,9 @@ use crate::capture::Capture;
 use crate::capture::draw::{Draw, Shading, TexturedDraw, Values};
 use crate::capture::primitives::QuadSplit;
 use crate::state::enums::*;
+use crate::state::matrix::{product, transform};
 use crate::state::snapshot::Snapshot;
-use crate::trace::lighting::{LightingSetup, product, transform};
+use crate::trace::lighting::LightingSetup;
 use crate::trace::overrides::RayMaterial;
 use std::sync::Arc;
 

@@ -11,14 +11,15 @@ pub(crate) mod evaluators;
 pub(crate) mod geometry_cache;
 pub(crate) mod immediate_mode;
 pub(crate) mod primitives;
+mod textures;
 pub(crate) mod vertex_arrays;
 pub(crate) mod vertex_recorder;
 
-use crate::trace::texturing::Images;
 use attribute_cache::AttributeCache;
 use display_lists::ListRecording;
 use evaluators::Evaluators;
 use geometry_cache::GeometryCache;
+use textures::TextureCache;
 use vertex_arrays::VertexArrays;
 use vertex_recorder::VertexRecorder;
 
@@ -50,5 +51,5 @@ pub(crate) struct Capture {
     pub(crate) depth_of_lists: u32,
     pub(crate) geometry_cache: GeometryCache,
     pub(crate) attribute_cache: AttributeCache,
-    pub(crate) images: Images,
+    pub(crate) textures: TextureCache,
 }

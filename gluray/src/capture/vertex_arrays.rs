@@ -458,8 +458,7 @@ impl Context {
             attributes.tex = Values::Packed(p);
         }
         let state = self.state.snapshot.clone();
-        let clip_from_object =
-            crate::trace::lighting::product(&state.projection, &state.model_view);
+        let clip_from_object = crate::state::matrix::product(&state.projection, &state.model_view);
         let (attributes, shading, ray_material) =
             (Arc::new(attributes), Shading::Fixed, RayMaterial::default());
         let draw =

@@ -30,8 +30,9 @@ use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::kept_errors::KeptErrors;
 use crate::state::current_attributes::CurrentAttributes;
 use crate::state::enums::*;
+use crate::state::texture_sampling;
 use crate::trace::overrides::{self, RayMaterial};
-use crate::trace::texturing::{self, Image};
+use crate::trace::texturing::Image;
 pub(crate) use color::FragmentSample;
 use depth_peeling::DepthPeeling;
 use program::CellData;
@@ -208,7 +209,7 @@ impl Context {
         }
         let map = match signature.colors {
             ColorSource::Map => {
-                Some(self.image_of(program, "colortexture", texturing::check_sampling)?)
+                Some(self.image_of(program, "colortexture", texture_sampling::check_sampling)?)
             }
             _ => None,
         };
@@ -322,12 +323,14 @@ impl Context {
         let sampler = if actor_texture.is_over_all() { "actortexture" } else { "albedoTex" };
         let version = self.capabilities.version;
         let image =
-            self.image_of(program, sampler, |target| {
-                match texturing::unsupported_sampling(target, version) {
+            self.image_of(
+                program,
+                sampler,
+                |target| match texture_sampling::unsupported_sampling(target, version) {
                     Some(why) => Err(why),
                     None => Ok(()),
-                }
-            })?;
+                },
+            )?;
         // Only these formats give the same components in all samplers.
         if image.is_of_colors() { Ok(image) } else { Err("a picture of luminance or alpha alone") }
     }
@@ -346,7 +349,7 @@ impl Context {
         let name = gl::word(TEXTURE_BINDING_2D);
         let followed = followed(TEXTURE_2D);
         let version = self.shared.texture_version();
-        let image = self.capture.images.get(TEXTURE_2D, name, version);
+        let image = self.capture.textures.get(TEXTURE_2D, name, version);
         gl::active_texture(active);
         followed?;
         image.ok_or("a texture without an image")

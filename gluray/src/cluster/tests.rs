@@ -81,7 +81,7 @@ fn draws(turn: f32) -> Vec<Draw> {
         attributes: Arc::new(a.clone()),
         state: state.clone(),
         shading: Shading::Fixed,
-        clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
+        clip_from_object: crate::state::matrix::product(&state.projection, &state.model_view),
         calls: 1,
         ray_material: RayMaterial::default(),
     };

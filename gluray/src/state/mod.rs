@@ -8,7 +8,9 @@ pub(crate) mod current_attributes;
 pub(crate) mod enums;
 pub(crate) mod material;
 pub(crate) mod material_properties;
+pub(crate) mod matrix;
 pub(crate) mod snapshot;
+pub(crate) mod texture_sampling;
 
 use crate::interpose::calls::class;
 use enums::{BACK, BACK_LEFT};

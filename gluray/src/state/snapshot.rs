@@ -3,6 +3,7 @@
 use crate::interpose::calls::class;
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
+use crate::state::texture_sampling::unsupported_sampling;
 
 /// A light source. Positions and directions are in eye space, as OpenGL stores them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -304,14 +305,14 @@ impl Snapshot {
     /// Returns whether points in object space are outside of the view volume, so that the driver
     /// must clip.
     pub(crate) fn clips(&self) -> impl Fn([f32; 3]) -> bool {
-        let m = crate::trace::lighting::product(&self.projection, &self.model_view);
+        let m = crate::state::matrix::product(&self.projection, &self.model_view);
         let (model_view, planes) = (self.model_view, self.clip_planes.clone());
         let depth_clamp = self.depth_clamp;
         move |p| {
-            let [x, y, z, w] = crate::trace::lighting::transform(&m, p);
+            let [x, y, z, w] = crate::state::matrix::transform(&m, p);
             let beyond = |v: f32| v > w || v < -w;
             let cut = |plane: &[f64; 4]| {
-                let eye = crate::trace::lighting::transform(&model_view, p);
+                let eye = crate::state::matrix::transform(&model_view, p);
                 eye.iter().zip(plane).map(|(a, b)| f64::from(*a) * b).sum::<f64>() < 0.0
             };
             beyond(x) || beyond(y) || (!depth_clamp && beyond(z)) || planes.iter().any(cut)
@@ -369,9 +370,8 @@ impl Snapshot {
             } else if target == TEXTURE_1D || target == TEXTURE_2D {
                 self.texture = Some(unit_0(target));
                 // The names say what is bound. The source of its image is queried when it is used.
-                self.foreign_texturing = self.foreign_texturing.or(
-                    crate::trace::texturing::unsupported_sampling(target, capabilities.version),
-                );
+                self.foreign_texturing =
+                    self.foreign_texturing.or(unsupported_sampling(target, capabilities.version));
             } else {
                 self.foreign_texturing = Some("a texture that is neither 1-D nor 2-D");
             }

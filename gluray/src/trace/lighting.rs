@@ -8,6 +8,7 @@ mod vertices;
 use crate::capture::draw::Attributes;
 use crate::state::enums::*;
 use crate::state::material::{Material, sides};
+use crate::state::matrix::transform;
 use crate::state::snapshot::{GlLight, Snapshot};
 use crate::trace::occlusion::{LightPosition, Visibility, vector};
 
@@ -39,19 +40,6 @@ fn scaled(a: V3, s: f32) -> V3 {
 pub(crate) fn normalized(a: V3) -> V3 {
     let l = dot(a, a);
     if l > 0.0 { scaled(a, 1.0 / l.sqrt()) } else { a }
-}
-
-/// `a * b`, column by column, summed in Mesa's order.
-pub(crate) fn product(a: &[f32; 16], b: &[f32; 16]) -> [f32; 16] {
-    std::array::from_fn(|i| {
-        let (column, row) = (i / 4, i % 4);
-        (1..4).fold(a[row] * b[4 * column], |s, k| s + a[4 * k + row] * b[4 * column + k])
-    })
-}
-
-/// `m * (p, 1)` as a multiplication and three multiply-adds, as in the driver's program.
-pub(crate) fn transform(m: &[f32; 16], p: V3) -> [f32; 4] {
-    std::array::from_fn(|r| m[r] * p[0] + m[4 + r] * p[1] + m[8 + r] * p[2] + m[12 + r])
 }
 
 /// The values that are equal for all vertices of a draw.

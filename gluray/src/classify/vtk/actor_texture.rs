@@ -5,7 +5,7 @@ use super::Image;
 use super::program::VtkProgram;
 use super::signature::{ActorTexture, ColorSource};
 use crate::capture::draw::Attributes;
-use crate::trace::lighting::transform;
+use crate::state::matrix::transform;
 use crate::trace::mixed;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;

@@ -4,7 +4,8 @@
 use super::program::{CellEdges, PbrMaterial, ProgramLight, VtkProgram};
 use super::signature::{ActorTexture, ColorSource};
 use crate::capture::draw::Attributes;
-use crate::trace::lighting::{normalized, transform};
+use crate::state::matrix::transform;
+use crate::trace::lighting::normalized;
 use crate::trace::mixed;
 use crate::trace::occlusion::Visibility;
 use rt_core::mesh::TriMesh;

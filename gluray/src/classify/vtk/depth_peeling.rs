@@ -28,9 +28,11 @@ pub(crate) struct DepthPeeling {
     depths: u64,
     /// The first pass had no other draws.
     whole: bool,
-    /// The draws that were taken out of the second pass. The framebuffer below is theirs.
+    /// The draws that were taken out of the second pass.
     taken: Vec<TexturedDraw>,
+    /// The depths up to which they count.
     limit: Option<DepthLimits>,
+    /// The framebuffer of the second pass.
     framebuffer: u32,
 }
 

@@ -17,7 +17,7 @@ impl Context {
         self.presentation.frame.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
             (self.capture.geometry_cache.hits, self.capture.geometry_cache.misses);
-        self.counters.report.textures_read = self.capture.images.read;
+        self.counters.report.textures_read = self.capture.textures.read;
         self.presentation.path_tracer.frame_done();
         self.classifier.programs.frame_done();
         self.capture.attribute_cache.frame_done();

@@ -182,7 +182,7 @@ impl Context {
             && !matches!(self.classifier.classification, Classification::Pass(_))
         {
             // Now, as it is bound now: when a batch of immediate mode ends another may be.
-            self.capture.images.get(t.target, t.name, t.version);
+            self.capture.textures.get(t.target, t.name, t.version);
         }
     }
 
@@ -256,7 +256,7 @@ impl Context {
             Arc::make_mut(&mut draw.state).blend = false;
         }
         let image = draw.state.texture.and_then(|t| {
-            self.errors.hiding(|| self.capture.images.get(t.target, t.name, t.version))
+            self.errors.hiding(|| self.capture.textures.get(t.target, t.name, t.version))
         });
         if in_order {
             self.trace_ordered(&draw, image);

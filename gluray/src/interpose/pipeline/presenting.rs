@@ -53,7 +53,7 @@ impl Context {
         }
         self.counters.count_flush(reason.text());
         // Contexts that never end a frame need this count, too.
-        self.counters.report.textures_read = self.capture.images.read;
+        self.counters.report.textures_read = self.capture.textures.read;
         self.presentation.frame.record_traced(self.counters.report.frames + 1, &pending);
         self.trace_pending(pending, func, reason);
     }

@@ -85,7 +85,7 @@ fn square_above_floor(light: [f32; 4], projection: DMat4, model_view: DMat4) -> 
             attributes: Arc::new(Attributes::constant(&current)),
             state: state.clone(),
             shading: Shading::Fixed,
-            clip_from_object: crate::trace::lighting::product(&state.projection, &state.model_view),
+            clip_from_object: crate::state::matrix::product(&state.projection, &state.model_view),
             calls: 1,
             ray_material: RayMaterial::default(),
         }
