@@ -1,27 +1,27 @@
-//! Which vendor's driver GLVND would have taken without us.
+//! Finds the vendor's driver that GLVND would take without us.
 //!
 //! GLX (libglvnd 1.6, `src/GLX/libglxmapping.c`): `__GLX_FORCE_VENDOR_LIBRARY_n` for screen n,
 //! `__GLX_VENDOR_LIBRARY_NAME`, the names that the X server gives for the screen
 //! (`GLX_EXT_libglvnd`), `indirect`. EGL (`src/EGL/libeglvendor.c`): the files named in
 //! `__EGL_VENDOR_LIBRARY_FILENAMES`, or those in the folders of `__EGL_VENDOR_LIBRARY_DIRS` in the
-//! order of their names; all of them are loaded, and the first that knows a display has it.
+//! order of their names. All of them are loaded, and the first that accepts a display gets it.
 
 mod server;
 
 use std::path::{Path, PathBuf};
 
-/// A driver that may be taken, and why.
+/// A driver that may be taken, and the reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Vendor {
-    /// `mesa` of `libGLX_mesa.so.0`; for EGL the name or the path of a library.
+    /// `mesa` of `libGLX_mesa.so.0`. For EGL, the name or the path of a library.
     pub name: String,
-    /// What led to it.
+    /// The source of the name.
     pub why: String,
 }
 
-/// Ours, with which `gluray run` replaces what GLVND's variables had.
+/// Our own variables, in which `gluray run` keeps the former values of GLVND's.
 const OURS: &str = "gluray";
-/// Folders of EGL vendors' files, as GLVND is built by distributions.
+/// The folders of EGL vendors' files in GLVND as distributions build it.
 const EGL_FOLDERS: &str = "/etc/glvnd/egl_vendor.d:/usr/share/glvnd/egl_vendor.d";
 
 fn vendor(name: &str, why: impl Into<String>) -> Option<Vendor> {
@@ -29,13 +29,13 @@ fn vendor(name: &str, why: impl Into<String>) -> Option<Vendor> {
     is_other.then(|| Vendor { name: name.to_owned(), why: why.into() })
 }
 
-/// The number of the screen in `:7.1`; 0 where there is none.
+/// The number of the screen in `:7.1`; 0 without one.
 pub(crate) fn screen_of(display: &str) -> u32 {
     let number = display.rsplit_once(':').map_or("", |(_, n)| n);
     number.split_once('.').and_then(|(_, screen)| screen.parse().ok()).unwrap_or(0)
 }
 
-/// GLX vendors in the order in which they are tried. `get` reads variables.
+/// The GLX vendors in the order in which they are tried. `get` reads variables.
 pub fn glx_vendors(get: impl Fn(&str) -> Option<String>) -> Vec<Vendor> {
     let display = get("DISPLAY").unwrap_or_default();
     let names = if display.is_empty() {
@@ -54,7 +54,7 @@ fn glx_order(
     display: &str,
     names: Result<Vec<String>, String>,
 ) -> Vec<Vendor> {
-    // `gluray run` keeps in ours what it replaces in GLVND's.
+    // `gluray run` keeps in our variables what it replaces in GLVND's.
     let forced = format!("__GLX_FORCE_VENDOR_LIBRARY_{}", screen_of(display));
     let variables = ["GLURAY_GLX_VENDOR", forced.as_str(), "__GLX_VENDOR_LIBRARY_NAME"];
     let mut out: Vec<Vendor> = variables
@@ -75,7 +75,7 @@ fn glx_order(
     out
 }
 
-/// Libraries of EGL vendors in the order in which they are asked for a display. `get` reads
+/// The libraries of EGL vendors in the order in which they are asked for a display. `get` reads
 /// variables.
 pub fn egl_vendors(get: impl Fn(&str) -> Option<String>) -> Vec<Vendor> {
     if let Some(names) = get("GLURAY_EGL_VENDOR").filter(|v| !v.is_empty()) {
@@ -102,13 +102,13 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The library that a vendor's file names; `None` where GLVND would pass it over.
+/// The library that a vendor's file names. `None` when GLVND would skip the file.
 fn of_file(file: &Path) -> Option<Vendor> {
     let text = std::fs::read_to_string(file).ok()?;
     let json: serde_json::Value = serde_json::from_str(&text).ok()?;
     json["file_format_version"].as_str().filter(|v| v.starts_with("1.0."))?;
     let library = json["ICD"]["library_path"].as_str()?;
-    // With a slash, but not at its beginning, it is beside the file.
+    // With a slash, but not at its beginning, the path is relative to the file.
     let path = match library.contains('/') && !library.starts_with('/') {
         true => file.parent()?.join(library).to_str()?.to_owned(),
         false => library.to_owned(),
@@ -116,7 +116,7 @@ fn of_file(file: &Path) -> Option<Vendor> {
     vendor(&path, format!("{} names it", file.display()))
 }
 
-/// The library of an EGL vendor by name (`mesa`), or by itself.
+/// The library of an EGL vendor by name (`mesa`), or the path itself.
 pub(crate) fn egl_library(name: &str) -> String {
     if name.contains('/') || name.contains(".so") {
         name.to_owned()

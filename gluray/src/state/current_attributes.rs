@@ -121,8 +121,8 @@ impl CurrentAttributes {
     }
 
     /// The colour, if the driver's material is not what colour material makes of it. Mesa compares
-    /// colours: when the same colour is set again after `glMaterial`, the material stays, and then
-    /// lights draws without colours of their own.
+    /// colours: when the same colour is set again after `glMaterial`, it keeps the material, which
+    /// then lights draws without colours of their own.
     pub(crate) fn untracked_color(&self, color_material: Option<(u32, u32)>) -> Option<[f32; 4]> {
         let (face, what) = color_material?;
         let mut followed = self.materials;

@@ -1,11 +1,11 @@
-//! Points of Bézier curves and surfaces (OpenGL 1.1, section 5.1): sums of Bernstein polynomials,
-//! by Horner's scheme.
+//! Points of Bézier curves and surfaces (OpenGL 1.1, section 5.1): sums of Bernstein polynomials by
+//! Horner's scheme.
 //!
 //! With s = 1 - t, and b(i) = C(n, i) · p(i) · t^i, the curve of degree n is ((b(0)·s + b(1))·s +
-//! …)·s + b(n). The order of the operations is Mesa's, so that lines over a surface, which the
-//! driver draws, lie where we put the surface.
+//! …)·s + b(n). The order of the operations is Mesa's, so that the driver's lines over a surface
+//! lie on our surface.
 
-/// The point of a curve at `t`, of `N` values. There is a control point at least.
+/// The point of a curve at `t`, with `N` values. There is at least one control point.
 pub(super) fn curve<const N: usize>(
     points: impl IntoIterator<Item = [f32; N]>,
     order: usize,
@@ -32,8 +32,8 @@ pub(super) fn curve<const N: usize>(
     sum
 }
 
-/// The point of a surface, whose control points come row by row: all of the first in `u`, and so
-/// on.
+/// The point of a surface. The control points come row by row: first all of the first row in `u`,
+/// and so on.
 pub(super) fn surface<const N: usize>(
     points: &[[f32; N]],
     orders: [usize; 2],

@@ -1,13 +1,12 @@
-//! A point of a Bézier surface with both tangents, for `GL_AUTO_NORMAL`: de Casteljau's algorithm,
-//! which has the tangents before its last step.
+//! A point of a Bézier surface with both tangents, for `GL_AUTO_NORMAL`, by de Casteljau's
+//! algorithm, which has the tangents before its last step.
 //!
-//! While the net of control points is more than two points wide either way, four neighbours become
-//! one, first along `u` and then along `v`. Surfaces whose orders differ are left with two lines of
-//! points, and go on as curves: of the points between the lines, and of their differences. The
-//! order of the operations is Mesa's, as in [`super::bernstein`].
+//! While the net of control points is more than two points wide in both directions, four neighbours
+//! are combined into one, first along `u` and then along `v`. A surface with different orders is
+//! reduced to two lines of points. It continues as curves: of the points between the lines, and of
+//! their differences. The order of the operations is Mesa's, as in [`super::bernstein`].
 
-/// A point of the surface, and its derivatives but for a positive factor. Both orders are at
-/// least 2.
+/// A point of the surface, and its derivatives up to a positive factor. Both orders are at least 2.
 pub(super) fn point_and_tangents<const N: usize>(
     points: &[[f32; N]],
     orders: [usize; 2],
@@ -52,8 +51,8 @@ pub(super) fn point_and_tangents<const N: usize>(
     }
 }
 
-/// The end of de Casteljau's algorithm for a curve: its point, and the difference of the two that
-/// it lies between.
+/// The end of de Casteljau's algorithm for a curve: its point, and the difference of the two points
+/// between which it lies.
 fn last_two<const N: usize>(mut points: Vec<[f32; N]>, t: f32) -> ([f32; N], [f32; N]) {
     let between = mix(t);
     for left in (2..points.len()).rev() {
@@ -73,8 +72,8 @@ fn less<const N: usize>(a: [f32; N], b: [f32; N]) -> [f32; N] {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-/// The unit normal from a point and the tangents; of a rational surface, whose fourth value is w,
-/// by the quotient rule. Zero where tangents are parallel.
+/// The unit normal from a point and the tangents. For a rational surface, whose fourth value is w,
+/// by the quotient rule. Zero when the tangents are parallel.
 pub(super) fn normal([point, du, dv]: [[f32; 4]; 3], rational: bool) -> [f32; 3] {
     let tangent = |d: [f32; 4]| -> [f32; 3] {
         std::array::from_fn(|k| if rational { d[k] * point[3] - d[3] * point[k] } else { d[k] })

@@ -1,11 +1,10 @@
-//! The maps of evaluators that are switched on, as the driver has them, and what they come to at a
-//! point.
+//! The enabled maps of evaluators, as the driver has them, and their values at a point.
 
 use super::{bernstein, casteljau};
 use crate::interpose::driver::gl;
 use crate::state::enums::*;
 
-/// How many parameters maps have.
+/// The number of parameters of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum MapKind {
     /// `GL_MAP1_…`: curves.
@@ -14,19 +13,19 @@ pub(crate) enum MapKind {
     Surface,
 }
 
-/// One map. Its control points have four values, of which the program gave the first `size`.
+/// One map. Its control points have four values. The program has set the first `size`.
 #[derive(Debug, Clone, PartialEq)]
 struct ControlPointMap {
     points: Vec<[f32; 4]>,
     size: usize,
-    /// Points in `u` and in `v`; one of the latter for a curve.
+    /// The numbers of points in `u` and in `v`; 1 in `v` for a curve.
     orders: [usize; 2],
-    /// Where the domain begins, and one over its length: in `u` and in `v`.
+    /// The start of the domain, and one over its length, in `u` and in `v`.
     first: [f32; 2],
     scale: [f32; 2],
 }
 
-/// A vertex by evaluators. What no map gives is current.
+/// An evaluated vertex. Attributes without a map are the current ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct EvaluatedVertex {
     pub(crate) position: [f32; 4],
@@ -35,7 +34,7 @@ pub(crate) struct EvaluatedVertex {
     pub(crate) tex: Option<[f32; 4]>,
 }
 
-/// The maps of one kind that count.
+/// The enabled maps of one kind.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct EvaluatorMaps {
     vertex: Option<ControlPointMap>,
@@ -45,8 +44,7 @@ pub(crate) struct EvaluatorMaps {
     tex: Option<ControlPointMap>,
 }
 
-/// Targets in the order that OpenGL numbers them in from `GL_MAP1_COLOR_4` and `GL_MAP2_COLOR_4`
-/// on.
+/// The targets in the order of OpenGL's numbers, from `GL_MAP1_COLOR_4` and `GL_MAP2_COLOR_4` on.
 const COLOR_4: u32 = 0;
 const NORMAL: u32 = 2;
 const TEXTURE_COORD_1: u32 = 3;
@@ -54,7 +52,7 @@ const VERTEX_3: u32 = 7;
 const VERTEX_4: u32 = 8;
 
 impl ControlPointMap {
-    /// The driver's map of `size` values a point.
+    /// The driver's map with `size` values per point.
     fn query(kind: MapKind, target: u32, size: usize) -> ControlPointMap {
         let (orders, values) = gl::map_points(target, size, kind == MapKind::Surface);
         let domain = gl::map_domain(target);
@@ -76,7 +74,7 @@ impl ControlPointMap {
         self.filled(bernstein::surface(&self.points, self.orders, self.inner(at)))
     }
 
-    /// What the program gave no points for is 0, 0, 0, 1.
+    /// Values that the program did not set are 0, 0, 0, 1.
     fn filled(&self, v: [f32; 4]) -> [f32; 4] {
         const REST: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
         std::array::from_fn(|k| if k < self.size { v[k] } else { REST[k] })
@@ -87,7 +85,7 @@ impl EvaluatorMaps {
     /// Asks the driver.
     pub(crate) fn query(kind: MapKind) -> EvaluatorMaps {
         let first = if kind == MapKind::Curve { MAP1_COLOR_4 } else { MAP2_COLOR_4 };
-        // The last one that is on has precedence.
+        // The last enabled one has precedence.
         let one_of = |targets: std::ops::RangeInclusive<u32>, least: usize| {
             let from = *targets.start();
             let on = targets.rev().find(|t| gl::is_enabled(first + t))?;
@@ -102,29 +100,29 @@ impl EvaluatorMaps {
         }
     }
 
-    /// Evaluation makes vertices.
+    /// True when evaluation gives vertices.
     pub(crate) fn has_vertices(&self) -> bool {
         self.vertex.is_some()
     }
 
-    /// Evaluation gives colours.
+    /// True when evaluation gives colours.
     pub(crate) fn has_colors(&self) -> bool {
         self.color.is_some()
     }
 
-    /// What evaluation leaves to the driver, in words.
+    /// The reason why evaluation is left to the driver, if any.
     pub(crate) fn unsupported(&self) -> Option<&'static str> {
         let map = self.vertex.as_ref().filter(|_| self.auto_normal)?;
         if map.orders.contains(&1) {
             return Some("automatic normals of a surface that has no tangents");
         }
-        // Mesa has only lately turned them round, as the specification has it.
+        // Only recent versions of Mesa orient them as the specification says.
         let turned = map.scale[0] < 0.0 || map.scale[1] < 0.0;
         turned.then_some("automatic normals over a domain that runs backwards")
     }
 
-    /// The vertex at a point of the domain. `None` when there is no map of vertices: then nothing
-    /// is drawn.
+    /// The vertex at a point of the domain. `None` without a map of vertices: then nothing is
+    /// drawn.
     pub(crate) fn at(&self, at: [f32; 2]) -> Option<EvaluatedVertex> {
         let map = self.vertex.as_ref()?;
         let of = |m: &Option<ControlPointMap>| m.as_ref().map(|m| m.at(at));

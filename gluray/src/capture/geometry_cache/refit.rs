@@ -1,6 +1,6 @@
-//! Geometry that moved: the same triangles at other places, as when a program animates a time step
-//! or a deformation. Its structure is that of before with boxes made anew (a sixth of a build, with
-//! the copy), as long as that leaves rays nearly as fast.
+//! Refits moved geometry: the same triangles at other positions, as when a program animates time
+//! steps or a deformation. Its structure is the earlier one with recomputed boxes, which costs a
+//! sixth of a build, including the copy. This is done as long as rays stay nearly as fast.
 
 use super::Geometry;
 use rt_core::bvh::{self, BuildOptions, Instance, World};
@@ -9,17 +9,17 @@ use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Growth of the expected work of a ray, against the tree when it was built, up to which moved
-/// triangles keep it. At 1.6 packets take a quarter longer, at 1.9 a third
-/// (`RefitReport::cost_growth`); a build takes as long as two frames.
+/// The growth of the expected cost of a ray, relative to the tree when it was built, up to which
+/// moved triangles keep the tree. At 1.6 packets take a quarter longer, at 1.9 a third
+/// (`RefitReport::cost_growth`). A build takes as long as two frames.
 const MOST_GROWTH: f64 = 1.8;
 
-/// The structure of `mesh`, made from that of `before`; `None` where there is none or where it
+/// The structure of `mesh`, refitted from that of `before`. `None` when there is none or when it
 /// would be too slow.
 pub(super) fn structure(before: &Geometry, mesh: &Arc<TriMesh>) -> Option<Arc<World>> {
     let old = before.structure_now()?;
     let start = Instant::now();
-    // The program may draw what was before again: it keeps its own.
+    // The program may draw the earlier geometry again, so that keeps its own structure.
     let geometry = bvh::Geometry::Mesh(before.mesh.clone());
     let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
     let mut world =

@@ -2,12 +2,12 @@
 
 use crate::capture::draw::Values;
 
-/// A stream of one attribute that costs nothing while it does not change.
+/// The values of one attribute. They cost nothing while they do not change.
 pub(super) struct AttributeStream<const N: usize> {
     pub(super) varying: bool,
     pub(super) constant: [f32; N],
     pub(super) values: Vec<[f32; N]>,
-    /// Memory of earlier frames: fresh pages would cost as much as filling them.
+    /// Memory of earlier frames. New pages would cost as much as filling them.
     spares: Vec<Vec<[f32; N]>>,
 }
 
@@ -52,7 +52,7 @@ impl<const N: usize> AttributeStream<N> {
         }
     }
 
-    /// Takes back what [`AttributeStream::take`] gave out.
+    /// Takes back the memory of values from [`AttributeStream::take`].
     pub(super) fn recycle(&mut self, values: Values<N>) {
         if let Values::PerVertex(v) = values {
             self.spare(v);
@@ -67,7 +67,7 @@ impl<const N: usize> AttributeStream<N> {
     }
 }
 
-/// Bit for bit: not a number is what it is.
+/// Compares bit by bit: NaN equals itself.
 #[inline(always)]
 pub(crate) fn same_bits<const N: usize>(a: &[[f32; N]], b: &[[f32; N]]) -> bool {
     bytemuck::cast_slice::<_, u8>(a) == bytemuck::cast_slice::<_, u8>(b)

@@ -1,4 +1,4 @@
-//! Batches of earlier frames, which may come again vertex by vertex.
+//! Batches of earlier frames, which may be repeated vertex by vertex.
 
 use super::VertexRecorder;
 use super::attribute_stream::same_bits;
@@ -10,17 +10,16 @@ use crate::state::material::Materials;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// A batch of an earlier frame, which may come again vertex by vertex.
+/// A batch of an earlier frame, which may be repeated vertex by vertex.
 pub(super) struct EarlierBatch {
     geometry: Arc<Geometry>,
     pub(super) mesh: Arc<TriMesh>,
     runs: Vec<PrimitiveRun>,
     kind: QuadSplit,
     frame: u64,
-    /// Its normals when nobody needs them any more, and the version of the attributes that they are
-    /// of.
+    /// Its normals, once nobody else needs them, and the version of their attributes.
     normals: Option<(Vec<[f32; 3]>, u64)>,
-    /// What else the attributes of that version are, where that is the same for all vertices.
+    /// The other attributes of that version, if they are the same for all vertices.
     constants: Option<ConstantAttributes>,
 }
 
@@ -28,7 +27,7 @@ pub(super) struct EarlierBatch {
 #[derive(Clone, PartialEq)]
 pub(super) struct ConstantAttributes {
     version: u64,
-    /// Of batches of one normal.
+    /// The normal of batches with only one.
     normal: Option<[u32; 3]>,
     color: [u32; 4],
     tex: [u32; 4],
@@ -36,8 +35,7 @@ pub(super) struct ConstantAttributes {
 }
 
 impl VertexRecorder {
-    /// Normals are not all the same: those of the earlier batch are compared with, or all are
-    /// written down.
+    /// The normals vary: they are compared with those of the earlier batch, or all are stored.
     #[cold]
     pub(super) fn vary_normals(&mut self) {
         let expected = self.expected.as_ref().and_then(|mesh| {
@@ -55,7 +53,7 @@ impl VertexRecorder {
         self.normals.varying = true;
     }
 
-    /// The geometry of the batch, when it is all that an earlier one was.
+    /// The geometry of the batch, if it repeats an earlier one completely.
     pub(crate) fn take_followed_geometry(&mut self, kind: &QuadSplit) -> Option<Arc<Geometry>> {
         let mesh = self.expected.as_ref()?;
         let first = mesh.positions[0].to_array().map(f32::to_bits);
@@ -69,7 +67,7 @@ impl VertexRecorder {
         Some(e.geometry.clone())
     }
 
-    /// This is what the batch was; it may come again.
+    /// Remembers the batch, because it may be repeated.
     pub(crate) fn remember_batch(&mut self, geometry: &Arc<Geometry>, kind: &QuadSplit) {
         const WORTH_FOLLOWING: usize = 1000;
         if self.positions.len() >= WORTH_FOLLOWING {
@@ -81,7 +79,7 @@ impl VertexRecorder {
         }
     }
 
-    /// A frame is over: what did not come again is not expected any more.
+    /// Ends a frame: batches that were not repeated are no longer expected.
     pub(crate) fn frame_done(&mut self) {
         const KEPT_FRAMES: u64 = 3;
         self.frame += 1;
@@ -94,8 +92,8 @@ impl VertexRecorder {
         self.earlier.get_mut(&first).filter(|e| Arc::ptr_eq(&e.geometry, geometry))
     }
 
-    /// Attributes that nobody needs any more: their memory serves again, and the normals are what
-    /// is compared with next.
+    /// Takes attributes that are no longer needed. Their memory is reused, and the next batch is
+    /// compared with the normals.
     pub(crate) fn recycle(&mut self, a: Attributes, geometry: &Arc<Geometry>) {
         let version = a.version;
         let mut normals = a.normals;
@@ -112,8 +110,8 @@ impl VertexRecorder {
         self.tex.recycle(a.tex);
     }
 
-    /// Names the attributes of a batch that may come again: those that are what they were in the
-    /// frame before have the name that they had. 0 for others.
+    /// The version of the attributes of a batch that may be repeated: the former version if they
+    /// equal those of the previous frame. 0 for others.
     pub(super) fn version(&mut self, geometry: &Arc<Geometry>) -> u64 {
         let one = self.normals.constant.map(f32::to_bits);
         let mut constants = ConstantAttributes {

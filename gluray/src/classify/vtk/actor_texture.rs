@@ -1,5 +1,5 @@
-//! Pictures on surfaces: a texture of VTK's actor that multiplies the lit colour, or that a
-//! physically based material has its colour from.
+//! Textures of VTK's actors: one that multiplies the lit colour, or gives a physically based
+//! material its colour.
 
 use super::Image;
 use super::program::VtkProgram;
@@ -11,13 +11,13 @@ use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
 impl VtkProgram {
-    /// The picture.
+    /// The actor's texture.
     pub(crate) fn picture(&self) -> Option<&Arc<Image>> {
         self.picture.as_ref()
     }
 
-    /// Texture coordinates of a vertex, of which those from number `first` on are meant, after the
-    /// program's matrix for them.
+    /// Texture coordinates of a vertex, from component `first` on, after the program's texture
+    /// matrix.
     fn transformed_coordinates(&self, a: &Attributes, vertex: usize, first: usize) -> [f32; 2] {
         let c = a.tex.at(vertex);
         let (s, t) = (c[first], c[first + 1]);
@@ -31,17 +31,18 @@ impl VtkProgram {
         }
     }
 
-    /// Where a vertex is on the colour map.
+    /// The coordinates of a vertex on the colour map.
     pub(crate) fn map_coordinates(&self, a: &Attributes, vertex: usize) -> [f32; 2] {
         self.transformed_coordinates(a, vertex, 0)
     }
 
-    /// Where a vertex is on the picture.
+    /// The coordinates of a vertex on the actor's texture.
     pub(crate) fn picture_coordinates(&self, a: &Attributes, vertex: usize) -> [f32; 2] {
         self.transformed_coordinates(a, vertex, if self.signature.two_coordinates { 2 } else { 0 })
     }
 
-    /// The picture at a fragment whose pixel covers so many of its texels, where that is known.
+    /// The actor's texture at a fragment. `texels` is the number of texels that its pixel covers,
+    /// where it is known.
     pub(super) fn picture_at(
         &self,
         a: &Attributes,
@@ -67,7 +68,7 @@ impl VtkProgram {
         })
     }
 
-    /// The colour and alpha of a lit fragment with the picture on it.
+    /// The colour and alpha of a lit fragment, multiplied by the actor's texture.
     pub(super) fn under_picture(
         &self,
         lit: [f32; 4],
@@ -85,7 +86,7 @@ impl VtkProgram {
         }
     }
 
-    /// True when no texel of the picture that counts lets anything through.
+    /// True when all texels that count are opaque.
     pub(super) fn picture_is_opaque(&self) -> bool {
         match self.signature.actor_texture {
             ActorTexture::No | ActorTexture::Rgb | ActorTexture::Grey => true,
@@ -96,7 +97,7 @@ impl VtkProgram {
         }
     }
 
-    /// The picture, where it lies on a single colour.
+    /// The actor's texture, if the surface has no other colours.
     pub(super) fn picture_alone(&self) -> Option<&Arc<Image>> {
         self.picture
             .as_ref()

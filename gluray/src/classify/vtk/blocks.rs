@@ -1,16 +1,16 @@
-//! What VTK writes into the shaders of surfaces, piece by piece and in the order in which it writes
-//! the pieces. `#` is a number.
+//! The blocks that VTK writes into the shaders of surfaces, in the order in which it writes them.
+//! `#` is a number.
 
 use super::signature::ActorTexture;
 
-/// Most lights that VTK writes into a shader.
+/// The most lights that VTK writes into a shader.
 pub(super) const MOST_LIGHTS: usize = 6;
 
 // ---- Vertex shaders -----------------------------------------------------------------------------
 /// Colours, normals, texture coordinates.
 pub(super) const VERTEX_COLOR: &str = "vertexColorVSOutput = scalarColor;";
 pub(super) const VERTEX_NORMAL: &str = "normalVCVSOutput = normalMatrix * normalMC;";
-/// Texture coordinates of colour maps, where they have a name of their own, and the others.
+/// Texture coordinates of colour maps, where they have their own name, and the others.
 pub(super) const COORDINATES: [&str; 2] =
     ["colorTCoordVCVSOutput = colorTCoord;", "tcoordVCVSOutput = tcoord;"];
 /// The same with a matrix.
@@ -20,7 +20,7 @@ pub(super) const TURNED: [&str; 2] = [
     "vec4 tcoordTmp = tcMatrix * vec4(tcoord, 0.0, 1.0);
      tcoordVCVSOutput = tcoordTmp.xy / tcoordTmp.w;",
 ];
-/// Clipping planes, and what is needed where a geometry shader has them.
+/// Clipping planes, and what a geometry shader needs for them.
 pub(super) const CLIPS: &str = "for (int planeNum = 0; planeNum < numClipPlanes; planeNum++)
      { clipDistancesVSOutput[planeNum] = dot(clipPlanes[planeNum], vertexMC); }";
 pub(super) const CLIPPED_LATER: &str = "clipVertexMC = vertexMC;";
@@ -28,7 +28,7 @@ pub(super) const VERTEX_VIEW: &str = "vertexVCVSOutput = MCVCMatrix * vertexMC;"
 pub(super) const VERTEX_PLACE: &str = "gl_Position = MCDCMatrix * vertexMC;";
 
 // ---- The geometry shader that measures edges ----------------------------------------------------
-/// VTK 9.1 and 9.2 have one that also makes triangles larger than they are; that one is not known.
+/// VTK 9.1 and 9.2 have one that also enlarges triangles. That one is not recognised.
 pub(super) const MEASURES: &str = "vec2 pos[4];
      for (int i = 0; i < 3; i++)
      {
@@ -49,8 +49,8 @@ pub(super) const MEASURES: &str = "vec2 pos[4];
      if (edgeValues < 4.0) edgeEqn[2].z = lineWidth;
      if (mod(edgeValues, 4.0) < 2.0) edgeEqn[1].z = lineWidth;
      if (mod(edgeValues, 2.0) < 1.0) edgeEqn[0].z = lineWidth;";
-/// Its loop over the corners, which go through as they are. It is split here: `split` wants whole
-/// blocks.
+/// Its loop over the corners, which are passed through unchanged. It is split here, because `split`
+/// needs whole blocks.
 pub(super) const CORNERS: [&str; 3] =
     ["for(inti=0;i<3;i++)", "{", "gl_PrimitiveID=gl_PrimitiveIDIn;"];
 pub(super) const CLIPS_LATER: &str = "for (int planeNum = 0; planeNum < numClipPlanes; planeNum++)
@@ -63,7 +63,7 @@ pub(super) const EMITS: [&str; 4] =
 // ---- Fragment shaders, from their beginning to their end ----------------------------------------
 pub(super) const VIEW: &str = "vec4 vertexVC = vertexVCVSOutput;";
 
-/// What normals of triangles are made of; VTK 9.7 keeps the differences away from underflow, the
+/// The derivatives for normals of triangles. VTK 9.7 avoids underflow of the differences; the
 /// normal is the same.
 pub(super) const DIFFERENCES: [&str; 2] = [
     "vec3 fdx = dFdx(vertexVC.xyz); vec3 fdy = dFdy(vertexVC.xyz);",
@@ -71,10 +71,10 @@ pub(super) const DIFFERENCES: [&str; 2] = [
      vec3 fdx = dFdx(vertexVC.xyz)*scale; vec3 fdy = dFdy(vertexVC.xyz)*scale;",
 ];
 
-/// The slope of the surface, for depths that are moved back.
+/// The slope of the surface, for depths that are offset.
 pub(super) const SLOPE: &str =
     "float cscale = length(vec2(dFdx(gl_FragCoord.z), dFdy(gl_FragCoord.z)));";
-/// Depths that are moved back, without and with the slope, in VTK 9.1 to 9.6 and in 9.7.
+/// Offset depths, without and with the slope, in VTK 9.1 to 9.6 and in 9.7.
 pub(super) const MOVED: [&str; 2] = [
     "gl_FragDepth = gl_FragCoord.z + 1.0*cOffset/65000;",
     "gl_FragDepth = gl_FragCoord.z + 1.0*cOffset/65000.0;",
@@ -84,8 +84,8 @@ pub(super) const MOVED_BY_SLOPE: [&str; 2] = [
     "gl_FragDepth = gl_FragCoord.z + cFactor*cscale + 1.0*cOffset/65000.0;",
 ];
 
-/// Depth peeling: the pass that finds how far surfaces reach, and both ends of the pass that takes
-/// layers off.
+/// Depth peeling: the pass that finds the range of depths, and the beginning and end of the pass
+/// that peels layers.
 pub(super) const PEEL_DEPTHS: &str = "gl_FragDepth = gl_FragCoord.z;
      ivec2 pixel = ivec2(gl_FragCoord.xy);
      float oDepth = texelFetch(opaqueDepth, pixel, 0).y;
@@ -106,7 +106,7 @@ pub(super) const PEEL_LAYERS: &str = "gl_FragDepth = gl_FragCoord.z;
      if (gl_FragDepth < minDepth - epsilon || gl_FragDepth > maxDepth + epsilon) { return; }
      if (gl_FragDepth > minDepth + epsilon && gl_FragDepth < maxDepth - epsilon)
      { fragOutput2.xy = vec2(-gl_FragDepth, gl_FragDepth); return; }";
-/// The tolerance has another power of ten in other versions.
+/// Other versions have another power of ten in the tolerance.
 pub(super) const OTHER_EPSILON: [&str; 2] = ["0.0000001", "0.000001"];
 pub(super) const PEELED_LAYERS: &str = "vec4 frag = fragOutput0;
      if (gl_FragDepth >= minDepth - epsilon && gl_FragDepth <= minDepth + epsilon)
@@ -124,7 +124,8 @@ pub(super) const CLIPPED: &str = "for (int planeNum = 0; planeNum < numClipPlane
 
 pub(super) const SPECULAR: &str = "vec3 specularColor = specularIntensity * specularColorUniform;
      float specularPower = specularPowerUniform;";
-/// Colours of maps, by coordinates of their own (VTK 9.3 and later) or the only ones, and of cells.
+/// Colours of maps, with their own coordinates (VTK 9.3 and later) or the only ones, and colours of
+/// cells.
 pub(super) const MAPS: [&str; 2] = [
     "vec4 texColor = texture(colortexture, colorTCoordVCVSOutput.st);",
     "vec4 texColor = texture(colortexture, tcoordVCVSOutput.st);",
@@ -144,7 +145,7 @@ pub(super) const OF_UNIFORMS: &str = "vec3 ambientColor = ambientIntensity * amb
 /// Colours made linear for physically based materials.
 pub(super) const LINEAR: &str = "ambientColor = pow(ambientColor, vec3(2.2));
      diffuseColor = pow(diffuseColor, vec3(2.2));";
-/// Another material for back faces, lit and not.
+/// The material of back faces, lit and unlit.
 pub(super) const BACK: [&str; 2] = [
     "if (gl_FrontFacing == false) {
        ambientColor = ambientIntensityBF * ambientColorUniformBF;
@@ -185,18 +186,18 @@ pub(super) const FLAT: &str = "vec3 normalVCVSOutput = normalize(cross(fdx,fdy))
      if (cameraParallel == 0 && dot(normalVCVSOutput,vertexVC.xyz) > 0.0)
      { normalVCVSOutput = -1.0*normalVCVSOutput; }";
 
-/// Without light.
+/// Surfaces without lighting.
 pub(super) const UNLIT: &str = "fragOutput0 = vec4(ambientColor + diffuseColor, opacity);";
-/// A light at the eye. VTK 9.1 has another least cosine.
+/// A headlight. VTK 9.1 has another minimum of the cosine.
 pub(super) const HEADLIGHT: &str = "float df = max(0.000001, normalVCVSOutput.z);
      float sf = pow(df, specularPower);
      vec3 diffuse = df * diffuseColor * lightColor0;
      vec3 specular = sf * specularColor * lightColor0;
      fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);";
-/// What [`HEADLIGHT`] and lights elsewhere have since VTK 9.2, and had before.
+/// The part of [`HEADLIGHT`] and of other lights since VTK 9.2, and before.
 pub(super) const LEAST_AT_EYE: [&str; 2] = ["max(0.000001,", "max(0.0,"];
 pub(super) const LEAST_ELSEWHERE: [&str; 2] = ["max(1e-5,", "max(0.0,"];
-/// Before and after lights elsewhere.
+/// The code before and after other lights.
 pub(super) const SUNS: &str =
     "vec3 diffuse = vec3(0,0,0); vec3 specular = vec3(0,0,0); float df; float sf;";
 pub(super) const LAMPS: &str = "vec3 diffuse = vec3(0,0,0); vec3 specular = vec3(0,0,0);
@@ -204,14 +205,14 @@ pub(super) const LAMPS: &str = "vec3 diffuse = vec3(0,0,0); vec3 specular = vec3
 pub(super) const SUMMED: &str = "diffuse = diffuse * diffuseColor;
      specular = specular * specularColor;
      fragOutput0 = vec4(ambientColor + diffuse + specular, opacity);";
-/// A light from far away.
+/// A directional light.
 pub(super) const SUN: &str = "df = max(0.0, dot(normalVCVSOutput, -lightDirectionVC#));
      diffuse += (df * lightColor#);
      sf = sign(df)*pow(max(1e-5, dot(reflect(lightDirectionVC#, normalVCVSOutput), \
      normalize(-vertexVC.xyz))),
        specularPower);
      specular += (sf * lightColor#);";
-/// A light that may have a place and a cone.
+/// A light that may have a position and a cone.
 pub(super) const LAMP: &str = "attenuation = 1.0;
      if (lightPositional# == 0)
      { vertLightDirectionVC = lightDirectionVC#; }
@@ -237,7 +238,7 @@ pub(super) const LAMP: &str = "attenuation = 1.0;
        normalize(-vertexVC.xyz))), specularPower);
      specular += (sf * lightColor#);";
 
-/// The colour of a physically based material: the surface's, or by a texture with what becomes of
+/// The colour of a physically based material: that of the surface, or a texture, with the use of
 /// its alpha.
 pub(super) const ALBEDO: &str = "vec3 albedo = diffuseColor;";
 pub(super) const ALBEDO_OF_TEXTURE: &str =
@@ -247,7 +248,7 @@ pub(super) const ALBEDO_ALPHA: [(ActorTexture, &str); 2] = [
     (ActorTexture::Albedo, "opacity = opacityUniform * albedoSample.a;"),
     (ActorTexture::AlbedoAlone, "opacity = albedoSample.a;"),
 ];
-/// What goes on behind it.
+/// The code after it.
 pub(super) const PHYSICAL: &str = "float roughness = roughnessUniform;
      float metallic = metallicUniform;
      float ao = 1.0;
@@ -264,15 +265,15 @@ pub(super) const PHYSICAL: &str = "float roughness = roughnessUniform;
      vec3 F90 = mix(vec3(f90), edgeTintUniform, metallic);
      vec3 L, H, radiance, F, specular, diffuse;
      float NdL, NdH, HdL, distanceVC, attenuation, D, Vis;";
-/// What `D_GGX` has since VTK 9.7; without blanks.
+/// The addition to `D_GGX` since VTK 9.7, without blanks.
 pub(super) const LOBES_HAVE_AN_END: &str = "max(PI*d*d,1e-8)";
-/// Its light at the eye.
+/// Its headlight.
 pub(super) const PHYSICAL_HEADLIGHT: &str = "
      specular = SpecularIsotropic(NdV, NdV, NdV, 1.0, roughness, F0, F90, F);
      diffuse = (1.0 - metallic) * (1.0 - F) * DiffuseLambert(albedo);
      radiance = lightColor0;
      Lo += radiance * (diffuse + specular) * NdV;";
-/// Its light from far away.
+/// Its directional light.
 pub(super) const PHYSICAL_SUN: &str = "L = normalize(-lightDirectionVC#);
      H = normalize(V + L);
      HdL = clamp(dot(H, L), 1e-5, 1.0);
@@ -282,7 +283,7 @@ pub(super) const PHYSICAL_SUN: &str = "L = normalize(-lightDirectionVC#);
      specular = SpecularIsotropic(NdH, NdV, NdL, HdL, roughness, F0, F90, F);
      diffuse = (1.0 - metallic) * (1.0 - F) * DiffuseLambert(albedo);
      Lo += radiance * (diffuse + specular) * NdL;";
-/// Its light that may have a place and a cone.
+/// Its light that may have a position and a cone.
 pub(super) const PHYSICAL_LAMP: &str = "if (lightPositional# == 0)
      { attenuation = 1.0; L = -lightDirectionVC#; }
      else
@@ -310,7 +311,7 @@ pub(super) const PHYSICAL_LAMP: &str = "if (lightPositional# == 0)
      specular = SpecularIsotropic(NdH, NdV, NdL, HdL, roughness, F0, F90, F);
      diffuse = (1.0 - metallic) * (1.0 - F) * DiffuseLambert(albedo);
      Lo += radiance * (diffuse + specular) * NdL;";
-/// What it ends with, in today's VTK and in 9.1 to 9.3.
+/// Its end, in current VTK and in 9.1 to 9.3.
 pub(super) const PHYSICAL_ENDS: [&str; 2] = [
     "vec3 iblSpecular = vec3(0.0);
      vec3 iblDiffuse = vec3(0.0);
@@ -331,8 +332,7 @@ pub(super) const PHYSICAL_ENDS: [&str; 2] = [
      fragOutput0 = vec4(color, opacity);",
 ];
 
-/// The texture of an actor, by its number in the shader: read, its components, and what is done
-/// with it.
+/// An actor's texture, by its number in the shader: the read, its components, and their use.
 pub(super) const READS: &str = "vec4 tcolor_# = texture(actortexture, tcoordVCVSOutput);";
 pub(super) const COMPONENTS: [(ActorTexture, &str); 4] = [
     (ActorTexture::Rgb, "tcolor_# = vec4(tcolor_#.r,tcolor_#.g,tcolor_#.b,1.0);"),
@@ -343,11 +343,11 @@ pub(super) const COMPONENTS: [(ActorTexture, &str); 4] = [
 pub(super) const MULTIPLIES: &str = "vec4 tcolor = tcolor_#;
      if (gl_FrontFacing == true || showTexturesOnBackface)
      { fragOutput0 = fragOutput0 * tcolor; }";
-/// Textures that VTK may have counted before it.
+/// Textures that VTK may have numbered before it.
 pub(super) const MOST_BEFORE: usize = 4;
 
 pub(super) const DISCARDS: &str = "if (fragOutput0.a <= 0.0) { discard; }";
-/// Sums for translucency that needs no order.
+/// Sums for order-independent translucency.
 pub(super) const WEIGHTED: &str =
     "fragOutput0 = vec4(fragOutput0.rgb * fragOutput0.a, fragOutput0.a);
      fragOutput1.r = fragOutput0.a;";

@@ -1,4 +1,5 @@
-//! Recognised programs as messages to other ranks. Colour map and picture go by their names.
+//! Recognised programs as messages to other ranks. The colour map and the actor's texture are sent
+//! by name.
 
 use super::color::Surface;
 use super::program::{CellEdges, PbrMaterial, PositionalLight, ProgramLight};
@@ -50,19 +51,18 @@ impl Wire for CellEdges {
 }
 
 impl VtkProgram {
-    /// Colour map and picture.
+    /// The colour map and the actor's texture.
     pub(crate) fn images(&self) -> [Option<&Arc<Image>>; 2] {
         [self.map.as_ref(), self.picture.as_ref()]
     }
 
-    /// The same with a colour map and a picture.
+    /// The same program with a colour map and an actor's texture.
     pub(crate) fn with_images(mut self, [map, picture]: [Option<Arc<Image>>; 2]) -> VtkProgram {
         (self.map, self.picture) = (map, picture);
         self
     }
 
-    /// Lights that the program computes with and that are not there; also those that are more than
-    /// can be.
+    /// The number of lights that the program uses without having them, or beyond the limit.
     pub(crate) fn missing_lights(&self) -> usize {
         let most = crate::trace::occlusion::MOST_LIGHTS;
         usize::from(self.signature.headlight && self.lights.is_empty())

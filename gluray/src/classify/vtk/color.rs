@@ -1,4 +1,4 @@
-//! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own, that of
+//! The colour of a fragment, step by step as VTK's shaders compute it: the surface's own colour,
 //! back faces, edges, lights.
 
 use super::program::{CellEdges, PbrMaterial, ProgramLight, VtkProgram};
@@ -12,7 +12,7 @@ use rt_core::mesh::TriMesh;
 
 type V3 = [f32; 3];
 
-/// What light falls on: colours with their coefficients.
+/// The surface before lighting: colours with their coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surface {
     pub(super) ambient: V3,
@@ -22,17 +22,17 @@ pub(crate) struct Surface {
     pub(super) alpha: f32,
 }
 
-/// Where a fragment is.
+/// The position of a fragment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FragmentSample {
     pub(crate) prim: usize,
     pub(crate) weights: V3,
     pub(crate) front: bool,
-    /// The window's pixel that sees it, where the eye does.
+    /// The window's pixel that shows it, for primary rays.
     pub(crate) pixel: Option<(i32, i32)>,
-    /// Texels of the picture that the pixel covers, where that is known.
+    /// The number of texels of the actor's texture that the pixel covers, where it is known.
     pub(crate) texels: Option<f32>,
-    /// The sample's place, from the middle of the pixel, that everything was moved by.
+    /// The sample offset from the pixel centre.
     pub(crate) sample_offset: [f32; 2],
 }
 
@@ -45,7 +45,7 @@ fn mix(a: V3, b: V3, t: f32) -> V3 {
 }
 
 impl ProgramLight {
-    /// Direction in which its light comes to a point, and what of it comes there.
+    /// The direction from which its light arrives at a point, and its share there.
     fn reaching(&self, at: V3) -> (V3, f32) {
         let Some(lamp) = self.lamp else { return (self.direction, 1.0) };
         let away: V3 = std::array::from_fn(|k| at[k] - lamp.position[k]);
@@ -66,9 +66,10 @@ impl ProgramLight {
 }
 
 impl PbrMaterial {
-    /// Reflected light by that which comes along `l`, as VTK has it: Lambert's and an isotropic GGX
-    /// lobe with the height-correlated Smith term and Schlick's Fresnel factor. `cosines` are those
-    /// of the half vector with the normal, the view, the light, and of half vector and light.
+    /// The light reflected towards the view, as in VTK: Lambert's term and an isotropic GGX lobe
+    /// with the height-correlated Smith term and Schlick's Fresnel factor. `cosines` are those of
+    /// the half vector with the normal, the view and the light, and of the half vector and the
+    /// light.
     fn reflected(&self, albedo: V3, [n_h, n_v, n_l, h_l]: [f32; 4]) -> V3 {
         use std::f32::consts::PI;
         let f0 = mix([self.base; 3], albedo, self.metallic);
@@ -93,7 +94,7 @@ impl PbrMaterial {
 }
 
 impl CellEdges {
-    /// How much of a fragment is line. `corners` are the triangle's in clip space.
+    /// The share of a fragment that edges cover. `corners` are the triangle's in clip space.
     fn share(&self, corners: [[f32; 4]; 3], at: &FragmentSample) -> f32 {
         let sides = self.sides.get(at.prim).copied().unwrap_or(7);
         let [vx, vy, vw, vh] = self.viewport;
@@ -107,7 +108,7 @@ impl CellEdges {
         let [mx, my] = at.sample_offset.map(f64::from);
         let (px, py) = match at.pixel {
             Some((x, y)) => (f64::from(x) + 0.5 - mx, f64::from(y) + 0.5 - my),
-            // Anywhere in a pixel, or seen in a mirror: where the eye would see it.
+            // At any position in a pixel, or in a mirror: where the eye would see it.
             None => {
                 let [x, y, _, w] = mixed(corners, at.weights);
                 (f64::from((x / w * 0.5 + 0.5) * vw + vx), f64::from((y / w * 0.5 + 0.5) * vh + vy))
@@ -130,8 +131,8 @@ impl CellEdges {
 }
 
 impl VtkProgram {
-    /// Colour and alpha of vertices, triangles or the colour map; no colour where the uniforms' are
-    /// taken.
+    /// The colour and alpha of vertices, triangles or the colour map. No colour when the uniforms'
+    /// colour is used.
     pub(super) fn own_color(
         &self,
         a: &Attributes,
@@ -152,7 +153,7 @@ impl VtkProgram {
         (Some([r, g, b]).filter(|_| !self.overrides), alpha)
     }
 
-    /// The surface of a fragment before light falls on it, step by step as the shader has it.
+    /// The surface of a fragment before lighting, step by step as in the shader.
     fn surface(
         &self,
         a: &Attributes,
@@ -174,7 +175,7 @@ impl VtkProgram {
                 }
             }
         };
-        // The colour of a block is over those of back faces, and is not made linear.
+        // The colour of a block replaces those of back faces and is not made linear.
         if self.overrides {
             surface.ambient = self.ambient.map(|v| v * self.ambient_intensity);
             surface.diffuse = self.diffuse.map(|v| v * self.diffuse_intensity);
@@ -200,7 +201,7 @@ impl VtkProgram {
         surface
     }
 
-    /// Place and normal of a fragment in eye space.
+    /// The position and normal of a fragment in eye space.
     fn eye_point(&self, a: &Attributes, mesh: &TriMesh, at: &FragmentSample) -> (V3, V3) {
         let corners = mesh.indices[at.prim].map(|i| i as usize);
         let view = corners.map(|i| {
@@ -264,7 +265,7 @@ impl VtkProgram {
                 shine[k] = sf * self.lights[0].color[k];
             }
         }
-        // A light that the user has added to one at the eye is one like others.
+        // A light that the user has added to a headlight is treated like any other light.
         let others = &self.lights[usize::from(self.signature.headlight)..];
         let visible = &reaches.lights[usize::from(self.signature.headlight)..];
         let to_eye = normalized(point.map(|v| -v));

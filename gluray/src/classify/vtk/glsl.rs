@@ -1,11 +1,10 @@
-//! GLSL as programs hand it over: without comments and with its conditions decided, its
-//! declarations and functions looked at, and `main` as statements that keep their order and their
-//! braces.
+//! Reads the GLSL sources of programs: removes comments, evaluates conditions, checks declarations
+//! and functions, and splits `main` into statements that keep their order and their braces.
 //!
-//! What is not understood makes the whole source unknown: a condition or a macro, a function, a
-//! global variable, an interpolation.
+//! Anything that is not understood makes the whole source unknown: a condition or a macro, a
+//! function, a global variable, an interpolation.
 
-/// Which shader of a program a source is.
+/// The shader stage of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ShaderStage {
     Vertex,
@@ -13,8 +12,7 @@ pub(super) enum ShaderStage {
     Fragment,
 }
 
-/// Inputs and outputs that VTK's surfaces have, with the suffix of vertex shaders where they have
-/// one.
+/// The inputs and outputs of VTK's surfaces, with the suffix of vertex shaders if any.
 const PASSED_ON: [&str; 13] = [
     "vertexMC",
     "normalMC",
@@ -31,7 +29,7 @@ const PASSED_ON: [&str; 13] = [
     "clipDistancesVSOutput",
 ];
 
-/// Macros of VTK's preambles, which rename what has other names in other dialects.
+/// The macros of VTK's preambles, which rename what has other names in other dialects.
 const MACROS: [&str; 10] = [
     "highp",
     "mediump",
@@ -57,7 +55,7 @@ const FUNCTIONS: [u64; 6] = [
     0xbb8a_0812_74c1_2afe,
 ];
 
-/// The statements of a stage's `main`; `None` where the source has anything that VTK's surfaces do
+/// The statements of a shader's `main`. `None` when the source has anything that VTK's surfaces do
 /// not have.
 pub(super) fn statements(source: &str, stage: ShaderStage) -> Option<Vec<String>> {
     let text = with_conditions_resolved(&without_comments(source))?;
@@ -86,16 +84,16 @@ pub(super) fn statements(source: &str, stage: ShaderStage) -> Option<Vec<String>
         item.clear();
     }
     let main = main.filter(|_| item.trim().is_empty() && depth == 0)?;
-    // An output that nobody writes has any value whatever.
+    // An output that is never written may have any value.
     let written = |name: &String| main.iter().any(|s| assigns(s, name));
     (stage == ShaderStage::Fragment || outputs.iter().all(written)).then_some(main)
 }
 
 /// Statements without blanks: those with a semicolon, heads of blocks without one, and braces.
 ///
-/// Blanks go, also between a type and a name: `vec4 x` and `vec4x` are the same here. The second
-/// could only be a variable of that name, and the only ones that a source may declare are inputs,
-/// outputs and uniforms, by [`output_declaration`].
+/// Blanks are removed, also between a type and a name, so `vec4 x` and `vec4x` are equal here. The
+/// second could only be a variable of that name, and a source may declare only inputs, outputs and
+/// uniforms, by [`output_declaration`].
 pub(super) fn split(body: &str) -> Option<Vec<String>> {
     let (mut out, mut statement) = (Vec::new(), String::new());
     let (mut parentheses, mut braces) = (0_usize, 0_usize);
@@ -120,7 +118,7 @@ pub(super) fn split(body: &str) -> Option<Vec<String>> {
                 out.push("}".into());
                 continue;
             }
-            // VTK leaves empty statements behind.
+            // VTK leaves empty statements.
             ';' if parentheses == 0 && statement.is_empty() => continue,
             _ => {}
         }
@@ -146,7 +144,7 @@ fn digest(text: &str) -> u64 {
         .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The source with lines put together that end in `\`, and a blank for each comment.
+/// The source with continued lines joined, and a blank for each comment.
 pub(super) fn without_comments(source: &str) -> String {
     let text = source.replace("\r\n", "\n").replace("\\\n", "");
     let (mut out, mut rest) = (String::with_capacity(text.len()), text.as_str());
@@ -166,12 +164,12 @@ pub(super) fn without_comments(source: &str) -> String {
     out + rest
 }
 
-/// The lines that remain when conditions are decided as OpenGL of the desktop decides them; `None`
-/// where that is not known.
+/// The lines that remain when conditions are evaluated as by desktop OpenGL. `None` when a
+/// condition is unknown.
 fn with_conditions_resolved(text: &str) -> Option<String> {
     let mut out = String::new();
     let mut version = 110;
-    // For each condition that is open: whether its lines count, and whether `else` came.
+    // For each open condition: whether its lines count, and whether `else` came.
     let mut open: Vec<(bool, bool)> = Vec::new();
     for line in text.lines() {
         let counts = open.iter().all(|(counts, _)| *counts);
@@ -184,7 +182,7 @@ fn with_conditions_resolved(text: &str) -> Option<String> {
         };
         let words: Vec<&str> = directive.split_whitespace().collect();
         match words.as_slice() {
-            // What is left out anyway needs no decision.
+            // A line that is left out needs no decision.
             ["if" | "ifdef" | "ifndef", ..] if !counts => open.push((false, false)),
             ["ifdef", name] => open.push((is_defined(name)?, false)),
             ["ifndef", name] => open.push((!is_defined(name)?, false)),
@@ -210,12 +208,12 @@ fn with_conditions_resolved(text: &str) -> Option<String> {
 }
 
 fn is_defined(name: &str) -> Option<bool> {
-    // Other macros than ours are refused where they are defined.
+    // Other macros are refused where they are defined.
     ["GL_ES", "ANISOTROPY", "CLEAR_COAT"].contains(&name).then_some(false)
 }
 
-/// Looks at a declaration outside of functions; the name when it is an output, `None` when VTK's
-/// surfaces have no such thing.
+/// Checks a global declaration. Returns the name of an output, or `None` when VTK's surfaces have
+/// no such declaration.
 fn output_declaration(text: &str, stage: ShaderStage) -> Option<Option<String>> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let plain = |name: &str| {
@@ -236,8 +234,7 @@ fn output_declaration(text: &str, stage: ShaderStage) -> Option<Option<String>> 
             let is_out = *storage == "out";
             (known && (!of_edges || name == "edgeEqn")).then_some(Some(name).filter(|_| is_out))
         }
-        // Uniforms that no statement has do nothing; those that statements have are asked for by
-        // name.
+        // Uniforms that no statement uses have no effect. The others are queried by name.
         ["uniform", _, name] if !of_edges => {
             plain(name).filter(|name| !PASSED_ON.contains(&name.as_str())).map(|_| None)
         }

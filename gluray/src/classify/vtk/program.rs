@@ -1,4 +1,4 @@
-//! A program that we know, with its uniforms at one draw.
+//! A recognised program, with its uniforms at one draw.
 
 use super::color::Surface;
 use super::signature::{ActorTexture, ColorSource, VtkShaderSignature};
@@ -12,43 +12,43 @@ use crate::trace::texturing::Image;
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
-/// What colours a program's surface.
+/// The source of a program's surface colours.
 pub(crate) enum ProgramColorSource<'a> {
     /// Uniforms.
     Constant,
-    /// The vertices' colours, times this.
+    /// The vertices' colours, times this factor.
     PerVertex(f32),
-    /// A colour map, times this.
+    /// A colour map, times this factor.
     Map(&'a Image, f32),
-    /// A picture over uniforms.
+    /// An actor's texture over uniforms.
     Picture(&'a Image),
-    /// A colour for each triangle, times this.
+    /// A colour for each triangle, times this factor.
     PerCell(&'a Image, f32),
 }
 
 /// A light in eye space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ProgramLight {
-    /// Where its light, or the middle of its cone, travels.
+    /// The direction of its light, or of the axis of its cone.
     pub(crate) direction: [f32; 3],
     pub(crate) color: [f32; 3],
-    /// `None` far away.
+    /// `None` for a directional light.
     pub(crate) lamp: Option<PositionalLight>,
 }
 
-/// A light with a place.
+/// A light with a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionalLight {
     pub(crate) position: [f32; 3],
-    /// Constant, linear, quadratic.
+    /// Constant, linear and quadratic attenuation.
     pub(crate) attenuation: [f32; 3],
-    /// 90 or more for no cone.
+    /// 90 or more means no cone.
     pub(crate) cone_deg: f32,
     pub(crate) exponent: f32,
 }
 
 impl ProgramLight {
-    /// The same as a light of fixed function.
+    /// The same light of fixed function.
     pub(crate) fn as_opengl(&self) -> GlLight {
         let [r, g, b] = self.color;
         let light = GlLight {
@@ -72,7 +72,7 @@ impl ProgramLight {
     }
 }
 
-/// Constants of a physically based material.
+/// The parameters of a physically based material.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PbrMaterial {
     pub(crate) metallic: f32,
@@ -80,31 +80,31 @@ pub(crate) struct PbrMaterial {
     /// Reflectance along the normal, and its tint at grazing angles.
     pub(crate) base: f32,
     pub(crate) tint: [f32; 3],
-    /// What the lobe is divided by is not less: 0 before VTK 9.7.
+    /// The minimum of the lobe's denominator: 0 before VTK 9.7.
     pub(crate) least_divisor: f32,
 }
 
 /// Lines along the edges of cells.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CellEdges {
-    /// For each triangle which of its sides are edges of its cell: bits.
+    /// For each triangle, the sides that are edges of its cell, as bits.
     pub(crate) sides: Arc<Vec<u8>>,
-    /// In pixels.
+    /// The width in pixels.
     pub(crate) width: f32,
     pub(crate) color: [f32; 3],
     pub(crate) opacity: f32,
-    /// The viewport as the program gave it.
+    /// The viewport as the program set it.
     pub(crate) viewport: [f32; 4],
 }
 
-/// What a draw's buffer textures have for each triangle.
+/// The data of a draw's buffer textures for each triangle.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CellData {
     pub(crate) colors: Option<Arc<Image>>,
     pub(crate) sides: Option<Arc<Vec<u8>>>,
 }
 
-/// A program whose picture we can make, with its uniforms at one draw.
+/// A program that can be reproduced, with its uniforms at one draw.
 #[derive(Debug, Clone)]
 pub(crate) struct VtkProgram {
     pub(crate) clip_from_object: [f32; 16],
@@ -121,26 +121,26 @@ pub(crate) struct VtkProgram {
     pub(super) parallel: bool,
     pub(super) overrides: bool,
     pub(crate) lights: Vec<ProgramLight>,
-    /// Of back faces, where they have one of their own.
+    /// The material of back faces, if they have their own.
     pub(super) back: Option<Surface>,
     pub(super) physical: Option<PbrMaterial>,
-    /// Planes in object space that fragments must be above.
+    /// Planes in object space. Fragments must lie above them.
     pub(super) clip_planes: Vec<[f32; 4]>,
     pub(super) edges: Option<CellEdges>,
     /// The colour map, or a colour for each triangle.
     pub(super) map: Option<Arc<Image>>,
-    /// The texture of the actor, and whether back faces have it.
+    /// The actor's texture, and whether back faces have it.
     pub(super) picture: Option<Arc<Image>>,
     pub(super) picture_on_backs: bool,
     /// The matrix for texture coordinates.
     pub(super) turn: Option<[f32; 16]>,
 }
 
-/// Most clipping planes of VTK's.
+/// The most clipping planes of VTK's shaders.
 const MOST_PLANES: i32 = 6;
 
 impl VtkProgram {
-    /// The uniforms now.
+    /// Reads the present uniforms.
     pub(super) fn from_uniforms(
         program: u32,
         signature: VtkShaderSignature,
@@ -216,7 +216,7 @@ impl VtkProgram {
                 sides: Arc::default(),
                 width: one("lineWidth"),
                 color: value(program, "edgeColor"),
-                // VTK gives it only where lines let something through.
+                // VTK sets it only where lines are translucent.
                 opacity: match gl::uniform_location(program, "edgeOpacity") {
                     -1 => 1.0,
                     at => gl::uniform_f::<1>(program, at)[0],
@@ -230,7 +230,7 @@ impl VtkProgram {
         }
     }
 
-    /// What buffer textures have for each triangle of the draw.
+    /// The same program with the data of buffer textures for the triangles of the draw.
     pub(super) fn with_cells(mut self, cells: &CellData) -> VtkProgram {
         if self.signature.colors == ColorSource::PerCell {
             self.map = cells.colors.clone();
@@ -241,7 +241,7 @@ impl VtkProgram {
         self
     }
 
-    /// One colour everywhere, instead of colour maps and colours of vertices and cells.
+    /// Replaces colour maps and the colours of vertices and cells by one colour.
     pub(crate) fn paint(&mut self, color: [f32; 3]) {
         (self.ambient, self.diffuse) = (color, color);
         self.signature.colors = ColorSource::Uniform;
@@ -250,7 +250,7 @@ impl VtkProgram {
         self.back = None;
     }
 
-    /// Where the lights are, in eye space.
+    /// The positions of the lights in eye space.
     pub(crate) fn light_positions(&self) -> Vec<LightPosition> {
         let place = |l: &ProgramLight| match l.lamp {
             None => LightPosition::Directional(vector(l.direction.map(|v| -v))),
@@ -259,7 +259,7 @@ impl VtkProgram {
         self.lights.iter().map(place).collect()
     }
 
-    /// Planes in object space that fragments must be above.
+    /// Planes in object space. Fragments must lie above them.
     pub(crate) fn clip_planes(&self) -> &[[f32; 4]] {
         &self.clip_planes
     }
@@ -278,7 +278,7 @@ impl VtkProgram {
             }
     }
 
-    /// Diffuse colour with its coefficient, and opacity; with the picture on it.
+    /// The diffuse colour with its coefficient, and the opacity, including the actor's texture.
     pub(crate) fn base(
         &self,
         a: &Attributes,
@@ -293,7 +293,7 @@ impl VtkProgram {
         }
     }
 
-    /// The same without the picture.
+    /// The same without the actor's texture.
     pub(crate) fn ground(
         &self,
         a: &Attributes,
@@ -312,7 +312,7 @@ impl VtkProgram {
         (color, alpha * self.opacity)
     }
 
-    /// Where colours come from, with the factor on them.
+    /// The source of the colours, with their factor.
     pub(crate) fn color_source(&self) -> ProgramColorSource<'_> {
         let unlit = if self.signature.lit { 0.0 } else { self.ambient_intensity };
         let factor = self.diffuse_intensity + unlit;
@@ -330,7 +330,7 @@ impl VtkProgram {
         }
     }
 
-    /// What a scene of paths has no place for, in words.
+    /// What a path-traced scene cannot represent, as a reason for the report.
     pub(crate) fn unsupported_in_path_mode(&self) -> impl Iterator<Item = &'static str> {
         let left_out = [
             (self.edges.is_some(), "edges of cells"),
@@ -344,17 +344,17 @@ impl VtkProgram {
         left_out.into_iter().filter_map(|(there, what)| there.then_some(what))
     }
 
-    /// True when the surface answers lights.
+    /// True when the surface is lit.
     pub(crate) fn is_lit(&self) -> bool {
         self.signature.lit
     }
 
-    /// True when a single light at the eye is all there is (VTK then makes highlights by N·L).
+    /// True when the only light is a headlight. VTK then computes highlights from N·L.
     pub(crate) fn has_headlight(&self) -> bool {
         self.signature.headlight
     }
 
-    /// The part of the light that no light has to send.
+    /// The part of the light that is independent of lights.
     pub(crate) fn ambient_light(&self) -> [f32; 3] {
         match self.physical {
             Some(_) => [0.0; 3],
@@ -362,12 +362,13 @@ impl VtkProgram {
         }
     }
 
-    /// Eye space from the normals of vertices; `None` where triangles have none but their own.
+    /// The matrix from vertex normals to eye space. `None` when triangles have only their own
+    /// normals.
     pub(crate) fn eye_from_normal(&self) -> Option<&[f32; 9]> {
         (!self.signature.flat).then_some(&self.normal_matrix)
     }
 
-    /// Shading normal in eye space.
+    /// The shading normal in eye space.
     pub(crate) fn smooth_normal(
         &self,
         a: &Attributes,
@@ -384,7 +385,7 @@ impl VtkProgram {
                 });
                 normalized(mixed(each, w))
             }
-            // The triangle's own decides.
+            // The triangle's own normal decides.
             None => [0.0; 3],
         }
     }

@@ -1,13 +1,13 @@
-//! VTK's shaders, from their first statement to their last.
+//! Recognises VTK's shaders, from their first statement to their last.
 //!
-//! VTK puts a shader together from pieces in one order. A source is VTK's when its `main` is such
-//! pieces in that order and nothing else: the same statements in another order, within a condition
-//! or twice are the work of somebody else, who had reasons.
+//! VTK assembles a shader from blocks in a fixed order. A source is VTK's when its `main` consists
+//! of such blocks in that order and nothing else. The same statements in another order, within a
+//! condition or twice were written by somebody else for a reason.
 
 use super::blocks::*;
 use super::glsl::{ShaderStage, split, statements, without_comments, without_whitespace};
 
-/// Where the surface's colour comes from.
+/// The source of the surface's colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum ColorSource {
     #[default]
@@ -20,24 +20,24 @@ pub(super) enum ColorSource {
     PerCell,
 }
 
-/// What a texture of the actor's does.
+/// The use of an actor's texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum ActorTexture {
     #[default]
     No,
-    /// It multiplies the lit colour, by all of its components or by these.
+    /// All of its components, or these, multiply the lit colour.
     Rgba,
     Rgb,
     Grey,
     GreyAlpha,
-    /// It is the colour of a physically based material; its alpha multiplies the opacity, or is it
-    /// alone.
+    /// It gives a physically based material its colour. Its alpha multiplies the opacity, or
+    /// replaces it.
     Albedo,
     AlbedoAlone,
 }
 
 impl ActorTexture {
-    /// True when light and all is multiplied.
+    /// True when it multiplies the result of lighting.
     pub(super) fn is_over_all(self) -> bool {
         matches!(
             self,
@@ -46,23 +46,23 @@ impl ActorTexture {
     }
 }
 
-/// What a program does for translucency.
+/// The part of a program in translucency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum TranslucencyPass {
     #[default]
     No,
-    /// Finds how far surfaces reach.
+    /// Finds the range of depths.
     Depths,
-    /// Takes off the nearest and the farthest layer.
+    /// Peels the nearest and the farthest layer.
     Layers,
-    /// Sums up layers in any order.
+    /// Sums layers in any order.
     Weighted,
 }
 
-/// Why a program that draws depths for VTK's shadow maps is not known.
+/// The reason for leaving programs to the driver that draw depths for VTK's shadow maps.
 pub(super) const SHADOW_MAP: &str = "a shadow map";
 
-/// What a program's text says.
+/// The properties of a program, read from its sources.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct VtkShaderSignature {
     pub(super) colors: ColorSource,
@@ -70,7 +70,7 @@ pub(crate) struct VtkShaderSignature {
     /// Normals from the triangle instead of an attribute.
     pub(super) flat: bool,
     pub(super) headlight: bool,
-    /// Number of lights elsewhere, and whether these may have places and cones.
+    /// The number of lights other than a headlight, and whether they may have positions and cones.
     pub(super) lights: usize,
     pub(super) placed: bool,
     pub(super) lit: bool,
@@ -84,25 +84,26 @@ pub(crate) struct VtkShaderSignature {
     pub(super) physical: bool,
     pub(super) linear: bool,
     pub(super) actor_texture: ActorTexture,
-    /// Colour map and picture have coordinates of their own, and whether a matrix multiplies those.
+    /// The colour map and the actor's texture have separate coordinates, and whether a matrix
+    /// multiplies those.
     pub(super) two_coordinates: bool,
     pub(super) has_texture_matrix: bool,
-    /// Depths are moved back by the slope of the surface and a constant, for lines that lie on it.
+    /// Depths are offset by the slope of the surface and a constant, for lines on the surface.
     pub(super) depth_offset: bool,
-    /// Cosines of highlights, and of a light at the eye, may be 0 (VTK 9.1); later they have a
-    /// least value.
+    /// The cosines of highlights, and of a headlight, may be 0 (VTK 9.1). Later versions have a
+    /// minimum.
     pub(super) cosines_from_zero: bool,
-    /// The lobe of a physically based material has a greatest value (VTK 9.7).
+    /// The lobe of a physically based material has a maximum (VTK 9.7).
     pub(super) lobes_have_an_end: bool,
 }
 
-/// Statements that are left to read.
+/// The statements that have not been read yet.
 struct StatementReader<'a> {
     left: &'a [String],
 }
 
 impl StatementReader<'_> {
-    /// Reads a piece if it comes next.
+    /// Reads a block if it comes next.
     fn take(&mut self, piece: &str) -> bool {
         let piece = split(piece).unwrap_or_default();
         !piece.is_empty() && self.take_all(&piece)
@@ -117,12 +118,12 @@ impl StatementReader<'_> {
         there
     }
 
-    /// Reads the first of some pieces that comes next, and says which it was.
+    /// Reads the first of several blocks that comes next. Returns which one it was.
     fn one_of<'p>(&mut self, pieces: impl IntoIterator<Item = &'p str>) -> Option<usize> {
         pieces.into_iter().position(|piece| self.take(piece))
     }
 
-    /// Reads pieces that follow one another and are numbered from 0 on.
+    /// Reads consecutive blocks that are numbered from 0 on.
     fn take_numbered(&mut self, piece: &str) -> usize {
         (0..=MOST_LIGHTS).take_while(|n| self.take(&piece.replace('#', &n.to_string()))).count()
     }
@@ -132,18 +133,18 @@ impl StatementReader<'_> {
     }
 }
 
-/// Lights of a shader.
+/// The lights of a shader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Lights {
-    /// One at the eye.
+    /// A headlight.
     head: bool,
-    /// From far away or, with `placed`, from a place; how many.
+    /// Directional lights or, with `placed`, positional ones, with their number.
     others: usize,
     placed: bool,
 }
 
 impl VtkShaderSignature {
-    /// Reads the shaders; the error says why the program is not recognised.
+    /// Reads the shaders. The error is the reason why the program is not recognised.
     pub(crate) fn read(
         vertex: &str,
         geometry: &str,
@@ -160,7 +161,7 @@ impl VtkShaderSignature {
         let vs = statements(vertex, ShaderStage::Vertex).ok_or(NOT_VTK)?;
         let mut fs = statements(fragment, ShaderStage::Fragment).ok_or(NOT_VTK)?;
         if !geometry.is_empty() {
-            // What goes through has another name behind it.
+            // Values that a geometry shader passes on have another name behind it.
             fs.iter_mut().for_each(|s| *s = s.replace("GSOutput", "VSOutput"));
             t.read_geometry(geometry).ok_or("a geometry or tessellation shader")?;
         }
@@ -172,7 +173,7 @@ impl VtkShaderSignature {
         Ok(t)
     }
 
-    /// The shader that measures edges, which changes nothing else.
+    /// The geometry shader that measures edges and changes nothing else.
     fn read_geometry(&mut self, text: &str) -> Option<()> {
         let text: Vec<String> = statements(text, ShaderStage::Geometry)?
             .iter()
@@ -181,7 +182,7 @@ impl VtkShaderSignature {
         let mut r = StatementReader { left: &text };
         self.edges = r.take(MEASURES) && r.take_all(&CORNERS);
         let mut through = GOES_THROUGH.map(Some);
-        // These are apart from each other, so that their order does not matter.
+        // These are independent of each other, so their order does not matter.
         loop {
             if !self.clipped && r.take(CLIPS_LATER) {
                 self.clipped = true;
@@ -205,7 +206,7 @@ impl VtkShaderSignature {
         let [map, picture] = [0, 1].map(|i| r.one_of([COORDINATES[i], TURNED[i]]));
         self.two_coordinates = map.is_some() && picture.is_some();
         self.has_texture_matrix = map == Some(1) || picture == Some(1);
-        // A matrix for one kind of coordinates alone.
+        // A matrix for only one kind of coordinates.
         if self.has_texture_matrix && (map == Some(0) || picture == Some(0)) {
             return None;
         }
@@ -264,7 +265,7 @@ impl VtkShaderSignature {
         r.is_done().then_some(())
     }
 
-    /// Where the surface's colour comes from, and what changes it before there is light.
+    /// The source of the surface's colour, and the changes to it before lighting.
     fn read_colors(&mut self, r: &mut StatementReader<'_>) -> Option<()> {
         r.take(SPECULAR);
         if r.one_of(MAPS).is_some() {
@@ -312,7 +313,7 @@ impl VtkShaderSignature {
         known.then_some(())
     }
 
-    /// Lights of a shader that lights by Phong's rule.
+    /// The lights of a shader with Phong's lighting.
     fn read_lights(&mut self, r: &mut StatementReader<'_>) -> Option<Lights> {
         let at_eye = LEAST_AT_EYE.map(|least| HEADLIGHT.replace(LEAST_AT_EYE[0], least));
         if let Some(version) = r.one_of(at_eye.iter().map(String::as_str)) {
@@ -333,7 +334,7 @@ impl VtkShaderSignature {
     }
 }
 
-/// The rest of a physically based material; its lights.
+/// The rest of a physically based material. Returns its lights.
 fn read_physical(r: &mut StatementReader<'_>) -> Option<Lights> {
     r.take(PHYSICAL).then_some(())?;
     let lights = if r.take(PHYSICAL_HEADLIGHT) {
@@ -347,7 +348,7 @@ fn read_physical(r: &mut StatementReader<'_>) -> Option<Lights> {
     r.one_of(PHYSICAL_ENDS).map(|_| lights)
 }
 
-/// A picture that multiplies the lit colour.
+/// An actor's texture that multiplies the lit colour.
 fn read_picture(r: &mut StatementReader<'_>) -> ActorTexture {
     for (actor_texture, components) in COMPONENTS {
         for n in 0..MOST_BEFORE {

@@ -1,6 +1,6 @@
-//! What an X server says of the vendors for a screen: two requests of the X protocol (X11, and GLX
-//! 1.4's `glXQueryServerString`), by ourselves, because a library that asks the server would be
-//! part of what is to be chosen.
+//! Asks an X server for the vendors of a screen, with two requests of the X protocol (X11, and GLX
+//! 1.4's `glXQueryServerString`). The requests are made without a library, because such a library
+//! would be part of what is to be chosen.
 
 use super::screen_of;
 use std::io::{Read, Write};
@@ -17,14 +17,14 @@ const COOKIE: &[u8] = b"MIT-MAGIC-COOKIE-1";
 const VENDOR_NAMES: u32 = 0x20f6;
 const QUERY_EXTENSION: u8 = 98;
 const GLX_QUERY_SERVER_STRING: u8 = 19;
-/// More than any answer has.
+/// More bytes than any answer has.
 const MOST_BYTES: usize = 1 << 20;
 
 trait Stream: Read + Write {}
 impl<S: Read + Write> Stream for S {}
 
-/// The names that the server of a display gives for its screen, the best first; the error says why
-/// there are none.
+/// The names that the server of a display gives for its screen, the best first. The error is the
+/// reason why there are none.
 pub(super) fn vendor_names(display: &str, authority: Option<&Path>) -> Result<Vec<String>, String> {
     let (host, number) =
         display.rsplit_once(':').ok_or_else(|| format!("`{display}` is no display"))?;
@@ -130,7 +130,7 @@ fn ask(
     }
 }
 
-/// A reply or an error, and what follows it.
+/// A reply or an error, and the data that follows it.
 fn reply(stream: &mut dyn Stream) -> std::io::Result<([u8; 32], Vec<u8>)> {
     let mut head = [0; 32];
     stream.read_exact(&mut head)?;
