@@ -9,7 +9,7 @@
 //!    ray tracing can replace the draw (`classify`).
 //! 3. If it can, the draw becomes a mesh (`capture`). The mesh's hierarchy may already be cached
 //!    (`capture::geometry_cache`).
-//! 4. When the program is about to see the image (`present::frame`), rays find the nearest
+//! 4. When the program is about to see the image (`interpose::pipeline`), rays find the nearest
 //!    triangle of every pixel (`trace`). Each hit is lit as OpenGL lights it (`trace::lighting`,
 //!    `trace::texturing`).
 //! 5. Colours and depths go into the program's framebuffer as one pass of fragments
