@@ -439,18 +439,19 @@ fn hand_written() -> Vec<String> {
 /// The tables of `interpose::calls`.
 fn table_of_calls(names: &[&str]) -> String {
     let mut s = String::new();
-    writeln!(s, "/// The number of calls.\npub(crate) const COUNT: usize = {};", names.len())
-        .unwrap();
+    let n = names.len();
+    writeln!(s, "/// The number of calls.\npub(crate) const COUNT: usize = {n};").unwrap();
     writeln!(s, "/// Their names, sorted.\npub(crate) static NAMES: [&CStr; COUNT] = [").unwrap();
     names.iter().for_each(|x| writeln!(s, "c\"{x}\",").unwrap());
     writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
     names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
-    let tables: [(&str, fn(&str) -> bool); 3] =
-        [("FLUSHES", flushes), ("OTHER_DRAWS", is_other_draw), ("READS_PIXELS", reads_pixels)];
-    for (table, holds) in tables {
-        writeln!(s, "];\nstatic {table}: [bool; COUNT] = [").unwrap();
+    let mut table = |name: &str, holds: fn(&str) -> bool| {
+        writeln!(s, "];\nstatic {name}: [bool; COUNT] = [").unwrap();
         names.iter().for_each(|x| write!(s, "{},", holds(x)).unwrap());
-    }
+    };
+    table("FLUSHES", flushes);
+    table("OTHER_DRAWS", is_other_draw);
+    table("READS_PIXELS", reads_pixels);
     writeln!(
         s,
         "];\n/// The number of each call.\n#[allow(dead_code, non_upper_case_globals, reason = \
@@ -460,8 +461,7 @@ fn table_of_calls(names: &[&str]) -> String {
     for (i, x) in names.iter().enumerate() {
         writeln!(s, "pub(crate) const {x}: usize = {i};").unwrap();
     }
-    writeln!(s, "}}").unwrap();
-    s
+    s + "}\n"
 }
 
 fn main() {
