@@ -1,8 +1,8 @@
 //! The calls between the steps of a frame, in one place.
 //!
 //! A [`Context`] has a struct for each step: [`StateCache`], [`AttributeState`], [`Capture`],
-//! [`Classifier`] and [`Presentation`], and the [`SharedObjects`] of its group. These structs do not
-//! refer to each other. What one step needs of another goes through here:
+//! [`Classifier`] and [`Presentation`], and the [`SharedObjects`] of its group. These structs do
+//! not refer to each other. What one step needs of another goes through here:
 //!
 //! 1. Before a watched call runs, pending draws are presented if the call needs them, and the
 //!    classes of state that it may change are marked ([`Context::watched_call`]).
