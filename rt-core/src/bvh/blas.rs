@@ -11,6 +11,7 @@ use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::widened;
 use super::layout::wide::{ChildRef, LeafWriter, Unit, WideBvh, write_id_leaf};
 use super::options::BuildOptions;
+use super::query::{AnyHit, ClosestHit, TriangleTest};
 use super::traverse::triangle_leaf::ClosestTri;
 use super::triangle_bvh::TriBvh;
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
@@ -143,14 +144,14 @@ impl Blas {
 
     /// The closest hit of a local-space ray.
     #[inline]
-    pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> ClosestTri {
+    pub(crate) fn closest<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> ClosestTri {
         match &self.content {
-            Content::Triangles(tris) => tris.closest::<S, EXACT>(simd, ray),
+            Content::Triangles(tris) => tris.closest::<S, T>(simd, ray),
             Content::Shape { bvh, shape } => {
                 let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
                 let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
                 let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
-                traverse::<S, _, true>(simd, bvh, &setup, t_max, &mut leaves);
+                traverse(simd, bvh, &setup, t_max, &mut leaves);
                 leaves.best
             }
         }
@@ -158,12 +159,12 @@ impl Blas {
 
     /// Whether anything blocks a local-space ray.
     #[inline]
-    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
+    pub(crate) fn occluded<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> bool {
         match &self.content {
-            Content::Triangles(tris) => tris.occluded::<S, EXACT>(simd, ray),
+            Content::Triangles(tris) => tris.occluded::<S, T>(simd, ray),
             Content::Shape { bvh, shape } => {
                 let mut leaves = ShapeAny { shape: &**shape, ray: *ray, found: false };
-                traverse::<S, _, false>(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
+                traverse(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
                 leaves.found
             }
         }
@@ -177,6 +178,8 @@ struct ShapeLeaf<'a> {
 }
 
 impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
+    type Query = ClosestHit;
+
     #[inline(always)]
     fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         for &prim in leaf_primitive_ids(units, leaf) {
@@ -201,6 +204,8 @@ struct ShapeAny<'a> {
 }
 
 impl<S: Simd> LeafTest<S> for ShapeAny<'_> {
+    type Query = AnyHit;
+
     #[inline(always)]
     fn test(&mut self, _: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
         self.found = leaf_primitive_ids(units, leaf)

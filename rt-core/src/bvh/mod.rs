@@ -10,6 +10,7 @@ pub(crate) mod layout;
 mod options;
 mod partition;
 mod placement;
+mod query;
 mod refit;
 mod streams;
 pub(crate) mod traverse;

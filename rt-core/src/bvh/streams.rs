@@ -6,6 +6,7 @@ use super::layout::wide::ChildRef;
 use super::options::Robustness;
 use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
+use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
 use super::triangle_bvh::TriBvh;
 use super::world::{InstanceFilter, World, with_ordinary_length};
 use crate::bvh::traverse::hybrid;
@@ -143,13 +144,12 @@ impl World {
             out.fill(0);
             return;
         }
-        let coherent = coherence == Coherence::Coherent;
         dispatch!(self.level, simd => match self.robustness {
             Robustness::Fast => {
-                self.occluded_blocks::<_, false>(simd, rays, out, coherent, filter)
+                self.occluded_blocks::<_, FastTest>(simd, rays, out, coherence, filter)
             }
             Robustness::Watertight => {
-                self.occluded_blocks::<_, true>(simd, rays, out, coherent, filter)
+                self.occluded_blocks::<_, WatertightTest>(simd, rays, out, coherence, filter)
             }
         })
     }
@@ -159,28 +159,28 @@ impl World {
         self.placements.len() == 1 && !filter.has(0)
     }
 
-    fn occluded_blocks<S: Simd, const EXACT: bool>(
+    fn occluded_blocks<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         rays: &[RayBlock],
         out: &mut [u16],
-        coherent: bool,
+        coherence: Coherence,
         filter: InstanceFilter<'_>,
     ) {
         SCRATCH.with_borrow_mut(|scratch| {
-            let single = if coherent { self.single_mesh() } else { None };
+            let single = self.single_mesh().filter(|_| coherence == Coherence::Coherent);
             let mut hits = [HitBlock::MISS; GROUPS];
             for (r, out) in rays.chunks(GROUPS).zip(out.chunks_mut(GROUPS)) {
                 let n = r.len();
                 if let Some((tris, limits)) = &single
                     && scratch.inner.load(simd, r, limits)
                 {
-                    scratch.inner.trace::<S, EXACT, true>(simd, &tris.bvh);
+                    scratch.inner.trace::<S, T, AnyHit>(simd, &tris.bvh);
                     out.copy_from_slice(&scratch.inner.hit[..n]);
                     continue;
                 }
                 let hits = &mut hits[..n];
-                self.trace_group::<S, EXACT, true>(simd, r, hits, coherent, filter, scratch);
+                self.trace_group::<S, T, AnyHit>(simd, r, hits, coherence, filter, scratch);
                 for (o, h) in out.iter_mut().zip(hits) {
                     *o = (0..LANES).fold(0, |m, l| m | ((h.prim[l] != NO_HIT) as u16) << l);
                 }
@@ -211,62 +211,66 @@ impl World {
             hits.fill(HitBlock::MISS);
             return;
         }
-        let coherent = coherence == Coherence::Coherent;
         dispatch!(self.level, simd => match self.robustness {
             Robustness::Fast => {
-                self.closest_blocks::<_, false>(simd, rays, hits, coherent, filter)
+                self.closest_blocks::<_, FastTest>(simd, rays, hits, coherence, filter)
             }
             Robustness::Watertight => {
-                self.closest_blocks::<_, true>(simd, rays, hits, coherent, filter)
+                self.closest_blocks::<_, WatertightTest>(simd, rays, hits, coherence, filter)
             }
         })
     }
 
-    fn closest_blocks<S: Simd, const EXACT: bool>(
+    fn closest_blocks<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
-        coherent: bool,
+        coherence: Coherence,
         filter: InstanceFilter<'_>,
     ) {
         SCRATCH.with_borrow_mut(|scratch| {
-            let single = if coherent { self.single_mesh() } else { None };
+            let single = self.single_mesh().filter(|_| coherence == Coherence::Coherent);
             for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
                 if let Some((tris, limits)) = &single
                     && scratch.inner.load(simd, r, limits)
                 {
-                    scratch.inner.trace::<S, EXACT, false>(simd, &tris.bvh);
+                    scratch.inner.trace::<S, T, ClosestHit>(simd, &tris.bvh);
                     scratch.inner.store_all(simd, h, 0);
                     continue;
                 }
-                self.trace_group::<S, EXACT, false>(simd, r, h, coherent, filter, scratch);
+                self.trace_group::<S, T, ClosestHit>(simd, r, h, coherence, filter, scratch);
             }
         });
     }
 
     /// At most sixteen blocks of any kind.
-    fn trace_group<S: Simd, const EXACT: bool, const ANY: bool>(
+    fn trace_group<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
-        coherent: bool,
+        coherence: Coherence,
         filter: InstanceFilter<'_>,
         scratch: &mut TraversalScratch,
     ) {
         hits.fill(HitBlock::MISS);
         if any_unusual_length(simd, rays) {
-            self.trace_single_rays::<S, EXACT, ANY>(simd, rays, hits, filter);
-        } else if coherent {
-            self.trace_coherent::<S, EXACT, ANY>(simd, rays, hits, filter, scratch);
-        } else {
-            self.trace_incoherent::<S, EXACT, ANY>(simd, rays, hits, filter, scratch);
+            self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
+            return;
+        }
+        match coherence {
+            Coherence::Coherent => {
+                self.trace_coherent::<S, T, Q>(simd, rays, hits, filter, scratch)
+            }
+            Coherence::Incoherent => {
+                self.trace_incoherent::<S, T, Q>(simd, rays, hits, filter, scratch)
+            }
         }
     }
 
     /// Blocks of rays in any direction.
-    fn trace_incoherent<S: Simd, const EXACT: bool, const ANY: bool>(
+    fn trace_incoherent<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         rays: &[RayBlock],
@@ -281,18 +285,25 @@ impl World {
                 {
                     for (r, h) in rays.iter().zip(hits) {
                         let active = hybrid::active_lanes(r);
-                        hybrid::trace::<S, EXACT, ANY>(simd, &tris.bvh, r, active, h, 0);
+                        hybrid::trace::<S, T, Q>(simd, &tris.bvh, r, active, h, 0);
                     }
                 } else {
-                    self.trace_instance::<S, EXACT, ANY>(simd, 0, rays, hits, scratch, false);
+                    self.trace_instance::<S, T, Q>(
+                        simd,
+                        0,
+                        rays,
+                        hits,
+                        scratch,
+                        Coherence::Incoherent,
+                    );
                 }
             }
-            _ => self.trace_single_rays::<S, EXACT, ANY>(simd, rays, hits, filter),
+            _ => self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter),
         }
     }
 
     /// At most sixteen blocks.
-    fn trace_coherent<S: Simd, const EXACT: bool, const ANY: bool>(
+    fn trace_coherent<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         rays: &[RayBlock],
@@ -303,7 +314,7 @@ impl World {
         if let [only] = self.placements.as_slice() {
             let blas = &self.blas[only.geometry];
             if let Content::Triangles(_) = blas.content {
-                self.trace_instance::<S, EXACT, ANY>(simd, 0, rays, hits, scratch, true);
+                self.trace_instance::<S, T, Q>(simd, 0, rays, hits, scratch, Coherence::Coherent);
                 return;
             }
         }
@@ -322,10 +333,17 @@ impl World {
             if use_packets {
                 order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 for &(distance, instance) in &order {
-                    if all_resolved::<ANY>(rays, hits, distance) {
+                    if all_resolved::<Q>(rays, hits, distance) {
                         break;
                     }
-                    self.trace_instance::<S, EXACT, ANY>(simd, instance, rays, hits, scratch, true);
+                    self.trace_instance::<S, T, Q>(
+                        simd,
+                        instance,
+                        rays,
+                        hits,
+                        scratch,
+                        Coherence::Coherent,
+                    );
                 }
             }
             scratch.order = order;
@@ -333,10 +351,10 @@ impl World {
                 return;
             }
         }
-        self.trace_single_rays::<S, EXACT, ANY>(simd, rays, hits, filter);
+        self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
     }
 
-    fn trace_single_rays<S: Simd, const EXACT: bool, const ANY: bool>(
+    fn trace_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         rays: &[RayBlock],
@@ -351,12 +369,12 @@ impl World {
                 }
                 count(Counter::Fallbacks, 1);
                 let (ray, unit) = with_ordinary_length(&ray);
-                if ANY {
-                    if self.occluded_in::<S, EXACT>(simd, &ray, filter) {
+                if Q::ANY {
+                    if self.occluded_in::<S, T>(simd, &ray, filter) {
                         h.prim[lane] = 0;
                     }
                 } else {
-                    let hit = self.closest_in::<S, EXACT>(simd, &ray, filter);
+                    let hit = self.closest_in::<S, T>(simd, &ray, filter);
                     h.set(lane, hit.map(|c| Hit { t: c.t * unit, ..c }));
                 }
             }
@@ -364,30 +382,30 @@ impl World {
     }
 
     /// One instance against blocks whose closest hits so far are in `hits`; merges the nearer ones.
-    fn trace_instance<S: Simd, const EXACT: bool, const ANY: bool>(
+    fn trace_instance<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         instance: u32,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
         scratch: &mut TraversalScratch,
-        coherent: bool,
+        coherence: Coherence,
     ) {
         let placement = &self.placements[instance as usize];
         let blas = &self.blas[placement.geometry];
         let single = self.placements.len() == 1;
-        if coherent && single && placement.accepts_blocks(simd, rays) {
-            trace_blas::<S, EXACT, ANY>(simd, blas, rays, hits, instance, &mut scratch.inner);
+        if coherence == Coherence::Coherent && single && placement.accepts_blocks(simd, rays) {
+            trace_blas::<S, T, Q>(simd, blas, rays, hits, instance, &mut scratch.inner);
             return;
         }
         let n = rays.len();
         scratch.local.resize(n, RayBlock::INACTIVE);
         scratch.moved.resize(n, [0.0; LANES]);
         scratch.local_hits.resize(n, HitBlock::MISS);
-        to_local_space(placement, rays, hits, ANY, &mut scratch.local, &mut scratch.moved);
+        to_local_space(placement, rays, hits, Q::ANY, &mut scratch.local, &mut scratch.moved);
         let local_hits = &mut scratch.local_hits[..n];
         local_hits.fill(HitBlock::MISS);
-        trace_blas::<S, EXACT, ANY>(
+        trace_blas::<S, T, Q>(
             simd,
             blas,
             &scratch.local[..n],
@@ -402,7 +420,7 @@ impl World {
                     c.t = (c.t as f64 + moved[lane]) as f32;
                 }
                 let better = c.t < h.t[lane] || (c.t == h.t[lane] && instance < h.instance[lane]);
-                if ANY || better {
+                if Q::ANY || better {
                     h.set(lane, Some(c));
                 }
             }
@@ -411,12 +429,12 @@ impl World {
 }
 
 /// Whether nothing at `distance` or farther can change an answer.
-fn all_resolved<const ANY: bool>(rays: &[RayBlock], hits: &[HitBlock], distance: f32) -> bool {
+fn all_resolved<Q: HitQuery>(rays: &[RayBlock], hits: &[HitBlock], distance: f32) -> bool {
     rays.iter().zip(hits).all(|(r, h)| {
         (0..LANES).all(|lane| {
             let found = h.prim[lane] != NO_HIT;
             let idle = r.t_max[lane] <= r.t_min[lane];
-            idle || found && (ANY || inflate_t(h.t[lane]) < distance)
+            idle || found && (Q::ANY || inflate_t(h.t[lane]) < distance)
         })
     })
 }
@@ -474,7 +492,7 @@ fn to_local_space(
 
 /// Blocks in local space against one geometry: as one packet when the rays agree in octant and
 /// dominant axis, else in smaller packets, else one by one.
-fn trace_blas<S: Simd, const EXACT: bool, const ANY: bool>(
+fn trace_blas<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
     blas: &Blas,
     rays: &[RayBlock],
@@ -483,37 +501,30 @@ fn trace_blas<S: Simd, const EXACT: bool, const ANY: bool>(
     packet: &mut Packet,
 ) {
     let Content::Triangles(tris) = &blas.content else {
-        trace_blas_single_rays::<S, EXACT, ANY>(simd, blas, rays, hits, instance);
+        trace_blas_single_rays::<S, T, Q>(simd, blas, rays, hits, instance);
         return;
     };
     // Packets of 16 blocks, then of 4; blocks whose rays diverge share the start of the traversal.
     for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         if packet.load(simd, r, &PacketLimits::NONE) {
-            packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
-            packet.store::<ANY>(h, instance);
+            packet.trace::<S, T, Q>(simd, &tris.bvh);
+            packet.store::<Q>(h, instance);
             continue;
         }
         for (r, h) in r.chunks(4).zip(h.chunks_mut(4)) {
             if packet.load(simd, r, &PacketLimits::NONE) {
-                packet.trace::<S, EXACT, ANY>(simd, &tris.bvh);
-                packet.store::<ANY>(h, instance);
+                packet.trace::<S, T, Q>(simd, &tris.bvh);
+                packet.store::<Q>(h, instance);
                 continue;
             }
             for (r, h) in r.iter().zip(h) {
-                hybrid::trace::<S, EXACT, ANY>(
-                    simd,
-                    &tris.bvh,
-                    r,
-                    hybrid::active_lanes(r),
-                    h,
-                    instance,
-                );
+                hybrid::trace::<S, T, Q>(simd, &tris.bvh, r, hybrid::active_lanes(r), h, instance);
             }
         }
     }
 }
 
-fn trace_blas_single_rays<S: Simd, const EXACT: bool, const ANY: bool>(
+fn trace_blas_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
     blas: &Blas,
     rays: &[RayBlock],
@@ -527,12 +538,12 @@ fn trace_blas_single_rays<S: Simd, const EXACT: bool, const ANY: bool>(
                 continue;
             }
             count(Counter::Fallbacks, 1);
-            if ANY {
-                if blas.occluded::<S, EXACT>(simd, &ray) {
+            if Q::ANY {
+                if blas.occluded::<S, T>(simd, &ray) {
                     h.prim[lane] = 0;
                 }
             } else {
-                let c = blas.closest::<S, EXACT>(simd, &ray);
+                let c = blas.closest::<S, T>(simd, &ray);
                 if c.found {
                     (h.t[lane], h.u[lane], h.v[lane]) = (c.t, c.u, c.v);
                     (h.prim[lane], h.instance[lane]) = (c.prim, instance);

@@ -1,6 +1,7 @@
 //! The traversal against the brute-force reference, on every preset, instruction set and robustness
 //! mode.
 
+use super::query::WatertightTest;
 use super::*;
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
@@ -251,7 +252,7 @@ fn check_among(world: &World, marked: &[bool], rays: &[Ray], what: &str) {
             if marked.len() == 1 {
                 return world.closest(ray);
             }
-            fearless_simd::dispatch!(level, simd => world.closest_in::<_, true>(simd, ray, filter))
+            fearless_simd::dispatch!(level, simd => world.closest_in::<_, WatertightTest>(simd, ray, filter))
         });
         found.min_by(|a, b| a.t.total_cmp(&b.t).then(a.instance.cmp(&b.instance)))
     };

@@ -5,6 +5,7 @@ use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::TriWriter;
 use super::layout::wide::WideBvh;
 use super::options::BuildQuality;
+use super::query::TriangleTest;
 use super::traverse::single::{RaySetup, traverse_body};
 use super::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::mesh::TriMesh;
@@ -40,13 +41,13 @@ impl TriBvh {
     /// The closest hit of a local-space ray. Set-up and traversal are one function body: called
     /// once per ray, the call chain around a traversal used to take two fifths of the time.
     #[inline(never)]
-    pub(crate) fn closest<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> ClosestTri {
+    pub(crate) fn closest<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> ClosestTri {
         simd.vectorize(
             #[inline(always)]
             || {
                 let setup = RaySetup::new(ray);
-                let mut leaves = ClosestLeaf::<EXACT>::new(&setup, ray.t_max);
-                traverse_body::<S, _, true>(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
+                let mut leaves = ClosestLeaf::<T>::new(&setup, ray.t_max);
+                traverse_body(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
                 leaves.best
             },
         )
@@ -54,13 +55,13 @@ impl TriBvh {
 
     /// Whether anything blocks a local-space ray.
     #[inline(never)]
-    pub(crate) fn occluded<S: Simd, const EXACT: bool>(&self, simd: S, ray: &Ray) -> bool {
+    pub(crate) fn occluded<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> bool {
         simd.vectorize(
             #[inline(always)]
             || {
                 let setup = RaySetup::new(ray);
-                let mut leaves = AnyLeaf::<EXACT>::new(&setup, ray.t_max);
-                traverse_body::<S, _, false>(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
+                let mut leaves = AnyLeaf::<T>::new(&setup, ray.t_max);
+                traverse_body(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
                 leaves.found
             },
         )

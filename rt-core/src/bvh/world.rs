@@ -7,6 +7,7 @@ use super::layout::wide::{ChildRef, Unit, WideBvh};
 use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
 use super::partition::{GlobalLayout, blas_of};
 use super::placement::{ORDINARY_LENGTHS, Placement, distance_to_sphere};
+use super::query::{AnyHit, ClosestHit, FastTest, TriangleTest, WatertightTest};
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::math::{Aabb, exp2i, max_abs};
 use crate::mesh::{MeshError, TriMesh};
@@ -17,6 +18,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -292,13 +294,13 @@ impl World {
             Robustness::Fast => {
                 dispatch!(
                     self.level,
-                    simd => self.closest_in::<_, false>(simd, &ray, InstanceFilter::All)
+                    simd => self.closest_in::<_, FastTest>(simd, &ray, InstanceFilter::All)
                 )
             }
             Robustness::Watertight => {
                 dispatch!(
                     self.level,
-                    simd => self.closest_in::<_, true>(simd, &ray, InstanceFilter::All)
+                    simd => self.closest_in::<_, WatertightTest>(simd, &ray, InstanceFilter::All)
                 )
             }
         };
@@ -315,20 +317,20 @@ impl World {
             Robustness::Fast => {
                 dispatch!(
                     self.level,
-                    simd => self.occluded_in::<_, false>(simd, &ray, InstanceFilter::All)
+                    simd => self.occluded_in::<_, FastTest>(simd, &ray, InstanceFilter::All)
                 )
             }
             Robustness::Watertight => {
                 dispatch!(
                     self.level,
-                    simd => self.occluded_in::<_, true>(simd, &ray, InstanceFilter::All)
+                    simd => self.occluded_in::<_, WatertightTest>(simd, &ray, InstanceFilter::All)
                 )
             }
         }
     }
 
     /// The closest hit with an instance of `filter`. With only one instance, the filter is ignored.
-    pub(crate) fn closest_in<S: Simd, const EXACT: bool>(
+    pub(crate) fn closest_in<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         ray: &Ray,
@@ -337,10 +339,10 @@ impl World {
         if let [only] = self.placements.as_slice()
             && only.accepts(ray)
         {
-            let c = self.blas[only.geometry].closest::<S, EXACT>(simd, ray);
+            let c = self.blas[only.geometry].closest::<S, T>(simd, ray);
             return c.found.then_some(Hit { t: c.t, u: c.u, v: c.v, prim: c.prim, instance: 0 });
         }
-        let mut leaves = InstanceClosest::<EXACT> { world: self, ray: *ray, filter, best: None };
+        let mut leaves = InstanceClosest::<T>::new(self, *ray, filter);
         match self.placements.len() {
             0 => return None,
             1 => {
@@ -349,7 +351,7 @@ impl World {
             }
             _ => {
                 let setup = RaySetup::new(ray);
-                traverse::<S, _, true>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.best
@@ -357,7 +359,7 @@ impl World {
 
     /// Whether an instance of `filter` blocks the ray. With only one instance, the filter is
     /// ignored.
-    pub(crate) fn occluded_in<S: Simd, const EXACT: bool>(
+    pub(crate) fn occluded_in<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         ray: &Ray,
@@ -366,21 +368,21 @@ impl World {
         if let [only] = self.placements.as_slice()
             && only.accepts(ray)
         {
-            return self.blas[only.geometry].occluded::<S, EXACT>(simd, ray);
+            return self.blas[only.geometry].occluded::<S, T>(simd, ray);
         }
-        let mut leaves = InstanceAny::<EXACT> { world: self, ray: *ray, filter, found: false };
+        let mut leaves = InstanceAny::<T>::new(self, *ray, filter);
         match self.placements.len() {
             0 => return false,
-            1 => leaves.found = self.instance_occluded::<S, EXACT>(simd, 0, ray),
+            1 => leaves.found = self.instance_occluded::<S, T>(simd, 0, ray),
             _ => {
                 let setup = RaySetup::new(ray);
-                traverse::<S, _, false>(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.found
     }
 
-    fn instance_occluded<S: Simd, const EXACT: bool>(
+    fn instance_occluded<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         instance: usize,
@@ -388,7 +390,7 @@ impl World {
     ) -> bool {
         let p = &self.placements[instance];
         let (local, _) = p.enter(ray);
-        local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, EXACT>(simd, &local)
+        local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, T>(simd, &local)
     }
 }
 
@@ -520,14 +522,19 @@ fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
     if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO }
 }
 
-struct InstanceClosest<'w, const EXACT: bool> {
+struct InstanceClosest<'w, T: TriangleTest> {
     world: &'w World,
     ray: Ray,
     filter: InstanceFilter<'w>,
     best: Option<Hit>,
+    test: PhantomData<T>,
 }
 
-impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
+impl<'w, T: TriangleTest> InstanceClosest<'w, T> {
+    fn new(world: &'w World, ray: Ray, filter: InstanceFilter<'w>) -> Self {
+        InstanceClosest { world, ray, filter, best: None, test: PhantomData }
+    }
+
     fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, skip_t: &mut f32) {
         let p = &self.world.placements[instance as usize];
         // One ulp past the best so far: a tie may go to this instance.
@@ -536,7 +543,7 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
         if local.t_max <= local.t_min {
             return;
         }
-        let c = self.world.blas[p.geometry].closest::<S, EXACT>(simd, &local);
+        let c = self.world.blas[p.geometry].closest::<S, T>(simd, &local);
         if !c.found {
             return;
         }
@@ -549,7 +556,9 @@ impl<const EXACT: bool> InstanceClosest<'_, EXACT> {
     }
 }
 
-impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
+impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceClosest<'_, T> {
+    type Query = ClosestHit;
+
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         let filter = self.filter;
         for &i in leaf_primitive_ids(units, leaf).iter().filter(|&&i| filter.has(i as usize)) {
@@ -559,20 +568,29 @@ impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceClosest<'_, EXACT> {
     }
 }
 
-struct InstanceAny<'w, const EXACT: bool> {
+struct InstanceAny<'w, T: TriangleTest> {
     world: &'w World,
     ray: Ray,
     filter: InstanceFilter<'w>,
     found: bool,
+    test: PhantomData<T>,
 }
 
-impl<S: Simd, const EXACT: bool> LeafTest<S> for InstanceAny<'_, EXACT> {
+impl<'w, T: TriangleTest> InstanceAny<'w, T> {
+    fn new(world: &'w World, ray: Ray, filter: InstanceFilter<'w>) -> Self {
+        InstanceAny { world, ray, filter, found: false, test: PhantomData }
+    }
+}
+
+impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceAny<'_, T> {
+    type Query = AnyHit;
+
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
         let (world, ray, filter) = (self.world, self.ray, self.filter);
         self.found = leaf_primitive_ids(units, leaf)
             .iter()
             .filter(|&&i| filter.has(i as usize))
-            .any(|&i| world.instance_occluded::<S, EXACT>(simd, i as usize, &ray));
+            .any(|&i| world.instance_occluded::<S, T>(simd, i as usize, &ray));
         self.found
     }
 }

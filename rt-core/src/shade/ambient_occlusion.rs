@@ -3,6 +3,7 @@
 
 use super::frame_context::FrameContext;
 use super::lobes::ambient_albedo;
+use super::point::{Maps, WithMaps, WithoutMaps};
 use super::shadow::trace_light_rays;
 use super::wavefront::{LightRays, RayState};
 use super::{Point, SampleDimension, TileArea};
@@ -36,7 +37,8 @@ pub(crate) fn add_ambient_light(
     mut cost: Option<&mut [f32]>,
 ) {
     let Some(mean) = &context.irradiance else { return };
-    let ambient = if parameters.is_empty() { ambient_at::<false> } else { ambient_at::<true> };
+    let ambient =
+        if parameters.is_empty() { ambient_at::<WithoutMaps> } else { ambient_at::<WithMaps> };
     let ambient = |p: &Point| ambient(context, mean, parameters, p);
     let occlusion = context
         .scene
@@ -104,17 +106,17 @@ pub(crate) fn add_ambient_light(
     }
 }
 
-/// Ambient light that a point reflects to the eye. `MAPS`: whether some material has maps.
-fn ambient_at<const MAPS: bool>(
+/// Ambient light that a point reflects to the eye.
+fn ambient_at<M: Maps>(
     context: &FrameContext<'_>,
     mean: &IrradianceCoefficients,
     parameters: &[SurfaceParameters],
     p: &Point,
 ) -> Vec3 {
     let albedo =
-        ambient_albedo(p.model::<MAPS>(context, parameters), p.surface.color, context.effects);
+        ambient_albedo(p.model::<M>(context, parameters), p.surface.color, context.effects);
     let light = albedo * mean.for_normal(p.surface.normal);
-    p.parameters::<MAPS>(parameters).map_or(light, |v| light * v.ambient)
+    p.parameters::<M>(parameters).map_or(light, |v| light * v.ambient)
 }
 
 /// The hemisphere of a point's rays.

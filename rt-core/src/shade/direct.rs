@@ -2,6 +2,7 @@
 
 use super::frame_context::FrameContext;
 use super::lobes::response;
+use super::point::{Maps, WithMaps, WithoutMaps};
 use super::shadow::trace_light_rays;
 use super::wavefront::{LightRays, RayState};
 use super::{Point, SampleDimension, TileArea};
@@ -90,14 +91,16 @@ pub(crate) fn add_direct_light(
     cost: Option<&mut [f32]>,
 ) {
     if parameters.is_empty() {
-        direct_lighting::<false>(context, area, points, parameters, states, rays, stats, cost);
+        direct_lighting::<WithoutMaps>(
+            context, area, points, parameters, states, rays, stats, cost,
+        );
     } else {
-        direct_lighting::<true>(context, area, points, parameters, states, rays, stats, cost);
+        direct_lighting::<WithMaps>(context, area, points, parameters, states, rays, stats, cost);
     }
 }
 
-/// As [`add_direct_light`]. `MAPS`: whether some material has maps.
-fn direct_lighting<const MAPS: bool>(
+/// As [`add_direct_light`].
+fn direct_lighting<M: Maps>(
     context: &FrameContext<'_>,
     area: &TileArea,
     points: &mut [Point],
@@ -118,8 +121,8 @@ fn direct_lighting<const MAPS: bool>(
             // An occluder between this point and the light would have hidden the point from the
             // eye.
             let traced = traced && !(light.follows_camera_rays && state.first);
-            let model = p.model::<MAPS>(context, parameters);
-            let arriving = p.parameters::<MAPS>(parameters).map_or(1.0, |v| v.direct);
+            let model = p.model::<M>(context, parameters);
+            let arriving = p.parameters::<M>(parameters).map_or(1.0, |v| v.direct);
             for k in 0..count {
                 let at = spread.then(|| {
                     light_point(&area.sampler(context, state.slot), state.stream, number, k, count)
@@ -138,7 +141,8 @@ fn direct_lighting<const MAPS: bool>(
                     light.color,
                     light.highlight,
                 );
-                let strength = if MAPS { arriving * incident.strength } else { incident.strength };
+                let strength =
+                    if M::USED { arriving * incident.strength } else { incident.strength };
                 let radiance = answer * (strength / count as f32);
                 if radiance == Vec3::ZERO {
                     continue;

@@ -41,7 +41,7 @@ use crate::sampler::SamplerBlock;
 use crate::surface::{ResolvedInstance, SurfacePoint};
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
-use point::NO_PARAMETERS;
+use point::{Maps, NO_PARAMETERS, WithMaps, WithoutMaps};
 use spawn::spawn_rays;
 use tile::{PIXELS, block_place, lane_pixel};
 use wavefront::{LightRays, RayKind, RayState, Wavefront};
@@ -390,14 +390,14 @@ fn process_hits(
 ) {
     // In distributed frames, the messages do not carry the parameters of mapped surfaces.
     if context.has_maps && work.surfaces.is_empty() {
-        process_hits_with::<true>(context, area, out, work, record, stats);
+        process_hits_with::<WithMaps>(context, area, out, work, record, stats);
     } else {
-        process_hits_with::<false>(context, area, out, work, record, stats);
+        process_hits_with::<WithoutMaps>(context, area, out, work, record, stats);
     }
 }
 
-/// As [`process_hits`]. `MAPS`: whether some material has maps.
-fn process_hits_with<const MAPS: bool>(
+/// As [`process_hits`].
+fn process_hits_with<M: Maps>(
     context: &FrameContext<'_>,
     area: &TileArea,
     out: &mut TileLayers,
@@ -439,7 +439,7 @@ fn process_hits_with<const MAPS: bool>(
             None => resolved.surface(&ray, &hit),
         };
         let parameters =
-            if MAPS { resolved.parameters(&ray, &hit, &mut surface.normal) } else { None };
+            if M::USED { resolved.parameters(&ray, &hit, &mut surface.normal) } else { None };
         if !transparent {
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;

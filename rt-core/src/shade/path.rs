@@ -6,6 +6,7 @@
 use super::frame_context::FrameContext;
 use super::lobes::pbr_transmitted;
 use super::microfacet::schlick;
+use super::point::WithMaps;
 use super::specular::{MIRROR_ROUGHNESS, facing, interface, mirrored, push_scattered, sample_lobe};
 use super::wavefront::{RayKind, RayState};
 use super::{Point, SampleDimension, TileArea, Workspace};
@@ -59,7 +60,7 @@ pub(super) fn continue_paths(
             }
             continue;
         }
-        let model = p.model::<true>(context, &work.parameters);
+        let model = p.model::<WithMaps>(context, &work.parameters);
         let Some((dir, weight, mut next)) = scatter(context, area, p, model, &state) else {
             continue;
         };

@@ -26,16 +26,34 @@ pub(crate) struct Point {
 /// Instead of an index: the point has its material's own parameters.
 pub(super) const NO_PARAMETERS: u32 = u32::MAX;
 
+/// Whether some material of the scene has maps. Frames without maps use separately compiled code in
+/// which looking for them costs nothing.
+pub(super) trait Maps {
+    const USED: bool;
+}
+
+/// Some material has maps.
+pub(super) struct WithMaps;
+
+/// No material has maps.
+pub(super) struct WithoutMaps;
+
+impl Maps for WithMaps {
+    const USED: bool = true;
+}
+
+impl Maps for WithoutMaps {
+    const USED: bool = false;
+}
+
 impl Point {
-    /// The surface parameters of this point, where they differ from the material. `MAPS`: whether
-    /// some material has maps. Frames without maps use separately compiled code in which the check
-    /// costs nothing.
+    /// The surface parameters of this point, where they differ from the material.
     #[inline(always)]
-    pub(super) fn parameters<'v, const MAPS: bool>(
+    pub(super) fn parameters<'v, M: Maps>(
         &self,
         parameters: &'v [SurfaceParameters],
     ) -> Option<&'v SurfaceParameters> {
-        if !MAPS || self.parameters == NO_PARAMETERS {
+        if !M::USED || self.parameters == NO_PARAMETERS {
             None
         } else {
             parameters.get(self.parameters as usize)
@@ -44,12 +62,12 @@ impl Point {
 
     /// The reflection model of this point.
     #[inline(always)]
-    pub(super) fn model<'v, const MAPS: bool>(
+    pub(super) fn model<'v, M: Maps>(
         &self,
         context: &'v FrameContext<'_>,
         parameters: &'v [SurfaceParameters],
     ) -> &'v SurfaceModel {
-        match self.parameters::<MAPS>(parameters) {
+        match self.parameters::<M>(parameters) {
             None => &context.instances[self.instance as usize].material.model,
             Some(v) => &v.model,
         }

@@ -5,6 +5,7 @@ use super::frame_context::FrameContext;
 use super::microfacet::{
     fresnel_dielectric, masking_ratio, refract, sample_visible_normal, schlick,
 };
+use super::point::WithMaps;
 use super::wavefront::{RayKind, RayState, Wavefront};
 use super::{Point, SampleDimension, TileArea, Workspace};
 use crate::effects::Effects;
@@ -45,10 +46,10 @@ pub(super) fn spawn_specular_rays(
     for p in &work.points {
         let state = work.current.states[p.lane as usize];
         let mut weight = state.throughput * p.surface.opacity;
-        if let Some(v) = p.parameters::<true>(&work.parameters) {
+        if let Some(v) = p.parameters::<WithMaps>(&work.parameters) {
             weight *= v.ambient;
         }
-        match *p.model::<true>(context, &work.parameters) {
+        match *p.model::<WithMaps>(context, &work.parameters) {
             SurfaceModel::Phong { mirror: share, .. } if share > 0.0 && mirror => {
                 reflect_at(
                     context,

@@ -6,7 +6,7 @@
 //! on all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that
 //! cannot be normalised) are left to `shading_point` itself.
 
-use super::{ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
+use super::{HitPoint, ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
 use crate::material::{ColorSource, Sides};
 use crate::mesh::{Attribute, PerElement, TriMesh};
 use crate::ray::{HitBlock, LANES, RayBlock};
@@ -97,7 +97,7 @@ impl ResolvedInstance<'_> {
 
     /// [`ResolvedInstance::shading_point`] for the hits whose bits are set in `lanes`, all of them
     /// on this instance; other lanes of `out` are undefined.
-    pub(crate) fn shading_point_block<S: Simd, const POINT: bool>(
+    pub(crate) fn shading_point_block<S: Simd, P: HitPoint>(
         &self,
         simd: S,
         lanes: u16,
@@ -106,7 +106,7 @@ impl ResolvedInstance<'_> {
         out: &mut ShadingPointBlock,
     ) {
         let done = match self.source {
-            Source::Mesh(mesh) => self.mesh_block::<S, POINT>(simd, mesh, lanes, rays, hits, out),
+            Source::Mesh(mesh) => self.mesh_block::<S, P>(simd, mesh, lanes, rays, hits, out),
             Source::Shape(_) => 0,
         };
         let mut left = lanes & !done;
@@ -114,7 +114,7 @@ impl ResolvedInstance<'_> {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
             if let Some(hit) = hits.get(lane) {
-                out.set(lane, &self.shading_point::<POINT>(&rays.get(lane), &hit));
+                out.set(lane, &self.shading_point::<P>(&rays.get(lane), &hit));
             }
         }
     }
@@ -187,7 +187,7 @@ impl ResolvedInstance<'_> {
 
     /// Returns the lanes that it completed.
     #[inline(never)]
-    fn mesh_block<S: Simd, const POINT: bool>(
+    fn mesh_block<S: Simd, P: HitPoint>(
         &self,
         simd: S,
         mesh: &TriMesh,
@@ -198,12 +198,12 @@ impl ResolvedInstance<'_> {
     ) -> u16 {
         simd.vectorize(
             #[inline(always)]
-            || self.mesh_block_body::<S, POINT>(simd, mesh, lanes, rays, hits, out),
+            || self.mesh_block_body::<S, P>(simd, mesh, lanes, rays, hits, out),
         )
     }
 
     #[inline(always)]
-    fn mesh_block_body<S: Simd, const POINT: bool>(
+    fn mesh_block_body<S: Simd, P: HitPoint>(
         &self,
         simd: S,
         mesh: &TriMesh,
@@ -283,7 +283,7 @@ impl ResolvedInstance<'_> {
         normal.store(&mut out.normal);
 
         // ---- Point.
-        if POINT {
+        if P::COMPUTED {
             let inside = e1.scale(u).add(e2.scale(w2));
             let shift = Vec3x16::splat(simd, self.render_from_object.translation.as_vec3());
             let point = if self.normal_from_object.is_none() {

@@ -81,6 +81,25 @@ pub(crate) struct ShadingPoint {
     pub(crate) opacity: f32,
 }
 
+/// Whether lights need the position of a [`ShadingPoint`].
+pub(crate) trait HitPoint {
+    const COMPUTED: bool;
+}
+
+/// Some light depends on the position.
+pub(crate) struct WithPoint;
+
+/// All light is directional.
+pub(crate) struct WithoutPoint;
+
+impl HitPoint for WithPoint {
+    const COMPUTED: bool = true;
+}
+
+impl HitPoint for WithoutPoint {
+    const COMPUTED: bool = false;
+}
+
 /// Squared lengths of face normals for which f32 suffices: outside this range, products of lengths
 /// may underflow or overflow.
 const ORDINARY_NORMAL_SQUARED: std::ops::Range<f32> = 1e-30..1e30;
@@ -163,12 +182,12 @@ impl<'a> ResolvedInstance<'a> {
     }
 
     /// Local-lighting data of the point that `ray` hit, where no other ray will start: on meshes in
-    /// f32 wherever the triangle's size allows it, and without the point itself unless `POINT`.
+    /// f32 wherever the triangle's size allows it, and without the point itself unless `P` asks for it.
     /// [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
     #[inline]
-    pub(crate) fn shading_point<const POINT: bool>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
+    pub(crate) fn shading_point<P: HitPoint>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         match self.source {
-            Source::Mesh(mesh) => self.mesh_shading_point::<POINT>(mesh, ray, hit),
+            Source::Mesh(mesh) => self.mesh_shading_point::<P>(mesh, ray, hit),
             Source::Shape(shape) => {
                 let s = self.shape_surface(shape, ray, hit);
                 ShadingPoint {
@@ -181,7 +200,7 @@ impl<'a> ResolvedInstance<'a> {
         }
     }
 
-    fn mesh_shading_point<const POINT: bool>(
+    fn mesh_shading_point<P: HitPoint>(
         &self,
         mesh: &TriMesh,
         ray: &Ray,
@@ -207,7 +226,7 @@ impl<'a> ResolvedInstance<'a> {
         };
         let shading =
             smooth.map_or(outward, |s| self.shading_normal(s, corner, hit.prim, weights, outward));
-        let point = if POINT { self.moved_point(a, e1 * u + e2 * v) } else { Vec3::ZERO };
+        let point = if P::COMPUTED { self.moved_point(a, e1 * u + e2 * v) } else { Vec3::ZERO };
         let (_, normal, drawn) = self.turned(outward, shading, ray.dir);
         let [r, g, b, alpha] = self.mesh_color(mesh, corner, hit.prim, weights);
         let opacity = if drawn { self.material.opacity * alpha } else { 0.0 };

@@ -10,6 +10,7 @@
 //! The test uses no fused multiply-add, so every instruction set gives the same bits, in packets
 //! and for single rays, and the products above are equal on both sides of an edge.
 
+use crate::bvh::query::TriangleTest;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 /// Axis order and shear that map a ray's direction to +z.
@@ -55,10 +56,9 @@ pub(crate) struct Candidate<V, M> {
 }
 
 /// Tests lanes of (triangle, ray) pairs. `a`, `b`, `c` are the vertices minus the ray's origin, in
-/// the axis order kx, ky, kz. Returns `None` when no lane passes the edge tests. `EXACT` decides
-/// zeros in f64 (watertight).
+/// the axis order kx, ky, kz. Returns `None` when no lane passes the edge tests.
 #[inline(always)]
-pub(crate) fn test<S, V, const EXACT: bool>(
+pub(crate) fn test<S, V, T>(
     simd: S,
     a: [V; 3],
     b: [V; 3],
@@ -71,6 +71,7 @@ where
     S: Simd,
     V: SimdFloat<S, Element = f32> + Lanes<S>,
     V::Mask: Select<V>,
+    T: TriangleTest,
 {
     let zero = V::splat(simd, 0.0);
     let (ax, ay) = (a[0] - sx * a[2], a[1] - sy * a[2]);
@@ -84,7 +85,7 @@ where
     if !inside.any_true() {
         return None;
     }
-    if EXACT {
+    if T::WATERTIGHT {
         // A zero matters only where the other two values agree in sign. There it is the smallest or
         // the largest of the three.
         let undecided = inside & (u.min(v).min(w).simd_eq(zero) | u.max(v).max(w).simd_eq(zero));

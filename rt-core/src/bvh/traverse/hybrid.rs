@@ -13,12 +13,14 @@ use super::pair::{RayQueue, RayTask, traverse_pairs};
 use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, inflate_t};
 use super::three;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::bvh::{Unit, WideBvh};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+use std::marker::PhantomData;
 
 /// With this many rays or fewer, each ray traverses the subtree by itself. Chosen on ambient
 /// occlusion (any hit) and on rays with random ends (closest hit) among one million triangles, by
@@ -39,7 +41,7 @@ struct Entry {
 /// Traces the rays of the `active` lanes through a triangle hierarchy and writes the results into
 /// `hits` (for occlusion, `prim` is 0 where something blocks the ray).
 #[inline(never)]
-pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(
+pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
     bvh: &WideBvh,
     rays: &RayBlock,
@@ -49,12 +51,12 @@ pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(
 ) {
     simd.vectorize(
         #[inline(always)]
-        || trace_body::<S, EXACT, ANY>(simd, bvh, rays, active, hits, instance),
+        || trace_body::<S, T, Q>(simd, bvh, rays, active, hits, instance),
     );
 }
 
 #[inline(always)]
-fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
+fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
     bvh: &WideBvh,
     rays: &RayBlock,
@@ -91,18 +93,19 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
         }
         let child = ChildRef(child);
         if child.is_leaf()
-            || met.count_ones() <= (if ANY { MAX_SINGLE_RAYS_ANY } else { MAX_SINGLE_RAYS_CLOSEST })
+            || met.count_ones()
+                <= (if Q::ANY { MAX_SINGLE_RAYS_ANY } else { MAX_SINGLE_RAYS_CLOSEST })
         {
             // ---- Few rays or a leaf: each ray separately from here, two at a time.
             let (setups, start) = (&setups, child);
-            if ANY {
-                let mut queue =
-                    AnyQueue::<EXACT> { setups, t: &t, start, met, hits, active: &mut active };
-                traverse_pairs::<S, _, false>(simd, bvh, &mut queue);
+            if Q::ANY {
+                let (t, active, test) = (&t, &mut active, PhantomData::<T>);
+                let mut queue = AnyQueue { setups, t, start, met, hits, active, test };
+                traverse_pairs(simd, bvh, &mut queue);
             } else {
-                let mut queue =
-                    ClosestQueue::<EXACT> { setups, t: &mut t, start, met, hits, instance };
-                traverse_pairs::<S, _, true>(simd, bvh, &mut queue);
+                let (t, test) = (&mut t, PhantomData::<T>);
+                let mut queue = ClosestQueue { setups, t, start, met, hits, instance, test };
+                traverse_pairs(simd, bvh, &mut queue);
             }
             continue;
         }
@@ -136,27 +139,28 @@ fn trace_body<S: Simd, const EXACT: bool, const ANY: bool>(
             // Another ray of `hit` may be nearer than the first one. The order of visits need not
             // be exact.
             let distance =
-                if ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
+                if Q::ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
             stack.push(Entry { distance, child: refs[slot], rays: hit });
         }
-        if !ANY {
+        if !Q::ANY {
             stack.sort_descending_from(base);
         }
     }
 }
 
 /// Lanes for which the closest hit in the subtree at `start` is requested.
-struct ClosestQueue<'a, 'r, const EXACT: bool> {
+struct ClosestQueue<'a, 'r, T> {
     setups: &'r [RaySetup; LANES],
     t: &'a mut [f32; LANES],
     start: ChildRef,
     met: u16,
     hits: &'a mut HitBlock,
     instance: u32,
+    test: PhantomData<T>,
 }
 
-impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for ClosestQueue<'_, 'r, EXACT> {
-    type Leaf = ClosestLeaf<'r, EXACT>;
+impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestQueue<'_, 'r, T> {
+    type Leaf = ClosestLeaf<'r, T>;
 
     #[inline(always)]
     fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>> {
@@ -184,17 +188,18 @@ impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for ClosestQueue<'_, 'r, EX
 }
 
 /// Lanes for which any hit in the subtree at `start` is requested.
-struct AnyQueue<'a, 'r, const EXACT: bool> {
+struct AnyQueue<'a, 'r, T> {
     setups: &'r [RaySetup; LANES],
     t: &'a [f32; LANES],
     start: ChildRef,
     met: u16,
     hits: &'a mut HitBlock,
     active: &'a mut u16,
+    test: PhantomData<T>,
 }
 
-impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for AnyQueue<'_, 'r, EXACT> {
-    type Leaf = AnyLeaf<'r, EXACT>;
+impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyQueue<'_, 'r, T> {
+    type Leaf = AnyLeaf<'r, T>;
 
     #[inline(always)]
     fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>> {

@@ -103,7 +103,7 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
 
     /// Continues to the next inner node and tests the leaves on the way. Returns false at the end.
     #[inline(always)]
-    fn advance<const ORDERED: bool>(
+    fn advance(
         &mut self,
         simd: S,
         units: &[Unit],
@@ -112,7 +112,7 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
         mask: u32,
     ) -> bool {
         count(Counter::Nodes, 1);
-        let child = push_children::<S, ORDERED>(units, node, near, mask, &mut self.stack);
+        let child = push_children::<S, L::Query>(units, node, near, mask, &mut self.stack);
         self.current = child.unwrap_or(self.current);
         self.pop_to_node(simd, units, child.is_none())
     }
@@ -164,7 +164,7 @@ fn next_traversal<'r, S: Simd, Q: RayQueue<'r, S>>(
 
 /// Traces all rays of the queue, each in its subtree.
 #[inline(always)]
-pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: bool>(
+pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>>(
     simd: S,
     bvh: &WideBvh,
     queue: &mut Q,
@@ -174,7 +174,7 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: boo
     let Some(first) = next_traversal(simd, units, queue) else { return };
     let mut a = Traversal::new(simd, first, &mut memory_a);
     let Some(second) = next_traversal(simd, units, queue) else {
-        finish_last::<S, _, ORDERED>(simd, units, &mut a);
+        finish_last(simd, units, &mut a);
         queue.done(a.number, a.leaf);
         return;
     };
@@ -183,13 +183,13 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: boo
         let (node_a, node_b) = (a.node(units), b.node(units));
         let (near_a, mask_a) = a.boxes(simd, node_a);
         let (near_b, mask_b) = b.boxes(simd, node_b);
-        let a_goes_on = a.advance::<ORDERED>(simd, units, node_a, near_a, mask_a);
-        let b_goes_on = b.advance::<ORDERED>(simd, units, node_b, near_b, mask_b);
+        let a_goes_on = a.advance(simd, units, node_a, near_a, mask_a);
+        let b_goes_on = b.advance(simd, units, node_b, near_b, mask_b);
         if !a_goes_on {
             queue.done(a.number, a.leaf);
             let Some(next) = next_traversal(simd, units, queue) else {
                 if b_goes_on {
-                    finish_last::<S, _, ORDERED>(simd, units, &mut b);
+                    finish_last(simd, units, &mut b);
                 }
                 queue.done(b.number, b.leaf);
                 return;
@@ -199,7 +199,7 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: boo
         if !b_goes_on {
             queue.done(b.number, b.leaf);
             let Some(next) = next_traversal(simd, units, queue) else {
-                finish_last::<S, _, ORDERED>(simd, units, &mut a);
+                finish_last(simd, units, &mut a);
                 queue.done(a.number, a.leaf);
                 return;
             };
@@ -210,17 +210,13 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>, const ORDERED: boo
 
 /// Finishes the last ray alone.
 #[inline(never)]
-fn finish_last<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
-    simd: S,
-    units: &[Unit],
-    walk: &mut Traversal<'_, S, L>,
-) {
+fn finish_last<S: Simd, L: LeafTest<S>>(simd: S, units: &[Unit], walk: &mut Traversal<'_, S, L>) {
     simd.vectorize(
         #[inline(always)]
         || loop {
             let node = walk.node(units);
             let (near, mask) = walk.boxes(simd, node);
-            if !walk.advance::<ORDERED>(simd, units, node, near, mask) {
+            if !walk.advance(simd, units, node, near, mask) {
                 return;
             }
         },

@@ -3,6 +3,7 @@
 use super::three;
 use crate::bvh::intersect::watertight::Shear;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use crate::bvh::query::HitQuery;
 use crate::bvh::{Unit, WideBvh};
 use crate::ray::Ray;
 use crate::simd::{Stack, StackMemory, prefetch};
@@ -70,19 +71,22 @@ impl RaySetup {
 
 /// The primitive test at a leaf.
 pub(crate) trait LeafTest<S: Simd> {
+    /// What is asked about the ray. Closest-hit queries visit the nearest child first; any-hit
+    /// queries do not need an order.
+    type Query: HitQuery;
+
     /// Tests the primitives of `leaf`. Lowers `skip_t`, the distance from which boxes are skipped,
     /// to [`inflate_t`] of the closest hit so far. Returns true when the search is over.
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 }
 
 /// Visits the leaves whose boxes the ray enters before `t_max`. Boxes are widened for rounding
-/// errors in every mode, because that costs nothing. `ORDERED` visits the nearest child first;
-/// any-hit queries do not need it.
+/// errors in every mode, because that costs nothing.
 ///
-/// Never inlined: one body per instruction set, leaf kind and mode. Inlining it into its callers
+/// Never inlined: one body per instruction set and kind of leaf. Inlining it into its callers
 /// multiplied the compile time by thirty.
 #[inline(never)]
-pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
+pub(crate) fn traverse<S: Simd, L: LeafTest<S>>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
@@ -91,26 +95,26 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
 ) {
     simd.vectorize(
         #[inline(always)]
-        || traverse_body::<S, L, ORDERED>(simd, bvh, ray, t_max, leaves),
+        || traverse_body(simd, bvh, ray, t_max, leaves),
     );
 }
 
 /// [`traverse`] without a function of its own, for callers already compiled for the instruction
 /// set.
 #[inline(always)]
-pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
+pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
     t_max: f32,
     leaves: &mut L,
 ) {
-    traverse_from::<S, L, ORDERED>(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
+    traverse_from(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
 }
 
 /// Traverses the subtree at `start`.
 #[inline(always)]
-pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
+pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
     simd: S,
     bvh: &WideBvh,
     ray: &RaySetup,
@@ -156,7 +160,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
             ));
             let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
             if let Some(child) =
-                push_children::<S, ORDERED>(units, node, near, hit.to_bitmask() as u32, &mut stack)
+                push_children::<S, L::Query>(units, node, near, hit.to_bitmask() as u32, &mut stack)
             {
                 current = child;
                 continue;
@@ -174,10 +178,10 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>, const ORDERED: bool>(
 }
 
 /// Selects the next child of a node, given the boxes in `mask` that the ray hits at the distances
-/// `near`. Returns the nearest child when `ORDERED`, any child otherwise, and pushes the others on
-/// the stack. `None` means that the next entry is on the stack.
+/// `near`. Returns the nearest child for closest-hit queries, any child for any-hit queries, and
+/// pushes the others on the stack. `None` means that the next entry is on the stack.
 #[inline(always)]
-pub(super) fn push_children<S: Simd, const ORDERED: bool>(
+pub(super) fn push_children<S: Simd, Q: HitQuery>(
     units: &[Unit],
     node: &[Unit; NODE_UNITS],
     near: f32x8<S>,
@@ -201,7 +205,7 @@ pub(super) fn push_children<S: Simd, const ORDERED: bool>(
         prefetch::<4>(units, ChildRef(child).unit());
         ((near[i & 7].to_bits() as u64) << 32) | child as u64
     };
-    if !ORDERED {
+    if Q::ANY {
         let child = ChildRef(entry(first) as u32);
         while mask != 0 {
             stack.push(entry(mask.trailing_zeros() as usize));

@@ -23,7 +23,7 @@ use crate::material_maps::SurfaceParameters;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use crate::ray_stats::RayStats;
 use crate::simd::vectors::{Row, Rows3};
-use crate::surface::{ShadingPoint, ShadingPointBlock};
+use crate::surface::{HitPoint, ShadingPoint, ShadingPointBlock, WithPoint, WithoutPoint};
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
@@ -78,15 +78,15 @@ pub(super) fn light(
     let points = context.lights.iter().any(has_place);
     dispatch!(context.level, simd => {
         if points {
-            light_hits::<_, true>(simd, context, area, out, work, pixels, record, stats);
+            light_hits::<_, WithPoint>(simd, context, area, out, work, pixels, record, stats);
         } else {
-            light_hits::<_, false>(simd, context, area, out, work, pixels, record, stats);
+            light_hits::<_, WithoutPoint>(simd, context, area, out, work, pixels, record, stats);
         }
     });
 }
 
-/// As [`light`]. `POINT`: some light needs the position of the surface.
-fn light_hits<S: Simd, const POINT: bool>(
+/// As [`light`].
+fn light_hits<S: Simd, P: HitPoint>(
     simd: S,
     context: &FrameContext<'_>,
     area: &TileArea,
@@ -113,7 +113,7 @@ fn light_hits<S: Simd, const POINT: bool>(
             let lanes = left & same;
             left &= !lanes;
             let resolved = &context.instances[instance as usize];
-            resolved.shading_point_block::<S, POINT>(simd, lanes, rays, hits, &mut shading_points);
+            resolved.shading_point_block::<S, P>(simd, lanes, rays, hits, &mut shading_points);
             for lane in 0..LANES {
                 let pale = shading_points.opacity[lane] < OPAQUE;
                 stats.opacity_ignored += (pale && lanes >> lane & 1 != 0) as u64;

@@ -135,7 +135,7 @@ fn sixteen_at_a_time_have_the_bits_of_one_at_every_level() {
                     Some(hit) => {
                         met[hit.instance as usize] += 1;
                         let resolved = context.instance_at(&hit);
-                        let shading_point = resolved.shading_point::<true>(&ray, &hit);
+                        let shading_point = resolved.shading_point::<WithPoint>(&ray, &hit);
                         one.record(&context, &area, slot as u16, &ray, &hit, || {
                             shading_point.normal
                         });

@@ -130,8 +130,8 @@ impl Packet {
 
         // ---- Intervals of the groups, sixteen reductions at a time.
         for a in 0..3 {
-            let lo = reduce_rows::<S, false>(simd, &self.rcp.as_flattened()[a..], 3);
-            let hi = reduce_rows::<S, true>(simd, &self.rcp.as_flattened()[a..], 3);
+            let lo = reduce_rows::<S, Smallest>(simd, &self.rcp.as_flattened()[a..], 3);
+            let hi = reduce_rows::<S, Largest>(simd, &self.rcp.as_flattened()[a..], 3);
             let octant = if negative[a] { hi.simd_lt(v(0.0)) } else { lo.simd_gt(v(0.0)) };
             if !octant.all_true() {
                 return false;
@@ -149,8 +149,8 @@ impl Packet {
                 }
                 continue;
             }
-            let lo = reduce_rows::<S, false>(simd, &self.origin.as_flattened()[a..], 3);
-            let hi = reduce_rows::<S, true>(simd, &self.origin.as_flattened()[a..], 3);
+            let lo = reduce_rows::<S, Smallest>(simd, &self.origin.as_flattened()[a..], 3);
+            let hi = reduce_rows::<S, Largest>(simd, &self.origin.as_flattened()[a..], 3);
             // NaN and infinite origins fail this comparison.
             if !(hi - lo).simd_lt(v(f32::INFINITY)).all_true() {
                 return false;
@@ -159,16 +159,16 @@ impl Packet {
             near.store_slice(&mut self.origin_near[a]);
             far.store_slice(&mut self.origin_far[a]);
         }
-        (reduce_rows::<S, true>(simd, &self.t, 1) * v(inflate_t(1.0)))
+        (reduce_rows::<S, Largest>(simd, &self.t, 1) * v(inflate_t(1.0)))
             .store_slice(&mut self.group_t);
-        reduce_rows::<S, false>(simd, &self.t_min, 1).store_slice(&mut self.group_t_min);
+        reduce_rows::<S, Smallest>(simd, &self.t_min, 1).store_slice(&mut self.group_t_min);
 
         // ---- Shears of the groups, as differences from the middle. Leaves test triangles' edges
         // against them.
         if self.common_origin {
             for a in 0..2 {
-                let lo = reduce_rows::<S, false>(simd, &self.shear.as_flattened()[a..], 3);
-                let hi = reduce_rows::<S, true>(simd, &self.shear.as_flattened()[a..], 3);
+                let lo = reduce_rows::<S, Smallest>(simd, &self.shear.as_flattened()[a..], 3);
+                let hi = reduce_rows::<S, Largest>(simd, &self.shear.as_flattened()[a..], 3);
                 let mid = 0.5 * (lo.reduce_min() + hi.reduce_max());
                 let (lo, hi) = (lo - v(mid), hi - v(mid));
                 self.shear_mid[a] = mid;
@@ -191,33 +191,56 @@ fn filled<S: Simd>(simd: S, row: &Row, on: Option<(mask32x16<S>, usize)>) -> f32
     }
 }
 
+/// What remains of two numbers.
+trait Reduction {
+    fn of<S: Simd>(x: f32x16<S>, y: f32x16<S>) -> f32x16<S>;
+}
+
+struct Smallest;
+
+struct Largest;
+
+impl Reduction for Smallest {
+    #[inline(always)]
+    fn of<S: Simd>(x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+        x.min(y)
+    }
+}
+
+impl Reduction for Largest {
+    #[inline(always)]
+    fn of<S: Simd>(x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+        x.max(y)
+    }
+}
+
 /// Sixteen reductions over sixteen lanes each: lane g of the result is the smallest (or largest) of
 /// `rows[g * stride]`. Each step combines two rows, so all reductions take fifteen steps instead of
 /// sixteen times four and as many transfers to scalar registers.
 #[inline(always)]
-fn reduce_rows<S: Simd, const MAX: bool>(simd: S, rows: &[Row], stride: usize) -> f32x16<S> {
+fn reduce_rows<S: Simd, R: Reduction>(simd: S, rows: &[Row], stride: usize) -> f32x16<S> {
     #[inline(always)]
-    fn step<S: Simd, const MAX: bool>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+    fn step<S: Simd, R: Reduction>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
         let (x, y) = (a.zip_low(b), a.zip_high(b));
-        if MAX { x.max(y) } else { x.min(y) }
+        R::of(x, y)
     }
     #[inline(always)]
-    fn pair<S: Simd, const MAX: bool>(simd: S, rows: &[Row], stride: usize, i: usize) -> f32x16<S> {
-        step::<S, MAX>(load_row(simd, &rows[i * stride]), load_row(simd, &rows[(i + 8) * stride]))
+    fn pair<S: Simd, R: Reduction>(simd: S, rows: &[Row], stride: usize, i: usize) -> f32x16<S> {
+        step::<S, R>(load_row(simd, &rows[i * stride]), load_row(simd, &rows[(i + 8) * stride]))
     }
     // Zipping interleaves lanes. Rows are passed in bit-reversed order, so the results are in the
     // order of the rows.
-    let ab = pair::<S, MAX>(simd, rows, stride, 0);
-    let cd = pair::<S, MAX>(simd, rows, stride, 4);
-    let ef = pair::<S, MAX>(simd, rows, stride, 2);
-    let gh = pair::<S, MAX>(simd, rows, stride, 6);
-    let even = step::<S, MAX>(step::<S, MAX>(ab, cd), step::<S, MAX>(ef, gh));
-    let ij = pair::<S, MAX>(simd, rows, stride, 1);
-    let kl = pair::<S, MAX>(simd, rows, stride, 5);
-    let mn = pair::<S, MAX>(simd, rows, stride, 3);
-    let op = pair::<S, MAX>(simd, rows, stride, 7);
-    let odd = step::<S, MAX>(step::<S, MAX>(ij, kl), step::<S, MAX>(mn, op));
-    step::<S, MAX>(even, odd)
+    let ab = pair::<S, R>(simd, rows, stride, 0);
+    let cd = pair::<S, R>(simd, rows, stride, 4);
+    let ef = pair::<S, R>(simd, rows, stride, 2);
+    let gh = pair::<S, R>(simd, rows, stride, 6);
+    let even = step::<S, R>(step::<S, R>(ab, cd), step::<S, R>(ef, gh));
+    let ij = pair::<S, R>(simd, rows, stride, 1);
+    let kl = pair::<S, R>(simd, rows, stride, 5);
+    let mn = pair::<S, R>(simd, rows, stride, 3);
+    let op = pair::<S, R>(simd, rows, stride, 7);
+    let odd = step::<S, R>(step::<S, R>(ij, kl), step::<S, R>(mn, op));
+    step::<S, R>(even, odd)
 }
 
 #[cfg(test)]
@@ -231,8 +254,8 @@ mod tests {
             std::array::from_fn(|l| ((g * 31 + l * 7) % 53) as f32 + g as f32 * 100.0)
         });
         dispatch!(Level::new(), simd => {
-            let lo = reduce_rows::<_, false>(simd, &rows, 1);
-            let hi = reduce_rows::<_, true>(simd, &rows, 1);
+            let lo = reduce_rows::<_, Smallest>(simd, &rows, 1);
+            let hi = reduce_rows::<_, Largest>(simd, &rows, 1);
             for g in 0..16 {
                 assert_eq!(lo.as_slice()[g], rows[g].iter().copied().fold(f32::INFINITY, f32::min));
                 let highest = rows[g].iter().copied().fold(f32::NEG_INFINITY, f32::max);

@@ -18,6 +18,7 @@ mod triangles;
 mod walk;
 
 use crate::bvh::layout::wide::ChildRef;
+use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::{Unit, WideBvh};
 use crate::ray::{HitBlock, LANES, NO_HIT};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u32x16};
@@ -153,7 +154,7 @@ impl Packet {
     }
 
     /// Writes the hits of the loaded rays. Lanes without a hit keep their contents.
-    pub(crate) fn store<const ANY: bool>(&self, out: &mut [HitBlock], instance: u32) {
+    pub(crate) fn store<Q: HitQuery>(&self, out: &mut [HitBlock], instance: u32) {
         for (g, h) in out.iter_mut().enumerate().take(GROUPS) {
             let hit = self.hit[g];
             if hit == 0 {
@@ -161,7 +162,7 @@ impl Packet {
             }
             for lane in 0..LANES {
                 let on = hit >> lane & 1 == 1;
-                if ANY {
+                if Q::ANY {
                     h.prim[lane] = if on { 0 } else { h.prim[lane] };
                     continue;
                 }
@@ -198,20 +199,22 @@ impl Packet {
     }
 
     /// Traces the loaded rays against a triangle hierarchy.
-    pub(crate) fn trace<S: Simd, const EXACT: bool, const ANY: bool>(
-        &mut self,
-        simd: S,
-        bvh: &WideBvh,
-    ) {
+    pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(&mut self, simd: S, bvh: &WideBvh) {
         if !self.common_origin {
             // Combined intervals of origins and directions are weak bounds: measured seven times
             // slower without per-ray tests.
-            self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, false>);
-        } else if self.slabs[ANY as usize].next() {
-            let slabs = self.walk::<S, _, true>(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
-            self.slabs[ANY as usize].learn(slabs);
+            self.walk::<S, _, IntervalsAndRays>(
+                simd,
+                bvh,
+                &mut Triangles::<T, Q, SeparateOrigins>::new(),
+            );
+        } else if self.slabs[Q::ANY as usize].next() {
+            let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
+            let slabs = self.walk::<S, _, IntervalsAndRays>(simd, bvh, &mut leaves);
+            self.slabs[Q::ANY as usize].learn(slabs);
         } else {
-            self.walk::<S, _, false>(simd, bvh, &mut Triangles::<EXACT, ANY, true>);
+            let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
+            self.walk::<S, _, IntervalsOnly>(simd, bvh, &mut leaves);
         }
     }
 
@@ -223,14 +226,54 @@ impl Packet {
         bvh: &WideBvh,
         out: &mut Vec<(f32, ChildRef)>,
     ) {
-        self.walk::<S, _, false>(simd, bvh, &mut CollectLeaves(out));
+        self.walk::<S, _, IntervalsOnly>(simd, bvh, &mut CollectLeaves(out));
     }
+}
+
+/// Where the rays of a packet start.
+trait PacketOrigin {
+    /// Whether they all start at one point.
+    const COMMON: bool;
+}
+
+/// All rays start at one point.
+struct CommonOrigin;
+
+/// Each ray has its own origin.
+struct SeparateOrigins;
+
+impl PacketOrigin for CommonOrigin {
+    const COMMON: bool = true;
+}
+
+impl PacketOrigin for SeparateOrigins {
+    const COMMON: bool = false;
+}
+
+/// The test that a packet does at a box before it continues with it.
+trait BoxTest {
+    /// Whether the groups whose intervals intersect the box are also tested ray by ray.
+    const PER_RAY: bool;
+}
+
+/// Only the intervals of the groups are tested.
+struct IntervalsOnly;
+
+/// The intervals are tested, then the rays of the groups that remain.
+struct IntervalsAndRays;
+
+impl BoxTest for IntervalsOnly {
+    const PER_RAY: bool = false;
+}
+
+impl BoxTest for IntervalsAndRays {
+    const PER_RAY: bool = true;
 }
 
 /// Callback for the leaves that a packet reaches.
 trait PacketLeaf<S: Simd> {
-    /// Whether all rays start at one point.
-    const COMMON: bool;
+    /// Where the rays start.
+    type Origin: PacketOrigin;
 
     /// Tests the leaf for the groups `reached`, whose bounds intersect its box, at `distance` at
     /// the nearest. Returns the groups whose limits changed.
@@ -260,7 +303,7 @@ trait PacketLeaf<S: Simd> {
 struct CollectLeaves<'a>(&'a mut Vec<(f32, ChildRef)>);
 
 impl<S: Simd> PacketLeaf<S> for CollectLeaves<'_> {
-    const COMMON: bool = false;
+    type Origin = SeparateOrigins;
 
     #[inline(always)]
     fn leaf(

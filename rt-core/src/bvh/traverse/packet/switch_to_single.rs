@@ -8,12 +8,14 @@ use super::Packet;
 use crate::bvh::WideBvh;
 use crate::bvh::intersect::watertight::Shear;
 use crate::bvh::layout::wide::ChildRef;
+use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::pair::{RayQueue, RayTask, traverse_pairs};
 use crate::bvh::traverse::single::RaySetup;
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::LANES;
 use crate::stats::{Counter, count};
 use fearless_simd::Simd;
+use std::marker::PhantomData;
 
 /// With this many rays or fewer: two pairs. Not tuned; with it, shadow rays from a surface gained 6
 /// % in the whole view of one million triangles (records `peers` before and after).
@@ -40,7 +42,7 @@ impl Packet {
     /// The rays of `lanes` in the groups of `reached`, at most [`MAX_SINGLE_RAYS`], through the
     /// subtree at `start`. Returns the groups with new hits.
     #[inline(never)]
-    pub(super) fn switch_to_single<S: Simd, const EXACT: bool, const ANY: bool>(
+    pub(super) fn switch_to_single<S: Simd, T: TriangleTest, Q: HitQuery>(
         &mut self,
         simd: S,
         bvh: &WideBvh,
@@ -78,13 +80,13 @@ impl Packet {
                     changed: 0,
                     packet: self,
                 };
-                if ANY {
-                    let mut queue = AnyRays::<EXACT>(rays);
-                    traverse_pairs::<S, _, false>(simd, bvh, &mut queue);
+                if Q::ANY {
+                    let mut queue = AnyRays::<T>(rays, PhantomData);
+                    traverse_pairs(simd, bvh, &mut queue);
                     queue.0.changed
                 } else {
-                    let mut queue = ClosestRays::<EXACT>(rays);
-                    traverse_pairs::<S, _, true>(simd, bvh, &mut queue);
+                    let mut queue = ClosestRays::<T>(rays, PhantomData);
+                    traverse_pairs(simd, bvh, &mut queue);
                     queue.0.changed
                 }
             },
@@ -116,10 +118,10 @@ impl<'r> LaneRays<'_, 'r> {
     }
 }
 
-struct AnyRays<'a, 'r, const EXACT: bool>(LaneRays<'a, 'r>);
+struct AnyRays<'a, 'r, T>(LaneRays<'a, 'r>, PhantomData<T>);
 
-impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for AnyRays<'_, 'r, EXACT> {
-    type Leaf = AnyLeaf<'r, EXACT>;
+impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyRays<'_, 'r, T> {
+    type Leaf = AnyLeaf<'r, T>;
 
     #[inline(always)]
     fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>> {
@@ -141,10 +143,10 @@ impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for AnyRays<'_, 'r, EXACT> 
     }
 }
 
-struct ClosestRays<'a, 'r, const EXACT: bool>(LaneRays<'a, 'r>);
+struct ClosestRays<'a, 'r, T>(LaneRays<'a, 'r>, PhantomData<T>);
 
-impl<'r, S: Simd, const EXACT: bool> RayQueue<'r, S> for ClosestRays<'_, 'r, EXACT> {
-    type Leaf = ClosestLeaf<'r, EXACT>;
+impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
+    type Leaf = ClosestLeaf<'r, T>;
 
     #[inline(always)]
     fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>> {

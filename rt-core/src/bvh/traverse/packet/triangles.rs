@@ -1,21 +1,27 @@
 //! Tests triangles against the groups of a packet.
 
-use super::{Packet, PacketLeaf, load_row};
+use super::{Packet, PacketLeaf, PacketOrigin, load_row};
 use crate::bvh::intersect::watertight::test;
 use crate::bvh::layout::wide::ChildRef;
+use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::three;
 use crate::bvh::{Unit, WideBvh, layout::triangles};
 use crate::ray::LANES;
 use crate::stats::{Counter, count};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x4, f32x16, mask32x16, u32x16};
+use std::marker::PhantomData;
 
-/// The leaf test of triangle hierarchies. `COMMON`: all rays start at one point.
-pub(super) struct Triangles<const EXACT: bool, const ANY: bool, const COMMON: bool>;
+/// The leaf test of triangle hierarchies.
+pub(super) struct Triangles<T, Q, O>(PhantomData<(T, Q, O)>);
 
-impl<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool> PacketLeaf<S>
-    for Triangles<EXACT, ANY, COMMON>
-{
-    const COMMON: bool = COMMON;
+impl<T: TriangleTest, Q: HitQuery, O: PacketOrigin> Triangles<T, Q, O> {
+    pub(super) fn new() -> Self {
+        Triangles(PhantomData)
+    }
+}
+
+impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin> PacketLeaf<S> for Triangles<T, Q, O> {
+    type Origin = O;
 
     #[inline(always)]
     fn leaf(
@@ -27,7 +33,7 @@ impl<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool> PacketLeaf
         reached: u16,
         _: f32,
     ) -> u16 {
-        packet.triangles::<S, EXACT, ANY, COMMON>(simd, units, leaf, reached)
+        packet.triangles::<S, T, Q, O>(simd, units, leaf, reached)
     }
 
     #[inline(always)]
@@ -40,7 +46,7 @@ impl<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool> PacketLeaf
         reached: u16,
         lanes: &[u16; LANES],
     ) -> u16 {
-        packet.switch_to_single::<S, EXACT, ANY>(simd, bvh, node, reached, lanes)
+        packet.switch_to_single::<S, T, Q>(simd, bvh, node, reached, lanes)
     }
 }
 
@@ -105,7 +111,7 @@ impl Packet {
 
     /// Corner `vertex` of a leaf's four triangles in shear order.
     #[inline(always)]
-    fn corner<S: Simd, const COMMON: bool>(
+    fn corner<S: Simd, O: PacketOrigin>(
         &self,
         simd: S,
         floats: &[f32; 40],
@@ -113,7 +119,7 @@ impl Packet {
     ) -> [f32x4<S>; 3] {
         three!(|k| {
             let r = f32x4::from_slice(simd, triangles::row(floats, 3 * vertex + self.axes[k]));
-            if COMMON { r - f32x4::splat(simd, self.origin_near[self.axes[k]][0]) } else { r }
+            if O::COMMON { r - f32x4::splat(simd, self.origin_near[self.axes[k]][0]) } else { r }
         })
     }
 
@@ -136,7 +142,7 @@ impl Packet {
     /// Tests the triangles of a leaf against the groups that reached it. Returns the groups with
     /// new hits.
     #[inline(always)]
-    fn triangles<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool>(
+    fn triangles<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin>(
         &mut self,
         simd: S,
         units: &[Unit],
@@ -148,11 +154,11 @@ impl Packet {
         let ids = triangles::leaf_triangle_ids(floats);
         // The nine coordinates in shear order. A common origin is subtracted here, only once.
         let abc = [
-            self.corner::<S, COMMON>(simd, floats, 0),
-            self.corner::<S, COMMON>(simd, floats, 1),
-            self.corner::<S, COMMON>(simd, floats, 2),
+            self.corner::<S, O>(simd, floats, 0),
+            self.corner::<S, O>(simd, floats, 1),
+            self.corner::<S, O>(simd, floats, 2),
         ];
-        let edges = if COMMON && reached.count_ones() >= CULL {
+        let edges = if O::COMMON && reached.count_ones() >= CULL {
             Some(self.edge_functions(simd, &abc))
         } else {
             None
@@ -178,7 +184,7 @@ impl Packet {
             while rest != 0 {
                 let g = rest.trailing_zeros() as usize & 15;
                 rest &= rest - 1;
-                changed |= self.triangle::<S, EXACT, ANY, COMMON>(simd, &corners, &ids, j & 3, g);
+                changed |= self.triangle::<S, T, Q, O>(simd, &corners, &ids, j & 3, g);
             }
         }
         changed
@@ -186,7 +192,7 @@ impl Packet {
 
     /// Tests triangle `j` against group `g`. Returns the group's bit when it has new hits.
     #[inline(always)]
-    fn triangle<S: Simd, const EXACT: bool, const ANY: bool, const COMMON: bool>(
+    fn triangle<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin>(
         &mut self,
         simd: S,
         corners: &[[f32; 4]; 9],
@@ -200,17 +206,17 @@ impl Packet {
         let mut a: [f32x16<S>; 3] = three!(|k| f32x16::splat(simd, corners[k][j]));
         let mut b: [f32x16<S>; 3] = three!(|k| f32x16::splat(simd, corners[3 + k][j]));
         let mut c: [f32x16<S>; 3] = three!(|k| f32x16::splat(simd, corners[6 + k][j]));
-        if !COMMON {
+        if !O::COMMON {
             let o: [f32x16<S>; 3] = three!(|k| load_row(simd, &self.origin[g][self.axes[k]]));
             a = three!(|k| a[k] - o[k]);
             b = three!(|k| b[k] - o[k]);
             c = three!(|k| c[k] - o[k]);
         }
-        let Some(c) = test::<S, f32x16<S>, EXACT>(simd, a, b, c, sx, sy, sz) else { return 0 };
+        let Some(c) = test::<S, f32x16<S>, T>(simd, a, b, c, sx, sy, sz) else { return 0 };
         let id = u32x16::splat(simd, ids[j]);
         let best = load_row(simd, &self.t[g]);
         let in_range = c.inside & c.t.simd_ge(load_row(simd, &self.t_min[g]));
-        let ok = if ANY {
+        let ok = if Q::ANY {
             in_range & c.t.simd_lt(best)
         } else {
             let old = u32x16::from_slice(simd, &self.prim[g]);
@@ -222,7 +228,7 @@ impl Packet {
         }
         self.hit[g] |= bits;
         let ok = mask32x16::from_bitmask(simd, bits as u64);
-        if ANY {
+        if Q::ANY {
             self.active[g] &= !bits;
             ok.select(v(-1.0), best).store_slice(&mut self.t[g]);
         } else {

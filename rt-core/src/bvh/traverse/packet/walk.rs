@@ -1,7 +1,7 @@
 //! Traversal of the hierarchy by a packet.
 
 use super::switch_to_single::MAX_SINGLE_RAYS;
-use super::{Packet, PacketLeaf, SlabCounts, load_row};
+use super::{BoxTest, Packet, PacketLeaf, PacketOrigin, SlabCounts, load_row};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::traverse::single::{BOX_SLACK, inflate_t};
 use crate::bvh::traverse::three;
@@ -83,10 +83,9 @@ impl Packet {
         near.simd_le(far).to_bitmask() as u16
     }
 
-    /// Traverses the hierarchy. With `SLABS`, groups whose intervals intersect a box are also
-    /// tested ray by ray before they continue. Returns the counts of these tests.
+    /// Traverses the hierarchy. Returns the counts of the tests ray by ray.
     #[inline(never)]
-    pub(super) fn walk<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
+    pub(super) fn walk<S: Simd, L: PacketLeaf<S>, B: BoxTest>(
         &mut self,
         simd: S,
         bvh: &WideBvh,
@@ -94,12 +93,12 @@ impl Packet {
     ) -> SlabCounts {
         simd.vectorize(
             #[inline(always)]
-            || self.walk_body::<S, L, SLABS>(simd, bvh, leaves),
+            || self.walk_body::<S, L, B>(simd, bvh, leaves),
         )
     }
 
     #[inline(always)]
-    fn walk_body<S: Simd, L: PacketLeaf<S>, const SLABS: bool>(
+    fn walk_body<S: Simd, L: PacketLeaf<S>, B: BoxTest>(
         &mut self,
         simd: S,
         bvh: &WideBvh,
@@ -163,9 +162,12 @@ impl Packet {
                     let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     count(Counter::GroupBoxes, 1);
-                    let reached =
-                        self.groups_in_box(simd, &planes(node, near_rows, i), group_t, L::COMMON)
-                            & groups;
+                    let reached = self.groups_in_box(
+                        simd,
+                        &planes(node, near_rows, i),
+                        group_t,
+                        L::Origin::COMMON,
+                    ) & groups;
                     if reached == 0 {
                         continue;
                     }
@@ -192,13 +194,13 @@ impl Packet {
                 let child = ChildRef(node[CHILD_ROW].bits()[slot]);
                 let mut lanes = [0; LANES];
                 let mut rays = u32::MAX;
-                if SLABS {
+                if B::PER_RAY {
                     slabs.tested += reached.count_ones();
                     (reached, rays) = self.cull_rays(
                         simd,
                         &planes(node, near_rows, slot),
                         reached,
-                        L::COMMON,
+                        L::Origin::COMMON,
                         &mut lanes,
                     );
                     slabs.kept += reached.count_ones();
@@ -212,20 +214,20 @@ impl Packet {
                     groups = reached;
                     continue 'nodes;
                 }
-                if !SLABS {
+                if !B::PER_RAY {
                     // Hits found since the push may be nearer than the leaf.
                     count(Counter::GroupBoxes, 1);
                     reached &= self.groups_in_box(
                         simd,
                         &planes(node, near_rows, slot),
                         group_t,
-                        L::COMMON,
+                        L::Origin::COMMON,
                     );
                     if reached == 0 {
                         continue;
                     }
                 }
-                let changed = if SLABS && !child.is_leaf() {
+                let changed = if B::PER_RAY && !child.is_leaf() {
                     leaves.switch_to_single(self, simd, bvh, child, reached, &lanes)
                 } else {
                     leaves.leaf(self, simd, units, child, reached, distance)
