@@ -5,7 +5,8 @@ use super::field_cache::FieldCache;
 use super::frame::{BlankCells, Frame};
 use super::kernel_ray::{KernelOutput, KernelRay};
 use super::packet::{
-    FeatureSet, KernelFeatures, Nodes, Packet, PacketConstants, Skip, Steps, Work, march,
+    Complete, CompleteEuler, DeflectionInGas, KernelFeatures, Nodes, Packet, PacketConstants,
+    PathInGas, Skip, Steps, Work, march,
 };
 use crate::at_level;
 use crate::field::Field;
@@ -233,19 +234,13 @@ impl<'a> Deviational<'a> {
         let plain = self.field.nodes().is_none() && self.bricks.is_none();
         match (self.options.scheme, plain) {
             (Scheme::Verlet, true) if self.options.wanted.opd => {
-                self.all(simd, field, starts, exits, FeatureSet::<true, false, false, false>);
+                self.all(simd, field, starts, exits, PathInGas);
             }
-            (Scheme::Verlet, true) => {
-                self.all(simd, field, starts, exits, FeatureSet::<false, false, false, false>)
-            }
-            // Three kernels per interpolant and instruction set, not twelve, because each takes a
-            // second to compile. Computing the path costs a tenth of a step.
-            (Scheme::Verlet, false) => {
-                self.all(simd, field, starts, exits, FeatureSet::<true, true, true, false>)
-            }
-            (Scheme::Euler, _) => {
-                self.all(simd, field, starts, exits, FeatureSet::<true, true, false, true>)
-            }
+            (Scheme::Verlet, true) => self.all(simd, field, starts, exits, DeflectionInGas),
+            // Three kernels an interpolant and instruction set, not twelve: each is a second of
+            // compiling. The path costs a tenth of a step.
+            (Scheme::Verlet, false) => self.all(simd, field, starts, exits, Complete),
+            (Scheme::Euler, _) => self.all(simd, field, starts, exits, CompleteEuler),
         }
     }
 

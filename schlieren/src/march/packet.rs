@@ -121,22 +121,48 @@ pub(super) trait KernelFeatures: Copy {
     const EULER: bool;
 }
 
-/// The only implementation of [`KernelFeatures`].
+/// Verlet in gas without skipping, for the deflection alone.
 #[derive(Clone, Copy)]
-pub(super) struct FeatureSet<
-    const OPD: bool,
-    const NODES: bool,
-    const SKIP: bool,
-    const EULER: bool,
->;
+pub(super) struct DeflectionInGas;
 
-impl<const OPD: bool, const NODES: bool, const SKIP: bool, const EULER: bool> KernelFeatures
-    for FeatureSet<OPD, NODES, SKIP, EULER>
-{
-    const OPD: bool = OPD;
-    const NODES: bool = NODES;
-    const SKIP: bool = SKIP;
-    const EULER: bool = EULER;
+impl KernelFeatures for DeflectionInGas {
+    const OPD: bool = false;
+    const NODES: bool = false;
+    const SKIP: bool = false;
+    const EULER: bool = false;
+}
+
+/// Verlet in gas without skipping, for the deflection and the path.
+#[derive(Clone, Copy)]
+pub(super) struct PathInGas;
+
+impl KernelFeatures for PathInGas {
+    const OPD: bool = true;
+    const NODES: bool = false;
+    const SKIP: bool = false;
+    const EULER: bool = false;
+}
+
+/// Verlet with all features.
+#[derive(Clone, Copy)]
+pub(super) struct Complete;
+
+impl KernelFeatures for Complete {
+    const OPD: bool = true;
+    const NODES: bool = true;
+    const SKIP: bool = true;
+    const EULER: bool = false;
+}
+
+/// Euler, which skips nothing.
+#[derive(Clone, Copy)]
+pub(super) struct CompleteEuler;
+
+impl KernelFeatures for CompleteEuler {
+    const OPD: bool = true;
+    const NODES: bool = true;
+    const SKIP: bool = false;
+    const EULER: bool = true;
 }
 
 /// Work done: packet-steps that took a sample, and those that were skipped.

@@ -38,7 +38,33 @@ impl Quality {
     }
 }
 
-/// Build options of a scene.
+/// One of Embree's two queries.
+trait Query {
+    /// The function of this query.
+    fn select<F>(intersect: F, occluded: F) -> F;
+}
+
+/// `rtcIntersect`: the closest hit.
+struct Intersect;
+
+/// `rtcOccluded`: any hit.
+struct Occluded;
+
+impl Query for Intersect {
+    #[inline(always)]
+    fn select<F>(intersect: F, _: F) -> F {
+        intersect
+    }
+}
+
+impl Query for Occluded {
+    #[inline(always)]
+    fn select<F>(_: F, occluded: F) -> F {
+        occluded
+    }
+}
+
+/// How a scene is built.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Options {
     /// Quality of the builder.
@@ -193,7 +219,7 @@ impl EmbreeScene {
     /// # Safety
     /// `packet` holds N rays with `N` of 1, 4, 8, 16.
     #[inline(always)]
-    unsafe fn query<const N: usize, const OCCLUDED: bool>(
+    unsafe fn query<const N: usize, Q: Query>(
         &self,
         valid: &Valid<N>,
         packet: &mut RayHitN<N>,
@@ -207,8 +233,7 @@ impl EmbreeScene {
         unsafe {
             match &self.embree.calls.queries {
                 Queries::V3 { intersect, occluded } => {
-                    let (f, context) =
-                        (if OCCLUDED { occluded } else { intersect }, &raw mut flags.context3);
+                    let (f, context) = (Q::select(intersect, occluded), &raw mut flags.context3);
                     match N {
                         1 => (f.one)(scene, context, rays),
                         4 => (f.four)(valid, scene, context, rays),
@@ -218,7 +243,7 @@ impl EmbreeScene {
                 }
                 Queries::V4 { intersect, occluded } => {
                     let (f, arguments) =
-                        (if OCCLUDED { occluded } else { intersect }, &raw mut flags.arguments4);
+                        (Q::select(intersect, occluded), &raw mut flags.arguments4);
                     match N {
                         1 => (f.one)(scene, rays, arguments),
                         4 => (f.four)(valid, scene, rays, arguments),
@@ -241,7 +266,7 @@ impl EmbreeScene {
                 }
                 // SAFETY: `closest` and `occluded` choose N from 1, 4, 8, 16, and `load` filled all
                 // lanes.
-                unsafe { self.query::<N, false>(&valid, &mut q, &mut flags) };
+                unsafe { self.query::<N, Intersect>(&valid, &mut q, &mut flags) };
                 let to = from..from + N;
                 h.t[to.clone()].copy_from_slice(&q.ray.tfar);
                 h.u[to.clone()].copy_from_slice(&q.hit.u);
@@ -264,9 +289,8 @@ impl EmbreeScene {
                     continue;
                 }
                 // SAFETY: as in `closest_n`.
-                unsafe { self.query::<N, true>(&valid, &mut q, &mut flags) };
-                // Embree sets the end of an occluded ray to -infinity; that of an empty lane was
-                // already negative.
+                unsafe { self.query::<N, Occluded>(&valid, &mut q, &mut flags) };
+                // An occluded ray's end is set to -infinity; an empty lane's was negative before.
                 for l in 0..N {
                     *m |= u16::from(q.ray.tfar[l] < 0.0 && valid.0[l] != 0) << (from + l);
                 }
