@@ -19,6 +19,7 @@ pub struct ThinLens {
 
 /// Why a camera cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// NaN or infinity in an argument.
     #[error("camera {field} is {value}; every component must be finite")]

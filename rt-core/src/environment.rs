@@ -8,6 +8,7 @@ use std::sync::Arc;
 /// Radiance from infinitely far away, by direction. It lights surfaces (attenuated by ambient
 /// occlusion). Reflected, refracted and path-traced rays see it when they leave the scene.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Environment {
     /// The same from all directions, linear RGB.
     Constant([f32; 3]),
@@ -147,6 +148,7 @@ impl Background {
 
 /// What fills pixels that no surface covers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Background {
     /// Nothing: alpha 0, for compositing.
     #[default]

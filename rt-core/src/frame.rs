@@ -99,6 +99,7 @@ pub enum PlaneValues<'a> {
 
 /// One channel of a frame, for image files with named channels (OpenEXR).
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Plane<'a> {
     /// Channel name as EXR viewers group them: `R`, `depth.Z`, `normal.X`.
     pub name: &'static str,
@@ -110,6 +111,7 @@ pub struct Plane<'a> {
 
 /// How linear colour is converted to 8 bits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Encoding {
     /// IEC 61966-2-1 (sRGB), which image files and screens expect.
     #[default]

@@ -18,6 +18,7 @@ pub struct Grid {
 
 /// Reasons why a grid cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GridError {
     /// The number of values does not match the dimensions.
     #[error("grid of {dims} points needs {expected} values, found {found}")]

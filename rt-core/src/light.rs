@@ -10,6 +10,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 /// The space in which a light's position and direction are given.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LightFrame {
     /// World space.
     #[default]
@@ -21,6 +22,7 @@ pub enum LightFrame {
 
 /// Shape of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum LightKind {
     /// The same from all directions; attenuated by ambient occlusion.
     Ambient,
@@ -126,6 +128,7 @@ pub struct Light {
 
 /// Why a light cannot be given a size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LightSizeError {
     /// Ambient light comes from all directions.
     #[error("ambient light has no size: it comes from everywhere; leave the size out")]

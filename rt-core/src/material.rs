@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 /// Where a surface's colour comes from.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub enum ColorSource {
     /// The geometry's own colours if it has any (per vertex, per triangle, per primitive), else
     /// [`Material::color`].
@@ -24,6 +25,7 @@ pub enum ColorSource {
 
 /// Highlight of [`SurfaceModel::Phong`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PhongForm {
     /// (N·H)^s with the half vector H: fixed-function OpenGL (Blinn 1977).
     #[default]
@@ -36,6 +38,7 @@ pub enum PhongForm {
 
 /// Formula of [`SurfaceModel::Pbr`] for lights.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PbrForm {
     /// glTF 2.0, appendix B: the matte layer receives the light that the coat transmits at the
     /// viewing angle.
@@ -49,6 +52,7 @@ pub enum PbrForm {
 
 /// The reflection model of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum SurfaceModel {
     /// The colour without lighting: pre-lit vertex colours, annotations.
     Unlit,

@@ -60,6 +60,7 @@ pub struct TriMesh {
 
 /// Why a mesh cannot be used at all. Tolerable faults are counted in [`MeshReport`] instead.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// An attribute has the wrong number of values.
     #[error("mesh attribute `{field}` has {found} values; give one per {per}, {expected} in all")]
@@ -88,6 +89,7 @@ pub enum MeshError {
 /// Faults found by [`TriMesh::validate`]. The build leaves unusable triangles out; the rest is
 /// rendered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MeshReport {
     /// Triangles in the mesh.
     pub triangles: usize,

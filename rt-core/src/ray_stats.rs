@@ -6,6 +6,7 @@ use std::ops::AddAssign;
 /// How many rays were traced, by kind, and how often each effect changed something. Kinds that the
 /// frame did not need are zero.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RayStats {
     /// Rays from the camera that can hit something (lanes outside the image are not counted).
     pub primary: u64,

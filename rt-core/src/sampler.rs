@@ -13,6 +13,7 @@ use fearless_simd::Simd;
 
 /// How sample points are distributed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Sampling {
     /// Owen-scrambled (0,2)-sequence: the error decreases nearly as 1/n where the integrand is
     /// smooth.

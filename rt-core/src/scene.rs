@@ -134,6 +134,7 @@ pub struct Scene {
 
 /// Reasons why a scene cannot be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The world could not be built.
     #[error(transparent)]

@@ -2,6 +2,7 @@
 
 /// The counted events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Counter {
     /// Nodes whose eight boxes were tested.
     Nodes,

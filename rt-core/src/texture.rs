@@ -5,6 +5,7 @@ use glam::Vec2;
 
 /// How texture coordinates outside 0..=1 are handled.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Wrap {
     /// Repeats the image (GL_REPEAT).
     #[default]
@@ -18,6 +19,7 @@ pub enum Wrap {
 /// How texels are combined. There are no mipmaps: use several samples per pixel where a texture is
 /// seen from afar.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Filter {
     /// The texel the point lies in.
     Nearest,
@@ -78,6 +80,7 @@ impl TexelSummary {
 
 /// Why a texture cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TextureError {
     /// The number of texels does not match the size.
     #[error(

@@ -23,6 +23,7 @@ pub struct TransferFunction {
 
 /// Why a transfer function cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TransferFunctionError {
     /// No control point.
     #[error("transfer function has no extinction points; give at least one [scalar, extinction]")]

@@ -5,6 +5,7 @@ use crate::simd::UnavailableLevel;
 
 /// Why a world could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BuildError {
     /// A mesh is unusable.
     #[error("geometry {geometry}: {source}")]

@@ -17,6 +17,7 @@ use std::time::Duration;
 /// | `Balanced` | 1 | 1 | 56 |
 /// | `Best` | 1.9–2.2 | 0.96–1.00 | 56 |
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum BuildQuality {
     /// SAH with 8 bins along the longest axis, for geometry that changes every frame.
     Fast,
@@ -66,6 +67,7 @@ impl std::str::FromStr for BuildQuality {
 
 /// A name of no preset.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub struct UnknownQuality {
     /// The given name.
     pub found: String,
@@ -122,6 +124,7 @@ pub struct BuildOptions {
 
 /// Report on a build: phases, sizes, and primitives left out.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct BuildReport {
     /// Time from input to traversable structure.
     pub total: Duration,

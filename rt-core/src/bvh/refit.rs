@@ -20,6 +20,7 @@ use std::time::{Duration, Instant};
 
 /// Report of [`World::refit`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RefitReport {
     /// Time from the new vertices to a traversable structure.
     pub elapsed: Duration,
@@ -38,6 +39,7 @@ pub struct RefitReport {
 
 /// Why [`World::refit`] failed. The world is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RefitError {
     /// The geometry index is out of range.
     #[error("there is no geometry {geometry}: the world has {count}")]

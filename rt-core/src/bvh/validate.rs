@@ -10,6 +10,7 @@ use crate::math::Aabb;
 
 /// Counts of [`World::validate`] over all geometries' trees.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TreeStats {
     /// 8-wide nodes.
     pub nodes: usize,
@@ -26,6 +27,7 @@ pub struct TreeStats {
 /// An invalid tree: a defect of this crate, please report it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{tree}: {fault}")]
+#[non_exhaustive]
 pub struct InvalidTree {
     /// "geometry 3" or "instances".
     pub tree: String,

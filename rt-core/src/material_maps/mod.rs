@@ -34,6 +34,7 @@ pub struct BsdfParameters {
 }
 
 /// The point at which a [`MaterialMaps`] is evaluated.
+#[non_exhaustive]
 pub struct MaterialEvalContext<'a> {
     /// Primitive of the geometry.
     pub primitive: u32,

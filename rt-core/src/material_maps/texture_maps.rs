@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 /// Which convention interprets the textures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MapConvention {
     /// glTF 2.0: occlusion attenuates ambient light only; the tangent frame belongs to the outside;
     /// tangents come from the texture coordinates where the mesh has none.

@@ -5,6 +5,7 @@ use crate::scene::SceneError;
 
 /// Why an image could not be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// The scene is invalid.
     #[error(transparent)]

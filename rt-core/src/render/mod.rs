@@ -25,6 +25,7 @@ use crate::scene::Scene;
 
 /// An image with a report on its rendering.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RenderOutput {
     /// The image.
     pub frame: Frame,

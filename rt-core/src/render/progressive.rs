@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 
 /// Why rendering ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StopReason {
     /// It has not ended yet.
     Running,
@@ -32,6 +33,7 @@ pub enum StopReason {
 
 /// A report on a frame.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RenderReport {
     /// Rays by kind.
     pub rays: RayStats,

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 /// What a ray is aimed at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum RayTarget {
     /// A vertex.
     Vertex,
@@ -65,6 +66,7 @@ pub enum RayOrigins {
 
 /// The queries of the world that trace the rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum QueryKind {
     /// [`World::closest`] and [`World::occluded`].
     Single,
@@ -81,6 +83,7 @@ impl QueryKind {
 
 /// Counts of a leak test.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LeakCount {
     /// Rays traced.
     pub rays: u64,

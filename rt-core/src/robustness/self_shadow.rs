@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 /// Counts of a self-shadow test.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SelfShadowCount {
     /// Camera rays that hit, which is also the number of secondary rays traced.
     pub rays: u64,

@@ -2,6 +2,7 @@
 
 /// Invalid input for a shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ShapeError {
     /// An array has the wrong number of values.
     #[error("{shape}: `{field}` has {found} values; give one per {per}, {expected} in all")]
@@ -66,6 +67,7 @@ pub enum ShapeError {
 
 /// Counts of primitives that were left out. They have empty bounds; the rest is rendered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ShapeReport {
     /// Primitives given.
     pub primitives: usize,

@@ -22,6 +22,7 @@ use std::sync::Arc;
 
 /// Where normals come from. Both point to smaller values.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum IsosurfaceNormals {
     /// The gradient of the trilinear interpolant: exactly the surface that is hit, so it shows the
     /// cells' edges.
@@ -50,6 +51,7 @@ impl Default for IsosurfaceOptions {
 
 /// Sizes of an isosurface, and the cells left out of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct IsosurfaceReport {
     /// Cells of the grid.
     pub cells: u64,

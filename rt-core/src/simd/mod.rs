@@ -16,6 +16,7 @@ pub(crate) use stack::{Stack, StackMemory};
 /// An instruction set to which the kernels can be limited, for tests and for comparisons with other
 /// ray tracers at the same level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum SimdLevel {
     /// 128-bit, the x86-64 baseline.
     Sse2,
@@ -90,6 +91,7 @@ impl SimdLevel {
     "this machine has no {}; ask for {}, or for none to get the best there is",
     wanted.name(), available_names()
 )]
+#[non_exhaustive]
 pub struct UnavailableLevel {
     /// The requested level.
     pub wanted: SimdLevel,

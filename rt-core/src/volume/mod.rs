@@ -44,6 +44,7 @@ pub const MACROCELL: u32 = 8;
 
 /// Accuracy of the integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum VolumeQuality {
     /// Adaptive: estimated error of the colour and opacity of a ray, in levels of 1/255 (linear)
     /// for colours up to 1. Half of it is for the integration, half for ending the ray when almost
@@ -88,6 +89,7 @@ impl VolumeSample {
 
 /// Sizes of a volume, and the cells left out of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct VolumeReport {
     /// Cells of the grid.
     pub cells: u64,

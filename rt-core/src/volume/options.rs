@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 /// Why a volume cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VolumeError {
     /// A grid without cells.
     #[error(
@@ -28,6 +29,7 @@ pub enum VolumeError {
 
 /// How a highlight falls off around the mirrored light.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VolumeHighlight {
     /// By the angle between the normal and the direction halfway between light and viewer (Blinn
     /// 1977).
@@ -112,6 +114,7 @@ impl GradientOpacity {
 /// transfer function's extinction as an opacity (of at most 1), or a weight: they do not depend on
 /// thickness.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub enum Blend {
     /// Emission and absorption.
     #[default]
@@ -131,6 +134,7 @@ pub enum Blend {
 
 /// Interpolation between the points of the grid.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Interpolation {
     /// Trilinear.
     #[default]
