@@ -1,13 +1,7 @@
 //! Ray tracing for scientific visualization on the CPU.
 //!
 //! ```
-//! use rt_core::camera::Camera;
-//! use rt_core::glam::{DVec3, Vec3};
-//! use rt_core::light::Light;
-//! use rt_core::material::Material;
-//! use rt_core::mesh::TriMesh;
-//! use rt_core::render::{RenderOptions, render};
-//! use rt_core::scene::SceneBuilder;
+//! use rt_core::prelude::*;
 //!
 //! let corners = vec![Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::Y * 9.0];
 //! let floor = TriMesh::new(corners, vec![[0, 1, 2]]);
@@ -25,6 +19,9 @@
 //! A [`scene::Scene`] has geometry in a [`bvh::World`], materials, lights and volumes. A
 //! [`camera::Camera`] and [`render::RenderOptions`] define the image. [`render::render`] returns it
 //! with a report. [`distributed`] renders scenes whose parts are held by several processes.
+//!
+//! Releases may add fields to options: build them from their defaults, as in
+//! `RenderOptions { samples: 4, ..RenderOptions::new(64, 64) }`.
 #![deny(unsafe_code)]
 
 pub mod bvh;
@@ -40,6 +37,7 @@ pub mod material;
 pub mod material_maps;
 pub mod math;
 pub mod mesh;
+pub mod prelude;
 pub mod ray;
 mod ray_cubic;
 pub mod ray_stats;

@@ -1,0 +1,23 @@
+//! The names that most programs need.
+//!
+//! ```
+//! use rt_core::prelude::*;
+//!
+//! let mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+//! let world = World::from_mesh(mesh, &BuildOptions::default())?;
+//! assert!(world.closest(&Ray::new(Vec3::new(0.2, 0.2, 5.0), Vec3::NEG_Z)).is_some());
+//! # Ok::<(), rt_core::bvh::BuildError>(())
+//! ```
+
+pub use crate::bvh::{BuildOptions, Geometry, Instance, World};
+pub use crate::camera::Camera;
+pub use crate::effects::Effects;
+pub use crate::frame::{Frame, Layers};
+pub use crate::light::Light;
+pub use crate::material::Material;
+pub use crate::mesh::{Attribute, TriMesh};
+pub use crate::ray::{Hit, HitBlock, Ray, RayBlock};
+pub use crate::render::{RenderOptions, RenderOutput, render};
+pub use crate::scene::{Appearance, Scene, SceneBuilder};
+pub use crate::shapes::Shape;
+pub use glam::{DAffine3, DVec3, Vec3};
