@@ -1,7 +1,6 @@
 //! Indexed triangle meshes with attributes, and their validation.
 
 use crate::math::Aabb;
-use crate::scene::attribute_part;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// Whether an [`Attribute`] has one value per vertex or one per triangle.
@@ -30,6 +29,18 @@ impl<T> Attribute<T> {
     /// One value per triangle.
     pub fn per_face(values: Vec<T>) -> Self {
         Attribute { per: PerElement::Face, values }
+    }
+}
+
+impl<T: Copy> Attribute<T> {
+    /// The values of some vertices and triangles.
+    fn part(&self, vertices: &[u32], triangles: &[u32]) -> Self {
+        let kept = match self.per {
+            PerElement::Vertex => vertices,
+            PerElement::Face => triangles,
+        };
+        let values = kept.iter().filter_map(|&i| self.values.get(i as usize).copied()).collect();
+        Attribute { per: self.per, values }
     }
 }
 
@@ -164,9 +175,9 @@ impl TriMesh {
             origin: self.origin,
             positions: vertices.iter().map(|i| self.positions[of_vertices(i)]).collect(),
             indices: kept.iter().map(|&t| self.indices[t as usize].map(new_index)).collect(),
-            normals: self.normals.as_ref().map(|n| attribute_part(n, &vertices, kept)),
-            colors: self.colors.as_ref().map(|c| attribute_part(c, &vertices, kept)),
-            scalars: self.scalars.as_ref().map(|s| attribute_part(s, &vertices, kept)),
+            normals: self.normals.as_ref().map(|n| n.part(&vertices, kept)),
+            colors: self.colors.as_ref().map(|c| c.part(&vertices, kept)),
+            scalars: self.scalars.as_ref().map(|s| s.part(&vertices, kept)),
             texcoords: self
                 .texcoords
                 .as_ref()

@@ -5,7 +5,6 @@ mod check;
 mod part;
 mod required_effects;
 
-pub(crate) use part::attribute_part;
 pub(crate) use required_effects::{requirements, transmits_light};
 
 use crate::bvh::{BuildError, BuildOptions, Geometry, Instance, World};

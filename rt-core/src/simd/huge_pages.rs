@@ -2,16 +2,14 @@
 //! pages, every node costs a TLB miss on top of its cache miss (notes: 251 ns instead of 147 ns per
 //! dependent read from memory).
 
-use crate::bvh::Unit;
-
-/// Allocates a zeroed arena. On Linux, arrays of several megabytes request transparent huge pages
-/// before they are first written.
-pub(crate) fn zeroed_units(len: usize) -> Vec<Unit> {
-    let mut units: Vec<Unit> = Vec::with_capacity(len);
+/// An array of `len` times `value`. On Linux, arrays of several megabytes request transparent huge
+/// pages before they are first written.
+pub(crate) fn filled<T: Copy>(value: T, len: usize) -> Vec<T> {
+    let mut items: Vec<T> = Vec::with_capacity(len);
     #[cfg(target_os = "linux")]
-    advise_huge(units.as_mut_ptr().cast(), len * size_of::<Unit>());
-    units.resize(len, Unit::ZERO);
-    units
+    advise_huge(items.as_mut_ptr().cast(), len * size_of::<T>());
+    items.resize(len, value);
+    items
 }
 
 #[cfg(target_os = "linux")]

@@ -1,15 +1,13 @@
 //! Prefetches memory before it is needed.
 
-use crate::bvh::Unit;
-
-/// Prefetches `LINES` cache lines from `units[first]` on. The processor ignores out-of-range
+/// Prefetches `LINES` cache lines from `items[first]` on. The processor ignores out-of-range
 /// addresses.
 #[inline(always)]
-pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
+pub(crate) fn prefetch<const LINES: usize, T>(items: &[T], first: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let p = units.as_ptr().wrapping_add(first).cast::<i8>();
+        let p = items.as_ptr().wrapping_add(first).cast::<i8>();
         for line in 0..LINES {
             // SAFETY: a prefetch reads nothing that the program can see, and it cannot fault,
             // whatever the address.
@@ -18,7 +16,7 @@ pub(crate) fn prefetch<const LINES: usize>(units: &[Unit], first: usize) {
     }
     #[cfg(not(target_arch = "x86_64"))]
     {
-        let _ = (units, first);
+        let _ = (items, first);
     }
 }
 

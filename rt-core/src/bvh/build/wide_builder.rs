@@ -142,7 +142,7 @@ pub(crate) fn build_wide<W: LeafWriter>(
     };
     let depth = root.depth();
     debug_assert!(depth <= MAX_DEPTH, "depth {depth} is bounded by construction");
-    let mut units = huge_pages::zeroed_units(root.units::<W>());
+    let mut units = huge_pages::filled(Unit::ZERO, root.units::<W>());
     root.write(writer, 0, &mut units);
     WideBvh { units, bounds: bounds.aabb(), depth }
 }

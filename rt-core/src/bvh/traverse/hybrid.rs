@@ -135,7 +135,7 @@ fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
             if hit == 0 {
                 continue;
             }
-            prefetch::<4>(units, ChildRef(refs[slot]).unit());
+            prefetch::<4, _>(units, ChildRef(refs[slot]).unit());
             // Another ray of `hit` may be nearer than the first one. The order of visits need not
             // be exact.
             let distance =

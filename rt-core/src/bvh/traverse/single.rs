@@ -196,13 +196,13 @@ pub(super) fn push_children<S: Simd, Q: HitQuery>(
     mask &= mask - 1;
     if mask == 0 {
         let child = ChildRef(refs[first & 7]);
-        prefetch::<4>(units, child.unit());
+        prefetch::<4, _>(units, child.unit());
         return Some(child);
     }
     let near: [f32; 8] = near.to_array();
     let entry = |i: usize| {
         let child = refs[i & 7];
-        prefetch::<4>(units, ChildRef(child).unit());
+        prefetch::<4, _>(units, ChildRef(child).unit());
         ((near[i & 7].to_bits() as u64) << 32) | child as u64
     };
     if Q::ANY {

@@ -171,7 +171,7 @@ impl Packet {
                     if reached == 0 {
                         continue;
                     }
-                    prefetch::<4>(units, ChildRef(refs[i]).unit());
+                    prefetch::<4, _>(units, ChildRef(refs[i]).unit());
                     let place = (node_at * 8 + i) as u64;
                     stack.push(Entry {
                         key: ((near[i].to_bits() as u64) << 32) | place,
