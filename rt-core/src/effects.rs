@@ -6,7 +6,6 @@
 //! [`crate::ray_stats::RayStats`] stays 0.
 
 use crate::camera::Camera;
-use crate::scene::Scene;
 use std::fmt;
 
 /// A set of effects.
@@ -51,13 +50,6 @@ impl Effects {
         (Effects::VOLUMES, "volumes"),
         (Effects::PATH_TRACING, "path tracing"),
     ];
-
-    /// The effects without which `scene` would look different, determined from its lights,
-    /// materials, attributes and volumes. The lens belongs to the camera
-    /// ([`Effects::required_by_camera`]), and path tracing is a render option.
-    pub fn required_by(scene: &Scene) -> Effects {
-        crate::scene::requirements(scene)
-    }
 
     /// [`Effects::DEPTH_OF_FIELD`] when the camera's lens has an aperture.
     pub fn required_by_camera(camera: &Camera) -> Effects {
@@ -110,6 +102,15 @@ impl Effects {
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Effects::ALL.into_iter().filter(move |(e, _)| self.contains(*e)).map(|(_, n)| n)
     }
+}
+
+/// Up to this roughness, a lobe is narrower than a pixel and is treated as a mirror.
+pub(crate) const MIRROR_ROUGHNESS: f32 = 1e-3;
+
+/// The effect whose rays a lobe of this roughness sends.
+#[inline]
+pub(crate) fn reflection_of(roughness: f32) -> Effects {
+    if roughness <= MIRROR_ROUGHNESS { Effects::REFLECTION } else { Effects::GLOSSY_REFLECTION }
 }
 
 impl std::ops::BitOr for Effects {

@@ -79,7 +79,7 @@ impl Environment {
         };
         // All other directions are derived from `up` alone, so no unit vector is degenerate.
         let upright = |up: Vec3| {
-            let ok = up.is_finite() && UNIT.contains(&crate::surface::length(up));
+            let ok = up.is_finite() && UNIT.contains(&crate::math::length(up));
             if ok { Ok(()) } else { Err(("up", up.to_string(), "of unit length: normalise it")) }
         };
         match self {

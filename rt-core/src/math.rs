@@ -136,6 +136,12 @@ pub fn median_high(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
+/// Length of a vector of any size: a plain f32 norm would overflow or underflow beyond 10^±19.
+#[inline]
+pub(crate) fn length(v: Vec3) -> f32 {
+    v.as_dvec3().length() as f32
+}
+
 /// The largest absolute coordinate.
 #[inline]
 pub fn max_abs(p: Vec3) -> f32 {

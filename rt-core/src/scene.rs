@@ -5,7 +5,7 @@ mod check;
 mod part;
 mod required_effects;
 
-pub(crate) use required_effects::{requirements, transmits_light};
+pub(crate) use required_effects::transmits_light;
 
 use crate::bvh::{BuildError, BuildOptions, Geometry, Instance, World};
 use crate::environment::{Background, Environment};

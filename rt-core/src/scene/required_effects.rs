@@ -2,10 +2,9 @@
 
 use super::Scene;
 use crate::colormap::ColorMap;
-use crate::effects::Effects;
+use crate::effects::{Effects, reflection_of};
 use crate::light::LightKind;
 use crate::material::{ColorSource, Material, SurfaceModel};
-use crate::shade::reflection_of;
 use std::sync::Arc;
 
 impl Scene {
@@ -81,8 +80,16 @@ pub(crate) fn transmits_light(scene: &Scene, effects: Effects) -> Vec<bool> {
     (0..count).map(passes).collect()
 }
 
-/// See [`Effects::required_by`].
-pub(crate) fn requirements(scene: &Scene) -> Effects {
+impl Effects {
+    /// The effects without which `scene` would look different, determined from its lights,
+    /// materials, attributes and volumes. The lens belongs to the camera
+    /// ([`Effects::required_by_camera`]), and path tracing is a render option.
+    pub fn required_by(scene: &Scene) -> Effects {
+        requirements(scene)
+    }
+}
+
+fn requirements(scene: &Scene) -> Effects {
     let mut used = vec![false; scene.materials.len()];
     let mut transparent = false;
     // A glyph plot has many instances, but their requirements depend only on material and geometry.

@@ -1,20 +1,20 @@
 //! Direct light from the scene's lights, with or without shadow rays.
 
 use super::frame_context::FrameContext;
+pub(super) use super::light_sampling::LightSampling;
 use super::lobes::response;
 use super::point::{Maps, WithMaps, WithoutMaps};
 use super::shadow::trace_light_rays;
 use super::wavefront::{LightRays, RayState};
 use super::{Point, SampleDimension, TileArea};
 use crate::bvh::Coherence;
-use crate::effects::Effects;
 use crate::light::{ResolvedLight, ResolvedLightKind, cone_share};
 use crate::material_maps::SurfaceParameters;
-use crate::math::{max_abs, orthonormal_basis};
+use crate::math::{length, max_abs, orthonormal_basis};
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
 use crate::sampler::{Sampler, unit_disk};
-use crate::surface::{SurfacePoint, length};
+use crate::surface::SurfacePoint;
 use glam::Vec3;
 
 /// Light that arrives at a point from one direction.
@@ -29,41 +29,6 @@ pub(super) struct Incident {
     lift: Vec3,
     /// Share of the light's colour that arrives here.
     pub(super) strength: f32,
-}
-
-/// The rays that every point sends to one light.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LightSampling {
-    /// Whether there are shadow rays at all.
-    pub(crate) traced: bool,
-    /// Whether they aim at different points of the light.
-    pub(crate) spread: bool,
-    /// How many.
-    pub(crate) count: u32,
-    /// Number of the first one among all light rays of a point.
-    pub(crate) first_number: u32,
-}
-
-impl LightSampling {
-    /// One for each of `lights`, and the number of rays to them all.
-    pub(crate) fn of(
-        lights: &[ResolvedLight],
-        effects: Effects,
-        light_rays: u32,
-    ) -> (Vec<LightSampling>, u32) {
-        let shadows = effects.contains(Effects::SHADOWS);
-        let soft = effects.contains(Effects::SOFT_SHADOWS);
-        let mut first_number = 0;
-        let of_light = |light: &ResolvedLight| {
-            let traced = shadows && light.shadows;
-            let spread = soft && light.size > 0.0 && traced;
-            let count = if spread { light_rays } else { 1 };
-            let light_sampling = LightSampling { traced, spread, count, first_number };
-            first_number += if traced { count } else { 0 };
-            light_sampling
-        };
-        (lights.iter().map(of_light).collect(), first_number)
-    }
 }
 
 /// Point of the unit square for ray `k` of `count` to light `number`; round lights map it to their

@@ -2,7 +2,7 @@
 //! generation set up.
 
 use super::camera_rays::CameraRays;
-use super::direct::LightSampling;
+use super::light_sampling::LightSampling;
 use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::environment::{Background, IrradianceCoefficients};

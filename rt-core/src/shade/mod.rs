@@ -13,6 +13,7 @@ mod direct;
 pub mod distributed;
 mod frame_context;
 mod layers;
+mod light_sampling;
 mod lobes;
 mod local;
 mod microfacet;
@@ -27,7 +28,6 @@ mod wavefront;
 
 pub(crate) use frame_context::FrameContext;
 pub(crate) use point::Point;
-pub(crate) use specular::reflection_of;
 pub(crate) use tile::{TILE, TileArea, TileLayers};
 
 use crate::bvh::{Coherence, InstanceFilter};
@@ -444,7 +444,7 @@ fn process_hits_with<M: Maps>(
             stats.opacity_ignored += (surface.opacity < OPAQUE) as u64;
             surface.opacity = 1.0;
         }
-        let length = crate::surface::length(ray.dir);
+        let length = crate::math::length(ray.dir);
         let state = &mut work.current.states[i];
         if state.absorption != Vec3::ZERO {
             // `t_min` is the parameter where the ray entered the medium or was last continued.

@@ -8,9 +8,10 @@ use super::wavefront::{LightRayResult, LightRays, OcclusionSource};
 use crate::bvh::{Coherence, InstanceFilter};
 use crate::effects::Effects;
 use crate::material::{Material, SurfaceModel};
+use crate::math::length;
 use crate::ray::{HitBlock, LANES, Ray};
 use crate::ray_stats::RayStats;
-use crate::surface::{SurfacePoint, length};
+use crate::surface::SurfacePoint;
 use glam::Vec3;
 
 /// Number of rays traced and of rays that hit something.

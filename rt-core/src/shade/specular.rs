@@ -8,22 +8,13 @@ use super::microfacet::{
 use super::point::WithMaps;
 use super::wavefront::{RayKind, RayState, Wavefront};
 use super::{Point, SampleDimension, TileArea, Workspace};
-use crate::effects::Effects;
+use crate::effects::{Effects, MIRROR_ROUGHNESS, reflection_of};
 use crate::material::SurfaceModel;
 use crate::math::orthonormal_basis;
 use crate::ray::Ray;
 use crate::ray_stats::RayStats;
 use crate::sampler::hash;
 use glam::Vec3;
-
-/// Up to this roughness, a lobe is narrower than a pixel and is treated as a mirror.
-pub(crate) const MIRROR_ROUGHNESS: f32 = 1e-3;
-
-/// The effect whose rays a lobe of this roughness sends.
-#[inline]
-pub(crate) fn reflection_of(roughness: f32) -> Effects {
-    if roughness <= MIRROR_ROUGHNESS { Effects::REFLECTION } else { Effects::GLOSSY_REFLECTION }
-}
 
 /// Default limit on consecutive reflections and refractions.
 const MIRROR_BOUNCES: u32 = 8;

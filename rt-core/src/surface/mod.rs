@@ -14,18 +14,12 @@ pub(crate) use block::{Planes, ShadingPointBlock};
 
 use crate::bvh::Geometry;
 use crate::material::{ColorSource, Material, Sides};
-use crate::math::max_abs;
+use crate::math::{length, max_abs};
 use crate::mesh::{Attribute, PerElement, TriMesh};
 use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 use crate::shapes::{Shape, ShapeHit};
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
-
-/// Length of a vector of any size: a plain f32 norm would overflow or underflow beyond 10^±19.
-#[inline]
-pub(crate) fn length(v: Vec3) -> f32 {
-    v.as_dvec3().length() as f32
-}
 
 /// One instance with all data for shading, resolved once per frame.
 pub(crate) struct ResolvedInstance<'a> {

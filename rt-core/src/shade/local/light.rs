@@ -214,7 +214,7 @@ fn incident<S: Simd>(simd: S, light: &ResolvedLight, points: &Rows3) -> (Vec3x16
     (dir, nowhere.select(zero, strength))
 }
 
-/// Lengths of vectors of any size, as [`crate::surface::length`].
+/// Lengths of vectors of any size, as [`crate::math::length`].
 #[inline(always)]
 fn length<S: Simd>(d: Vec3x16<S>) -> f32x16<S> {
     let ((x, x2), (y, y2), (z, z2)) = (d.x.widen(), d.y.widen(), d.z.widen());
