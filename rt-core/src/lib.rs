@@ -1,6 +1,24 @@
 //! Ray tracing for scientific visualization on the CPU.
 //!
+//! A [`bvh::World`] answers which primitive a ray meets, for single rays and for many at once:
+//!
 //! ```
+//! use rt_core::prelude::*;
+//!
+//! let corners = vec![Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::Y * 9.0];
+//! let floor = TriMesh::new(corners, vec![[0, 1, 2]]);
+//! let world = World::from_mesh(floor, &BuildOptions::default())?;
+//! let down = Ray::new(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z);
+//! assert_eq!(world.closest(&down).map(|hit| (hit.prim, hit.t)), Some((0, 4.0)));
+//! assert!(!world.occluded(&down.with_t_max(3.0)));
+//! # Ok::<(), rt_core::bvh::BuildError>(())
+//! ```
+//!
+//! The renderer (the feature `render`, on by default) makes pictures of such worlds:
+//!
+//! ```
+//! # #[cfg(feature = "render")]
+//! # {
 //! use rt_core::prelude::*;
 //!
 //! let corners = vec![Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::Y * 9.0];
@@ -14,6 +32,7 @@
 //! let output = render(&scene, &camera, &RenderOptions::new(32, 32)).unwrap();
 //! assert_eq!(output.frame.color_at(16, 16), [0.5, 0.25, 1.0, 1.0]);
 //! assert_eq!(output.report.rays.reflection, 0);
+//! # }
 //! ```
 //!
 //! A [`scene::Scene`] has geometry in a [`bvh::World`], materials, lights and volumes. A
@@ -24,37 +43,58 @@
 //! `RenderOptions { samples: 4, ..RenderOptions::new(64, 64) }`.
 #![deny(unsafe_code)]
 
+// ---- Ray queries: geometry, its trees, and the way of rays through them.
 pub mod bvh;
-pub mod camera;
-pub mod colormap;
-pub mod effects;
-pub mod environment;
-pub mod frame;
 pub mod grid;
 mod grid_walk;
-pub mod light;
-pub mod material;
-pub mod material_maps;
 pub mod math;
 pub mod mesh;
 pub mod prelude;
 pub mod ray;
 mod ray_cubic;
-pub mod ray_stats;
-pub mod render;
 pub mod robustness;
-pub mod sampler;
-pub mod scene;
-mod shade;
 pub mod shapes;
 pub mod simd;
 pub mod stats;
-mod surface;
 #[cfg(test)]
 pub(crate) mod test_shapes;
+
+// ---- The renderer, which the modules above know nothing of.
+#[cfg(feature = "render")]
+pub mod camera;
+#[cfg(feature = "render")]
+pub mod colormap;
+#[cfg(feature = "render")]
+pub mod effects;
+#[cfg(feature = "render")]
+pub mod environment;
+#[cfg(feature = "render")]
+pub mod frame;
+#[cfg(feature = "render")]
+pub mod light;
+#[cfg(feature = "render")]
+pub mod material;
+#[cfg(feature = "render")]
+pub mod material_maps;
+#[cfg(feature = "render")]
+pub mod ray_stats;
+#[cfg(feature = "render")]
+pub mod render;
+#[cfg(feature = "render")]
+pub mod sampler;
+#[cfg(feature = "render")]
+pub mod scene;
+#[cfg(feature = "render")]
+mod shade;
+#[cfg(feature = "render")]
+mod surface;
+#[cfg(feature = "render")]
 pub mod texture;
+#[cfg(feature = "render")]
 pub mod transfer_function;
+#[cfg(feature = "render")]
 pub mod volume;
 
 pub use glam;
+#[cfg(feature = "render")]
 pub use shade::distributed;

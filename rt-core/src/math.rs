@@ -137,6 +137,7 @@ pub fn median_high(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Length of a vector of any size: a plain f32 norm would overflow or underflow beyond 10^±19.
+#[cfg(feature = "render")]
 #[inline]
 pub(crate) fn length(v: Vec3) -> f32 {
     v.as_dvec3().length() as f32

@@ -10,14 +10,18 @@
 //! ```
 
 pub use crate::bvh::{BuildOptions, Geometry, Instance, World};
-pub use crate::camera::Camera;
-pub use crate::effects::Effects;
-pub use crate::frame::{Frame, Layers};
-pub use crate::light::Light;
-pub use crate::material::Material;
 pub use crate::mesh::{Attribute, TriMesh};
 pub use crate::ray::{Hit, HitBlock, Ray, RayBlock};
-pub use crate::render::{RenderOptions, RenderOutput, render};
-pub use crate::scene::{Appearance, Scene, SceneBuilder};
 pub use crate::shapes::Shape;
 pub use glam::{DAffine3, DVec3, Vec3};
+
+#[cfg(feature = "render")]
+pub use crate::{
+    camera::Camera,
+    effects::Effects,
+    frame::{Frame, Layers},
+    light::Light,
+    material::Material,
+    render::{RenderOptions, RenderOutput, render},
+    scene::{Appearance, Scene, SceneBuilder},
+};

@@ -1,4 +1,5 @@
 //! Ambient occlusion: closed forms, opacity, and warnings when there is no light to occlude.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::glam::{DVec3, Vec3};

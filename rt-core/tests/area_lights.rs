@@ -1,4 +1,5 @@
 //! Area lights against the irradiance of polygons and rings, and panoramas.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::camera::{Camera, CameraError, ThinLens};

@@ -1,5 +1,6 @@
 //! Shadows, ambient occlusion, reflection, refraction and transparency: closed forms, and counters
 //! that stay at zero.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::effects::Effects;

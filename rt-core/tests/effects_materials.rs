@@ -1,4 +1,5 @@
 //! Materials, lights and colour sources against the formulas of OpenGL, VTK and glTF.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::bvh::Geometry;

@@ -1,4 +1,5 @@
-//! Volumes in images: in front of, between and behind surfaces.
+//! Volumes in images: before, between and behind surfaces.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::colormap::ColorMap;

@@ -1,5 +1,6 @@
 //! Lights at the eye and along the view: shadow rays are omitted only where the eye cannot see a
 //! shadow.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::camera::{Camera, ThinLens};

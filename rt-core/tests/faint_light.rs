@@ -1,5 +1,6 @@
 //! Faint light is not omitted silently: unbiased paths, light through many layers, reflectors whose
 //! rays are omitted.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::camera::Camera;

@@ -1,5 +1,6 @@
 //! Rays towards lights are exact at both ends: at the surface, however far the light is, and at the
 //! light, even when it lies on a surface.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::bvh::BuildOptions;

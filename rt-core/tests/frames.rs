@@ -1,4 +1,5 @@
 //! Cameras, layers, depth, determinism, progress and the asynchronous renderer.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::camera::{Camera, CameraError};

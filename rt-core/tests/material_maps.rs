@@ -1,5 +1,6 @@
 //! Normal, roughness, metalness, occlusion and emission textures against materials without them and
 //! closed forms.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::camera::Camera;

@@ -1,5 +1,6 @@
 //! Invalid scenes and options are rejected, and settings without effect cause a warning. Messages
 //! name the item, the value and a cure.
+#![cfg(feature = "render")]
 
 use rt_core::bvh::{BuildError, BuildOptions, Geometry, World};
 use rt_core::camera::Camera;

@@ -1,4 +1,5 @@
 //! Path tracing, depth of field and the convergence of samples, against closed forms.
+#![cfg(feature = "render")]
 
 mod scenes_common;
 use rt_core::camera::ThinLens;

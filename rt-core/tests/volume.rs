@@ -1,4 +1,5 @@
 //! Direct volume rendering against closed forms and the slow reference.
+#![cfg(feature = "render")]
 
 mod shapes_common;
 

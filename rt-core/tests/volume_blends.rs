@@ -1,5 +1,6 @@
 //! Blend modes that are not a medium, and media that depend on gradients, against sums over many
 //! small steps.
+#![cfg(feature = "render")]
 
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3, Vec3};

@@ -1,4 +1,5 @@
 //! Rays carried from brick to brick of a volume accumulate the same bits as in the whole volume.
+#![cfg(feature = "render")]
 use rt_core::colormap::ColorMap;
 use rt_core::glam::{DVec3, UVec3, Vec3};
 use rt_core::grid::Grid;

@@ -111,6 +111,20 @@ pub(crate) const STEPS: &[Step] = &[
         ]),
     },
     Step {
+        name: "queries-alone",
+        tells: "who embeds ray queries builds them without the renderer",
+        action: cargo(&[
+            "clippy",
+            "-p",
+            "rt-core",
+            "--lib",
+            "--no-default-features",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    },
+    Step {
         name: "clippy-xtask",
         tells: "nor in this program",
         action: cargo(&[

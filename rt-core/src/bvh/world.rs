@@ -82,8 +82,10 @@ pub(crate) enum InstanceFilter<'a> {
     /// All instances.
     All,
     /// Marked instances. A missing mark counts as not set.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
     Marked(&'a [bool]),
     /// Unmarked instances.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
     Unmarked(&'a [bool]),
 }
 

@@ -2,12 +2,14 @@
 //! compares ray tracers.
 //!
 //! [`LeakTest`] counts rays that get through when aimed at vertices, edges and points of a closed
-//! mesh. [`SelfShadowTest`] counts secondary rays that hit the surface from which they start.
+//! mesh. `SelfShadowTest` (feature `render`) counts secondary rays that hit the surface from which they start.
 
 mod leaks;
+#[cfg(feature = "render")]
 mod self_shadow;
 
 pub use leaks::{LeakCount, LeakTest, QueryKind, RayOrigins, RayTarget};
+#[cfg(feature = "render")]
 pub use self_shadow::{SelfShadowCount, SelfShadowTest};
 
 use crate::math::SplitMix64;

@@ -7,10 +7,13 @@
 pub(crate) mod huge_pages;
 mod prefetch;
 mod stack;
+#[cfg(feature = "render")]
 pub(crate) mod vectors;
 
 use fearless_simd::Level;
-pub(crate) use prefetch::{prefetch, prefetch_item};
+pub(crate) use prefetch::prefetch;
+#[cfg(feature = "render")]
+pub(crate) use prefetch::prefetch_item;
 pub(crate) use stack::{Stack, StackMemory};
 
 /// An instruction set to which the kernels can be limited, for tests and for comparisons with other

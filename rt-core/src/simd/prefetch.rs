@@ -21,6 +21,7 @@ pub(crate) fn prefetch<const LINES: usize, T>(items: &[T], first: usize) {
 }
 
 /// Prefetches `items[i]`. The processor ignores out-of-range addresses.
+#[cfg(feature = "render")]
 #[inline(always)]
 pub(crate) fn prefetch_item<T>(items: &[T], i: usize) {
     #[cfg(target_arch = "x86_64")]

@@ -9,5 +9,6 @@ mod limits;
 mod oracle;
 mod random;
 mod scales;
+#[cfg(feature = "render")]
 mod secondary;
 mod ties;
