@@ -55,7 +55,8 @@ fn every_sample_has_vtks_bits() {
         peer::run(&python, SCRIPT, &args.iter().map(String::as_str).collect::<Vec<_>>());
 
         let theirs = std::fs::read(&path).unwrap();
-        let ours: Vec<u8> = w.grid().unwrap().values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let ours: Vec<u8> =
+            w.grid().unwrap().values().iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(ours.len(), theirs.len(), "{w:?}");
         let different = ours.chunks(4).zip(theirs.chunks(4)).filter(|(a, b)| a != b).count();
         assert_eq!(different, 0, "{w:?}: samples that differ");

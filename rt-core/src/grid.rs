@@ -6,14 +6,13 @@ use glam::{DVec3, UVec3, Vec3};
 /// `origin + spacing * (i,j,k)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    /// Points per axis, each at least 1.
-    pub dims: UVec3,
-    /// World position of point (0,0,0).
-    pub origin: DVec3,
-    /// World distance between neighbouring points, positive.
-    pub spacing: DVec3,
-    /// `dims.x * dims.y * dims.z` values.
-    pub values: Vec<f32>,
+    /// Each at least 1.
+    pub(crate) dims: UVec3,
+    pub(crate) origin: DVec3,
+    /// Positive.
+    pub(crate) spacing: DVec3,
+    /// As many as there are points.
+    pub(crate) values: Vec<f32>,
 }
 
 /// Reasons why a grid cannot be used.
@@ -65,6 +64,40 @@ impl Grid {
             return Err(GridError::Geometry { field: "origin", value: origin, rule: "finite" });
         }
         Ok(Grid { dims, origin, spacing, values })
+    }
+
+    /// Points per axis, each at least 1.
+    #[inline]
+    pub fn dims(&self) -> UVec3 {
+        self.dims
+    }
+
+    /// World position of point (0,0,0).
+    #[inline]
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// World distance between neighbouring points, positive.
+    #[inline]
+    pub fn spacing(&self) -> DVec3 {
+        self.spacing
+    }
+
+    /// The value of every point, x fastest.
+    #[inline]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The values, to change.
+    pub fn values_mut(&mut self) -> &mut [f32] {
+        &mut self.values
+    }
+
+    /// The values, without a copy.
+    pub fn into_values(self) -> Vec<f32> {
+        self.values
     }
 
     /// Value at point (i,j,k). Panics outside the grid.

@@ -39,8 +39,8 @@ fn surface_of(g: &Arc<Grid>, isovalues: &[f32], brick_cells: u32) -> Isosurface 
 
 /// Trilinear value in f64, as a sum over corners.
 fn value(g: &Grid, p: DVec3) -> f64 {
-    let last = (g.dims - UVec3::ONE).as_dvec3();
-    let p = (p / g.spacing).clamp(DVec3::ZERO, last);
+    let last = (g.dims() - UVec3::ONE).as_dvec3();
+    let p = (p / g.spacing()).clamp(DVec3::ZERO, last);
     let cell = p.floor().min(last - 1.0);
     let f = p - cell;
     let v = g.corners(cell.as_uvec3());
@@ -291,8 +291,9 @@ fn several_isovalues_come_in_order_with_their_scalar() {
 
 #[test]
 fn coloured_by_another_grid_of_other_resolution() {
-    let mut g = Arc::unwrap_or_clone(grid(9, DVec3::ONE, |p| p.x));
-    g.origin = DVec3::new(1e7, 0.0, -3.0);
+    let g = Arc::unwrap_or_clone(grid(9, DVec3::ONE, |p| p.x));
+    let origin = DVec3::new(1e7, 0.0, -3.0);
+    let g = Grid::new(g.dims(), origin, g.spacing(), g.into_values()).unwrap();
     let other = Grid::new(
         UVec3::new(2, 2, 2),
         DVec3::new(1e7, 0.0, -3.0),
@@ -310,8 +311,8 @@ fn coloured_by_another_grid_of_other_resolution() {
 fn nan_and_infinite_values_empty_their_cells_and_are_counted() {
     let mut g = Arc::unwrap_or_clone(grid(8, DVec3::ONE, |p| p.x));
     let (a, b) = (g.index(3, 3, 3), g.index(0, 0, 0));
-    g.values[a] = f32::NAN;
-    g.values[b] = f32::INFINITY;
+    g.values_mut()[a] = f32::NAN;
+    g.values_mut()[b] = f32::INFINITY;
     let s = surface_of(&g.into(), &[3.5], 4);
     assert_eq!((s.report().cells_non_finite, s.report().cells), (9, 343));
     assert!(

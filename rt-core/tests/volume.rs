@@ -268,7 +268,7 @@ fn another_transfer_function_makes_other_blocks_empty() {
 fn nan_values_are_transparent_and_counted() {
     let mut g = grid(9, 1.0, |_| 0.5);
     let i = g.index(4, 4, 4);
-    g.values[i] = f32::NAN;
+    g.values_mut()[i] = f32::NAN;
     let v = volume(g, single([1.0; 3]), &[[0.0, 0.1]]);
     assert_eq!(v.report().cells_non_finite, 8);
     let s = v.integrate(&Ray::new(Vec3::new(-1.0, 4.5, 4.5), Vec3::X), 0.0, INF, &tolerance(0.1));
@@ -458,8 +458,9 @@ fn useless_input_is_refused_with_the_cure() {
 
 #[test]
 fn bounds_and_origin_are_the_grids() {
-    let mut g = grid(5, 0.5, |_| 0.0);
-    g.origin = DVec3::new(1e9, -4.0, 0.25);
+    let g = grid(5, 0.5, |_| 0.0);
+    let origin = DVec3::new(1e9, -4.0, 0.25);
+    let g = Grid::new(g.dims(), origin, g.spacing(), g.into_values()).unwrap();
     let v = volume(g, single([1.0; 3]), &[[0.0, 1.0]]);
     assert_eq!(v.origin(), DVec3::new(1e9, -4.0, 0.25));
     let b = v.bounds();

@@ -55,7 +55,7 @@ fn scalars(v: &Volume, ray: &Ray) -> (Vec<f32>, f64) {
     let step = 1e-3f32;
     let points = (0..60_000).map(|i| ray.origin + ray.dir * (i as f32 * step));
     let inside = points.filter(|p| p.cmpge(Vec3::ZERO).all() && p.cmple(size).all());
-    let index = |p: Vec3| p / v.grid().spacing.as_vec3();
+    let index = |p: Vec3| p / v.grid().spacing().as_vec3();
     (inside.map(|p| v.grid().value(index(p))).collect(), step.into())
 }
 

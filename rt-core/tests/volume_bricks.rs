@@ -84,8 +84,8 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
                 volume(VolumeOptions { shading, interpolation, ..VolumeOptions::default() });
             let bricks = bricks(whole.blocks());
             let parts: Vec<Volume> = bricks.iter().map(|b| whole.part(*b)).collect();
-            let most = parts.iter().map(|p| p.grid().values.len()).max().unwrap();
-            assert!(most < whole.grid().values.len() / 2, "a part holds {most} values");
+            let most = parts.iter().map(|p| p.grid().values().len()).max().unwrap();
+            assert!(most < whole.grid().values().len() / 2, "a part holds {most} values");
             for quality in [VolumeQuality::default(), VolumeQuality::Step { voxels: 0.7 }] {
                 for n in 0..5000 {
                     let ray = ray(n, &mut random);

@@ -41,7 +41,7 @@ const MARGIN: f64 = 1.04;
 /// World corners of all geometry.
 pub(super) fn bounds(scene: &Scene) -> anyhow::Result<(DVec3, DVec3)> {
     let volumes =
-        scene.volumes.iter().map(|v| (v.volume.grid().origin, v.volume.grid().max_corner()));
+        scene.volumes.iter().map(|v| (v.volume.grid().origin(), v.volume.grid().max_corner()));
     let all = bounds_of_surfaces(&scene.world).into_iter().chain(volumes);
     corners(all.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))))
 }

@@ -179,7 +179,7 @@ impl RenderStyle {
     fn volume(&self, field: &VolumeField) -> anyhow::Result<Volume> {
         let [lo, hi] = self.range.unwrap_or(field.range);
         let ramp = vec![[lo, 0.0], [hi, RAMP_OPACITY]];
-        let stretch = OPACITY_STRETCH * (field.grid.max_corner() - field.grid.origin).length();
+        let stretch = OPACITY_STRETCH * (field.grid.max_corner() - field.grid.origin()).length();
         let opacity = self.opacity.as_ref().unwrap_or(&ramp);
         let transfer =
             TransferFunction::from_opacity(self.color_map([lo, hi])?, opacity, stretch as f32)?;

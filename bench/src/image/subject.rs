@@ -142,7 +142,7 @@ impl Subject {
             }
         }
         if let Some(v) = &self.volume {
-            corners_of_box(v.grid.origin, v.grid.max_corner()).into_iter().for_each(point);
+            corners_of_box(v.grid.origin(), v.grid.max_corner()).into_iter().for_each(point);
         }
     }
 
@@ -280,7 +280,7 @@ fn add_volume(
     }
     subject.contents.push(format!(
         "`{array}` as a volume of {} points",
-        grid.dims.as_u64vec3().element_product()
+        grid.dims().as_u64vec3().element_product()
     ));
     subject.extend_scalar_range(&[lo, hi]);
     subject.volume = Some(VolumeField { grid: Arc::new(grid), range: [lo, hi] });
@@ -306,7 +306,7 @@ fn lattice(
     };
     let Some(array) = color.clone().or_else(|| first_array(data)) else { return Ok(None) };
     match leaf.to_grid(&array) {
-        Ok(grid) if grid.dims.min_element() >= 2 => Ok(Some(Arc::new(grid))),
+        Ok(grid) if grid.dims().min_element() >= 2 => Ok(Some(Arc::new(grid))),
         Ok(_) => Ok(None),
         Err(e) => {
             subject
@@ -362,9 +362,9 @@ fn isosurface(
     };
     subject.contents.push(format!(
         "isosurface at {iso} of {} points",
-        field.dims.as_u64vec3().element_product()
+        field.dims().as_u64vec3().element_product()
     ));
-    let outline = corners_of_box(field.origin, field.max_corner()).to_vec();
+    let outline = corners_of_box(field.origin(), field.max_corner()).to_vec();
     subject.parts.push(Part::shape(Arc::new(surface), coloring, outline));
     Ok(subject)
 }

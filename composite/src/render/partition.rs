@@ -73,7 +73,7 @@ impl Part {
     /// Number of grid values of volumes in this part, including the layers around bricks.
     pub fn volume_values(&self) -> usize {
         let whole = self.scene.volumes.iter().filter(|v| !v.volume.is_medium());
-        let whole: usize = whole.map(|v| v.volume.grid().values.len()).sum();
+        let whole: usize = whole.map(|v| v.volume.grid().values().len()).sum();
         whole + self.brick_data.iter().flatten().map(BrickData::num_values).sum::<usize>()
     }
 }

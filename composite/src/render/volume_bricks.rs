@@ -178,7 +178,7 @@ impl BrickData {
 
     /// Number of grid values in this data.
     pub(super) fn num_values(&self) -> usize {
-        self.parts.iter().flatten().map(|(_, part)| part.grid().values.len()).sum()
+        self.parts.iter().flatten().map(|(_, part)| part.grid().values().len()).sum()
     }
 }
 
@@ -189,13 +189,14 @@ fn world_from_object(placed: &VolumeInstance) -> DAffine3 {
 
 /// Start of cell 0: half a spacing before the first point where cells are boxes around points.
 fn first_cell(volume: &Volume) -> DVec3 {
-    if volume.has_cells_around_points() { -0.5 * volume.grid().spacing } else { DVec3::ZERO }
+    if volume.has_cells_around_points() { -0.5 * volume.grid().spacing() } else { DVec3::ZERO }
 }
 
 /// Corners of a brick, in the space relative to the volume's origin.
 fn corners(volume: &Volume, brick: Brick) -> [DVec3; 2] {
-    let at =
-        |block: UVec3| first_cell(volume) + (block * MACROCELL).as_dvec3() * volume.grid().spacing;
+    let at = |block: UVec3| {
+        first_cell(volume) + (block * MACROCELL).as_dvec3() * volume.grid().spacing()
+    };
     [at(brick.first), at(brick.end)]
 }
 
@@ -214,7 +215,7 @@ fn moved(there: DAffine3, lo: DVec3, hi: DVec3) -> [DVec3; 2] {
 /// they enter another volume's space.
 fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Brick {
     let [low, high] = moved(there, lo, hi);
-    let cell = |p: DVec3| (p - first_cell(volume)) / volume.grid().spacing;
+    let cell = |p: DVec3| (p - first_cell(volume)) / volume.grid().spacing();
     let size = f64::from(MACROCELL);
     let first = ((cell(low) - 1.0) / size).floor().max(DVec3::ZERO).as_uvec3();
     let end = ((cell(high) + 1.0) / size).ceil().max(DVec3::ZERO).as_uvec3().min(volume.blocks());
@@ -225,7 +226,7 @@ fn blocks_around(volume: &Volume, there: DAffine3, lo: DVec3, hi: DVec3) -> Bric
 /// counts as finer.
 fn finer(scene: &Scene) -> Vec<usize> {
     let cell = |placed: &VolumeInstance| {
-        let size = DMat3::from_diagonal(placed.volume.grid().spacing);
+        let size = DMat3::from_diagonal(placed.volume.grid().spacing());
         (placed.world_from_object.matrix3 * size).determinant().abs()
     };
     let cells: Vec<f64> = scene.volumes.iter().map(cell).collect();
@@ -248,10 +249,10 @@ fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -
     move |block| {
         let [lo, hi] = corners(&here.volume, Brick { first: block, end: block + 1 });
         // With a margin of at least one cell of each: rays are rounded.
-        let margin = here.volume.grid().spacing;
+        let margin = here.volume.grid().spacing();
         others.iter().any(|(placed, there)| {
             let [low, high] = moved(*there, lo - margin, hi + margin);
-            let (bounds, spacing) = (placed.volume.bounds(), placed.volume.grid().spacing);
+            let (bounds, spacing) = (placed.volume.bounds(), placed.volume.grid().spacing());
             low.cmpgt(bounds.min.as_dvec3() + spacing).all()
                 && high.cmplt(bounds.max.as_dvec3() - spacing).all()
         })

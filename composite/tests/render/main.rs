@@ -216,8 +216,8 @@ fn a_volume_in_bricks_has_the_bits_of_one_node() {
             assert_same(&expected, &outputs, &format!("{}, {ranks} ranks", case.name));
             assert!(outputs[0].report.warnings.iter().all(|w| !w.contains("whole")));
         }
-        // Every rank has its brick with two layers of points around it, not the whole volume.
-        let whole = case.scene.volumes[0].volume.grid().values.len();
+        // Every rank holds its brick with two layers of points around it, and not the whole.
+        let whole = case.scene.volumes[0].volume.grid().values().len();
         let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
         assert!(
             held.iter().all(|&n| n < whole / 2) && held.iter().sum::<usize>() >= whole,

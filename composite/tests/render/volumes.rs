@@ -177,7 +177,7 @@ fn volumes_whole_on_some_ranks_and_cut_over_others_have_the_bits_of_one_node() {
             [vec![vec![0, 3], vec![4, 1]], cut(&[2, 2, 0, 2, 1, 3, 4, 0, 3]), cut(&[1, 4])],
         ),
     ];
-    let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values.len()).sum();
+    let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values().len()).sum();
     for (name, deal) in deals {
         let mut partition = Partition::new(&case.scene, 5, &Split::Triangles);
         for (volume, holders) in deal.iter().enumerate() {
@@ -211,7 +211,7 @@ fn bricks_of_several_volumes_are_small_and_little_is_held_twice() {
     };
     for turn in [0.0, 0.5] {
         let case = alone(vec![place(coarse.clone(), 0.0), place(fine.clone(), turn)]);
-        let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values.len()).sum();
+        let whole: usize = case.scene.volumes.iter().map(|v| v.volume.grid().values().len()).sum();
         let held = values_held(&case, &Partition::new(&case.scene, 8, &Split::Triangles));
         assert!(held.iter().all(|h| *h < whole * 3 / 10), "{held:?} of {whole}, turned by {turn}");
         assert!(

@@ -117,10 +117,11 @@ impl Flow {
         self.fields.iter().find(|f| f.name == name)
     }
 
-    /// A field as a grid for rt-core (copies its values).
+    /// A field as a grid for rt-core (copies its values). `None` when there is no such field with a
+    /// value at every point.
     pub fn grid(&self, name: &str) -> Option<Grid> {
         let values = self.field(name)?.values.clone();
-        Some(Grid { dims: self.dims, origin: self.origin_m, spacing: self.spacing_m, values })
+        Grid::new(self.dims, self.origin_m, self.spacing_m, values).ok()
     }
 
     /// Converts the fields to VTK image data, to be written as `.vti`. The values are moved; the

@@ -3,6 +3,7 @@
 use super::wavelet::Wavelet;
 use crate::isosurface::{self, Options};
 use glam::{DVec3, Vec3};
+use rt_core::grid::Grid;
 use rt_core::mesh::{Attribute, TriMesh};
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -131,11 +132,12 @@ pub fn torus(tube: f32, around: u32, across: u32) -> TriMesh {
 pub fn closed_wavelet(points: u32, iso: f64) -> Result<TriMesh, isosurface::IsosurfaceError> {
     let points = points.clamp(3, 1 << 10);
     let w = Wavelet::with_points(points);
-    let mut grid =
+    let sampled =
         w.grid().unwrap_or_else(|_| unreachable!("3 to 1024 points per axis are a valid extent"));
     let (n, last) = (points as usize, points as usize - 1);
-    (grid.origin, grid.spacing) = (DVec3::NEG_ONE, DVec3::splat(2.0 / last as f64));
-    for (i, v) in grid.values.iter_mut().enumerate() {
+    let spacing = DVec3::splat(2.0 / last as f64);
+    let mut grid = Grid::new(sampled.dims(), DVec3::NEG_ONE, spacing, sampled.into_values())?;
+    for (i, v) in grid.values_mut().iter_mut().enumerate() {
         if [i % n, i / n % n, i / (n * n)].iter().any(|&c| c == 0 || c == last) {
             *v = f32::min(*v, iso as f32 - 100.0);
         }

@@ -88,12 +88,16 @@ pub fn extract(
     isos: &[f64],
     options: Options,
 ) -> Result<Isosurfaces, IsosurfaceError> {
-    let placement =
-        Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
+    let placement = Placement::of(
+        grid.dims().as_u64vec3(),
+        grid.origin(),
+        grid.spacing(),
+        grid.values().len(),
+    )?;
     let mut result = Isosurfaces { triangles_per_iso: vec![0; isos.len()], ..Default::default() };
     result.mesh.origin = placement.mesh_origin;
     let cuts = cuts(isos, &placement)?;
-    let Some(block) = placement.whole(&grid.values) else { return Ok(result) };
+    let Some(block) = placement.whole(grid.values()) else { return Ok(result) };
     let planes = block.dims[2];
 
     // First pass: what every plane contributes to every surface.
@@ -136,10 +140,14 @@ pub fn extract(
 /// Counts the triangles of each isovalue without generating them: about a third of the work and no
 /// memory for the result.
 pub fn count_triangles(grid: &Grid, isos: &[f64]) -> Result<Vec<usize>, IsosurfaceError> {
-    let placement =
-        Placement::of(grid.dims.as_u64vec3(), grid.origin, grid.spacing, grid.values.len())?;
+    let placement = Placement::of(
+        grid.dims().as_u64vec3(),
+        grid.origin(),
+        grid.spacing(),
+        grid.values().len(),
+    )?;
     let cuts = cuts(isos, &placement)?;
-    let Some(block) = placement.whole(&grid.values) else { return Ok(vec![0; isos.len()]) };
+    let Some(block) = placement.whole(grid.values()) else { return Ok(vec![0; isos.len()]) };
     let total = |cut| {
         count_planes(&block, cut, 0..block.dims[2]).iter().map(|p| p.triangles as usize).sum()
     };

@@ -9,6 +9,7 @@ use super::{
 };
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
+use rt_core::grid::Grid;
 
 /// A scalar field that can compute any plane of its grid.
 pub trait PlaneSource: Sync {
@@ -23,18 +24,18 @@ pub trait PlaneSource: Sync {
     fn fill_plane(&self, k: u32, values: &mut [f32]);
 }
 
-impl PlaneSource for rt_core::grid::Grid {
+impl PlaneSource for Grid {
     fn dims(&self) -> UVec3 {
-        self.dims
+        Grid::dims(self)
     }
     fn origin(&self) -> DVec3 {
-        self.origin
+        Grid::origin(self)
     }
     fn spacing(&self) -> DVec3 {
-        self.spacing
+        Grid::spacing(self)
     }
     fn fill_plane(&self, k: u32, values: &mut [f32]) {
-        values.copy_from_slice(&self.values[k as usize * values.len()..][..values.len()]);
+        values.copy_from_slice(&self.values()[k as usize * values.len()..][..values.len()]);
     }
 }
 

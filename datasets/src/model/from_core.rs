@@ -9,16 +9,16 @@ impl ImageData {
     /// Converts a scalar field to image data with one point array.
     pub fn from_grid(grid: &Grid, name: &str) -> Self {
         let attributes = Attributes {
-            point: vec![DataArray::new(name, 1, Values::F32(grid.values.clone()))],
+            point: vec![DataArray::new(name, 1, Values::F32(grid.values().to_vec()))],
             point_scalars: Some(name.into()),
             ..Default::default()
         };
         let extent =
-            std::array::from_fn(|i| if i % 2 == 0 { 0 } else { grid.dims[i / 2] as i32 - 1 });
+            std::array::from_fn(|i| if i % 2 == 0 { 0 } else { grid.dims()[i / 2] as i32 - 1 });
         ImageData {
             extent,
-            origin: grid.origin,
-            spacing: grid.spacing,
+            origin: grid.origin(),
+            spacing: grid.spacing(),
             direction: DMat3::IDENTITY,
             attributes,
         }

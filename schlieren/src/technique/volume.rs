@@ -94,10 +94,9 @@ pub fn volume(
 
 /// Index of a world point in a grid, or `None` outside.
 pub(super) fn index_of(grid: &Grid, at: DVec3) -> Option<Vec3> {
-    let index = (at - grid.origin) / grid.spacing;
-    let last = (grid.dims - UVec3::ONE).as_dvec3();
-    // Tolerance of a thousandth of a cell, because the image's border pixels may lie on the border
-    // of the field.
+    let index = (at - grid.origin()) / grid.spacing();
+    let last = (grid.dims() - UVec3::ONE).as_dvec3();
+    // A thousandth of a cell: the frame's border pixels may lie on the border of the field.
     let inside = index.cmpge(DVec3::splat(-1e-3)).all() && index.cmple(last + 1e-3).all();
     inside.then(|| index.as_vec3())
 }

@@ -203,7 +203,7 @@ impl WorldCompiler<'_> {
             });
             let Some(medium) = made.as_ref() else { continue };
             let grid = medium.grid();
-            self.grow(Some([grid.origin, grid.max_corner()]), &placement.world_from_object);
+            self.grow(Some([grid.origin(), grid.max_corner()]), &placement.world_from_object);
             self.out.volumes.push(VolumeInstance {
                 volume: medium.clone(),
                 world_from_object: placement.world_from_object,
