@@ -441,7 +441,7 @@ fn missing_arrays_and_components_are_named() {
     let grid = d.to_grid("v:y").unwrap();
     assert_eq!(grid.values()[1], 4f64.sin() as f32);
     let cells = d.to_grid("c").unwrap();
-    assert_eq!((cells.dims.to_array(), cells.origin), ([3, 2, 1], DVec3::new(1.25, -1.5, 1.5)));
+    assert_eq!((cells.dims().to_array(), cells.origin()), ([3, 2, 1], DVec3::new(1.25, -1.5, 1.5)));
 }
 
 #[test]
@@ -449,7 +449,7 @@ fn axes_that_run_backwards_are_turned_round() {
     let mut d = sample_files::image();
     d.spacing.x = -0.5;
     let grid = Dataset::ImageData(d).to_grid("p").unwrap();
-    assert_eq!((grid.spacing.x, grid.origin.x), (0.5, -0.5));
+    assert_eq!((grid.spacing().x, grid.origin().x), (0.5, -0.5));
     assert_eq!(grid.values()[..4], [-1.5, -2.0, -2.5, -3.0]);
 }
 
