@@ -5,6 +5,7 @@ use crate::comm::CommError;
 /// Why an image could not be composited. After an error no rank gets an image: the communicator is
 /// aborted.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CompositeError {
     /// A slice of a frame has the wrong length.
     #[error(

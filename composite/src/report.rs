@@ -3,6 +3,7 @@
 /// Times and counts of one rank for one frame. Seconds are those of
 /// [`Communicator::now`](crate::Communicator::now).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Finding active pixels and writing messages (IceT: compress).
     pub compress_secs: f64,

@@ -68,6 +68,7 @@ pub enum Data {
 
 /// Why a data set cannot be generated.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CatalogueError {
     /// No data set has this name.
     #[error("no data set is called `{name}`; there are: {known}")]

@@ -27,6 +27,7 @@ use glam::{DMat3, DVec3};
 
 /// Why a data set cannot be converted as requested.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ModelError {
     /// There is no array of this name.
     #[error("no array `{name}` in this {kind}; it has {available}")]

@@ -5,7 +5,6 @@ use glam::Vec2;
 
 /// How texture coordinates outside 0..=1 are handled.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Wrap {
     /// Repeats the image (GL_REPEAT).
     #[default]

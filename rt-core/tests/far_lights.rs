@@ -306,7 +306,7 @@ fn transformed_light(light: Light, turn: DMat3, scale: f64) -> Light {
         LightKind::Quad { corner, edges, both_sides } => {
             LightKind::Quad { corner: place(corner), edges: edges.map(place), both_sides }
         }
-        other @ (LightKind::Ambient | LightKind::Directional { .. }) => other,
+        other => other,
     };
     Light { kind, ..light }
 }

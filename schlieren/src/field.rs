@@ -30,6 +30,7 @@ pub struct Field {
 
 /// Why a lattice cannot be a field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FieldError {
     /// Fewer than two nodes along an axis: the field has no depth there.
     #[error(

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Why an image cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OutputError {
     /// The image format cannot hold it, or the image file cannot be written.
     #[error(transparent)]

@@ -29,6 +29,7 @@ pub struct Solids {
 
 /// Why a body cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolidsError {
     /// The file cannot be read.
     #[error("the body cannot be read")]

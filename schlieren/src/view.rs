@@ -34,6 +34,7 @@ pub enum Axis {
 
 /// Why a direction of view does not define a frame.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ViewError {
     /// The light's direction is zero or not finite.
     #[error(

@@ -4,6 +4,7 @@ use crate::rect::Rect;
 
 /// What is wrong with a message.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MessageError {
     /// Fewer or more bytes than its header announces.
     #[error("{found} bytes where {expected} were expected")]

@@ -2,6 +2,7 @@
 
 /// Why a call of a communicator failed.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CommError {
     /// A message did not arrive in time.
     #[error(

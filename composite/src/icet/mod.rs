@@ -27,6 +27,7 @@ use table::Table;
 
 /// Why IceT could not be used.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum IcetError {
     /// Not found on this machine.
     #[error(

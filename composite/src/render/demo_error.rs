@@ -9,6 +9,7 @@ use rt_core::shapes::ShapeError;
 
 /// Why a demo could not be prepared or rendered.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DemoError {
     /// No such data set or size, or it cannot be made.
     #[error(transparent)]

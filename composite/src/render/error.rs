@@ -7,6 +7,7 @@ use rt_core::scene::SceneError;
 /// Why a frame could not be rendered. After an error no rank gets an image: the communicator is
 /// aborted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// Scene, camera or options.
     #[error(transparent)]

@@ -57,6 +57,7 @@ pub struct Span {
 
 /// One rank's costs of one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct RankReport {
     /// When this rank began, on the communicator's clock.
     pub begin_at_secs: f64,

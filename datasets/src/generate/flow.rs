@@ -69,6 +69,7 @@ pub enum Fields {
 
 /// Why a flow cannot be generated.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FlowError {
     /// Too few or too many lattice points.
     #[error("the lattice has {dims} points; each axis needs 4 to {most} points, and all together \

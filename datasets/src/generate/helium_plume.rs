@@ -89,7 +89,7 @@ mod tests {
         assert!((rho.at(0, 0, 0) - 1.185).abs() < 2e-3, "{}", rho.at(0, 0, 0));
         let (low, _) = rho.range().unwrap();
         assert!((low - 0.164).abs() < 0.02, "{low}");
-        for (i, (&y, &r)) in he.values.iter().zip(&rho.values).enumerate() {
+        for (i, (&y, &r)) in he.values().iter().zip(rho.values()).enumerate() {
             assert!((density(y as f64) / r as f64 - 1.0).abs() < 1e-5, "{i}");
             let air = flow.field("Y_air").unwrap().values[i];
             assert!((0.0..=1.0).contains(&y) && y + air == 1.0);

@@ -74,6 +74,7 @@ impl Size {
 
 /// Why the surfaces cannot be generated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NestedWaveletError {
     /// The field cannot be sampled.
     #[error(transparent)]

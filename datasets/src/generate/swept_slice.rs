@@ -36,6 +36,7 @@ pub enum Sweep {
 
 /// Why a data set cannot be used as a slice.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SliceError {
     /// The data set is not a structured grid of one layer.
     #[error(
@@ -266,7 +267,7 @@ mod tests {
             let flow = slice.flow(sweep, UVec3::new(41, 41, 41)).unwrap();
             let rho = flow.grid("density").unwrap();
             let mut checked = 0;
-            for (n, &value) in rho.values.iter().enumerate() {
+            for (n, &value) in rho.values().iter().enumerate() {
                 let n = n as u32;
                 let p = flow.position_m(n % 41, n / 41 % 41, n / 1681);
                 let r = if sweep == Sweep::Revolve { p.y.hypot(p.z) } else { p.y.abs() };

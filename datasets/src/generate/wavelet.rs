@@ -63,6 +63,7 @@ impl Default for Wavelet {
 
 /// Why a wavelet cannot be sampled.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WaveletError {
     /// An axis has no points, or more than 2²⁰.
     #[error(

@@ -100,6 +100,7 @@ impl From<f64> for MetadataValue {
 
 /// Why an image cannot be read, written or assembled.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// The file system reports an error.
     #[error("{path}: cannot {action}")]

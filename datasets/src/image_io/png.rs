@@ -19,6 +19,7 @@ pub enum PngDepth {
 
 /// Counts pixels that PNG cannot represent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PngReport {
     /// Pixels with NaN in colour or alpha, written as opaque magenta.
     pub nan: usize,

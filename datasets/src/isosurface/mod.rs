@@ -55,6 +55,7 @@ pub struct Isosurfaces {
 
 /// Why no surface can be extracted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IsosurfaceError {
     /// An isovalue is NaN or infinite.
     #[error("isovalue number {index} is {value}; isovalues must be finite")]

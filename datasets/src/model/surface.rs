@@ -11,6 +11,7 @@ use rt_core::mesh::{Attribute, MeshError, TriMesh};
 
 /// Statistics of a surface extraction: the cells that were drawn, left out or approximated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SurfaceReport {
     /// Triangles in the mesh.
     pub triangles: usize,

@@ -26,6 +26,7 @@ impl fmt::Display for At {
 
 /// Reason why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// The operating system refused access.
     #[error("{}: cannot be read; {cure}", path.display())]

@@ -26,6 +26,7 @@ use glam::DVec3;
 
 /// Why a data set cannot be resampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ResampleError {
     /// The data set has no solid cells.
     #[error("the {kind} has no cells that fill space ({found}); {cure}")]

@@ -27,6 +27,7 @@ pub struct ResamplingError {
 
 /// Statistics of mesh and lattice.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Number of nodes with a value.
     pub inside: usize,

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a file cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The operating system reports an error.
     #[error("{}: cannot be written; check that the directory exists, may be written and has \

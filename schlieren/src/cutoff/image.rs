@@ -19,6 +19,7 @@ pub struct FilterImage {
 
 /// Why an image cannot be used as a filter.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FilterError {
     /// The file cannot be read.
     #[error("the filter's picture cannot be used")]

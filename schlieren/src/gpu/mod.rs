@@ -29,6 +29,7 @@ pub use paths::{GpuCounters, GpuOptions, GpuPaths};
 
 /// Why the GPU cannot trace.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GpuError {
     /// No GPU was found.
     #[error(

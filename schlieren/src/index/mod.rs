@@ -29,6 +29,7 @@ use std::fmt;
 
 /// Why an index cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IndexError {
     /// A value that no gas can have, or at which the formula is undefined.
     #[error("{quantity} {value} {unit} {reason}; {cure}")]

@@ -32,6 +32,7 @@ use std::path::{Path, PathBuf};
 
 /// Why no field can be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
     /// The file cannot be read.
     #[error(transparent)]
@@ -153,6 +154,7 @@ impl Options {
 
 /// How a field was made.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// The formula: `ciddor`, `gladstone-dale`, `plasma`, `given` or `multifield`.
     pub formula: &'static str,

@@ -51,6 +51,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Errors of rendering.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// The scene is invalid.
     #[error(transparent)]
@@ -179,6 +180,7 @@ pub struct RenderOutput {
 
 /// Report of how an image was rendered.
 #[derive(Debug, Clone, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct Report {
     /// Effects that the scene needs.
     pub effects: Effects,

@@ -388,6 +388,7 @@ pub struct SolidsSpec {
 
 /// Errors of reading, checking and writing scenes.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
     #[error("{path}: cannot read the scene")]

@@ -33,6 +33,7 @@ use std::time::Duration;
 
 /// Errors of starting the server.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ServeError {
     /// The flow or the bodies cannot be read, or do not form a valid test section.
     #[error(transparent)]

@@ -18,6 +18,7 @@ use rt_core::volume::{Volume, VolumeError, VolumeOptions, VolumeQuality};
 
 /// Errors of drawing a comparison.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ComparisonError {
     /// No grid can be made of the field's gradient.
     #[error("the gradient of the field makes no grid")]

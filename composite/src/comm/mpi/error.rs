@@ -2,6 +2,7 @@
 
 /// Why MPI could not be started.
 #[derive(Debug, thiserror::Error, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MpiError {
     /// The process was not started by a launcher.
     #[error(

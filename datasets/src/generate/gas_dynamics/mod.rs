@@ -30,6 +30,7 @@ pub mod theta_beta_m;
 
 /// Why a flow does not exist.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GasError {
     /// Shocks and expansions need a supersonic stream.
     #[error("the Mach number is {mach}; it must be finite and greater than {least}")]
