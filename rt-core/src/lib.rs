@@ -37,10 +37,7 @@
 //!
 //! A [`scene::Scene`] has geometry in a [`bvh::World`], materials, lights and volumes. A
 //! [`camera::Camera`] and [`render::RenderOptions`] define the image. [`render::render`] returns it
-//! with a report. [`distributed`] renders scenes whose parts are held by several processes.
-//!
-//! Releases may add fields to options: build them from their defaults, as in
-//! `RenderOptions { samples: 4, ..RenderOptions::new(64, 64) }`.
+//! with a report. [`deferred`] renders scenes whose parts are held by several processes.
 #![deny(unsafe_code)]
 
 // ---- Ray queries: geometry, its trees, and the way of rays through them.
@@ -96,5 +93,4 @@ pub mod transfer_function;
 pub mod volume;
 
 pub use glam;
-#[cfg(feature = "render")]
-pub use shade::distributed;
+pub use shade::deferred;

@@ -1,6 +1,6 @@
 //! Errors of a frame of many ranks.
 use crate::comm::CommError;
-use rt_core::distributed::ProtocolError;
+use rt_core::deferred::AnswerError;
 use rt_core::render::RenderError;
 use rt_core::scene::SceneError;
 
@@ -52,7 +52,7 @@ pub enum FrameError {
         /// The receiver.
         rank: usize,
         /// What does not fit.
-        source: ProtocolError,
+        source: AnswerError,
     },
     /// The partition and the group do not match.
     #[error(

@@ -14,7 +14,7 @@
 //! ranks and any partition: parts use the local spaces of the whole
 //! ([`rt_core::bvh::World::build_part`]), hits are merged by parameter and then by number,
 //! occlusion bits by *or*, and the functions of one node do everything else
-//! ([`rt_core::distributed`]).
+//! ([`rt_core::deferred`]).
 //!
 //! ```
 //! use composite::render::{DataParallel, FrameOptions, Partition, Split};
@@ -44,13 +44,11 @@ mod demo_error;
 mod demo_model;
 mod error;
 pub mod ghost;
-mod message_codec;
 mod options;
 mod partition;
 mod primary_rays;
 mod rank_bounds;
 mod rank_frame;
-mod ray_codec;
 mod ray_parallel;
 mod report;
 mod request_reply;
@@ -61,6 +59,7 @@ mod tile_hits;
 mod tile_owners;
 mod volume_bricks;
 mod volumes;
+mod wire_format;
 
 pub use error::FrameError;
 pub use options::{FrameOptions, FrameOutput, SecondaryRayPolicy};

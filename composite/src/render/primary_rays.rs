@@ -13,7 +13,7 @@ use super::tile_hits::{Nearest, SLOTS, TileHits};
 use super::tile_owners::TileOwners;
 use super::{Activity, FrameError};
 use rayon::prelude::*;
-use rt_core::distributed::{CameraHits, DistributedFrame, Pass, ShadingHit};
+use rt_core::deferred::{CameraHits, DeferredFrame, Pass, ShadingHit};
 use std::sync::atomic::Ordering;
 
 /// Most chunks of an owner's tiles; all ranks process them one after the other. With more chunks,
@@ -265,7 +265,7 @@ impl PrimaryRays<'_, '_> {
     }
 }
 
-fn words_per_hit(frame: &DistributedFrame<'_>, colors: bool) -> usize {
+fn words_per_hit(frame: &DeferredFrame<'_>, colors: bool) -> usize {
     2 + (frame.num_instances() > 1) as usize + if colors { 4 } else { 0 }
 }
 

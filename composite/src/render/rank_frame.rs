@@ -2,12 +2,12 @@
 use super::Part;
 use super::request_reply::RankChannel;
 use rayon::prelude::*;
-use rt_core::distributed::DistributedFrame;
+use rt_core::deferred::DeferredFrame;
 use std::sync::atomic::Ordering;
 
 /// One rank's view of the current frame.
 pub(super) struct RankFrame<'a> {
-    pub(super) frame: &'a DistributedFrame<'a>,
+    pub(super) frame: &'a DeferredFrame<'a>,
     pub(super) part: &'a Part,
     pub(super) parallel: bool,
 }

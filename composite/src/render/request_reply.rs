@@ -1,6 +1,6 @@
 //! Requests to other ranks and their replies, all at once: the pattern of every exchange of a
 //! frame.
-use super::message_codec::{decode_message, encode_message, message_bytes};
+use super::wire_format::{decode_message, encode_message, message_bytes};
 use super::{Activity, FrameError, RankReport};
 use crate::comm::{Communicator, Receive};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

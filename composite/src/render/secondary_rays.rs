@@ -3,13 +3,11 @@
 use super::options::SecondaryRayPolicy;
 use super::rank_bounds::{RankBounds, ranks_in};
 use super::rank_frame::{RankFrame, each};
-use super::ray_codec::{RAY_WORDS, read_ray, write_ray};
 use super::request_reply::RankChannel;
 use super::tile_hits::TileHits;
+use super::wire_format::{RAY_WORDS, read_ray, write_ray};
 use super::{Activity, FrameError, RankReport, volumes};
-use rt_core::distributed::{
-    DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
-};
+use rt_core::deferred::{DeferredFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState};
 use rt_core::ray::Ray;
 
 /// By tile and ray.
@@ -21,7 +19,7 @@ pub(super) struct SecondaryRays<'a> {
     pub(super) rank_bounds: &'a RankBounds,
     pub(super) policy: SecondaryRayPolicy,
     /// This rank's part with a ghost layer, for ghost zones.
-    pub(super) ghost_layer: Option<&'a DistributedFrame<'a>>,
+    pub(super) ghost_layer: Option<&'a DeferredFrame<'a>>,
     /// Whether there are media, which are distributed in bricks.
     pub(super) media: bool,
     pub(super) pass: Pass,
@@ -378,7 +376,7 @@ fn rank_that_was_hit(rank_bounds: &RankBounds, tile: &TileState, hit: &[u32]) ->
 }
 
 fn blocked_in_parallel(
-    frame: &DistributedFrame<'_>,
+    frame: &DeferredFrame<'_>,
     points: &[LightPoint],
     pass: Pass,
     work: &mut OcclusionScratch,

@@ -8,7 +8,7 @@ use super::tile_owners::TileOwners;
 use super::{Activity, FrameError, Part, ghost, primary_rays, secondary_rays};
 use crate::comm::Communicator;
 use rt_core::camera::Camera;
-use rt_core::distributed::{DistributedFrame, Pass, TileState};
+use rt_core::deferred::{DeferredFrame, Pass, TileState};
 use rt_core::frame::Frame;
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
@@ -90,11 +90,11 @@ impl DataParallel {
     ) -> Result<Option<Frame>, FrameError> {
         let policy = self.secondary_ray_policy(channel, camera, options)?;
         let part = &self.part;
-        let frame = DistributedFrame::new(&part.scene, part.needed, camera, options)?;
+        let frame = DeferredFrame::new(&part.scene, part.needed, camera, options)?;
         let side = RankFrame { frame: &frame, part, parallel: self.options.parallel };
         let ghost_layer = match (&part.ghost_layer, policy) {
             (Some((_, scene)), SecondaryRayPolicy::GhostZones) => {
-                Some(DistributedFrame::new(scene, part.needed, camera, options)?)
+                Some(DeferredFrame::new(scene, part.needed, camera, options)?)
             }
             _ => None,
         };
@@ -173,7 +173,7 @@ impl DataParallel {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<SecondaryRayPolicy, FrameError> {
-        let probe = DistributedFrame::new(&self.part.scene, self.part.needed, camera, options)?;
+        let probe = DeferredFrame::new(&self.part.scene, self.part.needed, camera, options)?;
         let distance = probe.ambient_occlusion_only_distance().filter(|d| d.is_finite());
         let secondary = !probe.needs_only_local_light();
         drop(probe);

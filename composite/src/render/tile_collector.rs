@@ -5,7 +5,7 @@ use super::tile_hits::TileHits;
 use super::tile_owners::TileOwners;
 use super::{Activity, FrameError};
 use crate::comm::CommError;
-use rt_core::distributed::{DistributedFrame, Pass, TileState};
+use rt_core::deferred::{DeferredFrame, Pass, TileState};
 use rt_core::frame::Frame;
 use std::ops::Range;
 
@@ -165,7 +165,7 @@ impl<'a> TileCollector<'a> {
 }
 
 /// Words of a tile.
-fn words_of(frame: &DistributedFrame<'_>, tile: usize) -> usize {
+fn words_of(frame: &DeferredFrame<'_>, tile: usize) -> usize {
     let area = frame.tile_area(tile);
     (area.width * area.height) as usize * frame.words_per_pixel()
 }

@@ -1,5 +1,5 @@
 //! Hits of the camera rays in a tile.
-use rt_core::distributed::ShadingHit;
+use rt_core::deferred::ShadingHit;
 
 /// Slots of a tile.
 pub(super) const SLOTS: usize = 1024;

@@ -1,6 +1,6 @@
 //! Which rank owns which tiles. All ranks know all bounds, so all compute the same owners without a
 //! message.
-use rt_core::distributed::DistributedFrame;
+use rt_core::deferred::DeferredFrame;
 use rt_core::math::Aabb;
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ pub(super) struct TileOwners {
 impl TileOwners {
     /// Divides tiles into `bounds.len()` runs of about the same work. The work of a tile is 1 if no
     /// part can be visible in it, otherwise 8 plus the number of such parts.
-    pub(super) fn new(frame: &DistributedFrame<'_>, bounds: &[Aabb]) -> TileOwners {
+    pub(super) fn new(frame: &DeferredFrame<'_>, bounds: &[Aabb]) -> TileOwners {
         let touched: Vec<Vec<bool>> = bounds.iter().map(|b| frame.tiles_overlapping(*b)).collect();
         let work = |tile: usize| {
             let parts = touched.iter().filter(|t| t[tile]).count() as u64;

@@ -6,9 +6,10 @@
 //! order in which one node makes them, so they have the same bits.
 use super::rank_frame::RankFrame;
 use super::request_reply::RankChannel;
+use super::wire_format::{read_ray, write_ray};
 use super::{Activity, FrameError, RankReport};
 use rayon::prelude::*;
-use rt_core::distributed::{ShadingHit, TileState, VolumeRay};
+use rt_core::deferred::{ShadingHit, TileState, VolumeRay};
 use rt_core::ray::Ray;
 use rt_core::volume::{PartialIntegral, VolumeSample};
 
@@ -93,7 +94,7 @@ pub(super) fn composite_volumes(
             let holder = side.part.volume_bricks.holder(next.brick, rank);
             let request = &mut requests[holder];
             request.extend([next.brick as u32, next.first as u32, next.end as u32]);
-            super::ray_codec::write_ray(&Ray { t_max: j.ray.t_end, ..j.ray.ray }, None, request);
+            write_ray(&Ray { t_max: j.ray.t_end, ..j.ray.ray }, None, request);
             request.extend(j.collected.to_words());
             asked[holder].push(k);
         }
@@ -155,7 +156,7 @@ fn continue_ray(
     let ([brick, first, end], words) = words.split_first_chunk::<HEAD>()?;
     let (ray, collected) = words.split_last_chunk::<{ PartialIntegral::WORDS }>()?;
     let held = side.part.brick_data.get(*brick as usize)?.as_ref()?;
-    let (ray, spans) = (super::ray_codec::read_ray(ray), *first as usize..*end as usize);
+    let (ray, spans) = (read_ray(ray), *first as usize..*end as usize);
     let segments = side.frame.ray_segments(&ray, ray.t_max, |volume| held.volume(volume));
     if !segments.is_within(spans.clone(), |volume, block| held.has(volume, block)) {
         return None;

@@ -9,8 +9,8 @@
 
 mod ambient_occlusion;
 mod camera_rays;
+pub mod deferred;
 mod direct;
-pub mod distributed;
 mod frame_context;
 mod layers;
 mod light_sampling;

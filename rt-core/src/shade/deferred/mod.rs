@@ -15,16 +15,16 @@
 //!    surfaces, [`TileState::light_rays`] layer by layer ([`TileState::process_light_hits`]).
 //! 3. It calls [`TileState::advance`], which shades and returns whether there is another wavefront.
 //!
-//! Data servers answer with [`DistributedFrame::camera_hits`], [`DistributedFrame::closest`],
-//! [`DistributedFrame::occlusion_bits`] and [`DistributedFrame::light_hits`].
+//! Data servers answer with [`DeferredFrame::camera_hits`], [`DeferredFrame::closest`],
+//! [`DeferredFrame::occlusion_bits`] and [`DeferredFrame::light_hits`].
 
-mod data_server;
 mod messages;
-mod tile_owner;
+mod tile_state;
+mod tracing;
 
-pub use data_server::{CameraHits, OcclusionScratch};
 pub use messages::{LightPoint, ShadingHit};
-pub use tile_owner::{ProtocolError, TileState, VolumeRay};
+pub use tile_state::{AnswerError, TileState, VolumeRay};
+pub use tracing::{CameraHits, OcclusionScratch};
 
 use super::frame_context::FrameContext;
 use super::tile::{TILE, TileArea};
@@ -52,13 +52,13 @@ pub enum Pass {
 }
 
 /// A scene, or a part of one, prepared for one frame.
-pub struct DistributedFrame<'a> {
+pub struct DeferredFrame<'a> {
     context: FrameContext<'a>,
     tiles: Vec<TileArea>,
     warnings: Vec<String>,
 }
 
-impl<'a> DistributedFrame<'a> {
+impl<'a> DeferredFrame<'a> {
     /// Checks all arguments. `needed` are the effects that the whole scene needs
     /// ([`Effects::required_by`]): a part may seem to need fewer.
     ///
@@ -70,7 +70,7 @@ impl<'a> DistributedFrame<'a> {
         needed: Effects,
         camera: &Camera,
         options: &'a RenderOptions,
-    ) -> Result<DistributedFrame<'a>, RenderError> {
+    ) -> Result<DeferredFrame<'a>, RenderError> {
         let mut plan = plan_for(scene, needed, camera, options)?;
         if scene.materials.iter().any(|m| m.maps.is_some())
             && !plan.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
@@ -107,7 +107,7 @@ impl<'a> DistributedFrame<'a> {
                 tiles.push(TileArea { x: left + x, y: top + y, width, height, sample: 0 });
             }
         }
-        Ok(DistributedFrame {
+        Ok(DeferredFrame {
             context: FrameContext::new(scene, camera, options, plan.effects),
             tiles,
             warnings: plan.warnings,
@@ -222,7 +222,7 @@ impl<'a> DistributedFrame<'a> {
     }
 
     /// Number of light rays that a point may send, which is the number of bits per point in
-    /// [`DistributedFrame::occlusion_bits`].
+    /// [`DeferredFrame::occlusion_bits`].
     pub fn light_rays_per_point(&self) -> u32 {
         self.context.sky_number + self.sky_rays()
     }

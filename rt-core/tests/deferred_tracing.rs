@@ -4,8 +4,8 @@
 
 use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
-use rt_core::distributed::{
-    CameraHits, DistributedFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
+use rt_core::deferred::{
+    CameraHits, DeferredFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
 };
 use rt_core::effects::Effects;
 use rt_core::environment::{Background, Environment};
@@ -206,8 +206,8 @@ fn deal(scene: &Scene, parts: usize, seed: u32) -> Vec<Vec<Vec<u32>>> {
     out
 }
 
-struct DataServer<'a> {
-    frame: DistributedFrame<'a>,
+struct Holder<'a> {
+    frame: DeferredFrame<'a>,
     kept: &'a [Vec<u32>],
 }
 
@@ -279,8 +279,8 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
     let servers: Vec<DataServer<'_>> = scenes
         .iter()
         .zip(&kept)
-        .map(|(s, kept)| DataServer {
-            frame: DistributedFrame::new(s, needed, &case.camera, &case.options).unwrap(),
+        .map(|(s, kept)| Holder {
+            frame: DeferredFrame::new(s, needed, &case.camera, &case.options).unwrap(),
             kept,
         })
         .collect();

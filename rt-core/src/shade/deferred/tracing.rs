@@ -5,7 +5,7 @@ use super::super::direct::{LightSampling, incident_from, light_point, shadow_ray
 use super::super::tile::{PIXELS, TileArea};
 use super::super::wavefront::{LightRays, OcclusionSource};
 use super::super::{SampleDimension, Workspace, generate_camera_rays, local, prefetch_surfaces};
-use super::{DistributedFrame, LightPoint, Pass, ShadingHit};
+use super::{DeferredFrame, LightPoint, Pass, ShadingHit};
 use crate::bvh::{Coherence, InstanceFilter};
 use crate::frame::Layers;
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
@@ -41,8 +41,8 @@ impl CameraHits {
     }
 
     /// Colours of all slots with a hit, in frames where
-    /// [`DistributedFrame::needs_only_local_light`].
-    pub fn colors(&mut self, frame: &DistributedFrame<'_>) -> &[[f32; 4]] {
+    /// [`DeferredFrame::needs_only_local_light`].
+    pub fn colors(&mut self, frame: &DeferredFrame<'_>) -> &[[f32; 4]] {
         let Some(area) = self.area else { return &[] };
         let mut pixels = std::mem::take(&mut self.work.pixels);
         pixels.clear();
@@ -63,7 +63,7 @@ impl CameraHits {
     }
 
     /// The complete hit in slot `slot`.
-    pub fn shading_hit(&self, frame: &DistributedFrame<'_>, slot: usize) -> Option<ShadingHit> {
+    pub fn shading_hit(&self, frame: &DeferredFrame<'_>, slot: usize) -> Option<ShadingHit> {
         let (area, hit) = (self.area?, self.get(slot)?);
         let ray = self.work.current.blocks[slot / LANES].get(slot % LANES);
         let mut shading_hit = frame.shading_hit(&ray, &hit);
@@ -76,7 +76,7 @@ impl CameraHits {
     }
 }
 
-/// Scratch memory of [`DistributedFrame::occlusion_bits`].
+/// Scratch memory of [`DeferredFrame::occlusion_bits`].
 #[derive(Default)]
 pub struct OcclusionScratch {
     rays: LightRays,
@@ -89,7 +89,7 @@ pub struct OcclusionScratch {
 /// Light rays that are traced together.
 const BATCH_RAYS: usize = 4096;
 
-impl DistributedFrame<'_> {
+impl DeferredFrame<'_> {
     /// Hits of the camera rays of tile `tile` in this world.
     pub fn camera_hits(&self, tile: usize, pass: Pass, out: &mut CameraHits) {
         let mut area = self.tiles[tile];
@@ -193,7 +193,7 @@ impl DistributedFrame<'_> {
     }
 
     /// For every light ray of every point, whether this world blocks it:
-    /// [`DistributedFrame::light_rays_per_point`] bits per point, in whole 64-bit words, the lowest
+    /// [`DeferredFrame::light_rays_per_point`] bits per point, in whole 64-bit words, the lowest
     /// bit first. Rays that no material could need may be left out; their bits are 0.
     pub fn occlusion_bits(
         &self,

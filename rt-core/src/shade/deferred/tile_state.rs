@@ -7,7 +7,7 @@ use super::super::{
     Workspace, accumulate_radiance, add_light, generate_camera_wavefront, local, process_hits,
     spawn_rays,
 };
-use super::{DistributedFrame, LightPoint, Pass, ShadingHit};
+use super::{DeferredFrame, LightPoint, Pass, ShadingHit};
 use crate::effects::Effects;
 use crate::frame::Layers;
 use crate::ray::{Hit, HitBlock, LANES, Ray};
@@ -48,7 +48,7 @@ pub struct VolumeRay {
 /// An answer that no data server of this scene can have given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("an answer of tile {tile} does not fit its question: {what} {found}, expected {expected}")]
-pub struct ProtocolError {
+pub struct AnswerError {
     /// The tile.
     pub tile: usize,
     /// What is wrong.
@@ -59,7 +59,7 @@ pub struct ProtocolError {
     pub expected: u64,
 }
 
-impl DistributedFrame<'_> {
+impl DeferredFrame<'_> {
     /// An empty tile with the number `tile`.
     pub fn tile(&self, tile: usize) -> TileState {
         let background_depth = self.context.camera.background_depth() as f32;
@@ -91,7 +91,7 @@ impl TileState {
     }
 
     /// Generates camera rays.
-    pub fn begin(&mut self, frame: &DistributedFrame<'_>, pass: Pass) {
+    pub fn begin(&mut self, frame: &DeferredFrame<'_>, pass: Pass) {
         self.pass = pass;
         let first = matches!(pass, Pass::Color(0));
         self.area.sample = if let Pass::Color(sample) = pass { sample } else { 0 };
@@ -120,7 +120,7 @@ impl TileState {
     }
 
     /// Rays that wait for an answer, with the index of that answer and the slot of their pixel. The
-    /// first wavefront of a pass has the rays of [`DistributedFrame::camera_hits`], ray k in slot
+    /// first wavefront of a pass has the rays of [`DeferredFrame::camera_hits`], ray k in slot
     /// k.
     pub fn rays(&self) -> impl Iterator<Item = (usize, u16, Ray)> + '_ {
         let wave = &self.work.current;
@@ -130,16 +130,16 @@ impl TileState {
         })
     }
 
-    /// In frames where [`DistributedFrame::needs_only_local_light`], takes the colours of the
+    /// In frames where [`DeferredFrame::needs_only_local_light`], takes the colours of the
     /// nearest hits, slot by slot; `None` for the background. Ends the pass.
     ///
     /// # Errors
     /// When the number of colours is not the number of slots.
     pub fn select_colors(
         &mut self,
-        frame: &DistributedFrame<'_>,
+        frame: &DeferredFrame<'_>,
         colors: &[Option<[f32; 4]>],
-    ) -> Result<(), ProtocolError> {
+    ) -> Result<(), AnswerError> {
         self.expect("number of colours", colors.len(), PIXELS)?;
         let work = &mut self.work;
         work.hits.clear();
@@ -193,10 +193,7 @@ impl TileState {
     ///
     /// # Errors
     /// When the number of answers is not the number of rays.
-    pub fn set_volume_samples(
-        &mut self,
-        collected: Vec<VolumeSample>,
-    ) -> Result<(), ProtocolError> {
+    pub fn set_volume_samples(&mut self, collected: Vec<VolumeSample>) -> Result<(), AnswerError> {
         self.expect("number of crossings", collected.len(), self.num_rays())?;
         self.work.volume_samples = collected;
         Ok(())
@@ -208,9 +205,9 @@ impl TileState {
     /// When the answers do not fit the wavefront.
     pub fn process_hits(
         &mut self,
-        frame: &DistributedFrame<'_>,
+        frame: &DeferredFrame<'_>,
         hits: &[Option<ShadingHit>],
-    ) -> Result<(), ProtocolError> {
+    ) -> Result<(), AnswerError> {
         self.expect("number of answers", hits.len(), self.num_rays())?;
         let instances = frame.context.instances.len();
         self.work.hits.clear();
@@ -243,7 +240,7 @@ impl TileState {
 
     /// Records the geometry layers of first surfaces. In a separate geometry pass, rays continue
     /// behind surfaces that are too transparent.
-    fn record_wave(&mut self, frame: &DistributedFrame<'_>, hits: &[Option<ShadingHit>]) {
+    fn record_wave(&mut self, frame: &DeferredFrame<'_>, hits: &[Option<ShadingHit>]) {
         let transparent = frame.context.effects.contains(Effects::TRANSPARENCY);
         for (i, m) in hits.iter().enumerate() {
             let state = self.work.current.states[i];
@@ -272,7 +269,7 @@ impl TileState {
 
     // ---- Light ----------------------------------------------------------------------------------
     /// Runs the lights once to find the rays that they would send.
-    fn find_light_rays(&mut self, frame: &DistributedFrame<'_>) {
+    fn find_light_rays(&mut self, frame: &DeferredFrame<'_>) {
         let before: Vec<Vec3> = self.work.points.iter().map(|p| p.radiance).collect();
         self.work.light_rays.source = OcclusionSource::Recording(std::mem::take(&mut self.waiting));
         let mut no_stats = RayStats::default();
@@ -336,16 +333,16 @@ impl TileState {
         self.waiting.iter().map(|r| (self.place[r.point as usize] as usize, r.ray))
     }
 
-    /// Takes the bits of [`DistributedFrame::occlusion_bits`] for all [`TileState::light_points`].
+    /// Takes the bits of [`DeferredFrame::occlusion_bits`] for all [`TileState::light_points`].
     /// Combine the bits of several data servers by *or*.
     ///
     /// # Errors
     /// When the number of words is wrong.
     pub fn apply_occlusion(
         &mut self,
-        frame: &DistributedFrame<'_>,
+        frame: &DeferredFrame<'_>,
         bits: &[u64],
-    ) -> Result<(), ProtocolError> {
+    ) -> Result<(), AnswerError> {
         let words = (frame.light_rays_per_point() as usize).div_ceil(64);
         self.expect("words of light bits", bits.len(), words * self.points.len())?;
         let passage = |r: &RecordedRay| {
@@ -367,16 +364,16 @@ impl TileState {
         self.waiting.iter().map(|r| r.ray).filter(|r| r.t_max >= r.t_min)
     }
 
-    /// Takes the answer of [`DistributedFrame::light_hits`] to each of [`TileState::light_rays`];
+    /// Takes the answer of [`DeferredFrame::light_hits`] to each of [`TileState::light_rays`];
     /// of several data servers, the answer that [`ShadingHit::is_before`] the others.
     ///
     /// # Errors
     /// When the answers do not fit the rays.
     pub fn process_light_hits(
         &mut self,
-        frame: &DistributedFrame<'_>,
+        frame: &DeferredFrame<'_>,
         hits: &[Option<ShadingHit>],
-    ) -> Result<(), ProtocolError> {
+    ) -> Result<(), AnswerError> {
         self.expect("number of answers", hits.len(), self.light_rays().count())?;
         let mut answers = hits.iter();
         for (r, f) in self.waiting.iter_mut().zip(&mut self.light_ray_states) {
@@ -388,7 +385,7 @@ impl TileState {
                     let Some(resolved) = frame.context.instances.get(m.instance as usize) else {
                         let (found, expected) =
                             (m.instance as u64, frame.context.instances.len() as u64);
-                        return Err(ProtocolError {
+                        return Err(AnswerError {
                             tile: self.tile,
                             what: "an instance",
                             found,
@@ -417,7 +414,7 @@ impl TileState {
         Ok(())
     }
 
-    fn add_light(&mut self, frame: &DistributedFrame<'_>, given: Vec<LightRayResult>) {
+    fn add_light(&mut self, frame: &DeferredFrame<'_>, given: Vec<LightRayResult>) {
         self.waiting.clear();
         self.work.light_rays.source = OcclusionSource::Given(given.into_iter());
         let cost = self.layers.cost_mut();
@@ -430,7 +427,7 @@ impl TileState {
 
     /// Shades the wavefront. Returns true when there is another one; otherwise the pass is
     /// finished.
-    pub fn advance(&mut self, frame: &DistributedFrame<'_>) -> bool {
+    pub fn advance(&mut self, frame: &DeferredFrame<'_>) -> bool {
         if self.pass == Pass::Geometry {
             self.work.surfaces.clear();
             std::mem::swap(&mut self.work.current, &mut self.work.behind);
@@ -466,8 +463,8 @@ impl TileState {
 
     // ---- The result -----------------------------------------------------------------------------
     /// The finished tile, pixel by pixel and row by row: the requested layers of colour, depth,
-    /// distance, normal, ids and cost. See [`DistributedFrame::decode_tile`].
-    pub fn encode(&self, frame: &DistributedFrame<'_>) -> Vec<u32> {
+    /// distance, normal, ids and cost. See [`DeferredFrame::decode_tile`].
+    pub fn encode(&self, frame: &DeferredFrame<'_>) -> Vec<u32> {
         let options = frame.context.options;
         let has = |l| options.layers.contains(l);
         let scale = 1.0 / options.samples as f32;
@@ -499,16 +496,11 @@ impl TileState {
         out
     }
 
-    fn wrong(&self, what: &'static str, found: u64, expected: u64) -> ProtocolError {
-        ProtocolError { tile: self.tile, what, found, expected }
+    fn wrong(&self, what: &'static str, found: u64, expected: u64) -> AnswerError {
+        AnswerError { tile: self.tile, what, found, expected }
     }
 
-    fn expect(
-        &self,
-        what: &'static str,
-        found: usize,
-        expected: usize,
-    ) -> Result<(), ProtocolError> {
+    fn expect(&self, what: &'static str, found: usize, expected: usize) -> Result<(), AnswerError> {
         if found == expected {
             Ok(())
         } else {

@@ -2,7 +2,7 @@
 use crate::codec::checksum;
 
 /// The message for `words`.
-pub(super) fn encode_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
+pub(in crate::render) fn encode_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
     buffer.clear();
     buffer.reserve(8 + 4 * words.len());
     buffer.extend_from_slice(&[0; 8]);
@@ -15,7 +15,7 @@ pub(super) fn encode_message(words: &[u32], mut buffer: Vec<u8>) -> Vec<u8> {
 }
 
 /// The words of a message; `None` when it is damaged.
-pub(super) fn decode_message(message: &[u8]) -> Option<Vec<u32>> {
+pub(in crate::render) fn decode_message(message: &[u8]) -> Option<Vec<u32>> {
     let (head, body) = message.split_first_chunk::<8>()?;
     if !body.len().is_multiple_of(4) || checksum(body) != u64::from_le_bytes(*head) {
         return None;
@@ -24,7 +24,7 @@ pub(super) fn decode_message(message: &[u8]) -> Option<Vec<u32>> {
 }
 
 /// Bytes of a message of `words` words.
-pub(super) fn message_bytes(words: usize) -> usize {
+pub(in crate::render) fn message_bytes(words: usize) -> usize {
     8 + 4 * words
 }
 
