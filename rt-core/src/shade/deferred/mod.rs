@@ -18,11 +18,12 @@
 //! Data servers answer with [`DeferredFrame::camera_hits`], [`DeferredFrame::closest`],
 //! [`DeferredFrame::occlusion_bits`] and [`DeferredFrame::light_hits`].
 
+mod hits;
 mod messages;
 mod tile_state;
 mod tracing;
 
-pub use messages::{LightPoint, ShadingHit};
+pub use hits::{LightPoint, ShadingHit};
 pub use tile_state::{AnswerError, TileState, VolumeRay};
 pub use tracing::{CameraHits, OcclusionScratch};
 
