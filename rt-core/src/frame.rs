@@ -121,6 +121,24 @@ pub enum Encoding {
 }
 
 impl Frame {
+    /// An image in which nothing is hit, with the given layers: transparent, with the depth
+    /// `background_depth` ([`Camera::background_depth`](crate::camera::Camera::background_depth)).
+    pub fn blank(width: u32, height: u32, layers: Layers, background_depth: f32) -> Frame {
+        let n = width as usize * height as usize;
+        let pixels = |layer| if layers.contains(layer) { n } else { 0 };
+        Frame {
+            width,
+            height,
+            color: vec![[0.0; 4]; pixels(Layers::COLOR)],
+            depth: vec![background_depth; pixels(Layers::DEPTH)],
+            distance: vec![f32::INFINITY; pixels(Layers::DISTANCE)],
+            normal: vec![[0.0; 3]; pixels(Layers::NORMAL)],
+            instance: vec![u32::MAX; pixels(Layers::IDS)],
+            primitive: vec![u32::MAX; pixels(Layers::IDS)],
+            cost: vec![0.0; pixels(Layers::COST)],
+        }
+    }
+
     /// Index of pixel (`x`, `y`), y from the top. Panics outside the image.
     #[inline]
     pub fn index(&self, x: u32, y: u32) -> usize {

@@ -37,7 +37,8 @@
 //!
 //! A [`scene::Scene`] has geometry in a [`bvh::World`], materials, lights and volumes. A
 //! [`camera::Camera`] and [`render::RenderOptions`] define the image. [`render::render`] returns it
-//! with a report. [`deferred`] renders scenes whose parts are held by several processes.
+//! with a report. [`deferred`] leaves the tracing of rays to the caller, for scenes that lie in
+//! parts.
 #![deny(unsafe_code)]
 
 // ---- Ray queries: geometry, its trees, and the way of rays through them.

@@ -1,11 +1,10 @@
-//! Frames whose rays are traced by several data servers, each with a part of the scene, have the
-//! same bits as frames of the whole scene.
-#![cfg(feature = "render")]
+//! Frames whose rays are traced in several parts of the scene have the same bits as frames of the
+//! whole scene.
 
 use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
 use rt_core::deferred::{
-    CameraHits, DeferredFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
+    CameraHits, DeferredFrame, LightHit, OcclusionScratch, Pass, ShadingHit, TileState,
 };
 use rt_core::effects::Effects;
 use rt_core::environment::{Background, Environment};
@@ -14,7 +13,7 @@ use rt_core::glam::{DAffine3, DVec3, Vec3};
 use rt_core::light::Light;
 use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
-use rt_core::render::{RenderOptions, render};
+use rt_core::render::{Crop, RenderOptions, render};
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 use rt_core::shapes::{Radii, Spheres};
 use std::sync::Arc;
@@ -211,47 +210,52 @@ struct Holder<'a> {
     kept: &'a [Vec<u32>],
 }
 
-impl DataServer<'_> {
-    fn with_global_id(&self, scene: &Scene, mut hit: ShadingHit) -> ShadingHit {
-        let geometry = scene.world.instances()[hit.instance as usize].geometry;
-        hit.primitive = self.kept[geometry][hit.primitive as usize];
-        // Hits are sent as words.
-        ShadingHit::from_words(&hit.to_words())
+impl Holder<'_> {
+    fn in_whole(&self, scene: &Scene, mut met: ShadingHit) -> ShadingHit {
+        let geometry = scene.world.instances()[met.instance as usize].geometry;
+        met.primitive = self.kept[geometry][met.primitive as usize];
+        met
     }
 }
 
-fn nearer(best: &mut Option<ShadingHit>, hit: Option<ShadingHit>) {
-    if let Some(h) = hit
-        && best.as_ref().is_none_or(|b| h.is_before(b))
+/// Nearer, or at the same distance with a lower instance and primitive.
+fn is_before(a: &ShadingHit, b: &ShadingHit) -> bool {
+    let key = |m: &ShadingHit| (m.instance, m.primitive);
+    a.t < b.t || (a.t == b.t && key(a) < key(b))
+}
+
+fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
+    if let Some(m) = met
+        && best.as_ref().is_none_or(|b| is_before(&m, b))
     {
         *best = Some(h);
     }
 }
 
-/// Merges the hits of light rays from all data servers. A ray that one of them reports as blocked
-/// is blocked.
+/// Merges the hits of light rays from all parts. A ray that one of them reports as blocked is
+/// blocked.
 fn light_hits(
     servers: &[DataServer<'_>],
     scene: &Scene,
     rays: &[rt_core::ray::Ray],
-) -> Vec<Option<ShadingHit>> {
+) -> Vec<Option<LightHit>> {
     let mut best = vec![None; rays.len()];
-    let mut hits = Vec::new();
-    for h in servers {
-        h.frame.light_hits(rays, &mut hits);
-        for (b, m) in best.iter_mut().zip(&hits) {
-            // A blocked ray has no primitive id.
-            let with_global_id = |m: ShadingHit| {
-                if m.is_blocked() {
-                    ShadingHit::from_words(&m.to_words())
-                } else {
-                    h.with_global_id(scene, m)
-                }
-            };
-            nearer(b, m.map(with_global_id));
+    let mut blocked = vec![false; rays.len()];
+    let mut met = Vec::new();
+    for h in holders {
+        h.frame.light_hits(rays, &mut met);
+        for (i, m) in met.iter().enumerate() {
+            match m {
+                Some(LightHit::Blocked) => blocked[i] = true,
+                Some(LightHit::Surface(m)) => nearer(&mut best[i], Some(h.in_whole(scene, *m))),
+                None => {}
+            }
         }
     }
-    best
+    let one = |(hit, blocked): (Option<ShadingHit>, bool)| {
+        if blocked { Some(LightHit::Blocked) } else { hit.map(LightHit::Surface) }
+    };
+    best.into_iter().zip(blocked).map(one).collect()
 }
 
 fn closest(
@@ -284,36 +288,51 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
             kept,
         })
         .collect();
-    let owner = &servers[0].frame;
-    let mut image = owner.blank_frame();
+    let owner = &holders[0].frame;
+    let area = case.options.area();
+    let depth = case.camera.background_depth() as f32;
+    let mut picture = Frame::blank(area.width, area.height, case.options.layers, depth);
     for t in 0..owner.num_tiles() {
         let mut tile = owner.tile(t);
         for pass in owner.passes() {
             one_pass(case, &servers, &mut tile, pass);
         }
-        assert!(owner.decode_tile(&mut image, t, &tile.encode(owner)));
+        paste(&mut picture, &tile.image(owner), owner.tile_area(t));
     }
     image
 }
 
-fn one_pass(case: &Case, servers: &[DataServer<'_>], tile: &mut TileState, pass: Pass) {
-    let owner = &servers[0].frame;
+/// Copies all layers of a tile into the image.
+fn paste(picture: &mut Frame, tile: &Frame, area: Crop) {
+    for y in 0..area.height {
+        for x in 0..area.width {
+            let (to, from) = (picture.index(area.x + x, area.y + y), tile.index(x, y));
+            picture.color[to] = tile.color[from];
+            picture.depth[to] = tile.depth[from];
+            picture.distance[to] = tile.distance[from];
+            picture.normal[to] = tile.normal[from];
+            picture.instance[to] = tile.instance[from];
+            picture.primitive[to] = tile.primitive[from];
+            picture.cost[to] = tile.cost[from];
+        }
+    }
+}
+
+fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pass) {
+    let owner = &holders[0].frame;
     tile.begin(owner, pass);
     // ---- Primary rays.
     let mut best = vec![None; tile.num_rays()];
     let mut colors = vec![None; tile.num_rays()];
     let mut hits = CameraHits::default();
     let local = owner.needs_only_local_light() && pass != Pass::Geometry;
-    for h in servers {
-        if !h.frame.tiles_overlapping(h.frame.own_bounds())[tile.number()] {
-            continue;
-        }
+    for h in holders {
         h.frame.camera_hits(tile.number(), pass, &mut hits);
         let of_hits = if local { hits.colors(&h.frame).to_vec() } else { vec![[0.0; 4]; 1024] };
         for slot in 0..1024 {
-            let hit = hits.shading_hit(&h.frame, slot).map(|m| h.with_global_id(&case.scene, m));
-            if let Some(m) = hit
-                && best[slot].as_ref().is_none_or(|b: &ShadingHit| m.is_before(b))
+            let met = hits.shading_hit(&h.frame, slot).map(|m| h.in_whole(&case.scene, m));
+            if let Some(m) = met
+                && best[slot].as_ref().is_none_or(|b: &ShadingHit| is_before(&m, b))
             {
                 (best[slot], colors[slot]) = (Some(m), Some(of_hits[slot]));
             }
@@ -338,18 +357,9 @@ fn one_pass(case: &Case, servers: &[DataServer<'_>], tile: &mut TileState, pass:
                 tile.process_light_hits(owner, &light_hits(servers, &case.scene, &rays)).unwrap();
             }
         } else if !tile.light_points().is_empty() {
-            let mut words = Vec::new();
-            tile.light_points().iter().for_each(|p| p.write(&mut words));
-            let (mut points, mut rest) = (Vec::new(), &words[..]);
-            while !rest.is_empty() {
-                let (p, r) = LightPoint::read(rest).unwrap();
-                points.push(p);
-                rest = r;
-            }
-            assert_eq!(points, tile.light_points());
             let (mut all, mut bits, mut work) = (vec![], vec![], OcclusionScratch::default());
-            for h in servers {
-                h.frame.occlusion_bits(&points, pass, &mut work, &mut bits);
+            for h in holders {
+                h.frame.occlusion_bits(tile.light_points(), pass, &mut work, &mut bits);
                 all.resize(bits.len(), 0u64);
                 all.iter_mut().zip(&bits).for_each(|(a, b)| *a |= b);
             }

@@ -103,10 +103,8 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
                     let mut carried = PartialIntegral::default();
                     for (k, (brick, first)) in order.iter().enumerate() {
                         let end = order.get(k + 1).map_or(usize::MAX, |next| next.1);
-                        // As decoded from a message.
-                        let m = PartialIntegral::from_words(&carried.to_words());
                         let segments = RaySegments::new(vec![(&parts[*brick], ray)], 0.0, t1);
-                        carried = segments.integrate_spans(*first..end, &quality, m);
+                        carried = segments.integrate_spans(*first..end, &quality, carried);
                     }
                     let what = format!("{interpolation:?} {quality:?}, ray {n}, bricks {order:?}");
                     assert_eq!(bits(&carried.sample()), bits(&expected), "{what}");

@@ -14,7 +14,7 @@
 //! ranks and any partition: parts use the local spaces of the whole
 //! ([`rt_core::bvh::World::build_part`]), hits are merged by parameter and then by number,
 //! occlusion bits by *or*, and the functions of one node do everything else
-//! ([`rt_core::deferred`]).
+//! ([`rt_core::deferred`], which knows no ranks and no messages).
 //!
 //! ```
 //! use composite::render::{DataParallel, FrameOptions, Partition, Split};
@@ -50,6 +50,7 @@ mod primary_rays;
 mod rank_bounds;
 mod rank_frame;
 mod ray_parallel;
+mod ray_query;
 mod report;
 mod request_reply;
 mod secondary_rays;

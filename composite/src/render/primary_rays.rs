@@ -11,9 +11,10 @@ use super::request_reply::{Inbox, Incoming, RankChannel, Tag};
 use super::tile_collector::TileCollector;
 use super::tile_hits::{Nearest, SLOTS, TileHits};
 use super::tile_owners::TileOwners;
+use super::wire_format::{HIT_WORDS, decode_hit, encode_hit};
 use super::{Activity, FrameError};
 use rayon::prelude::*;
-use rt_core::deferred::{CameraHits, DeferredFrame, Pass, ShadingHit};
+use rt_core::deferred::{CameraHits, Pass};
 use std::sync::atomic::Ordering;
 
 /// Most chunks of an owner's tiles; all ranks process them one after the other. With more chunks,
@@ -139,7 +140,7 @@ impl PrimaryRays<'_, '_> {
     /// Posts all receives of the pass.
     fn post_receives(&mut self, channel: &mut RankChannel<'_>) -> Result<(), FrameError> {
         let (rank, size) = (channel.rank(), channel.size());
-        let per_pixel = words_per_hit(self.side.frame, self.wanted.colors);
+        let per_pixel = words_per_hit(self.side, self.wanted.colors);
         for chunk in (0..self.chunks).map(|c| (c, self.chunks)) {
             let mut missing = 1;
             for from in (0..size).filter(|&from| from != rank) {
@@ -265,8 +266,8 @@ impl PrimaryRays<'_, '_> {
     }
 }
 
-fn words_per_hit(frame: &DeferredFrame<'_>, colors: bool) -> usize {
-    2 + (frame.num_instances() > 1) as usize + if colors { 4 } else { 0 }
+fn words_per_hit(side: &RankFrame<'_>, colors: bool) -> usize {
+    2 + (side.num_instances() > 1) as usize + if colors { 4 } else { 0 }
 }
 
 /// Encodes hits in `tiles`: for each tile whether there are any, then a mask of slots and the hits
@@ -277,7 +278,7 @@ fn encode_hits(
     own: &mut OwnHits,
     colors: bool,
 ) -> Vec<u32> {
-    let several = side.frame.num_instances() > 1;
+    let several = side.num_instances() > 1;
     let tiles: Vec<usize> = tiles.collect();
     let mut out = Vec::new();
     for tile in tiles {
@@ -316,7 +317,7 @@ fn decode_hits(
     answers: &mut [TileHits],
     seen: &mut Vec<usize>,
 ) -> Option<()> {
-    let several = side.frame.num_instances() > 1;
+    let several = side.num_instances() > 1;
     for tile in tiles {
         let (&any, rest) = words.split_first()?;
         words = rest;
@@ -396,14 +397,14 @@ fn fetch_hit_details(
             for slot in slots(mask) {
                 let mut met = own[tile].as_ref()?.shading_hit(side.frame, slot)?;
                 met.primitive = side.global_primitive(met.instance, met.primitive);
-                out.extend(met.to_words());
+                out.extend(encode_hit(&met));
             }
         }
         Some(out)
     };
     let mut put = |from: usize, words: &[u32]| {
-        let (mets, rest) = words.as_chunks::<{ ShadingHit::WORDS }>();
-        let mut mets = mets.iter().map(ShadingHit::from_words);
+        let (mets, rest) = words.as_chunks::<HIT_WORDS>();
+        let mut mets = mets.iter().map(decode_hit);
         for (&tile, mask) in seen_by[from].iter().zip(won[from].chunks_exact(MASK_WORDS)) {
             for slot in slots(mask) {
                 answers[tile - first].hits[slot] = Some(mets.next()?);
@@ -435,7 +436,7 @@ fn fetch_hit_details(
     })?;
     let wins = |from: usize| won[from].iter().map(|w| w.count_ones() as usize).sum::<usize>();
     let sources = (0..size).filter(|&from| from != rank && owners.has_messages(from, rank, WHOLE));
-    let sources: Vec<_> = sources.map(|from| (from, wins(from) * ShadingHit::WORDS)).collect();
+    let sources: Vec<_> = sources.map(|from| (from, wins(from) * HIT_WORDS)).collect();
     channel.receive(Tag::Reply, "whole hits", sources, |channel, from, words| {
         put(from, &words).ok_or_else(|| channel.message_error(from, "whole hits", words.len()))?;
         channel.record_span(Activity::Composite);

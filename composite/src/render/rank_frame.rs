@@ -2,17 +2,27 @@
 use super::Part;
 use super::request_reply::RankChannel;
 use rayon::prelude::*;
+use rt_core::camera::Camera;
 use rt_core::deferred::DeferredFrame;
+use rt_core::render::RenderOptions;
 use std::sync::atomic::Ordering;
 
 /// One rank's view of the current frame.
 pub(super) struct RankFrame<'a> {
     pub(super) frame: &'a DeferredFrame<'a>,
     pub(super) part: &'a Part,
+    pub(super) camera: &'a Camera,
+    pub(super) options: &'a RenderOptions,
+    /// Use rayon's threads within this rank.
     pub(super) parallel: bool,
 }
 
 impl RankFrame<'_> {
+    /// Instances of the scene, the same in every part.
+    pub(super) fn num_instances(&self) -> usize {
+        self.part.scene.world.instances().len()
+    }
+
     /// The number of this part's primitive in the whole scene.
     pub(super) fn global_primitive(&self, instance: u32, primitive: u32) -> u32 {
         let geometry = self.part.scene.world.instances()[instance as usize].geometry;

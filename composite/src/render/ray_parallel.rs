@@ -5,10 +5,11 @@
 //! close together and every rank should get some of them. Bands of whole rows, tried first, stop
 //! scaling when there are as many ranks as bands (32 for 1024 rows).
 use super::request_reply::{RankChannel, Tag};
+use super::wire_format::{read_images, words_per_pixel, write_image};
 use super::{Activity, FrameError, FrameOptions, FrameOutput};
 use crate::comm::Communicator;
 use rt_core::camera::Camera;
-use rt_core::frame::{Frame, Layers};
+use rt_core::frame::Frame;
 use rt_core::render::{Crop, RenderOptions, Renderer};
 use rt_core::scene::Scene;
 
@@ -63,7 +64,7 @@ fn render(
         let output = if frame_options.parallel { draw()? } else { alone(&mut draw)? };
         channel.report.rays += output.report.rays;
         channel.report.effects = output.report.effects;
-        to_words(&output.frame, &mut mine);
+        write_image(&output.frame, &mut mine);
         renderer.recycle(output.frame);
         channel.alive();
     }
@@ -81,9 +82,10 @@ fn render(
         channel.record_span(Activity::Collect);
         return Ok(None);
     }
-    let mut picture = blank(area, options.layers, camera);
+    let depth = camera.background_depth() as f32;
+    let mut picture = Frame::blank(area.width, area.height, options.layers, depth);
     let per_pixel = words_per_pixel(options.layers);
-    put(&mut picture, pieces(area, rank, size), &mine)
+    read_images(&mut picture, pieces(area, rank, size), &mine)
         .ok_or_else(|| channel.message_error(rank, "pieces", mine.len()))?;
     let pixels = |from: usize| {
         pieces(area, from, size).map(|c| (c.width * c.height) as usize).sum::<usize>()
@@ -92,7 +94,7 @@ fn render(
         (0..size).filter(|&from| from != rank).map(|from| (from, pixels(from) * per_pixel));
     let sources: Vec<_> = sources.filter(|(_, words)| *words > 0).collect();
     channel.receive(Tag::Tiles, "pieces", sources, |channel, from, words| {
-        let fits = put(&mut picture, pieces(area, from, size), &words);
+        let fits = read_images(&mut picture, pieces(area, from, size), &words);
         channel.record_span(Activity::Collect);
         fits.ok_or_else(|| channel.message_error(from, "pieces", words.len()))
     })?;
@@ -151,100 +153,6 @@ fn lattice_step(size: usize) -> usize {
 
 fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
-}
-
-fn words_per_pixel(layers: Layers) -> usize {
-    let sizes = [
-        (Layers::COLOR, 4),
-        (Layers::DEPTH, 1),
-        (Layers::DISTANCE, 1),
-        (Layers::NORMAL, 3),
-        (Layers::IDS, 2),
-        (Layers::COST, 1),
-    ];
-    sizes.iter().filter(|(layer, _)| layers.contains(*layer)).map(|(_, words)| words).sum()
-}
-
-fn blank(area: Crop, layers: Layers, camera: &Camera) -> Frame {
-    let n = area.width as usize * area.height as usize;
-    let has = |l| if layers.contains(l) { n } else { 0 };
-    Frame {
-        width: area.width,
-        height: area.height,
-        color: vec![[0.0; 4]; has(Layers::COLOR)],
-        depth: vec![camera.background_depth() as f32; has(Layers::DEPTH)],
-        distance: vec![f32::INFINITY; has(Layers::DISTANCE)],
-        normal: vec![[0.0; 3]; has(Layers::NORMAL)],
-        instance: vec![u32::MAX; has(Layers::IDS)],
-        primitive: vec![u32::MAX; has(Layers::IDS)],
-        cost: vec![0.0; has(Layers::COST)],
-    }
-}
-
-/// Encodes all layers of a piece, one after the other.
-fn to_words(frame: &Frame, out: &mut Vec<u32>) {
-    let float = |v: &f32| v.to_bits();
-    out.extend(frame.color.as_flattened().iter().map(float));
-    out.extend(frame.depth.iter().map(float));
-    out.extend(frame.distance.iter().map(float));
-    out.extend(frame.normal.as_flattened().iter().map(float));
-    out.extend(&frame.instance);
-    out.extend(&frame.primitive);
-    out.extend(frame.cost.iter().map(float));
-}
-
-/// Writes the output of [`to_words`] for each of `pieces` into the image.
-fn put(picture: &mut Frame, pieces: impl Iterator<Item = Crop>, words: &[u32]) -> Option<()> {
-    let stride = picture.width as usize;
-    let mut rest = words;
-    for piece in pieces {
-        let mut put = Put { piece, stride, rest };
-        put.floats(picture.color.as_flattened_mut(), 4)?;
-        put.floats(&mut picture.depth, 1)?;
-        put.floats(&mut picture.distance, 1)?;
-        put.floats(picture.normal.as_flattened_mut(), 3)?;
-        put.layer(&mut picture.instance, 1, |w| w)?;
-        put.layer(&mut picture.primitive, 1, |w| w)?;
-        put.floats(&mut picture.cost, 1)?;
-        rest = put.rest;
-    }
-    rest.is_empty().then_some(())
-}
-
-/// A piece that is being written into the image.
-struct Put<'a> {
-    piece: Crop,
-    /// Pixels of a row of the image.
-    stride: usize,
-    rest: &'a [u32],
-}
-
-impl Put<'_> {
-    fn floats(&mut self, layer: &mut [f32], channels: usize) -> Option<()> {
-        self.layer(layer, channels, f32::from_bits)
-    }
-
-    /// Writes the next words into a layer of `channels` words per pixel; a layer that the image
-    /// does not have takes none.
-    fn layer<T>(
-        &mut self,
-        layer: &mut [T],
-        channels: usize,
-        value: impl Fn(u32) -> T,
-    ) -> Option<()> {
-        if layer.is_empty() {
-            return Some(());
-        }
-        let Crop { x, y, width, height } = self.piece;
-        for row in y..y + height {
-            let first = (row as usize * self.stride + x as usize) * channels;
-            let out = layer.get_mut(first..first + width as usize * channels)?;
-            let (words, rest) = self.rest.split_at_checked(out.len())?;
-            self.rest = rest;
-            out.iter_mut().zip(words).for_each(|(o, w)| *o = value(*w));
-        }
-        Some(())
-    }
 }
 
 #[cfg(test)]

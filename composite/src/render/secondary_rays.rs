@@ -3,15 +3,20 @@
 use super::options::SecondaryRayPolicy;
 use super::rank_bounds::{RankBounds, ranks_in};
 use super::rank_frame::{RankFrame, each};
+use super::ray_query::RayAnswer;
 use super::request_reply::RankChannel;
 use super::tile_hits::TileHits;
-use super::wire_format::{RAY_WORDS, read_ray, write_ray};
+use super::wire_format::{
+    HIT_WORDS, LEAST_POINT_WORDS, RAY_WORDS, read_point, read_ray, write_point, write_ray,
+};
 use super::{Activity, FrameError, RankReport, volumes};
-use rt_core::deferred::{DeferredFrame, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState};
+use rt_core::deferred::{
+    DeferredFrame, LightHit, LightPoint, OcclusionScratch, Pass, ShadingHit, TileState,
+};
 use rt_core::ray::Ray;
 
 /// By tile and ray.
-type ClosestHits = Vec<Vec<Option<ShadingHit>>>;
+type Answers<A> = Vec<Vec<Option<A>>>;
 
 /// The secondary rays of one pass.
 pub(super) struct SecondaryRays<'a> {
@@ -100,7 +105,7 @@ impl SecondaryRays<'_> {
                 points.iter().zip(targets.chunks(self.rank_bounds.bit_words())).enumerate()
             {
                 for r in ranks_in(targets).filter(|&r| r < size) {
-                    point.write(&mut requests[r]);
+                    write_point(point, &mut requests[r]);
                     asked[r].push((t as u32, p as u32));
                 }
             }
@@ -116,7 +121,7 @@ impl SecondaryRays<'_> {
             let mut points = Vec::new();
             let mut rest = request;
             while !rest.is_empty() {
-                let (point, r) = LightPoint::read(rest)?;
+                let (point, r) = read_point(rest)?;
                 points.push(point);
                 rest = r;
             }
@@ -131,8 +136,7 @@ impl SecondaryRays<'_> {
             report.answered_rays += work.traced - before;
             Some(out.iter().flat_map(|b| [*b as u32, (*b >> 32) as u32]).collect())
         };
-        // At least nine words per point.
-        let longest = |request: &[u32]| request.len() / 9 * words * 2;
+        let longest = |request: &[u32]| request.len() / LEAST_POINT_WORDS * words * 2;
         let message_error = |from: usize, n: usize| FrameError::Message {
             rank,
             from,
@@ -182,7 +186,7 @@ impl SecondaryRays<'_> {
             .zip(live)
             .map(|(t, &l)| if l { t.light_rays().collect() } else { vec![] })
             .collect();
-        let (any, met) = self.closest_hits(channel, &rays, RayQuery::Light)?;
+        let (any, met) = self.ask::<LightHit>(channel, &rays, None)?;
         let rank = channel.rank();
         for (tile, met) in tiles.iter_mut().zip(&met).filter(|(_, met)| !met.is_empty()) {
             tile.process_light_hits(self.side.frame, met)
@@ -212,8 +216,7 @@ impl SecondaryRays<'_> {
             };
             tiles.iter().zip(&waiting).map(of).collect()
         });
-        let wanted = RayQuery::Closest { pixels: pixels.as_deref() };
-        let (any, met) = self.closest_hits(channel, &rays, wanted)?;
+        let (any, met) = self.ask::<ShadingHit>(channel, &rays, pixels.as_deref())?;
         let rank = channel.rank();
         let mut answers: Vec<Vec<Option<ShadingHit>>> =
             tiles.iter().map(|t| vec![None; t.num_rays()]).collect();
@@ -236,19 +239,17 @@ impl SecondaryRays<'_> {
     }
 
     /// For each ray of each tile, the nearest of the hits that the ranks whose bounds it enters
-    /// report, ties to the lowest number. Returns false when no rank had a ray.
-    fn closest_hits(
+    /// report, ties to the lowest number. `pixels` are the tiles and slots of the rays, for hits
+    /// with depth and distance. Returns false when no rank had a ray. All ranks ask the same
+    /// question.
+    fn ask<A: RayAnswer>(
         &self,
         channel: &mut RankChannel<'_>,
         rays: &[Vec<Ray>],
-        wanted: RayQuery<'_>,
-    ) -> Result<(bool, ClosestHits), FrameError> {
-        let (pixels, light) = match wanted {
-            RayQuery::Closest { pixels } => (pixels, false),
-            RayQuery::Light => (None, true),
-        };
+        pixels: Option<&[Vec<u32>]>,
+    ) -> Result<(bool, Answers<A>), FrameError> {
         let (rank, size, side) = (channel.rank(), channel.size(), self.side);
-        let mut met: ClosestHits = rays.iter().map(|r| vec![None; r.len()]).collect();
+        let mut met: Answers<A> = rays.iter().map(|r| vec![None; r.len()]).collect();
         let mut requests: Vec<Vec<u32>> = vec![Vec::new(); size];
         let mut asked: Vec<Vec<(u32, u32)>> = vec![Vec::new(); size];
         let mut bits = vec![0; self.rank_bounds.bit_words()];
@@ -286,27 +287,18 @@ impl SecondaryRays<'_> {
                     .collect()
             });
             report.answered_rays += rays.len() as u64;
-            let mut met = Vec::new();
-            if light {
-                side.frame.light_hits(&rays, &mut met);
-            } else {
-                side.frame.closest(&rays, places.as_deref(), &mut met);
-            }
+            let met = A::trace(side, &rays, places.as_deref());
             // A mask, then the hits.
             let mut out = vec![0; rays.len().div_ceil(32)];
-            for (i, m) in met.into_iter().enumerate() {
-                if let Some(mut m) = m {
-                    if !m.is_blocked() {
-                        m.primitive = side.global_primitive(m.instance, m.primitive);
-                    }
+            for (i, m) in met.iter().enumerate() {
+                if let Some(m) = m {
                     out[i / 32] |= 1 << (i % 32);
-                    out.extend(m.to_words());
+                    out.extend(m.encode());
                 }
             }
             Some(out)
         };
-        let longest =
-            |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * ShadingHit::WORDS;
+        let longest = |q: &[u32]| (q.len() / words).div_ceil(32) + q.len() / words * HIT_WORDS;
         let message_error = |from: usize, n: usize| FrameError::Message {
             rank,
             from,
@@ -318,15 +310,14 @@ impl SecondaryRays<'_> {
                 let (mask, rest) = reply
                     .split_at_checked(asked[from].len().div_ceil(32))
                     .ok_or_else(|| message_error(from, reply.len()))?;
-                let (words, rest) = rest.as_chunks::<{ ShadingHit::WORDS }>();
+                let (words, rest) = rest.as_chunks::<HIT_WORDS>();
                 let mut words = words.iter();
                 for (i, &(t, ray)) in asked[from].iter().enumerate() {
                     if mask[i / 32] >> (i % 32) & 1 == 0 {
                         continue;
                     }
-                    let m = ShadingHit::from_words(
-                        words.next().ok_or_else(|| message_error(from, reply.len()))?,
-                    );
+                    let m =
+                        A::decode(words.next().ok_or_else(|| message_error(from, reply.len()))?);
                     let best = &mut met[t as usize][ray as usize];
                     if best.as_ref().is_none_or(|b| m.is_before(b)) {
                         *best = Some(m);
@@ -340,16 +331,6 @@ impl SecondaryRays<'_> {
             })?;
         Ok((any, met))
     }
-}
-
-/// What a request asks of its rays; the same on all ranks.
-#[derive(Clone, Copy)]
-enum RayQuery<'a> {
-    /// Their closest hits; with pixels, depth and distance too.
-    Closest { pixels: Option<&'a [Vec<u32>]> },
-    /// For light rays: the surfaces they hit that may let light pass, or that an opaque one blocks
-    /// them.
-    Light,
 }
 
 /// For each point of the tile, a bit for each rank whose bounds one of its light rays enters.

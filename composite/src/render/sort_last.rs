@@ -9,6 +9,7 @@ use super::{Activity, FrameError, Part, ghost, primary_rays, secondary_rays};
 use crate::comm::Communicator;
 use rt_core::camera::Camera;
 use rt_core::deferred::{DeferredFrame, Pass, TileState};
+use rt_core::effects::Effects;
 use rt_core::frame::Frame;
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
@@ -91,7 +92,8 @@ impl DataParallel {
         let policy = self.secondary_ray_policy(channel, camera, options)?;
         let part = &self.part;
         let frame = DeferredFrame::new(&part.scene, part.needed, camera, options)?;
-        let side = RankFrame { frame: &frame, part, parallel: self.options.parallel };
+        let parallel = self.options.parallel;
+        let side = RankFrame { frame: &frame, part, camera, options, parallel };
         let ghost_layer = match (&part.ghost_layer, policy) {
             (Some((_, scene)), SecondaryRayPolicy::GhostZones) => {
                 Some(DeferredFrame::new(scene, part.needed, camera, options)?)
@@ -100,13 +102,15 @@ impl DataParallel {
         };
         channel.report.effects = frame.effects();
         channel.report.warnings = frame.warnings().to_vec();
-        let media = frame.media();
-        if media.contains(&false) {
+        let volumes = frame.effects().contains(Effects::VOLUMES);
+        let volumes = if volumes { &part.scene.volumes[..] } else { &[] };
+        let media = volumes.iter().any(|placed| placed.volume.is_medium());
+        if volumes.iter().any(|placed| !placed.volume.is_medium()) {
             let words = "volumes that are no medium (maxima, minima, means, sums, isosurfaces) are \
                          not cut: every rank holds them whole";
             channel.report.warnings.push(words.into());
         }
-        let owners = TileOwners::new(&frame, &self.rank_bounds.bounds);
+        let owners = TileOwners::new(&side, &self.rank_bounds.bounds);
         let mine = owners.tiles[channel.rank()].clone();
         let mut tiles: Vec<TileState> = mine.map(|t| frame.tile(t)).collect();
         channel.record_span(Activity::Render);
@@ -147,7 +151,7 @@ impl DataParallel {
                 channel.record_span(Activity::Shade);
                 continue;
             }
-            let media = pass != Pass::Geometry && media.contains(&true);
+            let media = pass != Pass::Geometry && media;
             let mut wave = secondary_rays::SecondaryRays {
                 side: &side,
                 rank_bounds: &self.rank_bounds,
@@ -174,7 +178,10 @@ impl DataParallel {
         options: &RenderOptions,
     ) -> Result<SecondaryRayPolicy, FrameError> {
         let probe = DeferredFrame::new(&self.part.scene, self.part.needed, camera, options)?;
-        let distance = probe.ambient_occlusion_only_distance().filter(|d| d.is_finite());
+        // Whether rays of ambient occlusion are the only ones that leave a camera ray's hit.
+        let alone = probe.effects().without(Effects::DEPTH_OF_FIELD) == Effects::AMBIENT_OCCLUSION;
+        let ambient_occlusion = self.part.scene.ambient_occlusion.filter(|_| alone);
+        let distance = ambient_occlusion.map(|ao| ao.distance).filter(|d| d.is_finite());
         let secondary = !probe.needs_only_local_light();
         drop(probe);
         let Some(distance) =

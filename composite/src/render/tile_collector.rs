@@ -3,10 +3,12 @@ use super::rank_frame::{RankFrame, each};
 use super::request_reply::{Inbox, RankChannel, Tag};
 use super::tile_hits::TileHits;
 use super::tile_owners::TileOwners;
+use super::wire_format::{read_images, words_per_pixel, write_image};
 use super::{Activity, FrameError};
 use crate::comm::CommError;
-use rt_core::deferred::{DeferredFrame, Pass, TileState};
+use rt_core::deferred::{Pass, TileState};
 use rt_core::frame::Frame;
+use rt_core::render::Crop;
 use std::ops::Range;
 
 /// One rank's side of collecting the image at the root.
@@ -35,7 +37,10 @@ impl<'a> TileCollector<'a> {
         if let Some(peer) = root.filter(|&r| r >= size) {
             return Err(FrameError::Comm(CommError::NoSuchRank { peer, size }));
         }
-        let picture = (root == Some(rank)).then(|| side.frame.blank_frame());
+        let (area, layers) = (side.options.area(), side.options.layers);
+        let depth = side.camera.background_depth() as f32;
+        let picture =
+            (root == Some(rank)).then(|| Frame::blank(area.width, area.height, layers, depth));
         let next = owners.tiles.iter().map(|t| t.start).collect();
         Ok(TileCollector { side, tiles, first: owners.tiles[rank].start, root, picture, next })
     }
@@ -56,7 +61,7 @@ impl<'a> TileCollector<'a> {
             for from in (0..size).filter(|&from| from != rank) {
                 let tiles = owners.chunk(from, (chunk, chunks));
                 if !tiles.is_empty() {
-                    let words = tiles.map(|t| words_of(self.side.frame, t)).sum();
+                    let words = tiles.map(|t| words_of(self.side, t)).sum();
                     channel.expect(inbox, from, Tag::Tiles, words)?;
                 }
             }
@@ -101,7 +106,10 @@ impl<'a> TileCollector<'a> {
         let (rank, frame) = (channel.rank(), self.side.frame);
         let Some(root) = self.root.filter(|_| !range.is_empty()) else { return Ok(()) };
         let tiles = &self.tiles[range.start - self.first..range.end - self.first];
-        let words: Vec<u32> = tiles.iter().flat_map(|t| t.encode(frame)).collect();
+        let mut words = Vec::new();
+        for tile in tiles {
+            write_image(&tile.image(frame), &mut words);
+        }
         if rank == root {
             self.put(range, &words)
                 .ok_or_else(|| channel.message_error(rank, "tiles", words.len()))?;
@@ -112,15 +120,13 @@ impl<'a> TileCollector<'a> {
         Ok(())
     }
 
-    fn put(&mut self, range: Range<usize>, mut words: &[u32]) -> Option<()> {
-        let frame = self.side.frame;
-        let picture = self.picture.as_mut()?;
-        for tile in range {
-            let (own, rest) = words.split_at_checked(words_of(frame, tile))?;
-            words = rest;
-            frame.decode_tile(picture, tile, own).then_some(())?;
-        }
-        words.is_empty().then_some(())
+    fn put(&mut self, range: Range<usize>, words: &[u32]) -> Option<()> {
+        let (frame, whole) = (self.side.frame, self.side.options.area());
+        let areas = range.map(|tile| {
+            let area = frame.tile_area(tile);
+            Crop { x: area.x - whole.x, y: area.y - whole.y, ..area }
+        });
+        read_images(self.picture.as_mut()?, areas, words)
     }
 
     /// Writes the next chunk of tiles of rank `from` into the image.
@@ -165,7 +171,7 @@ impl<'a> TileCollector<'a> {
 }
 
 /// Words of a tile.
-fn words_of(frame: &DeferredFrame<'_>, tile: usize) -> usize {
-    let area = frame.tile_area(tile);
-    (area.width * area.height) as usize * frame.words_per_pixel()
+fn words_of(side: &RankFrame<'_>, tile: usize) -> usize {
+    let area = side.frame.tile_area(tile);
+    (area.width * area.height) as usize * words_per_pixel(side.options.layers)
 }

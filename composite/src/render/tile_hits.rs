@@ -1,8 +1,14 @@
 //! Hits of the camera rays in a tile.
-use rt_core::deferred::ShadingHit;
+use rt_core::deferred::{ShadingHit, TILE_SIDE};
 
 /// Slots of a tile.
-pub(super) const SLOTS: usize = 1024;
+pub(super) const SLOTS: usize = (TILE_SIDE * TILE_SIDE) as usize;
+
+/// Whether a hit, given by its parameter, instance and primitive, is ordered before another one of
+/// the same ray: nearer, or at the same parameter with lower numbers.
+pub(super) fn is_before(a: (f32, u32, u32), b: (f32, u32, u32)) -> bool {
+    a.0 < b.0 || (a.0 == b.0 && (a.1, a.2) < (b.1, b.2))
+}
 
 /// The nearest hit of a pixel so far.
 #[derive(Clone, Copy)]
@@ -24,9 +30,9 @@ impl Nearest {
     };
 
     pub(super) fn is_before(&self, other: &Nearest) -> bool {
-        let key = |n: &Nearest| (n.instance, n.primitive);
+        let key = |n: &Nearest| (n.t, n.instance, n.primitive);
         // Empty slots have infinite t and the highest numbers, so every hit comes before them.
-        self.t < other.t || (self.t == other.t && key(self) < key(other))
+        is_before(key(self), key(other))
     }
 }
 

@@ -6,17 +6,19 @@
 //! order in which one node makes them, so they have the same bits.
 use super::rank_frame::RankFrame;
 use super::request_reply::RankChannel;
-use super::wire_format::{read_ray, write_ray};
+use super::wire_format::{
+    INTEGRAL_WORDS, RAY_WORDS, decode_integral, encode_integral, read_ray, write_ray,
+};
 use super::{Activity, FrameError, RankReport};
 use rayon::prelude::*;
-use rt_core::deferred::{ShadingHit, TileState, VolumeRay};
+use rt_core::deferred::{ShadingHit, TileState};
 use rt_core::ray::Ray;
-use rt_core::volume::{PartialIntegral, VolumeSample};
+use rt_core::volume::{PartialIntegral, RaySegments, VolumeSample, composite_projections};
 
 /// Words for the brick and the spans of a ray.
 const HEAD: usize = 3;
 /// Those words, a ray and its accumulated light.
-const WORDS: usize = HEAD + 8 + PartialIntegral::WORDS;
+const WORDS: usize = HEAD + RAY_WORDS + INTEGRAL_WORDS;
 
 /// Consecutive spans of a ray in the same brick.
 struct BrickSpan {
@@ -25,9 +27,20 @@ struct BrickSpan {
     end: usize,
 }
 
+/// A ray through the volumes.
+#[derive(Clone, Copy)]
+struct VolumeRay {
+    tile: usize,
+    /// Its index among the answers of its tile's wavefront.
+    place: usize,
+    /// In render space.
+    ray: Ray,
+    /// Parameter of its surface hit, or of its own end.
+    t_end: f32,
+}
+
 /// A ray that traverses the bricks.
 struct BrickTraversal {
-    tile: usize,
     ray: VolumeRay,
     /// Remaining bricks in reverse order.
     remaining: Vec<BrickSpan>,
@@ -38,11 +51,11 @@ impl BrickTraversal {
     fn new(
         channel: &RankChannel<'_>,
         side: &RankFrame<'_>,
-        tile: usize,
         ray: VolumeRay,
     ) -> Result<BrickTraversal, FrameError> {
         let bricks = &side.part.volume_bricks;
-        let segments = side.frame.ray_segments(&ray.ray, ray.t_end, |_| None);
+        let volumes = side.frame.volumes_along(ray.ray).collect();
+        let segments = RaySegments::new(volumes, ray.ray.t_min, ray.t_end);
         let (mut remaining, mut held): (Vec<BrickSpan>, bool) = (Vec::new(), true);
         segments.spans(|number, here| {
             if !here.iter().any(|(v, block)| bricks.is_occupied(*v, *block)) {
@@ -61,7 +74,7 @@ impl BrickTraversal {
             return Err(channel.message_error(channel.rank(), "a block that nobody holds", 0));
         }
         remaining.reverse();
-        Ok(BrickTraversal { tile, ray, remaining, collected: PartialIntegral::default() })
+        Ok(BrickTraversal { ray, remaining, collected: PartialIntegral::default() })
     }
 }
 
@@ -73,12 +86,15 @@ pub(super) fn composite_volumes(
     tiles: &mut [TileState],
     met: &[Vec<Option<ShadingHit>>],
 ) -> Result<(), FrameError> {
-    let (rank, size, frame) = (channel.rank(), channel.size(), side.frame);
-    let quality = frame.volume_quality();
+    let (rank, size) = (channel.rank(), channel.size());
+    let quality = &side.options.volume_quality;
     let mut journeys = Vec::new();
-    for (t, (tile, met)) in tiles.iter().zip(met).enumerate() {
-        for ray in tile.volume_rays(met) {
-            journeys.push(BrickTraversal::new(channel, side, t, ray)?);
+    for (number, (tile, met)) in tiles.iter().zip(met).enumerate() {
+        for (place, _, ray) in tile.rays() {
+            let hit = met.get(place).and_then(|m| m.as_ref());
+            let t_end = hit.map_or(ray.t_max, |m| m.t);
+            let ray = VolumeRay { tile: number, place, ray, t_end };
+            journeys.push(BrickTraversal::new(channel, side, ray)?);
         }
     }
     channel.record_span(Activity::Shade);
@@ -95,7 +111,7 @@ pub(super) fn composite_volumes(
             let request = &mut requests[holder];
             request.extend([next.brick as u32, next.first as u32, next.end as u32]);
             write_ray(&Ray { t_max: j.ray.t_end, ..j.ray.ray }, None, request);
-            request.extend(j.collected.to_words());
+            request.extend(encode_integral(&j.collected));
             asked[holder].push(k);
         }
         channel.report.rays_sent +=
@@ -112,20 +128,20 @@ pub(super) fn composite_volumes(
             };
             all.filter(|_| rest.is_empty()).map(|all| all.into_flattened())
         };
-        let longest = |q: &[u32]| q.len() / WORDS * PartialIntegral::WORDS;
+        let longest = |q: &[u32]| q.len() / WORDS * INTEGRAL_WORDS;
         let any = channel.request_reply(
             "rays through a volume",
             &requests,
             longest,
             &mut answer,
             |from, reply| {
-                let (collected, rest) = reply.as_chunks::<{ PartialIntegral::WORDS }>();
+                let (collected, rest) = reply.as_chunks::<INTEGRAL_WORDS>();
                 if !rest.is_empty() || collected.len() != asked[from].len() {
                     let what = "what rays collect in a volume";
                     return Err(FrameError::Message { rank, from, what, words: reply.len() });
                 }
                 for (&k, words) in asked[from].iter().zip(collected) {
-                    journeys[k].collected = PartialIntegral::from_words(words);
+                    journeys[k].collected = decode_integral(words);
                 }
                 Ok(())
             },
@@ -138,8 +154,8 @@ pub(super) fn composite_volumes(
     let mut samples: Vec<Vec<VolumeSample>> =
         tiles.iter().map(|t| vec![VolumeSample::CLEAR; t.num_rays()]).collect();
     for j in &journeys {
-        let mixed = j.collected.sample();
-        samples[j.tile][j.ray.place] = frame.composite_projections(&j.ray.ray, j.ray.t_end, mixed);
+        let sample = with_projections(side, &j.ray, j.collected.sample());
+        samples[j.ray.tile][j.ray.place] = sample;
     }
     for (tile, samples) in tiles.iter_mut().zip(samples) {
         tile.set_volume_samples(samples).map_err(|source| FrameError::Answer { rank, source })?;
@@ -148,19 +164,29 @@ pub(super) fn composite_volumes(
     Ok(())
 }
 
+/// What a ray collects in all volumes if it collects `mixed` in the media. Every rank holds the
+/// projections whole.
+fn with_projections(side: &RankFrame<'_>, ray: &VolumeRay, mixed: VolumeSample) -> VolumeSample {
+    let volumes: Vec<_> = side.frame.volumes_along(ray.ray).collect();
+    if volumes.iter().all(|(volume, _)| volume.is_medium()) {
+        return mixed;
+    }
+    let quality = &side.options.volume_quality;
+    composite_projections(&volumes, ray.ray.t_min, ray.t_end, quality, mixed)
+}
+
 /// The reply to one request; `None` for a request that is not for this rank.
-fn continue_ray(
-    side: &RankFrame<'_>,
-    words: &[u32; WORDS],
-) -> Option<[u32; PartialIntegral::WORDS]> {
+fn continue_ray(side: &RankFrame<'_>, words: &[u32; WORDS]) -> Option<[u32; INTEGRAL_WORDS]> {
     let ([brick, first, end], words) = words.split_first_chunk::<HEAD>()?;
-    let (ray, collected) = words.split_last_chunk::<{ PartialIntegral::WORDS }>()?;
+    let (ray, collected) = words.split_last_chunk::<INTEGRAL_WORDS>()?;
     let held = side.part.brick_data.get(*brick as usize)?.as_ref()?;
     let (ray, spans) = (read_ray(ray), *first as usize..*end as usize);
-    let segments = side.frame.ray_segments(&ray, ray.t_max, |volume| held.volume(volume));
+    let here = side.frame.volumes_along(ray).enumerate();
+    let here = here.map(|(number, (whole, ray))| (held.volume(number).unwrap_or(whole), ray));
+    let segments = RaySegments::new(here.collect(), ray.t_min, ray.t_max);
     if !segments.is_within(spans.clone(), |volume, block| held.has(volume, block)) {
         return None;
     }
-    let collected = PartialIntegral::from_words(collected);
-    Some(segments.integrate_spans(spans, side.frame.volume_quality(), collected).to_words())
+    let quality = &side.options.volume_quality;
+    Some(encode_integral(&segments.integrate_spans(spans, quality, decode_integral(collected))))
 }

@@ -70,7 +70,7 @@ pub(crate) struct Workspace {
     behind: Wavefront,
     scattered: Wavefront,
     hits: Vec<HitBlock>,
-    /// For each ray, the surface at its hit, in distributed frames; empty where this scene's world
+    /// For each ray, the surface at its hit, in deferred frames; empty where this scene's world
     /// is traced.
     surfaces: Vec<SurfacePoint>,
     points: Vec<Point>,
@@ -388,7 +388,7 @@ fn process_hits(
     record: bool,
     stats: &mut RayStats,
 ) {
-    // In distributed frames, the messages do not carry the parameters of mapped surfaces.
+    // In deferred frames, the hits do not carry the parameters of mapped surfaces.
     if context.has_maps && work.surfaces.is_empty() {
         process_hits_with::<WithMaps>(context, area, out, work, record, stats);
     } else {

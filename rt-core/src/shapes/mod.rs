@@ -87,8 +87,8 @@ pub trait Shape: Send + Sync {
 
     /// A shape with only these primitives (ascending numbers in this shape, kept in that order),
     /// without the data of the others. All results must have the same bits as in this shape.
-    /// Returns `None` when the data cannot be split: a data server for some of the primitives then
-    /// keeps all data.
+    /// Returns `None` when the data cannot be split: a part with some of the primitives then keeps
+    /// all data.
     fn part(&self, _primitives: &[u32]) -> Option<Arc<dyn Shape>> {
         None
     }

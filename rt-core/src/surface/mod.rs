@@ -44,22 +44,23 @@ enum Source<'a> {
     Shape(&'a dyn Shape),
 }
 
-/// A shaded point, in render space.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SurfacePoint {
-    pub(crate) point: Vec3,
+/// A point of a surface with what shading needs of it, in render space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Position, computed from the primitive and not from the ray.
+    pub point: Vec3,
     /// Bound on the distance between `point` and the surface that rays hit.
-    pub(crate) point_error: f32,
+    pub point_error: f32,
     /// Unit face normal, turned against the ray.
-    pub(crate) face_normal: Vec3,
+    pub face_normal: Vec3,
     /// Unit shading normal, oriented by the material's sides.
-    pub(crate) normal: Vec3,
+    pub normal: Vec3,
     /// True when the ray hit the outside.
-    pub(crate) outside: bool,
+    pub outside: bool,
     /// Linear RGB.
-    pub(crate) color: Vec3,
+    pub color: Vec3,
     /// Opacity, 0 for culled sides.
-    pub(crate) opacity: f32,
+    pub opacity: f32,
 }
 
 /// The part of a surface point that lights without shadows need, in render space.

@@ -1,5 +1,4 @@
-//! Volumes in bricks, so that several data servers of one volume together compute the result of the
-//! whole volume.
+//! Volumes in bricks, which together give the result of the whole volume.
 //!
 //! The order in which a ray visits the blocks of a grid depends on the ray alone, and the
 //! contribution of a block depends only on what was collected in front of it. So a ray may be
@@ -40,10 +39,15 @@ impl Brick {
 /// What a ray has collected so far, passed from brick to brick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartialIntegral {
-    color: [f64; 3],
-    transmittance: f64,
-    depth: f64,
-    samples: u32,
+    /// Linear colour, premultiplied by its opacity.
+    pub color: [f64; 3],
+    /// Share of the light behind that passes.
+    pub transmittance: f64,
+    /// Ray parameter at which the opacity reaches 50 %; infinite when it does not.
+    pub depth: f64,
+    /// Intervals of the ray whose transfer function was integrated (or samples taken, with fixed
+    /// steps).
+    pub samples: u32,
 }
 
 impl Default for PartialIntegral {
@@ -54,35 +58,6 @@ impl Default for PartialIntegral {
 }
 
 impl PartialIntegral {
-    /// Words of [`PartialIntegral::to_words`].
-    pub const WORDS: usize = 11;
-
-    /// Encodes the integral for a message.
-    pub fn to_words(&self) -> [u32; PartialIntegral::WORDS] {
-        let [r, g, b] = self.color;
-        let mut words = [0; PartialIntegral::WORDS];
-        for (pair, number) in
-            words.chunks_exact_mut(2).zip([r, g, b, self.transmittance, self.depth])
-        {
-            let bits = number.to_bits();
-            pair.copy_from_slice(&[bits as u32, (bits >> 32) as u32]);
-        }
-        words[10] = self.samples;
-        words
-    }
-
-    /// Decodes the words of [`PartialIntegral::to_words`].
-    pub fn from_words(words: &[u32; PartialIntegral::WORDS]) -> PartialIntegral {
-        let number =
-            |i: usize| f64::from_bits(u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32);
-        PartialIntegral {
-            color: [0, 1, 2].map(number),
-            transmittance: number(3),
-            depth: number(4),
-            samples: words[10],
-        }
-    }
-
     /// The result at the end of the ray.
     pub fn sample(&self) -> VolumeSample {
         let [r, g, b] = self.color.map(|c| c as f32);
@@ -134,9 +109,9 @@ impl Volume {
         (z * self.blocks.y as usize + y) * self.blocks.x as usize + x
     }
 
-    /// The data that a data server of `brick` needs: the values of its cells with two ghost layers
-    /// of points, for gradients. The rest of the volume is clear here. See
-    /// [`RaySegments`](super::RaySegments) for an example.
+    /// The data that `brick` needs: the values of its cells with two ghost layers of points, for
+    /// gradients. The rest of the volume is clear here. See [`RaySegments`](super::RaySegments) for
+    /// an example.
     pub fn part(&self, brick: Brick) -> Volume {
         let cells = self.cells();
         let (mut ranges, mut report) =

@@ -96,7 +96,7 @@ struct VolumeSegments<'a> {
 
 /// The segments of a ray through several media, split into spans along which every medium stays
 /// within one block. Spans depend on the ray and on the volumes' sizes and positions alone, not on
-/// the values held here: data servers of parts ([`Volume::part`]) agree on them.
+/// the values held here: the holders of parts ([`Volume::part`]) agree on them.
 ///
 /// ```
 /// use rt_core::glam::{DVec3, UVec3, Vec3};

@@ -1,4 +1,4 @@
-//! What a tile owner does with the answers of the data servers.
+//! A tile in progress: generates rays, takes what they hit, and shades it.
 
 use super::super::shadow::LightRayState;
 use super::super::tile::{PIXELS, TileArea, TileLayers};
@@ -7,9 +7,9 @@ use super::super::{
     Workspace, accumulate_radiance, add_light, generate_camera_wavefront, local, process_hits,
     spawn_rays,
 };
-use super::{DeferredFrame, LightPoint, Pass, ShadingHit};
+use super::{DeferredFrame, LightHit, LightPoint, Pass, ShadingHit};
 use crate::effects::Effects;
-use crate::frame::Layers;
+use crate::frame::Frame;
 use crate::ray::{Hit, HitBlock, LANES, Ray};
 use crate::ray_stats::RayStats;
 use crate::surface::SurfacePoint;
@@ -34,18 +34,7 @@ pub struct TileState {
     lit: bool,
 }
 
-/// A ray through volumes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VolumeRay {
-    /// Its index among the answers of its wavefront.
-    pub place: usize,
-    /// In render space.
-    pub ray: Ray,
-    /// Parameter of its surface hit, or of its own end.
-    pub t_end: f32,
-}
-
-/// An answer that no data server of this scene can have given.
+/// An answer that no part of this scene can have given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("an answer of tile {tile} does not fit its question: {what} {found}, expected {expected}")]
 pub struct AnswerError {
@@ -178,18 +167,8 @@ impl TileState {
         }
     }
 
-    /// Where volumes are held in bricks: the waiting rays, which end at their hits in `hits`. Pass
-    /// what they collect to [`TileState::set_volume_samples`].
-    pub fn volume_rays(&self, hits: &[Option<ShadingHit>]) -> Vec<VolumeRay> {
-        let end =
-            |i: usize, ray: &Ray| hits.get(i).and_then(|m| m.as_ref()).map_or(ray.t_max, |m| m.t);
-        let way =
-            |(place, _, ray): (usize, u16, Ray)| VolumeRay { place, ray, t_end: end(place, &ray) };
-        if self.pass == Pass::Geometry { Vec::new() } else { self.rays().map(way).collect() }
-    }
-
-    /// Sets what each ray of the wavefront collects in the volumes, before
-    /// [`TileState::process_hits`].
+    /// Sets what each ray of the wavefront collects in the volumes up to its hit, before
+    /// [`TileState::process_hits`]. Without this call, the frame's own volumes are integrated.
     ///
     /// # Errors
     /// When the number of answers is not the number of rays.
@@ -328,13 +307,13 @@ impl TileState {
     }
 
     /// For each light ray that matters, its point among [`TileState::light_points`] and the ray.
-    /// Use them to decide which data servers to ask.
+    /// Use them to decide which parts to ask.
     pub fn light_rays_of_points(&self) -> impl Iterator<Item = (usize, Ray)> + '_ {
         self.waiting.iter().map(|r| (self.place[r.point as usize] as usize, r.ray))
     }
 
     /// Takes the bits of [`DeferredFrame::occlusion_bits`] for all [`TileState::light_points`].
-    /// Combine the bits of several data servers by *or*.
+    /// Combine the bits of several parts by *or*.
     ///
     /// # Errors
     /// When the number of words is wrong.
@@ -364,42 +343,40 @@ impl TileState {
         self.waiting.iter().map(|r| r.ray).filter(|r| r.t_max >= r.t_min)
     }
 
-    /// Takes the answer of [`DeferredFrame::light_hits`] to each of [`TileState::light_rays`];
-    /// of several data servers, the answer that [`ShadingHit::is_before`] the others.
+    /// Takes the answer of [`DeferredFrame::light_hits`] to each of [`TileState::light_rays`]; of
+    /// several parts, [`LightHit::Blocked`] before all others, else the closest hit.
     ///
     /// # Errors
     /// When the answers do not fit the rays.
     pub fn process_light_hits(
         &mut self,
         frame: &DeferredFrame<'_>,
-        hits: &[Option<ShadingHit>],
+        hits: &[Option<LightHit>],
     ) -> Result<(), AnswerError> {
         self.expect("number of answers", hits.len(), self.light_rays().count())?;
+        let instances = &frame.context.instances;
+        for hit in hits {
+            if let Some(LightHit::Surface(m)) = hit
+                && m.instance as usize >= instances.len()
+            {
+                return Err(self.wrong("an instance", m.instance as u64, instances.len() as u64));
+            }
+        }
         let mut answers = hits.iter();
         for (r, f) in self.waiting.iter_mut().zip(&mut self.light_ray_states) {
             if r.ray.t_max < r.ray.t_min {
                 continue;
             }
             let behind = match answers.next() {
-                Some(Some(m)) => {
-                    let Some(resolved) = frame.context.instances.get(m.instance as usize) else {
-                        let (found, expected) =
-                            (m.instance as u64, frame.context.instances.len() as u64);
-                        return Err(AnswerError {
-                            tile: self.tile,
-                            what: "an instance",
-                            found,
-                            expected,
-                        });
-                    };
-                    self.stats.light_closest += u64::from(!m.is_blocked());
-                    self.stats.light_lookups += u64::from(!m.is_blocked());
-                    if m.is_blocked() {
-                        *f = LightRayState::BLOCKED;
-                        None
-                    } else {
-                        f.pass(&frame.context, resolved.material, &m.surface, &r.ray, m.t)
-                    }
+                Some(Some(LightHit::Blocked)) => {
+                    *f = LightRayState::BLOCKED;
+                    None
+                }
+                Some(Some(LightHit::Surface(m))) => {
+                    self.stats.light_closest += 1;
+                    self.stats.light_lookups += 1;
+                    let material = instances[m.instance as usize].material;
+                    f.pass(&frame.context, material, &m.surface, &r.ray, m.t)
                 }
                 _ => {
                     self.stats.light_closest += 1;
@@ -462,38 +439,31 @@ impl TileState {
     }
 
     // ---- The result -----------------------------------------------------------------------------
-    /// The finished tile, pixel by pixel and row by row: the requested layers of colour, depth,
-    /// distance, normal, ids and cost. See [`DeferredFrame::decode_tile`].
-    pub fn encode(&self, frame: &DeferredFrame<'_>) -> Vec<u32> {
-        let options = frame.context.options;
-        let has = |l| options.layers.contains(l);
-        let scale = 1.0 / options.samples as f32;
-        let mut out = Vec::with_capacity(PIXELS * frame.words_per_pixel());
-        for y in 0..self.area.height {
-            for x in 0..self.area.width {
-                let slot = TileArea::slot(x, y);
-                let l = &self.layers;
-                if has(Layers::COLOR) {
-                    out.extend(l.color[slot].map(|v| (v * scale).to_bits()));
-                }
-                if has(Layers::DEPTH) {
-                    out.push(l.depth[slot].to_bits());
-                }
-                if has(Layers::DISTANCE) {
-                    out.push(l.distance[slot].to_bits());
-                }
-                if has(Layers::NORMAL) {
-                    out.extend(l.normal[slot].map(f32::to_bits));
-                }
-                if has(Layers::IDS) {
-                    out.extend([l.instance[slot], l.primitive[slot]]);
-                }
-                if has(Layers::COST) {
-                    out.push(l.cost[slot].to_bits());
-                }
-            }
+    /// The finished tile as an image: the requested layers of the pixels in
+    /// [`DeferredFrame::tile_area`].
+    pub fn image(&self, frame: &DeferredFrame<'_>) -> Frame {
+        let TileArea { width, height, .. } = self.area;
+        let scale = 1.0 / frame.context.options.samples as f32;
+        let slots: Vec<usize> =
+            (0..height).flat_map(|y| (0..width).map(move |x| TileArea::slot(x, y))).collect();
+        // Layers that were not requested are empty.
+        fn plane<T: Copy>(layer: &[T], slots: &[usize]) -> Vec<T> {
+            slots.iter().filter_map(|slot| layer.get(*slot).copied()).collect()
         }
-        out
+        let l = &self.layers;
+        let mut color = plane(&l.color, &slots);
+        color.as_flattened_mut().iter_mut().for_each(|v| *v *= scale);
+        Frame {
+            width,
+            height,
+            color,
+            depth: plane(&l.depth, &slots),
+            distance: plane(&l.distance, &slots),
+            normal: plane(&l.normal, &slots),
+            instance: plane(&l.instance, &slots),
+            primitive: plane(&l.primitive, &slots),
+            cost: plane(&l.cost, &slots),
+        }
     }
 
     fn wrong(&self, what: &'static str, found: u64, expected: u64) -> AnswerError {

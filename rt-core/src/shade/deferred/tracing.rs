@@ -1,11 +1,11 @@
-//! What a data server answers: hits of rays with the geometry that it holds.
+//! Traces the rays of a frame in its scene, or in a part of it: hits with their surfaces.
 
 use super::super::ambient_occlusion::{Hemisphere, HemisphereSamples, OcclusionPoint, directions};
 use super::super::direct::{LightSampling, incident_from, light_point, shadow_ray};
 use super::super::tile::{PIXELS, TileArea};
 use super::super::wavefront::{LightRays, OcclusionSource};
 use super::super::{SampleDimension, Workspace, generate_camera_rays, local, prefetch_surfaces};
-use super::{DeferredFrame, LightPoint, Pass, ShadingHit};
+use super::{DeferredFrame, LightHit, LightPoint, Pass, ShadingHit};
 use crate::bvh::{Coherence, InstanceFilter};
 use crate::frame::Layers;
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
@@ -156,14 +156,13 @@ impl DeferredFrame<'_> {
         }
     }
 
-    /// Hits of light rays in this world with surfaces that may transmit light, one answer each; or
-    /// [`ShadingHit::blocked`] where an opaque surface blocks the ray anywhere.
-    pub fn light_hits(&self, rays: &[Ray], out: &mut Vec<Option<ShadingHit>>) {
+    /// What light rays hit in this world, one answer each. Only the closest hit counts among those
+    /// of several parts, and [`LightHit::Blocked`] before all others.
+    pub fn light_hits(&self, rays: &[Ray], out: &mut Vec<Option<LightHit>>) {
         let mut blocks = RayBlock::from_rays(rays);
         let (world, marks) = (&self.context.scene.world, self.context.transmissive.as_slice());
         let mut ended = vec![0u16; blocks.len()];
-        let opaque = marks.iter().position(|m| !m);
-        if opaque.is_some() {
+        if marks.contains(&false) {
             let filter = InstanceFilter::Unmarked(marks);
             world.occluded_stream(&blocks, &mut ended, Coherence::Incoherent, filter);
         }
@@ -181,12 +180,11 @@ impl DeferredFrame<'_> {
         );
         let answer = |(i, ray): (usize, &Ray)| {
             let (block, lane) = (i / LANES, i % LANES);
-            match opaque {
-                Some(instance) if ended[block] >> lane & 1 != 0 => {
-                    Some(ShadingHit::blocked(instance as u32))
-                }
-                _ => hits[block].get(lane).map(|hit| self.shading_hit(ray, &hit)),
+            if ended[block] >> lane & 1 != 0 {
+                return Some(LightHit::Blocked);
             }
+            let hit = hits[block].get(lane)?;
+            Some(LightHit::Surface(self.shading_hit(ray, &hit)))
         };
         out.clear();
         out.extend(rays.iter().enumerate().map(answer));

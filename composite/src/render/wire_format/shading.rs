@@ -1,13 +1,12 @@
 //! Hits, and the points whose light is requested.
-use super::{LightPoint, ShadingHit};
-use crate::surface::SurfacePoint;
-use glam::Vec3;
+use rt_core::deferred::{LightHit, LightPoint, ShadingHit, SurfacePoint};
+use rt_core::glam::Vec3;
 
 /// Words of a hit.
-pub(super) const HIT_WORDS: usize = 20;
+pub(in crate::render) const HIT_WORDS: usize = 20;
 
 /// The words of a hit.
-pub(super) fn encode_hit(hit: &ShadingHit) -> [u32; HIT_WORDS] {
+pub(in crate::render) fn encode_hit(hit: &ShadingHit) -> [u32; HIT_WORDS] {
     let s = &hit.surface;
     let mut out = [0; HIT_WORDS];
     let numbers = [
@@ -28,8 +27,8 @@ pub(super) fn encode_hit(hit: &ShadingHit) -> [u32; HIT_WORDS] {
 /// Decodes the words of [`encode_hit`]. [`TileState::process_hits`] refuses hits that no scene can
 /// have produced.
 ///
-/// [`TileState::process_hits`]: super::TileState::process_hits
-pub(super) fn decode_hit(words: &[u32; HIT_WORDS]) -> ShadingHit {
+/// [`TileState::process_hits`]: rt_core::deferred::TileState::process_hits
+pub(in crate::render) fn decode_hit(words: &[u32; HIT_WORDS]) -> ShadingHit {
     let f = |i: usize| f32::from_bits(words[i]);
     ShadingHit {
         t: f(0),
@@ -49,6 +48,30 @@ pub(super) fn decode_hit(words: &[u32; HIT_WORDS]) -> ShadingHit {
     }
 }
 
+/// Stands for [`LightHit::Blocked`] in place of the parameter of a hit.
+const BLOCKED: f32 = f32::NEG_INFINITY;
+
+/// The words of what a light ray hits, as many as those of a hit.
+pub(in crate::render) fn encode_light_hit(hit: &LightHit) -> [u32; HIT_WORDS] {
+    match hit {
+        LightHit::Blocked => {
+            let mut out = [0; HIT_WORDS];
+            out[0] = BLOCKED.to_bits();
+            out
+        }
+        LightHit::Surface(hit) => encode_hit(hit),
+    }
+}
+
+/// Decodes the words of [`encode_light_hit`].
+pub(in crate::render) fn decode_light_hit(words: &[u32; HIT_WORDS]) -> LightHit {
+    let hit = decode_hit(words);
+    if hit.t == BLOCKED { LightHit::Blocked } else { LightHit::Surface(hit) }
+}
+
+/// Least words of a point: of a flat surface that the camera sees.
+pub(in crate::render) const LEAST_POINT_WORDS: usize = 9;
+
 const LAMPS: u32 = 1;
 const SKY: u32 = 2;
 /// The shading normal is the face normal.
@@ -56,8 +79,8 @@ const FLAT: u32 = 4;
 /// The stream is 0: a camera ray hit it.
 const FROM_CAMERA: u32 = 8;
 
-/// Encodes a point: nine words for a point of a flat surface that the camera sees, at most thirteen.
-pub(super) fn write_point(point: &LightPoint, out: &mut Vec<u32>) {
+/// Encodes a point: [`LEAST_POINT_WORDS`] to thirteen words.
+pub(in crate::render) fn write_point(point: &LightPoint, out: &mut Vec<u32>) {
     let flat =
         point.normal.to_array().map(f32::to_bits) == point.face_normal.to_array().map(f32::to_bits);
     let flag = |on: bool, bit: u32| if on { bit } else { 0 };
@@ -79,7 +102,7 @@ pub(super) fn write_point(point: &LightPoint, out: &mut Vec<u32>) {
 
 /// Decodes one point of [`write_point`] and returns it with the remaining words; `None` when the
 /// words are too few or invalid.
-pub(super) fn read_point(words: &[u32]) -> Option<(LightPoint, &[u32])> {
+pub(in crate::render) fn read_point(words: &[u32]) -> Option<(LightPoint, &[u32])> {
     let (&[flags, pixel, error], mut rest) = words.split_first_chunk::<3>()?;
     let vector = |rest: &mut &[u32]| {
         let (v, r) = rest.split_first_chunk::<3>()?;
