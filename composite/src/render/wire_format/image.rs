@@ -85,3 +85,53 @@ impl ImageReader<'_> {
         Some(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A different number for each word.
+    fn image(width: u32, height: u32, layers: Layers, first: u32) -> Frame {
+        let mut image = Frame::blank(width, height, layers, 1.0);
+        let words: Vec<u32> =
+            (first..).take((width * height) as usize * words_per_pixel(layers)).collect();
+        let whole = Crop { x: 0, y: 0, width, height };
+        read_images(&mut image, std::iter::once(whole), &words).unwrap();
+        image
+    }
+
+    #[test]
+    fn rectangles_come_back_at_their_places_with_the_layers_that_there_are() {
+        for layers in [Layers::ALL, Layers::COLOR, Layers::DEPTH | Layers::IDS] {
+            let (left, right) = (image(3, 2, layers, 1), image(2, 2, layers, 1000));
+            let mut words = Vec::new();
+            write_image(&left, &mut words);
+            write_image(&right, &mut words);
+            assert_eq!(words.len(), 10 * words_per_pixel(layers));
+            let areas = [(0, 3), (3, 2)].map(|(x, width)| Crop { x, y: 1, width, height: 2 });
+            let blank = Frame::blank(5, 4, layers, 1.0);
+            let mut joined = blank.clone();
+            read_images(&mut joined, areas.into_iter(), &words).unwrap();
+            for (part, x) in [(&left, 0), (&right, 3)] {
+                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let (at, there) = (part.index(i, j), joined.index(x + i, 1 + j));
+                    assert_eq!(part.color.get(at), joined.color.get(there));
+                    assert_eq!(part.depth.get(at), joined.depth.get(there));
+                    assert_eq!(part.normal.get(at), joined.normal.get(there));
+                    assert_eq!(part.primitive.get(at), joined.primitive.get(there));
+                    assert_eq!(part.cost.get(at), joined.cost.get(there));
+                }
+            }
+            assert_eq!(joined.depth.first(), blank.depth.first(), "outside of both");
+
+            // ---- Too few words, too many, and a place that is not in the image.
+            let mut image = blank.clone();
+            let short = &words[..words.len() - 1];
+            assert_eq!(read_images(&mut image, areas.into_iter(), short), None);
+            let long = [&words[..], &[0]].concat();
+            assert_eq!(read_images(&mut image, areas.into_iter(), &long), None);
+            let below = areas.map(|area| Crop { y: 3, ..area });
+            assert_eq!(read_images(&mut image, below.into_iter(), &words), None);
+        }
+    }
+}

@@ -28,3 +28,23 @@ pub(in crate::render) fn decode_integral(words: &[u32; INTEGRAL_WORDS]) -> Parti
         samples: words[10],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rays_collect_survives_with_all_its_bits() {
+        let some = PartialIntegral {
+            color: [0.1, -0.0, f64::MIN_POSITIVE],
+            transmittance: 1.0 / 3.0,
+            depth: 1e300,
+            samples: u32::MAX,
+        };
+        for collected in [PartialIntegral::default(), some] {
+            let words = encode_integral(&collected);
+            assert_eq!(decode_integral(&words), collected);
+            assert_eq!(encode_integral(&decode_integral(&words)), words, "the sign of zero, too");
+        }
+    }
+}

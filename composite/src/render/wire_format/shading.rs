@@ -128,3 +128,100 @@ pub(in crate::render) fn read_point(words: &[u32]) -> Option<(LightPoint, &[u32]
     let point = LightPoint { pixel, lamps, sky, stream, point, point_error, face_normal, normal };
     Some((point, rest))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hit() -> ShadingHit {
+        let surface = SurfacePoint {
+            point: Vec3::new(1.0, -0.0, f32::MIN_POSITIVE),
+            point_error: 1e-7,
+            face_normal: Vec3::new(0.0, 0.6, 0.8),
+            normal: Vec3::new(0.6, 0.0, 0.8),
+            outside: true,
+            color: Vec3::new(0.1, 0.2, 0.3),
+            opacity: 0.4,
+        };
+        ShadingHit { t: 2.5, instance: 3, primitive: u32::MAX, depth: 0.7, distance: 9.0, surface }
+    }
+
+    #[test]
+    fn hits_survive_with_all_their_bits() {
+        let outside = hit();
+        let mut inside = outside;
+        (inside.surface.outside, inside.t) = (false, f32::INFINITY);
+        for hit in [outside, inside] {
+            let words = encode_hit(&hit);
+            assert_eq!(decode_hit(&words), hit);
+            assert_eq!(encode_hit(&decode_hit(&words)), words, "the sign of zero, too");
+        }
+        // Any bits are a hit with the same bits, a NaN as well as others.
+        let mut words = std::array::from_fn(|i| 0x7fc0_0001 + 0x0012_3457 * i as u32);
+        words[17] = 1;
+        assert_eq!(encode_hit(&decode_hit(&words)), words);
+    }
+
+    #[test]
+    fn blocked_light_is_told_from_surfaces() {
+        for hit in [LightHit::Blocked, LightHit::Surface(hit())] {
+            assert_eq!(decode_light_hit(&encode_light_hit(&hit)), hit);
+        }
+    }
+
+    /// Points of curved and flat surfaces, hit by the camera's rays and by others.
+    fn points() -> Vec<LightPoint> {
+        let surface = hit().surface;
+        let mut points = Vec::new();
+        for (flat, stream) in [(true, 0), (true, 7), (false, 0), (false, u32::MAX)] {
+            for (lamps, sky) in [(true, false), (false, true), (true, true)] {
+                points.push(LightPoint {
+                    pixel: [65535, 4711],
+                    lamps,
+                    sky,
+                    stream,
+                    point: surface.point,
+                    point_error: surface.point_error,
+                    face_normal: surface.face_normal,
+                    normal: if flat { surface.face_normal } else { surface.normal },
+                });
+            }
+        }
+        points
+    }
+
+    #[test]
+    fn points_survive_one_behind_the_other_and_are_short_where_they_can_be() {
+        let (points, mut words) = (points(), Vec::new());
+        let mut lengths = Vec::new();
+        for point in &points {
+            let before = words.len();
+            write_point(point, &mut words);
+            lengths.push(words.len() - before);
+        }
+        assert_eq!(
+            [lengths[0], lengths[3], lengths[6], lengths[9]],
+            [LEAST_POINT_WORDS, 10, 12, 13]
+        );
+        let (mut read, mut rest) = (Vec::new(), &words[..]);
+        while !rest.is_empty() {
+            let (point, behind) = read_point(rest).unwrap();
+            read.push(point);
+            rest = behind;
+        }
+        assert_eq!(read, points);
+    }
+
+    #[test]
+    fn points_that_are_cut_short_or_have_unknown_flags_are_refused() {
+        for point in points() {
+            let mut words = Vec::new();
+            write_point(&point, &mut words);
+            for length in 0..words.len() {
+                assert!(read_point(&words[..length]).is_none(), "{length} words");
+            }
+            words[0] |= 16;
+            assert!(read_point(&words).is_none());
+        }
+    }
+}
