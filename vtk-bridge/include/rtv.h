@@ -311,8 +311,198 @@ typedef struct RtvPicture {
   /* Window depth of the first surface, or null without blended. */
   float const* first_depth;
 } RtvPicture;
+/* Representation of a property: every point. */
+#define RTV_POINTS 0u
+/* The edges of polygons. */
+#define RTV_WIREFRAME 1u
+/* Polygons. */
+#define RTV_SURFACE 2u
+/* Bits that describe a texture: it exists. */
+#define RTV_TEXTURE 1u
+/* It has a transform. */
+#define RTV_TEXTURE_TRANSFORM 2u
+/* It is a cube map. */
+#define RTV_TEXTURE_CUBE_MAP 4u
+/* A prop with its property and mapper. Asked about before the mapper is updated, and again if it then has no data. */
+typedef struct RtvActorFacts {
+  /* Name of the prop's VTK class. */
+  char const* actor_class;
+  /* Name of the mapper's VTK class; null for props other than actors and for actors without one. */
+  char const* mapper_class;
+  /* One of RTV_POINTS, RTV_WIREFRAME and RTV_SURFACE. */
+  uint32_t representation;
+  /* 1 for physically based shading. */
+  uint32_t pbr;
+  /* 1 if the edges of polygons are visible. */
+  uint32_t edge_visibility;
+  /* 1 if lines are drawn as shaded tubes. */
+  uint32_t lines_as_tubes;
+  /* 1 if the vertices of polygons are visible. */
+  uint32_t vertex_visibility;
+  /* HasTranslucentPolygonalGeometry; read only with edges or a back face property. */
+  uint32_t translucent;
+  /* Clipping planes of the mapper. */
+  uint32_t num_clipping_planes;
+  /* 1 if there is a back face property. */
+  uint32_t has_back;
+  /* Its opacity. */
+  double back_opacity;
+  /* Opacity of edges. */
+  double edge_opacity;
+  /* Strength of the clear coat. */
+  double coat_strength;
+  /* Anisotropy of the physically based model. */
+  double anisotropy;
+  /* Metallic, of the physically based model. */
+  double metallic;
+  /* Colour of a metal at grazing angles. */
+  double edge_tint[3];
+  /* 1 if it has shaders or shader replacements of its own. */
+  uint32_t shader_code;
+  /* 1 for a vtkGlyph3DMapper. */
+  uint32_t glyphs;
+  /* The actor's texture: bits RTV_TEXTURE and following. */
+  uint32_t texture;
+  /* Textures of the property, of any name. */
+  uint32_t num_textures;
+  /* Bits of the property's albedoTex. */
+  uint32_t albedo;
+  /* Bits of its materialTex. */
+  uint32_t material;
+  /* Bits of its normalTex. */
+  uint32_t normal;
+  /* Bits of its emissiveTex. */
+  uint32_t emissive;
+  /* 1 if the mapper was updated and has no data. */
+  uint32_t no_data;
+  /* Not used. */
+  uint32_t reserved;
+} RtvActorFacts;
+/* The data of an actor, or one of their blocks, and its surface. Asked about when the cells are known, and again when the surface is complete. */
+typedef struct RtvSurfaceFacts {
+  /* Vertices of the data. */
+  uint64_t num_verts;
+  /* Lines of the data. */
+  uint64_t num_lines;
+  /* As in RtvActorFacts. */
+  uint32_t representation;
+  /* 1 if the data are neither vtkPolyData nor blocks. */
+  uint32_t not_polygons;
+  /* 1 if polygons were cut into triangles, because they are not convex. */
+  uint32_t triangulated;
+  /* 1 if the edges of polygons are drawn on the surface. */
+  uint32_t edges;
+  /* 1 for a texture that gives the colour. */
+  uint32_t texture;
+  /* 1 for other textures of the property. */
+  uint32_t maps;
+  /* As in RtvSurface. */
+  uint32_t has_back;
+  /* As in RtvSurface. */
+  uint32_t color_source;
+  /* 1 if rtv_surfaces refused the arrays. */
+  uint32_t invalid_arrays;
+  /* 1 if cells have point numbers that cannot be read, in the array described below. */
+  uint32_t unreadable_cells;
+  /* Numbers per tuple of that array. */
+  uint32_t cell_components;
+  /* Not used. */
+  uint32_t reserved;
+  /* Name of its numbers' type. */
+  char const* cell_type;
+  /* Name of its VTK class; null if there is no array. */
+  char const* cell_array_class;
+} RtvSurfaceFacts;
+/* A glyph mapper with its data. Asked about before its sources are updated, again for each source, and again for each data set with colours. */
+typedef struct RtvGlyphFacts {
+  /* 1 if the sources are in a tree. */
+  uint32_t source_table_tree;
+  /* Clipping planes of the mapper. */
+  uint32_t num_clipping_planes;
+  /* Sources that the mapper uses. */
+  uint32_t num_sources;
+  /* 1 if the data are one data set. */
+  uint32_t data_set;
+  /* 1 if they are blocks. */
+  uint32_t composite;
+  /* 1 if blocks have colours, opacities or visibilities of their own. */
+  uint32_t block_attributes;
+  /* Blocks that are no data sets. */
+  uint32_t num_blocks_without_points;
+  /* 1 if the two fields below describe a source. */
+  uint32_t has_source;
+  /* Polygons and strips of the source; 0 if it is not vtkPolyData. */
+  uint64_t num_source_polygons;
+  /* Its vertices and lines. */
+  uint64_t num_other_source_cells;
+  /* 1 if the fields below describe colours. */
+  uint32_t has_colors;
+  /* Bytes per colour. */
+  uint32_t color_components;
+  /* Colours of the data set. */
+  uint64_t num_colors;
+  /* Points of the data set. */
+  uint64_t num_points;
+} RtvGlyphFacts;
+/* A volume with its mapper and property, the lights and its image. Asked about when its classes are known, again before the mapper's input is updated, and again with the image. */
+typedef struct RtvVolumeFacts {
+  /* Name of the volume's VTK class. */
+  char const* volume_class;
+  /* Name of the mapper's VTK class, or null. */
+  char const* mapper_class;
+  /* 1 if the mapper crops. */
+  uint32_t cropping;
+  /* Clipping planes of the mapper. */
+  uint32_t num_clipping_planes;
+  /* 1 if the mapper has a mask. */
+  uint32_t mask;
+  /* 1 if the mapper computes shadows or scattering. */
+  uint32_t scattering;
+  /* 1 if the mapper shows vectors. */
+  uint32_t vectors;
+  /* 1 if the transfer function has two dimensions. */
+  uint32_t transfer_function_2d;
+  /* 1 if the property has colours or opacities of labels. */
+  uint32_t labels;
+  /* The mapper's blend mode, with VTK's number: RTV_BLEND_*, or another. */
+  uint32_t blend_mode;
+  /* 1 if opacities depend on the gradient. */
+  uint32_t gradient_opacity;
+  /* 1 for shading by the gradient. */
+  uint32_t shade;
+  /* Lights that are on; this and the next three are read only with shade. */
+  uint32_t num_lights;
+  /* Of these, positional ones. */
+  uint32_t num_positional_lights;
+  /* Of these, ones with an ambient colour. */
+  uint32_t num_ambient_lights;
+  /* Lights in RtvVolume. */
+  uint32_t num_listed_lights;
+  /* Coefficient of the highlight. */
+  double specular;
+  /* 1 if the data are known, which the fields below describe. */
+  uint32_t has_data;
+  /* 1 if they are one image. */
+  uint32_t image;
+  /* Number of blocks, for blocks. */
+  uint32_t num_blocks;
+  /* Points per axis; these and the following are read only with image. */
+  uint32_t dims[3];
+  /* 1 if points or cells are blanked. */
+  uint32_t blanked;
+  /* 1 if there are scalars. */
+  uint32_t scalars;
+  /* 1 if they belong to cells. */
+  uint32_t cell_scalars;
+  /* Numbers per scalar. */
+  uint32_t num_components;
+  /* As in RtvVolume. */
+  double range[2];
+  /* Scalars that RTV_BLEND_AVERAGE takes the mean of. */
+  double average_range[2];
+} RtvVolumeFacts;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 4135612408u
+#define RTV_ABI 981677105u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -353,6 +543,14 @@ typedef struct RtvApi {
   double (*bridge_option)(RtvBridge*, char const*);
   /* rtv_surfaces. */
   int32_t (*surfaces)(RtvBridge*, RtvSurface const*, uint64_t);
+  /* rtv_check_actor. */
+  char const* (*check_actor)(RtvBridge*, RtvActorFacts const*);
+  /* rtv_check_surface. */
+  char const* (*check_surface)(RtvBridge*, RtvSurfaceFacts const*);
+  /* rtv_check_glyphs. */
+  char const* (*check_glyphs)(RtvBridge*, RtvGlyphFacts const*);
+  /* rtv_check_volume. */
+  char const* (*check_volume)(RtvBridge*, RtvVolumeFacts const*);
 } RtvApi;
 
 /* RTV_ABI of the library. */
@@ -377,7 +575,7 @@ int32_t rtv_begin(RtvBridge* bridge);
 int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
 /* Adds all surfaces of one prop, or none of them, so that nothing is drawn twice. Returns how many will be traced, or -1 if the arrays of one are invalid (a warning names it). */
 int32_t rtv_surfaces(RtvBridge* bridge, RtvSurface const* surfaces, uint64_t count);
-/* Adds a volume: null if it will be traced, else the reason, in memory of the bridge that is valid until its next call. */
+/* Adds a volume: null if it will be traced, else the reason, as rtv_check_actor gives it. */
 char const* rtv_volume(RtvBridge* bridge, RtvVolume const* volume);
 /* Returns 1 if the scalars of this key are cached; rtv_volume then does not need them. */
 int32_t rtv_has_volume(RtvBridge* bridge, uint64_t scalar_key);
@@ -385,6 +583,14 @@ int32_t rtv_has_volume(RtvBridge* bridge, uint64_t scalar_key);
 int32_t rtv_has_colors(RtvBridge* bridge, uint64_t shape_key, uint64_t color_key);
 /* Adds a light. */
 void rtv_light(RtvBridge* bridge, RtvLight const* light);
+/* Why OpenGL has to draw an actor; null if nothing in these facts speaks against ray tracing it. The text is in memory of the bridge that is valid until it gives another one. */
+char const* rtv_check_actor(RtvBridge* bridge, RtvActorFacts const* facts);
+/* As rtv_check_actor, for the data of an actor or one of their blocks. */
+char const* rtv_check_surface(RtvBridge* bridge, RtvSurfaceFacts const* facts);
+/* As rtv_check_actor, for glyphs. */
+char const* rtv_check_glyphs(RtvBridge* bridge, RtvGlyphFacts const* facts);
+/* As rtv_check_actor, for volumes. rtv_volume may give a reason too. */
+char const* rtv_check_volume(RtvBridge* bridge, RtvVolumeFacts const* facts);
 /* Records for the report that OpenGL draws something, and why. */
 void rtv_pass(RtvBridge* bridge, char const* name, char const* reason);
 /* Warns the user, once for each text. */

@@ -167,7 +167,11 @@ fn the_number_of_the_interface_follows_structures_and_calls_and_not_comments() {
 #[test]
 fn the_header_says_what_the_library_does() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let made = header(&[include_str!("../src/capi/types.rs"), include_str!("../src/capi/mod.rs")]);
+    let made = header(&[
+        include_str!("../src/capi/types.rs"),
+        include_str!("../src/capi/facts.rs"),
+        include_str!("../src/capi/mod.rs"),
+    ]);
     let path = folder.join("include/rtv.h");
     if std::env::var_os("RTV_WRITE_HEADER").is_some() {
         std::fs::write(&path, &made).expect("the header can be written");

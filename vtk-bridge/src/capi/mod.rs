@@ -1,16 +1,20 @@
 //! The C ABI behind the C++ shim, the plugin and the Python package: `include/rtv.h`.
 //!
 //! A frame is `rtv_begin`, then `rtv_surface` and `rtv_light` for each surface and light, then
-//! `rtv_render`. Arrays belong to the caller and are read before the call returns. Images and
-//! strings belong to the bridge. A panic never crosses the interface: it becomes a warning, and the
-//! call fails. One thread at a time uses a bridge. Different bridges may be used concurrently, each
-//! with its own options.
+//! `rtv_render`. Programs with VTK's props ask `rtv_check_actor` and the calls beside it which of
+//! them can be traced, and report the others with `rtv_pass`. Arrays belong to the caller and are
+//! read before the call returns. Images and strings belong to the bridge. A panic never crosses the
+//! interface: it becomes a warning, and the call fails. One thread at a time uses a bridge.
+//! Different bridges may be used concurrently, each with its own options.
 #![allow(unsafe_code, reason = "this is where foreign code calls us")]
 
 mod arrays;
+mod eligibility;
+mod facts;
 mod state;
 mod types;
 
+pub use facts::*;
 pub use types::*;
 
 use crate::bridge::AddOutcome;
@@ -29,7 +33,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 4_135_612_408;
+pub const RTV_ABI: u32 = 981_677_105;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -164,8 +168,7 @@ pub unsafe extern "C" fn rtv_surfaces(
     }
 }
 
-/// Adds a volume: null if it will be traced, else the reason, in memory of the bridge that is valid
-/// until its next call.
+/// Adds a volume: null if it will be traced, else the reason, as `rtv_check_actor` gives it.
 ///
 /// # Safety
 /// As `rtv_surface`.
@@ -224,6 +227,83 @@ pub unsafe extern "C" fn rtv_light(bridge: *mut RtvBridge, light: *const RtvLigh
     let Some(l) = (unsafe { light.as_ref() }) else { return };
     // SAFETY: as above.
     unsafe { with(bridge, (), |h| h.bridge.add_light(arrays::light(l))) }
+}
+
+/// Why OpenGL has to draw an actor; null if nothing in these facts speaks against ray tracing it.
+/// The text is in memory of the bridge that is valid until it gives another one.
+///
+/// # Safety
+/// As `rtv_begin`; `facts` is null or valid, and its texts are null or end with a zero byte.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_check_actor(
+    bridge: *mut RtvBridge,
+    facts: *const RtvActorFacts,
+) -> *const c_char {
+    // SAFETY: as above; null facts are refused.
+    let Some(f) = (unsafe { facts.as_ref() }) else { return c"no facts".as_ptr() };
+    // SAFETY: as above.
+    unsafe {
+        with(bridge, c"internal error".as_ptr(), |h| {
+            let (actor, mapper) = (text(f.actor_class), text(f.mapper_class));
+            h.reason(eligibility::actor(f, &actor, &mapper, h.radii()))
+        })
+    }
+}
+
+/// As `rtv_check_actor`, for the data of an actor or one of their blocks.
+///
+/// # Safety
+/// As `rtv_check_actor`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_check_surface(
+    bridge: *mut RtvBridge,
+    facts: *const RtvSurfaceFacts,
+) -> *const c_char {
+    // SAFETY: as above.
+    let Some(f) = (unsafe { facts.as_ref() }) else { return c"no facts".as_ptr() };
+    // SAFETY: as above.
+    unsafe {
+        with(bridge, c"internal error".as_ptr(), |h| {
+            let (number_type, class) = (text(f.cell_type), text(f.cell_array_class));
+            let cells = eligibility::CellArray { number_type: &number_type, class: &class };
+            h.reason(eligibility::surface(f, cells, h.radii()))
+        })
+    }
+}
+
+/// As `rtv_check_actor`, for glyphs.
+///
+/// # Safety
+/// As `rtv_check_actor`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_check_glyphs(
+    bridge: *mut RtvBridge,
+    facts: *const RtvGlyphFacts,
+) -> *const c_char {
+    // SAFETY: as above.
+    let Some(f) = (unsafe { facts.as_ref() }) else { return c"no facts".as_ptr() };
+    // SAFETY: as above.
+    unsafe { with(bridge, c"internal error".as_ptr(), |h| h.reason(eligibility::glyphs(f))) }
+}
+
+/// As `rtv_check_actor`, for volumes. `rtv_volume` may give a reason too.
+///
+/// # Safety
+/// As `rtv_check_actor`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_check_volume(
+    bridge: *mut RtvBridge,
+    facts: *const RtvVolumeFacts,
+) -> *const c_char {
+    // SAFETY: as above.
+    let Some(f) = (unsafe { facts.as_ref() }) else { return c"no facts".as_ptr() };
+    // SAFETY: as above.
+    unsafe {
+        with(bridge, c"internal error".as_ptr(), |h| {
+            let (volume, mapper) = (text(f.volume_class), text(f.mapper_class));
+            h.reason(eligibility::volume(f, &volume, &mapper))
+        })
+    }
 }
 
 /// Records for the report that OpenGL draws something, and why.
@@ -338,6 +418,15 @@ pub struct RtvApi {
     pub bridge_option: unsafe extern "C" fn(*mut RtvBridge, *const c_char) -> f64,
     /// [`rtv_surfaces`].
     pub surfaces: unsafe extern "C" fn(*mut RtvBridge, *const RtvSurface, u64) -> i32,
+    /// [`rtv_check_actor`].
+    pub check_actor: unsafe extern "C" fn(*mut RtvBridge, *const RtvActorFacts) -> *const c_char,
+    /// [`rtv_check_surface`].
+    pub check_surface:
+        unsafe extern "C" fn(*mut RtvBridge, *const RtvSurfaceFacts) -> *const c_char,
+    /// [`rtv_check_glyphs`].
+    pub check_glyphs: unsafe extern "C" fn(*mut RtvBridge, *const RtvGlyphFacts) -> *const c_char,
+    /// [`rtv_check_volume`].
+    pub check_volume: unsafe extern "C" fn(*mut RtvBridge, *const RtvVolumeFacts) -> *const c_char,
 }
 
 static API: RtvApi = RtvApi {
@@ -360,6 +449,10 @@ static API: RtvApi = RtvApi {
     set_bridge_option: rtv_set_bridge_option,
     bridge_option: rtv_bridge_option,
     surfaces: rtv_surfaces,
+    check_actor: rtv_check_actor,
+    check_surface: rtv_check_surface,
+    check_glyphs: rtv_check_glyphs,
+    check_volume: rtv_check_volume,
 };
 
 /// The table; valid as long as the library is loaded.

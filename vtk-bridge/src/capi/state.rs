@@ -1,5 +1,6 @@
 //! The state behind a handle, which is a bridge with its options, and the guard against panics.
 
+use super::eligibility::Radii;
 use super::{RtvBridge, RtvPicture};
 use crate::bridge::Bridge;
 use crate::input::View;
@@ -17,7 +18,7 @@ pub(super) struct BridgeState {
     pub(super) bridge: Bridge,
     number: u64,
     poisoned: bool,
-    /// The text that the last call returned.
+    /// The last text that a call returned.
     answer: CString,
     /// Options set for this bridge alone; they take precedence over all others.
     own: OptionValues,
@@ -162,7 +163,18 @@ impl BridgeState {
         number(self.effective_options.of(OptionSources::now(&self.own)).0, name)
     }
 
-    /// Stores `text` for the caller until the next call.
+    /// The radii of this frame.
+    pub(super) fn radii(&self) -> Radii {
+        let options = self.bridge.options();
+        Radii { point: options.point_radius, line: options.line_radius }
+    }
+
+    /// The reason for the caller, as [`BridgeState::answer`] stores it; null if there is none.
+    pub(super) fn reason(&mut self, reason: Option<impl Into<String>>) -> *const c_char {
+        reason.map_or(std::ptr::null(), |text| self.answer(text.into()))
+    }
+
+    /// Stores `text` for the caller until the next text.
     pub(super) fn answer(&mut self, text: String) -> *const c_char {
         self.answer = CString::new(text.replace('\0', " ")).unwrap_or_default();
         self.answer.as_ptr()

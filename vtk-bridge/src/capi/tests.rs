@@ -312,6 +312,39 @@ fn surfaces_of_a_prop_are_added_all_or_none() {
 }
 
 #[test]
+fn reasons_follow_the_radii_of_the_frame_and_bad_facts_are_refused() {
+    let bridge = rtv_new();
+    // SAFETY: all zero is no fact at all.
+    let none: RtvSurfaceFacts = unsafe { std::mem::zeroed() };
+    let facts = RtvSurfaceFacts { representation: RTV_SURFACE, num_lines: 7, ..none };
+    // SAFETY: texts end with zero, facts live until the end, and only this thread uses the bridge.
+    unsafe {
+        assert_eq!(rtv_begin(bridge), 1);
+        let reason = text(rtv_check_surface(bridge, &facts));
+        assert_eq!(reason, "it has lines (set RTV_LINE_RADIUS to trace them as tubes)");
+        rtv_end(bridge);
+        assert_eq!(rtv_set_bridge_option(bridge, c"RTV_LINE_RADIUS".as_ptr(), c"1".as_ptr()), 1);
+        assert_eq!(rtv_begin(bridge), 1);
+        assert!(rtv_check_surface(bridge, &facts).is_null());
+        let cells = RtvSurfaceFacts {
+            unreadable_cells: 1,
+            cell_components: 3,
+            cell_type: c"int".as_ptr(),
+            cell_array_class: c"vtkIntArray".as_ptr(),
+            ..facts
+        };
+        let reason = rtv_check_surface(bridge, &cells);
+        assert_eq!(text(reason), "its cells are numbered by 3 x int of vtkIntArray");
+        rtv_pass(bridge, c"it".as_ptr(), reason);
+        assert_eq!(text(reason), "its cells are numbered by 3 x int of vtkIntArray");
+        assert_eq!(text(rtv_check_actor(bridge, ptr::null())), "no facts");
+        assert_eq!(text(rtv_check_surface(ptr::null_mut(), &facts)), "internal error");
+        rtv_end(bridge);
+        rtv_free(bridge);
+    }
+}
+
+#[test]
 fn a_bridge_s_options_go_over_those_of_the_process_and_hold_for_a_frame() {
     let (bridge, other) = (rtv_new(), rtv_new());
     let name = c"RTV_LINE_RADIUS".as_ptr();

@@ -137,7 +137,23 @@ int main(void)
   api->end(bridges[1]);
   CHECK(api->bridge_option(bridges[0], "RTV_OFF") == 1 && api->bridge_option(bridges[1], "RTV_OFF") == 0);
   CHECK(api->set_bridge_option(bridges[0], "RTV_OFF", "") == 1 && api->set_bridge_option(0, "RTV_OFF", "1") == 0);
-  /* Misuse must have no effect. */
+  /* Reasons of props that are not drawn, from facts that are freed at once. */
+  RtvActorFacts facts;
+  memset(&facts, 0, sizeof facts);
+  facts.representation = RTV_SURFACE;
+  facts.mapper_class = "vtkPolyDataMapper";
+  char* class_name = copy("vtkActor", sizeof "vtkActor");
+  facts.actor_class = class_name;
+  CHECK(!api->check_actor(bridges[0], &facts));
+  class_name[3] = 'F';
+  char const* reason = api->check_actor(bridges[0], &facts);
+  free(class_name);
+  CHECK(reason && !strcmp(reason, "OpenGL draws props of this class"));
+  RtvGlyphFacts glyphs;
+  memset(&glyphs, 0, sizeof glyphs);
+  CHECK(!strcmp(api->check_glyphs(bridges[0], &glyphs), "glyphs without a source"));
+  /* Misuse: nothing may happen. */
+  CHECK(api->check_actor(bridges[0], 0) && api->check_surface(0, 0) && api->check_glyphs(0, &glyphs) && api->check_volume(0, 0));
   CHECK(api->surfaces(bridges[0], 0, 3) == -1 && api->surfaces(0, 0, 0) == -1);
   api->free_bridge(0);
   CHECK(api->begin(0) == 0 && api->render(0, 0, 0) == 0 && api->surface(bridges[0], 0) == -1);
