@@ -87,15 +87,15 @@ RtvArray PointArray(vtkDataArray* array, RtvKeep& keep)
   return RtvArray{ copy, static_cast<uint64_t>(array->GetNumberOfTuples()), 3, RTV_F64 };
 }
 
-// Cells in any storage of vtkCellArray. Since VTK 9.6, cells of equal size have computed offsets,
-// and both arrays may have any type. Returns why not, or null.
-const char* CellsOf(
-  vtkCellArray* cells, RtvCells& out, uint64_t& key, RtvKeep& keep, std::string& answer)
+// Cells in any storage of vtkCellArray: since VTK 9.6 cells of one size have offsets that are
+// computed, and both arrays may be of any type. False if one cannot be read.
+bool CellsOf(
+  vtkCellArray* cells, RtvCells& out, uint64_t& key, RtvKeep& keep, RtvSurfaceFacts& facts)
 {
   out = RtvCells{ NoArray, NoArray };
   if (!cells || cells->GetNumberOfCells() == 0)
   {
-    return nullptr;
+    return true;
   }
   vtkDataArray* offsets = cells->GetOffsetsArray();
   vtkDataArray* connectivity = cells->GetConnectivityArray();
@@ -104,14 +104,15 @@ const char* CellsOf(
   {
     if (!array || !rtvIds(array, array == offsets ? out.offsets : out.connectivity, keep))
     {
-      answer = std::string("its cells are numbered by ") +
-        (array ? std::to_string(array->GetNumberOfComponents()) + " x " + array->GetDataTypeAsString() + " of " + array->GetClassName()
-               : std::string("no array"));
-      return answer.c_str();
+      facts.unreadable_cells = 1;
+      facts.cell_components = array ? static_cast<uint32_t>(array->GetNumberOfComponents()) : 0;
+      facts.cell_type = array ? array->GetDataTypeAsString() : nullptr;
+      facts.cell_array_class = array ? array->GetClassName() : nullptr;
+      return false;
     }
     key = rtvMix(rtvMix(key, static_cast<vtkObject*>(array)), array->GetMTime());
   }
-  return nullptr;
+  return true;
 }
 
 uint64_t Mixed(uint64_t key, vtkObject* object)
@@ -158,13 +159,12 @@ const char* rtvCommit(RtvBridge* bridge, const RtvBatch& batch)
     all.push_back(pending->Surface);
     all.back().name = pending->Name.c_str();
   }
-  return !all.empty() && rtvApi->surfaces(bridge, all.data(), all.size()) < 0
-    ? "its arrays do not fit together (a warning names them)"
-    : nullptr;
+  RtvSurfaceFacts facts = {};
+  facts.invalid_arrays = !all.empty() && rtvApi->surfaces(bridge, all.data(), all.size()) < 0 ? 1 : 0;
+  return rtvApi->check_surface(bridge, &facts);
 }
 
-const char* rtvAddShape(
-  RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, std::string& answer)
+bool rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, RtvSurfaceFacts& facts)
 {
   uint64_t key = 1469598103934665603ull;
   vtkDataArray* coordinates = data->GetPoints()->GetData();
@@ -183,15 +183,15 @@ const char* rtvAddShape(
     s.verts.connectivity = RtvArray{ ids, static_cast<uint64_t>(count), 1, RTV_I64 };
     s.lines = s.polys = s.strips = RtvCells{ NoArray, NoArray };
     s.shape_key = rtvMix(rtvMix(key, 1), s.point_radius);
-    return nullptr;
+    return true;
   }
   vtkCellArray* const cells[] = { data->GetVerts(), data->GetLines(), data->GetPolys(), data->GetStrips() };
   RtvCells* const to[] = { &s.verts, &s.lines, &s.polys, &s.strips };
   for (int i = 0; i < 4; ++i)
   {
-    if (const char* reason = CellsOf(cells[i], *to[i], key, keep, answer))
+    if (!CellsOf(cells[i], *to[i], key, keep, facts))
     {
-      return reason;
+      return false;
     }
   }
   vtkDataArray* ofPoints = data->GetPointData()->GetNormals();
@@ -206,7 +206,7 @@ const char* rtvAddShape(
   key = Mixed(Mixed(Mixed(Mixed(key, s.property.flat ? nullptr : ofPoints), ofCells), texcoords), tangents);
   key = rtvMix(rtvMix(rtvMix(rtvMix(key, s.point_radius), s.line_radius), s.edges_only), s.has_back);
   s.shape_key = key;
-  return nullptr;
+  return true;
 }
 
 void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep)
@@ -307,17 +307,11 @@ void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyDa
   s.colors = ArrayOf(rgba, RTV_U8);
 }
 
-const char* rtvTextureReason(vtkTexture* texture)
+uint32_t rtvTextureBits(vtkTexture* texture)
 {
-  if (texture->GetTransform())
-  {
-    return "a texture with a transform";
-  }
-  if (texture->GetCubeMap())
-  {
-    return "a cube map";
-  }
-  return nullptr;
+  return !texture ? 0
+                  : RTV_TEXTURE | (texture->GetTransform() ? RTV_TEXTURE_TRANSFORM : 0u) |
+      (texture->GetCubeMap() ? RTV_TEXTURE_CUBE_MAP : 0u);
 }
 
 namespace

@@ -50,7 +50,10 @@ struct RtvPending
 // translucent.
 using RtvBatch = std::vector<std::unique_ptr<RtvPending>>;
 
-// Passes a prop's surfaces to the bridge: all, or none. Returns why not, or null.
+// Functions below that return a text give the reason why OpenGL has to draw a prop, as the bridge
+// words it, or null. The text is valid until the bridge gives another one.
+
+// Passes a prop's surfaces to the bridge: all, or none.
 const char* rtvCommit(RtvBridge* bridge, const RtvBatch& batch);
 
 // A key of everything that was mixed in (FNV-1a).
@@ -70,9 +73,8 @@ uint64_t rtvMix(uint64_t key, const T& value)
 // integers of 32 or 64 bits, else to a copy. False if it has other than one component.
 bool rtvIds(vtkDataArray* array, RtvArray& out, RtvKeep& keep);
 // Points, cells, normals, texture coordinates, and the key of all of them. `points`: every point is
-// a vertex. Returns why not, or null; `answer` keeps the text.
-const char* rtvAddShape(
-  RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, std::string& answer);
+// a vertex. False if an array of cells cannot be read; `facts` then describes it.
+bool rtvAddShape(RtvSurface& s, vtkPolyData* data, bool points, RtvKeep& keep, RtvSurfaceFacts& facts);
 // Colours of points, cells or a map, as the mapper makes them; only if the bridge has not cached
 // them.
 void rtvAddColors(RtvBridge* bridge, RtvSurface& s, vtkMapper* mapper, vtkPolyData* data, RtvKeep& keep);
@@ -80,11 +82,10 @@ void rtvAddTexture(RtvSurface& s, vtkTexture* texture, RtvKeep& keep);
 // The textures of a physically based property other than its colour; `maps` must live until the
 // bridge has read it. Null if there are none.
 const RtvMaps* rtvMapsOf(const RtvSurface& s, vtkProperty* property, RtvMaps& maps, RtvKeep& keep);
-// Why a texture cannot be traced, or null.
-const char* rtvTextureReason(vtkTexture* texture);
-// A volume. Returns why not, or null; `answer` keeps the text.
-const char* rtvAddVolume(
-  RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name, std::string& answer);
-// Copies of the sources of a glyph mapper. Returns why not, or null; `answer` keeps the text.
+// Bits RTV_TEXTURE and following of a texture; 0 for none.
+uint32_t rtvTextureBits(vtkTexture* texture);
+// A volume.
+const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name);
+// Copies of the sources of a glyph mapper.
 const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* data,
-  const RtvProperty& property, const std::string& name, std::string& answer);
+  const RtvProperty& property, const std::string& name);

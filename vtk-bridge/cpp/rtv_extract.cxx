@@ -1,4 +1,4 @@
-// Converts props to surfaces: decides which are traced, and why the others are not.
+// Converts props to surfaces. Which of them are traced decides the bridge from facts about them.
 #include "rtv_arrays.h"
 
 #include <algorithm>
@@ -48,8 +48,6 @@ struct Actor
   vtkCompositeDataDisplayAttributes* Attributes = nullptr;
   RtvBatch Batch;
   std::string Name;
-  // Storage for a reason that is composed at run time.
-  std::string Answer;
   double PointRadius, LineRadius;
   bool Edges = false, Points = false;
 };
@@ -60,6 +58,32 @@ void CopyColor(const double* from, float* to)
   {
     to[c] = static_cast<float>(from[c]);
   }
+}
+
+// What properties have since VTK 9.3: widths and opacities of edges. Overloads with `long` are for
+// versions without.
+template <class P>
+auto EdgeOpacity(P* p, int) -> decltype(static_cast<double>(p->GetEdgeOpacity()))
+{
+  return p->GetEdgeOpacity();
+}
+
+template <class P>
+double EdgeOpacity(P*, long)
+{
+  return 1.0;
+}
+
+template <class P>
+auto EdgeWidth(P* p, int) -> decltype(p->GetUseLineWidthForEdgeThickness(), static_cast<float>(p->GetEdgeWidth()))
+{
+  return p->GetUseLineWidthForEdgeThickness() ? p->GetLineWidth() : p->GetEdgeWidth();
+}
+
+template <class P>
+float EdgeWidth(P* p, long)
+{
+  return p->GetLineWidth();
 }
 
 RtvProperty PropertyOf(vtkProperty* p)
@@ -83,7 +107,8 @@ RtvProperty PropertyOf(vtkProperty* p)
   out.cull_back = p->GetBackfaceCulling() ? 1 : 0;
   CopyColor(p->GetEdgeColor(), out.edge_color);
   // OpenGL's lines are never thinner than this.
-  out.edge_width = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE ? std::max(1.1f, p->GetLineWidth()) : 0.0f;
+  const bool edges = p->GetEdgeVisibility() && p->GetRepresentation() == VTK_SURFACE;
+  out.edge_width = edges ? std::max(1.1f, EdgeWidth(p, 0)) : 0.0f;
   return out;
 }
 
@@ -121,19 +146,18 @@ void AddClipPlanes(Actor& a, RtvPending& pending)
   }
 }
 
-// Prepares the surface of one data set for the bridge. Returns why not, or null.
+// Prepares the surface of one data set for the bridge.
 const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, const std::string& blockName)
 {
-  const bool surface = !a.Edges && !a.Points;
   const bool others = data->GetNumberOfVerts() + data->GetNumberOfLines() > 0;
   const bool polygons = data->GetNumberOfPolys() + data->GetNumberOfStrips() > 0;
-  if (surface && data->GetNumberOfVerts() > 0 && a.PointRadius <= 0.0)
+  RtvSurfaceFacts facts = {};
+  facts.representation = static_cast<uint32_t>(a.Prop->GetProperty()->GetRepresentation());
+  facts.num_verts = static_cast<uint64_t>(data->GetNumberOfVerts());
+  facts.num_lines = static_cast<uint64_t>(data->GetNumberOfLines());
+  if (const char* reason = rtvApi->check_surface(a.Bridge, &facts))
   {
-    return "it has vertices (set RTV_POINT_RADIUS to trace them as spheres)";
-  }
-  if (surface && data->GetNumberOfLines() > 0 && a.LineRadius <= 0.0)
-  {
-    return "it has lines (set RTV_LINE_RADIUS to trace them as tubes)";
+    return reason;
   }
   if (data->GetNumberOfPoints() == 0 || (!polygons && !others && !a.Points))
   {
@@ -164,9 +188,9 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   s.point_radius = a.PointRadius;
   s.line_radius = a.LineRadius;
   s.edges_only = a.Edges ? 1 : 0;
-  if (const char* reason = rtvAddShape(s, data, a.Points, keep, a.Answer))
+  if (!rtvAddShape(s, data, a.Points, keep, facts))
   {
-    return reason;
+    return rtvApi->check_surface(a.Bridge, &facts);
   }
   AddClipPlanes(a, pending);
   if (!block.HasColor)
@@ -185,22 +209,19 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     // The texture's alpha replaces the opacity.
     s.property.opacity = 1.0f;
   }
+  s.maps = rtvMapsOf(s, a.Prop->GetProperty(), pending.Maps, keep);
+  facts.edges = s.property.edge_width > 0.0f ? 1 : 0;
+  facts.texture = texture ? 1 : 0;
+  facts.maps = s.maps ? 1 : 0;
+  facts.has_back = s.has_back;
+  facts.color_source = s.color_source;
+  if (const char* reason = rtvApi->check_surface(a.Bridge, &facts))
+  {
+    return reason;
+  }
   if (texture)
   {
-    if (s.has_back)
-    {
-      return "a texture on a surface whose backs have a property of their own";
-    }
-    if (s.color_source != RTV_COLOR_PROPERTY)
-    {
-      return "it has a texture and colours";
-    }
     rtvAddTexture(s, texture, keep);
-  }
-  s.maps = rtvMapsOf(s, a.Prop->GetProperty(), pending.Maps, keep);
-  if (s.maps && s.has_back)
-  {
-    return "textures of the property on a surface whose backs have a property of their own";
   }
   return nullptr;
 }
@@ -265,121 +286,47 @@ const char* AddTree(Actor& a, vtkDataObject* data, BlockState block, const std::
     }
     return reason;
   }
-  return "its data are not polygons";
+  RtvSurfaceFacts facts = {};
+  facts.not_polygons = 1;
+  return rtvApi->check_surface(a.Bridge, &facts);
 }
 
-// Why OpenGL has to draw an actor, as far as the actor's own properties decide; null if it can be
-// traced.
-const char* WhyNot(vtkActor* actor, vtkMapper* mapper, double pointRadius, double lineRadius)
+RtvActorFacts FactsOf(vtkActor* actor, vtkMapper* mapper)
 {
-  static const char* const known[] = { "vtkActor", "vtkOpenGLActor", "vtkPVLODActor", "vtkLODActor", "vtkQuadricLODActor" };
-  bool plain = false;
-  for (const char* name : known)
-  {
-    plain = plain || !strcmp(actor->GetClassName(), name);
-  }
-  if (!plain)
-  {
-    return "OpenGL draws props of this class";
-  }
-  vtkProperty* property = actor->GetProperty();
-  if (property->GetRepresentation() == VTK_WIREFRAME && lineRadius <= 0.0)
-  {
-    return "wireframe (set RTV_LINE_RADIUS to trace edges as tubes)";
-  }
-  if (property->GetRepresentation() == VTK_POINTS && pointRadius <= 0.0)
-  {
-    return "points (set RTV_POINT_RADIUS to trace them as spheres)";
-  }
-  if (property->GetRepresentation() == VTK_SURFACE && property->GetEdgeVisibility())
-  {
-    if (property->GetRenderLinesAsTubes())
-    {
-      return "edges as shaded tubes on the surface";
-    }
-    if (actor->HasTranslucentPolygonalGeometry())
-    {
-      return "edges on a translucent surface";
-    }
-    if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
-    {
-      return "edges on a clipped surface";
-    }
-  }
-  if (property->GetRepresentation() == VTK_SURFACE && property->GetVertexVisibility())
-  {
-    return "vertices on the surface";
-  }
-  if (vtkProperty* back = actor->GetBackfaceProperty())
-  {
-    if (actor->HasTranslucentPolygonalGeometry() || back->GetOpacity() < 1.0)
-    {
-      return "translucent backs with a property of their own";
-    }
-    if (mapper->IsA("vtkGlyph3DMapper"))
-    {
-      return "glyphs whose backs have a property of their own";
-    }
-  }
-  if (property->GetInterpolation() == VTK_PBR)
-  {
-    const double* tint = property->GetEdgeTint();
-    if (property->GetCoatStrength() > 0.0 || property->GetAnisotropy() != 0.0)
-    {
-      return "a clear coat or anisotropy";
-    }
-    if (property->GetMetallic() > 0.0 && (tint[0] != 1.0 || tint[1] != 1.0 || tint[2] != 1.0))
-    {
-      return "a metal with an edge tint";
-    }
-  }
-  for (const auto& texture : property->GetAllTextures())
-  {
-    static const char* const known[] = { "albedoTex", "materialTex", "normalTex", "emissiveTex" };
-    const auto same = [&](const char* name) { return texture.first == name; };
-    if (std::none_of(std::begin(known), std::end(known), same))
-    {
-      return "textures of the property for coats or anisotropy, or of a program's own shader";
-    }
-    if (mapper->IsA("vtkGlyph3DMapper") && texture.first != known[0])
-    {
-      return "glyphs with textures of the property other than its base colour";
-    }
-    if (actor->GetTexture())
-    {
-      return "a texture and a texture of the property";
-    }
-    if (property->GetInterpolation() != VTK_PBR)
-    {
-      return "textures of the property without physically based shading";
-    }
-    if (const char* reason = rtvTextureReason(texture.second))
-    {
-      return reason;
-    }
-  }
+  RtvActorFacts facts = {};
+  facts.actor_class = actor->GetClassName();
+  facts.mapper_class = mapper->GetClassName();
+  vtkProperty* p = actor->GetProperty();
+  facts.representation = static_cast<uint32_t>(p->GetRepresentation());
+  facts.pbr = p->GetInterpolation() == VTK_PBR ? 1 : 0;
+  facts.edge_visibility = p->GetEdgeVisibility() ? 1 : 0;
+  facts.edge_opacity = EdgeOpacity(p, 0);
+  facts.lines_as_tubes = p->GetRenderLinesAsTubes() ? 1 : 0;
+  facts.vertex_visibility = p->GetVertexVisibility() ? 1 : 0;
+  vtkProperty* back = actor->GetBackfaceProperty();
+  facts.has_back = back ? 1 : 0;
+  facts.back_opacity = back ? back->GetOpacity() : 1.0;
+  // It may look at all colours, so only where it matters.
+  facts.translucent = (facts.edge_visibility || back) && actor->HasTranslucentPolygonalGeometry() ? 1 : 0;
+  vtkPlaneCollection* planes = mapper->GetClippingPlanes();
+  facts.num_clipping_planes = planes ? static_cast<uint32_t>(planes->GetNumberOfItems()) : 0;
+  facts.coat_strength = p->GetCoatStrength();
+  facts.anisotropy = p->GetAnisotropy();
+  facts.metallic = p->GetMetallic();
+  std::copy(p->GetEdgeTint(), p->GetEdgeTint() + 3, facts.edge_tint);
   vtkShaderProperty* shader = actor->GetShaderProperty();
-  if (shader && (shader->HasFragmentShaderCode() || shader->HasVertexShaderCode() || shader->GetNumberOfShaderReplacements() > 0))
-  {
-    return "shader code of its own";
-  }
-  if (vtkTexture* texture = actor->GetTexture())
-  {
-    if (const char* reason = rtvTextureReason(texture))
-    {
-      return reason;
-    }
-  }
-  static const char* const mappers[] = { "vtkPolyDataMapper", "vtkOpenGLPolyDataMapper", "vtkCompositePolyDataMapper",
-    "vtkCompositePolyDataMapper2", "vtkDataSetMapper", "vtkGlyph3DMapper", "vtkOpenGLGlyph3DMapper" };
-  for (const char* name : mappers)
-  {
-    if (!strcmp(mapper->GetClassName(), name))
-    {
-      return nullptr;
-    }
-  }
-  return "OpenGL draws mappers of this class";
+  facts.shader_code = shader &&
+      (shader->HasFragmentShaderCode() || shader->HasVertexShaderCode() || shader->GetNumberOfShaderReplacements() > 0)
+    ? 1
+    : 0;
+  facts.glyphs = mapper->IsA("vtkGlyph3DMapper") ? 1 : 0;
+  facts.texture = rtvTextureBits(actor->GetTexture());
+  facts.num_textures = static_cast<uint32_t>(p->GetAllTextures().size());
+  facts.albedo = rtvTextureBits(p->GetTexture("albedoTex"));
+  facts.material = rtvTextureBits(p->GetTexture("materialTex"));
+  facts.normal = rtvTextureBits(p->GetTexture("normalTex"));
+  facts.emissive = rtvTextureBits(p->GetTexture("emissiveTex"));
+  return facts;
 }
 }
 
@@ -416,23 +363,20 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
     rtvApi->pass(bridge, a.Name.c_str(), reason);
     return false;
   };
+  if (auto volume = vtkVolume::SafeDownCast(prop))
+  {
+    const char* reason = rtvAddVolume(bridge, volume, renderer, a.Name);
+    if (reason)
+    {
+      rtvApi->warn(bridge, (a.Name + ": " + reason + "; OpenGL draws it").c_str());
+    }
+    return reason ? pass(reason) : true;
+  }
   a.Prop = vtkActor::SafeDownCast(prop);
   a.Mapper = a.Prop ? a.Prop->GetMapper() : nullptr;
-  if (!a.Mapper)
-  {
-    if (auto volume = vtkVolume::SafeDownCast(prop))
-    {
-      std::string answer;
-      const char* reason = rtvAddVolume(bridge, volume, renderer, a.Name, answer);
-      if (reason)
-      {
-        rtvApi->warn(bridge, (a.Name + ": " + reason + "; OpenGL draws it").c_str());
-      }
-      return reason ? pass(reason) : true;
-    }
-    return pass("OpenGL draws props of this class");
-  }
-  if (const char* reason = WhyNot(a.Prop, a.Mapper, a.PointRadius, a.LineRadius))
+  RtvActorFacts facts = a.Mapper ? FactsOf(a.Prop, a.Mapper) : RtvActorFacts{};
+  // Refuses everything without a mapper.
+  if (const char* reason = rtvApi->check_actor(bridge, &facts))
   {
     return pass(reason);
   }
@@ -444,7 +388,8 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
     a.Mapper->GetNumberOfInputConnections(0) > 0 ? a.Mapper->GetInputDataObject(0, 0) : nullptr;
   if (!data)
   {
-    return pass("no data");
+    facts.no_data = 1;
+    return pass(rtvApi->check_actor(bridge, &facts));
   }
   a.Points = a.Prop->GetProperty()->GetRepresentation() == VTK_POINTS;
   a.Edges = a.Prop->GetProperty()->GetRepresentation() == VTK_WIREFRAME;
@@ -455,7 +400,7 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
   }
   if (auto glyphs = vtkGlyph3DMapper::SafeDownCast(a.Mapper))
   {
-    const char* reason = rtvAddGlyphs(bridge, a.Prop, glyphs, data, PropertyOf(a.Prop->GetProperty()), a.Name, a.Answer);
+    const char* reason = rtvAddGlyphs(bridge, a.Prop, glyphs, data, PropertyOf(a.Prop->GetProperty()), a.Name);
     return reason ? pass(reason) : true;
   }
   vtkDataSet* set = vtkDataSet::SafeDownCast(data);

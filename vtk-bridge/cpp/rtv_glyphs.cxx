@@ -104,23 +104,21 @@ void Scale(vtkGlyph3DMapper* mapper, vtkDataArray* array, vtkIdType i, double sc
     scale[c] = scale[c] == 0.0 ? 1.0e-10 : scale[c];
   }
 }
-// The glyph sources by index. Returns why not, or null.
-const char* Sources(vtkGlyph3DMapper* mapper, std::vector<vtkPolyData*>& sources)
+
+// The sources by number, as far as the bridge can trace them.
+const char* Sources(
+  RtvBridge* bridge, vtkGlyph3DMapper* mapper, RtvGlyphFacts& facts, std::vector<vtkPolyData*>& sources)
 {
-  const int count = mapper->GetSourceIndexing() ? mapper->GetNumberOfInputConnections(1)
-                                                : std::min(mapper->GetNumberOfInputConnections(1), 1);
-  if (count == 0)
+  for (uint32_t i = 0; i < facts.num_sources; ++i)
   {
-    return "glyphs without a source";
-  }
-  for (int i = 0; i < count; ++i)
-  {
-    mapper->GetInputAlgorithm(1, i)->Update();
-    vtkPolyData* source = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(1, i));
-    if (!source || source->GetNumberOfPolys() + source->GetNumberOfStrips() == 0 ||
-      source->GetNumberOfLines() + source->GetNumberOfVerts() > 0)
+    mapper->GetInputAlgorithm(1, static_cast<int>(i))->Update();
+    vtkPolyData* source = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(1, static_cast<int>(i)));
+    facts.has_source = 1;
+    facts.num_source_polygons = source ? source->GetNumberOfPolys() + source->GetNumberOfStrips() : 0;
+    facts.num_other_source_cells = source ? source->GetNumberOfLines() + source->GetNumberOfVerts() : 0;
+    if (const char* reason = rtvApi->check_glyphs(bridge, &facts))
     {
-      return "glyphs whose source is not polygons";
+      return reason;
     }
     sources.push_back(source);
   }
@@ -143,7 +141,7 @@ size_t SourceOf(vtkDataArray* index, vtkIdType i, size_t count)
   return value >= static_cast<double>(count) ? count - 1 : static_cast<size_t>(value);
 }
 
-const char* AddGlyphsOf(RtvBatch& batch, std::string& answer, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataSet* data,
+const char* AddGlyphsOf(RtvBridge* bridge, RtvBatch& batch, RtvGlyphFacts& facts, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataSet* data,
   const std::vector<vtkPolyData*>& sources, const RtvProperty& property, const std::string& name)
 {
   vtkDataArray* scales = InputArray(mapper, vtkGlyph3DMapper::SCALE, data);
@@ -157,10 +155,14 @@ const char* AddGlyphsOf(RtvBatch& batch, std::string& answer, vtkActor* actor, v
   {
     mapper->ClearColorArrays();
     colors = mapper->MapScalars(data, 1.0, cellFlag);
-    if (colors && (cellFlag != 0 || colors->GetNumberOfComponents() != 4))
-    {
-      return "glyphs with colours that are not of points";
-    }
+  }
+  facts.has_colors = colors ? 1 : 0;
+  facts.color_components = colors ? static_cast<uint32_t>(colors->GetNumberOfComponents()) : 0;
+  facts.num_colors = colors ? static_cast<uint64_t>(colors->GetNumberOfTuples()) : 0;
+  facts.num_points = static_cast<uint64_t>(data->GetNumberOfPoints());
+  if (const char* reason = rtvApi->check_glyphs(bridge, &facts))
+  {
+    return reason;
   }
 
   vtkDataArray* index =
@@ -211,9 +213,10 @@ const char* AddGlyphsOf(RtvBatch& batch, std::string& answer, vtkActor* actor, v
     s.property = property;
     const double* m = &actor->GetMatrix()->Element[0][0];
     std::copy(m, m + 16, s.world_from_data);
-    if (const char* reason = rtvAddShape(s, sources[which], false, pending.Keep, answer))
+    RtvSurfaceFacts shape = {};
+    if (!rtvAddShape(s, sources[which], false, pending.Keep, shape))
     {
-      return reason;
+      return rtvApi->check_surface(bridge, &shape);
     }
     s.glyph_matrices = RtvArray{ matrices.data(), matrices.size() / 16, 16, RTV_F64 };
     s.glyph_colors =
@@ -224,40 +227,50 @@ const char* AddGlyphsOf(RtvBatch& batch, std::string& answer, vtkActor* actor, v
 }
 
 const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* input,
-  const RtvProperty& property, const std::string& name, std::string& answer)
+  const RtvProperty& property, const std::string& name)
 {
-  if (mapper->GetUseSourceTableTree())
+  const int connected = mapper->GetNumberOfInputConnections(1);
+  vtkPlaneCollection* planes = mapper->GetClippingPlanes();
+  vtkCompositeDataDisplayAttributes* blocks = mapper->GetBlockAttributes();
+  RtvGlyphFacts facts = {};
+  facts.source_table_tree = mapper->GetUseSourceTableTree() ? 1 : 0;
+  facts.num_clipping_planes = planes ? static_cast<uint32_t>(planes->GetNumberOfItems()) : 0;
+  facts.num_sources = static_cast<uint32_t>(mapper->GetSourceIndexing() ? connected : std::min(connected, 1));
+  facts.block_attributes =
+    blocks && (blocks->HasBlockVisibilities() || blocks->HasBlockColors() || blocks->HasBlockOpacities()) ? 1 : 0;
+  std::vector<vtkDataSet*> leaves;
+  if (auto data = vtkDataSet::SafeDownCast(input))
   {
-    return "glyphs from a tree of sources";
+    facts.data_set = 1;
+    leaves.push_back(data);
   }
-  if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
+  else if (auto composite = vtkCompositeDataSet::SafeDownCast(input))
   {
-    return "glyphs with clipping planes";
+    facts.composite = 1;
+    auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+    {
+      auto leaf = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
+      facts.num_blocks_without_points += leaf ? 0 : 1;
+      leaves.push_back(leaf);
+    }
+  }
+  if (const char* reason = rtvApi->check_glyphs(bridge, &facts))
+  {
+    return reason;
   }
   std::vector<vtkPolyData*> sources;
-  if (const char* reason = Sources(mapper, sources))
+  if (const char* reason = Sources(bridge, mapper, facts, sources))
   {
     return reason;
   }
   RtvBatch batch;
-  if (auto data = vtkDataSet::SafeDownCast(input))
+  for (vtkDataSet* leaf : leaves)
   {
-    const char* reason = AddGlyphsOf(batch, answer, actor, mapper, data, sources, property, name);
-    return reason ? reason : rtvCommit(bridge, batch);
+    if (const char* reason = AddGlyphsOf(bridge, batch, facts, actor, mapper, leaf, sources, property, name))
+    {
+      return reason;
+    }
   }
-  auto composite = vtkCompositeDataSet::SafeDownCast(input);
-  vtkCompositeDataDisplayAttributes* blocks = mapper->GetBlockAttributes();
-  if (!composite || (blocks && (blocks->HasBlockVisibilities() || blocks->HasBlockColors() || blocks->HasBlockOpacities())))
-  {
-    return "glyphs on blocks with colours or visibility of their own";
-  }
-  auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-  const char* reason = nullptr;
-  for (it->InitTraversal(); !it->IsDoneWithTraversal() && !reason; it->GoToNextItem())
-  {
-    auto leaf = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
-    reason = leaf ? AddGlyphsOf(batch, answer, actor, mapper, leaf, sources, property, name)
-                  : "glyphs on data without points";
-  }
-  return reason ? reason : rtvCommit(bridge, batch);
+  return rtvCommit(bridge, batch);
 }

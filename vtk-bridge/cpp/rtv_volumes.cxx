@@ -1,5 +1,4 @@
-// Passes volumes on uniform grids to the bridge: decides which of them rt-core can draw as VTK
-// does, and why OpenGL draws the others.
+// Volumes of uniform grids to the bridge, which decides from facts about them which it can draw.
 #include "rtv_arrays.h"
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include <vtkLightCollection.h>
 #include <vtkMatrix3x3.h>
 #include <vtkMatrix4x4.h>
+#include <vtkMultiBlockVolumeMapper.h>
 #include <vtkPiecewiseFunction.h>
 #include <vtkPlaneCollection.h>
 #include <vtkSmartVolumeMapper.h>
@@ -32,71 +32,12 @@ namespace
 // The number of entries of OpenGL's tables.
 const int Entries = 1024;
 
-const char* ClassReason(vtkVolume* volume, vtkVolumeMapper* mapper)
-{
-  if (strcmp(volume->GetClassName(), "vtkVolume") && strcmp(volume->GetClassName(), "vtkPVLODVolume"))
-  {
-    return "OpenGL draws volumes of this class";
-  }
-  static const char* const known[] = { "vtkSmartVolumeMapper", "vtkGPUVolumeRayCastMapper", "vtkOpenGLGPUVolumeRayCastMapper",
-    "vtkFixedPointVolumeRayCastMapper", "vtkMultiBlockVolumeMapper" };
-  for (const char* name : known)
-  {
-    if (mapper && !strcmp(mapper->GetClassName(), name))
-    {
-      return nullptr;
-    }
-  }
-  return "OpenGL draws volume mappers of this class";
-}
-
-// The upper end of OpenGL's gradient-opacity table, as a fraction of the scalar range.
+// What OpenGL's table of opacities by gradient reaches to: a quarter of the range of the scalars.
 const double GradientRange = 0.25;
-
-// RTV_BLEND_* of a mapper's blend mode, or -1.
-int BlendOf(int mode)
-{
-  switch (mode)
-  {
-    case vtkVolumeMapper::COMPOSITE_BLEND:
-      return RTV_BLEND_COMPOSITE;
-    case vtkVolumeMapper::MAXIMUM_INTENSITY_BLEND:
-      return RTV_BLEND_MAXIMUM;
-    case vtkVolumeMapper::MINIMUM_INTENSITY_BLEND:
-      return RTV_BLEND_MINIMUM;
-    case vtkVolumeMapper::AVERAGE_INTENSITY_BLEND:
-      return RTV_BLEND_AVERAGE;
-    case vtkVolumeMapper::ADDITIVE_BLEND:
-      return RTV_BLEND_ADDITIVE;
-    case vtkVolumeMapper::ISOSURFACE_BLEND:
-      return RTV_BLEND_ISOSURFACES;
-    default:
-      return -1;
-  }
-}
 
 bool HasGradientOpacity(vtkVolumeProperty* property)
 {
   return !property->GetDisableGradientOpacity(0) && property->HasGradientOpacity(0);
-}
-
-const char* BlendReason(int mode, vtkVolumeProperty* property)
-{
-  const int blend = BlendOf(mode);
-  if (blend < 0)
-  {
-    return mode == vtkVolumeMapper::SLICE_BLEND ? "a volume with slice blending" : "a volume with a blend mode that is not known";
-  }
-  if (blend != RTV_BLEND_COMPOSITE && HasGradientOpacity(property))
-  {
-    return "a volume with gradient opacity and another blending than composite";
-  }
-  // OpenGL shades the largest scalar with the gradient at the end of the ray.
-  if ((blend == RTV_BLEND_MAXIMUM || blend == RTV_BLEND_MINIMUM) && property->GetShade(0))
-  {
-    return "a shaded volume with maximum or minimum intensity blending";
-  }
-  return nullptr;
 }
 
 // The lights of shaded volumes.
@@ -109,29 +50,26 @@ struct Lights
   bool Several = false;
 };
 
-const char* ReadLights(vtkRenderer* renderer, Lights& out)
+void ReadLights(vtkRenderer* renderer, Lights& out, RtvVolumeFacts& facts)
 {
   vtkLightCollection* lights = renderer->GetLights();
   vtkCollectionSimpleIterator it;
   lights->InitTraversal(it);
   bool plain = true, colored = false;
-  int on = 0;
   while (vtkLight* light = lights->GetNextLight(it))
   {
     if (!light->GetSwitch())
     {
       continue;
     }
-    ++on;
-    if (light->GetPositional())
-    {
-      return "a shaded volume under lights that have a place";
-    }
     const double* color = light->GetDiffuseColor();
     const double* ambient = light->GetAmbientColor();
     const double* highlight = light->GetSpecularColor();
     const double strength = light->GetIntensity();
-    // OpenGL handles a headlight of another strength like several lights.
+    facts.num_lights += 1;
+    facts.num_positional_lights += light->GetPositional() ? 1 : 0;
+    facts.num_ambient_lights += ambient[0] != 0.0 || ambient[1] != 0.0 || ambient[2] != 0.0 ? 1 : 0;
+    // OpenGL takes a headlight of another strength for one of several.
     plain = plain && light->LightTypeIsHeadlight() && strength == 1.0;
     double from[3], to[3];
     light->GetTransformedPosition(from);
@@ -139,10 +77,6 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
     for (int c = 0; c < 3; ++c)
     {
       colored = colored || strength * color[c] != 1.0 || strength * highlight[c] != 1.0;
-      if (ambient[c] != 0.0)
-      {
-        return "a shaded volume under lights with an ambient colour";
-      }
       out.List.push_back(static_cast<float>(from[c] - to[c]));
     }
     for (int c = 0; c < 3; ++c)
@@ -150,15 +84,7 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
       out.List.push_back(static_cast<float>(strength * color[c]));
     }
   }
-  if (on == 0)
-  {
-    return "a shaded volume without a light";
-  }
-  out.Several = on > 1 || !plain;
-  if (on > 6)
-  {
-    return "a shaded volume under more than six lights";
-  }
+  out.Several = facts.num_lights > 1 || !plain;
   if (!out.Several && colored)
   {
     // A single headlight is at the viewer, not directional.
@@ -168,63 +94,52 @@ const char* ReadLights(vtkRenderer* renderer, Lights& out)
   {
     out.List.clear();
   }
-  return nullptr;
+  facts.num_listed_lights = static_cast<uint32_t>(out.List.size() / 6);
 }
 
-const char* MapperReason(vtkVolumeMapper* mapper)
+// What only some mappers and versions have; overloads with `long` are for the others.
+template <class M>
+auto HasScattering(M* m, int) -> decltype(m->GetVolumetricScatteringBlending(), m->GetGlobalIlluminationReach() > 0.0f)
 {
-  if (mapper->GetCropping())
-  {
-    return "a cropped volume";
-  }
-  if (mapper->GetClippingPlanes() && mapper->GetClippingPlanes()->GetNumberOfItems() > 0)
-  {
-    return "a volume with clipping planes";
-  }
-  if (auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper))
-  {
-    if (gpu->GetMaskInput())
-    {
-      return "a volume with a mask";
-    }
-#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
-    if (gpu->GetGlobalIlluminationReach() > 0.0f || gpu->GetVolumetricScatteringBlending() > 0.0f)
-    {
-      return "a volume with shadows or scattering of its own";
-    }
-#endif
-  }
-  if (auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper))
-  {
-    if (smart->GetVectorMode() != vtkSmartVolumeMapper::DISABLED)
-    {
-      return "a volume of vectors";
-    }
-#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
-    if (smart->GetGlobalIlluminationReach() > 0.0f || smart->GetVolumetricScatteringBlending() > 0.0f)
-    {
-      return "a volume with shadows or scattering of its own";
-    }
-#endif
-  }
-  return nullptr;
+  return m->GetGlobalIlluminationReach() > 0.0f || m->GetVolumetricScatteringBlending() > 0.0f;
 }
 
-const char* PropertyReason(vtkVolumeProperty* property)
+template <class M>
+bool HasScattering(M*, long)
 {
-  if (property->GetTransferFunctionMode() != vtkVolumeProperty::TF_1D)
-  {
-    return "a volume with a two-dimensional transfer function";
-  }
-  if (property->HasLabelGradientOpacity() || property->GetLabelColor(1) || property->GetLabelScalarOpacity(1))
-  {
-    return "a volume with labels";
-  }
-  return nullptr;
+  return false;
+}
+
+void ReadMapper(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
+{
+  vtkPlaneCollection* planes = mapper->GetClippingPlanes();
+  facts.cropping = mapper->GetCropping() ? 1 : 0;
+  facts.num_clipping_planes = planes ? static_cast<uint32_t>(planes->GetNumberOfItems()) : 0;
+  facts.blend_mode = static_cast<uint32_t>(mapper->GetBlendMode());
+  auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper);
+  auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper);
+  auto blocks = vtkMultiBlockVolumeMapper::SafeDownCast(mapper);
+  facts.mask = gpu && gpu->GetMaskInput() ? 1 : 0;
+  facts.scattering = (gpu && HasScattering(gpu, 0)) || (smart && HasScattering(smart, 0)) ||
+      (blocks && HasScattering(blocks, 0))
+    ? 1
+    : 0;
+  const int off = vtkSmartVolumeMapper::DISABLED;
+  facts.vectors = (smart && smart->GetVectorMode() != off) || (blocks && blocks->GetVectorMode() != off) ? 1 : 0;
+}
+
+void ReadProperty(vtkVolumeProperty* property, RtvVolumeFacts& facts)
+{
+  facts.transfer_function_2d = property->GetTransferFunctionMode() != vtkVolumeProperty::TF_1D ? 1 : 0;
+  facts.labels =
+    property->HasLabelGradientOpacity() || property->GetLabelColor(1) || property->GetLabelScalarOpacity(1) ? 1 : 0;
+  facts.gradient_opacity = HasGradientOpacity(property) ? 1 : 0;
+  facts.shade = property->GetShade(0) ? 1 : 0;
+  facts.specular = property->GetSpecular(0);
 }
 
 const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, const Lights& lights,
-  const std::string& name, std::string& answer)
+  const std::string& name, RtvVolumeFacts& facts)
 {
   vtkVolumeProperty* property = volume->GetProperty();
   RtvVolume v = {};
@@ -233,26 +148,30 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   image->GetExtent(extent);
   for (int axis = 0; axis < 3; ++axis)
   {
-    v.dims[axis] = static_cast<uint32_t>(extent[2 * axis + 1] - extent[2 * axis] + 1);
+    v.dims[axis] = static_cast<uint32_t>(std::max(0, extent[2 * axis + 1] - extent[2 * axis] + 1));
     v.spacing[axis] = image->GetSpacing()[axis];
-    if (extent[2 * axis + 1] <= extent[2 * axis])
-    {
-      return "a volume one point thick";
-    }
+    facts.dims[axis] = v.dims[axis];
   }
-  if (image->HasAnyBlankPoints() || image->HasAnyBlankCells())
-  {
-    return "a volume with blanked parts";
-  }
+  facts.image = 1;
+  facts.blanked = image->HasAnyBlankPoints() || image->HasAnyBlankCells() ? 1 : 0;
   vtkDataArray* scalars = vtkAbstractMapper::GetScalars(
     image, mapper->GetScalarMode(), mapper->GetArrayAccessMode(), mapper->GetArrayId(), mapper->GetArrayName(), cellFlag);
-  if (!scalars || cellFlag != 0)
+  facts.scalars = scalars ? 1 : 0;
+  facts.cell_scalars = cellFlag != 0 ? 1 : 0;
+  facts.num_components = scalars ? static_cast<uint32_t>(scalars->GetNumberOfComponents()) : 0;
+  if (scalars)
   {
-    return scalars ? "a volume of cells' values" : "a volume without scalars";
+    scalars->GetFiniteRange(v.range, 0);
+    if (!(v.range[1] > v.range[0]))
+    {
+      v.range[1] = v.range[0] + std::max(1e-6 * std::abs(v.range[0]), 1e-30);
+    }
+    std::copy(v.range, v.range + 2, facts.range);
   }
-  if (scalars->GetNumberOfComponents() != 1)
+  std::copy(mapper->GetAverageIPScalarRange(), mapper->GetAverageIPScalarRange() + 2, facts.average_range);
+  if (const char* reason = rtvApi->check_volume(bridge, &facts))
   {
-    return "a volume of several components";
+    return reason;
   }
 
   // ---- Scalars, unless they are cached.
@@ -306,26 +225,16 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), local, world);
   std::copy(&world->Element[0][0], &world->Element[0][0] + 16, v.world_from_data);
 
-  // ---- Tables over the range of the scalars, as in OpenGL.
-  scalars->GetFiniteRange(v.range, 0);
-  if (!(v.range[1] > v.range[0]))
-  {
-    v.range[1] = v.range[0] + std::max(1e-6 * std::abs(v.range[0]), 1e-30);
-  }
-  const int blend = BlendOf(mapper->GetBlendMode());
+  // ---- Tables over the range of the scalars, as OpenGL's are.
+  v.blend = facts.blend_mode;
   std::vector<float> colors(3 * Entries), opacities(Entries), gradients;
   std::vector<double> isovalues;
-  if (blend == RTV_BLEND_AVERAGE || blend == RTV_BLEND_ADDITIVE)
+  if (v.blend == RTV_BLEND_AVERAGE || v.blend == RTV_BLEND_ADDITIVE)
   {
     // Average and additive blending use the scalars themselves, mapped from black to white.
     for (int i = 0; i < 3 * Entries; ++i)
     {
       colors[i] = static_cast<float>(i / 3) / (Entries - 1);
-    }
-    const double* range = mapper->GetAverageIPScalarRange();
-    if (blend == RTV_BLEND_AVERAGE && (range[0] > v.range[0] || range[1] < v.range[1]))
-    {
-      return "a volume with average intensity blending of a part of its scalars";
     }
   }
   else if (property->GetColorChannels(0) == 1)
@@ -346,8 +255,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   v.opacities = RtvArray{ opacities.data(), Entries, 1, RTV_F32 };
   v.unit_distance = property->GetScalarOpacityUnitDistance(0);
   v.nearest = property->GetInterpolationType() == VTK_NEAREST_INTERPOLATION ? 1 : 0;
-  v.blend = static_cast<uint32_t>(blend);
-  if (blend == RTV_BLEND_ISOSURFACES)
+  if (v.blend == RTV_BLEND_ISOSURFACES)
   {
     vtkContourValues* values = property->GetIsoSurfaceValues();
     isovalues.assign(values->GetValues(), values->GetValues() + values->GetNumberOfContours());
@@ -378,71 +286,47 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
 #if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
   v.specular_mirrored = 1;
 #endif
-  const char* reason = rtvApi->volume(bridge, &v);
-  answer = reason ? reason : "";
-  return reason ? answer.c_str() : nullptr;
+  return rtvApi->volume(bridge, &v);
 }
 }
 
-const char* rtvAddVolume(
-  RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name, std::string& answer)
+const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name)
 {
   auto mapper = vtkVolumeMapper::SafeDownCast(volume->GetMapper());
-  if (const char* reason = ClassReason(volume, mapper))
+  RtvVolumeFacts facts = {};
+  facts.volume_class = volume->GetClassName();
+  facts.mapper_class = mapper ? mapper->GetClassName() : nullptr;
+  if (const char* reason = rtvApi->check_volume(bridge, &facts))
   {
     return reason;
   }
-  if (const char* reason = MapperReason(mapper))
-  {
-    return reason;
-  }
-  if (const char* reason = PropertyReason(volume->GetProperty()))
-  {
-    return reason;
-  }
-  if (const char* reason = BlendReason(mapper->GetBlendMode(), volume->GetProperty()))
-  {
-    return reason;
-  }
+  ReadMapper(mapper, facts);
+  ReadProperty(volume->GetProperty(), facts);
   Lights lights;
-  if (volume->GetProperty()->GetShade(0))
+  if (facts.shade)
   {
-    if (const char* reason = ReadLights(renderer, lights))
-    {
-      return reason;
-    }
-    // In VTK 9.1, OpenGL's highlight under several lights is that of the last one, seen from a
-    // mirrored position.
-    if (!lights.List.empty() && volume->GetProperty()->GetSpecular(0) > 0.0)
-    {
-      return "a shaded volume with a highlight under other lights than one white headlight";
-    }
+    ReadLights(renderer, lights, facts);
+  }
+  if (const char* reason = rtvApi->check_volume(bridge, &facts))
+  {
+    return reason;
   }
   if (mapper->GetNumberOfInputConnections(0) > 0 && mapper->GetInputAlgorithm(0, 0))
   {
     mapper->GetInputAlgorithm(0, 0)->Update();
   }
   vtkDataObject* data = mapper->GetNumberOfInputConnections(0) > 0 ? mapper->GetInputDataObject(0, 0) : nullptr;
-  if (auto image = vtkImageData::SafeDownCast(data))
-  {
-    return AddGrid(bridge, mapper, volume, image, lights, name, answer);
-  }
-  auto composite = vtkCompositeDataSet::SafeDownCast(data);
-  vtkImageData* only = nullptr;
-  int leaves = 0;
-  if (composite)
+  vtkImageData* image = vtkImageData::SafeDownCast(data);
+  if (auto composite = vtkCompositeDataSet::SafeDownCast(data))
   {
     auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
     for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
     {
-      only = vtkImageData::SafeDownCast(it->GetCurrentDataObject());
-      ++leaves;
+      // One block is as good as the image alone.
+      image = facts.num_blocks == 0 ? vtkImageData::SafeDownCast(it->GetCurrentDataObject()) : nullptr;
+      ++facts.num_blocks;
     }
   }
-  if (leaves == 1 && only)
-  {
-    return AddGrid(bridge, mapper, volume, only, lights, name, answer);
-  }
-  // Each block would need tables over the range of all blocks.
-  return leaves > 1 ? "a volume of several blocks" : "a volume that is not image data";
+  facts.has_data = 1;
+  return image ? AddGrid(bridge, mapper, volume, image, lights, name, facts) : rtvApi->check_volume(bridge, &facts);
 }

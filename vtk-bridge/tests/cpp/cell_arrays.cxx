@@ -99,9 +99,9 @@ void Polygons(vtkCellArray* cells, const char* name)
   data->SetPolys(cells);
   RtvKeep keep;
   RtvSurface s = {};
-  std::string answer;
-  const char* reason = rtvAddShape(s, data, false, keep, answer);
-  Check(!reason && Has(s.polys.offsets, Offsets) && Has(s.polys.connectivity, Corners), name);
+  RtvSurfaceFacts facts = {};
+  const bool read = rtvAddShape(s, data, false, keep, facts);
+  Check(read && !facts.unreadable_cells && Has(s.polys.offsets, Offsets) && Has(s.polys.connectivity, Corners), name);
 }
 }
 
