@@ -11,7 +11,7 @@ from . import library as rtv
 from .glyphs import Glyphs, leaves_of, sources_of
 from .shape import Shapes
 from .volumes import Volumes
-from .why import POINTS, SURFACE, WIREFRAME, Untraceable, check_actor, check_cells
+from .eligibility import POINTS, SURFACE, WIREFRAME, Untraceable, check_actor, check_cells
 
 FLAT, PBR = 0, 3
 

@@ -5,7 +5,7 @@ from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vt
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
 from .arrays import key_of, numbers, rgba_of
-from .why import Untraceable
+from .eligibility import Untraceable
 
 _REAL = [np.dtype(np.float64)]
 # Indices of the mapper's arrays.

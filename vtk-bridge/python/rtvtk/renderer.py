@@ -13,7 +13,7 @@ from . import library as rtv
 from .extract import Extractor
 from .overlay import Overlay
 from .view import add_lights, prepare_lights, size_of, view_of
-from .why import Untraceable
+from .eligibility import Untraceable
 
 _VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion())
 
