@@ -106,14 +106,6 @@ def add_colors(bridge, surface, mapper, data, cell_map, keep):
     surface.colors = rtv.Array.of(rgba)
 
 
-def why_not_texture(texture):
-    if texture.GetTransform():
-        return "a texture with a transform"
-    if texture.GetCubeMap():
-        return "a cube map"
-    return None
-
-
 # Textures of a property, by the library's field that receives them.
 MAPS = {"material": "materialTex", "normal": "normalTex", "emissive": "emissiveTex"}
 

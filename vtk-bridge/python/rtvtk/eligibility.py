@@ -1,12 +1,11 @@
-"""Reasons in an actor itself and in its cells for which OpenGL has to draw it."""
+"""Asks the library which props it can trace: facts about them, and its reason for OpenGL to draw one."""
+import ctypes as C
+
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
-from . import arrays
+from . import library as rtv
+from .arrays import MAPS
 
-ACTORS = {"vtkActor", "vtkOpenGLActor", "vtkLODActor", "vtkQuadricLODActor"}
-MAPPERS = {"vtkPolyDataMapper", "vtkOpenGLPolyDataMapper", "vtkCompositePolyDataMapper", "vtkDataSetMapper", "vtkGlyph3DMapper",
-           "vtkOpenGLGlyph3DMapper"}
-POINTS, WIREFRAME, SURFACE = range(3)
 _PBR = 3
 
 
@@ -14,74 +13,44 @@ class Untraceable(Exception):
     """Raised for a prop that OpenGL has to draw; the text says why."""
 
 
-def check_actor(actor, mapper, point_radius, line_radius):
-    p = actor.GetProperty()
-    # Classes derived in Python (PyVista's) are recognised by the names of their VTK base classes.
-    if actor.GetClassName() not in ACTORS:
-        raise Untraceable("OpenGL draws props of this class")
-    if p.GetRepresentation() == WIREFRAME and line_radius <= 0:
-        raise Untraceable("wireframe (set RTV_LINE_RADIUS to trace edges as tubes)")
-    if p.GetRepresentation() == POINTS and point_radius <= 0:
-        raise Untraceable("points (set RTV_POINT_RADIUS to trace them as spheres)")
-    if p.GetRepresentation() == SURFACE and p.GetEdgeVisibility():
-        _check_edges(actor, mapper, p)
-    if p.GetRepresentation() == SURFACE and p.GetVertexVisibility():
-        raise Untraceable("vertices on the surface")
-    back = actor.GetBackfaceProperty()
-    if back is not None:
-        if actor.HasTranslucentPolygonalGeometry() or back.GetOpacity() < 1:
-            raise Untraceable("translucent backs with a property of their own")
-        if isinstance(mapper, vtkGlyph3DMapper):
-            raise Untraceable("glyphs whose backs have a property of their own")
-    if p.GetInterpolation() == _PBR:
-        if p.GetCoatStrength() > 0 or p.GetAnisotropy() != 0:
-            raise Untraceable("a clear coat or anisotropy")
-        if p.GetMetallic() > 0 and p.GetEdgeTint() != (1, 1, 1):
-            raise Untraceable("a metal with an edge tint")
-    if p.GetNumberOfTextures() > 0:
-        _check_textures(actor, mapper, p)
-    shader = actor.GetShaderProperty()
-    if shader.HasFragmentShaderCode() or shader.HasVertexShaderCode() or shader.GetNumberOfShaderReplacements() > 0:
-        raise Untraceable("shader code of its own")
-    if actor.GetTexture() is not None:
-        reason = arrays.why_not_texture(actor.GetTexture())
-        if reason:
-            raise Untraceable(reason)
-    if mapper.GetClassName() not in MAPPERS:
-        raise Untraceable("OpenGL draws mappers of this class")
+def require(check, facts):
+    """Raises `Untraceable` if a function of the library (`check`) finds a reason in `facts`."""
+    reason = check(C.byref(facts))
+    if reason:
+        raise Untraceable(reason.decode())
 
 
-def _check_edges(actor, mapper, p):
-    if p.GetRenderLinesAsTubes():
-        raise Untraceable("edges as shaded tubes on the surface")
-    if hasattr(p, "GetEdgeOpacity") and p.GetEdgeOpacity() < 1:
-        raise Untraceable("translucent edges on the surface")
-    if actor.HasTranslucentPolygonalGeometry():
-        raise Untraceable("edges on a translucent surface")
-    if mapper.GetClippingPlanes() and mapper.GetClippingPlanes().GetNumberOfItems() > 0:
-        raise Untraceable("edges on a clipped surface")
+def texture_bits(texture):
+    if texture is None:
+        return 0
+    transform, cube = (rtv.TEXTURE_TRANSFORM if texture.GetTransform() else 0), (rtv.TEXTURE_CUBE_MAP if texture.GetCubeMap() else 0)
+    return rtv.TEXTURE | transform | cube
 
 
-def _check_textures(actor, mapper, p):
-    known = [t for t in (p.GetTexture(name) for name in ("albedoTex", *arrays.MAPS.values())) if t is not None]
-    if p.GetNumberOfTextures() > len(known):
-        raise Untraceable("textures of the property for coats or anisotropy, or of a program's own shader")
-    if isinstance(mapper, vtkGlyph3DMapper) and any(p.GetTexture(name) is not None for name in arrays.MAPS.values()):
-        raise Untraceable("glyphs with textures of the property other than its base colour")
-    if actor.GetTexture() is not None:
-        raise Untraceable("a texture and a texture of the property")
-    if p.GetInterpolation() != _PBR:
-        raise Untraceable("textures of the property without physically based shading")
-    for texture in known:
-        reason = arrays.why_not_texture(texture)
-        if reason:
-            raise Untraceable(reason)
+def actor_facts(actor, mapper):
+    f = rtv.ActorFacts()
+    # Classes derived in Python (PyVista's) have the names of their VTK base classes.
+    f.actor_class, f.mapper_class = actor.GetClassName().encode(), mapper.GetClassName().encode()
+    p, back, shader, planes = actor.GetProperty(), actor.GetBackfaceProperty(), actor.GetShaderProperty(), mapper.GetClippingPlanes()
+    f.representation, f.pbr = p.GetRepresentation(), p.GetInterpolation() == _PBR
+    f.edge_visibility, f.lines_as_tubes = bool(p.GetEdgeVisibility()), bool(p.GetRenderLinesAsTubes())
+    f.edge_opacity = p.GetEdgeOpacity() if hasattr(p, "GetEdgeOpacity") else 1.0
+    f.vertex_visibility = bool(p.GetVertexVisibility())
+    f.has_back, f.back_opacity = back is not None, back.GetOpacity() if back is not None else 1.0
+    # It may look at all colours, so only where it matters.
+    f.translucent = bool((f.edge_visibility or f.has_back) and actor.HasTranslucentPolygonalGeometry())
+    f.num_clipping_planes = planes.GetNumberOfItems() if planes else 0
+    f.coat_strength, f.anisotropy, f.metallic, f.edge_tint[:] = p.GetCoatStrength(), p.GetAnisotropy(), p.GetMetallic(), p.GetEdgeTint()
+    f.shader_code = bool(shader.HasFragmentShaderCode() or shader.HasVertexShaderCode() or shader.GetNumberOfShaderReplacements() > 0)
+    f.glyphs = isinstance(mapper, vtkGlyph3DMapper)
+    f.texture, f.num_textures = texture_bits(actor.GetTexture()), p.GetNumberOfTextures()
+    if f.num_textures:
+        f.albedo = texture_bits(p.GetTexture("albedoTex"))
+        for field, name in MAPS.items():
+            setattr(f, field, texture_bits(p.GetTexture(name)))
+    return f
 
 
-def check_cells(data, representation, point_radius, line_radius):
-    if representation != SURFACE:
-        return
-    if data.GetNumberOfVerts() > 0 and point_radius <= 0:
-        raise Untraceable("it has vertices (set RTV_POINT_RADIUS to trace them as spheres)")
-    if data.GetNumberOfLines() > 0 and line_radius <= 0:
-        raise Untraceable("it has lines (set RTV_LINE_RADIUS to trace them as tubes)")
+def prop_facts(prop):
+    """Facts about a prop that is neither an actor with a mapper nor a volume."""
+    return rtv.ActorFacts(actor_class=prop.GetClassName().encode())

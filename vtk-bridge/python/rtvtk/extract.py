@@ -1,4 +1,4 @@
-"""Converts props to surfaces: decides which are traced, and says why OpenGL draws the others."""
+"""Converts props to surfaces. Which of them are traced decides the library from facts about them."""
 import ctypes as C
 
 import numpy as np
@@ -8,10 +8,10 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkVolume
 
 from . import arrays
 from . import library as rtv
-from .glyphs import Glyphs, leaves_of, sources_of
+from .eligibility import Untraceable, actor_facts, prop_facts, require
+from .glyphs import GlyphInput, Glyphs
 from .shape import Shapes
 from .volumes import Volumes
-from .eligibility import POINTS, SURFACE, WIREFRAME, Untraceable, check_actor, check_cells
 
 FLAT, PBR = 0, 3
 
@@ -23,7 +23,7 @@ def _property(p):
     out.opacity, out.metallic, out.roughness, out.base_ior = p.GetOpacity(), p.GetMetallic(), p.GetRoughness(), p.GetBaseIOR()
     out.flat, out.pbr, out.lighting = p.GetInterpolation() == FLAT, p.GetInterpolation() == PBR, bool(p.GetLighting())
     out.cull_front, out.cull_back = bool(p.GetFrontfaceCulling()), bool(p.GetBackfaceCulling())
-    if p.GetEdgeVisibility() and p.GetRepresentation() == SURFACE:
+    if p.GetEdgeVisibility() and p.GetRepresentation() == rtv.SURFACE:
         by_line = not hasattr(p, "GetUseLineWidthForEdgeThickness") or p.GetUseLineWidthForEdgeThickness()
         out.edge_color[:] = p.GetEdgeColor()
         # OpenGL's lines are never thinner than this.
@@ -63,23 +63,24 @@ class Extractor:
     def add(self, renderer, prop, name):
         """Passes a prop to the bridge, or raises `Untraceable`."""
         if isinstance(prop, vtkVolume):
-            reason = self._volumes.add(self._bridge, prop, renderer, name)
-            if reason:
+            try:
+                return self._volumes.add(self._bridge, prop, renderer, name)
+            except Untraceable as reason:
                 self._bridge.warn(f"{name}: {reason}; OpenGL draws it")
-                raise Untraceable(reason)
+                raise
+        mapper = prop.GetMapper() if isinstance(prop, vtkActor) else None
+        if mapper is not None and self._add_again(prop, mapper, name):
             return
-        if not isinstance(prop, vtkActor) or prop.GetMapper() is None:
-            raise Untraceable("OpenGL draws props of this class")
-        mapper = prop.GetMapper()
-        if self._add_again(prop, mapper, name):
-            return
-        check_actor(prop, mapper, *self._radii)
+        facts = prop_facts(prop) if mapper is None else actor_facts(prop, mapper)
+        # Refuses everything without a mapper.
+        require(self._bridge.check_actor, facts)
         connected = mapper.GetNumberOfInputConnections(0) > 0
         if connected and not mapper.GetStatic():
             mapper.Update()
         data = mapper.GetInputDataObject(0, 0) if connected else None
         if data is None:
-            raise Untraceable("no data")
+            facts.no_data = 1
+            require(self._bridge.check_actor, facts)
         if isinstance(mapper, vtkGlyph3DMapper):
             return self._add_glyphs(prop, mapper, data, name)
         if data.IsA("vtkDataSet") and not isinstance(data, vtkPolyData):
@@ -90,19 +91,25 @@ class Extractor:
         # translucent block, it would be blended twice.
         batch = []
         representation = prop.GetProperty().GetRepresentation()
-        blocks = list(_leaves(data, attributes, start, ""))
-        for block, _, _ in blocks:
-            check_cells(block, representation, *self._radii)
-        for block, state, block_name in blocks:
+        blocks = [(self._data_facts(leaf, representation), leaf, *rest) for leaf, *rest in _leaves(data, attributes, start, "")]
+        for facts, block, state, block_name in blocks:
             alone = data is block and not attributes
-            if block.GetNumberOfPoints() > 0 and (block.GetNumberOfCells() > 0 or representation == POINTS):
+            if block.GetNumberOfPoints() > 0 and (block.GetNumberOfCells() > 0 or representation == rtv.POINTS):
                 shown_as = f"{name}, block {block_name}" if block_name else name
-                batch.append(self._block(prop, mapper, block, state, shown_as, alone))
+                batch.append(self._block(prop, mapper, block, facts, state, shown_as, alone))
         self._commit(batch)
         for s, keep, shown in batch:
             if shown is not None:
                 self._used.add(prop.__this__)
                 self._plain[prop.__this__] = self._times(prop, mapper, shown), s, keep
+
+    def _data_facts(self, data, representation):
+        """Facts about a block, so far as they do not refuse it."""
+        facts = rtv.SurfaceFacts(representation=representation, not_polygons=not isinstance(data, vtkPolyData))
+        if not facts.not_polygons:
+            facts.num_verts, facts.num_lines = data.GetNumberOfVerts(), data.GetNumberOfLines()
+        require(self._bridge.check_surface, facts)
+        return facts
 
     def _commit(self, batch):
         """Passes all of a prop's surfaces (the first of each entry) to the library, or none."""
@@ -110,7 +117,7 @@ class Extractor:
             return
         surfaces = (rtv.Surface * len(batch))(*(entry[0] for entry in batch))
         if self._bridge.surfaces(surfaces, len(batch)) < 0:
-            raise Untraceable("its arrays do not fit together (a warning names them)")
+            require(self._bridge.check_surface, rtv.SurfaceFacts(invalid_arrays=1))
         for s, *_ in batch:
             self._shapes.given(s.shape_key)
 
@@ -164,9 +171,9 @@ class Extractor:
         return s, matrix
 
     def _add_glyphs(self, actor, mapper, data, name):
-        sources = sources_of(mapper, data)
-        leaves = leaves_of(mapper, data)
-        copies = [c for leaf in leaves for c in self._glyphs.of(mapper, leaf, len(sources))]
+        given = GlyphInput(self._bridge, mapper, data)
+        sources = given.sources
+        copies = [c for leaf in given.leaves for c in self._glyphs.of(mapper, leaf, given)]
         batch = []
         for which, matrices, rgba in copies:
             s, _ = self._start(actor, f"{name}, source {which}" if len(sources) > 1 else name)
@@ -178,7 +185,7 @@ class Extractor:
                 s.glyph_colors = rtv.Array.of(rgba)
         self._commit(batch)
 
-    def _block(self, actor, mapper, data, state, name, alone):
+    def _block(self, actor, mapper, data, facts, state, name, alone):
         """A block's surface, the arrays that it needs, and its data if the next frame may reuse
         the surface unchanged."""
         representation = actor.GetProperty().GetRepresentation()
@@ -191,31 +198,27 @@ class Extractor:
         if back is not None:
             _add_back(s, _property(back))
         s.point_radius, s.line_radius = self._radii
-        s.edges_only = representation == WIREFRAME
+        s.edges_only = representation == rtv.WIREFRAME
         planes = _planes(mapper, matrix)
-        cell_map = self._shapes.add(s, data, representation == POINTS, planes, keep)
+        cell_map = self._shapes.add(s, data, representation == rtv.POINTS, planes, keep)
         if not state["color"]:
             arrays.add_colors(self._bridge, s, mapper, data, cell_map, keep)
         if s.color_source != rtv.COLOR_PROPERTY:
             # Colours of points and cells are visible on both sides.
             s.has_back = 0
-        if cell_map is not None and s.property.edge_width > 0:
-            raise Untraceable("edges of polygons that are not convex")
-        texture = actor.GetTexture()
+        texture, texcoords = actor.GetTexture(), data.GetPointData().GetTCoords()
         if actor.GetProperty().GetTexture("albedoTex") is not None:
             texture = actor.GetProperty().GetTexture("albedoTex")
             # The texture's alpha replaces the opacity.
             s.property.opacity = 1.0
+        maps = self._textures.maps_of(actor.GetProperty(), texcoords)
+        facts.triangulated, facts.edges = cell_map is not None, s.property.edge_width > 0
+        facts.texture, facts.maps = texture is not None, maps is not None
+        facts.has_back, facts.color_source = s.has_back, s.color_source
+        require(self._bridge.check_surface, facts)
         if texture is not None:
-            if s.has_back:
-                raise Untraceable("a texture on a surface whose backs have a property of their own")
-            if s.color_source != rtv.COLOR_PROPERTY:
-                raise Untraceable("it has a texture and colours")
-            self._textures.add(s, texture, data.GetPointData().GetTCoords())
-        maps = self._textures.maps_of(actor.GetProperty(), data.GetPointData().GetTCoords())
+            self._textures.add(s, texture, texcoords)
         if maps is not None:
-            if s.has_back:
-                raise Untraceable("textures of the property on a surface whose backs have a property of their own")
             s.maps = C.pointer(maps)
         cells_given = any(c.offsets.kind for c in (s.verts, s.lines, s.polys, s.strips))
         plain = all(part is None for part in (planes, texture, maps, back))
@@ -245,7 +248,7 @@ def _planes(mapper, matrix):
 
 
 def _leaves(data, attributes, state, name):
-    """The visible polygon data below `data`, with the attributes of their blocks."""
+    """The visible polygon data below `data` with the attributes of their blocks, and all that is neither polygons nor blocks."""
     if data is None:
         return
     if attributes is not None:
@@ -263,6 +266,7 @@ def _leaves(data, attributes, state, name):
         if state["visible"]:
             yield data, state, name
         return
+    children = []
     if isinstance(data, vtkMultiBlockDataSet):
         children = [data.GetBlock(i) for i in range(data.GetNumberOfBlocks())]
     elif isinstance(data, vtkPartitionedDataSet):
@@ -270,6 +274,6 @@ def _leaves(data, attributes, state, name):
     elif isinstance(data, vtkPartitionedDataSetCollection):
         children = [data.GetPartitionedDataSet(i) for i in range(data.GetNumberOfPartitionedDataSets())]
     else:
-        raise Untraceable("its data are not polygons")
+        yield data, state, name
     for i, child in enumerate(children):
         yield from _leaves(child, attributes, state, f"{name}/{i}" if name else str(i))

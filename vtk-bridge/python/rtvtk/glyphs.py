@@ -4,50 +4,56 @@ from vtkmodules.vtkCommonCore import vtkBitArray
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkDataObject, vtkDataSet, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
+from . import library as rtv
 from .arrays import key_of, numbers, rgba_of
-from .eligibility import Untraceable
+from .eligibility import require
 
 _REAL = [np.dtype(np.float64)]
 # Indices of the mapper's arrays.
 _SCALE, _INDEX, _MASK, _ORIENTATION = range(4)
 
 
-def sources_of(mapper, data):
-    """The glyph sources by index."""
-    if mapper.GetUseSourceTableTree():
-        raise Untraceable("glyphs from a tree of sources")
-    if mapper.GetNumberOfClippingPlanes() > 0:
-        raise Untraceable("glyphs with clipping planes")
-    count = mapper.GetNumberOfInputConnections(1)
-    count = count if mapper.GetSourceIndexing() else min(count, 1)
-    if count == 0:
-        raise Untraceable("glyphs without a source")
-    found = []
-    for i in range(count):
+class GlyphInput:
+    """The sources of a glyph mapper by index, and the data sets whose points have glyphs. Raises `Untraceable`."""
+
+    def __init__(self, bridge, mapper, data):
+        self._check, self.facts = bridge.check_glyphs, _facts(mapper, data)
+        self.require()
+        self.sources = [self._source(mapper, i) for i in range(self.facts.num_sources)]
+        self.leaves = _leaves(data)
+
+    def require(self):
+        require(self._check, self.facts)
+
+    def _source(self, mapper, i):
         mapper.GetInputAlgorithm(1, i).Update()
-        source = mapper.GetInputDataObject(1, i)
-        if not isinstance(source, vtkPolyData) or source.GetNumberOfPolys() + source.GetNumberOfStrips() == 0 or (
-                source.GetNumberOfLines() + source.GetNumberOfVerts() > 0):
-            raise Untraceable("glyphs whose source is not polygons")
-        found.append(source)
-    return found
+        source, f = mapper.GetInputDataObject(1, i), self.facts
+        is_polydata, f.has_source = isinstance(source, vtkPolyData), 1
+        f.num_source_polygons = source.GetNumberOfPolys() + source.GetNumberOfStrips() if is_polydata else 0
+        f.num_other_source_cells = source.GetNumberOfLines() + source.GetNumberOfVerts() if is_polydata else 0
+        self.require()
+        return source
 
 
-def leaves_of(mapper, data):
-    """The data sets whose points have glyphs."""
+def _facts(mapper, data):
+    f, connected, blocks = rtv.GlyphFacts(), mapper.GetNumberOfInputConnections(1), mapper.GetBlockAttributes()
+    f.source_table_tree, f.num_clipping_planes = bool(mapper.GetUseSourceTableTree()), mapper.GetNumberOfClippingPlanes()
+    f.num_sources = connected if mapper.GetSourceIndexing() else min(connected, 1)
+    f.data_set, f.composite = isinstance(data, vtkDataSet), isinstance(data, vtkCompositeDataSet)
+    f.block_attributes = bool(blocks and (blocks.HasBlockVisibilities() or blocks.HasBlockColors() or blocks.HasBlockOpacities()))
+    if f.composite:
+        f.num_blocks_without_points = sum(not isinstance(leaf, vtkDataSet) for leaf in _leaves(data))
+    return f
+
+
+def _leaves(data):
     if isinstance(data, vtkDataSet):
         return [data]
-    blocks = mapper.GetBlockAttributes()
-    if not isinstance(data, vtkCompositeDataSet) or (
-            blocks and (blocks.HasBlockVisibilities() or blocks.HasBlockColors() or blocks.HasBlockOpacities())):
-        raise Untraceable("glyphs on blocks with colours or visibility of their own")
     leaves, it = [], data.NewIterator()
     it.InitTraversal()
     while not it.IsDoneWithTraversal():
         leaves.append(it.GetCurrentDataObject())
         it.GoToNextItem()
-    if not all(isinstance(leaf, vtkDataSet) for leaf in leaves):
-        raise Untraceable("glyphs on data without points")
     return leaves
 
 
@@ -117,8 +123,9 @@ class Glyphs:
     def end_frame(self):
         self._kept, self._used = self._used, {}
 
-    def of(self, mapper, data, sources):
-        """Index of the source, and matrices and colours of its instances, for each source that has any."""
+    def of(self, mapper, data, given):
+        """Index of the source, and matrices and colours of its instances, for each source of a `GlyphInput` that has any."""
+        sources = len(given.sources)
         scale = _array(mapper, _SCALE, data)
         turn = _array(mapper, _ORIENTATION, data) if mapper.GetOrient() else None
         mask = _array(mapper, _MASK, data) if mapper.GetMasking() else None
@@ -132,22 +139,23 @@ class Glyphs:
         key = key_of(mapper.__this__, data, data.GetPointData(), scale, turn, mask, index, mapper.GetLookupTable(), *settings)
         found = self._kept.get(key)
         if found is None:
-            found = list(_copies(mapper, data, scale, turn, mask, index, sources))
+            found = list(_copies(mapper, data, scale, turn, mask, index, given))
         self._used[key] = found
         return found
 
 
-def _copies(mapper, data, scale, turn, mask, index, sources):
-    keep, n = [], data.GetNumberOfPoints()
+def _copies(mapper, data, scale, turn, mask, index, given):
+    keep, n, sources, f = [], data.GetNumberOfPoints(), len(given.sources), given.facts
     if n == 0:
         return
     rgba = None
     if mapper.GetScalarVisibility():
         mapper.ClearColorArrays()
         colors = mapper.MapScalars(data, 1.0)
+        f.has_colors, f.num_points = colors is not None, n
         if colors is not None:
-            if colors.GetNumberOfTuples() != n:
-                raise Untraceable("glyphs with colours that are not of points")
+            f.num_colors, f.color_components = colors.GetNumberOfTuples(), colors.GetNumberOfComponents()
+            given.require()
             rgba = rgba_of(numbers(colors, [np.dtype(np.uint8)], keep))
     points = data.GetPoints() if hasattr(data, "GetPoints") else None
     if points is not None and points.GetNumberOfPoints() == n:

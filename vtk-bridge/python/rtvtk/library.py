@@ -8,6 +8,8 @@ ABI = 981677105
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
+POINTS, WIREFRAME, SURFACE = range(3)
+TEXTURE, TEXTURE_TRANSFORM, TEXTURE_CUBE_MAP = 1, 2, 4
 _KINDS = {np.dtype(np.uint8): U8, np.dtype(np.float32): F32, np.dtype(np.float64): F64, np.dtype(np.int32): I32, np.dtype(np.int64): I64}
 
 
@@ -89,6 +91,45 @@ class Picture(C.Structure):
     ]
 
 
+class ActorFacts(C.Structure):
+    _fields_ = [("actor_class", C.c_char_p), ("mapper_class", C.c_char_p)]
+    _fields_ += [(n, C.c_uint32) for n in (
+        "representation", "pbr", "edge_visibility", "lines_as_tubes", "vertex_visibility", "translucent", "num_clipping_planes", "has_back")]
+    _fields_ += [(n, C.c_double) for n in ("back_opacity", "edge_opacity", "coat_strength", "anisotropy", "metallic")]
+    _fields_ += [("edge_tint", C.c_double * 3)]
+    _fields_ += [(n, C.c_uint32) for n in (
+        "shader_code", "glyphs", "texture", "num_textures", "albedo", "material", "normal", "emissive", "no_data", "reserved")]
+
+
+class SurfaceFacts(C.Structure):
+    _fields_ = [(n, C.c_uint64) for n in ("num_verts", "num_lines")]
+    _fields_ += [(n, C.c_uint32) for n in (
+        "representation", "not_polygons", "triangulated", "edges", "texture", "maps", "has_back", "color_source", "invalid_arrays",
+        "unreadable_cells", "cell_components", "reserved")]
+    _fields_ += [("cell_type", C.c_char_p), ("cell_array_class", C.c_char_p)]
+
+
+class GlyphFacts(C.Structure):
+    _fields_ = [(n, C.c_uint32) for n in (
+        "source_table_tree", "num_clipping_planes", "num_sources", "data_set", "composite", "block_attributes", "num_blocks_without_points",
+        "has_source")]
+    _fields_ += [(n, C.c_uint64) for n in ("num_source_polygons", "num_other_source_cells")]
+    _fields_ += [(n, C.c_uint32) for n in ("has_colors", "color_components")]
+    _fields_ += [(n, C.c_uint64) for n in ("num_colors", "num_points")]
+
+
+class VolumeFacts(C.Structure):
+    _fields_ = [("volume_class", C.c_char_p), ("mapper_class", C.c_char_p)]
+    _fields_ += [(n, C.c_uint32) for n in (
+        "cropping", "num_clipping_planes", "mask", "scattering", "vectors", "transfer_function_2d", "labels", "blend_mode", "gradient_opacity",
+        "shade", "num_lights", "num_positional_lights", "num_ambient_lights", "num_listed_lights")]
+    _fields_ += [("specular", C.c_double)]
+    _fields_ += [(n, C.c_uint32) for n in ("has_data", "image", "num_blocks")]
+    _fields_ += [("dims", C.c_uint32 * 3)]
+    _fields_ += [(n, C.c_uint32) for n in ("blanked", "scalars", "cell_scalars", "num_components")]
+    _fields_ += [(n, C.c_double * 2) for n in ("range", "average_range")]
+
+
 def _places():
     here = os.path.dirname(os.path.abspath(__file__))
     yield "RTVTK_LIBRARY", os.environ.get("RTVTK_LIBRARY")
@@ -132,6 +173,10 @@ def _functions(library, path):
         surfaces=bind("rtv_surfaces", C.c_int32, p, C.POINTER(Surface), C.c_uint64),
         has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
         volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
+        check_actor=bind("rtv_check_actor", text, p, C.POINTER(ActorFacts)),
+        check_surface=bind("rtv_check_surface", text, p, C.POINTER(SurfaceFacts)),
+        check_glyphs=bind("rtv_check_glyphs", text, p, C.POINTER(GlyphFacts)),
+        check_volume=bind("rtv_check_volume", text, p, C.POINTER(VolumeFacts)),
         light=bind("rtv_light", None, p, C.POINTER(Light)), pass_on=bind("rtv_pass", None, p, text, text), warn=bind("rtv_warn", None, p, text),
         render=bind("rtv_render", C.c_int32, p, C.POINTER(View), C.POINTER(Picture)), end=bind("rtv_end", None, p),
     )

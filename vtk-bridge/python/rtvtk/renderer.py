@@ -10,10 +10,10 @@ import vtkmodules.vtkRenderingOpenGL2 as gl
 from vtkmodules.vtkCommonCore import vtkVersion, vtkWeakReference
 
 from . import library as rtv
+from .eligibility import Untraceable
 from .extract import Extractor
 from .overlay import Overlay
 from .view import add_lights, prepare_lights, size_of, view_of
-from .eligibility import Untraceable
 
 _VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion())
 

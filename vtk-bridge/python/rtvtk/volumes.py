@@ -1,6 +1,4 @@
-"""Volumes on uniform grids: decides which of them the library can draw as VTK does, and says why OpenGL draws the others."""
-import ctypes as C
-
+"""Volumes on uniform grids. Which of them are traced decides the library from facts about them."""
 import numpy as np
 from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkImageData
@@ -8,14 +6,13 @@ from vtkmodules.vtkRenderingCore import vtkAbstractMapper
 
 from . import library as rtv
 from .arrays import key_of, numbers
+from .eligibility import require
 
 # The number of entries of OpenGL's tables.
 _ENTRIES = 1024
 _KINDS = [np.dtype(t) for t in (np.float32, np.float64, np.uint8, np.int32)]
-_MAPPERS = {"vtkSmartVolumeMapper", "vtkGPUVolumeRayCastMapper", "vtkOpenGLGPUVolumeRayCastMapper", "vtkFixedPointVolumeRayCastMapper",
-            "vtkMultiBlockVolumeMapper"}
 # VTK's blend modes; the library uses the same numbers.
-_COMPOSITE, _MAXIMUM, _MINIMUM, _AVERAGE, _ADDITIVE, _ISOSURFACES, _SLICE = range(7)
+_AVERAGE, _ADDITIVE, _ISOSURFACES = 3, 4, 5
 # The upper end of OpenGL's gradient-opacity table, as a fraction of the scalar range.
 _GRADIENT_RANGE = 0.25
 
@@ -24,86 +21,71 @@ def _has_gradient_opacity(p):
     return not p.GetDisableGradientOpacity(0) and p.HasGradientOpacity(0)
 
 
-def _why_not_blend(mode, p):
-    if not _COMPOSITE <= mode <= _ISOSURFACES:
-        return "a volume with slice blending" if mode == _SLICE else "a volume with a blend mode that is not known"
-    if mode != _COMPOSITE and _has_gradient_opacity(p):
-        return "a volume with gradient opacity and another blending than composite"
-    # OpenGL shades the largest scalar with the gradient at the end of the ray.
-    if mode in (_MAXIMUM, _MINIMUM) and p.GetShade(0):
-        return "a shaded volume with maximum or minimum intensity blending"
-    return None
+def _read_mapper(mapper, f):
+    f.cropping, f.num_clipping_planes, f.blend_mode = bool(mapper.GetCropping()), mapper.GetNumberOfClippingPlanes(), mapper.GetBlendMode()
+    f.mask = bool(hasattr(mapper, "GetMaskInput") and mapper.GetMaskInput())
+    reach = ("GetGlobalIlluminationReach", "GetVolumetricScatteringBlending")
+    f.scattering = any(hasattr(mapper, name) and getattr(mapper, name)() > 0 for name in reach)
+    f.vectors = hasattr(mapper, "GetVectorMode") and mapper.GetVectorMode() != -1
 
 
-def _why_not_mapper(mapper):
-    if mapper.GetCropping():
-        return "a cropped volume"
-    if mapper.GetNumberOfClippingPlanes() > 0:
-        return "a volume with clipping planes"
-    if hasattr(mapper, "GetMaskInput") and mapper.GetMaskInput():
-        return "a volume with a mask"
-    for name in ("GetGlobalIlluminationReach", "GetVolumetricScatteringBlending"):
-        if hasattr(mapper, name) and getattr(mapper, name)() > 0:
-            return "a volume with shadows or scattering of its own"
-    if hasattr(mapper, "GetVectorMode") and mapper.GetVectorMode() != -1:
-        return "a volume of vectors"
-    return None
-
-
-def _why_not_property(p):
-    if p.GetTransferFunctionMode() != 0:
-        return "a volume with a two-dimensional transfer function"
-    if p.HasLabelGradientOpacity() or p.GetLabelColor(1) or p.GetLabelScalarOpacity(1):
-        return "a volume with labels"
-    return None
+def _read_property(p, f):
+    f.transfer_function_2d = p.GetTransferFunctionMode() != 0
+    f.labels = bool(p.HasLabelGradientOpacity() or p.GetLabelColor(1) or p.GetLabelScalarOpacity(1))
+    f.gradient_opacity, f.shade, f.specular = bool(_has_gradient_opacity(p)), bool(p.GetShade(0)), p.GetSpecular(0)
 
 
 class _Lights:
-    """The lights of shaded volumes, six numbers each, in the library's layout; none for one white headlight. `reason`: why OpenGL has to shade."""
+    """The lights of shaded volumes, six numbers each, in the library's layout; none for one white headlight."""
 
-    def __init__(self, renderer):
+    def __init__(self, renderer, f):
         lights = renderer.GetLights()
         on = [light for light in (lights.GetItemAsObject(i) for i in range(lights.GetNumberOfItems())) if light.GetSwitch()]
-        self.rows, self.reason = [], None
+        self.rows = []
         # OpenGL uses another formula unless there is exactly one headlight of full strength: no ambient term, and different highlights.
         self.several = len(on) > 1 or not all(light.LightTypeIsHeadlight() and light.GetIntensity() == 1 for light in on)
-        if not on:
-            self.reason = "a shaded volume without a light"
-        elif any(light.GetPositional() for light in on):
-            self.reason = "a shaded volume under lights that have a place"
-        elif any(tuple(light.GetAmbientColor()) != (0, 0, 0) for light in on):
-            self.reason = "a shaded volume under lights with an ambient colour"
-        elif len(on) > 6:
-            self.reason = "a shaded volume under more than six lights"
+        f.num_lights, f.num_positional_lights = len(on), sum(bool(light.GetPositional()) for light in on)
+        f.num_ambient_lights = sum(tuple(light.GetAmbientColor()) != (0, 0, 0) for light in on)
         white = all(tuple(light.GetDiffuseColor()) == tuple(light.GetSpecularColor()) == (1, 1, 1) for light in on)
         if self.several or not white:
             for light in on:
                 # A single headlight is at the viewer, not directional.
                 place = zip(light.GetTransformedPosition(), light.GetTransformedFocalPoint())
-                towards = [p - f for p, f in place] if self.several else [0.0] * 3
+                towards = [a - b for a, b in place] if self.several else [0.0] * 3
                 self.rows.append([*towards, *(light.GetIntensity() * c for c in light.GetDiffuseColor())])
+        f.num_listed_lights = len(self.rows)
 
 
-def _image_of(mapper):
-    """The image data of a mapper, or the reason why there are none."""
+def _image_of(mapper, f):
+    """The image data of a mapper, or `None`."""
     connected = mapper.GetNumberOfInputConnections(0) > 0
     if connected and mapper.GetInputAlgorithm(0, 0):
         mapper.GetInputAlgorithm(0, 0).Update()
     data = mapper.GetInputDataObject(0, 0) if connected else None
-    if isinstance(data, vtkImageData):
-        return data
     if isinstance(data, vtkCompositeDataSet):
         leaves, it = [], data.NewIterator()
         it.InitTraversal()
         while not it.IsDoneWithTraversal():
             leaves.append(it.GetCurrentDataObject())
             it.GoToNextItem()
-        if len(leaves) == 1 and isinstance(leaves[0], vtkImageData):
-            return leaves[0]
-        if len(leaves) > 1:
-            # Each block would need tables over the range of all blocks.
-            return "a volume of several blocks"
-    return "a volume that is not image data"
+        f.num_blocks = len(leaves)
+        # One block is as good as the image alone.
+        data = leaves[0] if len(leaves) == 1 else None
+    f.has_data, f.image = 1, isinstance(data, vtkImageData)
+    return data if f.image else None
+
+
+def _scalars_of(mapper, image, f):
+    """The scalars of an image, which may be `None`."""
+    flag = reference(0)
+    scalars = vtkAbstractMapper.GetScalars(
+        image, mapper.GetScalarMode(), mapper.GetArrayAccessMode(), mapper.GetArrayId(), mapper.GetArrayName(), flag)
+    f.scalars, f.cell_scalars = scalars is not None, int(flag) != 0
+    if scalars is not None:
+        f.num_components = scalars.GetNumberOfComponents()
+        low, high = scalars.GetFiniteRange(0)
+        f.range[:] = low, high if high > low else low + max(1e-6 * abs(low), 1e-30)
+    return scalars
 
 
 class Volumes:
@@ -116,40 +98,28 @@ class Volumes:
         self._kept, self._used = self._used, {}
 
     def add(self, bridge, volume, renderer, name):
-        """Passes a volume to the bridge. Returns why OpenGL has to draw it, or `None`."""
-        mapper = volume.GetMapper()
-        if volume.GetClassName() != "vtkVolume":
-            return "OpenGL draws volumes of this class"
-        if mapper is None or mapper.GetClassName() not in _MAPPERS:
-            return "OpenGL draws volume mappers of this class"
-        p = volume.GetProperty()
-        reason = _why_not_mapper(mapper) or _why_not_property(p) or _why_not_blend(mapper.GetBlendMode(), p)
-        if reason:
-            return reason
-        lights = _Lights(renderer)
-        if p.GetShade(0) and lights.reason:
-            return lights.reason
-        if p.GetShade(0) and lights.rows and p.GetSpecular(0) > 0:
-            return "a shaded volume with a highlight under other lights than one white headlight"
-        image = _image_of(mapper)
-        return image if isinstance(image, str) else self._add_grid(bridge, mapper, volume, image, lights, name)
+        """Passes a volume to the bridge, or raises `Untraceable`."""
+        mapper, f = volume.GetMapper(), rtv.VolumeFacts(volume_class=volume.GetClassName().encode())
+        f.mapper_class = None if mapper is None else mapper.GetClassName().encode()
+        require(bridge.check_volume, f)
+        _read_mapper(mapper, f)
+        _read_property(volume.GetProperty(), f)
+        lights = _Lights(renderer, f)
+        require(bridge.check_volume, f)
+        image = _image_of(mapper, f)
+        if image is None:
+            require(bridge.check_volume, f)
+        self._add_grid(bridge, mapper, volume, image, lights, name, f)
 
-    def _add_grid(self, bridge, mapper, volume, image, lights, name):
+    def _add_grid(self, bridge, mapper, volume, image, lights, name, f):
         p, v, keep = volume.GetProperty(), rtv.Volume(), []
         v.name = name.encode()
         extent = image.GetExtent()
-        dims = [extent[2 * a + 1] - extent[2 * a] + 1 for a in range(3)]
-        if min(dims) <= 1:
-            return "a volume one point thick"
-        if image.HasAnyBlankPoints() or image.HasAnyBlankCells():
-            return "a volume with blanked parts"
-        flag = reference(0)
-        scalars = vtkAbstractMapper.GetScalars(
-            image, mapper.GetScalarMode(), mapper.GetArrayAccessMode(), mapper.GetArrayId(), mapper.GetArrayName(), flag)
-        if scalars is None or int(flag) != 0:
-            return "a volume without scalars" if scalars is None else "a volume of cells' values"
-        if scalars.GetNumberOfComponents() != 1:
-            return "a volume of several components"
+        dims = [max(0, extent[2 * a + 1] - extent[2 * a] + 1) for a in range(3)]
+        f.dims[:], f.average_range[:] = dims, mapper.GetAverageIPScalarRange()
+        f.blanked = bool(image.HasAnyBlankPoints() or image.HasAnyBlankCells())
+        scalars = _scalars_of(mapper, image, f)
+        require(bridge.check_volume, f)
         v.dims[:], v.spacing[:] = dims, image.GetSpacing()
         v.scalar_key = key_of(scalars, *dims, *image.GetSpacing())
         if not bridge.has_volume(v.scalar_key):
@@ -164,19 +134,13 @@ class Volumes:
         v.world_from_data[:] = (np.array(volume.GetMatrix().GetData()).reshape(4, 4) @ local).ravel().tolist()
 
         # ---- Tables over the range of the scalars, as OpenGL's are.
-        low, high = scalars.GetFiniteRange(0)
-        if not high > low:
-            high = low + max(1e-6 * abs(low), 1e-30)
-        v.range[:] = low, high
-        blend = mapper.GetBlendMode()
+        low, high = v.range[:] = f.range[:]
+        blend = f.blend_mode
         colors, opacities, gradients = self._tables(p, low, high)
         if blend in (_AVERAGE, _ADDITIVE):
             # Average and additive blending use the scalars themselves, mapped from black to white.
             colors = np.repeat(np.linspace(0, 1, _ENTRIES, dtype=np.float32)[:, None], 3, 1)
             keep.append(colors)
-            first, last = mapper.GetAverageIPScalarRange()
-            if blend == _AVERAGE and (first > low or last < high):
-                return "a volume with average intensity blending of a part of its scalars"
         if blend == _ISOSURFACES:
             values = p.GetIsoSurfaceValues()
             keep.append(np.array([values.GetValue(i) for i in range(values.GetNumberOfContours())], np.float64).reshape(-1, 1))
@@ -193,8 +157,7 @@ class Volumes:
             v.lights = rtv.Array.of(keep[-1])
         v.ambient, v.diffuse, v.specular = 0.0 if lights.several else p.GetAmbient(0), p.GetDiffuse(0), p.GetSpecular(0)
         v.specular_power, v.specular_mirrored = p.GetSpecularPower(0), 1
-        reason = bridge.volume(C.byref(v))
-        return reason.decode() if reason else None
+        require(bridge.volume, v)
 
     def _tables(self, p, low, high):
         gray = p.GetColorChannels(0) == 1
