@@ -94,4 +94,5 @@ pub mod transfer_function;
 pub mod volume;
 
 pub use glam;
-pub use shade::deferred;
+pub use shade::distributed;
+pub use shade::vtk_pbr;

@@ -1,7 +1,9 @@
 //! The reflection of light from one direction, and of ambient light, by a material.
 
 use super::microfacet::{ggx, schlick};
-use crate::effects::{Effects, reflection_of};
+use super::specular::reflection_of;
+use super::vtk_pbr;
+use crate::effects::Effects;
 use crate::material::{PbrForm, PhongForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -133,18 +135,10 @@ fn vtk_pbr(
     let f0 = Vec3::splat(specular).lerp(albedo, metallic);
     let grazing = (f0.element_sum() * (50.0 * 0.33)).clamp(0.0, 1.0);
     let f90 = Vec3::splat(grazing).lerp(Vec3::ONE, metallic);
-    let m = 1.0 - hl;
-    let m2 = m * m;
-    let f = f0 + (f90 - f0) * (m2 * m2 * m);
-    let a = roughness * roughness;
-    let a2 = a * a;
-    let d = (nh * a2 - nh) * nh + 1.0;
+    let f = vtk_pbr::fresnel(f0, f90, hl);
     // A mirror's highlight is a point that no pixel would hit; the shader divides 0 by 0 there.
-    let distribution = a2 / (PI * d * d).max(f32::MIN_POSITIVE);
-    let visibility = 0.5
-        / (nl * (a + nv * (nv - a * nv)).max(0.0).sqrt()
-            + nv * (a + nl * (nl - a * nl)).max(0.0).sqrt());
-    [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (distribution * visibility * PI)]
+    let lobe = vtk_pbr::specular_isotropic([nh, nv, nl], roughness, f32::MIN_POSITIVE);
+    [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (lobe * PI)]
 }
 
 /// Light reflected to the viewer per unit of ambient radiance. Where a reflector's own reflection

@@ -24,6 +24,7 @@ mod spawn;
 mod specular;
 mod tile;
 mod volumes;
+pub mod vtk_pbr;
 mod wavefront;
 
 pub(crate) use frame_context::FrameContext;

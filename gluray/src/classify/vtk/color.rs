@@ -9,6 +9,7 @@ use crate::trace::lighting::normalized;
 use crate::trace::mixed;
 use crate::trace::occlusion::Visibility;
 use rt_core::mesh::TriMesh;
+use rt_core::vtk_pbr;
 
 type V3 = [f32; 3];
 
@@ -75,21 +76,9 @@ impl PbrMaterial {
         let f0 = mix([self.base; 3], albedo, self.metallic);
         let grazing = (f0.iter().sum::<f32>() * 50.0 * 0.33).clamp(0.0, 1.0);
         let f90 = mix([grazing; 3], self.tint, self.metallic);
-        let schlick = (1.0 - h_l).powi(5);
-        let a = self.roughness * self.roughness;
-        let a2 = a * a;
-        let d = (n_h * a2 - n_h) * n_h + 1.0;
-        let lobe = a2 / (PI * d * d).max(self.least_divisor);
-        let r2 = self.roughness * self.roughness;
-        let (ggx_v, ggx_l) = (
-            n_l * (r2 + n_v * (n_v - r2 * n_v)).sqrt(),
-            n_v * (r2 + n_l * (n_l - r2 * n_l)).sqrt(),
-        );
-        let visible = 0.5 / (ggx_v + ggx_l);
-        std::array::from_fn(|k| {
-            let f = f0[k] + (f90[k] - f0[k]) * schlick;
-            (1.0 - self.metallic) * (1.0 - f) * albedo[k] / PI + lobe * visible * f
-        })
+        let f = vtk_pbr::fresnel(f0.into(), f90.into(), h_l).to_array();
+        let lobe = vtk_pbr::specular_isotropic([n_h, n_v, n_l], self.roughness, self.least_divisor);
+        std::array::from_fn(|k| (1.0 - self.metallic) * (1.0 - f[k]) * albedo[k] / PI + lobe * f[k])
     }
 }
 
