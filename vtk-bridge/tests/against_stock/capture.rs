@@ -60,6 +60,12 @@ impl Capture {
         lists.flatten().filter_map(|p| p[key].as_str().map(str::to_owned)).collect()
     }
 
+    /// The reasons that the script expects, in the order of its props.
+    pub(crate) fn expected_reasons(&self) -> Vec<String> {
+        let reasons = self.facts["reasons"].as_array().map_or(&[][..], Vec::as_slice);
+        reasons.iter().filter_map(|r| r.as_str().map(str::to_owned)).collect()
+    }
+
     /// All warnings.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let lists = self.renderers().iter().filter_map(|r| r["warnings"].as_array());

@@ -155,6 +155,7 @@ scripts! {
     textures_of_physically_based_surfaces_are_as_in_stock_vtk: "pbr_maps",
     projections_of_all_kinds_are_exact: "projections",
     blocks_beside_a_refused_one_are_not_drawn_twice: "refused_blocks",
+    props_of_every_reason_are_as_in_stock_vtk: "reasons",
     edges_points_and_mixed_cells_are_as_in_stock_vtk: "representations",
     picks_and_selections_are_stock: "selection",
     highlights_are_as_in_stock_vtk: "specular",
@@ -260,6 +261,14 @@ fn what_stays_opengl_is_in_the_report_with_its_reason() {
     for reason in ["wireframe", "points"] {
         assert!(passed.iter().any(|p| p.contains(reason)), "{reason}: {passed:?}");
     }
+}
+
+#[test]
+fn every_prop_that_opengl_draws_has_its_own_reason() {
+    let Some(both) = both() else { return };
+    let capture = both.ours.capture("reasons", "reasons").unwrap();
+    assert!(capture.expected_reasons().len() > 20);
+    assert_eq!(capture.passed("reason"), capture.expected_reasons());
 }
 
 #[test]
