@@ -46,12 +46,13 @@ def picture():
         image.GetPointData().GetScalars().SetComponent(i // 3, i % 3, 255 if i // 3 % 2 else 90)
     texture = vtk.vtkTexture()
     texture.SetInputData(image)
+    texture.UseSRGBColorSpaceOn()
     return texture
 
 
 def mapped():
-    texcoords = vtk.vtkTextureMapToSphere()
-    texcoords.SetInputConnection(ball().GetOutputPort())
+    source, texcoords = ball(), vtk.vtkTextureMapToSphere()
+    texcoords.SetInputConnection(source.GetOutputPort())
     return texcoords
 
 
@@ -95,8 +96,8 @@ _, a = shown("shader code of its own")
 a.GetShaderProperty().AddFragmentShaderReplacement("//VTK::Light::Impl", True, "//VTK::Light::Impl\n  // nothing else\n", False)
 
 # ---- Classes and data.
-gaussian = vtk.vtkPointGaussianMapper()
-gaussian.SetInputConnection(ball().GetOutputPort())
+source, gaussian = ball(), vtk.vtkPointGaussianMapper()
+gaussian.SetInputConnection(source.GetOutputPort())
 gaussian.SetScaleFactor(0.05)
 dots = vtk.vtkActor()
 dots.SetMapper(gaussian)
@@ -113,8 +114,8 @@ line, point = vtk.vtkLineSource(), vtk.vtkPointSource()
 shown("it has lines (set RTV_LINE_RADIUS to trace them as tubes)", line)
 point.SetNumberOfPoints(1)
 shown("it has vertices (set RTV_POINT_RADIUS to trace them as spheres)", point)
-colored = vtk.vtkElevationFilter()
-colored.SetInputConnection(mapped().GetOutputPort())
+source, colored = mapped(), vtk.vtkElevationFilter()
+colored.SetInputConnection(source.GetOutputPort())
 both = actor(colored)
 both.SetTexture(picture())
 place(both, "it has a texture and colours")
