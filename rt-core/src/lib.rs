@@ -14,7 +14,7 @@
 //! # Ok::<(), rt_core::bvh::BuildError>(())
 //! ```
 //!
-//! The renderer (the feature `render`, on by default) makes pictures of such worlds:
+//! The renderer (the feature `render`, on by default) renders images of such worlds:
 //!
 //! ```
 //! # #[cfg(feature = "render")]
@@ -39,6 +39,9 @@
 //! [`camera::Camera`] and [`render::RenderOptions`] define the image. [`render::render`] returns it
 //! with a report. [`deferred`] leaves the tracing of rays to the caller, for scenes that lie in
 //! parts.
+//!
+//! Releases may add fields to options: build them from their defaults, as in
+//! `RenderOptions { samples: 4, ..RenderOptions::new(64, 64) }`.
 #![deny(unsafe_code)]
 
 // ---- Ray queries: geometry, its trees, and the way of rays through them.
@@ -94,5 +97,7 @@ pub mod transfer_function;
 pub mod volume;
 
 pub use glam;
-pub use shade::distributed;
+#[cfg(feature = "render")]
+pub use shade::deferred;
+#[cfg(feature = "render")]
 pub use shade::vtk_pbr;
