@@ -228,14 +228,14 @@ fn nearer(best: &mut Option<ShadingHit>, met: Option<ShadingHit>) {
     if let Some(m) = met
         && best.as_ref().is_none_or(|b| is_before(&m, b))
     {
-        *best = Some(h);
+        *best = Some(m);
     }
 }
 
 /// Merges the hits of light rays from all parts. A ray that one of them reports as blocked is
 /// blocked.
 fn light_hits(
-    servers: &[DataServer<'_>],
+    holders: &[Holder<'_>],
     scene: &Scene,
     rays: &[rt_core::ray::Ray],
 ) -> Vec<Option<LightHit>> {
@@ -259,17 +259,17 @@ fn light_hits(
 }
 
 fn closest(
-    servers: &[DataServer<'_>],
+    holders: &[Holder<'_>],
     scene: &Scene,
     rays: &[rt_core::ray::Ray],
     pixels: Option<&[(u32, u16)]>,
 ) -> Vec<Option<ShadingHit>> {
     let mut best = vec![None; rays.len()];
-    let mut hits = Vec::new();
-    for h in servers {
-        h.frame.closest(rays, pixels, &mut hits);
-        for (b, m) in best.iter_mut().zip(&hits) {
-            nearer(b, m.map(|m| h.with_global_id(scene, m)));
+    let mut met = Vec::new();
+    for h in holders {
+        h.frame.closest(rays, pixels, &mut met);
+        for (b, m) in best.iter_mut().zip(&met) {
+            nearer(b, m.map(|m| h.in_whole(scene, m)));
         }
     }
     best
@@ -280,7 +280,7 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
     let options = BuildOptions::default();
     let scenes: Vec<Scene> = kept.iter().map(|k| case.scene.part(k, &options).unwrap()).collect();
     let needed = Effects::required_by(&case.scene);
-    let servers: Vec<DataServer<'_>> = scenes
+    let holders: Vec<Holder<'_>> = scenes
         .iter()
         .zip(&kept)
         .map(|(s, kept)| Holder {
@@ -295,11 +295,11 @@ fn in_parts(case: &Case, parts: usize, seed: u32) -> Frame {
     for t in 0..owner.num_tiles() {
         let mut tile = owner.tile(t);
         for pass in owner.passes() {
-            one_pass(case, &servers, &mut tile, pass);
+            one_pass(case, &holders, &mut tile, pass);
         }
         paste(&mut picture, &tile.image(owner), owner.tile_area(t));
     }
-    image
+    picture
 }
 
 /// Copies all layers of a tile into the image.
@@ -354,7 +354,7 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pas
                 if rays.is_empty() {
                     break;
                 }
-                tile.process_light_hits(owner, &light_hits(servers, &case.scene, &rays)).unwrap();
+                tile.process_light_hits(owner, &light_hits(holders, &case.scene, &rays)).unwrap();
             }
         } else if !tile.light_points().is_empty() {
             let (mut all, mut bits, mut work) = (vec![], vec![], OcclusionScratch::default());
@@ -373,8 +373,8 @@ fn one_pass(case: &Case, holders: &[Holder<'_>], tile: &mut TileState, pass: Pas
         let pixels: Vec<_> = waiting.iter().map(|(_, s, _)| (tile.number() as u32, *s)).collect();
         let recorded = owner.records_geometry(pass).then_some(&pixels[..]);
         let mut answers = vec![None; tile.num_rays()];
-        for ((i, ..), hit) in waiting.iter().zip(closest(servers, &case.scene, &rays, recorded)) {
-            answers[*i] = hit;
+        for ((i, ..), met) in waiting.iter().zip(closest(holders, &case.scene, &rays, recorded)) {
+            answers[*i] = met;
         }
         tile.process_hits(owner, &answers).unwrap();
     }

@@ -1,9 +1,8 @@
 //! The reflection of light from one direction, and of ambient light, by a material.
 
 use super::microfacet::{ggx, schlick};
-use super::specular::reflection_of;
 use super::vtk_pbr;
-use crate::effects::Effects;
+use crate::effects::{Effects, reflection_of};
 use crate::material::{PbrForm, PhongForm, SurfaceModel};
 use glam::Vec3;
 use std::f32::consts::PI;
