@@ -7,7 +7,7 @@
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
 use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
-use crate::trace::raster::polygon_offset;
+use crate::trace::raster::{corner_depth, polygon_offset};
 use rt_core::ray::{HitBlock, LANES, NO_HIT};
 
 /// The result of a lane.
@@ -143,7 +143,10 @@ impl FragmentBlock {
             let sum = l0 + l1 + l2;
             let z = l0 * h(0, 2) + l1 * h(1, 2) + l2 * h(2, 2);
             let w = l0 * h(0, 3) + l1 * h(1, 3) + l2 * h(2, 3);
-            let plain = n + (f - n) * (z / w * 0.5 + 0.5);
+            let corners = [0, 1, 2].map(|i| corner_depth(c[i][2][l], c[i][3][l], s.depth_range));
+            let level = (corners[0] == corners[1]) & (corners[1] == corners[2]);
+            let sloped = n + (f - n) * (z / w * 0.5 + 0.5);
+            let plain = if level { f64::from(corners[0]) } else { sloped };
             let depth = plain + (f64::from(factor) * steep[l] + constant + shift[l]);
             let inside = s.depth_clamp | (z.abs() <= w.abs() * (1.0 + SLACK));
             let before = (c[0][3][l] > 0.0) & (c[1][3][l] > 0.0) & (c[2][3][l] > 0.0);

@@ -30,7 +30,7 @@ use crate::state::enums::*;
 use crate::state::matrix::transform;
 use crate::trace::lighting::{LightingSetup, VertexColors};
 use crate::trace::occlusion::{Eye, LightPosition};
-use crate::trace::raster::{covers, gradient, polygon_offset, steepness};
+use crate::trace::raster::{covers, gradient, level_depth, polygon_offset, steepness};
 use crate::trace::texturing::Image;
 pub(crate) use nearest::nearest;
 pub(crate) use primitive_order::ordered_layers;
@@ -377,8 +377,9 @@ impl<'a> Prepared<'a> {
         let z = (0..3).map(|i| l[i] * f64::from(c[i][2])).sum::<f64>();
         let w = (0..3).map(|i| l[i] * f64::from(c[i][3])).sum::<f64>();
         let [n, f] = s.depth_range;
-        let mut depth = n + (f - n) * (z / w * 0.5 + 0.5);
-        let plain_depth = depth;
+        let plain_depth = level_depth(&c, s.depth_range)
+            .map_or_else(|| n + (f - n) * (z / w * 0.5 + 0.5), f64::from);
+        let mut depth = plain_depth;
         // One unit of polygon offset is two steps of the depth buffer (as in Mesa).
         if let Some((factor, units)) = s.polygon_offset {
             let [slope, shift] = match s.offset_by_length {

@@ -34,6 +34,20 @@ pub(crate) fn covers(c: &[[f32; 4]; 3], viewport: [i32; 4], x: i32, y: i32) -> b
     })
 }
 
+/// The window depth of a corner, rounded as a driver rounds it: the quotient to `f32`, then the
+/// viewport transform to `f32` (Mesa's draw module with a fused multiply and add).
+pub(crate) fn corner_depth(z: f32, w: f32, [near, far]: [f64; 2]) -> f32 {
+    (f64::from(z * (1.0 / w)) * ((far - near) * 0.5) + (far + near) * 0.5) as f32
+}
+
+/// The depth of a triangle parallel to the screen: that of its corners, where all three are equal.
+/// Interpolation in `f64` misses it by a step of the depth buffer, which is enough to let lines and
+/// labels of the driver's in the same plane pass a test that they fail without gluray.
+pub(crate) fn level_depth(c: &[[f32; 4]; 3], range: [f64; 2]) -> Option<f32> {
+    let [a, b, c] = c.map(|v| corner_depth(v[2], v[3], range));
+    (a == b && b == c).then_some(a)
+}
+
 /// The greater of |dz/dx| and |dz/dy| in window coordinates, for polygon offset.
 pub(crate) fn steepness(c: &[[f32; 4]; 3], viewport: [i32; 4], depth_scale: f64) -> f64 {
     let [dx, dy] = gradient(c, viewport, depth_scale);

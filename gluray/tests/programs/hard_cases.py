@@ -193,6 +193,24 @@ def polygon_offset_under_lines():
     bump()
 
 
+def lines_in_the_plane_of_a_surface():
+    """Surfaces parallel to the screen, and lines in their planes that GL_LESS hides."""
+    start(perspective=True)
+    disable(0x0B50)
+    for i in range(16):
+        x, y, z = 0.55 * (i % 4) - 1.05, 0.55 * (i // 4) - 1.05, -0.137 * i
+        begin(QUADS)
+        color(0.2 + 0.05 * i, 0.6, 1 - 0.05 * i, 1)
+        for dx, dy in ((0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)):
+            vertex((x + dx) * (2 - z) / 2, (y + dy) * (2 - z) / 2, z)
+        end()
+        begin(2)
+        color(1, 1, 1, 1)
+        for dx, dy in ((0.1, 0.1), (0.4, 0.13), (0.37, 0.4), (0.1, 0.33)):
+            vertex((x + dx) * (2 - z) / 2, (y + dy) * (2 - z) / 2, z)
+        end()
+
+
 def clip_planes():
     simple()
     for i, p in enumerate(((1, 0.2, 0, 0.3), (0, -1, 0.5, 0.5))):
