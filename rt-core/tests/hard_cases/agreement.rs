@@ -199,8 +199,8 @@ fn many_instances_packets_equal_single_rays_and_the_oracle() {
 }
 
 /// Checks that the hit is where the f64 reference puts it and that no other hit is certainly
-/// nearer. Both allow for the rounding error of t ([`oracle::PlaneIntersection::t_error`]), as for one mesh.
-/// That error grows with the coordinates, the slant and the slenderness of the triangle;
+/// nearer. Both allow for the rounding error of t ([`oracle::PlaneIntersection::t_error`]), as for
+/// one mesh. That error grows with the coordinates, the slant and the slenderness of the triangle;
 /// transforming the rays adds no more. Returns the error of t as a fraction of the allowed error,
 /// or `None` for a miss. (The largest is 0.35.)
 fn check_instances(
