@@ -145,7 +145,8 @@ fn the_phase_steps_by_the_density_across_a_shock() {
     }
     println!("{waves:.4} waves, off by {worst:.1e}; brightness by {worst_brightness:.1e}");
     // The spline overshoots beside the jump. The overshoot falls by 3.7 per voxel (the pole of the
-    // cubic spline's prefilter is sqrt(3) - 2), and samples are 4 voxels and more from the jump. Tolerance: 2e-3 of the step and of a fringe's brightness.
+    // cubic spline's prefilter is sqrt(3) - 2), and samples are 4 voxels and more from the jump.
+    // Tolerance: 2e-3 of the step and of a fringe's brightness.
     assert!(
         checked == 24 && worst < 2e-3 * waves && worst_brightness < 0.05,
         "{worst} of {waves}; {worst_brightness}"

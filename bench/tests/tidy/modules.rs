@@ -18,7 +18,6 @@ const CYCLES: &[(&str, usize)] = &[
     ("gluray/src/cluster", 2),
     ("gluray/src/interpose", 5),
     ("gluray/src/trace", 2),
-    ("gluray/src/trace/texturing", 2),
     ("rt-core/src", 6),
     ("rt-core/src/bvh", 2),
     ("schlieren/src", 4),

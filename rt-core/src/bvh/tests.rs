@@ -252,7 +252,10 @@ fn check_among(world: &World, marked: &[bool], rays: &[Ray], what: &str) {
             if marked.len() == 1 {
                 return world.closest(ray);
             }
-            fearless_simd::dispatch!(level, simd => world.closest_in::<_, WatertightTest>(simd, ray, filter))
+            fearless_simd::dispatch!(
+                level,
+                simd => world.closest_in::<_, WatertightTest>(simd, ray, filter)
+            )
         });
         found.min_by(|a, b| a.t.total_cmp(&b.t).then(a.instance.cmp(&b.instance)))
     };

@@ -2,7 +2,8 @@
 //! compares ray tracers.
 //!
 //! [`LeakTest`] counts rays that get through when aimed at vertices, edges and points of a closed
-//! mesh. `SelfShadowTest` (feature `render`) counts secondary rays that hit the surface from which they start.
+//! mesh. `SelfShadowTest` (feature `render`) counts secondary rays that hit the surface from which
+//! they start.
 
 mod leaks;
 #[cfg(feature = "render")]

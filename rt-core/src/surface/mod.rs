@@ -177,8 +177,8 @@ impl<'a> ResolvedInstance<'a> {
     }
 
     /// Local-lighting data of the point that `ray` hit, where no other ray will start: on meshes in
-    /// f32 wherever the triangle's size allows it, and without the point itself unless `P` asks for it.
-    /// [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
+    /// f32 wherever the triangle's size allows it, and without the point itself unless `P` asks for
+    /// it. [`ResolvedInstance::shading_point_block`] does the same for sixteen rays.
     #[inline]
     pub(crate) fn shading_point<P: HitPoint>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         match self.source {
