@@ -51,12 +51,14 @@ fn slope(b: &[f64; 4], u: f64) -> f64 {
 }
 
 /// Smallest and largest coefficient. All values of the cubic are between them.
+#[cfg(feature = "render")]
 #[inline]
 pub(crate) fn hull(b: &[f64; 4]) -> (f64, f64) {
     (b[0].min(b[1]).min(b[2].min(b[3])), b[0].max(b[1]).max(b[2].max(b[3])))
 }
 
 /// The coefficients on 0..=u and on u..=1 (de Casteljau).
+#[cfg(any(test, feature = "render"))]
 #[inline]
 pub(crate) fn split(b: &[f64; 4], u: f64) -> ([f64; 4], [f64; 4]) {
     let m = |x: f64, y: f64| x + (y - x) * u;

@@ -1,5 +1,6 @@
 //! Frames whose rays are traced in several parts of the scene have the same bits as frames of the
 //! whole scene.
+#![cfg(feature = "render")]
 
 use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, ThinLens};
