@@ -288,6 +288,8 @@ fn flushes(name: &str) -> bool {
         "glXWaitGL",
         "glXSwapBuffersMscOML",
         "eglSwapBuffers",
+        "eglSwapBuffersWithDamageEXT",
+        "eglSwapBuffersWithDamageKHR",
         "eglCopyBuffers",
         "eglWaitGL",
         "eglWaitClient",

@@ -65,7 +65,13 @@ pub(crate) fn reads_pixels(index: usize) -> bool {
 
 /// True for calls that end a frame on the screen.
 pub(crate) fn swaps_buffers(index: usize) -> bool {
-    const SWAPS: [usize; 3] = [at::glXSwapBuffers, at::eglSwapBuffers, at::glXSwapBuffersMscOML];
+    const SWAPS: [usize; 5] = [
+        at::glXSwapBuffers,
+        at::glXSwapBuffersMscOML,
+        at::eglSwapBuffers,
+        at::eglSwapBuffersWithDamageEXT,
+        at::eglSwapBuffersWithDamageKHR,
+    ];
     SWAPS.contains(&index)
 }
 
@@ -98,11 +104,13 @@ pub(crate) fn imports_texels(index: usize) -> bool {
 
 /// True for calls after which a context sees what other contexts have written.
 pub(crate) fn waits_for_others(index: usize) -> bool {
-    const WAITS: [usize; 5] = [
+    const WAITS: [usize; 7] = [
         at::glWaitSync,
         at::glClientWaitSync,
         at::eglWaitSync,
+        at::eglWaitSyncKHR,
         at::eglClientWaitSync,
+        at::eglClientWaitSyncKHR,
         at::glWaitSemaphoreEXT,
     ];
     WAITS.contains(&index)
@@ -111,6 +119,17 @@ pub(crate) fn waits_for_others(index: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Toolkits that repaint parts of a window swap by the extension (GTK 4, Qt 6).
+    #[test]
+    fn every_swap_of_egl_ends_a_frame_and_flushes() {
+        let swaps =
+            ["eglSwapBuffers", "eglSwapBuffersWithDamageEXT", "eglSwapBuffersWithDamageKHR"];
+        for name in swaps {
+            let index = index_of(name.as_bytes()).unwrap_or_else(|| panic!("{name} is no entry"));
+            assert!(swaps_buffers(index) && flushes(index), "{name}");
+        }
+    }
 
     #[test]
     fn calls_that_read_pixels_are_told_by_number() {
