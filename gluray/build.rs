@@ -287,9 +287,6 @@ fn flushes(name: &str) -> bool {
         "glXCopyContext",
         "glXWaitGL",
         "glXSwapBuffersMscOML",
-        "eglSwapBuffers",
-        "eglSwapBuffersWithDamageEXT",
-        "eglSwapBuffersWithDamageKHR",
         "eglCopyBuffers",
         "eglWaitGL",
         "eglWaitClient",
@@ -340,7 +337,7 @@ fn flushes(name: &str) -> bool {
         "glDeleteTextures",
         "glDeleteRenderbuffers",
     ];
-    NAMES.contains(&name) || is_other_draw(name)
+    NAMES.contains(&name) || name.starts_with("eglSwapBuffers") || is_other_draw(name)
 }
 
 /// Calls by which a program, or the driver for it, may look at what was drawn.
