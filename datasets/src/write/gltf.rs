@@ -297,7 +297,7 @@ mod tests {
                 change(&|m| m.scalars = Some(Attribute::per_vertex(vec![0.0; m.positions.len()]))),
             ),
             ("vertex 99999", change(&|m| m.indices[3] = [0, 1, 99_999])),
-            ("vertex 7 lies", change(&|m| m.positions[7] = nan)),
+            ("vertex 7 is at", change(&|m| m.positions[7] = nan)),
             ("normal of vertex 5", change(&|m| m.normals.as_mut().unwrap().values[5] = Vec3::ZERO)),
             ("colour of vertex 2", change(&|m| m.colors.as_mut().unwrap().values[2][1] = 1.5)),
             (
