@@ -36,7 +36,7 @@ cases! {
     list_changed_while_in_use: true 0;
     flat_shading: true 0;
     polygon_offset_under_lines: true 0;
-    lines_in_the_plane_of_a_surface: true 0;
+    surfaces_parallel_to_the_screen: true 0;
     clip_planes: true 0;
     fog: true 0;
     color_map_texture: true 0;

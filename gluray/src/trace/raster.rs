@@ -41,8 +41,8 @@ pub(crate) fn corner_depth(z: f32, w: f32, [near, far]: [f64; 2]) -> f32 {
 }
 
 /// The depth of a triangle parallel to the screen: that of its corners, where all three are equal.
-/// Interpolation in `f64` misses it by a step of the depth buffer, which is enough to let lines and
-/// labels of the driver's in the same plane pass a test that they fail without gluray.
+/// Interpolation in `f64` misses the driver's depth by a step, which decides depth tests between
+/// surfaces and lines in one plane.
 pub(crate) fn level_depth(c: &[[f32; 4]; 3], range: [f64; 2]) -> Option<f32> {
     let [a, b, c] = c.map(|v| corner_depth(v[2], v[3], range));
     (a == b && b == c).then_some(a)
