@@ -45,8 +45,18 @@ unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn dlsym() {
     core::arch::naked_asm!(
-        "push rdi", "push rsi", "sub rsp, 8", "call {ours}", "add rsp, 8", "pop rsi", "pop rdi",
-        "test rax, rax", "jne 2f", "jmp qword ptr [rip + {real}]", "2:", "ret",
+        "push rdi",
+        "push rsi",
+        "sub rsp, 8",
+        "call {ours}",
+        "add rsp, 8",
+        "pop rsi",
+        "pop rdi",
+        "test rax, rax",
+        "jne 2f",
+        "jmp qword ptr [rip + {real}]",
+        "2:",
+        "ret",
         ours = sym ours, real = sym REAL_DLSYM
     )
 }

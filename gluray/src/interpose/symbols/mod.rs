@@ -173,24 +173,62 @@ fn leave_at(index: usize) {
     }
 }
 
+/// A naked function that runs the first instructions with all argument registers saved, restores
+/// these, and ends with the others: the registers of integers, the number of vector registers in
+/// `al` (variadic calls), those of vectors, and `r11`, the index of the entry.
+macro_rules! with_arguments_kept {
+    ([$($call:literal),*], [$($jump:literal),*], $($operands:tt)*) => {
+        core::arch::naked_asm!(
+            "push rbp",
+            "mov rbp, rsp",
+            "push rdi",
+            "push rsi",
+            "push rdx",
+            "push rcx",
+            "push r8",
+            "push r9",
+            "push rax",
+            "push r11",
+            "sub rsp, 128",
+            "movdqu [rsp], xmm0",
+            "movdqu [rsp+16], xmm1",
+            "movdqu [rsp+32], xmm2",
+            "movdqu [rsp+48], xmm3",
+            "movdqu [rsp+64], xmm4",
+            "movdqu [rsp+80], xmm5",
+            "movdqu [rsp+96], xmm6",
+            "movdqu [rsp+112], xmm7",
+            $($call,)*
+            "movdqu xmm0, [rsp]",
+            "movdqu xmm1, [rsp+16]",
+            "movdqu xmm2, [rsp+32]",
+            "movdqu xmm3, [rsp+48]",
+            "movdqu xmm4, [rsp+64]",
+            "movdqu xmm5, [rsp+80]",
+            "movdqu xmm6, [rsp+96]",
+            "movdqu xmm7, [rsp+112]",
+            "add rsp, 128",
+            "pop r11",
+            "pop rax",
+            "pop r9",
+            "pop r8",
+            "pop rcx",
+            "pop rdx",
+            "pop rsi",
+            "pop rdi",
+            "pop rbp",
+            $($jump,)*
+            $($operands)*
+        )
+    };
+}
+
 /// Finds the target of entry r11 and jumps to it, with all argument registers unchanged.
 #[unsafe(naked)]
 unsafe extern "C" fn lazy() {
-    core::arch::naked_asm!(
-        "push rbp", "mov rbp, \
-                     rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
-        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], \
-                                                                        xmm2", "movdqu [rsp+48], \
-                                                                                xmm3",
-        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], \
-                                                           xmm6", "movdqu [rsp+112], xmm7",
-        "mov edi, r11d", "call {resolve}", "mov r10, rax",
-        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, \
-                                                                                 [rsp+48]",
-        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, \
-                                                                                    [rsp+112]",
-        "add rsp, \
-         128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+    with_arguments_kept!(
+        ["mov edi, r11d", "call {resolve}", "mov r10, rax"],
+        ["jmp r10"],
         resolve = sym resolve
     )
 }
@@ -198,21 +236,9 @@ unsafe extern "C" fn lazy() {
 /// The target of former hooks after a fault: see [`left`].
 #[unsafe(naked)]
 unsafe extern "C" fn leaving() {
-    core::arch::naked_asm!(
-        "push rbp", "mov rbp, \
-                     rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
-        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], \
-                                                                        xmm2", "movdqu [rsp+48], \
-                                                                                xmm3",
-        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], \
-                                                           xmm6", "movdqu [rsp+112], xmm7",
-        "mov edi, r11d", "call {left}", "mov r10, rax",
-        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, \
-                                                                                 [rsp+48]",
-        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, \
-                                                                                    [rsp+112]",
-        "add rsp, \
-         128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp", "jmp r10",
+    with_arguments_kept!(
+        ["mov edi, r11d", "call {left}", "mov r10, rax"],
+        ["jmp r10"],
         left = sym left
     )
 }
@@ -220,22 +246,9 @@ unsafe extern "C" fn leaving() {
 /// Reports entry r11, then jumps to its target, with all argument registers unchanged.
 #[unsafe(naked)]
 unsafe extern "C" fn slow() {
-    core::arch::naked_asm!(
-        "push rbp", "mov rbp, \
-                     rsp", "push rdi", "push rsi", "push rdx", "push rcx", "push r8", "push r9", "push rax", "push r11",
-        "sub rsp, 128", "movdqu [rsp], xmm0", "movdqu [rsp+16], xmm1", "movdqu [rsp+32], \
-                                                                        xmm2", "movdqu [rsp+48], \
-                                                                                xmm3",
-        "movdqu [rsp+64], xmm4", "movdqu [rsp+80], xmm5", "movdqu [rsp+96], \
-                                                           xmm6", "movdqu [rsp+112], xmm7",
-        "mov edi, r11d", "call {on_state_call}",
-        "movdqu xmm0, [rsp]", "movdqu xmm1, [rsp+16]", "movdqu xmm2, [rsp+32]", "movdqu xmm3, \
-                                                                                 [rsp+48]",
-        "movdqu xmm4, [rsp+64]", "movdqu xmm5, [rsp+80]", "movdqu xmm6, [rsp+96]", "movdqu xmm7, \
-                                                                                    [rsp+112]",
-        "add rsp, \
-         128", "pop r11", "pop rax", "pop r9", "pop r8", "pop rcx", "pop rdx", "pop rsi", "pop rdi", "pop rbp",
-        "lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]",
+    with_arguments_kept!(
+        ["mov edi, r11d", "call {on_state_call}"],
+        ["lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]"],
         on_state_call = sym on_state_call, table = sym TABLE
     )
 }
