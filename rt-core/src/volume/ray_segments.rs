@@ -122,7 +122,7 @@ struct VolumeSegments<'a> {
 /// let collected = through(&near).integrate_spans(0..near_spans, &quality, begun);
 /// let collected = through(&far).integrate_spans(near_spans..usize::MAX, &quality, collected);
 /// assert_eq!(collected.sample(), whole.integrate(&ray, 0.0, f32::INFINITY, &quality));
-/// assert!(near.grid().values.len() < whole.grid().values.len());
+/// assert!(near.grid().values().len() < whole.grid().values().len());
 /// ```
 pub struct RaySegments<'a> {
     per_volume: Vec<VolumeSegments<'a>>,
