@@ -55,7 +55,7 @@ pub struct Luneburg;
 
 impl Medium for Luneburg {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
-        squared(2.0 - at_m.length_squared(), -at_m)
+        eps_from_n_squared(2.0 - at_m.length_squared(), -at_m)
     }
 }
 
@@ -91,7 +91,7 @@ pub struct Selfoc {
 impl Medium for Selfoc {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
         let g2 = self.gradient_per_m.powi(2);
-        squared(
+        eps_from_n_squared(
             1.0 - g2 * (at_m.x * at_m.x + at_m.y * at_m.y),
             DVec3::new(at_m.x, at_m.y, 0.0) * -g2,
         )
@@ -107,7 +107,7 @@ pub struct LinearSquare {
 
 impl Medium for LinearSquare {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
-        squared(1.0 + 2.0 * self.slope_per_m * at_m.y, DVec3::Y * self.slope_per_m)
+        eps_from_n_squared(1.0 + 2.0 * self.slope_per_m * at_m.y, DVec3::Y * self.slope_per_m)
     }
 }
 
@@ -134,7 +134,7 @@ pub struct Kepler {
 impl Medium for Kepler {
     fn sample(&self, at_m: DVec3) -> (f64, DVec3) {
         let r = at_m.length();
-        squared(1.0 + 2.0 * self.strength_m / r, -at_m * (self.strength_m / (r * r * r)))
+        eps_from_n_squared(1.0 + 2.0 * self.strength_m / r, -at_m * (self.strength_m / (r * r * r)))
     }
 }
 
@@ -147,7 +147,7 @@ impl Kepler {
 
 /// Computes eps and its gradient from n^2 and half the gradient of n^2. Avoids the cancellation in
 /// sqrt(1 + x) - 1.
-fn squared(n2: f64, half_gradient: DVec3) -> (f64, DVec3) {
+fn eps_from_n_squared(n2: f64, half_gradient: DVec3) -> (f64, DVec3) {
     let n = n2.sqrt();
     ((n2 - 1.0) / (n + 1.0), half_gradient / n)
 }

@@ -35,13 +35,13 @@ struct Part {
     /// Order along x, in addition to the orders along y and z.
     along_x: usize,
     /// How often the derivative occurs in its tensor.
-    times: f64,
+    multiplicity: f64,
 }
 
 /// Differences by their orders along y and z, with their orders along x.
 const DIFFERENCES: [(usize, usize, &[Part]); 12] = {
-    const fn p(along_x: usize, times: u32) -> Part {
-        Part { along_x, times: times as f64 }
+    const fn p(along_x: usize, multiplicity: u32) -> Part {
+        Part { along_x, multiplicity: multiplicity as f64 }
     }
     [
         (0, 0, &[p(1, 1), p(2, 1), p(3, 1), p(4, 1)]),
@@ -79,15 +79,15 @@ const ALONG_AXES: usize = 4;
 
 impl DerivativeBounds {
     /// Computes the bounds in one parallel pass over the lattice.
-    pub fn of(field: &Field) -> DerivativeBounds {
+    pub fn new(field: &Field) -> DerivativeBounds {
         let [nx, ny, nz] = field.dims();
         (0..ny * nz)
             .into_par_iter()
-            .map_init(Row::default, |row, r| row.of(field, r % ny, r / ny, nx))
-            .reduce(DerivativeBounds::default, DerivativeBounds::larger)
+            .map_init(Row::default, |row, r| row.bounds(field, r % ny, r / ny, nx))
+            .reduce(DerivativeBounds::default, DerivativeBounds::max)
     }
 
-    fn larger(self, other: DerivativeBounds) -> DerivativeBounds {
+    fn max(self, other: DerivativeBounds) -> DerivativeBounds {
         DerivativeBounds {
             gradient: self.gradient.max(other.gradient),
             gradient_on_faces: self.gradient_on_faces.max(other.gradient_on_faces),
@@ -104,7 +104,7 @@ impl Row {
     /// The largest values in the row of nodes at (j, k). Nodes whose difference would reach beyond
     /// the last node use the difference of the last nodes. Every node then has all differences that
     /// fit into the lattice.
-    fn of(&mut self, field: &Field, j: usize, k: usize, nx: usize) -> DerivativeBounds {
+    fn bounds(&mut self, field: &Field, j: usize, k: usize, nx: usize) -> DerivativeBounds {
         let (eps, dims) = (field.eps(), field.dims());
         let per_m = field.spacing_m().map(|h| 1.0 / h);
         for s in &mut self.squares {
@@ -130,9 +130,9 @@ impl Row {
             }
             for part in parts.iter().filter(|p| p.along_x < nx) {
                 let order = along_y + along_z + part.along_x;
-                let factor = part.times * per_m[0].powi(2 * part.along_x as i32);
+                let factor = part.multiplicity * per_m[0].powi(2 * part.along_x as i32);
                 add_squares(&mut self.squares[order - 1], &self.difference, part.along_x, factor);
-                if order == 2 && part.times == 1.0 {
+                if order == 2 && part.multiplicity == 1.0 {
                     add_squares(
                         &mut self.squares[ALONG_AXES],
                         &self.difference,
@@ -201,7 +201,7 @@ mod tests {
         let of = |f: fn(DVec3) -> f64| {
             let (dims, spacing) = ([9, 8, 7], [0.25, 0.5, 0.125]);
             // Powers of two: f32 holds the values exactly.
-            DerivativeBounds::of(
+            DerivativeBounds::new(
                 &Field::from_fn(dims, spacing, DVec3::ZERO, 1.0, |p| f(p) / 4096.0).unwrap(),
             )
         };
@@ -235,7 +235,7 @@ mod tests {
             let f =
                 Field::from_fn(dims, [1.0; 3], DVec3::ZERO, 1.0, |p| (p.x + p.y * p.z) / 4096.0)
                     .unwrap();
-            let r = DerivativeBounds::of(&f);
+            let r = DerivativeBounds::new(&f);
             assert!(
                 r.gradient >= 1.0 / 4096.0 && (r.second * 4096.0 - 2f64.sqrt()).abs() < 1e-6,
                 "{r:?}"

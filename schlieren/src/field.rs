@@ -120,11 +120,11 @@ impl Field {
         }
 
         // Nodes without a finite value have no data.
-        let not_gas_is_marked =
+        let is_marked =
             |nodes: &Option<Vec<Node>>, i: usize| nodes.as_ref().is_some_and(|n| n[i] != Node::Gas);
         let mut not_finite = 0;
         for i in 0..wanted {
-            if not_gas_is_marked(&nodes, i) {
+            if is_marked(&nodes, i) {
                 continue;
             }
             if !eps[i].is_finite() {

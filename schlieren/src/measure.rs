@@ -29,7 +29,7 @@ pub struct Photograph {
 
 /// Where search lines begin. Each runs along a row or column of pixels to the opposite side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum From {
+pub enum SearchFrom {
     /// Along rows, to the right.
     Left,
     /// Along columns, downwards.
@@ -66,7 +66,7 @@ pub struct Line {
 impl Photograph {
     /// Converts an image rendered with [`crate::render::Layers::map`], which distinguishes bodies
     /// from dark shocks. `None` if the map was not rendered.
-    pub fn of(rendered: &RenderOutput) -> Option<Photograph> {
+    pub fn from_render(rendered: &RenderOutput) -> Option<Photograph> {
         let map = rendered.map.as_ref()?;
         Some(Photograph {
             framing: rendered.framing,
@@ -78,11 +78,18 @@ impl Photograph {
     /// The outermost strong mark on each search line, at most one point per line, along right and
     /// up in metres. Pixels within `margin_px` of a dark pixel on the line are ignored. So are
     /// lines whose largest mark is below `least`.
-    pub fn fronts_m(&self, from: From, mark: Mark, least: f32, margin_px: usize) -> Vec<[f64; 2]> {
+    pub fn fronts_m(
+        &self,
+        from: SearchFrom,
+        mark: Mark,
+        least: f32,
+        margin_px: usize,
+    ) -> Vec<[f64; 2]> {
         let [width, height] = [self.framing.width as usize, self.framing.height as usize];
-        let [lines, length] = if from == From::Left { [height, width] } else { [width, height] };
+        let [lines, length] =
+            if from == SearchFrom::Left { [height, width] } else { [width, height] };
         let pixel = |line: usize, i: usize| {
-            if from == From::Left { i + line * width } else { line + i * width }
+            if from == SearchFrom::Left { i + line * width } else { line + i * width }
         };
         let near_dark = |line: usize, i: usize| {
             (i.saturating_sub(margin_px)..(i + margin_px + 1).min(length))
@@ -116,7 +123,7 @@ impl Photograph {
                 (s + f64::from(*d), m + f64::from(*d) * ((first + i) as f64 + offset))
             });
             let (along, across) = (moment / sum, line as f64 + 0.5);
-            let [x, y] = if from == From::Left { [along, across] } else { [across, along] };
+            let [x, y] = if from == SearchFrom::Left { [along, across] } else { [across, along] };
             points.push(self.framing.plane_from_pixel(x, y));
         }
         points
@@ -211,7 +218,7 @@ mod tests {
                 p.lit.push(!body);
             }
         }
-        let points = p.fronts_m(From::Top, Mark::Edge, 0.1, 2);
+        let points = p.fronts_m(SearchFrom::Top, Mark::Edge, 0.1, 2);
         assert_eq!(points.len(), 60);
         let line = fitted_line(&points).unwrap();
         assert!((line.angle_rad.tan() + 0.5).abs() < 0.01 && line.outliers < 3, "{line:?}");
@@ -220,13 +227,13 @@ mod tests {
             assert!((x - x0).abs() < 1e-12 && (y - y0).abs() < 0.5e-3, "{i}: {y} {y0}");
         }
         // The middle of the band is two and a half pixels further in.
-        let band = p.fronts_m(From::Top, Mark::Band { undisturbed: 0.5 }, 0.1, 2);
+        let band = p.fronts_m(SearchFrom::Top, Mark::Band { undisturbed: 0.5 }, 0.1, 2);
         for (edge, middle) in points.iter().zip(&band) {
             assert!((edge[1] - middle[1] - 2.5e-3).abs() < 0.6e-3, "{edge:?} {middle:?}");
         }
         // No mark is strong enough.
-        assert!(p.fronts_m(From::Top, Mark::Edge, 0.4, 2).is_empty());
+        assert!(p.fronts_m(SearchFrom::Top, Mark::Edge, 0.4, 2).is_empty());
         // Search lines from the left find the band as well.
-        assert!(p.fronts_m(From::Left, Mark::Edge, 0.1, 2).len() > 25);
+        assert!(p.fronts_m(SearchFrom::Left, Mark::Edge, 0.1, 2).len() > 25);
     }
 }

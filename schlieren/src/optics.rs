@@ -24,7 +24,7 @@
 use crate::path::{Exit, Start};
 
 /// A point or vector in a plane perpendicular to the light: components along `right` and `up`.
-pub type Across = [f32; 2];
+pub type PlaneVector = [f32; 2];
 
 /// The shape of the light source in the collimator's focal plane.
 ///
@@ -88,7 +88,7 @@ pub enum SourceImage {
 impl Optics {
     /// The default bench: a slit of 1 mm by 5 mm, mirrors of 1.5 m focal length, focused on the
     /// centre of the field.
-    pub const CUSTOMARY: Optics = Optics {
+    pub const DEFAULT: Optics = Optics {
         source: SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 0.0 },
         collimator_focal_length_m: 1.5,
         schlieren_focal_length_m: 1.5,
@@ -121,14 +121,14 @@ impl Optics {
     }
 
     /// The direction of the beam from a point of the source image.
-    pub fn tilt_rad(&self, image_point_m: Across) -> Across {
+    pub fn tilt_rad(&self, image_point_m: PlaneVector) -> PlaneVector {
         image_point_m.map(|c| (f64::from(c) / self.schlieren_focal_length_m) as f32)
     }
 
     /// The point where a photon crosses the cut-off plane: the image of its source point, shifted
     /// by its deflection.
     #[inline]
-    pub fn cutoff_point_m(&self, image_point_m: Across, exit: &Exit) -> Across {
+    pub fn cutoff_point_m(&self, image_point_m: PlaneVector, exit: &Exit) -> PlaneVector {
         let f2 = self.schlieren_focal_length_m as f32;
         [0, 1].map(|i| f2 * exit.deflection_rad[i] + image_point_m[i])
     }
@@ -141,7 +141,7 @@ impl Optics {
     /// to that plane times the tangent of the angle. The undisturbed ray of a tilted beam crosses
     /// the plane of focus at `tilt focus` from the start.
     #[inline]
-    pub fn film_shift_m(&self, start: &Start, exit: &Exit) -> Across {
+    pub fn film_shift_m(&self, start: &Start, exit: &Exit) -> PlaneVector {
         let focus = self.focus_m as f32;
         let lever = focus - exit.exit_depth_m;
         let [dx, dy] = exit.deflection_rad;
@@ -172,7 +172,7 @@ impl Optics {
 impl SourceImage {
     /// Maps the unit square to the source image, uniformly by area.
     #[inline]
-    pub fn point_m(&self, square: Across) -> Across {
+    pub fn point_m(&self, square: PlaneVector) -> PlaneVector {
         match *self {
             SourceImage::Point => [0.0, 0.0],
             SourceImage::Rectangle { half_m, axis } => {
@@ -189,14 +189,14 @@ impl SourceImage {
     pub fn half_extent_m(&self, direction: [f64; 2]) -> f64 {
         match *self {
             SourceImage::Point => 0.0,
-            SourceImage::Rectangle { .. } => self.half_sides_along(direction).iter().sum(),
+            SourceImage::Rectangle { .. } => self.projected_half_sides(direction).iter().sum(),
             SourceImage::Disc { radius_m } => radius_m,
         }
     }
 
     /// Half the lengths of a rectangle's two sides, projected onto a direction; zero for other
     /// shapes.
-    pub(crate) fn half_sides_along(&self, direction: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn projected_half_sides(&self, direction: [f64; 2]) -> [f64; 2] {
         let SourceImage::Rectangle { half_m, axis } = *self else { return [0.0; 2] };
         let along = (axis[0] * direction[0] + axis[1] * direction[1]).abs();
         let across = (axis[0] * direction[1] - axis[1] * direction[0]).abs();
@@ -212,7 +212,12 @@ mod tests {
     use super::*;
     use crate::path::Status;
 
-    fn exit(deflection_rad: Across, displacement_m: Across, exit_depth_m: f32, opd_m: f32) -> Exit {
+    fn exit(
+        deflection_rad: PlaneVector,
+        displacement_m: PlaneVector,
+        exit_depth_m: f32,
+        opd_m: f32,
+    ) -> Exit {
         Exit {
             deflection_rad,
             displacement_m,
@@ -224,7 +229,7 @@ mod tests {
     }
 
     fn bench(focus_m: f64) -> Optics {
-        Optics { focus_m, ..Optics::CUSTOMARY }
+        Optics { focus_m, ..Optics::DEFAULT }
     }
 
     #[test]
@@ -272,7 +277,7 @@ mod tests {
         let o = Optics {
             source: SourceShape::Slit { width_m: 1e-3, length_m: 4e-3, angle_deg: 90.0 },
             schlieren_focal_length_m: 3.0,
-            ..Optics::CUSTOMARY
+            ..Optics::DEFAULT
         };
         let image = o.source_image();
         assert!((image.half_extent_m([0.0, 1.0]) - 1e-3).abs() < 1e-12);

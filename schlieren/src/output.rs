@@ -3,7 +3,7 @@
 
 use crate::render::RenderOutput;
 use crate::scene::{Scene, SceneError};
-use datasets::image_io::{self, ImageError, Metadata, Picture, PngDepth, PngReport, keys};
+use datasets::image_io::{self, ImageError, LayeredImage, Metadata, PngDepth, PngReport, keys};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -32,9 +32,9 @@ pub enum OutputError {
 
 /// Writes the image as sRGB with 8 bits per channel.
 pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, OutputError> {
-    let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
-    add_pixels(&mut p, rendered)?;
-    Ok(image_io::write_png(path, &p, PngDepth::Eight)?)
+    let mut image = LayeredImage::new(rendered.framing.width, rendered.framing.height);
+    add_pixels(&mut image, rendered)?;
+    Ok(image_io::write_png(path, &image, PngDepth::Eight)?)
 }
 
 /// Writes every layer that was rendered:
@@ -61,25 +61,25 @@ pub fn write_exr(
     scene: &Scene,
     elapsed_secs: f64,
 ) -> Result<(), OutputError> {
-    let mut p = picture(rendered)?;
-    p.metadata = metadata(rendered, scene, elapsed_secs)?;
-    Ok(image_io::write_exr(path, &p)?)
+    let mut image = layers(rendered)?;
+    image.metadata = metadata(rendered, scene, elapsed_secs)?;
+    Ok(image_io::write_exr(path, &image)?)
 }
 
 /// Collects all rendered layers as planes.
-pub fn picture(rendered: &RenderOutput) -> Result<Picture, OutputError> {
-    let mut p = Picture::new(rendered.framing.width, rendered.framing.height);
-    add_pixels(&mut p, rendered)?;
+pub fn layers(rendered: &RenderOutput) -> Result<LayeredImage, OutputError> {
+    let mut image = LayeredImage::new(rendered.framing.width, rendered.framing.height);
+    add_pixels(&mut image, rendered)?;
     if let Some(m) = &rendered.map {
         for (axis, name) in ["X", "Y"].into_iter().enumerate() {
             let of = |v: &[[f32; 2]]| v.iter().map(|d| d[axis]).collect();
-            p.add(&format!("deflection.{name}"), "rad", of(&m.deflection_rad))?;
-            p.add(&format!("displacement.{name}"), "m", of(&m.displacement_m))?;
+            image.add(&format!("deflection.{name}"), "rad", of(&m.deflection_rad))?;
+            image.add(&format!("displacement.{name}"), "m", of(&m.displacement_m))?;
         }
         if !m.waves.is_empty() {
-            p.add("phase.Y", "waves", m.waves.clone())?;
+            image.add("phase.Y", "waves", m.waves.clone())?;
         }
-        p.add("transmission.Y", "1", m.transmission.clone())?;
+        image.add("transmission.Y", "1", m.transmission.clone())?;
     }
     if let Some(m) = &rendered.media {
         for (name, unit, layer) in [
@@ -88,30 +88,30 @@ pub fn picture(rendered: &RenderOutput) -> Result<Picture, OutputError> {
             ("rotation.Y", "rad", &m.rotation_rad),
         ] {
             if !layer.is_empty() {
-                p.add(name, unit, layer.clone())?;
+                image.add(name, unit, layer.clone())?;
             }
         }
     }
     if let Some(counts) = &rendered.counts {
-        p.add("samples.Y", "photons", counts.iter().map(|n| *n as f32).collect())?;
+        image.add("samples.Y", "photons", counts.iter().map(|n| *n as f32).collect())?;
     }
     if let Some(noise) = &rendered.noise {
-        p.add("error.Y", "1", noise.clone())?;
+        image.add("error.Y", "1", noise.clone())?;
     }
     if let Some(error) = rendered.report.deflection_error_rad {
-        p.add("error.deflection", "rad", vec![error as f32; rendered.framing.pixels()])?;
+        image.add("error.deflection", "rad", vec![error as f32; rendered.framing.pixels()])?;
     }
-    Ok(p)
+    Ok(image)
 }
 
-fn add_pixels(p: &mut Picture, rendered: &RenderOutput) -> Result<(), OutputError> {
+fn add_pixels(image: &mut LayeredImage, rendered: &RenderOutput) -> Result<(), OutputError> {
     let channel = |c: usize| rendered.pixels.iter().map(|v| v[c]).collect();
     if rendered.colored {
         for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-            p.add(name, "", channel(c))?;
+            image.add(name, "", channel(c))?;
         }
     } else {
-        p.add("Y", "", channel(0))?;
+        image.add("Y", "", channel(0))?;
     }
     Ok(())
 }

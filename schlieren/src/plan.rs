@@ -145,7 +145,7 @@ impl Plan {
     /// Chooses the cheapest march whose bounds are within the tolerance, or the most accurate march
     /// if none is.
     pub fn new(field: &Field, request: Request) -> Plan {
-        let derivative_bounds = DerivativeBounds::of(field);
+        let derivative_bounds = DerivativeBounds::new(field);
         Self::from_derivative_bounds(field, request, derivative_bounds)
     }
 
@@ -170,7 +170,7 @@ impl Plan {
         let steps_rad = |voxels: f64| {
             growth * length_m * (voxels * h_m).powi(2) / 24.0 * (r.third + r.second * r.gradient)
         };
-        let of_interpolant = |i: Interpolant| {
+        let interpolant_error_rad = |i: Interpolant| {
             let per_m = match i {
                 Interpolant::BSpline => h_m.powi(3) / 24.0 * r.fourth,
                 Interpolant::TrilinearGradient => h_m.powi(2) / 6.0 * r.third,
@@ -184,8 +184,13 @@ impl Plan {
         // than three quarters of it, the share is a third of that bound, because shorter steps
         // would only cost time. The two shares are equal at that point. Tolerance zero requests the
         // highest accuracy.
-        let share =
-            |i| if tolerance > 0.0 { (tolerance / 4.0).max(of_interpolant(i) / 3.0) } else { 0.0 };
+        let share = |i| {
+            if tolerance > 0.0 {
+                (tolerance / 4.0).max(interpolant_error_rad(i) / 3.0)
+            } else {
+                0.0
+            }
+        };
 
         // Strong index: deflections too large for the paraxial mode, or an index far from the
         // reference index.
@@ -207,7 +212,9 @@ impl Plan {
         // The cheapest interpolant within the tolerance. Line of sight is as fast with the spline
         // as with the trilinear interpolants.
         let interpolant = request.interpolant.unwrap_or(
-            if mode == Mode::Paraxial && of_interpolant(Interpolant::Trilinear) <= 0.5 * tolerance {
+            if mode == Mode::Paraxial
+                && interpolant_error_rad(Interpolant::Trilinear) <= 0.5 * tolerance
+            {
                 Interpolant::Trilinear
             } else {
                 Interpolant::BSpline
@@ -215,7 +222,7 @@ impl Plan {
         );
 
         // The longest step within the tolerance, found by halving from one voxel.
-        let of_step = |voxels: f64| match mode {
+        let step_error_rad = |voxels: f64| match mode {
             Mode::LineOfSight => projected_rad,
             Mode::Paraxial => steps_rad(voxels),
             // PEFRL is of fourth order with a constant of about 1/5000 (Omelyan 2002, table 2),
@@ -224,7 +231,7 @@ impl Plan {
         };
         // Optical paths are summed at the same positions. The error of eps there comes from its
         // second derivative along the ray.
-        let path_of_step_m = |voxels: f64| match mode {
+        let path_error_m = |voxels: f64| match mode {
             Mode::LineOfSight => {
                 if box_path.oblique {
                     length_m * h_m.powi(2) / 24.0 * r.second
@@ -240,8 +247,8 @@ impl Plan {
         let share_rad = share(interpolant);
         let good_enough = |voxels: f64| {
             let path_is =
-                !request.wanted.opd || path_of_step_m(voxels) <= 0.25 * tolerance * length_m;
-            of_step(voxels) <= share_rad && (path_is || share_rad > tolerance)
+                !request.wanted.opd || path_error_m(voxels) <= 0.25 * tolerance * length_m;
+            step_error_rad(voxels) <= share_rad && (path_is || share_rad > tolerance)
         };
         let step_voxels = request.step_voxels.unwrap_or_else(|| {
             let mut step = 1.0;
@@ -254,11 +261,11 @@ impl Plan {
         let bounds = Bounds {
             bending_rad: if straight { bending_rad } else { 0.0 },
             // Oblique projections are interpolated a second time, as maps.
-            interpolation_rad: of_interpolant(interpolant)
+            interpolation_rad: interpolant_error_rad(interpolant)
                 * if straight && box_path.oblique { 2.0 } else { 1.0 },
-            step_rad: of_step(step_voxels),
+            step_rad: step_error_rad(step_voxels),
             edges_rad: if straight { edges_rad } else { 0.0 },
-            path_m: path_of_step_m(step_voxels) + if straight { bending_path_m } else { 0.0 },
+            path_m: path_error_m(step_voxels) + if straight { bending_path_m } else { 0.0 },
             deflection_rad,
         };
         Plan { request, mode, interpolant, step_voxels, bounds, derivative_bounds }
@@ -409,9 +416,9 @@ fn coarsened(field: &Field, spline: &dyn Fn() -> Arc<BSpline>) -> Option<Field> 
     }
     let ratio = [0, 1, 2].map(|c| (d[c] - 1) as f64 / (half[c] - 1) as f64);
     let count = half.iter().product();
-    let place = |i: usize| [i % half[0], i / half[0] % half[1], i / (half[0] * half[1])];
+    let node_indices = |i: usize| [i % half[0], i / half[0] % half[1], i / (half[0] * half[1])];
     let near = |i: usize| {
-        let at = place(i);
+        let at = node_indices(i);
         let at = [0, 1, 2].map(|c| (at[c] as f64 * ratio[c]).round() as usize);
         at[0] + d[0] * (at[1] + d[1] * at[2])
     };
@@ -421,7 +428,7 @@ fn coarsened(field: &Field, spline: &dyn Fn() -> Arc<BSpline>) -> Option<Field> 
     } else {
         let spline = spline();
         let at = |i: usize| {
-            let at = place(i);
+            let at = node_indices(i);
             [0, 1, 2].map(|c| at[c] as f64 * ratio[c])
         };
         (0..count).into_par_iter().map(|i| spline.sample(at(i)).eps as f32).collect()

@@ -147,17 +147,17 @@ pub(crate) fn beams_grey(
 
 /// Runs `work` on a thread of its own and returns its result. Fails the test instead of hanging
 /// when it takes longer than `limit`.
-pub(crate) fn within<T: Send + 'static>(
+pub(crate) fn with_timeout<T: Send + 'static>(
     limit: Duration,
     what: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> T {
-    let (tell, told) = std::sync::mpsc::channel();
+    let (sender, receiver) = std::sync::mpsc::channel();
     let worker = std::thread::spawn(move || {
         // The receiver is gone when the limit has passed.
-        let _ = tell.send(work());
+        let _ = sender.send(work());
     });
-    match told.recv_timeout(limit) {
+    match receiver.recv_timeout(limit) {
         Ok(done) => done,
         Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {
             panic!("{what}: not done within {limit:?}")
@@ -171,7 +171,7 @@ pub(crate) fn within<T: Send + 'static>(
 /// Runs job 0 on a pool and spawns 48 more jobs from outside while it runs, as another image would.
 /// This repeats with fresh `jobs` for each of several delays. A worker that waits inside rayon
 /// takes these late jobs before it continues.
-pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(
+pub(crate) fn with_concurrent_jobs<J: Fn(usize) + Send + Sync + 'static>(
     threads: usize,
     jobs: impl Fn() -> J,
 ) {
@@ -179,19 +179,19 @@ pub(crate) fn with_late_jobs<J: Fn(usize) + Send + Sync + 'static>(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     for delay_us in [100, 300, 1000, 2000, 3000, 5000, 8000, 12_000, 20_000, 30_000] {
         let job = std::sync::Arc::new(jobs());
-        let (tell, told) = std::sync::mpsc::channel();
+        let (sender, receiver) = std::sync::mpsc::channel();
         for i in 0..JOBS {
-            let (job, tell) = (job.clone(), tell.clone());
+            let (job, sender) = (job.clone(), sender.clone());
             pool.spawn(move || {
                 job(i);
                 // The receiver is gone when the test has failed.
-                let _ = tell.send(());
+                let _ = sender.send(());
             });
             if i == 0 {
                 std::thread::sleep(Duration::from_micros(delay_us));
             }
         }
-        drop(tell);
-        assert_eq!(told.iter().count(), JOBS, "a job panicked");
+        drop(sender);
+        assert_eq!(receiver.iter().count(), JOBS, "a job panicked");
     }
 }

@@ -6,7 +6,7 @@ use datasets::resample::Resolution;
 use glam::DVec3;
 use schlieren::field::Node;
 use schlieren::input::{Depth, LoadedField, Medium, Options, Quantity, Role, load};
-use schlieren::measure::{From, Mark, Photograph};
+use schlieren::measure::{Mark, Photograph, SearchFrom};
 use schlieren::render::{Control, Layers, TestSection, render};
 use schlieren::scene::Scene;
 use std::io::Write;
@@ -114,7 +114,7 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
     let picture =
         render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
             .unwrap();
-    let photograph = Photograph::of(&picture).unwrap();
+    let photograph = Photograph::from_render(&picture).unwrap();
     let framing = photograph.framing;
 
     // The edge of the fin's silhouette: the last dark pixel of the row, from the right.
@@ -125,7 +125,7 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
         let dark = (0..width).rev().take_while(|i| !photograph.lit[i + row * width]).last();
         dark.map(|i| framing.plane_from_pixel(i as f64, 0.0)[0])
     };
-    let fronts = photograph.fronts_m(From::Left, Mark::Band { undisturbed: 0.5 }, 0.1, 2);
+    let fronts = photograph.fronts_m(SearchFrom::Left, Mark::Band { undisturbed: 0.5 }, 0.1, 2);
     let mut stand_offs = vec![];
     for [x_m, up_m] in fronts {
         let z = (centre_m.z + up_m) / unit_m;

@@ -10,13 +10,13 @@ mod browser;
 mod serving;
 
 use browser::{Browser, chromium};
-use datasets::image_io::{Picture, read_png};
+use datasets::image_io::{LayeredImage, read_png};
 use serving::Served;
 use std::io::Write as _;
 
 /// A screenshot of the window.
 struct Window {
-    picture: Picture,
+    picture: LayeredImage,
     rgba: Vec<[f32; 4]>,
 }
 

@@ -11,7 +11,7 @@ use datasets::generate::oblique_shock::Wedge;
 use glam::UVec3;
 use schlieren::index::Gas;
 use schlieren::input::{Medium, Options, from_dataset};
-use schlieren::measure::{From, Line, Mark, Photograph, fitted_line};
+use schlieren::measure::{Line, Mark, Photograph, SearchFrom, fitted_line};
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 
@@ -39,10 +39,10 @@ fn shock(flow: Flow, knife_deg: f64, part: [f64; 2]) -> Line {
          {knife_deg:?} }}\n[sampling]\nmethod = \"photons\"\nsamples = 4"
     );
     let rendered = photographed(flow, &toml, Layers { map: true, ..Layers::NONE });
-    let photograph = Photograph::of(&rendered).unwrap();
+    let photograph = Photograph::from_render(&rendered).unwrap();
     let framing = photograph.framing;
     let [left, right] = part.map(|p| framing.plane_from_pixel(p * 300.0, 0.0)[0]);
-    let points = photograph.fronts_m(From::Top, Mark::Edge, 0.05, 4);
+    let points = photograph.fronts_m(SearchFrom::Top, Mark::Edge, 0.05, 4);
     let points: Vec<_> = points.into_iter().filter(|p| (left..right).contains(&p[0])).collect();
     let line = fitted_line(&points).unwrap();
     // The points lie on a line.

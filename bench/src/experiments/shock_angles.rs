@@ -11,7 +11,7 @@ use datasets::generate::gas_dynamics::FreeStream;
 use datasets::generate::oblique_shock::Wedge;
 use glam::UVec3;
 use schlieren::input::{Medium, Options, from_dataset};
-use schlieren::measure::{From, Line, Mark, Photograph, fitted_line};
+use schlieren::measure::{Line, Mark, Photograph, SearchFrom, fitted_line};
 use schlieren::render::{Layers, RenderOutput, TestSection};
 
 /// Pressure and temperature of air drawn from the room into a vacuum vessel.
@@ -137,12 +137,12 @@ fn photographed(context: &Context<'_>, flow: Flow, width: u32) -> anyhow::Result
 
 /// The shock above the body, without the third of the image around the tip.
 fn shock(rendered: &RenderOutput) -> Option<Line> {
-    let photograph = Photograph::of(rendered)?;
+    let photograph = Photograph::from_render(rendered)?;
     let width = f64::from(photograph.framing.width);
     let [left, right] =
         [0.35, 0.98].map(|p| photograph.framing.plane_from_pixel(p * width, 0.0)[0]);
     // On a coarse lattice, a shock is many pixels wide and the change between pixels is small.
-    let points = photograph.fronts_m(From::Top, Mark::Edge, 0.01, 4);
+    let points = photograph.fronts_m(SearchFrom::Top, Mark::Edge, 0.01, 4);
     fitted_line(&points.into_iter().filter(|p| (left..right).contains(&p[0])).collect::<Vec<_>>())
 }
 

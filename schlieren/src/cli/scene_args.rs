@@ -263,20 +263,24 @@ impl OpticsArgs {
             };
         };
         // Light deflected by 0.3 mrad reaches the rim at the default focal length.
-        let customary = 0.5e-3;
+        let default_radius_m = 0.5e-3;
         match self.cutoff.as_deref() {
             None => {}
             Some("knife") => *cutoff = CutoffSpec::default(),
             Some("circle") => {
-                *cutoff = CutoffSpec::Circle { radius_m: customary, center_m: [0.0; 2] }
+                *cutoff = CutoffSpec::Circle { radius_m: default_radius_m, center_m: [0.0; 2] }
             }
             Some("complemented-circle") => {
-                *cutoff =
-                    CutoffSpec::ComplementedCircle { radius_m: customary, center_m: [0.0; 2] };
+                *cutoff = CutoffSpec::ComplementedCircle {
+                    radius_m: default_radius_m,
+                    center_m: [0.0; 2],
+                };
             }
-            Some("color") => *cutoff = CutoffSpec::Color { radius_m: customary, red_deg: 0.0 },
+            Some("color") => {
+                *cutoff = CutoffSpec::Color { radius_m: default_radius_m, red_deg: 0.0 }
+            }
             Some(file) if file.to_ascii_lowercase().ends_with(".png") => {
-                *cutoff = CutoffSpec::Image { file: file.into(), width_m: 2.0 * customary };
+                *cutoff = CutoffSpec::Image { file: file.into(), width_m: 2.0 * default_radius_m };
             }
             Some(other) => {
                 return Err(UsageError(format!(

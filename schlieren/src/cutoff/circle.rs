@@ -4,7 +4,7 @@
 //! passes strongly deflected light: in this dark field, deflections in any direction brighten. The
 //! dissertation calls them "circular" and "complemented circular" (section 5.3.4).
 
-use crate::optics::{Across, SourceImage};
+use crate::optics::{PlaneVector, SourceImage};
 
 /// A circle in the cut-off plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,19 +46,19 @@ impl Passes {
 impl Aperture {
     /// Transmission at one point. The rim belongs to the inside.
     #[inline]
-    pub(super) fn transmission(&self, at_m: Across) -> f32 {
+    pub(super) fn transmission(&self, at_m: PlaneVector) -> f32 {
         self.passes.of(f64::from(self.distance(at_m) <= self.radius_m))
     }
 
     /// The open fraction of a disc's area. Rectangles have to be sampled.
     #[inline]
-    pub(super) fn averaged(&self, image: &SourceImage, shift_m: Across) -> Option<f32> {
+    pub(super) fn averaged(&self, image: &SourceImage, shift_m: PlaneVector) -> Option<f32> {
         let SourceImage::Disc { radius_m } = *image else { return None };
         let common = common_area(self.radius_m, radius_m, self.distance(shift_m));
         Some(self.passes.of(common / (std::f64::consts::PI * radius_m * radius_m)))
     }
 
-    fn distance(&self, p: Across) -> f64 {
+    fn distance(&self, p: PlaneVector) -> f64 {
         (f64::from(p[0]) - self.center_m[0]).hypot(f64::from(p[1]) - self.center_m[1])
     }
 }

@@ -6,7 +6,7 @@
 //! cut-off plane, as on a real filter.
 
 use super::Rgb;
-use crate::optics::Across;
+use crate::optics::PlaneVector;
 
 /// A colour wheel: white on the axis, saturated from `radius_m` outwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ impl ColorWheel {
     /// Transmission at a point: hue by angle, saturation by distance. The strongest channel is
     /// always 1, because a filter cannot add light.
     #[inline]
-    pub(super) fn transmission(&self, [x, y]: Across) -> Rgb {
+    pub(super) fn transmission(&self, [x, y]: PlaneVector) -> Rgb {
         let saturation = (f64::from(x).hypot(f64::from(y)) / self.radius_m).min(1.0) as f32;
         let turn = (f64::from(y).atan2(f64::from(x)).to_degrees() - self.red_deg) / 60.0;
         let pure = hue(turn.rem_euclid(6.0) as f32);

@@ -2,7 +2,7 @@
 //! crosses the cut-off plane.
 
 use super::Rgb;
-use crate::optics::Across;
+use crate::optics::PlaneVector;
 use datasets::image_io::{ImageError, read_png};
 use std::path::Path;
 
@@ -94,7 +94,7 @@ impl FilterImage {
     }
 
     /// Position of a point of the plane in pixels; (0, 0) is the upper left corner.
-    pub fn pixel_from_plane(&self, at_m: Across) -> [f64; 2] {
+    pub fn pixel_from_plane(&self, at_m: PlaneVector) -> [f64; 2] {
         let [w, h] = [f64::from(self.width), f64::from(self.height)];
         [
             (f64::from(at_m[0]) / self.size_m[0] + 0.5) * w,
@@ -107,7 +107,7 @@ impl FilterImage {
         self.pixels.iter().any(|p| p[0] != p[1] || p[1] != p[2])
     }
 
-    pub(super) fn transmission(&self, at_m: Across) -> Rgb {
+    pub(super) fn transmission(&self, at_m: PlaneVector) -> Rgb {
         let [x, y] = self.pixel_from_plane(at_m);
         let clamp = |v: f64, n: u32| (v - 0.5).clamp(0.0, f64::from(n - 1));
         let (x, y) = (clamp(x, self.width), clamp(y, self.height));

@@ -6,7 +6,7 @@
 //! contrast is `f2 ε/a` (Settles 2001, equation 3.7). The range before clipping is `-a/f2 …
 //! (h-a)/f2`. Slits at other angles and round sources have closed forms of their own.
 
-use crate::optics::{Across, SourceImage};
+use crate::optics::{PlaneVector, SourceImage};
 
 /// A straight knife edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +63,7 @@ impl Knife {
             SourceImage::Point => Open::Step,
             SourceImage::Disc { radius_m } => Open::Disc { radius_m },
             SourceImage::Rectangle { .. } => {
-                let [a, b] = image.half_sides_along(direction);
+                let [a, b] = image.projected_half_sides(direction);
                 let (p, q) = (a.max(b), a.min(b));
                 // Corners smaller than f32 rounding are ignored.
                 if q <= 1e-7 * p {
@@ -102,14 +102,14 @@ impl Edge {
     /// Transmission at one point: 1 beyond the edge, and 1/2 on it, so that a point source with the
     /// edge on the axis has a defined background.
     #[inline]
-    pub(super) fn transmission(&self, at_m: Across) -> f32 {
+    pub(super) fn transmission(&self, at_m: PlaneVector) -> f32 {
         let d = self.beyond(at_m);
         if d == 0.0 { 0.5 } else { f32::from(d > 0.0) }
     }
 
     /// The open fraction of the source image's area.
     #[inline]
-    pub(super) fn averaged(&self, shift_m: Across) -> f32 {
+    pub(super) fn averaged(&self, shift_m: PlaneVector) -> f32 {
         match self.open {
             Open::Step => self.transmission(shift_m),
             Open::Linear { half_m } => (0.5 + 0.5 * self.beyond(shift_m) / half_m).clamp(0.0, 1.0),
@@ -121,7 +121,7 @@ impl Edge {
     }
 
     #[inline]
-    fn beyond(&self, p: Across) -> f32 {
+    fn beyond(&self, p: PlaneVector) -> f32 {
         self.direction[0] * p[0] + self.direction[1] * p[1] - self.edge_m
     }
 }
@@ -180,7 +180,7 @@ mod tests {
         use crate::optics::{Optics, SourceShape};
         let slope = |f2: f64, position| {
             let source = SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 0.0 };
-            let optics = Optics { source, schlieren_focal_length_m: f2, ..Optics::CUSTOMARY };
+            let optics = Optics { source, schlieren_focal_length_m: f2, ..Optics::DEFAULT };
             let image = optics.source_image();
             let knife = Knife { angle_deg: 0.0, position };
             let at = |e: f64| f64::from(knife.edge(&image).averaged([(f2 * e) as f32, 0.0]));

@@ -21,7 +21,7 @@ pub use color::ColorWheel;
 pub use image::{FilterError, FilterImage};
 pub use knife::{Knife, KnifePosition};
 
-use crate::optics::{Across, SourceImage};
+use crate::optics::{PlaneVector, SourceImage};
 
 /// Linear red, green, blue.
 pub type Rgb = [f32; 3];
@@ -94,7 +94,7 @@ impl CutoffPlane {
 
     /// Transmission of light that crosses the plane in one point.
     #[inline]
-    pub fn transmission(&self, at_m: Across) -> Rgb {
+    pub fn transmission(&self, at_m: PlaneVector) -> Rgb {
         match &self.kind {
             Kind::Knife(k) => [k.transmission(at_m); 3],
             Kind::Other(Cutoff::Aperture(a)) => [a.transmission(at_m); 3],
@@ -108,7 +108,7 @@ impl CutoffPlane {
     /// if it has a closed form. `None` if the source image has to be sampled. A closed form needs
     /// one photon where sampling needs many.
     #[inline]
-    pub fn averaged(&self, shift_m: Across) -> Option<Rgb> {
+    pub fn averaged(&self, shift_m: PlaneVector) -> Option<Rgb> {
         match &self.kind {
             Kind::Knife(k) => Some([k.averaged(shift_m); 3]),
             Kind::Other(Cutoff::Open) => Some([1.0; 3]),
@@ -130,7 +130,7 @@ pub(crate) mod testing {
     use rt_core::sampler::{Sampler, Sampling};
 
     /// Mean transmission over the source image by sampling: the reference for closed forms.
-    pub(crate) fn sampled(cutoff: &CutoffPlane, shift_m: Across, samples: u32) -> f64 {
+    pub(crate) fn sampled(cutoff: &CutoffPlane, shift_m: PlaneVector, samples: u32) -> f64 {
         let one = |i: u32| {
             let p = cutoff.image().point_m(Sampler::new(Sampling::Sobol, 1, 0, 0, i).square(0));
             f64::from(cutoff.transmission([p[0] + shift_m[0], p[1] + shift_m[1]])[0])

@@ -13,7 +13,7 @@
 
 use super::photons::Exposure;
 use super::{Film, Tally, quantize};
-use crate::optics::Across;
+use crate::optics::PlaneVector;
 use crate::path::{Exit, Start, Status};
 use crate::technique::Photon;
 use rayon::prelude::*;
@@ -97,7 +97,7 @@ pub fn expose_beams<const C: usize>(
 }
 
 /// Points that sample the source; none when there is a closed form.
-fn source_points(exposure: &Exposure<'_>) -> Vec<Across> {
+fn source_points(exposure: &Exposure<'_>) -> Vec<PlaneVector> {
     if !exposure.technique.needs_source_points() {
         return Vec::new();
     }
@@ -111,7 +111,7 @@ fn source_points(exposure: &Exposure<'_>) -> Vec<Across> {
 fn corners<const C: usize>(
     exposure: &Exposure<'_>,
     film: &Film<C>,
-    source_points: &[Across],
+    source_points: &[PlaneVector],
     columns: usize,
     y: f64,
     place: &impl Fn(usize) -> f64,

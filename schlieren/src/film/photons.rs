@@ -6,7 +6,7 @@
 //! also send photons, because light from there reaches the image's edge.
 
 use super::{Film, PhotonTile, TILE, Tally};
-use crate::optics::Across;
+use crate::optics::PlaneVector;
 use crate::path::{Exit, LightPaths, Start, Status};
 use crate::solids::Solids;
 use crate::technique::{Photon, Technique};
@@ -112,7 +112,7 @@ fn expose_tile<const C: usize>(
         films.iter().map(|f| PhotonTile::new(f, corner)).collect();
     let capacity = (TILE * TILE) as usize;
     let (mut starts, mut places) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-    let mut image_points: Vec<Across> = Vec::with_capacity(capacity);
+    let mut image_points: Vec<PlaneVector> = Vec::with_capacity(capacity);
     let mut exits = vec![Exit::UNDISTURBED; capacity];
     let needs_source = exposure.tilted_beams || technique.needs_source_points();
     let to_pixels = (1.0 / framing.pixel_m) as f32;

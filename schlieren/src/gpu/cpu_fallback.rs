@@ -201,7 +201,7 @@ impl<'a> CpuFallback<'a> {
 mod tests {
     use super::*;
     use crate::path::PathQuantities;
-    use crate::testing::{with_late_jobs, within};
+    use crate::testing::{with_concurrent_jobs, with_timeout};
     use glam::DVec3;
     use std::sync::Arc;
     use std::sync::atomic::AtomicU32;
@@ -404,8 +404,8 @@ mod tests {
         let shared = Arc::new((starts, expected));
         for threads in [1, 2, 8] {
             let shared = shared.clone();
-            within(Duration::from_secs(120), &format!("{threads} threads"), move || {
-                with_late_jobs(threads, || {
+            with_timeout(Duration::from_secs(120), &format!("{threads} threads"), move || {
+                with_concurrent_jobs(threads, || {
                     let device = Fails::new(true, 0, 0);
                     let cpu_fallback_paths = CpuFallback::of_march(
                         field,

@@ -42,7 +42,7 @@ const PROJECTIONS: usize = 2;
 impl FieldCache {
     /// The field's largest derivatives.
     pub fn derivative_bounds(&self, field: &Field) -> DerivativeBounds {
-        get_or_make(&self.derivative_bounds, || DerivativeBounds::of(field))
+        get_or_make(&self.derivative_bounds, || DerivativeBounds::new(field))
     }
 
     /// The spline through the field.
@@ -84,7 +84,7 @@ fn get_or_make<T: Clone>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{with_late_jobs, within};
+    use crate::testing::{with_concurrent_jobs, with_timeout};
     use crate::view::Axis;
     use glam::DVec3;
     use std::time::Duration;
@@ -102,8 +102,8 @@ mod tests {
             for threads in [1, 2, 8] {
                 let field = field.clone();
                 let name = format!("preparation {what} on {threads} threads");
-                within(Duration::from_secs(120), &name, move || {
-                    with_late_jobs(threads, || {
+                with_timeout(Duration::from_secs(120), &name, move || {
+                    with_concurrent_jobs(threads, || {
                         let (field, cache) = (field.clone(), FieldCache::default());
                         move |_| match what {
                             0 => drop(cache.spline(&field)),

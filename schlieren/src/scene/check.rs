@@ -226,27 +226,27 @@ impl Scene {
     /// because every effective scene has them.
     fn check_lenses(&self) -> Result<(), SceneError> {
         let technique = self.technique.name();
-        let customary = super::LensSpec::default();
+        let defaults = super::LensSpec::default();
         let fraction = matches!(
             self.technique,
             TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { open_m: None, .. } }
         );
-        if self.lenses.schlieren_m != customary.schlieren_m {
-            let in_vain =
+        if self.lenses.schlieren_m != defaults.schlieren_m {
+            let no_effect =
                 |hint| Err(SceneError::NoEffect { key: "lenses.schlieren_m", technique, hint });
             if fraction {
-                return in_vain(
+                return no_effect(
                     ", because with a knife that leaves a fraction of the source open the image \
                      and its shift grow alike; give the open height technique.cutoff.open_m, or \
                      take lenses.collimator_m",
                 );
             }
             if !matches!(self.technique, TechniqueSpec::Schlieren { .. }) {
-                return in_vain("; it belongs to schlieren");
+                return no_effect("; it belongs to schlieren");
             }
         }
         let point = self.optics().source == crate::optics::SourceShape::Point;
-        if self.lenses.collimator_m != customary.collimator_m
+        if self.lenses.collimator_m != defaults.collimator_m
             && (point || !self.technique.uses_source())
         {
             let hint = "; it sets how large the source looks, and there is a point or none";
@@ -258,31 +258,31 @@ impl Scene {
     /// Refuses keys whose value cannot change a pixel.
     fn check_effect(&self) -> Result<(), SceneError> {
         let technique = self.technique.name();
-        let in_vain = |key, hint| Err(SceneError::NoEffect { key, technique, hint });
+        let no_effect = |key, hint| Err(SceneError::NoEffect { key, technique, hint });
         if self.light.source.is_some() && !self.technique.uses_source() {
-            return in_vain("light.source", "; it belongs to schlieren and shadowgraph");
+            return no_effect("light.source", "; it belongs to schlieren and shadowgraph");
         }
         if self.light.beams != BeamsSpec::Auto && !self.technique.uses_source() {
-            return in_vain("light.beams", "; it belongs to schlieren and shadowgraph");
+            return no_effect("light.beams", "; it belongs to schlieren and shadowgraph");
         }
         if self.light.beams == BeamsSpec::Tilted
             && matches!(self.sampling(), SamplingSpec::Beams { .. })
         {
-            return in_vain("light.beams = \"tilted\"", " with sampling by beams; take photons");
+            return no_effect("light.beams = \"tilted\"", " with sampling by beams; take photons");
         }
         self.check_lenses()?;
         if !self.technique.follows_light() {
             if self.film.focus_m.is_some() {
-                return in_vain("film.focus_m", "; it knows no optics");
+                return no_effect("film.focus_m", "; it knows no optics");
             }
             if self.sampling.is_some() {
-                return in_vain("sampling", "; it takes one ray per pixel");
+                return no_effect("sampling", "; it takes one ray per pixel");
             }
             if !self.solids.files.is_empty() {
-                return in_vain("solids", "; it knows no light to block");
+                return no_effect("solids", "; it knows no light to block");
             }
             if self.light.wavelengths_nm.len() > 1 {
-                return in_vain("light.wavelengths_nm (several)", "; give one");
+                return no_effect("light.wavelengths_nm (several)", "; give one");
             }
         }
         if matches!(self.technique, TechniqueSpec::Shadowgraph {}) && self.focus_m() == 0.0 {

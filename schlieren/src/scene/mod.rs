@@ -173,7 +173,7 @@ pub struct LensSpec {
 }
 
 fn focal_length() -> f64 {
-    Optics::CUSTOMARY.schlieren_focal_length_m
+    Optics::DEFAULT.schlieren_focal_length_m
 }
 
 impl Default for LensSpec {
@@ -521,12 +521,12 @@ impl Scene {
     /// its default is beams. The default of the others is photons.
     pub fn sampling(&self) -> SamplingSpec {
         let beams = matches!(self.technique, TechniqueSpec::Shadowgraph {});
-        let customary = if beams {
+        let default_sampling = if beams {
             SamplingSpec::Beams { cells_per_side: cells() }
         } else {
             SamplingSpec::default()
         };
-        self.sampling.unwrap_or(customary)
+        self.sampling.unwrap_or(default_sampling)
     }
 
     /// The plane in focus: the given one or the technique's default.
@@ -553,14 +553,14 @@ impl Scene {
             TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { angle_deg, .. } } => *angle_deg,
             _ => 0.0,
         };
-        let customary = match &self.technique {
+        let default_source = match &self.technique {
             TechniqueSpec::Schlieren { cutoff: CutoffSpec::Knife { .. } } => {
                 SourceSpec::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: None }
             }
             TechniqueSpec::Schlieren { .. } => SourceSpec::Circle { diameter_m: 0.5e-3 },
             _ => SourceSpec::Point {},
         };
-        let source = match self.light.source.unwrap_or(customary) {
+        let source = match self.light.source.unwrap_or(default_source) {
             SourceSpec::Point {} => SourceShape::Point,
             SourceSpec::Slit { width_m, length_m, angle_deg } => {
                 SourceShape::Slit { width_m, length_m, angle_deg: angle_deg.unwrap_or(along_knife) }

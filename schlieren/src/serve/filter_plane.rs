@@ -4,7 +4,7 @@
 use crate::cutoff::painted::{Painting, Stroke};
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
 use crate::film::Framing;
-use crate::optics::{Across, SourceImage};
+use crate::optics::{PlaneVector, SourceImage};
 use crate::render::Map;
 use crate::scene::{CutoffSpec, Scene, SceneError, TechniqueSpec};
 use rt_core::colormap::linear_to_srgb;
@@ -131,7 +131,7 @@ pub(super) fn traced(
     framing: &Framing,
     f2_m: f64,
     at: [f64; 2],
-) -> Option<(Across, Across)> {
+) -> Option<(PlaneVector, PlaneVector)> {
     let [w, h] = [framing.width, framing.height];
     let landed = [at[0] * f64::from(w), at[1] * f64::from(h)];
     let pixel = |p: [f64; 2]| {
@@ -212,7 +212,7 @@ mod tests {
         Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{technique}")).unwrap()
     }
 
-    fn prism(deflection: Across) -> Map {
+    fn prism(deflection: PlaneVector) -> Map {
         Map {
             deflection_rad: vec![deflection; 16],
             displacement_m: vec![[0.0; 2]; 16],

@@ -11,7 +11,7 @@ use super::merge_patch::merge;
 use crate::cutoff::Rgb;
 use crate::cutoff::painted::Stroke;
 use crate::input::Step;
-use crate::optics::Across;
+use crate::optics::PlaneVector;
 use crate::scene::{
     BeamsSpec, CutoffSpec, FilmSpec, FlowSpec, LensSpec, LightSpec, SamplingSpec, Scene,
     TechniqueSpec,
@@ -444,7 +444,7 @@ impl Session {
 
     /// Deflection, and point on the filter, of the light at a point of the image; `None` without
     /// light.
-    pub fn trace(&self, at: [f64; 2]) -> Result<Option<(Across, Across)>, RefusedChange> {
+    pub fn trace(&self, at: [f64; 2]) -> Result<Option<(PlaneVector, PlaneVector)>, RefusedChange> {
         if !at.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(refused("places of the picture are 0 to 1 from its upper left corner"));
         }

@@ -11,7 +11,7 @@
 //! the cell. It is the same at any resolution.
 
 use super::Photon;
-use crate::optics::{Across, Optics};
+use crate::optics::{Optics, PlaneVector};
 use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::view::View;
 use rt_core::math::mix64;
@@ -113,7 +113,7 @@ impl<'a> ReversedPaths<'a> {
     }
 }
 
-fn mirrored([x, y]: Across) -> Across {
+fn mirrored([x, y]: PlaneVector) -> PlaneVector {
     [-x, y]
 }
 
@@ -158,7 +158,7 @@ mod tests {
     const FRAMING: Framing = Framing { width: 64, height: 48, pixel_m: 0.5e-3, center_m: [0.0; 2] };
 
     fn picture(paths: &ClosedForm, distance_m: f64) -> Vec<f32> {
-        let optics = Optics { focus_m: distance_m, ..Optics::CUSTOMARY };
+        let optics = Optics { focus_m: distance_m, ..Optics::DEFAULT };
         expose_grey(&Technique::Bos(Bos::new(optics, DOTS)), paths, FRAMING, 16)
     }
 

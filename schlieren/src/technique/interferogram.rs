@@ -109,7 +109,7 @@ mod tests {
     const WAVELENGTH: f64 = 633e-9;
 
     fn picture(paths: &ClosedForm, visibility: f64, fringes: Option<Fringes>) -> Vec<f32> {
-        let i = Interferogram::new(Optics::CUSTOMARY, WAVELENGTH, visibility, fringes, 1.0);
+        let i = Interferogram::new(Optics::DEFAULT, WAVELENGTH, visibility, fringes, 1.0);
         expose_grey(&Technique::Interferogram(i), paths, FRAMING, 16)
     }
 
@@ -162,7 +162,7 @@ mod tests {
     fn a_gaussian_blob_shows_contours_of_its_closed_form() {
         let framing = Framing { width: 64, height: 64, pixel_m: 0.5e-3, center_m: [0.0; 2] };
         let blob = ClosedForm::gaussian(3.2 * WAVELENGTH, 6e-3, 0.0);
-        let i = Interferogram::new(Optics::CUSTOMARY, WAVELENGTH, 1.0, None, 1.0);
+        let i = Interferogram::new(Optics::DEFAULT, WAVELENGTH, 1.0, None, 1.0);
         let film = expose_grey(&Technique::Interferogram(i), &blob, framing, 64);
         let mut worst = 0.0f64;
         for (k, s) in framing.pixel_centers().iter().enumerate() {
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn thousands_of_waves_keep_their_phase() {
-        let i = Interferogram::new(Optics::CUSTOMARY, WAVELENGTH, 1.0, None, 1.0);
+        let i = Interferogram::new(Optics::DEFAULT, WAVELENGTH, 1.0, None, 1.0);
         let exit = crate::path::Exit {
             opd_m: (3000.25 * WAVELENGTH) as f32,
             ..crate::path::Exit::UNDISTURBED

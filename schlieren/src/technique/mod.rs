@@ -16,7 +16,7 @@ pub mod slice;
 pub mod volume;
 
 use crate::cutoff::Rgb;
-use crate::optics::{Across, Optics};
+use crate::optics::{Optics, PlaneVector};
 use crate::path::{Exit, Start};
 
 /// A photon behind the test section.
@@ -28,9 +28,9 @@ pub struct Photon<'a> {
     pub exit: &'a Exit,
     /// The image of its source point in the cut-off plane. Zero unless the technique needs source
     /// points ([`Technique::needs_source_points`]) or the beams are tilted.
-    pub image_point_m: Across,
+    pub image_point_m: PlaneVector,
     /// Shift from its start to where it lands, in the plane of focus.
-    pub shift_m: Across,
+    pub shift_m: PlaneVector,
 }
 
 /// A technique that simulates light, with its optics.

@@ -94,7 +94,7 @@ mod tests {
         for (angle_deg, expected) in [(0.0, 0.65), (90.0, 0.515), (180.0, 0.35), (-90.0, 0.485)] {
             let cutoff = Cutoff::Knife(Knife { angle_deg, position: HALF_OPEN });
             for sampled in [false, true] {
-                let s = Schlieren::new(Optics::CUSTOMARY, &cutoff, sampled);
+                let s = Schlieren::new(Optics::DEFAULT, &cutoff, sampled);
                 let film = expose_grey(&Technique::Schlieren(s), &prism, FRAMING, 64);
                 let middle = film[8 * 24 + 12];
                 let expected: f32 = expected;
@@ -112,7 +112,7 @@ mod tests {
     fn a_gaussian_blob_is_its_gradient_in_grey_levels() {
         let blob = ClosedForm::gaussian(1e-7, 4e-3, 0.0);
         let cutoff = Cutoff::Knife(Knife { angle_deg: 0.0, position: HALF_OPEN });
-        let s = Schlieren::new(Optics::CUSTOMARY, &cutoff, false);
+        let s = Schlieren::new(Optics::DEFAULT, &cutoff, false);
         let film = expose_grey(&Technique::Schlieren(s), &blob, FRAMING, 64);
         let (mut worst, mut contrast) = (0.0f32, 0.0f32);
         for (i, start) in FRAMING.pixel_centers().iter().enumerate() {
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn the_color_filter_paints_directions() {
         let cutoff = Cutoff::Color(ColorWheel { radius_m: 1e-3, red_deg: 0.0 });
-        let optics = Optics { source: crate::optics::SourceShape::Point, ..Optics::CUSTOMARY };
+        let optics = Optics { source: crate::optics::SourceShape::Point, ..Optics::DEFAULT };
         for (deflection, strongest) in
             [([3e-4, 0.0], 0), ([-1.5e-4, 2.6e-4], 1), ([-1.5e-4, -2.6e-4], 2)]
         {

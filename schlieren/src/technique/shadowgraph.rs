@@ -21,7 +21,7 @@ mod tests {
     const SIGMA: f64 = 6e-3;
 
     fn at(distance_m: f64) -> Technique {
-        Technique::Shadowgraph(Optics { focus_m: distance_m, ..Optics::CUSTOMARY })
+        Technique::Shadowgraph(Optics { focus_m: distance_m, ..Optics::DEFAULT })
     }
 
     /// `I = 1/|det(1 + D ∇u)|` of a radial deflection u(r) = -(opd/σ²) r, opd = A exp(-r²/2σ²), at
