@@ -109,7 +109,7 @@ fn photons<const C: usize>(
     let done = expose(&exposure(t, p), &films, 0..samples, false, &cancel, &|_| {})
         .expect("not cancelled");
     assert_eq!(done.tally.not_a_number, 0);
-    films[0].developed(f64::from(samples))
+    films[0].to_pixels(f64::from(samples))
 }
 
 /// Exposes a grey film by photons.
@@ -142,7 +142,7 @@ pub(crate) fn beams_grey(
     let film = Film::<1>::new(framing, false);
     expose_beams(&exposure(t, p), &film, per_side, &AtomicBool::new(false), &|_| {})
         .expect("not cancelled");
-    film.developed(1.0).into_iter().flatten().collect()
+    film.to_pixels(1.0).into_iter().flatten().collect()
 }
 
 /// Runs `work` on a thread of its own and returns its result. Fails the test instead of hanging

@@ -117,7 +117,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let scene = scene(toml)?;
         let framing = framing(&scene, &section);
         let technique = technique(&scene, 0, &framing, section.fields[0].n0(), false)?;
-        let needs = (technique.looks_from_film(), technique.needs_opd(), !scene.media.is_empty());
+        let needs = (technique.samples_from_film(), technique.needs_opd(), !scene.media.is_empty());
         benches.push(Bench { name, scene, technique, needs });
     }
 
@@ -197,7 +197,7 @@ fn exposed(b: &Bench, section: &TestSection, paths: &dyn LightPaths, passes: u32
         never: &AtomicBool,
     ) -> u64 {
         expose(e, std::slice::from_ref(&film), 0..passes, false, never, &|_| {});
-        film.developed(f64::from(passes))
+        film.to_pixels(f64::from(passes))
             .iter()
             .flatten()
             .map(|v| f64::from(*v))

@@ -163,7 +163,7 @@ fn jet(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
         };
         let film = Film::<1>::new(framing, false);
         let done = expose(&exposure, std::slice::from_ref(&film), 0..10, false, &never, &|_| {});
-        let light: f64 = film.developed(10.0).iter().map(|p| f64::from(p[0])).sum();
+        let light: f64 = film.to_pixels(10.0).iter().map(|p| f64::from(p[0])).sum();
         (done.map_or(0, |d| d.tally.sent), light.to_bits())
     };
     let photons = frame(&held).0 as f64;

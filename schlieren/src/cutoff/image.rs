@@ -67,10 +67,10 @@ impl FilterImage {
     /// Reads a PNG as a filter of width `width_m`. The height follows from the aspect ratio.
     /// Colours are multiplied by alpha, so transparent pixels are dark.
     pub fn from_png(path: &Path, width_m: f64) -> Result<Self, FilterError> {
-        let picture = read_png(path)?;
-        let (width, height) = (picture.width, picture.height);
+        let png = read_png(path)?;
+        let (width, height) = (png.width, png.height);
         let size_m = [width_m, width_m * f64::from(height) / f64::from(width.max(1))];
-        let pixels = picture.rgba()?.iter().map(|p| [p[0], p[1], p[2]]).collect();
+        let pixels = png.rgba()?.iter().map(|p| [p[0], p[1], p[2]]).collect();
         FilterImage::new(width, height, size_m, pixels)
     }
 

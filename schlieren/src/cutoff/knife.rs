@@ -103,7 +103,7 @@ impl Edge {
     /// edge on the axis has a defined background.
     #[inline]
     pub(super) fn transmission(&self, at_m: PlaneVector) -> f32 {
-        let d = self.beyond(at_m);
+        let d = self.signed_distance(at_m);
         if d == 0.0 { 0.5 } else { f32::from(d > 0.0) }
     }
 
@@ -112,16 +112,20 @@ impl Edge {
     pub(super) fn averaged(&self, shift_m: PlaneVector) -> f32 {
         match self.open {
             Open::Step => self.transmission(shift_m),
-            Open::Linear { half_m } => (0.5 + 0.5 * self.beyond(shift_m) / half_m).clamp(0.0, 1.0),
-            Open::Trapezoid { p, q } => {
-                open_rectangle(p, q, f64::from(self.beyond(shift_m))) as f32
+            Open::Linear { half_m } => {
+                (0.5 + 0.5 * self.signed_distance(shift_m) / half_m).clamp(0.0, 1.0)
             }
-            Open::Disc { radius_m } => open_disc(radius_m, f64::from(self.beyond(shift_m))) as f32,
+            Open::Trapezoid { p, q } => {
+                open_rectangle(p, q, f64::from(self.signed_distance(shift_m))) as f32
+            }
+            Open::Disc { radius_m } => {
+                open_disc(radius_m, f64::from(self.signed_distance(shift_m))) as f32
+            }
         }
     }
 
     #[inline]
-    fn beyond(&self, p: PlaneVector) -> f32 {
+    fn signed_distance(&self, p: PlaneVector) -> f32 {
         self.direction[0] * p[0] + self.direction[1] * p[1] - self.edge_m
     }
 }

@@ -35,7 +35,7 @@ const LOST: Corner = Corner { at_px: [f64::NAN; 2], energy: [0.0; 3] };
 
 /// Exposes `film` with `per_side` × `per_side` cells per pixel and returns counts of triangles.
 /// `progress` receives numbers of traced rays. Returns `None` when `cancel` was set.
-/// `film.developed(1.0)` is the image.
+/// `film.to_pixels(1.0)` is the image.
 pub fn expose_beams<const C: usize>(
     exposure: &Exposure<'_>,
     film: &Film<C>,
@@ -47,7 +47,7 @@ pub fn expose_beams<const C: usize>(
     let (k, margin) = (f64::from(per_side), exposure.margin_px);
     let columns = ((framing.width + 2 * margin) * per_side + 1) as usize;
     let rows = ((framing.height + 2 * margin) * per_side + 1) as usize;
-    let place = |i: usize| i as f64 / k - f64::from(margin);
+    let position_px = |i: usize| i as f64 / k - f64::from(margin);
     let source_points = source_points(exposure);
 
     // A row of cells needs only two rows of corners. To trace in parallel, the cells are divided
@@ -62,10 +62,17 @@ pub fn expose_beams<const C: usize>(
                 return tally;
             }
             let last = (first + BAND).min(rows - 1);
-            let mut above = corners(exposure, film, &source_points, columns, place(first), &place);
+            let mut above =
+                corners(exposure, film, &source_points, columns, position_px(first), &position_px);
             for row in first..last {
-                let below =
-                    corners(exposure, film, &source_points, columns, place(row + 1), &place);
+                let below = corners(
+                    exposure,
+                    film,
+                    &source_points,
+                    columns,
+                    position_px(row + 1),
+                    &position_px,
+                );
                 for c in 0..columns - 1 {
                     let [a, b, d, e] = [above[c], above[c + 1], below[c], below[c + 1]];
                     // The diagonal alternates so that no direction is preferred.
@@ -114,11 +121,11 @@ fn corners<const C: usize>(
     source_points: &[PlaneVector],
     columns: usize,
     y: f64,
-    place: &impl Fn(usize) -> f64,
+    position_px: &impl Fn(usize) -> f64,
 ) -> Vec<Corner> {
     let (framing, technique) = (film.framing(), exposure.technique);
     let start = |i: usize| Start {
-        position_m: framing.plane_from_pixel(place(i), y).map(|c| c as f32),
+        position_m: framing.plane_from_pixel(position_px(i), y).map(|c| c as f32),
         tilt_rad: [0.0; 2],
     };
     let starts: Vec<Start> = (0..columns).map(start).collect();
@@ -130,7 +137,7 @@ fn corners<const C: usize>(
             return LOST;
         }
         let shift_m = technique.optics().film_shift_m(start, exit);
-        let of = |image_point_m| technique.landed(&Photon { start, exit, image_point_m, shift_m });
+        let of = |image_point_m| technique.energy(&Photon { start, exit, image_point_m, shift_m });
         let mut energy = [0.0f32; 3];
         match source_points {
             [] => energy = of([0.0; 2]),
@@ -139,10 +146,10 @@ fn corners<const C: usize>(
                 (0..3).for_each(|c| energy[c] += e[c] / points.len() as f32);
             }),
         }
-        let shift = if technique.looks_from_film() { [0.0; 2] } else { shift_m.map(f64::from) };
+        let shift = if technique.samples_from_film() { [0.0; 2] } else { shift_m.map(f64::from) };
         // The lattice is exact and the shift is small, so areas keep the relative accuracy of the
         // shift.
-        let at_px = [place(i) + shift[0] / framing.pixel_m, y - shift[1] / framing.pixel_m];
+        let at_px = [position_px(i) + shift[0] / framing.pixel_m, y - shift[1] / framing.pixel_m];
         Corner { at_px, energy }
     };
     starts.iter().zip(&exits).enumerate().map(corner).collect()
@@ -163,7 +170,7 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
     };
     let ((x0, x1), (y0, y1)) = (bounds(0, framing.width), bounds(1, framing.height));
     let area = polygon_area(&points);
-    let give = |x: i64, y: i64, share: f64| {
+    let add_share = |x: i64, y: i64, share: f64| {
         let shared = energy.map(|e| quantize((e * share) as f32));
         film.add(y as usize * framing.width as usize + x as usize, shared, 0);
     };
@@ -173,7 +180,7 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
         let inside = (0.0..f64::from(framing.width)).contains(&center[0])
             && (0.0..f64::from(framing.height)).contains(&center[1]);
         if inside {
-            give(center[0] as i64, center[1] as i64, 1.0);
+            add_share(center[0] as i64, center[1] as i64, 1.0);
         }
         return inside;
     }
@@ -184,7 +191,7 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
             let cell = clip(clip(row, 0, x as f64, 1.0), 0, x as f64 + 1.0, -1.0);
             let share = polygon_area(cell.points()) / area;
             if share > 0.0 {
-                give(x, y, share);
+                add_share(x, y, share);
                 any = true;
             }
         }
@@ -264,7 +271,7 @@ mod tests {
         // The two halves of the square 0..3 x 0..3, with opposite orientations, which count alike.
         assert!(deposit(&film, [corner(0.0, 0.0), corner(3.0, 0.0), corner(0.0, 3.0)], 4.5));
         assert!(deposit(&film, [corner(3.0, 3.0), corner(3.0, 0.0), corner(0.0, 3.0)], 4.5));
-        let f = film.developed(1.0);
+        let f = film.to_pixels(1.0);
         for y in 0..4 {
             for x in 0..4 {
                 let expected = if x < 3 && y < 3 { 1.0 } else { 0.0 };
@@ -277,7 +284,7 @@ mod tests {
     fn a_point_focus_keeps_all_its_energy() {
         let film = Film::<1>::new(Framing::fitted(4, 4, [1.0, 1.0]), false);
         assert!(deposit(&film, [corner(2.5, 1.5); 3], 0.5));
-        assert_eq!(film.developed(1.0)[4 + 2], [0.5]);
+        assert_eq!(film.to_pixels(1.0)[4 + 2], [0.5]);
         assert!(!deposit(&film, [corner(-2.5, 1.5); 3], 0.5), "beside the film");
     }
 
@@ -285,7 +292,7 @@ mod tests {
     fn triangles_half_outside_leave_only_their_inside() {
         let film = Film::<1>::new(Framing::fitted(2, 2, [1.0, 1.0]), false);
         deposit(&film, [corner(-2.0, 0.0), corner(2.0, 0.0), corner(0.0, 2.0)], 4.0);
-        let sum: f32 = film.developed(1.0).iter().map(|e| e[0]).sum();
+        let sum: f32 = film.to_pixels(1.0).iter().map(|e| e[0]).sum();
         assert!((sum - 2.0).abs() < 1e-6, "{sum}");
     }
 }

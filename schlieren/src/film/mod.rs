@@ -150,7 +150,7 @@ impl<const C: usize> Film<C> {
 
     /// The energy of each pixel divided by `per_pixel`, the number of photons that the undisturbed
     /// beam leaves in a pixel.
-    pub fn developed(&self, per_pixel: f64) -> Vec<[f32; C]> {
+    pub fn to_pixels(&self, per_pixel: f64) -> Vec<[f32; C]> {
         let scale = 1.0 / (ONE * per_pixel);
         self.energy
             .chunks_exact(C)
@@ -186,7 +186,7 @@ mod tests {
             film.add(0, [quantize(0.25)], 1);
         }
         film.add(0, [quantize(f32::NAN)], 0);
-        assert_eq!(film.developed(1000.0), [[0.25]]);
+        assert_eq!(film.to_pixels(1000.0), [[0.25]]);
         assert_eq!(film.counts(), Some(vec![1000]));
     }
 }

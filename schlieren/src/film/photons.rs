@@ -111,7 +111,8 @@ fn expose_tile<const C: usize>(
     let mut tiles: Vec<PhotonTile<'_, C>> =
         films.iter().map(|f| PhotonTile::new(f, corner)).collect();
     let capacity = (TILE * TILE) as usize;
-    let (mut starts, mut places) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+    let (mut starts, mut positions_px) =
+        (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
     let mut image_points: Vec<PlaneVector> = Vec::with_capacity(capacity);
     let mut exits = vec![Exit::UNDISTURBED; capacity];
     let needs_source = exposure.tilted_beams || technique.needs_source_points();
@@ -120,7 +121,7 @@ fn expose_tile<const C: usize>(
     for pass in passes {
         // Start at a jittered position in every pixel.
         starts.clear();
-        places.clear();
+        positions_px.clear();
         image_points.clear();
         for y in corner[1]..end[1] {
             for x in corner[0]..end[0] {
@@ -129,7 +130,7 @@ fn expose_tile<const C: usize>(
                 let sampler =
                     Sampler::new(exposure.sampling, exposure.seed, x as u32, y as u32, pass);
                 let jitter = sampler.square(JITTER);
-                let place = [x as f32 + jitter[0], y as f32 + jitter[1]];
+                let position_px = [x as f32 + jitter[0], y as f32 + jitter[1]];
                 let at = framing.plane_from_pixel(
                     x as f64 + f64::from(jitter[0]),
                     y as f64 + f64::from(jitter[1]),
@@ -148,7 +149,7 @@ fn expose_tile<const C: usize>(
                     continue;
                 }
                 starts.push(start);
-                places.push(place);
+                positions_px.push(position_px);
                 image_points.push(point);
             }
         }
@@ -171,15 +172,18 @@ fn expose_tile<const C: usize>(
             }
             let shift_m = optics.film_shift_m(start, exit);
             let energy =
-                technique.landed(&Photon { start, exit, image_point_m: image_points[i], shift_m });
-            let moved = if technique.looks_from_film() { [0.0; 2] } else { shift_m };
+                technique.energy(&Photon { start, exit, image_point_m: image_points[i], shift_m });
+            let shift = if technique.samples_from_film() { [0.0; 2] } else { shift_m };
             // A NaN or infinity in either becomes NaN here; comparisons with it are false.
-            let check = (moved[0] + moved[1] + energy[0] + energy[1] + energy[2]) * 0.0;
+            let check = (shift[0] + shift[1] + energy[0] + energy[1] + energy[2]) * 0.0;
             if check != 0.0 {
                 done.tally.not_a_number += 1;
                 continue;
             }
-            let at_px = [places[i][0] + moved[0] * to_pixels, places[i][1] - moved[1] * to_pixels];
+            let at_px = [
+                positions_px[i][0] + shift[0] * to_pixels,
+                positions_px[i][1] - shift[1] * to_pixels,
+            ];
             let energy: [f32; C] = std::array::from_fn(|c| energy[c]);
             done.tally.landed += 1;
             done.tally.on_film += u64::from(tile.deposit(at_px, energy));

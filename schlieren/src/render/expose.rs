@@ -75,7 +75,7 @@ pub(super) fn expose_lines<'a>(
         if line == 0 {
             r.report.add_plan(&planned);
         }
-        let margin_px = if t.looks_from_film() {
+        let margin_px = if t.samples_from_film() {
             0
         } else {
             margin_px(&*planned.paths, &optics, &framing, &mut r.report)
@@ -155,7 +155,7 @@ fn expose_line<const C: usize>(
             r.report.counters.differential_rays += rays;
             r.report.counters.rays += rays;
             r.report.counters.solid_queries += if setup.solids.is_some() { rays } else { 0 };
-            film.developed(1.0)
+            film.to_pixels(1.0)
         }
         SamplingSpec::Photons { samples, filter, .. } => {
             let filter = filter.filter().shrunk(samples);
@@ -184,7 +184,7 @@ fn expose_line<const C: usize>(
                 r.counts = films[0].counts();
             }
             filtered(
-                &films[0].developed(f64::from(samples)),
+                &films[0].to_pixels(f64::from(samples)),
                 &exposed.landed,
                 &framing,
                 filter,
@@ -223,11 +223,11 @@ fn noise<const C: usize>(
     exposure: f64,
 ) -> Vec<f32> {
     let halves = [samples.div_ceil(2), samples / 2];
-    let developed: Vec<Vec<[f32; C]>> =
-        films.iter().zip(halves).map(|(f, n)| f.developed(f64::from(n))).collect();
-    let difference: Vec<[f32; C]> = developed[0]
+    let half_images: Vec<Vec<[f32; C]>> =
+        films.iter().zip(halves).map(|(f, n)| f.to_pixels(f64::from(n))).collect();
+    let difference: Vec<[f32; C]> = half_images[0]
         .iter()
-        .zip(&developed[1])
+        .zip(&half_images[1])
         .map(|(a, b)| std::array::from_fn(|c| 0.5 * exposure as f32 * (a[c] - b[c])))
         .collect();
     let width = films[0].framing().width as usize;

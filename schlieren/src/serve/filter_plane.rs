@@ -133,7 +133,7 @@ pub(super) fn traced(
     at: [f64; 2],
 ) -> Option<(PlaneVector, PlaneVector)> {
     let [w, h] = [framing.width, framing.height];
-    let landed = [at[0] * f64::from(w), at[1] * f64::from(h)];
+    let end_px = [at[0] * f64::from(w), at[1] * f64::from(h)];
     let pixel = |p: [f64; 2]| {
         let [x, y] = [
             p[0].clamp(0.0, f64::from(w - 1)) as usize,
@@ -141,12 +141,12 @@ pub(super) fn traced(
         ];
         y * w as usize + x
     };
-    let mut start = landed;
+    let mut start = end_px;
     for _ in 0..4 {
         let moved = map.displacement_m.get(pixel(start))?;
         start = [
-            landed[0] - f64::from(moved[0]) / framing.pixel_m,
-            landed[1] + f64::from(moved[1]) / framing.pixel_m,
+            end_px[0] - f64::from(moved[0]) / framing.pixel_m,
+            end_px[1] + f64::from(moved[1]) / framing.pixel_m,
         ];
     }
     let k = pixel(start);

@@ -77,7 +77,7 @@ impl Technique {
     /// Whether rays are traced from the camera's pixels towards the light, so that energy stays in
     /// the pixel of the ray, and not from the light to the film.
     #[inline]
-    pub fn looks_from_film(&self) -> bool {
+    pub fn samples_from_film(&self) -> bool {
         matches!(self, Technique::Bos(_))
     }
 
@@ -96,7 +96,7 @@ impl Technique {
     /// The energy that a photon leaves on the film, with [`Exit::transmission`]. Absorption dims
     /// only the object beam, so an interferogram loses contrast before it gets dark.
     #[inline]
-    pub fn landed(&self, photon: &Photon<'_>) -> Rgb {
+    pub fn energy(&self, photon: &Photon<'_>) -> Rgb {
         let left = photon.exit.transmission;
         match self {
             Technique::Interferogram(i) if left < 1.0 => [i.dimmed(photon, left); 3],
