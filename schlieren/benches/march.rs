@@ -55,7 +55,7 @@ fn speed(c: &mut Criterion) {
                     &field,
                     view,
                     interpolant,
-                    Options { wanted: PathQuantities { opd }, ..Options::default() },
+                    Options { quantities: PathQuantities { opd }, ..Options::default() },
                 );
                 paths.trace(&rays, &mut exits);
                 group.throughput(Throughput::Elements(paths.counters().ray_steps));

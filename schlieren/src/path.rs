@@ -116,8 +116,8 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
         (**self).view()
     }
 
-    fn wanted(&self) -> PathQuantities {
-        (**self).wanted()
+    fn quantities(&self) -> PathQuantities {
+        (**self).quantities()
     }
 
     fn difference_step_m(&self) -> f64 {
@@ -160,7 +160,7 @@ pub trait LightPaths: Sync {
     fn view(&self) -> &View;
 
     /// The quantities that [`Exit`] will hold.
-    fn wanted(&self) -> PathQuantities;
+    fn quantities(&self) -> PathQuantities;
 
     /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences, about
     /// half a voxel.

@@ -72,7 +72,7 @@ pub struct Request {
     /// Quantities to compute besides deflection and displacement. The optical path, if requested,
     /// may have an error of up to the tolerance times the longest path through the field. This is
     /// consistent with the tolerance, because the slope of the optical path is a deflection.
-    pub wanted: PathQuantities,
+    pub quantities: PathQuantities,
     /// How cells without data treat light.
     pub blank: BlankCells,
     /// [`Options::skip_rad`], for [`Mode::Paraxial`].
@@ -200,7 +200,7 @@ impl Plan {
         let spline = request.interpolant.unwrap_or(Interpolant::BSpline);
         let straight_is_enough = bending_rad + edges_rad <= 0.5 * tolerance
             && projected_rad <= share(spline)
-            && (!request.wanted.opd || bending_path_m <= 0.5 * tolerance * length_m);
+            && (!request.quantities.opd || bending_path_m <= 0.5 * tolerance * length_m);
         let mode = request.mode.unwrap_or(if strong {
             Mode::Full
         } else if straight_is_enough {
@@ -247,7 +247,7 @@ impl Plan {
         let share_rad = share(interpolant);
         let good_enough = |voxels: f64| {
             let path_is =
-                !request.wanted.opd || path_error_m(voxels) <= 0.25 * tolerance * length_m;
+                !request.quantities.opd || path_error_m(voxels) <= 0.25 * tolerance * length_m;
             step_error_rad(voxels) <= share_rad && (path_is || share_rad > tolerance)
         };
         let step_voxels = request.step_voxels.unwrap_or_else(|| {
@@ -283,17 +283,18 @@ impl Plan {
         view: View,
         cache: &FieldCache,
     ) -> Box<dyn LightPaths + 'a> {
-        let (wanted, blank) = (self.request.wanted, self.request.blank);
+        let (quantities, blank) = (self.request.quantities, self.request.blank);
         match self.mode {
             Mode::LineOfSight => {
-                let projection = Projection { view, interpolant: self.interpolant, wanted, blank };
+                let projection =
+                    Projection { view, interpolant: self.interpolant, quantities, blank };
                 Box::new(cache.line_of_sight(field, projection))
             }
             Mode::Paraxial => {
                 let options = Options {
                     scheme: Scheme::Verlet,
                     step_voxels: self.step_voxels,
-                    wanted,
+                    quantities,
                     blank,
                     skip_rad: self.request.skip_rad,
                     skip_opd_m: self.request.skip_opd_m,
@@ -303,7 +304,7 @@ impl Plan {
             Mode::Full => {
                 let options = FullOptions {
                     step_voxels: self.step_voxels,
-                    wanted,
+                    quantities,
                     blank,
                     ..FullOptions::default()
                 };
@@ -489,8 +490,8 @@ impl LightPaths for FullSpline<'_> {
         &self.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.options.wanted
+    fn quantities(&self) -> PathQuantities {
+        self.options.quantities
     }
 
     fn difference_step_m(&self) -> f64 {

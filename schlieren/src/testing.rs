@@ -77,7 +77,7 @@ impl LightPaths for ClosedForm {
     fn view(&self) -> &View {
         &self.view
     }
-    fn wanted(&self) -> PathQuantities {
+    fn quantities(&self) -> PathQuantities {
         PathQuantities { opd: true }
     }
     fn difference_step_m(&self) -> f64 {

@@ -31,7 +31,7 @@ fn reference<'a, I: Interpolate, G: Integrator>(
         interpolate,
         g,
         view,
-        FullOptions { step_voxels: step, wanted: OPD, ..Default::default() },
+        FullOptions { step_voxels: step, quantities: OPD, ..Default::default() },
     )
 }
 
@@ -46,7 +46,7 @@ fn f32_keeps_its_digits_at_any_amplitude_in_an_oblique_view() {
         let spline = BSpline::new(&field);
         let wanted = trace(&reference(&field, &spline, Verlet, oblique(), 1.0), &starts);
         for opd in [false, true] {
-            let options = Options { wanted: PathQuantities { opd }, ..Default::default() };
+            let options = Options { quantities: PathQuantities { opd }, ..Default::default() };
             let got =
                 trace(&Deviational::new(&field, oblique(), Interpolant::BSpline, options), &starts);
             let (rms, max) = difference(&got, &wanted);
@@ -81,7 +81,7 @@ fn phase_is_right_within_a_thousandth_of_a_radian_of_three_thousand() {
     let wave_number = std::f64::consts::TAU / 633e-9;
     for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
         let wanted = trace(&reference(&field, &spline, Pefrl, view, 0.25), &starts);
-        let options = Options { wanted: OPD, step_voxels: 0.25, ..Default::default() };
+        let options = Options { quantities: OPD, step_voxels: 0.25, ..Default::default() };
         let got = trace(&Deviational::new(&field, view, Interpolant::BSpline, options), &starts);
         let phase = |e: &schlieren::path::Exit| f64::from(e.opd_m) * wave_number;
         let largest = wanted.iter().map(phase).fold(0.0, f64::max);
@@ -106,7 +106,7 @@ fn every_interpolant_and_scheme_agrees_with_its_f64_reference() {
         tolerance: f64,
     ) {
         for scheme in [Scheme::Verlet, Scheme::Euler] {
-            let options = Options { scheme, wanted: OPD, ..Default::default() };
+            let options = Options { scheme, quantities: OPD, ..Default::default() };
             // Along an axis all rays have the same steps in kernel and reference.
             let view = View::along(Axis::Y, DVec3::ZERO);
             let got = trace(&Deviational::new(field, view, interpolant, options), starts);
@@ -146,7 +146,7 @@ fn all_instruction_sets_agree() {
     #[cfg(not(target_arch = "x86_64"))]
     let levels = [Some(best)];
     for interpolant in INTERPOLANTS {
-        let options = Options { wanted: OPD, ..Default::default() };
+        let options = Options { quantities: OPD, ..Default::default() };
         let wanted =
             trace(&Deviational::with_level(&field, oblique(), interpolant, options, best), &starts);
         for level in levels.into_iter().flatten() {
@@ -174,7 +174,7 @@ fn views_along_all_axes_agree() {
     // A view rotated by half a turn about the light: right and up change sign.
     let half = View { right: -DVec3::X, up: -DVec3::Y, forward: DVec3::Z, centre_m: DVec3::ZERO };
     for interpolant in INTERPOLANTS {
-        let options = Options { wanted: OPD, ..Default::default() };
+        let options = Options { quantities: OPD, ..Default::default() };
         let wanted = trace(&Deviational::new(&straight, along_z, interpolant, options), &starts);
         let got = trace(&Deviational::new(&turned, along, interpolant, options), &starts);
         assert!(difference(&got, &wanted).1 < 1e-6, "{interpolant:?}");
@@ -235,7 +235,7 @@ fn gaussian_blob_is_the_closed_form_to_first_order() {
         &field,
         View::along(Axis::Z, DVec3::ZERO),
         Interpolant::BSpline,
-        Options { wanted: OPD, ..Default::default() },
+        Options { quantities: OPD, ..Default::default() },
     );
     let exits = trace(&paths, &starts);
     let scale = largest(&exits);
@@ -270,7 +270,7 @@ fn interpolation_errors_are_those_on_record() {
                 &field,
                 View::along(Axis::Z, DVec3::ZERO),
                 interpolant,
-                Options { wanted: OPD, ..Default::default() },
+                Options { quantities: OPD, ..Default::default() },
             ),
             &starts,
         );
@@ -304,7 +304,7 @@ fn cylinders_are_abel_pairs() {
             &field,
             View::along(Axis::Z, DVec3::ZERO),
             Interpolant::BSpline,
-            Options { wanted: OPD, ..Default::default() },
+            Options { quantities: OPD, ..Default::default() },
         );
         let exits = trace(&paths, &starts);
         let scale = largest(&exits);
@@ -397,7 +397,7 @@ fn fields_of_a_nanometre_and_of_a_thousand_kilometres_bend_light_alike() {
                 &field,
                 oblique(),
                 Interpolant::BSpline,
-                Options { wanted: OPD, ..Default::default() },
+                Options { quantities: OPD, ..Default::default() },
             ),
             &scaled,
         );

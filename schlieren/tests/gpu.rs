@@ -44,8 +44,8 @@ fn cpu<'a>(
     interpolant: Interpolant,
     options: GpuOptions,
 ) -> Deviational<'a> {
-    let GpuOptions { step_voxels, wanted, blank } = options;
-    let options = Options { step_voxels, wanted, blank, ..Options::default() };
+    let GpuOptions { step_voxels, quantities, blank } = options;
+    let options = Options { step_voxels, quantities, blank, ..Options::default() };
     Deviational::new(field, view, interpolant, options)
 }
 
@@ -77,9 +77,9 @@ fn relative(a: &[Exit], b: &[Exit], value: impl Fn(&Exit) -> f32) -> f64 {
 fn deflection_displacement_and_opd_agree_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let field = cube(33, lopsided);
-    let wanted = PathQuantities { opd: true };
+    let quantities = PathQuantities { opd: true };
     for view in [View::along(Axis::X, DVec3::ZERO), View::along(Axis::Z, DVec3::ZERO), oblique()] {
-        let options = GpuOptions { wanted, ..GpuOptions::default() };
+        let options = GpuOptions { quantities, ..GpuOptions::default() };
         let starts = grid(15, 0.9);
         let [a, b] = both(gpu.clone(), &field, view, Interpolant::BSpline, options, &starts);
         let (_, max) = difference(&a, &b);
@@ -104,8 +104,8 @@ fn trilinear_agrees_but_for_samples_on_a_face() {
     let Some(gpu) = gpu() else { return };
     let field = cube(33, lopsided);
     for view in [View::along(Axis::Y, DVec3::ZERO), oblique()] {
-        let wanted = PathQuantities { opd: true };
-        let options = GpuOptions { wanted, ..GpuOptions::default() };
+        let quantities = PathQuantities { opd: true };
+        let options = GpuOptions { quantities, ..GpuOptions::default() };
         let [a, b] =
             both(gpu.clone(), &field, view, Interpolant::Trilinear, options, &grid(15, 0.9));
         let scale = largest(&b);
@@ -137,7 +137,7 @@ fn odd_sizes() {
             let starts = &grid(32, 1.3)[..count];
             let options = GpuOptions {
                 step_voxels: 0.37,
-                wanted: PathQuantities { opd: true },
+                quantities: PathQuantities { opd: true },
                 ..GpuOptions::default()
             };
             let [a, b] = both(gpu.clone(), &field, view, interpolant, options, starts);
@@ -184,7 +184,7 @@ fn compilers_keep_the_compensation_of_sums() {
     let field = blob(33, 1e-4, 0.12);
     let options = GpuOptions {
         step_voxels: 1.0 / 128.0,
-        wanted: PathQuantities { opd: true },
+        quantities: PathQuantities { opd: true },
         ..GpuOptions::default()
     };
     let view = View::along(Axis::Z, DVec3::ZERO);
@@ -268,7 +268,8 @@ fn a_field_larger_than_a_binding_is_the_same_field() {
     let field = cube(21, lopsided);
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         let starts = grid(11, 0.9);
-        let options = GpuOptions { wanted: PathQuantities { opd: true }, ..GpuOptions::default() };
+        let options =
+            GpuOptions { quantities: PathQuantities { opd: true }, ..GpuOptions::default() };
         let view = oblique();
         let one = GpuPaths::new(whole.clone(), &field, view, interpolant, options).unwrap();
         assert_eq!(one.slabs(), 1);
@@ -313,7 +314,7 @@ fn an_interpolant_without_a_kernel_is_refused_by_name() {
 fn several_batches_have_the_bits_of_one() {
     let Some(gpu) = gpu() else { return };
     let field = with_body(17);
-    let options = GpuOptions { wanted: PathQuantities { opd: true }, ..GpuOptions::default() };
+    let options = GpuOptions { quantities: PathQuantities { opd: true }, ..GpuOptions::default() };
     let starts = &grid(40, 1.1)[..1597];
     for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
         let paths = |batch| {

@@ -34,7 +34,7 @@ fn rays_in_faces_and_edges_are_in_the_field() {
             &field,
             View::along(Axis::Z, DVec3::ZERO),
             i,
-            Options { wanted: OPD, ..Default::default() },
+            Options { quantities: OPD, ..Default::default() },
         )
     };
     let at = [-0.5, -0.375, 0.0, 0.0625, 0.5];
@@ -73,7 +73,7 @@ fn directions_with_zeros_and_the_long_diagonal() {
                 &field,
                 view,
                 Interpolant::BSpline,
-                Options { wanted: OPD, ..Default::default() },
+                Options { quantities: OPD, ..Default::default() },
             ),
             &[start(0.0, 0.0)],
         )[0];
@@ -231,14 +231,18 @@ fn what_skipping_leaves_out_is_within_its_bound_and_counted() {
         &field,
         view,
         Interpolant::BSpline,
-        Options { wanted: OPD, ..Default::default() },
+        Options { quantities: OPD, ..Default::default() },
     );
     let wanted = trace(&plain, &starts);
     assert_eq!(plain.counters().ray_steps_skipped, 0);
     assert!(plain.bricks().is_none());
     for tolerance in [1e-9, 1e-7] {
-        let options =
-            Options { wanted: OPD, skip_rad: tolerance, skip_opd_m: 1e-10, ..Default::default() };
+        let options = Options {
+            quantities: OPD,
+            skip_rad: tolerance,
+            skip_opd_m: 1e-10,
+            ..Default::default()
+        };
         let paths = Deviational::new(&field, view, Interpolant::BSpline, options);
         let got = trace(&paths, &starts);
         let worst = difference(&got, &wanted).1 * largest(&wanted);
@@ -265,8 +269,13 @@ fn full_march_focuses_a_luneburg_lens_on_a_lattice() {
     let field = Field::from_fn([n; 3], [h; 3], DVec3::splat(-1.2), 1.0, lens).unwrap();
     let spline = BSpline::new(&field);
     let view = View::along(Axis::Z, DVec3::ZERO);
-    let paths =
-        Full::new(&field, &spline, Sharma, view, FullOptions { wanted: OPD, ..Default::default() });
+    let paths = Full::new(
+        &field,
+        &spline,
+        Sharma,
+        view,
+        FullOptions { quantities: OPD, ..Default::default() },
+    );
     let starts: Vec<Start> = [-0.8, -0.4, 0.2, 0.6].into_iter().map(|b| start(b, 0.0)).collect();
     for (s, e) in starts.iter().zip(trace(&paths, &starts)) {
         let b = f64::from(s.position_m[0]);
@@ -301,7 +310,13 @@ fn full_and_deviational_agree_where_both_hold() {
     let starts = grid(8, 0.5);
     let view = View::along(Axis::Z, DVec3::ZERO);
     let wanted = trace(
-        &Full::new(&field, &spline, Pefrl, view, FullOptions { wanted: OPD, ..Default::default() }),
+        &Full::new(
+            &field,
+            &spline,
+            Pefrl,
+            view,
+            FullOptions { quantities: OPD, ..Default::default() },
+        ),
         &starts,
     );
     let got = trace(
@@ -309,7 +324,7 @@ fn full_and_deviational_agree_where_both_hold() {
             &field,
             view,
             Interpolant::BSpline,
-            Options { wanted: OPD, ..Default::default() },
+            Options { quantities: OPD, ..Default::default() },
         ),
         &starts,
     );

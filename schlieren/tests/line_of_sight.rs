@@ -22,7 +22,7 @@ fn marched(field: &Field, view: View) -> Deviational<'_> {
         field,
         view,
         Interpolant::BSpline,
-        Options { wanted: OPD, step_voxels: 0.25, ..Default::default() },
+        Options { quantities: OPD, step_voxels: 0.25, ..Default::default() },
     )
 }
 

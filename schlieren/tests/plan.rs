@@ -176,7 +176,7 @@ fn errors(
         let d = d[0].hypot(d[1]);
         assert!(d.is_finite());
         angle = angle.max(d);
-        if paths.wanted().opd {
+        if paths.quantities().opd {
             path = path.max((f64::from(exit.opd_m) - opd).abs());
         }
     }
@@ -202,7 +202,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     mode: Some(Mode::Full),
                     interpolant: Some(Interpolant::BSpline),
                     step_voxels: Some(0.25),
-                    wanted: PathQuantities { opd },
+                    quantities: PathQuantities { opd },
                     ..ask(0.0)
                 };
                 let of_lattice =

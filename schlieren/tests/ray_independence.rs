@@ -107,7 +107,7 @@ fn gas_alone_is_independent_of_neighbours_and_threads() {
                 [(Scheme::Verlet, false), (Scheme::Verlet, true), (Scheme::Euler, true)]
             {
                 let options =
-                    Options { scheme, wanted: PathQuantities { opd }, ..Options::default() };
+                    Options { scheme, quantities: PathQuantities { opd }, ..Options::default() };
                 let paths = Deviational::new(&field, view, interpolant, options);
                 assert_independent(&paths, &starts, &format!("{interpolant:?} {scheme:?} {opd}"));
             }
@@ -126,7 +126,7 @@ fn masked_and_blocked_are_independent_of_neighbours_and_threads() {
                     let options = Options {
                         scheme,
                         blank,
-                        wanted: PathQuantities { opd: true },
+                        quantities: PathQuantities { opd: true },
                         ..Options::default()
                     };
                     let paths = Deviational::new(&field, view, interpolant, options);
@@ -148,10 +148,10 @@ fn straight_and_full_marches_are_independent_of_neighbours_and_threads() {
     let starts: Vec<Start> = rays().into_iter().step_by(3).collect();
     for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
         for blank in [BlankCells::Opaque, BlankCells::Continued] {
-            let wanted = PathQuantities { opd: true };
-            let sight = LineOfSight::new(&field, view, Interpolant::BSpline, wanted, blank);
+            let quantities = PathQuantities { opd: true };
+            let sight = LineOfSight::new(&field, view, Interpolant::BSpline, quantities, blank);
             assert_independent(&sight, &starts, "line of sight");
-            let options = FullOptions { blank, wanted, ..FullOptions::default() };
+            let options = FullOptions { blank, quantities, ..FullOptions::default() };
             assert_independent(&Full::new(&field, &spline, Pefrl, view, options), &starts, "full");
         }
     }

@@ -140,7 +140,7 @@ impl LightPaths for ThesisMarch {
     fn view(&self) -> &View {
         &self.view
     }
-    fn wanted(&self) -> PathQuantities {
+    fn quantities(&self) -> PathQuantities {
         PathQuantities { opd: false }
     }
     fn difference_step_m(&self) -> f64 {

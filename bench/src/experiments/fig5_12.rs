@@ -120,16 +120,16 @@ fn difference(field: &Field, pixels: u32) -> Difference {
     let size = field.size_m();
     // Slightly inside, so that no ray runs along a face.
     let starts = Framing::fitted(pixels, pixels, [0.98 * size.x, 0.98 * size.y]).pixel_centers();
-    let wanted = PathQuantities { opd: true };
+    let quantities = PathQuantities { opd: true };
     let mut straight = vec![Exit::UNDISTURBED; starts.len()];
     let mut traced = straight.clone();
-    LineOfSight::new(field, view, Interpolant::BSpline, wanted, BlankCells::Opaque)
+    LineOfSight::new(field, view, Interpolant::BSpline, quantities, BlankCells::Opaque)
         .trace_parallel(&starts, &mut straight);
     Deviational::new(
         field,
         view,
         Interpolant::BSpline,
-        Options { step_voxels: 0.5, wanted, ..Options::default() },
+        Options { step_voxels: 0.5, quantities, ..Options::default() },
     )
     .trace_parallel(&starts, &mut traced);
     let both = || {

@@ -79,7 +79,7 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
     let field = Field::from_fn([n; 3], [1.0 / (n - 1) as f64; 3], DVec3::splat(-0.5), 1.0, blob)?;
     let views =
         [("along an axis", View::along(ViewAxis::Z, DVec3::ZERO)), ("at 0.6 rad", oblique()?)];
-    let wanted = PathQuantities { opd: false };
+    let quantities = PathQuantities { opd: false };
     for (view_name, view) in views {
         let rays = tiles(if context.quick { 192 } else { 256 }, 0.9);
         let photons = tiles(if context.quick { 1024 } else { 2048 }, 0.9);
@@ -94,11 +94,12 @@ fn marches(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()>
                 &field,
                 view,
                 interpolant,
-                Options { wanted, ..Options::default() },
+                Options { quantities, ..Options::default() },
             );
             marches.push((format!("{name}, {view_name}"), march, bar));
         }
-        let los = LineOfSight::new(&field, view, Interpolant::BSpline, wanted, BlankCells::Opaque);
+        let los =
+            LineOfSight::new(&field, view, Interpolant::BSpline, quantities, BlankCells::Opaque);
         // Work of one run, from the march's own counters.
         let mut counts = vec![];
         for (_, march, bar) in &marches {

@@ -103,12 +103,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let film = film_bytes();
             let (march_bytes, bricks, row, build_secs, after) = match interpolant {
                 None => {
-                    let wanted = PathQuantities::default();
+                    let quantities = PathQuantities::default();
                     let los = LineOfSight::new(
                         &field,
                         view,
                         Interpolant::BSpline,
-                        wanted,
+                        quantities,
                         BlankCells::Opaque,
                     );
                     (los.memory_bytes(), 0, row, start.elapsed().as_secs_f64(), resident_bytes())

@@ -220,7 +220,7 @@ mod tests {
         fn view(&self) -> &View {
             &self.0
         }
-        fn wanted(&self) -> PathQuantities {
+        fn quantities(&self) -> PathQuantities {
             PathQuantities::default()
         }
         fn difference_step_m(&self) -> f64 {

@@ -30,7 +30,7 @@ pub struct GpuOptions {
     /// Longest step, in lattice steps.
     pub step_voxels: f64,
     /// Quantities to compute besides deflection and displacement.
-    pub wanted: PathQuantities,
+    pub quantities: PathQuantities,
     /// How cells without data treat light.
     pub blank: BlankCells,
 }
@@ -39,7 +39,7 @@ impl Default for GpuOptions {
     fn default() -> Self {
         GpuOptions {
             step_voxels: 1.0,
-            wanted: PathQuantities::default(),
+            quantities: PathQuantities::default(),
             blank: BlankCells::Opaque,
         }
     }
@@ -114,7 +114,7 @@ impl DeviceState {
         let volume = Volume::new(&gpu, field, spline)?;
         let pipeline = gpu.pipeline(&Kernel {
             interpolant,
-            opd: options.wanted.opd,
+            opd: options.quantities.opd,
             nodes: volume.kinds.is_some(),
             slabs: volume.slabs.len() as u32,
         })?;
@@ -250,8 +250,8 @@ impl<'a> GpuPaths<'a> {
         }
         let spline = (interpolant == Interpolant::BSpline).then(|| BSpline::new(field));
         let on_device = DeviceState::new(gpu, 0, field, spline.as_ref(), interpolant, options)?;
-        let GpuOptions { step_voxels, wanted, blank } = options;
-        let on_cpu = Options { step_voxels, wanted, blank, ..Options::default() };
+        let GpuOptions { step_voxels, quantities, blank } = options;
+        let on_cpu = Options { step_voxels, quantities, blank, ..Options::default() };
         Ok(GpuPaths {
             field,
             frame: Frame::new(field, view),
@@ -427,7 +427,7 @@ impl BatchTracer for GpuPaths<'_> {
                 pending.scratch.readback.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
             let outputs: &[RawKernelOutput] = bytemuck::cast_slice(&range);
             let read = |((exit, p), raw): ((&mut Exit, &KernelRay), &RawKernelOutput)| {
-                let opd = self.options.wanted.opd.then_some(raw.opd);
+                let opd = self.options.quantities.opd.then_some(raw.opd);
                 let output = KernelOutput { v: raw.v, xi: raw.xi, opd, met: raw.met as u8 };
                 *exit = p.exit(&self.frame, self.field.n0(), self.options.blank, &output);
             };
@@ -489,8 +489,8 @@ impl LightPaths for GpuPaths<'_> {
         &self.frame.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.options.wanted
+    fn quantities(&self) -> PathQuantities {
+        self.options.quantities
     }
 
     fn difference_step_m(&self) -> f64 {

@@ -40,7 +40,7 @@ pub struct Options {
     /// interpolant dominates the error.
     pub step_voxels: f64,
     /// Quantities to compute besides deflection and displacement.
-    pub wanted: PathQuantities,
+    pub quantities: PathQuantities,
     /// How light is treated in cells without data.
     pub blank: BlankCells,
     /// Skip bricks as long as the bounds on the lost deflection of a ray add up to less than this.
@@ -58,7 +58,7 @@ impl Default for Options {
         Options {
             scheme: Scheme::Verlet,
             step_voxels: 1.0,
-            wanted: PathQuantities::default(),
+            quantities: PathQuantities::default(),
             blank: BlankCells::Opaque,
             skip_rad: 0.0,
             skip_opd_m: 0.0,
@@ -233,7 +233,7 @@ impl<'a> Deviational<'a> {
     ) {
         let plain = self.field.nodes().is_none() && self.bricks.is_none();
         match (self.options.scheme, plain) {
-            (Scheme::Verlet, true) if self.options.wanted.opd => {
+            (Scheme::Verlet, true) if self.options.quantities.opd => {
                 self.all(simd, field, starts, exits, PathInGas);
             }
             (Scheme::Verlet, true) => self.all(simd, field, starts, exits, DeflectionInGas),
@@ -264,7 +264,7 @@ impl<'a> Deviational<'a> {
                 bricks,
                 unit_m: self.frame.unit_m as f32,
                 tolerance_rad: self.options.skip_rad as f32,
-                tolerance_opd_m: if self.options.wanted.opd {
+                tolerance_opd_m: if self.options.quantities.opd {
                     self.options.skip_opd_m as f32
                 } else {
                     f32::INFINITY
@@ -315,7 +315,7 @@ impl<'a> Deviational<'a> {
                 let output = KernelOutput {
                     v: [0, 1, 2].map(|c| p.v[c][l]),
                     xi: [0, 1, 2].map(|c| p.xi[c][l]),
-                    opd: self.options.wanted.opd.then_some(p.opd[l]),
+                    opd: self.options.quantities.opd.then_some(p.opd[l]),
                     met: p.met[l],
                 };
                 *exit = rays[i].exit(&self.frame, self.field.n0(), self.options.blank, &output);
@@ -353,8 +353,8 @@ impl LightPaths for Deviational<'_> {
         &self.frame.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.options.wanted
+    fn quantities(&self) -> PathQuantities {
+        self.options.quantities
     }
 
     fn difference_step_m(&self) -> f64 {

@@ -30,7 +30,7 @@ pub struct Projection {
     /// Used only for oblique views.
     pub interpolant: Interpolant,
     /// The quantities that exits contain.
-    pub wanted: PathQuantities,
+    pub quantities: PathQuantities,
     /// How light is treated in cells without data.
     pub blank: BlankCells,
 }
@@ -59,7 +59,8 @@ impl FieldCache {
         if let Some(made) = found(&lock()) {
             return made;
         }
-        let made = Arc::new(LineOfSight::new(field, of.view, of.interpolant, of.wanted, of.blank));
+        let made =
+            Arc::new(LineOfSight::new(field, of.view, of.interpolant, of.quantities, of.blank));
         let mut all = lock();
         if let Some(first) = found(&all) {
             return first;
@@ -113,7 +114,7 @@ mod tests {
                                 Projection {
                                     view: view[what - 2],
                                     interpolant: Interpolant::Trilinear,
-                                    wanted: PathQuantities::default(),
+                                    quantities: PathQuantities::default(),
                                     blank: BlankCells::Opaque,
                                 },
                             )),
@@ -132,7 +133,7 @@ mod tests {
         let of = |axis| Projection {
             view: View::along(axis, field.centre_m()),
             interpolant: Interpolant::BSpline,
-            wanted: PathQuantities::default(),
+            quantities: PathQuantities::default(),
             blank: BlankCells::Opaque,
         };
         assert!(Arc::ptr_eq(&cache.spline(&field), &cache.spline(&field)));

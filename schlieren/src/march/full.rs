@@ -15,7 +15,7 @@ pub struct FullOptions {
     /// Length of a step, in lattice steps of the undisturbed ray.
     pub step_voxels: f64,
     /// Quantities to compute besides deflection and displacement.
-    pub wanted: PathQuantities,
+    pub quantities: PathQuantities,
     /// How light is treated in cells without data.
     pub blank: BlankCells,
     /// Limit on a ray's steps, as a multiple of those of the undisturbed ray. A ray that is still
@@ -27,7 +27,7 @@ impl Default for FullOptions {
     fn default() -> Self {
         FullOptions {
             step_voxels: 0.5,
-            wanted: PathQuantities::default(),
+            quantities: PathQuantities::default(),
             blank: BlankCells::Opaque,
             patience: 8,
         }
@@ -64,7 +64,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let [near_m, far_m] = ray.range_m;
         if near_m >= far_m {
             return Exit {
-                opd_m: if self.options.wanted.opd { 0.0 } else { f32::NAN },
+                opd_m: if self.options.quantities.opd { 0.0 } else { f32::NAN },
                 ..Exit::UNDISTURBED
             };
         }
@@ -139,7 +139,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
             deflection_rad: [r.u.dot(right) as f32, r.u.dot(up) as f32],
             displacement_m: [r.xi_m.dot(right) as f32, r.xi_m.dot(up) as f32],
             exit_depth_m: (near_m + depth_m) as f32,
-            opd_m: if self.options.wanted.opd {
+            opd_m: if self.options.quantities.opd {
                 (self.field.n0() * r.path_difference_m()) as f32
             } else {
                 f32::NAN
@@ -163,8 +163,8 @@ impl<I: Interpolate, G: Integrator> LightPaths for Full<'_, I, G> {
         &self.frame.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.options.wanted
+    fn quantities(&self) -> PathQuantities {
+        self.options.quantities
     }
 
     fn difference_step_m(&self) -> f64 {

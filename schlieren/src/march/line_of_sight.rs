@@ -27,7 +27,7 @@ use spline_derivatives::{derivatives, second_derivatives};
 pub struct LineOfSight {
     frame: Frame,
     map: Map,
-    wanted: PathQuantities,
+    quantities: PathQuantities,
     blank: BlankCells,
     n0: f64,
     level: Level,
@@ -62,10 +62,10 @@ impl LineOfSight {
         field: &Field,
         view: View,
         interpolant: Interpolant,
-        wanted: PathQuantities,
+        quantities: PathQuantities,
         blank: BlankCells,
     ) -> LineOfSight {
-        Self::with_level(field, view, interpolant, wanted, blank, Level::new())
+        Self::with_level(field, view, interpolant, quantities, blank, Level::new())
     }
 
     /// [`LineOfSight::new`] limited to an instruction set, for tests and measurements.
@@ -73,7 +73,7 @@ impl LineOfSight {
         field: &Field,
         view: View,
         interpolant: Interpolant,
-        wanted: PathQuantities,
+        quantities: PathQuantities,
         blank: BlankCells,
         level: Level,
     ) -> LineOfSight {
@@ -105,7 +105,7 @@ impl LineOfSight {
             };
             (map, None)
         };
-        LineOfSight { frame, map, wanted, blank, n0: field.n0(), level, exit_depth_m }
+        LineOfSight { frame, map, quantities, blank, n0: field.n0(), level, exit_depth_m }
     }
 
     /// Memory in bytes.
@@ -138,7 +138,7 @@ impl LineOfSight {
     fn exit(&self, start: &Start, map: [f32; 2], path_m: f32, slope: [f32; 2]) -> Exit {
         let Some(depth_m) = self.exit_depth_m(start, map) else {
             return Exit {
-                opd_m: if self.wanted.opd { 0.0 } else { f32::NAN },
+                opd_m: if self.quantities.opd { 0.0 } else { f32::NAN },
                 ..Exit::UNDISTURBED
             };
         };
@@ -151,7 +151,7 @@ impl LineOfSight {
             deflection_rad: slope,
             displacement_m: slope.map(|u| u * depth_m as f32),
             exit_depth_m: depth_m as f32,
-            opd_m: if self.wanted.opd { path_m * self.n0 as f32 } else { f32::NAN },
+            opd_m: if self.quantities.opd { path_m * self.n0 as f32 } else { f32::NAN },
             transmission,
             status,
         }
@@ -528,8 +528,8 @@ impl LightPaths for LineOfSight {
         &self.frame.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.wanted
+    fn quantities(&self) -> PathQuantities {
+        self.quantities
     }
 
     fn difference_step_m(&self) -> f64 {

@@ -59,8 +59,8 @@ impl LightPaths for AttenuatedPaths<'_> {
         self.paths.view()
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.paths.wanted()
+    fn quantities(&self) -> PathQuantities {
+        self.paths.quantities()
     }
 
     fn difference_step_m(&self) -> f64 {

@@ -47,7 +47,7 @@ pub(crate) fn map(
         map.transmission.push(if dark { 0.0 } else { exit.transmission });
         map.deflection_rad.push(if dark { [0.0; 2] } else { exit.deflection_rad });
         map.displacement_m.push(if dark { [0.0; 2] } else { optics.film_shift_m(start, exit) });
-        if paths.wanted().opd {
+        if paths.quantities().opd {
             let path_m = f64::from(optics.film_path_difference_m(exit, n0 as f32));
             map.waves.push(if dark { 0.0 } else { (path_m / wavelength_m) as f32 });
         }

@@ -290,7 +290,7 @@ pub fn render(
     if layers.map {
         // Reuses the image's own paths when they have the wanted quantities. The optical path is
         // not computed for photons that do not need it.
-        let planned = match first.filter(|p| p.paths.wanted().opd || !layers.phase) {
+        let planned = match first.filter(|p| p.paths.quantities().opd || !layers.phase) {
             Some(planned) => planned,
             None => section.paths(
                 scene,

@@ -106,7 +106,7 @@ pub(super) fn on_gpu<'a>(
         }
         let options = GpuOptions {
             step_voxels: plan.step_voxels,
-            wanted: request.wanted,
+            quantities: request.quantities,
             blank: request.blank,
         };
         // A device that fails while the field is copied to it is reopened, up to a limited number

@@ -42,7 +42,7 @@ impl TestSection {
         &self,
         scene: &Scene,
         line: usize,
-        wanted: PathQuantities,
+        quantities: PathQuantities,
         against_light: bool,
         measure: bool,
     ) -> Result<PlannedPaths<'_>, RenderError> {
@@ -71,7 +71,7 @@ impl TestSection {
             mode,
             interpolant,
             step_voxels: march.step_voxels,
-            wanted,
+            quantities,
             blank: BlankCells::default(),
             skip_rad: march.skip_rad,
             skip_opd_m: SKIPPED_WAVES * scene.light.wavelengths_nm[line] * 1e-9,
@@ -103,7 +103,8 @@ impl TestSection {
             if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
                 let interpolant = interpolant.unwrap_or_default();
                 let step_voxels = march.step_voxels.unwrap_or(1.0);
-                let paths = comparison_march(name, field, view, interpolant, step_voxels, wanted);
+                let paths =
+                    comparison_march(name, field, view, interpolant, step_voxels, quantities);
                 let bend = if name == "euler" { Bend::Paraxial } else { Bend::Full };
                 (paths, described(name, interpolant, step_voxels), None, (bend, step_voxels))
             } else {
@@ -115,7 +116,7 @@ impl TestSection {
                 {
                     let step = plan.step_voxels;
                     let options =
-                        FullOptions { step_voxels: step, wanted, ..FullOptions::default() };
+                        FullOptions { step_voxels: step, quantities, ..FullOptions::default() };
                     let paths = full(field, view, plan.interpolant, Pefrl, options);
                     skip_warning = (march.skip_rad > 0.0).then(|| skipping_has_no_effect("pefrl"));
                     (paths, described("pefrl", plan.interpolant, step), None, walked)
@@ -169,15 +170,15 @@ fn comparison_march<'a>(
     view: View,
     interpolant: Interpolant,
     step_voxels: f64,
-    wanted: PathQuantities,
+    quantities: PathQuantities,
 ) -> Box<dyn LightPaths + 'a> {
-    let options = FullOptions { step_voxels, wanted, ..FullOptions::default() };
+    let options = FullOptions { step_voxels, quantities, ..FullOptions::default() };
     match name {
         "sharma" => full(field, view, interpolant, Sharma, options),
         "rk4" => full(field, view, interpolant, RungeKutta4, options),
         _ => {
             let options =
-                Options { scheme: Scheme::Euler, step_voxels, wanted, ..Options::default() };
+                Options { scheme: Scheme::Euler, step_voxels, quantities, ..Options::default() };
             Box::new(Deviational::new(field, view, interpolant, options))
         }
     }
@@ -234,8 +235,8 @@ impl<I: Interpolate, G: Integrator + Copy> LightPaths for OwnedFull<'_, I, G> {
         &self.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.options.wanted
+    fn quantities(&self) -> PathQuantities {
+        self.options.quantities
     }
 
     fn difference_step_m(&self) -> f64 {

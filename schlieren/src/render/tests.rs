@@ -237,8 +237,8 @@ impl LightPaths for Failed<'_> {
     fn view(&self) -> &crate::view::View {
         self.0.view()
     }
-    fn wanted(&self) -> PathQuantities {
-        self.0.wanted()
+    fn quantities(&self) -> PathQuantities {
+        self.0.quantities()
     }
     fn difference_step_m(&self) -> f64 {
         self.0.difference_step_m()

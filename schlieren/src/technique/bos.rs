@@ -130,8 +130,8 @@ impl LightPaths for ReversedPaths<'_> {
         &self.view
     }
 
-    fn wanted(&self) -> PathQuantities {
-        self.paths.wanted()
+    fn quantities(&self) -> PathQuantities {
+        self.paths.quantities()
     }
 
     fn difference_step_m(&self) -> f64 {
