@@ -54,7 +54,7 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
                 .with_batch(100);
         let expected = format!("{:?}", trace(&paths, &starts));
         assert_eq!(paths.device_warning(), None);
-        own.lose();
+        own.destroy();
         assert_eq!(format!("{:?}", trace(&paths, &starts)), expected, "{interpolant:?}");
         let c = paths.counters();
         assert!(c.rays_on_cpu == 0 && c.rays_repeated > 0, "{c:?}");
@@ -81,7 +81,7 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
                 });
             }
             std::thread::sleep(std::time::Duration::from_millis(20));
-            lost.lose();
+            lost.destroy();
         });
         assert_eq!(format!("{:?}", trace(&paths, &starts)), expected, "{interpolant:?}");
         assert_eq!(paths.counters().rays_on_cpu, 0);
@@ -95,7 +95,7 @@ fn the_program_s_gpu_comes_back_after_it_was_lost() {
     let Some(before) = gpu() else { return };
     let field = cube(17, lopsided);
     let expected = drawn(&field);
-    before.lose();
+    before.destroy();
     for _ in 0..2 {
         let r = drawn(&field);
         assert!(r.pixels == expected.pixels, "another picture");
@@ -125,7 +125,7 @@ fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
     let on_cpu = Deviational::new(&field, oblique(), Interpolant::BSpline, Options::default());
     let expected = trace(&on_cpu, &starts);
     for lost in 1..=5 {
-        paths.gpu().lose();
+        paths.gpu().destroy();
         let exits = trace(&paths, &starts);
         let (_, max) = difference(&exits, &expected);
         assert!(max < TOLERANCE, "{max:e}");

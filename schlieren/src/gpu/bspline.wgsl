@@ -1,16 +1,16 @@
 // Prefiltered cubic B-spline from slab SLAB. `o` is the first of the 4x4x4 coefficients there.
-fn sample_SLAB(o: u32, place: vec3f) -> vec4f {
+fn sample_SLAB(o: u32, fraction: vec3f) -> vec4f {
     // Weights of the four coefficients along each axis, and of their three differences for the
     // derivative.
-    let s = vec3f(1.0) - place;
-    let t2 = place * place;
+    let s = vec3f(1.0) - fraction;
+    let t2 = fraction * fraction;
     let s2 = s * s;
     let w0 = s2 * s * (1.0 / 6.0);
-    let w1 = fma(fma(place, vec3f(0.5), vec3f(-1.0)), t2, vec3f(2.0 / 3.0));
+    let w1 = fma(fma(fraction, vec3f(0.5), vec3f(-1.0)), t2, vec3f(2.0 / 3.0));
     let w2 = fma(fma(s, vec3f(0.5), vec3f(-1.0)), s2, vec3f(2.0 / 3.0));
-    let w3 = t2 * place * (1.0 / 6.0);
+    let w3 = t2 * fraction * (1.0 / 6.0);
     let d0 = s2 * 0.5;
-    let d1 = fma(place, s, vec3f(0.5));
+    let d1 = fma(fraction, s, vec3f(0.5));
     let d2 = t2 * 0.5;
     let wy = vec4f(w0.y, w1.y, w2.y, w3.y);
     let dy = vec4f(0.0, d0.y, d1.y, d2.y);

@@ -97,9 +97,9 @@ impl<'a> CpuFallback<'a> {
     /// A warning with the first failure and the remedy.
     pub(super) fn device_warning(&self) -> Option<String> {
         let cause = self.cause.get()?;
-        let again = self.repeated() > 0;
+        let was_reopened = self.repeated() > 0;
         let reopen_error = self.reopen_error.get().filter(|e| *e != cause);
-        Some(match (again, self.rays() > 0) {
+        Some(match (was_reopened, self.rays() > 0) {
             (false, _) => match reopen_error {
                 None => super::fallback_message(cause),
                 Some(e) => format!("{} ({e})", super::fallback_message(cause)),
@@ -209,9 +209,9 @@ mod tests {
 
     /// Deflects each ray in proportion to its position. The factor distinguishes the device (2)
     /// from the CPU (1).
-    struct Bends(View, f32);
+    struct LinearDeflection(View, f32);
 
-    impl LightPaths for Bends {
+    impl LightPaths for LinearDeflection {
         fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
             for (s, e) in starts.iter().zip(exits) {
                 *e = Exit { deflection_rad: s.position_m.map(|p| p * self.1), ..Exit::UNDISTURBED };
@@ -228,17 +228,17 @@ mod tests {
         }
     }
 
-    fn bends(by: f32) -> Bends {
-        Bends(View::new(DVec3::Z, DVec3::Y, DVec3::ZERO).unwrap(), by)
+    fn linear_deflection(by: f32) -> LinearDeflection {
+        LinearDeflection(View::new(DVec3::Z, DVec3::Y, DVec3::ZERO).unwrap(), by)
     }
 
-    fn lamp_9(reason: String) -> GpuError {
+    fn failure(reason: String) -> GpuError {
         GpuError::Failed { adapter: "Lamp 9".into(), reason }
     }
 
     /// A device that fails from a certain call on. Its replacements fail after the same number of
     /// calls.
-    struct Fails {
+    struct FailingDevice {
         at: u64,
         calls: AtomicU64,
         in_submit: bool,
@@ -248,9 +248,15 @@ mod tests {
         present: AtomicU32,
     }
 
-    impl Fails {
-        fn new(in_submit: bool, at: u64, others: u32) -> Fails {
-            Fails { at, calls: AtomicU64::new(0), in_submit, others, present: AtomicU32::new(0) }
+    impl FailingDevice {
+        fn new(in_submit: bool, at: u64, others: u32) -> FailingDevice {
+            FailingDevice {
+                at,
+                calls: AtomicU64::new(0),
+                in_submit,
+                others,
+                present: AtomicU32::new(0),
+            }
         }
 
         fn call(&self, submit: bool) -> Result<(), Failure> {
@@ -259,18 +265,18 @@ mod tests {
             }
             let n = self.calls.load(Ordering::Relaxed);
             let device = self.present.load(Ordering::Relaxed);
-            Err(Failure { device, error: lamp_9(format!("out of memory, call {n}")) })
+            Err(Failure { device, error: failure(format!("out of memory, call {n}")) })
         }
     }
 
-    impl BatchTracer for Fails {
+    impl BatchTracer for FailingDevice {
         type Pending = Vec<Start>;
         fn submit(&self, starts: &[Start], _: bool) -> Result<Vec<Start>, Failure> {
             self.call(true).map(|()| starts.to_vec())
         }
         fn finish(&self, pending: Vec<Start>, exits: &mut [Exit], _: bool) -> Result<(), Failure> {
             self.call(false)?;
-            bends(2.0).trace(&pending, exits);
+            linear_deflection(2.0).trace(&pending, exits);
             Ok(())
         }
         fn replace(&self, failed: &Failure) -> Result<(), GpuError> {
@@ -297,8 +303,8 @@ mod tests {
             [(true, 0), (true, 4), (true, 9), (false, 0), (false, 4), (false, 9), (true, 99)]
         {
             for parallel in [false, true] {
-                let device = Fails::new(in_submit, at, 0);
-                let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
+                let device = FailingDevice::new(in_submit, at, 0);
+                let cpu_fallback_paths = CpuFallback::new(|| Box::new(linear_deflection(1.0)));
                 let mut exits =
                     vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
                 cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, parallel);
@@ -314,10 +320,10 @@ mod tests {
                 assert_eq!(cpu_fallback_paths.rays(), 95 - by_device as u64);
                 match cpu_fallback_paths.device_warning() {
                     None => assert_eq!(by_device, 95),
-                    Some(told) => {
+                    Some(warning) => {
                         let cause = format!("out of memory, call {}", at + 1);
                         for word in ["Lamp 9", &cause, "on the CPU"] {
-                            assert!(told.contains(word), "{word}: {told}");
+                            assert!(warning.contains(word), "{word}: {warning}");
                         }
                     }
                 }
@@ -331,8 +337,8 @@ mod tests {
             (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
         for in_submit in [true, false] {
             for at in [1, 2, 5, 9] {
-                let device = Fails::new(in_submit, at, 100);
-                let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
+                let device = FailingDevice::new(in_submit, at, 100);
+                let cpu_fallback_paths = CpuFallback::new(|| Box::new(linear_deflection(1.0)));
                 let mut exits =
                     vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
                 cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, false);
@@ -348,11 +354,11 @@ mod tests {
                     "{}",
                     cpu_fallback_paths.repeated()
                 );
-                let told = cpu_fallback_paths.device_warning().unwrap();
+                let warning = cpu_fallback_paths.device_warning().unwrap();
                 for word in ["Lamp 9", &format!("out of memory, call {}", at + 1), "opened again"] {
-                    assert!(told.contains(word), "{word}: {told}");
+                    assert!(warning.contains(word), "{word}: {warning}");
                 }
-                assert!(!told.contains("CPU"), "{told}");
+                assert!(!warning.contains("CPU"), "{warning}");
             }
         }
     }
@@ -363,8 +369,8 @@ mod tests {
         let starts: Vec<Start> =
             (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
         for (in_submit, at) in [(true, 0), (true, 1), (false, 0), (false, 2)] {
-            let device = Fails::new(in_submit, at, 3);
-            let cpu_fallback_paths = CpuFallback::new(|| Box::new(bends(1.0)));
+            let device = FailingDevice::new(in_submit, at, 3);
+            let cpu_fallback_paths = CpuFallback::new(|| Box::new(linear_deflection(1.0)));
             let mut exits = vec![Exit { deflection_rad: [f32::NAN; 2], ..Exit::UNDISTURBED }; 95];
             cpu_fallback_paths.trace(&device, 10, &starts, &mut exits, false);
             let on_cpu =
@@ -374,9 +380,9 @@ mod tests {
             assert_eq!(cpu_fallback_paths.rays(), on_cpu);
             assert_eq!(device.present.load(Ordering::Relaxed), 3);
             assert!(on_cpu > 0 && (at > 0) == (cpu_fallback_paths.repeated() > 0), "{on_cpu}");
-            let told = cpu_fallback_paths.device_warning().unwrap();
+            let warning = cpu_fallback_paths.device_warning().unwrap();
             for word in ["Lamp 9", "opened again 3 times", "on the CPU"] {
-                assert!(told.contains(word), "{word}: {told}");
+                assert!(warning.contains(word), "{word}: {warning}");
             }
         }
     }
@@ -406,7 +412,7 @@ mod tests {
             let shared = shared.clone();
             with_timeout(Duration::from_secs(120), &format!("{threads} threads"), move || {
                 with_concurrent_jobs(threads, || {
-                    let device = Fails::new(true, 0, 0);
+                    let device = FailingDevice::new(true, 0, 0);
                     let cpu_fallback_paths = CpuFallback::of_march(
                         field,
                         view,

@@ -23,7 +23,7 @@ pub struct Gpu {
     failure: Arc<OnceLock<String>>,
     pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
     /// Whether this device has finished a batch.
-    proven: AtomicBool,
+    has_finished_batch: AtomicBool,
     /// How often in a row the GPU was reopened before this device.
     reopened: u32,
     replacement: Mutex<Replacement>,
@@ -93,7 +93,7 @@ impl Gpu {
             storage_buffers: limits.max_storage_buffers_per_shader_stage,
             failure,
             pipelines: Mutex::default(),
-            proven: AtomicBool::new(false),
+            has_finished_batch: AtomicBool::new(false),
             reopened: 0,
             replacement: Mutex::default(),
         })
@@ -108,7 +108,7 @@ impl Gpu {
         static SHARED: Mutex<Option<Result<Arc<Gpu>, GpuError>>> = Mutex::new(None);
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
         let gpu = match &*shared {
-            Some(Ok(gpu)) => gpu.working(),
+            Some(Ok(gpu)) => gpu.current(),
             Some(Err(none)) => Err(none.clone()),
             None => Gpu::open().map(Arc::new),
         };
@@ -124,14 +124,18 @@ impl Gpu {
     ///
     /// # Errors
     /// If the GPU cannot be reopened, or has failed too often.
-    pub(super) fn working(self: &Arc<Gpu>) -> Result<Arc<Gpu>, GpuError> {
+    pub(super) fn current(self: &Arc<Gpu>) -> Result<Arc<Gpu>, GpuError> {
         let mut gpu = Arc::clone(self);
         while let Some(reason) = gpu.failure() {
             let mut s = gpu.replacement.lock().unwrap_or_else(PoisonError::into_inner);
             let successor = match &s.successor {
                 Some(successor) => Arc::clone(successor),
                 None => {
-                    let before = if gpu.proven.load(Ordering::Relaxed) { 0 } else { gpu.reopened };
+                    let before = if gpu.has_finished_batch.load(Ordering::Relaxed) {
+                        0
+                    } else {
+                        gpu.reopened
+                    };
                     let times = before + s.attempts;
                     if times >= MAX_REOPENINGS {
                         return Err(gpu.give_up_error(times, reason));
@@ -157,7 +161,7 @@ impl Gpu {
     }
 
     /// Destroys the device, as a driver reset does, to test recovery.
-    pub fn lose(&self) {
+    pub fn destroy(&self) {
         self.device.destroy();
     }
 
@@ -168,8 +172,8 @@ impl Gpu {
     }
 
     /// Records that a batch was finished.
-    pub(super) fn mark_working(&self) {
-        self.proven.store(true, Ordering::Relaxed);
+    pub(super) fn mark_batch_finished(&self) {
+        self.has_finished_batch.store(true, Ordering::Relaxed);
     }
 
     /// Name of the device and its driver.

@@ -39,13 +39,13 @@ impl Kernel {
         text += if self.nodes {
             include_str!("nodes.wgsl")
         } else {
-            "fn meet(at: vec3f) -> u32 {\n    return 0u;\n}\n"
+            "fn node_kind(at: vec3f) -> u32 {\n    return 0u;\n}\n"
         };
         if spline {
             text += "fn weighted(w: vec4f, v: vec4f) -> f32 {\n    return fma(w.w, v.w, fma(w.z, \
                      v.z, fma(w.y, v.y, w.x * v.x)));\n}\n";
         }
-        let piece =
+        let source =
             if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
         for slab in 0..self.slabs {
             let binding = FIRST_SLAB + slab;
@@ -54,7 +54,7 @@ impl Kernel {
                 "@group(0) @binding({binding}) var<storage, read> values_{slab}: array<f32>;"
             );
             declared.expect("writing to a String cannot fail");
-            text += &piece.replace("SLAB", &slab.to_string());
+            text += &source.replace("SLAB", &slab.to_string());
         }
         text += &self.sample();
         text
@@ -63,10 +63,10 @@ impl Kernel {
     /// The function that samples eps (w) and its gradient per lattice step (xyz) in the slab that
     /// holds the point.
     fn sample(&self) -> String {
-        let mut text = "fn sample(at: vec3f) -> vec4f {\n    let p = place_of(at);\n".to_string();
+        let mut text = "fn sample(at: vec3f) -> vec4f {\n    let p = locate(at);\n".to_string();
         let offset = |z: &str| format!("p.cell.x + p.cell.y * params.row + ({z}) * params.layer");
         if self.slabs == 1 {
-            text += &format!("    return sample_0({}, p.place);\n}}\n", offset("p.cell.z"));
+            text += &format!("    return sample_0({}, p.fraction);\n}}\n", offset("p.cell.z"));
             return text;
         }
         text += "    let slab = p.cell.z / params.slab;\n";
@@ -75,10 +75,10 @@ impl Kernel {
             offset("p.cell.z - slab * params.slab")
         );
         for slab in 0..self.slabs - 1 {
-            text += &format!("        case {slab}u: {{ return sample_{slab}(o, p.place); }}\n");
+            text += &format!("        case {slab}u: {{ return sample_{slab}(o, p.fraction); }}\n");
         }
         text += &format!(
-            "        default: {{ return sample_{}(o, p.place); }}\n    }}\n}}\n",
+            "        default: {{ return sample_{}(o, p.fraction); }}\n    }}\n}}\n",
             self.slabs - 1
         );
         text

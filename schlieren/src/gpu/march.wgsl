@@ -1,7 +1,7 @@
 // Integrates deviations from straight rays by position Verlet, one ray per invocation. This is the
 // kernel of march/packet.rs in WGSL, with the same order of operations.
 //
-// The host adds `const OPD`, `meet` (from nodes.wgsl, or a constant) and `sample` (from
+// The host adds `const OPD`, `node_kind` (from nodes.wgsl, or a constant) and `sample` (from
 // trilinear.wgsl or bspline.wgsl).
 
 struct Ray {
@@ -25,7 +25,7 @@ struct KernelOutput {
     v: vec3f,
     opd: f32,
     xi: vec3f,
-    met: u32,
+    worst_node: u32,
 }
 
 struct Params {
@@ -53,16 +53,16 @@ struct Params {
 @group(0) @binding(1) var<storage, read> rays: array<Ray>;
 @group(0) @binding(2) var<storage, read_write> outputs: array<KernelOutput>;
 
-struct Place {
+struct CellPosition {
     cell: vec3u,
-    place: vec3f,
+    fraction: vec3f,
 }
 
 // The cell of a point, clamped to the first and last cell, and the position in it.
-fn place_of(at: vec3f) -> Place {
+fn locate(at: vec3f) -> CellPosition {
     let inside = min(max(at, vec3f(0.0)), params.last);
     let cell = vec3u(min(inside, params.last_cell));
-    return Place(cell, inside - vec3f(cell));
+    return CellPosition(cell, inside - vec3f(cell));
 }
 
 // Returns the same number. Vulkan allows compilers to replace (a + b) - a by b, and Mesa's do. No
@@ -87,9 +87,9 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     var v_rest = vec3f(0.0);
     var opd = 0.0;
     var opd_rest = 0.0;
-    var met = 0u;
+    var worst_node = 0u;
     if ray.steps == 0u {
-        outputs[i] = KernelOutput(v, opd, vec3f(0.0), met);
+        outputs[i] = KernelOutput(v, opd, vec3f(0.0), worst_node);
         return;
     }
     // Step numbers are relative to the midpoint of the path, which makes them exact in f32.
@@ -122,8 +122,8 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
         }
         xi = fma(vec3f(move_by), v, xi);
         let at = fma(vec3f(number), ray.stride, ray.middle) + xi;
-        met = max(met, meet(at));
-        if met > params.survives {
+        worst_node = max(worst_node, node_kind(at));
+        if worst_node > params.survives {
             break;
         }
         let here = sample(at);
@@ -160,5 +160,5 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
             xi = fma(vec3f(0.5 * dt), v, xi);
         }
     }
-    outputs[i] = KernelOutput(v, opd, xi, met);
+    outputs[i] = KernelOutput(v, opd, xi, worst_node);
 }

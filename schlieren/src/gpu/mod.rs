@@ -55,7 +55,7 @@ pub enum GpuError {
     },
     /// The field does not fit.
     #[error(
-        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {room}; compute on the \
+        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {available}; compute on the \
          CPU (--device cpu), or resample the flow coarser"
     )]
     TooLarge {
@@ -66,7 +66,7 @@ pub enum GpuError {
         /// Memory that it needs.
         need: String,
         /// Memory that is available.
-        room: String,
+        available: String,
         /// The device.
         adapter: String,
     },

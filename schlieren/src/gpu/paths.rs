@@ -190,7 +190,7 @@ struct RawKernelOutput {
     v: [f32; 3],
     opd: f32,
     xi: [f32; 3],
-    met: u32,
+    worst_node: u32,
 }
 
 /// `Params` of march.wgsl.
@@ -387,10 +387,10 @@ impl BatchTracer for GpuPaths<'_> {
         let bytes = (starts.len() * size_of::<RawKernelOutput>()) as u64;
         commands.copy_buffer_to_buffer(&scratch.outputs, 0, &scratch.readback, 0, bytes);
         let index = queue.submit([commands.finish()]);
-        let (tell, mapped) = mpsc::channel();
+        let (sender, mapped) = mpsc::channel();
         scratch.readback.map_async(wgpu::MapMode::Read, ..bytes, move |r| {
             // The receiver is gone if the batch was abandoned.
-            let _ = tell.send(r);
+            let _ = sender.send(r);
         });
         let steps: u64 = rays.iter().map(|r| u64::from(r.steps)).sum();
         self.ray_steps.fetch_add(steps, Ordering::Relaxed);
@@ -414,7 +414,7 @@ impl BatchTracer for GpuPaths<'_> {
         let mapped = loop {
             match pending.mapped.recv_timeout(LOOK) {
                 Err(mpsc::RecvTimeoutError::Timeout) if gpu.failure().is_none() => {}
-                told => break told,
+                result => break result,
             }
         };
         mapped.map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
@@ -428,7 +428,8 @@ impl BatchTracer for GpuPaths<'_> {
             let outputs: &[RawKernelOutput] = bytemuck::cast_slice(&range);
             let read = |((exit, p), raw): ((&mut Exit, &KernelRay), &RawKernelOutput)| {
                 let opd = self.options.quantities.opd.then_some(raw.opd);
-                let output = KernelOutput { v: raw.v, xi: raw.xi, opd, met: raw.met as u8 };
+                let output =
+                    KernelOutput { v: raw.v, xi: raw.xi, opd, worst_node: raw.worst_node as u8 };
                 *exit = p.exit(&self.frame, self.field.n0(), self.options.blank, &output);
             };
             if parallel {
@@ -440,7 +441,7 @@ impl BatchTracer for GpuPaths<'_> {
             }
         }
         pending.scratch.readback.unmap();
-        gpu.mark_working();
+        gpu.mark_batch_finished();
         on_device.idle.lock().unwrap_or_else(PoisonError::into_inner).push(pending.scratch);
         Ok(())
     }
@@ -462,12 +463,12 @@ impl BatchTracer for GpuPaths<'_> {
         }
         let gpu = Arc::clone(gpu);
         current.attempts += 1;
-        let working = gpu.working()?;
+        let gpu = gpu.current()?;
         let spline =
             (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
         let number = failed.device + 1;
         let made = DeviceState::new(
-            working,
+            gpu,
             number,
             self.field,
             spline.as_ref(),

@@ -39,26 +39,27 @@ impl Volume {
         } else {
             Interpolant::Trilinear
         });
-        let too_large = |what, need, room| GpuError::TooLarge {
+        let too_large = |what, need, available| GpuError::TooLarge {
             what,
             dims: field.dims(),
             need,
-            room,
+            available,
             adapter: gpu.name(),
         };
         let Some((count, layers)) =
             cut(nz - 1, halo, 4 * stride[1] as u64, gpu.binding_bytes(), gpu.slabs())
         else {
             let need = bytes_of(size_of_val(values) as u64);
-            let room = format!("{} bindings of {}", gpu.slabs(), bytes_of(gpu.binding_bytes()));
-            return Err(too_large("a field", need, room));
+            let available =
+                format!("{} bindings of {}", gpu.slabs(), bytes_of(gpu.binding_bytes()));
+            return Err(too_large("a field", need, available));
         };
         let words = field.nodes().map(packed);
         if let Some(w) = words.as_ref().filter(|w| size_of_val(&w[..]) as u64 > gpu.binding_bytes())
         {
-            let (need, room) =
+            let (need, available) =
                 (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
-            return Err(too_large("the mask", need, room));
+            return Err(too_large("the mask", need, available));
         }
 
         let slabs = (0..count)

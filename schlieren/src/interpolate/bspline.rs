@@ -245,17 +245,17 @@ fn layer<S: Simd>(simd: S, rows: &[&[f32]; 4], at: usize) -> [f32x8<S>; 2] {
 }
 
 impl Interpolate16 for BSplineRows<'_> {
-    const EXACT: bool = true;
+    const COMPENSATE_SUMS: bool = true;
 
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
-        let (cells, place) = cells16(simd, at, self.last, self.last_cell);
+        let (cells, fraction) = cells16(simd, at, self.last, self.last_cell);
         let offsets =
             cells[0] + cells[1] * (self.stride[0] as i32) + cells[2] * (self.stride[1] as i32);
         let offsets: [i32; LANES] = offsets.into();
-        let (wx, dx) = weights16(simd, place[0]);
-        let (wy, dy) = weights16(simd, place[1]);
-        let (wz, dz) = weights16(simd, place[2]);
+        let (wx, dx) = weights16(simd, fraction[0]);
+        let (wy, dy) = weights16(simd, fraction[1]);
+        let (wz, dz) = weights16(simd, fraction[2]);
         // Along y and z, each ray's weights are scalars that multiply its four taps along x.
         let wy: [Row; 4] = [wy[0].into(), wy[1].into(), wy[2].into(), wy[3].into()];
         let wz: [Row; 4] = [wz[0].into(), wz[1].into(), wz[2].into(), wz[3].into()];

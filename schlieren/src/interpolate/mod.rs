@@ -74,7 +74,7 @@ pub trait Interpolate: Sync {
 pub(crate) trait Interpolate16: Copy + Sync {
     /// Whether the samples are accurate enough that compensated (Kahan) summation over hundreds of
     /// them is worth its cost.
-    const EXACT: bool;
+    const COMPENSATE_SUMS: bool;
 
     /// Values and gradients at points in lattice coordinates. Points may lie outside the lattice;
     /// NaN is not allowed.
@@ -99,13 +99,13 @@ pub(crate) fn cells16<S: Simd>(
     last_cell: [f32; 3],
 ) -> ([i32x16<S>; 3], [f32x16<S>; 3]) {
     let mut cells = [i32x16::splat(simd, 0); 3];
-    let mut place = *at;
+    let mut fraction = *at;
     for c in 0..3 {
         let clamped = at[c].max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, last[c]));
         cells[c] = clamped.min(f32x16::splat(simd, last_cell[c])).to_int::<i32x16<S>>();
-        place[c] = clamped - cells[c].to_float::<f32x16<S>>();
+        fraction[c] = clamped - cells[c].to_float::<f32x16<S>>();
     }
-    (cells, place)
+    (cells, fraction)
 }
 
 /// Transposes sixteen groups of four numbers, one group per ray, into four vectors with one lane

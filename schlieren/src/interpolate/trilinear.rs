@@ -111,12 +111,12 @@ pub(crate) struct TrilinearRows<'a> {
 }
 
 impl Interpolate16 for TrilinearRows<'_> {
-    const EXACT: bool = false;
+    const COMPENSATE_SUMS: bool = false;
 
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
         // Cells and positions in them.
-        let (cells, place) = cells16(simd, at, self.last, self.last_cell);
+        let (cells, fraction) = cells16(simd, at, self.last, self.last_cell);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
 
@@ -125,7 +125,7 @@ impl Interpolate16 for TrilinearRows<'_> {
 
         // Differences are taken first, so that the gradient is not a difference of interpolated
         // values.
-        let [x, y, z] = place;
+        let [x, y, z] = fraction;
         let [da, db, dc, dd] = [a1 - a0, b1 - b0, c1 - c0, d1 - d0];
         let [a, b, c, d] =
             [x.mul_add(da, a0), x.mul_add(db, b0), x.mul_add(dc, c0), x.mul_add(dd, d0)];

@@ -108,12 +108,12 @@ pub(crate) struct TrilinearGradientRows<'a> {
 }
 
 impl Interpolate16 for TrilinearGradientRows<'_> {
-    const EXACT: bool = false;
+    const COMPENSATE_SUMS: bool = false;
 
     #[inline(always)]
     fn sample16<S: Simd>(&self, simd: S, at: &[f32x16<S>; 3]) -> Samples<S> {
-        let (cells, place) = cells16(simd, at, self.last, self.last_cell);
-        let place: [Row; 3] = place.map(Into::into);
+        let (cells, fraction) = cells16(simd, at, self.last, self.last_cell);
+        let fraction: [Row; 3] = fraction.map(Into::into);
         let offsets = cells[0] + cells[1] * self.stride[0] + cells[2] * self.stride[1];
         let offsets: [i32; LANES] = offsets.into();
         // The compiler sees here that the slices have one length, so one bounds check is enough for
@@ -128,9 +128,9 @@ impl Interpolate16 for TrilinearGradientRows<'_> {
         let mut out = [0.0f32; 4 * LANES];
         for l in 0..LANES {
             let o = 4 * offsets[l] as u32 as usize;
-            let x = f32x4::splat(simd, place[0][l]);
-            let y = f32x4::splat(simd, place[1][l]);
-            let z = f32x4::splat(simd, place[2][l]);
+            let x = f32x4::splat(simd, fraction[0][l]);
+            let y = f32x4::splat(simd, fraction[1][l]);
+            let z = f32x4::splat(simd, fraction[2][l]);
             let mut edges = [x; 4];
             for e in 0..4 {
                 let taps = &corners[e][o..o + 8];

@@ -157,9 +157,9 @@ impl CellExact {
                 continue;
             }
             out.pieces += 1;
-            for (place, weight) in points.rule() {
+            for (abscissa, weight) in points.rule() {
                 let (eps, gradient) =
-                    medium.sample(start_m + direction * (pair[0] + place * piece_m));
+                    medium.sample(start_m + direction * (pair[0] + abscissa * piece_m));
                 out.path_m += eps * (weight * piece_m);
                 out.slope += gradient * (weight * piece_m);
             }

@@ -316,7 +316,7 @@ impl<'a> Deviational<'a> {
                     v: [0, 1, 2].map(|c| p.v[c][l]),
                     xi: [0, 1, 2].map(|c| p.xi[c][l]),
                     opd: self.options.quantities.opd.then_some(p.opd[l]),
-                    met: p.met[l],
+                    worst_node: p.worst_node[l],
                 };
                 *exit = rays[i].exit(&self.frame, self.field.n0(), self.options.blank, &output);
             }

@@ -18,8 +18,8 @@ pub enum BlankCells {
 
 impl BlankCells {
     /// Transmission and status of a ray, from the worst node it encountered.
-    pub(crate) fn outcome(self, met: u8) -> (f32, Status) {
-        match (met, self) {
+    pub(crate) fn outcome(self, worst_node: u8) -> (f32, Status) {
+        match (worst_node, self) {
             (m, _) if m == Node::Gas as u8 => (1.0, Status::Free),
             (m, _) if m == Node::Solid as u8 => (0.0, Status::Blocked),
             (_, BlankCells::Opaque) => (0.0, Status::Masked),

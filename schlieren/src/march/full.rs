@@ -20,7 +20,7 @@ pub struct FullOptions {
     pub blank: BlankCells,
     /// Limit on a ray's steps, as a multiple of those of the undisturbed ray. A ray that is still
     /// inside then is given up as [`Status::Turned`].
-    pub patience: u32,
+    pub step_limit_factor: u32,
 }
 
 impl Default for FullOptions {
@@ -29,7 +29,7 @@ impl Default for FullOptions {
             step_voxels: 0.5,
             quantities: PathQuantities::default(),
             blank: BlankCells::Opaque,
-            patience: 8,
+            step_limit_factor: 8,
         }
     }
 }
@@ -80,7 +80,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
 
         // A ray is outside beyond the exit plane, or a voxel beyond a face: rays along a face thus
         // stay inside.
-        let mut met = 0;
+        let mut worst_node = 0;
         let margin = 1.0;
         let smallest_m = self.frame.spacing_m.min_element();
         let outside = |r: &Ray| {
@@ -88,9 +88,9 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
             let beyond = (-p).max(p - self.frame.last).max_element() - margin;
             (r.depth_m() - length_m).max(beyond * smallest_m)
         };
-        let patience = self.options.patience.saturating_mul(steps as u32).max(1);
+        let step_limit = self.options.step_limit_factor.saturating_mul(steps as u32).max(1);
         let end = match self.field.nodes() {
-            None => self.integrator.run_until(&medium, &begin, dtau_m, patience, outside),
+            None => self.integrator.run_until(&medium, &begin, dtau_m, step_limit, outside),
             Some(kinds) => {
                 // Checks the nearest node after each step.
                 let d = self.field.dims();
@@ -102,19 +102,19 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
                     let p = lattice(r).clamp(DVec3::ZERO, self.frame.last).round().as_usizevec3();
                     kinds[p.x + (p.y + p.z * d[1]) * d[0]] as u8
                 };
-                let met_cell = std::cell::Cell::new(look(&begin));
-                let end = self.integrator.run_until(&medium, &begin, dtau_m, patience, |r| {
+                let worst_seen = std::cell::Cell::new(look(&begin));
+                let end = self.integrator.run_until(&medium, &begin, dtau_m, step_limit, |r| {
                     let out = outside(r);
                     if out < 0.0 {
-                        met_cell.set(met_cell.get().max(look(r)));
+                        worst_seen.set(worst_seen.get().max(look(r)));
                     }
-                    if stops(met_cell.get()) { f64::NAN } else { out }
+                    if stops(worst_seen.get()) { f64::NAN } else { out }
                 });
-                met = met_cell.get();
+                worst_node = worst_seen.get();
                 end
             }
         };
-        let (mut transmission, mut status) = self.options.blank.outcome(met);
+        let (mut transmission, mut status) = self.options.blank.outcome(worst_node);
         let Some(mut r) = end.filter(|r| r.position_m().is_finite()) else {
             return Exit {
                 exit_depth_m: far_m as f32,

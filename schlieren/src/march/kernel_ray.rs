@@ -50,7 +50,7 @@ pub(crate) struct KernelOutput {
     /// Optical path difference; `None` when it was not computed.
     pub(crate) opd: Option<f32>,
     /// The worst [`crate::field::Node`] that the ray encountered.
-    pub(crate) met: u8,
+    pub(crate) worst_node: u8,
 }
 
 impl KernelRay {
@@ -125,7 +125,7 @@ impl KernelRay {
         } else {
             DVec3::ZERO
         };
-        let (transmission, status) = blank.outcome(output.met);
+        let (transmission, status) = blank.outcome(output.worst_node);
         let opd_m = |opd: f32| (f64::from(opd) * self.scale * frame.unit_m * n0) as f32;
         Exit {
             deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],

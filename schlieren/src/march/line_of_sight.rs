@@ -142,11 +142,11 @@ impl LineOfSight {
                 ..Exit::UNDISTURBED
             };
         };
-        let met = self.map.kinds.as_ref().map_or(0, |k| {
+        let worst_node = self.map.kinds.as_ref().map_or(0, |k| {
             let near = |c: usize| (map[c] + 0.5).clamp(0.0, (self.map.dims[c] - 1) as f32) as usize;
             k[near(0) + near(1) * self.map.dims[0]]
         });
-        let (transmission, status) = self.blank.outcome(met);
+        let (transmission, status) = self.blank.outcome(worst_node);
         Exit {
             deflection_rad: slope,
             displacement_m: slope.map(|u| u * depth_m as f32),
@@ -209,18 +209,18 @@ fn spline2<S: Simd>(
     at: &[Row; 2],
 ) -> [Row; 3] {
     let mut cells = [i32x16::splat(simd, 0); 2];
-    let mut place = [f32x16::splat(simd, 0.0); 2];
+    let mut fraction = [f32x16::splat(simd, 0.0); 2];
     for c in 0..2 {
         let last = f32x16::splat(simd, (dims[c] - 1) as f32);
         // NaN becomes 0 here, because comparisons with it are false.
         let a = f32x16::from_slice(simd, &at[c]);
         let inside = a.simd_ge(0.0).select(a, f32x16::splat(simd, 0.0)).min(last);
         cells[c] = inside.min(f32x16::splat(simd, (dims[c] - 2) as f32)).to_int::<i32x16<S>>();
-        place[c] = inside - cells[c].to_float::<f32x16<S>>();
+        fraction[c] = inside - cells[c].to_float::<f32x16<S>>();
     }
     let offsets: [i32; LANES] = (cells[0] + cells[1] * (row as i32)).into();
-    let (ws, ds) = bspline_weights16(simd, place[0]);
-    let (wt, dt) = bspline_weights16(simd, place[1]);
+    let (ws, ds) = bspline_weights16(simd, fraction[0]);
+    let (wt, dt) = bspline_weights16(simd, fraction[1]);
     let wt: [Row; 4] = [wt[0].into(), wt[1].into(), wt[2].into(), wt[3].into()];
     let dt: [Row; 3] = [dt[0].into(), dt[1].into(), dt[2].into()];
     let mut value = [0.0f32; 4 * LANES];

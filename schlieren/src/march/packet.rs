@@ -48,7 +48,7 @@ pub(super) struct Packet {
     pub(super) xi: [Row; 3],
     pub(super) v: [Row; 3],
     /// Accumulated rounding error of `v` (Kahan 1965), for interpolants that are accurate enough
-    /// ([`Interpolate16::EXACT`]).
+    /// ([`Interpolate16::COMPENSATE_SUMS`]).
     pub(super) v_rest: [Row; 3],
     pub(super) opd: Row,
     /// Accumulated rounding error of `opd`.
@@ -56,7 +56,7 @@ pub(super) struct Packet {
     /// Bound on the deflection that was lost by skipping.
     pub(super) skipped_rad: Row,
     /// The worst [`Node`] encountered.
-    pub(super) met: [u8; LANES],
+    pub(super) worst_node: [u8; LANES],
 }
 
 impl Packet {
@@ -73,7 +73,7 @@ impl Packet {
         opd: [0.0; LANES],
         opd_rest: [0.0; LANES],
         skipped_rad: [0.0; LANES],
-        met: [0; LANES],
+        worst_node: [0; LANES],
     };
 }
 
@@ -290,7 +290,7 @@ fn rest(p: &mut Packet, l: usize) {
 #[inline(always)]
 fn rest_where_stopped(constants: &PacketConstants<'_>, p: &mut Packet) {
     for l in 0..LANES {
-        if p.met[l] > constants.survives {
+        if p.worst_node[l] > constants.survives {
             rest(p, l);
         }
     }
@@ -395,7 +395,7 @@ fn kick<S: Simd, I: Interpolate16, E: KernelFeatures>(
         if E::OPD {
             middle[c] = if E::EULER { v } else { (push * 0.5).mul_add(here.gradient[c], v) };
         }
-        if I::EXACT {
+        if I::COMPENSATE_SUMS {
             let term = push.mul_sub(here.gradient[c], f32x16::from_slice(simd, &p.v_rest[c]));
             let new = v + term;
             ((new - v) - term).store_slice(&mut p.v_rest[c]);
@@ -447,7 +447,7 @@ fn look_up_nodes<S: Simd>(
     let o: [i32; LANES] = o.into();
     for l in 0..LANES {
         if p.dt[l] > 0.0 {
-            p.met[l] = p.met[l].max(nodes.kinds[o[l] as u32 as usize] as u8);
+            p.worst_node[l] = p.worst_node[l].max(nodes.kinds[o[l] as u32 as usize] as u8);
         }
     }
     rest_where_stopped(constants, p);

@@ -50,7 +50,7 @@ pub(super) fn collect(
         })
     };
     let mut sums = Sums::default();
-    for _ in 0..FullOptions::default().patience.saturating_mul(steps as u32).max(1) {
+    for _ in 0..FullOptions::default().step_limit_factor.saturating_mul(steps as u32).max(1) {
         let mut after = Pefrl.step(&medium, &before, dtau_m);
         let out = outside(&after);
         let last = out >= 0.0 || out.is_nan();

@@ -57,7 +57,7 @@ impl Dots {
         for dj in -1..=1 {
             for di in -1..=1 {
                 let (i, j) = (cell[0] + f64::from(di), cell[1] + f64::from(dj));
-                let [u, v] = self.place(i as i64, j as i64);
+                let [u, v] = self.dot_offset(i as i64, j as i64);
                 let (dx, dy) =
                     (at_m[0] - (i + u) * self.spacing_m, at_m[1] - (j + v) * self.spacing_m);
                 if dx * dx + dy * dy < radius2 {
@@ -69,7 +69,7 @@ impl Dots {
     }
 
     /// Position of the dot in its cell, 0..1 along each axis.
-    fn place(&self, i: i64, j: i64) -> [f64; 2] {
+    fn dot_offset(&self, i: i64, j: i64) -> [f64; 2] {
         let word = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
             ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f).rotate_left(32)
             ^ u64::from(self.seed);

@@ -60,11 +60,11 @@ impl Schlieren {
     /// million squares.
     pub(super) fn passes_evenly(&self, stop_m: f64) -> Rgb {
         const SIDE: u32 = 1024;
-        let place = |i: u32| ((f64::from(i) + 0.5) / f64::from(SIDE) - 0.5) * stop_m;
+        let position = |i: u32| ((f64::from(i) + 0.5) / f64::from(SIDE) - 0.5) * stop_m;
         let (mut sum, mut squares) = ([0.0f64; 3], 0u32);
         for j in 0..SIDE {
             for i in 0..SIDE {
-                let at_m = [place(i), place(j)];
+                let at_m = [position(i), position(j)];
                 if at_m[0].hypot(at_m[1]) <= 0.5 * stop_m {
                     let rgb = self.seen(self.plane.transmission(at_m.map(|c| c as f32)));
                     (0..3).for_each(|c| sum[c] += f64::from(rgb[c]));
