@@ -46,11 +46,11 @@ fn every_row_of_nist() {
 #[test]
 fn every_row_of_the_ciddor_grid() {
     let t = table("ciddor_grid.csv");
-    let answers = schlieren::index::csv::answer_table(t.clone()).unwrap();
+    let results = schlieren::index::csv::compute_table(t.clone()).unwrap();
     let first = t.numbers("n_minus_1_ciddor96").unwrap();
     let second = t.numbers("n_minus_1_second_implementation").unwrap();
-    assert_eq!((t.len(), answers.warnings()), (1440, &[][..]));
-    for (i, got) in answers.n_minus_1().iter().enumerate() {
+    assert_eq!((t.len(), results.warnings()), (1440, &[][..]));
+    for (i, got) in results.n_minus_1().iter().enumerate() {
         assert!((got - second[i]).abs() <= GRID_TOLERANCE, "line {}", t.line(i));
         assert!(
             (got - first[i]).abs() <= SAME_FORMULA_TOLERANCE,

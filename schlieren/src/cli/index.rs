@@ -3,7 +3,7 @@
 
 use super::units;
 use crate::index::Gas;
-use crate::index::conditions::{Conditions, Model, answer};
+use crate::index::conditions::{Conditions, Model, compute};
 use crate::index::csv;
 use clap::Args;
 use datasets::cli::{CommonArgs, UsageError};
@@ -45,18 +45,18 @@ pub(super) struct IndexArgs {
 
 pub(super) fn index(common: CommonArgs, args: &IndexArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.csv {
-        let answers = csv::answer(path)?;
-        for w in answers.warnings() {
+        let table = csv::compute(path)?;
+        for w in table.warnings() {
             common.warn(w);
         }
         if common.json {
-            for n in answers.n_minus_1() {
+            for n in table.n_minus_1() {
                 common.result(&serde_json::json!({ "n_minus_1": n }), || "")?;
             }
             return Ok(());
         }
         let mut text = Vec::new();
-        answers.write(&mut text)?;
+        table.write(&mut text)?;
         std::io::stdout().lock().write_all(&text)?;
         return Ok(());
     }
@@ -77,9 +77,9 @@ pub(super) fn index(common: CommonArgs, args: &IndexArgs) -> anyhow::Result<()> 
         density_kg_m3: args.density,
         model: args.model,
     };
-    let answer = answer(&conditions).map_err(|e| UsageError(e.to_string()))?;
-    for w in &answer.warnings {
+    let result = compute(&conditions).map_err(|e| UsageError(e.to_string()))?;
+    for w in &result.warnings {
         common.warn(w);
     }
-    common.result(&answer, || format!("n - 1 = {:.11e}", answer.n_minus_1))
+    common.result(&result, || format!("n - 1 = {:.11e}", result.n_minus_1))
 }

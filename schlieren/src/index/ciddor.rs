@@ -8,7 +8,7 @@
 use super::{IndexError, OutOfRange};
 
 /// Molar gas constant of the paper, J/(mol K).
-const R: f64 = 8.314510;
+const R_CODATA_1986: f64 = 8.314510;
 /// Molar mass of water, kg/mol.
 const MOLAR_MASS_WATER: f64 = 0.018015;
 /// Temperature (°C) and pressure (Pa) of standard air, which is dry.
@@ -94,7 +94,8 @@ impl Ciddor {
         let n_as = 1e-8 * (5_792_105.0 / (238.0185 - s) + 167_917.0 / (57.362 - s));
         let n_ws = 1.022e-8 * (295.235 + 2.6422 * s - 0.032380 * s * s + 0.004028 * s * s * s);
         let (t, p) = STANDARD_VAPOUR;
-        let rho_ws = p * MOLAR_MASS_WATER / (compressibility(t, p, 1.0) * R * (t + ZERO_CELSIUS_K));
+        let rho_ws = p * MOLAR_MASS_WATER
+            / (compressibility(t, p, 1.0) * R_CODATA_1986 * (t + ZERO_CELSIUS_K));
         Ok(Ciddor { wavelength_um, n_as, n_ws, rho_ws })
     }
 
@@ -108,12 +109,13 @@ impl Ciddor {
 
         // Density of standard air.
         let (t_s, p_s) = STANDARD_AIR;
-        let rho_axs =
-            p_s * molar_mass_air / (compressibility(t_s, p_s, 0.0) * R * (t_s + ZERO_CELSIUS_K));
+        let rho_axs = p_s * molar_mass_air
+            / (compressibility(t_s, p_s, 0.0) * R_CODATA_1986 * (t_s + ZERO_CELSIUS_K));
 
         // Eq. 4: densities of the two components, with the compressibility of the mixture.
         let (t, p) = (air.temperature_c, air.pressure_pa);
-        let mole_density = p / (compressibility(t, p, vapour_fraction) * R * (t + ZERO_CELSIUS_K));
+        let mole_density =
+            p / (compressibility(t, p, vapour_fraction) * R_CODATA_1986 * (t + ZERO_CELSIUS_K));
         let rho_a = mole_density * molar_mass_air * (1.0 - vapour_fraction);
         let rho_w = mole_density * MOLAR_MASS_WATER * vapour_fraction;
 
@@ -173,7 +175,7 @@ impl Ciddor {
     pub fn gladstone_dale_m3_per_kg(&self) -> [f64; 2] {
         let (t, p) = STANDARD_AIR;
         let rho_as = p * molar_mass_of_dry_air(450.0)
-            / (compressibility(t, p, 0.0) * R * (t + ZERO_CELSIUS_K));
+            / (compressibility(t, p, 0.0) * R_CODATA_1986 * (t + ZERO_CELSIUS_K));
         [self.n_as / rho_as, self.n_ws / self.rho_ws]
     }
 }
@@ -314,7 +316,7 @@ mod tests {
         // Reason: the extrapolated compressibility makes the result differ by more than 1 % from an
         // ideal gas with the same K.
         let k = c.gladstone_dale_m3_per_kg()[0];
-        let ideal = k * 101_325.0 * molar_mass_of_dry_air(450.0) / (R * 2000.0);
+        let ideal = k * 101_325.0 * molar_mass_of_dry_air(450.0) / (R_CODATA_1986 * 2000.0);
         let ratio = c.n_minus_1(&flame).unwrap() / ideal;
         assert!((1.01..1.02).contains(&ratio), "{ratio}");
         assert!(c.out_of_range(&MoistAir::default()).is_empty());

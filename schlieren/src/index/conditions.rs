@@ -70,7 +70,7 @@ impl Default for Conditions {
 
 /// The result. Its fields are the keys of `--json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Answer {
+pub struct IndexResult {
     /// n − 1.
     pub n_minus_1: f64,
     /// n, for readers; it has fewer digits than n − 1.
@@ -100,16 +100,16 @@ pub struct Answer {
 /// Computes n − 1 for `conditions`.
 ///
 /// ```
-/// use schlieren::index::conditions::{Conditions, answer};
+/// use schlieren::index::conditions::{Conditions, compute};
 /// // A row of NIST's table: 40 C, 120 kPa, 75 % humidity.
 /// let (temperature_c, pressure_pa) = (40.0, 120e3);
 /// let moist =
 ///     Conditions { temperature_c, pressure_pa, humidity: 0.75, ..Default::default() };
-/// let answer = answer(&moist)?;
-/// assert!((answer.n_minus_1 - 2.99418e-4).abs() < 1e-9 && answer.warnings.is_empty());
+/// let result = compute(&moist)?;
+/// assert!((result.n_minus_1 - 2.99418e-4).abs() < 1e-9 && result.warnings.is_empty());
 /// # Ok::<(), schlieren::index::IndexError>(())
 /// ```
-pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {
+pub fn compute(conditions: &Conditions) -> Result<IndexResult, IndexError> {
     let c = conditions;
     let wavelength_um = c.wavelength_nm * 1e-3;
     let ciddor = Ciddor::new(wavelength_um)?;
@@ -166,7 +166,7 @@ pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {
             let mixture = Mixture::new(&named, &Gas::AIR, wavelength_um)?;
             warnings.extend(mixture.warnings().iter().map(ToString::to_string));
             let fractions: Vec<f64> = c.species.iter().map(|s| s.1).collect();
-            let blend = mixture.blend_strictly(&fractions)?;
+            let blend = mixture.try_blend(&fractions)?;
             let density = match c.density_kg_m3 {
                 Some(given) if given >= 0.0 && given.is_finite() => given,
                 Some(given) => {
@@ -186,7 +186,7 @@ pub fn answer(conditions: &Conditions) -> Result<Answer, IndexError> {
             (blend.n_minus_1(density), Some(density), Some(blend.k_m3_per_kg))
         }
     };
-    Ok(Answer {
+    Ok(IndexResult {
         n_minus_1,
         n: 1.0 + n_minus_1,
         model,
@@ -207,18 +207,19 @@ mod tests {
 
     #[test]
     fn automatic_choice_of_the_formula() {
-        let cold = answer(&Conditions::default()).unwrap();
+        let cold = compute(&Conditions::default()).unwrap();
         assert_eq!((cold.model, cold.warnings.len()), (Model::Ciddor, 0));
-        let flame = answer(&Conditions { temperature_c: 1500.0, ..Default::default() }).unwrap();
+        let flame = compute(&Conditions { temperature_c: 1500.0, ..Default::default() }).unwrap();
         assert_eq!((flame.model, flame.warnings.len()), (Model::GladstoneDale, 1));
         let forced =
             Conditions { temperature_c: 1500.0, model: Model::Ciddor, ..Default::default() };
         assert!(
-            answer(&forced).unwrap().warnings[0]
+            compute(&forced).unwrap().warnings[0]
                 .contains("temperature 1500 C is outside -40..100 C")
         );
         // For dry air at room temperature, both agree except for the compressibility, 4e-4.
-        let gd = answer(&Conditions { model: Model::GladstoneDale, ..Default::default() }).unwrap();
+        let gd =
+            compute(&Conditions { model: Model::GladstoneDale, ..Default::default() }).unwrap();
         let ratio = gd.n_minus_1 / cold.n_minus_1;
         assert!((ratio - 1.0).abs() < 6e-4 && ratio != 1.0, "{ratio}");
     }
@@ -226,19 +227,19 @@ mod tests {
     #[test]
     fn helium_and_refusals() {
         let helium = vec![("He".parse().unwrap(), 1.0)];
-        let he = answer(&Conditions { species: helium.clone(), ..Default::default() }).unwrap();
+        let he = compute(&Conditions { species: helium.clone(), ..Default::default() }).unwrap();
         assert!(
             (he.n_minus_1 - 3.25e-5).abs() < 1e-7 && he.density_kg_m3.unwrap() > 0.166,
             "{he:?}"
         );
         let text =
-            answer(&Conditions { species: helium, model: Model::Ciddor, ..Default::default() });
+            compute(&Conditions { species: helium, model: Model::Ciddor, ..Default::default() });
         assert!(text.unwrap_err().to_string().contains("contradiction"));
         let humid = Conditions { humidity: 0.5, model: Model::GladstoneDale, ..Default::default() };
-        assert!(answer(&humid).unwrap().warnings[0].contains("humidity 0.5 is not used"));
-        assert!(answer(&Conditions { density_kg_m3: Some(-1.0), ..Default::default() }).is_err());
+        assert!(compute(&humid).unwrap().warnings[0].contains("humidity 0.5 is not used"));
+        assert!(compute(&Conditions { density_kg_m3: Some(-1.0), ..Default::default() }).is_err());
         assert!(
-            answer(&Conditions {
+            compute(&Conditions {
                 temperature_c: -300.0,
                 model: Model::GladstoneDale,
                 ..Default::default()
@@ -249,7 +250,7 @@ mod tests {
 
     #[test]
     fn json_has_the_promised_keys() {
-        let json = serde_json::to_value(answer(&Conditions::default()).unwrap()).unwrap();
+        let json = serde_json::to_value(compute(&Conditions::default()).unwrap()).unwrap();
         assert_eq!(json["model"], "ciddor");
         assert!(json["n_minus_1"].as_f64().unwrap() > 2.7e-4);
         assert!(json.get("density_kg_m3").is_none());

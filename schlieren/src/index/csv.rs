@@ -14,29 +14,29 @@ pub const RESULT: &str = "n_minus_1";
 
 /// A table with its results.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answers {
+pub struct IndexTable {
     table: CsvTable,
     n_minus_1: Vec<f64>,
     warnings: Vec<String>,
 }
 
 /// Computes n − 1 by Ciddor's equation for every row of the file.
-pub fn answer(path: &Path) -> Result<Answers, ReadError> {
-    answer_table(csv::read(path)?)
+pub fn compute(path: &Path) -> Result<IndexTable, ReadError> {
+    compute_table(csv::read(path)?)
 }
 
 /// Computes n − 1 by Ciddor's equation for every row of the table.
 ///
 /// ```
-/// use schlieren::index::csv::answer_table;
+/// use schlieren::index::csv::compute_table;
 /// let text = b"T_C,p_Pa,lambda_um,RH_frac,CO2_ppm\n20,101325,0.633,0,450\n";
-/// let answers = answer_table(datasets::read::csv::read_from_bytes("t.csv".as_ref(), text)?)?;
+/// let results = compute_table(datasets::read::csv::read_from_bytes("t.csv".as_ref(), text)?)?;
 /// let mut out = Vec::new();
-/// answers.write(&mut out).unwrap();
+/// results.write(&mut out).unwrap();
 /// assert_eq!(out, b"T_C,p_Pa,lambda_um,RH_frac,CO2_ppm,n_minus_1\n20,101325,0.633,0,450,2.71799831635e-4\n");
 /// # Ok::<(), datasets::read::ReadError>(())
 /// ```
-pub fn answer_table(table: CsvTable) -> Result<Answers, ReadError> {
+pub fn compute_table(table: CsvTable) -> Result<IndexTable, ReadError> {
     if table.columns().iter().any(|c| c == RESULT) {
         return Err(table.cell_error(
             0,
@@ -76,7 +76,7 @@ pub fn answer_table(table: CsvTable) -> Result<Answers, ReadError> {
             more => format!("{first} ({more} rows)"),
         })
         .collect();
-    Ok(Answers { table, n_minus_1, warnings })
+    Ok(IndexTable { table, n_minus_1, warnings })
 }
 
 /// Converts an error of the formula to an error of the cell that causes it.
@@ -94,7 +94,7 @@ fn refused(table: &CsvTable, row: usize, error: &IndexError) -> ReadError {
     table.cell_error(row, column, reason, cure)
 }
 
-impl Answers {
+impl IndexTable {
     /// The results, row by row.
     pub fn n_minus_1(&self) -> &[f64] {
         &self.n_minus_1
@@ -135,15 +135,15 @@ mod tests {
             ("0.5,20,101325,50,450", "RH_frac", "50", "50 % is 0.5"),
             ("0.5,20,101325,0,-1", "CO2_ppm", "-1", "ppm"),
         ] {
-            let text = answer_table(table(&format!("{header}{row}\n"))).unwrap_err().to_string();
+            let text = compute_table(table(&format!("{header}{row}\n"))).unwrap_err().to_string();
             for word in ["conditions.csv", "line 3", column, value, cure] {
                 assert!(text.contains(word), "{word} is not in: {text}");
             }
         }
-        let text = answer_table(table("lambda_um,T_C,p_Pa,RH_frac\n")).unwrap_err().to_string();
+        let text = compute_table(table("lambda_um,T_C,p_Pa,RH_frac\n")).unwrap_err().to_string();
         assert!(text.contains("no column `CO2_ppm`"), "{text}");
         let text =
-            answer_table(table("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm,n_minus_1\n1,1,1,0,1,1\n"))
+            compute_table(table("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm,n_minus_1\n1,1,1,0,1,1\n"))
                 .unwrap_err();
         assert!(text.to_string().contains("rename the column"));
     }
@@ -152,7 +152,7 @@ mod tests {
     fn rows_out_of_range_are_counted_and_the_first_is_named() {
         let rows = "0.5,20,101325,0,450\n0.5,500,101325,0,450\n0.5,600,101325,0,450\n1.7,20,101325,0,450\n";
         let a =
-            answer_table(table(&format!("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm\n{rows}"))).unwrap();
+            compute_table(table(&format!("lambda_um,T_C,p_Pa,RH_frac,CO2_ppm\n{rows}"))).unwrap();
         assert_eq!((a.n_minus_1().len(), a.warnings().len()), (4, 2));
         assert!(
             a.warnings()[0].starts_with("line 3: ") && a.warnings()[0].ends_with("(2 rows)"),
@@ -177,7 +177,7 @@ mod tests {
             for r in &rows {
                 text += &line([r.0.to_string(), r.1.to_string(), r.2.to_string(), r.3.to_string(), r.4.to_string(), "x".into()]);
             }
-            let a = answer_table(table(&text)).unwrap();
+            let a = compute_table(table(&text)).unwrap();
             let mut out = Vec::new();
             a.write(&mut out).unwrap();
             let printed = csv::read_from_bytes(Path::new("out.csv"), &out).unwrap().numbers(RESULT).unwrap();

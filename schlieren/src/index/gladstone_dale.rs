@@ -17,7 +17,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// Molar gas constant (SI 2019), J/(mol K).
-pub(crate) const R: f64 = 8.314_462_618;
+pub(crate) const R_CODATA_2018: f64 = 8.314_462_618;
 
 /// A component of a mixture.
 #[derive(Debug, Clone, PartialEq)]
@@ -306,7 +306,7 @@ impl KnownGas {
 
 impl State {
     fn density_kg_m3(&self, molar_mass_kg: f64) -> f64 {
-        let rt = R * self.kelvin;
+        let rt = R_CODATA_2018 * self.kelvin;
         let z = 1.0 + self.virial_cm3 * 1e-6 * self.pascal / rt;
         self.pascal * molar_mass_kg / (rt * z)
     }

@@ -4,7 +4,7 @@
 //! air wrong by 12 % at a mole fraction of 0.1. Mass fractions are the correct weights: ρ Yᵢ is the
 //! density of species i, and each species contributes Kᵢ times its own density.
 
-use super::gladstone_dale::{Gas, R};
+use super::gladstone_dale::{Gas, R_CODATA_2018};
 use super::{IndexError, OutOfRange};
 
 /// Mass fractions whose sum differs from 1 by at most this are scaled to 1 without a warning.
@@ -101,15 +101,23 @@ impl Mixture {
         }
         // A remainder within the tolerance is an error of the fractions, not a trace of air.
         let scale = if sum > 1.0 - SUM_TOLERANCE { 1.0 / sum } else { 1.0 };
-        let rest = if sum > 1.0 - SUM_TOLERANCE { 0.0 } else { 1.0 - sum };
-        let inverse =
-            inverse * scale + if rest > 0.0 { rest * self.balance_inverse_molar_mass } else { 0.0 };
-        Blend { k_m3_per_kg: k * scale + rest * self.balance_k, molar_mass_kg: 1.0 / inverse, sum }
+        let balance_fraction = if sum > 1.0 - SUM_TOLERANCE { 0.0 } else { 1.0 - sum };
+        let inverse = inverse * scale
+            + if balance_fraction > 0.0 {
+                balance_fraction * self.balance_inverse_molar_mass
+            } else {
+                0.0
+            };
+        Blend {
+            k_m3_per_kg: k * scale + balance_fraction * self.balance_k,
+            molar_mass_kg: 1.0 / inverse,
+            sum,
+        }
     }
 
     /// [`Self::blend`] for user input: fails unless each fraction is from 0 to 1 and their sum is
     /// at most 1.
-    pub fn blend_strictly(&self, mass_fractions: &[f64]) -> Result<Blend, IndexError> {
+    pub fn try_blend(&self, mass_fractions: &[f64]) -> Result<Blend, IndexError> {
         let sum: f64 = mass_fractions.iter().sum();
         let bad = mass_fractions.iter().any(|y| !(0.0..=1.0).contains(y));
         if bad || sum > 1.0 + SUM_TOLERANCE {
@@ -126,7 +134,7 @@ impl Mixture {
 impl Blend {
     /// Density of an ideal gas, kg/m³.
     pub fn density_kg_m3(&self, temperature_k: f64, pressure_pa: f64) -> f64 {
-        pressure_pa * self.molar_mass_kg / (R * temperature_k)
+        pressure_pa * self.molar_mass_kg / (R_CODATA_2018 * temperature_k)
     }
     /// n − 1 = K ρ.
     pub fn n_minus_1(&self, density_kg_m3: f64) -> f64 {
@@ -213,9 +221,7 @@ mod tests {
         let air = Gas::AIR.k_m3_per_kg(0.589).unwrap();
         let n2 = Gas::Known(2).k_m3_per_kg(0.589).unwrap();
         assert!((half.k_m3_per_kg - 0.5 * (air + n2)).abs() < 1e-18);
-        assert!(
-            m.blend_strictly(&[0.8, 0.4]).unwrap_err().to_string().contains("N2, CO2 sum to 1.2")
-        );
+        assert!(m.try_blend(&[0.8, 0.4]).unwrap_err().to_string().contains("N2, CO2 sum to 1.2"));
     }
 
     #[test]

@@ -84,17 +84,17 @@ pub(super) fn evaluate(
     if let Some(s) = &n {
         report.n_minus_1_range = [s.low, s.high];
     }
-    count_lost(columns, &out, options, report);
+    warn_without_index(columns, &out, options, report);
     Ok(out)
 }
 
 /// Warns about points with finite values but no index.
-fn count_lost(columns: &[Column], out: &[f64], options: &Options, report: &mut Report) {
-    let lost = (0..out.len())
+fn warn_without_index(columns: &[Column], out: &[f64], options: &Options, report: &mut Report) {
+    let without_index = (0..out.len())
         .into_par_iter()
         .filter(|&i| !out[i].is_finite() && columns.iter().all(|c| c.at(i).is_finite()))
         .count();
-    if lost > 0 {
+    if without_index > 0 {
         let why = match options.medium {
             Medium::Electrons(_) => "the electron density is negative or above the critical one",
             _ => {
@@ -103,7 +103,7 @@ fn count_lost(columns: &[Column], out: &[f64], options: &Options, report: &mut R
             }
         };
         report.warnings.push(format!(
-            "{lost} of {} values of {} give no index: {why}; these places are blank",
+            "{without_index} of {} values of {} give no index: {why}; these places are blank",
             out.len(),
             options.medium.describe()
         ));
@@ -277,10 +277,10 @@ impl Blends<'_> {
             Blends::Same(b) => *b,
             Blends::Each(columns) => {
                 // Mixtures in flames have about ten species; more are allocated on the heap.
-                let mut few = [0.0; 16];
-                if let Some(room) = few.get_mut(..columns.len()) {
-                    room.iter_mut().zip(*columns).for_each(|(f, c)| *f = c.at(i));
-                    mixture.blend(room)
+                let mut stack = [0.0; 16];
+                if let Some(fractions) = stack.get_mut(..columns.len()) {
+                    fractions.iter_mut().zip(*columns).for_each(|(f, c)| *f = c.at(i));
+                    mixture.blend(fractions)
                 } else {
                     mixture.blend(&columns.iter().map(|c| c.at(i)).collect::<Vec<_>>())
                 }

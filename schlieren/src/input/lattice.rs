@@ -9,7 +9,7 @@ use datasets::resample::{
 use glam::{DMat3, DVec3};
 
 /// The points at which the index is computed.
-pub(super) enum Places {
+pub(super) enum SamplePoints {
     /// The nodes of a uniform lattice, which is used unchanged.
     Uniform {
         lattice: Lattice,
@@ -32,8 +32,8 @@ pub(super) struct LatticeValues {
 /// interpolant.
 const SPAN_NODES: usize = 8;
 
-impl Places {
-    pub(super) fn find(data: &Dataset, options: &Options) -> Result<Places, InputError> {
+impl SamplePoints {
+    pub(super) fn find(data: &Dataset, options: &Options) -> Result<SamplePoints, InputError> {
         data.check().map_err(InputError::Model)?;
         let mut associations = Vec::new();
         for name in options.medium.arrays() {
@@ -55,14 +55,14 @@ impl Places {
             && options.samples_per_axis == 1
         {
             let lattice = if per_point { lattice } else { cell_centres(lattice) };
-            return Ok(Places::Uniform { lattice, backwards });
+            return Ok(SamplePoints::Uniform { lattice, backwards });
         }
         let mesh = match options.depth {
             Some(Depth::Span(span)) => Mesh::with_plane(data, Plane::Extrude { span })?,
             Some(Depth::Revolve) => Mesh::with_plane(data, Plane::Extrude { span: sheet(data) })?,
             None => Mesh::new(data)?,
         };
-        Ok(Places::Mesh { mesh: Box::new(mesh), per_point, own: own.map(|o| o.0) })
+        Ok(SamplePoints::Mesh { mesh: Box::new(mesh), per_point, own: own.map(|o| o.0) })
     }
 
     /// The values of an array, in the order of the points.
@@ -81,12 +81,12 @@ impl Places {
             })
         };
         match self {
-            Places::Mesh { mesh, per_point, .. } => match (per_point, color.per_point) {
+            SamplePoints::Mesh { mesh, per_point, .. } => match (per_point, color.per_point) {
                 (_, true) => mesh.gather_points(data, of),
                 (false, false) => mesh.gather_cells(data, of),
                 (true, false) => mesh.cells_to_points(&mesh.gather_cells(data, of)),
             },
-            Places::Uniform { lattice, backwards } => {
+            SamplePoints::Uniform { lattice, backwards } => {
                 let leaves = data.leaves();
                 let Some(a) = leaves.first().and_then(|l| l.attributes()) else {
                     return Vec::new();
@@ -113,13 +113,13 @@ impl Places {
         options: &Options,
     ) -> Result<LatticeValues, InputError> {
         match self {
-            Places::Uniform { lattice, .. } => {
+            SamplePoints::Uniform { lattice, .. } => {
                 let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
                 let mark = |v: &f32| if v.is_finite() { Mark::Inside } else { Mark::NotFinite };
                 let marks = values.iter().map(mark).collect();
                 Ok(LatticeValues { lattice: *lattice, values, marks, report: None })
             }
-            Places::Mesh { mesh, per_point, own } => {
+            SamplePoints::Mesh { mesh, per_point, own } => {
                 let lattice = target(mesh, own.as_ref(), options)?;
                 let samples =
                     if *per_point { Samples::Points(&values) } else { Samples::Cells(&values) };

@@ -1,6 +1,6 @@
 //! Loads properties of the medium (absorption, emission, rotation) from the arrays of a file.
 
-use super::lattice::Places;
+use super::lattice::SamplePoints;
 use super::medium::Column;
 use super::{InputError, Medium, Options, Quantity, Source, with_data};
 use crate::field::Field;
@@ -52,8 +52,8 @@ fn volume(
 ) -> Result<Volume, InputError> {
     // Treat the array as a given index: unchanged values, on the lattice that the array would get.
     let options = Options { medium: Medium::NMinus1(quantity.clone()), ..options.clone() };
-    let places = Places::find(data, &options)?;
-    let values = match options.medium.columns(data, &places)?.pop() {
+    let points = SamplePoints::find(data, &options)?;
+    let values = match options.medium.columns(data, &points)?.pop() {
         Some(Column::Values(values)) => values,
         _ => Vec::new(),
     };
@@ -67,7 +67,7 @@ fn volume(
             cure: "check the array's name and its values",
         });
     }
-    let on = places.to_lattice(values, &options)?;
+    let on = points.to_lattice(values, &options)?;
     let unknown: Vec<bool> =
         on.marks.iter().map(|m| matches!(m, Mark::Outside | Mark::Hidden)).collect();
     let (unit, lattice) = (options.length_unit_m, on.lattice);

@@ -1,7 +1,7 @@
 //! Gives the arrays of a file their meaning and units.
 
 use super::InputError;
-use super::lattice::Places;
+use super::lattice::SamplePoints;
 use crate::index::multifield::{Multifield, Rule, TransferFunction};
 use crate::index::{Gas, IndexError};
 use datasets::model::{ColorBy, Dataset};
@@ -195,7 +195,7 @@ impl Medium {
     pub(super) fn columns(
         &self,
         data: &Dataset,
-        places: &Places,
+        points: &SamplePoints,
     ) -> Result<Vec<Column>, InputError> {
         let quantities = self.quantities();
         if quantities.iter().all(|q| matches!(q.source, Source::Constant(_))) {
@@ -221,7 +221,7 @@ impl Medium {
                     Source::Constant(x) => Column::Constant(x * q.scale + q.offset),
                     Source::Array(name) => {
                         let color = ColorBy::find(data, name)?;
-                        let mut values = places.values(data, &color);
+                        let mut values = points.values(data, &color);
                         if (q.scale, q.offset) != (1.0, 0.0) {
                             values.iter_mut().for_each(|v| *v = *v * q.scale + q.offset);
                         }

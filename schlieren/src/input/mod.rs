@@ -238,8 +238,8 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     let mut report = Report::default();
 
     // n − 1 at the points of the file, less a common background.
-    let places = lattice::Places::find(data, options)?;
-    let columns = options.medium.columns(data, &places)?;
+    let points = lattice::SamplePoints::find(data, options)?;
+    let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;
     let background = reference::median(&index);
     if !background.is_finite() {
@@ -251,7 +251,7 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     index.iter_mut().for_each(|n| *n -= background);
 
     // Resample to a uniform lattice.
-    let mut on = places.to_lattice(index, options)?;
+    let mut on = points.to_lattice(index, options)?;
     if let Some(r) = &on.report {
         report.warnings.extend(r.warnings());
     }
