@@ -15,7 +15,7 @@ use std::sync::Arc;
 const EVERY_BEND: [Bend; 3] = [Bend::Straight, Bend::Paraxial, Bend::Full];
 
 /// A box of uniform gas, 0.4 x 0.3 x 0.2 m.
-fn even() -> Field {
+fn uniform_box() -> Field {
     let at = DVec3::new(0.1, -0.2, 0.3);
     Field::from_fn([33, 25, 17], [0.0125; 3], at, 1.0003, |_| 1e-4).unwrap()
 }
@@ -24,22 +24,27 @@ fn start(x: f64, y: f64) -> Start {
     Start { position_m: [x as f32, y as f32], tilt_rad: [0.0; 2] }
 }
 
-fn along(walk: &MediaIntegrator<'_>, starts: &[Start]) -> Vec<MediaIntegrals> {
+fn along(integrator: &MediaIntegrator<'_>, starts: &[Start]) -> Vec<MediaIntegrals> {
     let mut out = vec![MediaIntegrals::default(); starts.len()];
-    walk.collect(starts, None, &mut out);
+    integrator.integrate(starts, None, &mut out);
     let mut parallel = out.clone();
-    walk.collect_parallel(starts, None, &mut parallel);
+    integrator.integrate_parallel(starts, None, &mut parallel);
     assert_eq!(out, parallel);
     out
 }
 
-fn walk<'a>(field: &'a Field, view: View, media: &'a Media, bend: Bend) -> MediaIntegrator<'a> {
+fn integrator<'a>(
+    field: &'a Field,
+    view: View,
+    media: &'a Media,
+    bend: Bend,
+) -> MediaIntegrator<'a> {
     MediaIntegrator::new(field, view, media, &Property::ALL, bend, 1.0, BlankCells::Opaque)
 }
 
 #[test]
 fn an_even_slab_absorbs_emits_and_turns_by_its_closed_forms() {
-    let field = even();
+    let field = uniform_box();
     let (alpha, j, rho) = (7.0, 2.0, -1.5);
     let uniform = |v| Volume::uniform(v, &field).unwrap();
     let media = Media::default()
@@ -49,7 +54,7 @@ fn an_even_slab_absorbs_emits_and_turns_by_its_closed_forms() {
     for (axis, depth) in [(Axis::X, 0.4), (Axis::Y, 0.3), (Axis::Z, 0.2f64)] {
         let view = View::along(axis, field.centre_m());
         for bend in EVERY_BEND {
-            let w = walk(&field, view, &media, bend);
+            let w = integrator(&field, view, &media, bend);
             for c in along(&w, &[start(0.0, 0.0), start(0.031, -0.042)]) {
                 assert!(
                     (c.transmission(None) - (-alpha * depth).exp()).abs() < 1e-6,
@@ -106,7 +111,8 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
     for bend in EVERY_BEND {
         for axis in [Axis::X, Axis::Y, Axis::Z] {
             let view = View::along(axis, DVec3::ZERO);
-            for (s, c) in starts.iter().zip(along(&walk(&field, view, &media, bend), &starts)) {
+            for (s, c) in starts.iter().zip(along(&integrator(&field, view, &media, bend), &starts))
+            {
                 let [x, y] = s.position_m.map(f64::from);
                 let expected = closed(x.hypot(y), half);
                 // The trilinear error is h²/8σ² = 3.4e-4 of the largest value for each of the two
@@ -121,7 +127,7 @@ fn a_gaussian_absorber_is_its_error_function_from_every_side() {
         // Oblique views have the same integrals, but rays leave the box elsewhere, at 2.5 σ or
         // farther: 1 % of the middle's value is outside.
         let view = View::from_angles_deg(34.0, 21.0, DVec3::ZERO).unwrap();
-        for (s, c) in starts.iter().zip(along(&walk(&field, view, &media, bend), &starts)) {
+        for (s, c) in starts.iter().zip(along(&integrator(&field, view, &media, bend), &starts)) {
             let b = f64::from(s.position_m[0]).hypot(f64::from(s.position_m[1]));
             let error = (f64::from(c.optical_depth) - closed(b, 10.0 * sigma)).abs();
             assert!(error < 0.013 * closed(0.0, half), "{bend:?} {c:?}");
@@ -150,8 +156,8 @@ fn views_turned_with_the_smoke_agree() {
         let view_a = View::new(light_a, up_a, DVec3::ZERO).unwrap();
         let view_b = View::new(turn(light_a), turn(up_a), DVec3::ZERO).unwrap();
         for bend in EVERY_BEND {
-            let one = along(&walk(&a, view_a, &smoke_a, bend), &starts);
-            let other = along(&walk(&b, view_b, &smoke_b, bend), &starts);
+            let one = along(&integrator(&a, view_a, &smoke_a, bend), &starts);
+            let other = along(&integrator(&b, view_b, &smoke_b, bend), &starts);
             for (p, q) in one.iter().zip(&other) {
                 assert!(
                     (p.optical_depth - q.optical_depth).abs() < 1e-6 * 0.6,
@@ -165,7 +171,7 @@ fn views_turned_with_the_smoke_agree() {
 /// A wall of smoke hides a glowing slab behind it from one side, but not from the other.
 #[test]
 fn emission_is_dimmed_by_what_lies_between_it_and_the_eye() {
-    let field = even();
+    let field = uniform_box();
     let (z0, h) = (0.3, 0.0125);
     let smoke = Volume::from_fn([2, 2, 17], [0.4, 0.3, h], field.origin_m(), |p| {
         if p.z < z0 + 4.5 * h { 40.0 } else { 0.0 }
@@ -179,7 +185,7 @@ fn emission_is_dimmed_by_what_lies_between_it_and_the_eye() {
     let forward = View::along(Axis::Z, field.centre_m());
     let backward = View { right: -forward.right, forward: -forward.forward, ..forward };
     for bend in EVERY_BEND {
-        let seen = |v| along(&walk(&field, v, &media, bend), &[start(0.01, 0.02)])[0];
+        let seen = |v| along(&integrator(&field, v, &media, bend), &[start(0.01, 0.02)])[0];
         // Smoke is 4.5 steps deep, with half of the ramp at its end. Nodes 11 to 16 glow: five
         // steps and half of the ramp.
         let (depth, glow) = (40.0 * h * 4.5, 3.0 * h * 5.5);
@@ -211,10 +217,10 @@ fn walks_end_at_bodies_and_where_they_are_told() {
     for bend in EVERY_BEND {
         // The nearest node is in the body from half a step before node 10 on. A step counts as a
         // whole or not at all.
-        let c = along(&walk(&walled, view, &media, bend), &[start(0.0, 0.0)])[0];
+        let c = along(&integrator(&walled, view, &media, bend), &[start(0.0, 0.0)])[0];
         assert!((c.optical_depth - 2.0 * 0.095).abs() < 2.0 * 0.0051, "{bend:?} {c:?}");
         let mut out = [MediaIntegrals::default(); 2];
-        walk(&open, view, &media, bend).collect(
+        integrator(&open, view, &media, bend).integrate(
             &[start(0.0, 0.0); 2],
             Some(&[-0.063, -0.4]),
             &mut out,
@@ -239,7 +245,7 @@ fn what_a_ray_collects_does_not_depend_on_the_rays_beside_it() {
     let starts: Vec<Start> =
         (0..48).map(|i| start(-0.3 + 0.0125 * f64::from(i), 0.004 * f64::from(i % 5))).collect();
     for bend in EVERY_BEND {
-        let w = walk(&field, view, &media, bend);
+        let w = integrator(&field, view, &media, bend);
         let together = along(&w, &starts);
         assert!(together.iter().filter(|c| c.optical_depth > 0.1).count() > 16);
         assert!(together.iter().any(|c| c.optical_depth == 0.0));
@@ -371,7 +377,7 @@ fn paths_keep_all_but_the_transmission_bit_by_bit() {
     let mut dimmed = plain.clone();
     march().trace(&starts, &mut plain);
     let rays = Arc::default();
-    let w = walk(&field, view, &media, Bend::Paraxial);
+    let w = integrator(&field, view, &media, Bend::Paraxial);
     let through = AttenuatedPaths::new(march(), w, None, rays);
     through.trace(&starts, &mut dimmed);
     assert_eq!(through.rays(), starts.len() as u64);

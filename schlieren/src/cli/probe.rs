@@ -94,7 +94,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         "warnings": warnings,
     });
     let mut of_medium = String::new();
-    if let Some(c) = section.collected(&scene, &planned, &[start])? {
+    if let Some(c) = section.media_integrals(&scene, &planned, &[start])? {
         let c = c[0];
         let emission = section.emitted(&scene, &planned, &[start])?.map_or(0.0, |e| e[0]);
         let given = &scene.media;

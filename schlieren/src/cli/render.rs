@@ -46,11 +46,11 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         }
         return Err(UsageError("no output: give -o PNG, --exr EXR or --npy NPY".into()).into());
     }
-    let drawn = draw(common, cancel, &scene, &outputs)?;
+    let summary = render_and_write(common, cancel, &scene, &outputs)?;
     if args.print_scene && !common.json {
         return Ok(());
     }
-    common.result(&drawn.json, || &drawn.text)
+    common.result(&summary.json, || &summary.text)
 }
 
 /// The files to write.
@@ -103,7 +103,7 @@ pub(super) struct RenderSummary {
 }
 
 /// Reads the flow, renders it and writes the files.
-pub(super) fn draw(
+pub(super) fn render_and_write(
     common: CommonArgs,
     cancel: Cancel,
     scene: &Scene,

@@ -1,7 +1,7 @@
 //! Implements `schlieren sweep`: renders a time series, or one flow for several values of a key of
 //! its scene.
 
-use super::render::{Outputs, draw};
+use super::render::{Outputs, render_and_write};
 use super::scene_args::SceneArgs;
 use crate::scene::Scene;
 use clap::Args;
@@ -112,14 +112,14 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
         let numbered = |p: &Option<PathBuf>| p.as_ref().map(|p| number(p, i));
         let (png, exr, npy) = (numbered(&args.out), numbered(&args.exr), numbered(&args.npy));
         let outputs = Outputs::new(png.as_deref(), exr.as_deref(), npy.as_deref())?;
-        let drawn = draw(common, cancel, &scene, &outputs)?;
-        reference = reference.or(drawn.json["n0_minus_1"].as_f64());
-        let mut object = drawn.json;
+        let summary = render_and_write(common, cancel, &scene, &outputs)?;
+        reference = reference.or(summary.json["n0_minus_1"].as_f64());
+        let mut object = summary.json;
         if let Some(map) = object.as_object_mut() {
             map.insert("index".into(), i.into());
             map.insert("swept".into(), label.clone());
         }
-        common.result(&object, || format!("{label} {}", drawn.text))?;
+        common.result(&object, || format!("{label} {}", summary.text))?;
     }
     Ok(())
 }

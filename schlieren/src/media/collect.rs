@@ -16,7 +16,7 @@ impl MediaIntegrator<'_> {
     ///
     /// # Panics
     /// If the slices differ in length.
-    pub fn collect(&self, starts: &[Start], ends_m: Option<&[f64]>, out: &mut [MediaIntegrals]) {
+    pub fn integrate(&self, starts: &[Start], ends_m: Option<&[f64]>, out: &mut [MediaIntegrals]) {
         assert_eq!(starts.len(), out.len(), "one answer per start");
         assert!(ends_m.is_none_or(|e| e.len() == starts.len()), "one end per start");
         let end_m = |i: usize| ends_m.map_or(f64::INFINITY, |e| e[i]);
@@ -24,7 +24,7 @@ impl MediaIntegrator<'_> {
             BendField::Full(spline) => {
                 let mut known = None;
                 for (i, (start, to)) in starts.iter().zip(out).enumerate() {
-                    *to = full::collect(self, spline, start, end_m(i), &mut known);
+                    *to = full::integrate(self, spline, start, end_m(i), &mut known);
                 }
                 return;
             }
@@ -48,17 +48,17 @@ impl MediaIntegrator<'_> {
                 at_level!(self.level, simd => integrate16(simd, &sampled, &mut packet));
             }
             for (l, to) in out.iter_mut().enumerate() {
-                *to = packet.collected[l].rounded();
+                *to = packet.integrals[l].rounded();
             }
         }
     }
 
-    /// [`MediaIntegrator::collect`] on all threads of the current rayon pool. The result does not
+    /// [`MediaIntegrator::integrate`] on all threads of the current rayon pool. The result does not
     /// depend on their number.
     ///
     /// # Panics
     /// If the slices differ in length.
-    pub fn collect_parallel(
+    pub fn integrate_parallel(
         &self,
         starts: &[Start],
         ends_m: Option<&[f64]>,
@@ -70,7 +70,7 @@ impl MediaIntegrator<'_> {
         const CHUNK: usize = 1024;
         starts.par_chunks(CHUNK).zip(out.par_chunks_mut(CHUNK)).enumerate().for_each(
             |(i, (s, o))| {
-                self.collect(s, ends_m.map(|e| &e[i * CHUNK..i * CHUNK + s.len()]), o);
+                self.integrate(s, ends_m.map(|e| &e[i * CHUNK..i * CHUNK + s.len()]), o);
             },
         );
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Integrates along one ray. Each step is the cubic Hermite curve through its ends. Properties are
 /// sampled at its middle, and its length is the integral of |w| by Simpson's rule. Both are of
 /// fourth order, as the march is.
-pub(super) fn collect(
+pub(super) fn integrate(
     integrator: &MediaIntegrator<'_>,
     spline: &BSpline,
     start: &Start,

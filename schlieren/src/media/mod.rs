@@ -46,7 +46,7 @@
 //! let (bend, rest) = (Bend::Straight, Default::default());
 //! let integrator = MediaIntegrator::new(&air, view, &media, &Property::ALL, bend, 1.0, rest);
 //! let mut along = [MediaIntegrals::default()];
-//! integrator.collect(&[Start::default()], None, &mut along);
+//! integrator.integrate(&[Start::default()], None, &mut along);
 //! assert!((along[0].optical_depth - 0.3).abs() < 1e-6);
 //! assert!((along[0].emission - 0.5 / 3.0 * (1.0 - (-0.3f32).exp())).abs() < 1e-6);
 //! # Ok::<(), schlieren::field::FieldError>(())

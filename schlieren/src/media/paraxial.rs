@@ -32,7 +32,7 @@ pub(super) struct Packet {
     /// Slope, in lattice steps per unit of depth.
     v: [Row; 3],
     stopped: [bool; LANES],
-    pub(super) collected: [Sums; LANES],
+    pub(super) integrals: [Sums; LANES],
 }
 
 impl Packet {
@@ -49,7 +49,7 @@ impl Packet {
             xi: [[0.0; LANES]; 3],
             v: [[0.0; LANES]; 3],
             stopped: [true; LANES],
-            collected: [Sums::default(); LANES],
+            integrals: [Sums::default(); LANES],
         }
     }
 
@@ -232,7 +232,7 @@ fn gather<S: Simd>(
         if !p.stopped[l] {
             let part = (p.end[l] - step).min(1.0);
             let length_m = p.dz_m[l] * f64::from(stretch[l]) * part;
-            p.collected[l].add([values[0][l], values[1][l], values[2][l]], length_m);
+            p.integrals[l].add([values[0][l], values[1][l], values[2][l]], length_m);
             p.stopped[l] = part < 1.0;
         }
     }

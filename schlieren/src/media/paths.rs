@@ -34,10 +34,10 @@ impl<'a> AttenuatedPaths<'a> {
         self.rays.load(Ordering::Relaxed)
     }
 
-    fn dim(&self, starts: &[Start], exits: &mut [Exit]) {
-        let mut collected = vec![MediaIntegrals::default(); starts.len()];
-        self.integrator.collect(starts, None, &mut collected);
-        for (exit, c) in exits.iter_mut().zip(&collected) {
+    fn attenuate(&self, starts: &[Start], exits: &mut [Exit]) {
+        let mut integrals = vec![MediaIntegrals::default(); starts.len()];
+        self.integrator.integrate(starts, None, &mut integrals);
+        for (exit, c) in exits.iter_mut().zip(&integrals) {
             // Only blocked rays have 0. Absorbed light stays above 0, however weak, so that its
             // exit remains valid.
             if exit.transmission > 0.0 {
@@ -52,7 +52,7 @@ impl<'a> AttenuatedPaths<'a> {
 impl LightPaths for AttenuatedPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
         self.paths.trace(starts, exits);
-        self.dim(starts, exits);
+        self.attenuate(starts, exits);
     }
 
     fn view(&self) -> &View {
@@ -82,12 +82,15 @@ impl LightPaths for AttenuatedPaths<'_> {
         jacobians: &mut [Jacobian],
     ) {
         self.paths.trace_with_jacobians(starts, exits, jacobians);
-        self.dim(starts, exits);
+        self.attenuate(starts, exits);
     }
 
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
         const CHUNK: usize = 1024;
         self.paths.trace_parallel(starts, exits);
-        starts.par_chunks(CHUNK).zip(exits.par_chunks_mut(CHUNK)).for_each(|(s, e)| self.dim(s, e));
+        starts
+            .par_chunks(CHUNK)
+            .zip(exits.par_chunks_mut(CHUNK))
+            .for_each(|(s, e)| self.attenuate(s, e));
     }
 }

@@ -95,18 +95,20 @@ pub(super) fn expose_lines<'a>(
             tilted_beams,
         };
         let part = |done: f64| (control.progress)((line as f64 + done) / lines.len() as f64);
-        let wished = Layers {
+        let line_layers = Layers {
             counts: layers.counts && line == 0,
             noise: layers.noise && line == 0,
             ..layers
         };
         let (scale, before) = (scene.exposure() as f32, r.report.counters.rays);
         if t.is_colored() {
-            let film = expose_line::<3>(scene, &setup, framing, wished, control.cancel, &part, r)?;
+            let film =
+                expose_line::<3>(scene, &setup, framing, line_layers, control.cancel, &part, r)?;
             r.colored = true;
             r.pixels = film.into_iter().map(|p| p.map(|v| v * scale)).collect();
         } else {
-            let film = expose_line::<1>(scene, &setup, framing, wished, control.cancel, &part, r)?;
+            let film =
+                expose_line::<1>(scene, &setup, framing, line_layers, control.cancel, &part, r)?;
             let color = if lines.len() > 1 { colors[line] } else { [1.0; 3] };
             for (p, f) in r.pixels.iter_mut().zip(film) {
                 (0..3).for_each(|c| p[c] += f[0] * color[c] * scale);
@@ -267,21 +269,21 @@ fn margin_px(
     paths.trace_parallel(&starts, &mut exits);
     let lands =
         |e: &&(&Start, &Exit)| e.1.transmission > 0.0 && e.1.status != crate::path::Status::Turned;
-    let stray = |(s, e): (&Start, &Exit)| {
+    let shift_px = |(s, e): (&Start, &Exit)| {
         let [x, y] = optics.film_shift_m(s, e);
         f64::from(x.abs().max(y.abs())) / framing.pixel_m
     };
     let pairs: Vec<(&Start, &Exit)> = starts.iter().zip(&exits).collect();
-    let farthest = pairs.iter().filter(lands).map(|p| stray(*p)).fold(0.0f64, f64::max);
-    let wanted = (1.25 * farthest + 1.0).ceil();
+    let farthest = pairs.iter().filter(lands).map(|p| shift_px(*p)).fold(0.0f64, f64::max);
+    let needed_px = (1.25 * farthest + 1.0).ceil();
     let limit = f64::from(framing.width.max(framing.height));
-    if wanted > limit {
+    if needed_px > limit {
         report.warnings.push(format!(
             "light strays by {farthest:.0} pixels, more than the picture's size; what comes from \
              farther away is left out. Bring the film nearer, or look at more"
         ));
     }
-    let margin = wanted.min(limit) as u32;
+    let margin = needed_px.min(limit) as u32;
     report.margin_px = report.margin_px.max(margin);
     margin
 }

@@ -59,7 +59,7 @@ impl TestSection {
         view: View,
         mut planned: PlannedPaths<'a>,
     ) -> Result<PlannedPaths<'a>, RenderError> {
-        let wanted = scene.media.dims_light();
+        let wanted = scene.media.attenuating();
         let Some(media) = self.media_of(scene)?.filter(|_| !wanted.is_empty()) else {
             return Ok(planned);
         };
@@ -95,7 +95,7 @@ impl TestSection {
     ///
     /// # Errors
     /// If the scene needs a property that the test section lacks.
-    pub fn collected(
+    pub fn media_integrals(
         &self,
         scene: &Scene,
         planned: &PlannedPaths<'_>,
@@ -108,10 +108,10 @@ impl TestSection {
         if against_light {
             let integrator =
                 self.media_integrator(media, 0, ReversedPaths::view(&self.view), planned, &wanted);
-            integrator.collect_parallel(&ReversedPaths::starts(starts), None, &mut out);
+            integrator.integrate_parallel(&ReversedPaths::starts(starts), None, &mut out);
         } else {
             self.media_integrator(media, 0, self.view, planned, &wanted)
-                .collect_parallel(starts, None, &mut out);
+                .integrate_parallel(starts, None, &mut out);
         }
         Ok(Some(out))
     }
@@ -137,7 +137,7 @@ impl TestSection {
             starts.iter().map(|s| solids.depth_m(&view, s).unwrap_or(f64::INFINITY)).collect()
         });
         let mut out = vec![MediaIntegrals::default(); starts.len()];
-        integrator.collect_parallel(&starts, ends.as_deref(), &mut out);
+        integrator.integrate_parallel(&starts, ends.as_deref(), &mut out);
         Ok(Some(out.into_iter().map(|c| c.emission).collect()))
     }
 }
@@ -192,7 +192,7 @@ pub(super) fn add_map(
     if spec.absorption.is_none() && spec.rotation.is_none() {
         return Ok(());
     }
-    let Some(all) = section.collected(scene, planned, &r.framing.pixel_centers())? else {
+    let Some(all) = section.media_integrals(scene, planned, &r.framing.pixel_centers())? else {
         return Ok(());
     };
     counters.media_rays += all.len() as u64;

@@ -12,12 +12,12 @@
 //!     -2e-5 * (-p.length_squared() / (2.0 * 12e-3f64.powi(2))).exp()
 //! })?;
 //! let section = TestSection::of_fields(&scene, vec![blob], None)?;
-//! let picture = render(&scene, &section, Layers::NONE, &Control::default())?;
+//! let image = render(&scene, &section, Layers::NONE, &Control::default())?;
 //! // Light is bent away from the warm middle: against the background of 1/2 the image is darker to
 //! // the left of it and brighter to the right.
-//! let [left, right] = [16 * 32 + 11, 16 * 32 + 20].map(|i: usize| picture.pixels[i][0]);
+//! let [left, right] = [16 * 32 + 11, 16 * 32 + 20].map(|i: usize| image.pixels[i][0]);
 //! assert!(left < 0.46 && right > 0.54, "{left} {right}");
-//! assert!((picture.pixels[0][0] - 0.5).abs() < 1e-3);
+//! assert!((image.pixels[0][0] - 0.5).abs() < 1e-3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -309,7 +309,7 @@ pub fn render(
         .iter()
         .flatten()
         .fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
-    warn_about_picture(scene, &mut r.report);
+    warn_about_image(scene, &mut r.report);
     (control.progress)(1.0);
     Ok(r)
 }
@@ -412,7 +412,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
 }
 
 /// Warns about images that show nothing: they are correct but rarely wanted.
-fn warn_about_picture(scene: &Scene, report: &mut Report) {
+fn warn_about_image(scene: &Scene, report: &mut Report) {
     let [low, high] = report.levels;
     // One step of an 8-bit image at half brightness, in linear light.
     let visible = 0.004 * high.max(0.1);

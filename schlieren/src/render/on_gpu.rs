@@ -18,7 +18,7 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
         return Ok(());
     }
     #[cfg(feature = "gpu")]
-    return refused(march)
+    return unsupported(march)
         .map_or_else(|| crate::gpu::Gpu::shared().map(|_| ()), Err)
         .map_err(RenderError::Gpu);
     #[cfg(not(feature = "gpu"))]
@@ -31,7 +31,7 @@ const CURE: &str =
 
 /// The error for options that a scene names but that have no kernel.
 #[cfg(feature = "gpu")]
-fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
+fn unsupported(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
     let what = match (march.method.as_deref(), march.interpolant.as_deref()) {
         (Some(m), _) if m != "verlet" => format!("the march {m}"),
         (_, Some("trilinear-gradient")) => "the interpolant trilinear-gradient".into(),
@@ -45,12 +45,12 @@ fn refused(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
 /// known before rendering are errors. A device that is lost or out of memory is only a reason, so
 /// that the image is still rendered.
 #[cfg(feature = "gpu")]
-fn fallback_reason(asked: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
+fn fallback_reason(requested: Device, error: crate::gpu::GpuError) -> Result<String, RenderError> {
     match error {
         crate::gpu::GpuError::Failed { .. } | crate::gpu::GpuError::GivenUp { .. } => {
             Ok(crate::gpu::fallback_message(&error))
         }
-        e if asked == Device::Gpu => Err(RenderError::Gpu(e)),
+        e if requested == Device::Gpu => Err(RenderError::Gpu(e)),
         e => Ok(crate::gpu::fallback_message(&e)),
     }
 }
@@ -87,7 +87,7 @@ pub(super) fn on_gpu<'a>(
         );
     }
     let made = (|| {
-        if let Some(e) = refused(march) {
+        if let Some(e) = unsupported(march) {
             return Err(e);
         }
         if plan.mode != Mode::Paraxial {
@@ -111,11 +111,11 @@ pub(super) fn on_gpu<'a>(
         };
         // A device that fails while the field is copied to it is reopened, up to a limited number
         // of times.
-        let mut told = None;
+        let mut warning = None;
         let paths = loop {
             match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
-                    told.get_or_insert(format!(
+                    warning.get_or_insert(format!(
                         "{}; it was opened again",
                         crate::gpu::failure_message(&e)
                     ));
@@ -124,10 +124,10 @@ pub(super) fn on_gpu<'a>(
                 made => break made?,
             }
         };
-        Ok((paths, gpu, told))
+        Ok((paths, gpu, warning))
     })();
     match made {
-        Ok((paths, gpu, told)) => {
+        Ok((paths, gpu, warning)) => {
             // The error is measured with the CPU's march, which agrees within rounding.
             let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, cache));
             let description = described("verlet", plan.interpolant, plan.step_voxels);
@@ -138,7 +138,7 @@ pub(super) fn on_gpu<'a>(
                 march.tolerance_rad,
                 (Mode::Paraxial.into(), plan.step_voxels),
             );
-            planned.warnings.extend(told);
+            planned.warnings.extend(warning);
             Ok(Ok(planned))
         }
         Err(e) => fallback_reason(march.device, e).map(|why| Err(Some(why))),
@@ -178,11 +178,11 @@ mod tests {
             times: 3,
             reason: "the device is lost".into(),
         };
-        for asked in [Device::Gpu, Device::Auto] {
+        for requested in [Device::Gpu, Device::Auto] {
             for e in [&lost, &give_up_error] {
-                let told = fallback_reason(asked, e.clone()).unwrap();
+                let warning = fallback_reason(requested, e.clone()).unwrap();
                 for word in ["Lamp 9", "the device is lost", "on the CPU"] {
-                    assert!(told.contains(word), "{word}: {told}");
+                    assert!(warning.contains(word), "{word}: {warning}");
                 }
             }
         }

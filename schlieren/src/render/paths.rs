@@ -87,19 +87,21 @@ impl TestSection {
             on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), cache)?;
         let why_not = match planned {
             Ok(mut planned) => {
-                if !scene.media.dims_light().is_empty() {
+                if !scene.media.attenuating().is_empty() {
                     planned
                         .warnings
                         .push("absorption and rotation are collected on the CPU".into());
                 }
-                return Ok(self.attenuated(scene, line, view, planned)?.seen(against_light));
+                return Ok(self
+                    .attenuated(scene, line, view, planned)?
+                    .in_image_frame(against_light));
             }
             Err(why_not) => why_not,
         };
 
         let mut skip_warning = None;
         // Marches for comparison are selected by name only.
-        let (paths, description, achieved, walked) =
+        let (paths, description, achieved, media_step) =
             if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
                 let interpolant = interpolant.unwrap_or_default();
                 let step_voxels = march.step_voxels.unwrap_or(1.0);
@@ -110,7 +112,7 @@ impl TestSection {
             } else {
                 let plan =
                     Plan::from_derivative_bounds(field, with(mode), cache.derivative_bounds(field));
-                let walked = (Bend::from(plan.mode), plan.step_voxels);
+                let media_step = (Bend::from(plan.mode), plan.step_voxels);
                 // A plan makes PEFRL with the spline only.
                 if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline)
                 {
@@ -119,7 +121,7 @@ impl TestSection {
                         FullOptions { step_voxels: step, quantities, ..FullOptions::default() };
                     let paths = full(field, view, plan.interpolant, Pefrl, options);
                     skip_warning = (march.skip_rad > 0.0).then(|| skipping_has_no_effect("pefrl"));
-                    (paths, described("pefrl", plan.interpolant, step), None, walked)
+                    (paths, described("pefrl", plan.interpolant, step), None, media_step)
                 } else {
                     let name = match plan.mode {
                         Mode::LineOfSight => "line-of-sight",
@@ -140,14 +142,14 @@ impl TestSection {
                             }
                         }
                     }
-                    (plan.paths_with(field, view, cache), description, achieved, walked)
+                    (plan.paths_with(field, view, cache), description, achieved, media_step)
                 }
             };
         let mut planned =
-            PlannedPaths::new(paths, description, achieved, march.tolerance_rad, walked);
+            PlannedPaths::new(paths, description, achieved, march.tolerance_rad, media_step);
         planned.warnings.extend(why_not);
         planned.warnings.extend(skip_warning);
-        Ok(self.attenuated(scene, line, view, planned)?.seen(against_light))
+        Ok(self.attenuated(scene, line, view, planned)?.in_image_frame(against_light))
     }
 }
 

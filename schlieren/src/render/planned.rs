@@ -73,7 +73,7 @@ impl<'a> PlannedPaths<'a> {
     }
 
     /// The same paths, converted to the image's frame when `against_light`.
-    pub(super) fn seen(self, against_light: bool) -> PlannedPaths<'a> {
+    pub(super) fn in_image_frame(self, against_light: bool) -> PlannedPaths<'a> {
         let paths = self.paths;
         let paths = if against_light {
             Box::new(ReversedPaths::new(paths)) as Box<dyn LightPaths>

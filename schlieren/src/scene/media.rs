@@ -60,7 +60,7 @@ impl MediaSpec {
     }
 
     /// Properties that change the transmitted light: absorption, and rotation with an analyser.
-    pub fn dims_light(&self) -> Vec<Property> {
+    pub fn attenuating(&self) -> Vec<Property> {
         let counts = |p: &Property| match p {
             Property::Absorption => self.absorption.is_some(),
             Property::Emission => false,
@@ -88,9 +88,9 @@ impl Scene {
             return Ok(());
         }
         let technique = self.technique.name();
-        let in_vain = |key, hint| Err(SceneError::NoEffect { key, technique, hint });
+        let no_effect = |key, hint| Err(SceneError::NoEffect { key, technique, hint });
         if !self.technique.follows_light() {
-            return in_vain("media", "; it knows no light to absorb, add or turn");
+            return no_effect("media", "; it knows no light to absorb, add or turn");
         }
         for (property, quantity) in m.quantities() {
             let key = match property {
@@ -110,14 +110,14 @@ impl Scene {
             }
         }
         if m.rotation.is_some() && matches!(self.technique, TechniqueSpec::Interferogram { .. }) {
-            return in_vain(
+            return no_effect(
                 "media.rotation",
                 ", whose reference beam is not polarised; take another technique",
             );
         }
         if let Some(angle) = m.analyser_deg {
             if m.rotation.is_none() {
-                return in_vain(
+                return no_effect(
                     "media.analyser_deg",
                     ", or give media.rotation: only a rotation makes it show the flow",
                 );
@@ -126,7 +126,7 @@ impl Scene {
         }
         if let Some(stop_m) = m.stop_m {
             if m.emission.is_none() || !matches!(self.technique, TechniqueSpec::Schlieren { .. }) {
-                return in_vain("media.stop_m", "; it belongs to media.emission with schlieren");
+                return no_effect("media.stop_m", "; it belongs to media.emission with schlieren");
             }
             super::check::positive("media.stop_m", stop_m)?;
         }
@@ -171,6 +171,6 @@ mod tests {
         let effective = glowing.effective();
         assert_eq!(effective.media.stop_m, Some(STOP_M));
         assert_eq!(Scene::from_toml(&effective.to_toml().unwrap()).unwrap(), effective);
-        assert!(glowing.media.dims_light().is_empty());
+        assert!(glowing.media.attenuating().is_empty());
     }
 }
