@@ -61,9 +61,9 @@ impl From<RenderError> for ServeError {
 }
 
 /// Interval at which `cancel` is polled.
-const TICK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Time that connections get to finish at shutdown.
-const FAREWELL: Duration = Duration::from_secs(1);
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Serves the scene until `cancel` is set. With several `steps` the page offers a choice of time
 /// and shows the first step first; otherwise it shows the scene's own file. `ready` is called with
@@ -102,7 +102,7 @@ pub fn serve(
     let session = Arc::new(Session::new(scene, flow.arrays(), steps)?);
     let worker = worker::Worker::new(session.clone(), flow, solids);
     let thread = std::thread::Builder::new()
-        .name("draws".into())
+        .name("render".into())
         .spawn(move || worker.run())
         .map_err(|e| start(&e))?;
 
@@ -110,17 +110,17 @@ pub fn serve(
     let app = routes::router(session.clone(), &token);
     runtime.block_on(async {
         let ending = Arc::new(tokio::sync::Notify::new());
-        let told = ending.clone();
-        let server =
-            axum::serve(listener, app).with_graceful_shutdown(async move { told.notified().await });
+        let shutdown = ending.clone();
+        let server = axum::serve(listener, app)
+            .with_graceful_shutdown(async move { shutdown.notified().await });
         let server = tokio::spawn(async move { server.await });
         while !cancel.load(Ordering::Relaxed) && !server.is_finished() {
-            tokio::time::sleep(TICK).await;
+            tokio::time::sleep(POLL_INTERVAL).await;
         }
         session.stop();
         ending.notify_one();
         // Clients that still wait for a frame or read slowly are disconnected.
-        let _ = tokio::time::timeout(FAREWELL, server).await;
+        let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, server).await;
     });
     drop(runtime);
     // A panic of the thread was already reported.

@@ -28,10 +28,10 @@ use std::time::Duration;
 /// Largest size of a request's body.
 const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 /// How long a request waits for a frame.
-const PATIENCE: Duration = Duration::from_secs(15);
+const FRAME_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The page's files, embedded in the program.
-const PARTS: [(&str, &str, &str); 8] = [
+const ASSETS: [(&str, &str, &str); 8] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
@@ -72,7 +72,7 @@ pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
 /// server.
 async fn guarded(State(app): State<App>, request: Request, next: Next) -> Response {
     let given = request.uri().path().split('/').nth(1).unwrap_or_default();
-    let mut response = if same(given, &app.token) {
+    let mut response = if constant_time_eq(given, &app.token) {
         next.run(request).await
     } else {
         let text = "This address lacks the token: open the one that `schlieren serve` printed.\n";
@@ -95,7 +95,7 @@ async fn guarded(State(app): State<App>, request: Request, next: Next) -> Respon
 }
 
 /// Comparison in constant time, which does not reveal how many characters were right.
-fn same(a: &str, b: &str) -> bool {
+fn constant_time_eq(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |d, (x, y)| d | (x ^ y)) == 0
 }
 
@@ -121,7 +121,7 @@ async fn index() -> Response {
 }
 
 async fn part(Path((_, name)): Path<(String, String)>) -> Response {
-    match PARTS.iter().find(|p| p.0 == name) {
+    match ASSETS.iter().find(|p| p.0 == name) {
         Some((_, kind, text)) => ([(header::CONTENT_TYPE, *kind)], *text).into_response(),
         None => StatusCode::NOT_FOUND.into_response(),
     }
@@ -140,7 +140,7 @@ struct FrameQuery {
 async fn frame(State(app): State<App>, Query(FrameQuery { after }): Query<FrameQuery>) -> Response {
     let mut frames = app.session.frames.subscribe();
     let other = frames.wait_for(|serial| *serial != after && *serial > 0);
-    match tokio::time::timeout(PATIENCE, other).await {
+    match tokio::time::timeout(FRAME_TIMEOUT, other).await {
         Ok(Ok(_)) => {}
         // There is no new frame, or the program ends.
         _ => return StatusCode::NO_CONTENT.into_response(),
@@ -182,11 +182,11 @@ struct TraceQuery {
 }
 
 async fn trace(State(app): State<App>, body: Bytes) -> Response {
-    let place: TraceQuery = match json(&body) {
-        Ok(place) => place,
+    let query: TraceQuery = match json(&body) {
+        Ok(query) => query,
         Err(response) => return *response,
     };
-    match app.session.trace(place.at) {
+    match app.session.trace(query.at) {
         Ok(Some((deflection, point))) => {
             axum::Json(serde_json::json!({ "deflection_rad": deflection, "filter_m": point }))
                 .into_response()

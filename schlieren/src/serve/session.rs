@@ -245,8 +245,8 @@ impl Session {
                 )));
             };
             previous = Some(TechniqueSettings::of(&before));
-            let again = shared.settings.get(custom.name()).cloned();
-            TechniqueSettings::restore(again, custom, &mut base);
+            let saved = shared.settings.get(custom.name()).cloned();
+            TechniqueSettings::restore(saved, custom, &mut base);
         }
         let mut patch = patch.clone();
         let step = patch.as_object_mut().and_then(|p| p.remove("step"));
@@ -394,7 +394,7 @@ impl Session {
 
         // The points on the filter.
         let traced_view = shared.frame.as_ref().and_then(|f| f.traced.clone());
-        let (places, dark) = match paint.on {
+        let (points_m, dark) = match paint.on {
             Canvas::Filter => (paint.points.clone(), 0),
             Canvas::Picture => {
                 let Some(view) = &traced_view else {
@@ -406,9 +406,9 @@ impl Session {
                 let on_filter = |p: &[f64; 2]| {
                     traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from))
                 };
-                let places: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
-                let dark = paint.points.len() - places.len();
-                (places, dark)
+                let points_m: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
+                let dark = paint.points.len() - points_m.len();
+                (points_m, dark)
             }
         };
 
@@ -416,7 +416,7 @@ impl Session {
         let half_m = half_side_m(&shared.scene, traced_view.as_ref().map(|t| &t.map));
         let (mut painting, same) = as_painting(&shared.scene, &cutoff, half_m, [0.0; 3])
             .map_err(|e| refused(chain(&e)))?;
-        let strokes = strokes(&places, paint);
+        let strokes = strokes(&points_m, paint);
         let added = strokes.len();
         painting.strokes.extend(strokes);
         if painting.strokes.len() > MAX_STROKES {
@@ -507,11 +507,11 @@ impl Session {
 /// Strokes through points on the filter. Points of a stroke on the image that are farther apart on
 /// the filter than the brush is wide are not joined, because across a shock there is nothing
 /// between them. Points that almost repeat the last one add nothing.
-fn strokes(places: &[[f64; 2]], paint: &Paint) -> Vec<Stroke> {
+fn strokes(points_m: &[[f64; 2]], paint: &Paint) -> Vec<Stroke> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let mut strokes: Vec<Stroke> = Vec::new();
     let mut last: Option<[f64; 2]> = None;
-    for &to_m in places {
+    for &to_m in points_m {
         let joined =
             |l: &[f64; 2]| paint.on == Canvas::Filter || distance(*l, to_m) <= 2.0 * paint.radius_m;
         if last.is_some_and(|l| distance(l, to_m) < 0.05 * paint.radius_m) {

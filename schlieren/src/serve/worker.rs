@@ -13,7 +13,7 @@
 //! accumulation would.
 
 use super::filter_plane::FilterPlane;
-use super::flow::{Flow, coarse};
+use super::flow::Flow;
 use super::frame::{DeflectionMap, Frame, FrameInfo};
 use super::session::{Save, SaveKind, Session, chain};
 use crate::output;
@@ -27,16 +27,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time that the first image after a change may take.
-const MOVING_SECS: f64 = 0.06;
+const INTERACTIVE_SECS: f64 = 0.06;
 /// Upper and lower limit of the longest side of that image.
-const MOVING_SIDES: [u32; 2] = [320, 64];
+const INTERACTIVE_SIDES: [u32; 2] = [320, 64];
 /// Photons per pixel of that image.
-const MOVING_SAMPLES: u32 = 4;
+const INTERACTIVE_SAMPLES: u32 = 4;
 /// Tolerance of the first two images. It gives straight rays through all but the strongest flows,
 /// without a visible difference.
 const DRAFT_TOLERANCE_RAD: f64 = 1e-2;
 /// Time without a change before the error is measured, because measuring cannot be stopped.
-const STILL: Duration = Duration::from_millis(500);
+const IDLE_TIME: Duration = Duration::from_millis(500);
 
 /// The parts of a scene that determine deflections.
 #[derive(Clone, PartialEq)]
@@ -88,14 +88,14 @@ pub(super) struct Worker {
     traced: Option<(Geometry, Arc<DeflectionMap>)>,
     errors: Option<(Geometry, Errors)>,
     serial: u64,
-    moving_side: u32,
+    interactive_side: u32,
 }
 
 struct Section {
     flow: FlowSpec,
     wavelengths_nm: Vec<f64>,
     full: TestSection,
-    thin: Option<TestSection>,
+    coarse: Option<TestSection>,
 }
 
 /// One step of the progressive refinement.
@@ -104,7 +104,7 @@ struct Level {
     scene: Scene,
     /// Whether it is rendered with a coarse tolerance.
     draft: bool,
-    thin: bool,
+    coarse: bool,
     stoppable: bool,
     samples: Option<u32>,
 }
@@ -120,7 +120,7 @@ impl Worker {
             traced: None,
             errors: None,
             serial: 0,
-            moving_side: MOVING_SIDES[0],
+            interactive_side: INTERACTIVE_SIDES[0],
         }
     }
 
@@ -188,11 +188,11 @@ impl Worker {
     fn draw_levels(&mut self, scene: &Scene, generation: u64) -> Result<bool, RenderError> {
         self.prepare(scene)?;
         let dots = self.with_section(false, |s| dots(scene, s))?;
-        let levels = levels(scene, self.moving_side).into_iter().map(|l| l.with_dots(&dots));
+        let levels = levels(scene, self.interactive_side).into_iter().map(|l| l.with_dots(&dots));
         let levels: Vec<Level> = levels.collect();
         let last = levels.len() - 1;
         let geometry = Geometry::of(scene);
-        let mut drawn = None;
+        let mut last_frame = None;
         for (i, level) in levels.into_iter().enumerate() {
             let start = Instant::now();
             let rendered = self.render(&level)?;
@@ -217,7 +217,7 @@ impl Worker {
                 &rendered,
                 &traced,
             )?;
-            drawn = Some((info, rendered, traced));
+            last_frame = Some((info, rendered, traced));
             if i < last && self.session.cancel.load(Ordering::Relaxed) {
                 return Ok(false);
             }
@@ -227,7 +227,7 @@ impl Worker {
         if self.errors_known(&geometry).is_some() {
             return Ok(true);
         }
-        let end = Instant::now() + STILL;
+        let end = Instant::now() + IDLE_TIME;
         while Instant::now() < end {
             if self.session.cancel.load(Ordering::Relaxed) {
                 return Ok(false);
@@ -235,7 +235,7 @@ impl Worker {
             std::thread::sleep(Duration::from_millis(10));
         }
         self.measure(scene, &geometry)?;
-        if let Some((info, rendered, traced)) = drawn {
+        if let Some((info, rendered, traced)) = last_frame {
             self.publish(scene, FrameInfo { finished: true, ..info }, &rendered, &traced)?;
         }
         Ok(true)
@@ -256,20 +256,21 @@ impl Worker {
             of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
             // Bodies stay in `self.solids` until nothing can fail any more.
             let mut full = self.flow.section(&of_series, None)?.with_caches();
-            let thin_fields: Option<Vec<_>> = full.fields.iter().map(coarse).collect();
-            let thin = match thin_fields {
+            let coarse_fields: Option<Vec<_>> =
+                full.fields.iter().map(super::flow::coarse).collect();
+            let coarse = match coarse_fields {
                 Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.with_caches()),
                 None => None,
             };
             full.solids = self.solids.take();
             let (flow, wavelengths_nm) = (scene.flow.clone(), scene.light.wavelengths_nm.clone());
-            self.section = Some(Section { flow, wavelengths_nm, full, thin });
+            self.section = Some(Section { flow, wavelengths_nm, full, coarse });
         }
         if let Some(s) = &mut self.section {
             let view = scene.view.direction.view(s.full.fields[0].centre_m())?;
             s.full.view = view;
-            if let Some(thin) = &mut s.thin {
-                thin.view = view;
+            if let Some(coarse) = &mut s.coarse {
+                coarse.view = view;
             }
         }
         Ok(())
@@ -298,15 +299,15 @@ impl Worker {
     /// coarse one borrows them during the call.
     fn with_section<T>(
         &mut self,
-        thin: bool,
+        coarse: bool,
         with: impl FnOnce(&TestSection) -> T,
     ) -> Result<T, RenderError> {
         let Some(s) = &mut self.section else { return Err(RenderError::Cancelled) };
-        match s.thin.as_mut().filter(|_| thin) {
-            Some(thin) => {
-                thin.solids = s.full.solids.take();
-                let result = catch_unwind(AssertUnwindSafe(|| with(thin)));
-                s.full.solids = thin.solids.take();
+        match s.coarse.as_mut().filter(|_| coarse) {
+            Some(coarse) => {
+                coarse.solids = s.full.solids.take();
+                let result = catch_unwind(AssertUnwindSafe(|| with(coarse)));
+                s.full.solids = coarse.solids.take();
                 result.map_err(|panic| std::panic::resume_unwind(panic))
             }
             None => Ok(with(&s.full)),
@@ -321,7 +322,7 @@ impl Worker {
             progress: &|_| {},
         };
         let layers = Layers { noise: true, ..Layers::NONE };
-        self.with_section(level.thin, |s| render::render(&level.scene, s, layers, &control))?
+        self.with_section(level.coarse, |s| render::render(&level.scene, s, layers, &control))?
     }
 
     /// Deflections of the scene itself where they are known, otherwise of this level.
@@ -336,7 +337,7 @@ impl Worker {
             return Ok(t.clone());
         }
         let scene = &level.scene;
-        let traced = self.with_section(level.thin, |section| {
+        let traced = self.with_section(level.coarse, |section| {
             let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, false)?;
             let framing = framing(scene, section);
             let blocked = |s: &crate::path::Start| {
@@ -410,10 +411,10 @@ impl Worker {
 
     /// Adapts the size of the first image to the speed of the machine.
     fn adapt(&mut self, elapsed_secs: f64, scene: &Scene) {
-        let factor = (MOVING_SECS / elapsed_secs.max(1e-4)).sqrt().clamp(0.5, 1.3);
-        let largest = scene.film.size[0].max(scene.film.size[1]).min(MOVING_SIDES[0]);
-        let side = f64::from(self.moving_side) * factor;
-        self.moving_side = (side as u32).min(largest).max(MOVING_SIDES[1]);
+        let factor = (INTERACTIVE_SECS / elapsed_secs.max(1e-4)).sqrt().clamp(0.5, 1.3);
+        let largest = scene.film.size[0].max(scene.film.size[1]).min(INTERACTIVE_SIDES[0]);
+        let side = f64::from(self.interactive_side) * factor;
+        self.interactive_side = (side as u32).min(largest).max(INTERACTIVE_SIDES[1]);
     }
 
     fn save(&mut self, save: Save) {
@@ -472,7 +473,7 @@ fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
 impl Level {
     fn with_dots(mut self, dots: &Option<TechniqueSpec>) -> Level {
         // The final image uses the scene unchanged.
-        if let Some(dots) = dots.as_ref().filter(|_| self.thin) {
+        if let Some(dots) = dots.as_ref().filter(|_| self.coarse) {
             self.scene.technique = dots.clone();
         }
         self
@@ -487,7 +488,7 @@ fn wanted_samples(scene: &Scene) -> Option<u32> {
 }
 
 /// The steps of the progressive refinement; the last is the scene itself.
-fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
+fn levels(scene: &Scene, interactive_side: u32) -> Vec<Level> {
     let wanted = wanted_samples(scene);
     let whole = |samples: Option<u32>| {
         let mut s = scene.clone();
@@ -496,15 +497,15 @@ fn levels(scene: &Scene, moving_side: u32) -> Vec<Level> {
         {
             s.sampling = Some(SamplingSpec::Photons { samples: n, jitter, seed, filter });
         }
-        Level { scene: s, draft: false, thin: false, stoppable: true, samples }
+        Level { scene: s, draft: false, coarse: false, stoppable: true, samples }
     };
-    let mut draft = whole(wanted.map(|n| n.min(MOVING_SAMPLES)));
+    let mut draft = whole(wanted.map(|n| n.min(INTERACTIVE_SAMPLES)));
     draft.scene.march.tolerance_rad = scene.march.tolerance_rad.max(DRAFT_TOLERANCE_RAD);
     draft.draft = true;
-    let mut moving = Level { thin: true, stoppable: false, ..draft.clone() };
-    shrink(&mut moving.scene, moving_side);
-    let mut levels = vec![moving, draft];
-    let mut samples = MOVING_SAMPLES;
+    let mut interactive = Level { coarse: true, stoppable: false, ..draft.clone() };
+    shrink(&mut interactive.scene, interactive_side);
+    let mut levels = vec![interactive, draft];
+    let mut samples = INTERACTIVE_SAMPLES;
     while wanted.is_some_and(|w| samples < w) {
         levels.push(whole(Some(samples)));
         samples *= 4;
@@ -546,7 +547,7 @@ mod tests {
         assert_eq!(samples, [4, 4, 4, 16, 64, 100]);
         assert!(levels[0].draft && levels[1].draft && !levels[2].draft);
         assert_eq!(levels[0].scene.film.size, [128, 64]);
-        assert!(levels[0].thin && !levels[0].stoppable);
+        assert!(levels[0].coarse && !levels[0].stoppable);
         assert_eq!(levels.last().unwrap().scene, s);
         for l in &levels {
             l.scene.check().unwrap();
