@@ -156,7 +156,7 @@ mod tests {
     /// A camera on the film's side looks along -forward. An object on its right must be on the
     /// image's right.
     #[test]
-    fn pictures_are_not_mirrored_seen_from_the_film() {
+    fn images_are_not_mirrored_seen_from_the_film() {
         for axis in [Axis::X, Axis::Y, Axis::Z] {
             let v = View::along(axis, DVec3::ZERO);
             assert_frame(&v);

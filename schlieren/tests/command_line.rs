@@ -224,7 +224,7 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
 }
 
 #[test]
-fn a_printed_scene_draws_the_same_picture() {
+fn a_printed_scene_renders_the_same_image() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));
@@ -256,7 +256,7 @@ fn a_printed_scene_draws_the_same_picture() {
 }
 
 #[test]
-fn sweeps_number_their_pictures_and_probes_print_numbers() {
+fn sweeps_number_their_images_and_probes_print_numbers() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));
@@ -428,7 +428,7 @@ fn transfer_functions_from_options_and_from_a_scene_are_the_same() {
 }
 
 #[test]
-fn smoke_glow_and_rotation_reach_pictures_layers_probes_and_sweeps() {
+fn smoke_glow_and_rotation_reach_images_layers_probes_and_sweeps() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
     flow(&dir.path().join("flow.vti"));

@@ -208,7 +208,7 @@ fn views_along_all_axes_agree() {
 /// Denser gas on the right deflects light to the right in the image, and denser gas above deflects
 /// it upwards.
 #[test]
-fn light_bends_towards_dense_gas_in_the_picture() {
+fn light_bends_towards_dense_gas_in_the_image() {
     for axis in [Axis::X, Axis::Y, Axis::Z] {
         let view = View::along(axis, DVec3::ZERO);
         for (towards, c) in [(view.right, 0), (view.up, 1)] {

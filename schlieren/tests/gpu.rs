@@ -340,7 +340,7 @@ fn several_batches_have_the_bits_of_one() {
 
 /// More rays than one dispatch takes, as in the program, against the CPU.
 #[test]
-fn pictures_larger_than_a_dispatch_agree_with_the_cpu() {
+fn images_larger_than_a_dispatch_agree_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let field = cube(9, lopsided);
     let starts = grid(515, 0.9);
@@ -385,7 +385,7 @@ fn batches_of_several_threads_do_not_mix() {
 }
 
 /// Renders a scene of `field` on a device.
-fn drawn(field: &Field, device: &str, rest: &str) -> Result<RenderOutput, Box<RenderError>> {
+fn rendered(field: &Field, device: &str, rest: &str) -> Result<RenderOutput, Box<RenderError>> {
     // The film of the shadowgraph is far behind the flow, because its contrast grows with the
     // distance.
     let focus = if rest.contains("shadowgraph") { "focus_m = 30.0\n" } else { "" };
@@ -411,7 +411,7 @@ fn films_agree_with_the_cpu() {
         "method = \"verlet\"\n[technique]\nkind = \"interferogram\"",
         "method = \"verlet\"\n[technique]\nkind = \"bos\"",
     ] {
-        let [a, b] = ["gpu", "cpu"].map(|d| drawn(&field, d, rest).unwrap());
+        let [a, b] = ["gpu", "cpu"].map(|d| rendered(&field, d, rest).unwrap());
         let sum: f64 =
             a.pixels.iter().zip(&b.pixels).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum();
         let rms = (sum / a.pixels.len() as f64).sqrt();
@@ -438,10 +438,10 @@ fn marches_without_a_kernel_are_refused_by_name_or_left_to_the_cpu() {
     for (rest, word) in
         [("method = \"pefrl\"", "pefrl"), ("interpolant = \"trilinear-gradient\"", "gradient")]
     {
-        let e = drawn(&field, "gpu", rest).unwrap_err();
+        let e = rendered(&field, "gpu", rest).unwrap_err();
         assert!(matches!(*e, RenderError::Gpu(GpuError::Unsupported { .. })), "{e:?}");
         assert!(e.to_string().contains(word), "{e}");
-        let r = drawn(&field, "auto", rest).unwrap();
+        let r = rendered(&field, "auto", rest).unwrap();
         assert!(
             r.report.warnings.iter().any(|w| w.contains("on the CPU") && w.contains(word)),
             "{:?}",
@@ -450,8 +450,8 @@ fn marches_without_a_kernel_are_refused_by_name_or_left_to_the_cpu() {
     }
     // With a large tolerance the plan would choose line of sight; when the GPU is requested, the
     // rays are marched.
-    let r = drawn(&field, "gpu", "tolerance_rad = 1e-3").unwrap();
+    let r = rendered(&field, "gpu", "tolerance_rad = 1e-3").unwrap();
     assert!(r.report.march.starts_with("verlet"), "{}", r.report.march);
-    let r = drawn(&field, "auto", "tolerance_rad = 1e-3").unwrap();
+    let r = rendered(&field, "auto", "tolerance_rad = 1e-3").unwrap();
     assert!(r.report.march.starts_with("line-of-sight"), "{}", r.report.march);
 }

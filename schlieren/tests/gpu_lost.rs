@@ -32,7 +32,7 @@ fn gpu() -> Option<Arc<Gpu>> {
 }
 
 /// Renders a scene of `field` on the GPU.
-fn drawn(field: &Field) -> RenderOutput {
+fn rendered(field: &Field) -> RenderOutput {
     let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice \
                 = \"gpu\"\nmethod = \"verlet\"";
     let scene = Scene::from_toml(toml).unwrap();
@@ -42,7 +42,7 @@ fn drawn(field: &Field) -> RenderOutput {
 
 /// The device is lost as by a driver's reset: between two traces, and while other threads trace.
 #[test]
-fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
+fn a_lost_device_is_reopened_and_no_ray_is_left_to_the_cpu() {
     let Some(_) = gpu() else { return };
     let field = cube(17, lopsided);
     let starts = grid(32, 0.9);
@@ -63,10 +63,12 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
                 && own.failure().is_some()
                 && paths.gpu().failure().is_none()
         );
-        let told = paths.device_warning().unwrap();
+        let warning = paths.device_warning().unwrap();
         assert!(
-            told.contains("lost") && told.contains("opened again") && !told.contains("CPU"),
-            "{told}"
+            warning.contains("lost")
+                && warning.contains("opened again")
+                && !warning.contains("CPU"),
+            "{warning}"
         );
 
         // While four threads trace with it.
@@ -94,10 +96,10 @@ fn a_lost_device_is_opened_again_and_no_ray_is_left_to_the_cpu() {
 fn the_program_s_gpu_comes_back_after_it_was_lost() {
     let Some(before) = gpu() else { return };
     let field = cube(17, lopsided);
-    let expected = drawn(&field);
+    let expected = rendered(&field);
     before.destroy();
     for _ in 0..2 {
-        let r = drawn(&field);
+        let r = rendered(&field);
         assert!(r.pixels == expected.pixels, "another picture");
         assert!(r.report.march.contains(" on "), "{}", r.report.march);
         assert!(
@@ -132,6 +134,9 @@ fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
         let c = paths.counters();
         assert_eq!(c.rays_on_cpu > 0, lost > 3, "lost {lost} times: {c:?}");
     }
-    let told = paths.device_warning().unwrap();
-    assert!(told.contains("opened again 3 times") && told.contains("on the CPU"), "{told}");
+    let warning = paths.device_warning().unwrap();
+    assert!(
+        warning.contains("opened again 3 times") && warning.contains("on the CPU"),
+        "{warning}"
+    );
 }

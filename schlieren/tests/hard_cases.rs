@@ -188,7 +188,7 @@ fn a_large_constant_does_not_drown_a_small_signal() {
 }
 
 #[test]
-fn nan_cells_are_dark_or_continued_as_told() {
+fn nan_cells_are_dark_or_continued_as_requested() {
     let n = 33;
     let mut eps: Vec<f32> = cube(n, |p| 1e-5 * p.x).eps().to_vec();
     // A NaN block in the middle.

@@ -200,7 +200,7 @@ fn emission_is_dimmed_by_what_lies_between_it_and_the_eye() {
 }
 
 #[test]
-fn walks_end_at_bodies_and_where_they_are_told() {
+fn integrals_end_at_bodies_and_where_requested() {
     let (n, h) = (21, 0.01);
     let dims = [n; 3];
     let mut nodes = vec![Node::Gas; n * n * n];

@@ -11,14 +11,14 @@ use schlieren::render::TestSection;
 use schlieren::scene::Scene;
 use schlieren::view::{Axis, View};
 
-fn ask(tolerance_rad: f64) -> Request {
+fn request(tolerance_rad: f64) -> Request {
     Request { tolerance_rad, ..Request::default() }
 }
 
 #[test]
 fn weaker_tolerances_are_cheaper() {
     let field = blob(64, 1e-4, 0.12);
-    let plans = [1e-2, 1e-4, 1e-7, 0.0].map(|t| Plan::new(&field, ask(t)));
+    let plans = [1e-2, 1e-4, 1e-7, 0.0].map(|t| Plan::new(&field, request(t)));
     assert_eq!(plans[0].mode, Mode::LineOfSight);
     assert_eq!(plans[2].mode, Mode::Paraxial);
     for p in plans.windows(2) {
@@ -29,7 +29,7 @@ fn weaker_tolerances_are_cheaper() {
 
 #[test]
 fn strong_index_is_traced_in_full() {
-    assert_eq!(Plan::new(&cube(16, |p| 0.33 * (1.0 - p.length())), ask(1e-3)).mode, Mode::Full);
+    assert_eq!(Plan::new(&cube(16, |p| 0.33 * (1.0 - p.length())), request(1e-3)).mode, Mode::Full);
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn what_is_forced_is_kept() {
             mode: Some(mode),
             interpolant: Some(Interpolant::Trilinear),
             step_voxels: Some(0.7),
-            ..ask(1e-9)
+            ..request(1e-9)
         };
         let p = Plan::new(&field, request);
         assert_eq!((p.mode, p.interpolant, p.step_voxels), (mode, Interpolant::Trilinear, 0.7));
@@ -58,8 +58,10 @@ fn errors_are_within_bounds_and_bounds_within_tolerance_where_possible() {
     for field in &fields {
         for tolerance in [1e-3, 1e-5, 1e-6, 1e-7, 1e-9] {
             for view in [View::along(Axis::X, DVec3::ZERO), oblique()] {
-                let plan =
-                    Plan::new(field, Request { direction: Some(view.forward), ..ask(tolerance) });
+                let plan = Plan::new(
+                    field,
+                    Request { direction: Some(view.forward), ..request(tolerance) },
+                );
                 let b = plan.bounds;
                 let achieved = plan.measure(field, view, 200);
                 // Arithmetic in f32 adds 1e-6 of the deflection.
@@ -203,7 +205,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     interpolant: Some(Interpolant::BSpline),
                     step_voxels: Some(0.25),
                     quantities: PathQuantities { opd },
-                    ..ask(0.0)
+                    ..request(0.0)
                 };
                 let of_lattice =
                     errors(&*Plan::new(&field, finest).paths(&field, view), &starts, &truths);
@@ -261,7 +263,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
 #[test]
 fn a_saddle_is_not_free_of_curvature() {
     let field = cube(NODES, FLOWS[0].1);
-    let plan = Plan::new(&field, Request { direction: Some(DVec3::Z), ..ask(1e-9) });
+    let plan = Plan::new(&field, Request { direction: Some(DVec3::Z), ..request(1e-9) });
     assert_eq!(plan.mode, Mode::Paraxial, "{plan:?}");
     assert!(
         (plan.derivative_bounds.second / (1e-3 * 2f64.sqrt()) - 1.0).abs() < 1e-3,
@@ -274,8 +276,8 @@ fn a_saddle_is_not_free_of_curvature() {
 #[test]
 fn coarse_lattices_do_not_ask_for_short_steps() {
     let field = blob(16, 1e-3, 0.08);
-    let plan = Plan::new(&field, ask(1e-9));
+    let plan = Plan::new(&field, request(1e-9));
     assert_eq!(plan.mode, Mode::Paraxial);
     assert!(plan.bounds.interpolation_rad > 1e-9 && plan.step_voxels >= 0.5, "{plan:?}");
-    assert!(Plan::new(&field, ask(0.0)).step_voxels < plan.step_voxels);
+    assert!(Plan::new(&field, request(0.0)).step_voxels < plan.step_voxels);
 }

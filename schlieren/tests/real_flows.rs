@@ -40,7 +40,11 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
     );
     // At the fin the stretched mesh is finer than any lattice over the whole mesh, but the error is
     // still small.
-    assert!(r.back.compared > 20_000 && r.back.rms < 0.03 * r.back.range, "{r:?}");
+    assert!(
+        r.resampling_error.compared > 20_000
+            && r.resampling_error.rms < 0.03 * r.resampling_error.range,
+        "{r:?}"
+    );
     let [low, high] = whole.report.density_range_kg_m3.unwrap();
     assert!(
         (low - 1.2 * 0.1926).abs() < 0.01 && (high - 1.2 * 4.9775).abs() < 0.01,
@@ -55,8 +59,8 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
         ..Options::new(medium)
     };
     let LoadedField { field, report } = load(&path, &options).unwrap();
-    let back = report.resampling.unwrap().back;
-    assert!(back.rms < 0.006 * back.range, "{back:?}");
+    let error = report.resampling.unwrap().resampling_error;
+    assert!(error.rms < 0.006 * error.range, "{error:?}");
     let nodes = field.nodes().unwrap();
     let [nx, ny, nz] = field.dims();
     let h = field.spacing_m()[0];
@@ -88,7 +92,7 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
 /// stream has 0.1 kg/m³, as in a tunnel at Mach 3 that draws air from the room. The image reaches
 /// from grey to nearly white without saturation.
 #[test]
-fn blunt_fin_stand_off_is_measured_in_our_schlieren_picture() {
+fn blunt_fin_stand_off_is_measured_in_our_schlieren_image() {
     let Some(path) = flow("bluntfinxyz.bin") else { return };
     let (stream, radius) = (0.1, 0.5);
     let options = Options {
@@ -161,7 +165,9 @@ fn combustor_is_read_and_resampled() {
     // Two of its cells are really folded.
     assert_eq!((r.cells, r.folded_cells), (56 * 32 * 24, 2));
     assert!(
-        r.inside > 100_000 && r.back.compared > 20_000 && r.back.rms < 0.02 * r.back.range,
+        r.inside > 100_000
+            && r.resampling_error.compared > 20_000
+            && r.resampling_error.rms < 0.02 * r.resampling_error.range,
         "{r:?}"
     );
     let [low, high] = report.density_range_kg_m3.unwrap();
@@ -185,7 +191,7 @@ fn ladenburgs_jet_is_revolved() {
         "{:?}",
         report.warnings
     );
-    assert!(r.back.rms < 0.02 * r.back.range, "{r:?}");
+    assert!(r.resampling_error.rms < 0.02 * r.resampling_error.range, "{r:?}");
     // The field is round: eps is the same at points a quarter turn apart around the axis.
     let [nx, ny, nz] = field.dims();
     assert_eq!(ny, nz);

@@ -5,7 +5,7 @@ mod serving;
 
 use datasets::image_io::{read_exr, read_png};
 use serde_json::json;
-use serving::{Served, changed};
+use serving::{Server, changed};
 use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ const SMALL: [&str; 4] = ["--size", "96x48", "--samples", "16"];
 
 #[test]
 fn the_page_and_its_parts_need_nothing_from_elsewhere() {
-    let s = Served::start(&SMALL);
+    let s = Server::start(&SMALL);
     let page = s.get("");
     assert_eq!(page.status, 200);
     assert!(page.head.contains("content-security-policy: default-src 'none'"), "{}", page.head);
@@ -41,8 +41,8 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
 }
 
 #[test]
-fn without_the_token_nothing_is_told() {
-    let s = Served::start(&SMALL);
+fn without_the_token_nothing_is_reported() {
+    let s = Server::start(&SMALL);
     let wrong = format!("/{}/", "0".repeat(32));
     for path in [
         "/",
@@ -67,8 +67,8 @@ fn without_the_token_nothing_is_told() {
 }
 
 #[test]
-fn the_finished_picture_is_that_of_render() {
-    let s = Served::start(&SMALL);
+fn the_finished_image_is_that_of_render() {
+    let s = Server::start(&SMALL);
     let shown = s.finished();
     assert_eq!((shown.info["width"].as_u64(), shown.info["height"].as_u64()), (Some(96), Some(48)));
     assert_eq!(shown.info["samples"], 16);
@@ -116,7 +116,7 @@ fn srgb(v: f32) -> u8 {
 
 #[test]
 fn every_technique_and_cutoff_draws() {
-    let s = Served::start(&SMALL);
+    let s = Server::start(&SMALL);
     let mut last = s.finished().rgb;
     for technique in ["shadowgraph", "interferogram", "bos", "volume", "slice", "schlieren"] {
         s.change(&json!({"technique": {"kind": technique}}));
@@ -140,8 +140,8 @@ fn every_technique_and_cutoff_draws() {
 }
 
 #[test]
-fn painting_changes_the_picture_where_its_light_is() {
-    let s = Served::start(&SMALL);
+fn painting_changes_the_image_where_its_light_is() {
+    let s = Server::start(&SMALL);
     // With a clear filter and a small source, the image is white until something is painted.
     s.change(&json!({
         "light": {"source": {"kind": "circle", "diameter_m": 5e-5}},
@@ -153,12 +153,12 @@ fn painting_changes_the_picture_where_its_light_is() {
 
     // Light left of the blob's middle crosses the filter at a point of its own, away from the axis.
     let at = [0.60, 0.40];
-    let traced = s.ask("POST", "trace", &json!({ "at": at }).to_string()).json();
+    let traced = s.request("POST", "trace", &json!({ "at": at }).to_string()).json();
     let place = [0, 1].map(|i| traced["filter_m"][i].as_f64().unwrap());
     assert!(place[0].hypot(place[1]) > 5e-5, "{traced}");
     let red = |on: &str, points: serde_json::Value| {
         let body = json!({"on": on, "points": points, "radius_m": 6e-5, "rgb": [1.0, 0.0, 0.0]});
-        let answer = s.ask("POST", "paint", &body.to_string());
+        let answer = s.request("POST", "paint", &body.to_string());
         assert_eq!(answer.status, 200, "{}", answer.text());
         s.finished()
     };
@@ -186,7 +186,7 @@ fn painting_changes_the_picture_where_its_light_is() {
 
 #[test]
 fn curves_make_another_index_and_bodies_stay_shut() {
-    let s = Served::start(&SMALL);
+    let s = Server::start(&SMALL);
     let state = s.get("state").json();
     let names: Vec<&str> =
         state["arrays"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
@@ -202,7 +202,7 @@ fn curves_make_another_index_and_bodies_stay_shut() {
 
 #[test]
 fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
-    let s = Served::start_series(&SMALL);
+    let s = Server::start_series(&SMALL);
     let state = s.get("state").json();
     assert_eq!((&state["times"], &state["step"]), (&json!([0.0, 0.5, 1.0, 1.5]), &json!(0)));
     let first = s.finished();
@@ -251,19 +251,19 @@ fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     assert_eq!(s.finished().rgb, first.rgb);
 
     for wrong in [json!(4), json!(-1), json!(1.5), json!("1"), json!(null), json!({"a": 1})] {
-        let answer = s.ask("POST", "scene", &json!({ "step": wrong }).to_string());
+        let answer = s.request("POST", "scene", &json!({ "step": wrong }).to_string());
         assert_eq!(answer.status, 422, "{wrong}: {}", answer.text());
         assert!(answer.json()["error"].as_str().unwrap().contains("0 to 3"), "{}", answer.text());
     }
-    let single = Served::start(&SMALL);
+    let single = Server::start(&SMALL);
     assert_eq!(single.get("state").json()["times"], json!([]));
-    let answer = single.ask("POST", "scene", "{\"step\": 0}");
+    let answer = single.request("POST", "scene", "{\"step\": 0}");
     assert!(answer.status == 422 && answer.text().contains(".pvd"), "{}", answer.text());
 }
 
 #[test]
 fn bad_requests_get_a_reason_and_harm_nothing() {
-    let s = Served::start(&SMALL);
+    let s = Server::start(&SMALL);
     for (method, path, body, status) in [
         ("POST", "scene", "{", 400),
         ("POST", "scene", "{\"film\": {\"size\": [4000000000, 4000000000]}}", 422),
@@ -278,16 +278,16 @@ fn bad_requests_get_a_reason_and_harm_nothing() {
         ("GET", "../../etc/passwd", "", 404),
         ("DELETE", "scene", "", 405),
     ] {
-        let answer = s.ask(method, path, body);
+        let answer = s.request(method, path, body);
         assert_eq!(answer.status, status, "{method} {path} {body}: {}", answer.text());
         if status == 422 {
             assert!(answer.json()["error"].as_str().unwrap().len() > 10);
         }
     }
     let deep = "[".repeat(100_000);
-    assert_eq!(s.ask("POST", "scene", &deep).status, 400);
+    assert_eq!(s.request("POST", "scene", &deep).status, 400);
     let huge = " ".repeat(3 << 20);
-    assert_eq!(s.ask("POST", "scene", &huge).status, 413);
+    assert_eq!(s.request("POST", "scene", &huge).status, 413);
     // Bytes that are not HTTP, a header without end, and a wrong length.
     for bytes in [
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03".to_vec(),
@@ -311,7 +311,7 @@ fn bad_requests_get_a_reason_and_harm_nothing() {
 
 #[test]
 fn dropped_and_idle_connections_are_left_behind() {
-    let s = Served::start(&SMALL);
+    let s = Server::start(&SMALL);
     let _idle: Vec<_> = (0..50).map(|_| s.connect()).collect();
     for _ in 0..20 {
         let mut half = s.connect();
@@ -354,7 +354,7 @@ fn dropped_and_idle_connections_are_left_behind() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
-    let mut s = Served::start(&SMALL);
+    let mut s = Server::start(&SMALL);
     s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
     let mut wait = s.connect();
     wait.write_all(
@@ -375,7 +375,7 @@ fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
 
 #[test]
 fn a_taken_port_and_a_wrong_flow_are_errors_of_the_command_line() {
-    let s = Served::start(&SMALL);
+    let s = Server::start(&SMALL);
     let run = |args: &[&str]| {
         let out = std::process::Command::new(env!("CARGO_BIN_EXE_schlieren"))
             .args(args)

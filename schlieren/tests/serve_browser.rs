@@ -11,7 +11,7 @@ mod serving;
 
 use browser::{Browser, chromium};
 use datasets::image_io::{LayeredImage, read_png};
-use serving::Served;
+use serving::Server;
 use std::io::Write as _;
 
 /// A screenshot of the window.
@@ -59,7 +59,7 @@ fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
 }
 
 /// Waits until the page shows the final image of the program's current scene.
-fn settled(b: &mut Browser) {
+fn wait_until_final(b: &mut Browser) {
     b.wait_for(
         "fetch('state').then(r => r.json()).then(s => document.body.dataset.finished === 'true' && \
          Number(document.body.dataset.generation) === s.generation)",
@@ -84,7 +84,7 @@ fn looking_orbiting_painting_and_switching() {
             return;
         }
     };
-    let s = Served::start_series(&[
+    let s = Server::start_series(&[
         "--size",
         "384x192",
         "--samples",
@@ -118,13 +118,13 @@ fn looking_orbiting_painting_and_switching() {
         inside(picture, 0.55, 0.55),
         inside(picture, 0.6, 0.6),
     ]);
-    settled(&mut b);
+    wait_until_final(&mut b);
     let orbited = look(&mut b, "orbited");
     let direction = s.get("state").json()["scene"]["view"]["direction"].to_string();
     assert!(direction.contains(','), "{direction}");
     assert!(differs(&first, &orbited, picture, [0.2, 0.2, 0.8, 0.8]) > 0.03);
     b.evaluate("document.querySelector('[data-view=z]').click()");
-    settled(&mut b);
+    wait_until_final(&mut b);
     let back = look(&mut b, "back");
     assert!(
         differs(&first, &back, picture, [0.0, 0.0, 1.0, 0.8]) < 1e-3,
@@ -134,7 +134,7 @@ fn looking_orbiting_painting_and_switching() {
     // Paint on the filter: a red dab in the middle colours undisturbed light in the image, and the
     // middle of the filter.
     b.evaluate("document.getElementById('clear-white').click()");
-    settled(&mut b);
+    wait_until_final(&mut b);
     let clear = look(&mut b, "clear");
     b.drag(&[
         inside(filter, 0.5, 0.4),
@@ -145,7 +145,7 @@ fn looking_orbiting_painting_and_switching() {
     b.wait_for(
         "fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)",
     );
-    settled(&mut b);
+    wait_until_final(&mut b);
     let painted = look(&mut b, "painted-filter");
     let corner = [0.02, 0.05, 0.2, 0.4];
     assert!(differs(&clear, &painted, picture, corner) > 0.9, "undisturbed light is painted on");
@@ -157,7 +157,7 @@ fn looking_orbiting_painting_and_switching() {
 
     // Paint on the image: the pixels under the brush change.
     b.evaluate("document.getElementById('clear-white').click()");
-    settled(&mut b);
+    wait_until_final(&mut b);
     b.evaluate(
         "document.querySelector('input[value=paint]').click(); const r = \
                 document.getElementById('radius'); r.value = 0.05; r.dispatchEvent(new \
@@ -167,7 +167,7 @@ fn looking_orbiting_painting_and_switching() {
     b.wait_for(
         "fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)",
     );
-    settled(&mut b);
+    wait_until_final(&mut b);
     let on_picture = look(&mut b, "painted-picture");
     assert!(
         differs(&clear, &on_picture, picture, [0.59, 0.38, 0.61, 0.42]) > 0.8,
@@ -180,7 +180,7 @@ fn looking_orbiting_painting_and_switching() {
                 'interferogram'; t.dispatchEvent(new Event('change'))",
     );
     b.wait_for("document.body.innerText.includes('fringe spacing')");
-    settled(&mut b);
+    wait_until_final(&mut b);
     let switched = look(&mut b, "interferogram");
     assert!(differs(&on_picture, &switched, picture, [0.3, 0.1, 0.9, 0.9]) > 0.2);
     assert!(
@@ -194,7 +194,7 @@ fn looking_orbiting_painting_and_switching() {
                 step.dispatchEvent(new Event('input'))",
     );
     b.wait_for("document.getElementById('when').innerText.includes('4 of 4')");
-    settled(&mut b);
+    wait_until_final(&mut b);
     let later = look(&mut b, "later");
     assert!(differs(&switched, &later, picture, [0.1, 0.1, 0.9, 0.9]) > 0.1);
 
@@ -204,7 +204,7 @@ fn looking_orbiting_painting_and_switching() {
                 w.dispatchEvent(new Event('change'))",
     );
     b.wait_for("document.getElementById('message').innerText.includes('wavelengths_nm')");
-    settled(&mut b);
-    let refused: Vec<&String> = b.complaints.iter().filter(|c| !c.contains("422")).collect();
+    wait_until_final(&mut b);
+    let refused: Vec<&String> = b.page_errors.iter().filter(|c| !c.contains("422")).collect();
     assert!(refused.is_empty(), "{refused:?}");
 }

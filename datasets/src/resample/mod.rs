@@ -246,7 +246,7 @@ const MAX_SAMPLES: usize = 8;
 /// let fine = resample(&mesh, Samples::Points(&values), &lattice, &Options::default())?;
 /// let p = lattice.node(3, 5, 7);
 /// assert!((fine.values[3 + 8 * (5 + 8 * 7)] as f64 - (p.x + 2.0 * p.y)).abs() < 1e-6);
-/// assert!(fine.report.back.max < 1e-6);
+/// assert!(fine.report.resampling_error.max < 1e-6);
 /// # Ok::<(), datasets::resample::ResampleError>(())
 /// ```
 pub fn resample(
@@ -283,8 +283,8 @@ pub fn resample(
     };
     let (values, marks, counts) =
         rasterize::rasterize(mesh, points, cells, lattice, options.samples_per_axis);
-    let back = report::resampling_error(mesh, samples, lattice, &values);
-    let report = Report::new(mesh, &marks, counts, back);
+    let resampling_error = report::resampling_error(mesh, samples, lattice, &values);
+    let report = Report::new(mesh, &marks, counts, resampling_error);
     Ok(ResampledField { lattice: *lattice, values, marks, report })
 }
 

@@ -51,11 +51,16 @@ pub struct Report {
     /// Number of higher-order cells treated as linear cells.
     pub straightened_cells: usize,
     /// Error of sampling the lattice back at the mesh.
-    pub back: ResamplingError,
+    pub resampling_error: ResamplingError,
 }
 
 impl Report {
-    pub(super) fn new(mesh: &Mesh, marks: &[Mark], counts: Counts, back: ResamplingError) -> Self {
+    pub(super) fn new(
+        mesh: &Mesh,
+        marks: &[Mark],
+        counts: Counts,
+        resampling_error: ResamplingError,
+    ) -> Self {
         let of = |m: Mark| marks.par_iter().filter(|x| **x == m).count();
         Report {
             inside: of(Mark::Inside),
@@ -68,7 +73,7 @@ impl Report {
             folded_cells: counts.folded,
             left_out_cells: mesh.left_out() + counts.non_finite,
             straightened_cells: mesh.higher_order(),
-            back,
+            resampling_error,
         }
     }
 

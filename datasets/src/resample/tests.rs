@@ -69,7 +69,11 @@ fn curvilinear_grids_give_linear_fields_exactly_and_a_mask() {
     }
     assert_eq!(r.report.inside + r.report.outside, lattice.len());
     assert_eq!((r.report.folded_cells, r.report.missed_cells, r.report.left_out_cells), (0, 0, 0));
-    assert!(r.report.back.compared > 0 && r.report.back.max < 1e-6, "{:?}", r.report.back);
+    assert!(
+        r.report.resampling_error.compared > 0 && r.report.resampling_error.max < 1e-6,
+        "{:?}",
+        r.report.resampling_error
+    );
 }
 
 #[test]
@@ -82,7 +86,7 @@ fn the_error_falls_with_the_square_of_the_spacing() {
         resample(&mesh, Samples::Points(&values), &lattice, &Options::default())
             .unwrap()
             .report
-            .back
+            .resampling_error
             .rms
     };
     let (coarse, fine) = (rms(11), rms(21));
@@ -256,11 +260,12 @@ fn cell_values_are_averaged_and_the_smoothing_shows_in_the_report() {
     let r = resample(&mesh, Samples::Cells(&of_cells), &lattice, &Options::default()).unwrap();
     // Cells next to the step at x = 4 have their centres half a cell from the value 1/2 there.
     assert!(
-        (r.report.back.max - 0.25).abs() < 1e-6 && r.report.back.range == 1.0,
+        (r.report.resampling_error.max - 0.25).abs() < 1e-6
+            && r.report.resampling_error.range == 1.0,
         "{:?}",
-        r.report.back
+        r.report.resampling_error
     );
-    assert_eq!((r.report.back.compared, r.report.inside), (512, 17 * 17 * 17));
+    assert_eq!((r.report.resampling_error.compared, r.report.inside), (512, 17 * 17 * 17));
     assert!((r.values[8] - 0.5).abs() < 1e-7 && r.values[0] == 0.0 && r.values[16] == 1.0);
 }
 
@@ -408,7 +413,11 @@ fn revolved_planes_are_round() {
             _ => assert!(radius > 0.999, "{m:?} at {p}"),
         }
     }
-    assert!(r.report.back.compared > 300 && r.report.back.rms < 5e-3, "{:?}", r.report.back);
+    assert!(
+        r.report.resampling_error.compared > 300 && r.report.resampling_error.rms < 5e-3,
+        "{:?}",
+        r.report.resampling_error
+    );
     // Radii below zero are invalid.
     let below =
         Mesh::new(&Dataset::ImageData(ImageData::new([3; 3], DVec3::splat(-1.0), DVec3::ONE)))

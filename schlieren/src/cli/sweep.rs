@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_numbered() {
+    fn images_are_numbered() {
         assert_eq!(number("a/out.png".as_ref(), 12), PathBuf::from("a/out-0012.png"));
     }
 }

@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_pictures_top_is_up_and_its_right_is_right() {
+    fn the_images_top_is_up_and_its_right_is_right() {
         let f = FilterImage::new(
             2,
             2,

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn no_photons_make_a_black_picture() {
+    fn no_photons_make_a_black_image() {
         assert!(cone::<1>(&[], &FRAMING, 10, 1.0).iter().all(|p| p[0] == 0.0));
     }
 }

@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn radius_zero_is_the_picture_and_one_is_three_by_three() {
+    fn radius_zero_is_the_image_and_one_is_three_by_three() {
         let pixels: Vec<[f32; 1]> = (0..25u16).map(|i| [f32::from(i * i)]).collect();
         assert_eq!(mean(&pixels, 5, 0.0), pixels);
         let m = mean(&pixels, 5, 1.0)[12][0];

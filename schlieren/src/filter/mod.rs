@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn even_pictures_stay_even_and_energy_stays() {
+    fn uniform_images_stay_uniform_and_energy_stays() {
         let even = vec![[0.25f32, 2.0]; 12 * 9];
         let mut spot = vec![[0.0f32; 1]; 31 * 31];
         spot[15 * 31 + 15] = [1.0];

@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_failing_device_leaves_is_traced_on_the_cpu_and_the_first_cause_is_told() {
+    fn what_a_failing_device_leaves_is_traced_on_the_cpu_and_the_first_cause_is_reported() {
         let starts: Vec<Start> =
             (0..95).map(|i| Start { position_m: [i as f32, -1.0], ..Start::default() }).collect();
         // There are ten batches, the last of which is short.
@@ -392,7 +392,7 @@ mod tests {
     /// tile. That tile's batch would fail as well and would wait for the spline that its own worker
     /// is building.
     #[test]
-    fn a_device_that_fails_inside_rayon_jobs_hangs_no_picture() {
+    fn a_device_that_fails_inside_rayon_jobs_hangs_no_image() {
         let starts: Vec<Start> = (0..49 * 64)
             .map(|i| Start {
                 position_m: [i % 64, i / 64].map(|k| (k as f32 - 31.4) * 0.01),

@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn weighting_by_volume_as_in_the_thesis_would_be_wrong_by_twelve_per_cent() {
+    fn weighting_by_volume_as_in_the_dissertation_would_be_wrong_by_twelve_per_cent() {
         let m = helium_in_air();
         let y = mass_from_mole_fractions(&[(0.1, "He".parse().unwrap()), (0.9, Gas::AIR)]).unwrap();
         let b = m.blend(&[y[0]]);

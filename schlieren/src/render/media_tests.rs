@@ -29,7 +29,7 @@ fn section(s: &Scene, values: &[(Property, f64)], solids: Option<Solids>) -> Tes
 }
 
 /// An image through uniform media; the scene names an array for each given property.
-fn drawn(rest: &str, media: &str, values: &[(Property, f64)], layers: Layers) -> RenderOutput {
+fn rendered(rest: &str, media: &str, values: &[(Property, f64)], layers: Layers) -> RenderOutput {
     let media = if media.is_empty() { String::new() } else { format!("[media]\n{media}\n") };
     let s = scene(&format!("{media}{rest}"));
     render(&s, &section(&s, values, None), layers, &Control::default()).unwrap()
@@ -63,14 +63,14 @@ fn media_that_the_scene_does_not_call_for_change_no_bit_and_cost_no_ray() {
         let fields = s.lines().iter().map(|_| blob()).collect();
         let without = TestSection::of_fields(&s, fields, None).unwrap();
         let plain = render(&s, &without, Layers::ALL, &Control::default()).unwrap();
-        let unused = drawn(technique, "", &[SMOKE, GLOW, TURN], Layers::ALL);
+        let unused = rendered(technique, "", &[SMOKE, GLOW, TURN], Layers::ALL);
         assert_eq!(bits(&plain), bits(&unused), "{technique}");
         assert_eq!((&plain.map, unused.media), (&unused.map, None));
         assert_eq!(unused.report.counters.media_rays, 0);
         let effects = unused.report.effects;
         assert!(!effects.absorption && !effects.emission && !effects.polarisation);
         // A rotation without an analyser is visible in layers only.
-        let hidden = drawn(technique, "rotation = \"r\"", &[TURN], Layers::NONE);
+        let hidden = rendered(technique, "rotation = \"r\"", &[TURN], Layers::NONE);
         assert_eq!(bits(&plain), bits(&hidden), "{technique}");
         assert_eq!(hidden.report.counters.media_rays, 0);
         assert!(
@@ -85,8 +85,8 @@ fn media_that_the_scene_does_not_call_for_change_no_bit_and_cost_no_ray() {
 fn even_smoke_dims_every_technique_by_beer_and_lambert() {
     let left = (-SMOKE.1 * 2.0 * HALF).exp() as f32;
     for technique in TECHNIQUES {
-        let plain = drawn(technique, "", &[], Layers::NONE);
-        let smoky = drawn(technique, "absorption = \"a\"", &[SMOKE], Layers::ALL);
+        let plain = rendered(technique, "", &[], Layers::NONE);
+        let smoky = rendered(technique, "absorption = \"a\"", &[SMOKE], Layers::ALL);
         for i in [ROW + 8, ROW + 12, ROW + 15] {
             for c in 0..3 {
                 let (p, s) = (plain.pixels[i][c], smoky.pixels[i][c]);
@@ -115,8 +115,8 @@ fn an_interferogram_loses_contrast_before_light() {
             row.iter().fold([f32::MAX, 0.0], |[l, h]: [f32; 2], v| [l.min(*v), h.max(*v)]);
         [low, high]
     };
-    let [low, high] = of(drawn(fringes, "", &[], Layers::NONE));
-    let [dim_low, dim_high] = of(drawn(fringes, "absorption = \"a\"", &[SMOKE], Layers::NONE));
+    let [low, high] = of(rendered(fringes, "", &[], Layers::NONE));
+    let [dim_low, dim_high] = of(rendered(fringes, "absorption = \"a\"", &[SMOKE], Layers::NONE));
     let left = (-SMOKE.1 * 2.0 * HALF).exp() as f32;
     // The mean is (1 + T)/4 and the amplitude is scaled by √T.
     let middle = 0.25 * (1.0 + left) + left.sqrt() * (0.5 * (low + high) - 0.5);
@@ -141,9 +141,13 @@ fn glow_adds_what_the_cut_offs_mean_over_the_stop_lets_through() {
         ("[technique]\nkind = \"interferogram\"\nvisibility = 0.0\n".to_string(), 0.25),
     ] {
         // Smoke that only absorbs, and smoke that also glows.
-        let dark = drawn(&technique, "absorption = \"a\"", &[SMOKE], Layers::NONE);
-        let lit =
-            drawn(&technique, "absorption = \"a\"\nemission = \"j\"", &[SMOKE, GLOW], Layers::ALL);
+        let dark = rendered(&technique, "absorption = \"a\"", &[SMOKE], Layers::NONE);
+        let lit = rendered(
+            &technique,
+            "absorption = \"a\"\nemission = \"j\"",
+            &[SMOKE, GLOW],
+            Layers::ALL,
+        );
         let i = ROW + 12;
         let added = f64::from(lit.pixels[i][0] - dark.pixels[i][0]);
         // A circle with a radius of 41 of the million squares has its area within 1 %.
@@ -153,14 +157,14 @@ fn glow_adds_what_the_cut_offs_mean_over_the_stop_lets_through() {
         assert!(lit.report.effects.emission);
     }
     // The image is wider than the field, and nothing is added outside the field.
-    let glowing = drawn(TECHNIQUES[0], "emission = \"j\"", &[GLOW], Layers::NONE);
-    let plain = drawn(TECHNIQUES[0], "", &[], Layers::NONE);
+    let glowing = rendered(TECHNIQUES[0], "emission = \"j\"", &[GLOW], Layers::NONE);
+    let plain = rendered(TECHNIQUES[0], "", &[], Layers::NONE);
     assert_eq!(glowing.pixels[ROW].map(f32::to_bits), plain.pixels[ROW].map(f32::to_bits));
     // Emission takes one ray per pixel and adds none for photons.
     assert_eq!(glowing.report.counters.media_rays, 24 * 20);
     // Emission has the light's own colour: with red and green lines blue stays dark.
-    let white = drawn(TECHNIQUES[4], "emission = \"j\"", &[GLOW], Layers::NONE);
-    let several = drawn(TECHNIQUES[4], "", &[], Layers::NONE);
+    let white = rendered(TECHNIQUES[4], "emission = \"j\"", &[GLOW], Layers::NONE);
+    let several = rendered(TECHNIQUES[4], "", &[], Layers::NONE);
     for (c, part) in [(0, 1.0), (1, 1.0), (2, 0.0)] {
         let added = f64::from(white.pixels[ROW + 12][c] - several.pixels[ROW + 12][c]);
         assert!((added - 0.5 * part * GLOW.1 * depth).abs() < 2e-5, "{added}");
@@ -175,10 +179,10 @@ fn an_analyser_shows_the_rotation_by_malus() {
         "{}[sampling]\nmethod = \"photons\"\nsamples = 4\nfilter = {{ kind = \"none\" }}\n",
         TECHNIQUES[0]
     );
-    let plain = drawn(&technique, "", &[], Layers::NONE);
+    let plain = rendered(&technique, "", &[], Layers::NONE);
     for deg in [0.0, 45.0, 90.0, -45.0f64] {
         let media = format!("rotation = \"r\"\nanalyser_deg = {deg:?}");
-        let r = drawn(&technique, &media, &[TURN], Layers::ALL);
+        let r = rendered(&technique, &media, &[TURN], Layers::ALL);
         let i = ROW + 12;
         let expected = f64::from(plain.pixels[i][0]) * (deg.to_radians() - phi).cos().powi(2);
         assert!((f64::from(r.pixels[i][0]) - expected).abs() < 2e-6, "{deg}: {expected}");
@@ -189,8 +193,12 @@ fn an_analyser_shows_the_rotation_by_malus() {
         assert_eq!(r.map.as_ref().unwrap().dark, 0);
         assert!((f64::from(r.media.unwrap().rotation_rad[i]) - phi).abs() < 1e-6);
         // Emitted light is not polarised: half of it passes.
-        let both =
-            drawn(&technique, &format!("{media}\nemission = \"j\""), &[TURN, GLOW], Layers::NONE);
+        let both = rendered(
+            &technique,
+            &format!("{media}\nemission = \"j\""),
+            &[TURN, GLOW],
+            Layers::NONE,
+        );
         let added = f64::from(both.pixels[i][0] - r.pixels[i][0]);
         assert!((added - 0.25 * GLOW.1 * 2.0 * HALF).abs() < 2e-5, "{added}");
     }

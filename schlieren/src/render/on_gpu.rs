@@ -170,7 +170,7 @@ mod tests {
     use crate::gpu::GpuError;
 
     #[test]
-    fn a_device_that_fails_spoils_no_picture_and_one_that_cannot_is_refused() {
+    fn a_device_that_fails_spoils_no_image_and_one_that_cannot_is_refused() {
         let lost =
             GpuError::Failed { adapter: "Lamp 9".into(), reason: "the device is lost".into() };
         let give_up_error = GpuError::GivenUp {

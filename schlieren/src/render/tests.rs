@@ -19,7 +19,7 @@ fn scene(rest: &str) -> Scene {
     Scene::from_toml(&format!("[flow]\nfile = \"-\"\ndensity = \"-\"\n{rest}")).unwrap()
 }
 
-fn drawn(rest: &str, layers: Layers) -> RenderOutput {
+fn rendered(rest: &str, layers: Layers) -> RenderOutput {
     let s = scene(rest);
     let fields = s.lines().iter().map(|_| blob()).collect();
     let section = TestSection::of_fields(&s, fields, None).unwrap();
@@ -29,7 +29,7 @@ fn drawn(rest: &str, layers: Layers) -> RenderOutput {
 const SMALL: &str = "[film]\nsize = [48, 40]\n";
 
 #[test]
-fn pictures_are_the_same_for_any_number_of_threads() {
+fn images_are_the_same_for_any_number_of_threads() {
     for technique in [
         "kind = \"schlieren\"",
         "kind = \"shadowgraph\"",
@@ -43,7 +43,7 @@ fn pictures_are_the_same_for_any_number_of_threads() {
             let text = format!("{SMALL}[technique]\n{technique}\n[sampling]\n{sampling}");
             let with = |threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| drawn(&text, Layers::NONE).pixels)
+                pool.install(|| rendered(&text, Layers::NONE).pixels)
             };
             let bits = |p: Vec<Rgb>| p.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>();
             assert_eq!(bits(with(1)), bits(with(5)), "{text}");
@@ -75,7 +75,7 @@ fn a_flow_that_no_light_passes_is_named() {
 
 #[test]
 fn the_map_is_the_closed_form_with_row_0_at_the_top() {
-    let r = drawn(SMALL, Layers { map: true, phase: true, ..Layers::NONE });
+    let r = rendered(SMALL, Layers { map: true, phase: true, ..Layers::NONE });
     let m = r.map.unwrap();
     let half_m = 48e-3;
     let n0 = 1.00027;
@@ -109,7 +109,7 @@ fn the_map_is_the_closed_form_with_row_0_at_the_top() {
 
 #[test]
 fn what_a_scene_does_not_call_for_is_not_counted() {
-    let c = |text: &str, layers| drawn(&format!("{SMALL}{text}"), layers).report;
+    let c = |text: &str, layers| rendered(&format!("{SMALL}{text}"), layers).report;
     let photons = "[sampling]\nmethod = \"photons\"\nsamples = 2\n";
     let plain = c(photons, Layers::NONE);
     let k = plain.counters;
@@ -178,8 +178,8 @@ fn a_plate_casts_its_shadow_and_only_there() {
 }
 
 #[test]
-fn even_pictures_are_warned_about_and_cancelling_cancels() {
-    let r = drawn("[film]\nsize = [16, 16]\n[lenses]\ncollimator_m = 1e-3", Layers::NONE);
+fn uniform_images_are_warned_about_and_cancelling_cancels() {
+    let r = rendered("[film]\nsize = [16, 16]\n[lenses]\ncollimator_m = 1e-3", Layers::NONE);
     assert!(
         r.report.warnings.iter().any(|w| w.contains("more sensitive")),
         "{:?}",
@@ -194,7 +194,7 @@ fn even_pictures_are_warned_about_and_cancelling_cancels() {
 
 #[test]
 fn the_tolerance_picks_the_march() {
-    let march = |rest: &str| drawn(&format!("{SMALL}[march]\n{rest}"), Layers::NONE).report;
+    let march = |rest: &str| rendered(&format!("{SMALL}[march]\n{rest}"), Layers::NONE).report;
     let rough = march("tolerance_rad = 1e-6");
     assert!(rough.march.starts_with("line-of-sight"), "{}", rough.march);
     let fine = march("tolerance_rad = 2e-10");
@@ -215,7 +215,7 @@ fn the_tolerance_picks_the_march() {
 
 #[test]
 fn dots_are_displaced_as_the_map_says() {
-    let r = drawn(
+    let r = rendered(
         &format!("{SMALL}[technique]\nkind = \"bos\"\n"),
         Layers { map: true, ..Layers::NONE },
     );
@@ -249,7 +249,7 @@ impl LightPaths for Failed<'_> {
 }
 
 #[test]
-fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
+fn a_device_that_failed_on_the_way_is_a_warning_of_the_image_reported_once() {
     for technique in ["schlieren", "bos"] {
         let s = scene(&format!("{SMALL}[technique]\nkind = \"{technique}\""));
         let section = TestSection::of_fields(&s, vec![blob()], None).unwrap();
@@ -257,16 +257,16 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_picture_told_once() {
         let planned =
             section.paths(&s, 0, PathQuantities::default(), against_light, false).unwrap();
         let planned = PlannedPaths { paths: Box::new(Failed(planned.paths)), ..planned };
-        let mut r = drawn(&format!("{SMALL}[technique]\nkind = \"{technique}\""), Layers::NONE);
+        let mut r = rendered(&format!("{SMALL}[technique]\nkind = \"{technique}\""), Layers::NONE);
         for _ in 0..2 {
             add_map(&s, &section, &planned, &mut r);
         }
-        let told = r
+        let warning = r
             .report
             .warnings
             .iter()
             .filter(|w| w.contains("Lamp 9") && w.contains("out of memory"));
-        assert_eq!(told.count(), 1, "{technique}: {:?}", r.report.warnings);
+        assert_eq!(warning.count(), 1, "{technique}: {:?}", r.report.warnings);
         assert!(r.map.is_some());
     }
     // Paths traced against the light pass the warning on.

@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_of_the_picture_is_followed_back_to_where_its_light_started() {
+    fn a_point_of_the_image_is_followed_back_to_where_its_light_started() {
         let framing = Framing { width: 4, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
         let mut map = prism([1e-4, 0.0]);
         assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));

@@ -540,7 +540,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_get_finer_and_the_last_is_the_scene_itself() {
+    fn images_get_finer_and_the_last_is_the_scene_itself() {
         let s = scene("[film]\nsize = [512, 256]\n[sampling]\nmethod = \"photons\"\nsamples = 100");
         let levels = levels(&s, 128);
         let samples: Vec<_> = levels.iter().map(|l| l.samples.unwrap()).collect();
@@ -555,7 +555,7 @@ mod tests {
     }
 
     #[test]
-    fn every_technique_has_pictures_that_are_scenes() {
+    fn every_technique_has_images_that_are_scenes() {
         for name in TechniqueSpec::NAMES {
             let s = scene(&format!("[technique]\nkind = \"{name}\""));
             let levels = levels(&s, 100);

@@ -157,17 +157,17 @@ mod tests {
     const DOTS: Dots = Dots { diameter_m: 2e-3, spacing_m: 4e-3, seed: 1 };
     const FRAMING: Framing = Framing { width: 64, height: 48, pixel_m: 0.5e-3, center_m: [0.0; 2] };
 
-    fn picture(paths: &ClosedForm, distance_m: f64) -> Vec<f32> {
+    fn image(paths: &ClosedForm, distance_m: f64) -> Vec<f32> {
         let optics = Optics { focus_m: distance_m, ..Optics::DEFAULT };
         expose_grey(&Technique::Bos(Bos::new(optics, DOTS)), paths, FRAMING, 16)
     }
 
     #[test]
     fn a_prism_displaces_the_pattern_by_angle_times_distance() {
-        let still = picture(&ClosedForm::prism([0.0; 2]), 2.0);
+        let still = image(&ClosedForm::prism([0.0; 2]), 2.0);
         // 1 mm right and 0.5 mm up at 2 m: pixel (x, y) shows what pixel (x+2, y-1) shows without
         // flow.
-        let moved = picture(&ClosedForm::prism([5e-4, 2.5e-4]), 2.0);
+        let moved = image(&ClosedForm::prism([5e-4, 2.5e-4]), 2.0);
         let same = |dx: usize, dy: usize| {
             (4..44).flat_map(|y| (4..60).map(move |x| (x, y))).fold(0.0f32, |sum, (x, y)| {
                 sum + (moved[y * 64 + x] - still[(y - dy) * 64 + x + dx]).abs()

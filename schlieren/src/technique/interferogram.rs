@@ -108,7 +108,7 @@ mod tests {
     const FRAMING: Framing = Framing { width: 200, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
     const WAVELENGTH: f64 = 633e-9;
 
-    fn picture(paths: &ClosedForm, visibility: f64, fringes: Option<Fringes>) -> Vec<f32> {
+    fn image(paths: &ClosedForm, visibility: f64, fringes: Option<Fringes>) -> Vec<f32> {
         let i = Interferogram::new(Optics::DEFAULT, WAVELENGTH, visibility, fringes, 1.0);
         expose_grey(&Technique::Interferogram(i), paths, FRAMING, 16)
     }
@@ -122,7 +122,7 @@ mod tests {
     fn a_phase_ramp_shows_its_number_of_fringes() {
         // Over the 0.2 m of the image, the path grows by 12.5 waves.
         let wedge = ClosedForm::path_ramp(12.5 * WAVELENGTH / 0.2);
-        let film = picture(&wedge, 1.0, None);
+        let film = image(&wedge, 1.0, None);
         assert!((12..=13).contains(&fringes_in(&film)), "{}", fringes_in(&film));
         let (low, high) = film.iter().fold((1.0f32, 0.0f32), |(l, h), v| (l.min(*v), h.max(*v)));
         assert!(low < 0.02 && high > 0.98, "full range: {low} {high}");
@@ -131,10 +131,10 @@ mod tests {
     #[test]
     fn nothing_is_bright_and_visibility_limits_the_range() {
         assert!(
-            picture(&ClosedForm::prism([0.0; 2]), 1.0, None).iter().all(|v| (v - 1.0).abs() < 1e-6)
+            image(&ClosedForm::prism([0.0; 2]), 1.0, None).iter().all(|v| (v - 1.0).abs() < 1e-6)
         );
         let half = ClosedForm::path_ramp(10.0 * WAVELENGTH / 0.2);
-        let film = picture(&half, 0.5, None);
+        let film = image(&half, 0.5, None);
         let (low, high) = film.iter().fold((1.0f32, 0.0f32), |(l, h), v| (l.min(*v), h.max(*v)));
         assert!((low - 0.25).abs() < 0.01 && (high - 0.75).abs() < 0.01, "{low} {high}");
     }
@@ -142,15 +142,15 @@ mod tests {
     #[test]
     fn finite_fringes_are_shifted_by_the_flow() {
         let fringes = Some(Fringes { spacing_m: 0.02, angle_deg: 0.0 });
-        let still = picture(&ClosedForm::prism([0.0; 2]), 1.0, fringes);
+        let still = image(&ClosedForm::prism([0.0; 2]), 1.0, fringes);
         assert!((9..=10).contains(&fringes_in(&still)), "0.2 m / 0.02 m");
         // A shift of half a wave everywhere exchanges bright and dark.
-        let moved = picture(&ClosedForm::constant_path(0.5 * WAVELENGTH), 1.0, fringes);
+        let moved = image(&ClosedForm::constant_path(0.5 * WAVELENGTH), 1.0, fringes);
         for (a, b) in still.iter().zip(&moved) {
             assert!((a + b - 1.0).abs() < 2e-3, "{a} {b}");
         }
         // Horizontal fringes are constant along rows.
-        let across = picture(
+        let across = image(
             &ClosedForm::prism([0.0; 2]),
             1.0,
             Some(Fringes { spacing_m: 0.02, angle_deg: 90.0 }),

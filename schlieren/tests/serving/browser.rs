@@ -33,7 +33,7 @@ pub(crate) struct Browser {
     socket: TcpStream,
     last_id: u64,
     /// Errors and exceptions of the page.
-    pub(crate) complaints: Vec<String>,
+    pub(crate) page_errors: Vec<String>,
     _profile: tempfile::TempDir,
 }
 
@@ -75,7 +75,7 @@ impl Browser {
             child,
             socket: upgrade(&host, &page),
             last_id: 0,
-            complaints: Vec::new(),
+            page_errors: Vec::new(),
             _profile: profile,
         };
         for domain in ["Page", "Runtime", "Log"] {
@@ -94,10 +94,10 @@ impl Browser {
             let message: Value = serde_json::from_str(&self.receive()).expect("JSON");
             match message["method"].as_str() {
                 Some("Runtime.exceptionThrown") => {
-                    self.complaints.push(message["params"].to_string())
+                    self.page_errors.push(message["params"].to_string())
                 }
                 Some("Log.entryAdded") if message["params"]["entry"]["level"] == "error" => {
-                    self.complaints.push(message["params"]["entry"].to_string());
+                    self.page_errors.push(message["params"]["entry"].to_string());
                 }
                 _ => {}
             }
@@ -125,7 +125,7 @@ impl Browser {
                 Instant::now() < end,
                 "never true: {expression}\n{}\n{:?}",
                 self.evaluate(state),
-                self.complaints
+                self.page_errors
             );
             std::thread::sleep(Duration::from_millis(50));
         }

@@ -40,7 +40,7 @@ fn flow_at(path: &Path, blob_x_m: f64, around_kg_m3: f64) {
 }
 
 /// The running program, which is killed on drop.
-pub(crate) struct Served {
+pub(crate) struct Server {
     pub(crate) child: Child,
     /// `127.0.0.1:PORT`.
     pub(crate) address: String,
@@ -68,17 +68,17 @@ impl Answer {
     }
 }
 
-impl Served {
-    pub(crate) fn start(options: &[&str]) -> Served {
+impl Server {
+    pub(crate) fn start(options: &[&str]) -> Server {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("flow.vti");
         flow(&path);
-        Served::of(&path, dir, options)
+        Server::of(&path, dir, options)
     }
 
     /// A series of four times in which the blob moves to the left. The file of the third is
     /// missing.
-    pub(crate) fn start_series(options: &[&str]) -> Served {
+    pub(crate) fn start_series(options: &[&str]) -> Server {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         let mut entries = String::new();
@@ -95,10 +95,10 @@ impl Served {
              version=\"0.1\"><Collection>{entries}</Collection></VTKFile>"
         );
         std::fs::write(path("flow.pvd"), text).unwrap();
-        Served::of(&path("flow.pvd"), dir, options)
+        Server::of(&path("flow.pvd"), dir, options)
     }
 
-    fn of(path: &Path, dir: tempfile::TempDir, options: &[&str]) -> Served {
+    fn of(path: &Path, dir: tempfile::TempDir, options: &[&str]) -> Server {
         let mut child = Command::new(env!("CARGO_BIN_EXE_schlieren"))
             .args(["serve", path.to_str().unwrap(), "--density", "rho", "--json"])
             .args(options)
@@ -110,7 +110,7 @@ impl Served {
         let answer: Value = serde_json::from_str(&line).expect("the address as JSON");
         let url = answer["url"].as_str().unwrap().strip_prefix("http://").unwrap().to_string();
         let (address, token) = url.split_once('/').unwrap();
-        Served { child, address: address.into(), base: format!("/{token}"), _dir: dir }
+        Server { child, address: address.into(), base: format!("/{token}"), _dir: dir }
     }
 
     pub(crate) fn url(&self) -> String {
@@ -137,7 +137,7 @@ impl Served {
     }
 
     /// Sends a request below the token.
-    pub(crate) fn ask(&self, method: &str, path: &str, body: &str) -> Answer {
+    pub(crate) fn request(&self, method: &str, path: &str, body: &str) -> Answer {
         let (base, length) = (&self.base, body.len());
         let request = format!(
             "{method} {base}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: \
@@ -147,18 +147,18 @@ impl Served {
     }
 
     pub(crate) fn get(&self, path: &str) -> Answer {
-        self.ask("GET", path, "")
+        self.request("GET", path, "")
     }
 
     /// Changes the scene, which must succeed.
     pub(crate) fn change(&self, patch: &Value) -> Value {
-        let answer = self.ask("POST", "scene", &patch.to_string());
+        let answer = self.request("POST", "scene", &patch.to_string());
         assert_eq!(answer.status, 200, "{patch}: {}", answer.text());
         answer.json()
     }
 
     /// Waits for the final frame of the newest scene.
-    pub(crate) fn finished(&self) -> Shown {
+    pub(crate) fn finished(&self) -> DecodedFrame {
         let generation = self.get("state").json()["generation"].as_u64().unwrap();
         let (end, mut after) = (Instant::now() + Duration::from_secs(120), 0);
         while Instant::now() < end {
@@ -166,7 +166,7 @@ impl Served {
             if answer.status == 204 {
                 continue;
             }
-            let shown = Shown::new(&answer.body);
+            let shown = DecodedFrame::new(&answer.body);
             after = shown.info["serial"].as_u64().unwrap();
             if shown.info["finished"] == true
                 && shown.info["generation"].as_u64() >= Some(generation)
@@ -182,7 +182,7 @@ impl Served {
     }
 }
 
-impl Drop for Served {
+impl Drop for Server {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -190,15 +190,15 @@ impl Drop for Served {
 }
 
 /// A decoded frame.
-pub(crate) struct Shown {
+pub(crate) struct DecodedFrame {
     pub(crate) info: Value,
     pub(crate) rgb: Vec<u8>,
     pub(crate) filter: Vec<u8>,
     pub(crate) light: Vec<f32>,
 }
 
-impl Shown {
-    fn new(bytes: &[u8]) -> Shown {
+impl DecodedFrame {
+    fn new(bytes: &[u8]) -> DecodedFrame {
         let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
         let info: Value = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
         let size = |key: &str| info[key].as_u64().unwrap() as usize;
@@ -209,7 +209,7 @@ impl Shown {
             .chunks_exact(4)
             .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
             .collect();
-        Shown { rgb: rest[..n].to_vec(), filter: rest[n..n + 3 * m].to_vec(), light, info }
+        DecodedFrame { rgb: rest[..n].to_vec(), filter: rest[n..n + 3 * m].to_vec(), light, info }
     }
 }
 

@@ -128,7 +128,7 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
 }
 
 #[test]
-fn strokes_on_the_picture_do_not_cross_a_shock() {
+fn strokes_on_the_image_do_not_cross_a_shock() {
     let paint = Paint { on: Canvas::Picture, points: vec![], radius_m: 1e-4, rgb: [0.0; 3] };
     let made = strokes(&[[0.0, 0.0], [1e-4, 0.0], [5e-3, 0.0]], &paint);
     assert_eq!(made.len(), 3);
