@@ -40,9 +40,6 @@ pub struct LayeredImage {
     pub metadata: Metadata,
 }
 
-/// Former name of [`LayeredImage`].
-pub type Picture = LayeredImage;
-
 /// One value per pixel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plane {

@@ -39,11 +39,11 @@ pub(super) struct FlowArgs {
     /// Array with the mass fraction of a gas; may be repeated
     #[arg(long, value_name = "NAME=GAS", value_parser = units::species)]
     species: Vec<(String, String)>,
-    /// Transfer function of an array to n - 1, straight between its points; may be repeated, one
+    /// Transfer function from an array to n - 1, linear between its points; may be repeated, one
     /// per array. Illustration, not physics
     #[arg(long, value_name = "NAME=VALUE:N,...", value_parser = units::curve, allow_hyphen_values = true)]
     curve: Vec<(String, Vec<[f64; 2]>)>,
-    /// Factor of an array's transfer function; 0 leaves it out
+    /// Factor of an array's transfer function; 0 disables it
     #[arg(long, value_name = "NAME=NUMBER", value_parser = units::weight, allow_hyphen_values = true)]
     curve_weight: Vec<(String, f64)>,
     /// How transfer functions combine: sum, or largest
@@ -61,13 +61,13 @@ pub(super) struct FlowArgs {
     /// Nodes along the longest axis when data are resampled
     #[arg(long, value_name = "N")]
     resample: Option<usize>,
-    /// Standard deviation in nodes of the smoothing of shocks
+    /// Standard deviation of the smoothing of shocks, in nodes
     #[arg(long, value_name = "NODES")]
     smoothing: Option<f64>,
-    /// What lies outside the mesh: blank, solid (a body) or gas (undisturbed flow)
+    /// Role of nodes outside the mesh: blank, solid (a body) or gas (undisturbed flow)
     #[arg(long, value_name = "ROLE", value_parser = units::role)]
     outside: Option<Role>,
-    /// What lies in cells that the solver hid: blank, solid or gas
+    /// Role of cells hidden by the solver: blank, solid or gas
     #[arg(long, value_name = "ROLE", value_parser = units::role)]
     hidden: Option<Role>,
     /// Body that blocks light (OBJ, STL, PLY, glTF, VTP); may be repeated

@@ -29,16 +29,16 @@ pub(super) struct IndexArgs {
     /// Relative humidity, 0 to 1
     #[arg(long, value_name = "PART", default_value_t = 0.0)]
     humidity: f64,
-    /// CO2
+    /// CO2 content
     #[arg(long, value_name = "PPM", default_value_t = 450.0)]
     co2_ppm: f64,
-    /// Density in kg/m³ instead of what follows from temperature and pressure
+    /// Density in kg/m³, in place of the one that follows from temperature and pressure
     #[arg(long, value_name = "KG_M3")]
     density: Option<f64>,
     /// A gas and its mass fraction, GAS=0.1; the rest is air; may be repeated
     #[arg(long, value_name = "GAS=FRACTION", value_parser = units::species)]
     species: Vec<(String, String)>,
-    /// auto, ciddor or gladstone-dale
+    /// Formula: auto, ciddor or gladstone-dale
     #[arg(long, value_name = "NAME", default_value = "auto")]
     model: Model,
 }

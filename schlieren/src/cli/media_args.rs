@@ -15,10 +15,11 @@ pub(super) struct MediaArgs {
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     emission: Option<String>,
     /// Array with the rotation of the plane of polarisation in rad/m, counter-clockwise in the
-    /// picture
+    /// image
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     rotation: Option<String>,
-    /// With --rotation: angle of an analyser behind the flow to the polariser before it [default:
+    /// With --rotation: angle between an analyser behind the flow and the polariser before it
+    /// [default:
     /// no analyser]
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
     analyser: Option<f64>,

@@ -27,11 +27,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Draws a flow
+    /// Renders a flow
     Render(Box<render::RenderArgs>),
-    /// Draws a time series, or one flow for several values of an option
+    /// Renders a time series, or one flow for several values of a key of its scene
     Sweep(Box<sweep::SweepArgs>),
-    /// Prints the path and the numbers of one pixel
+    /// Prints the path of one pixel's ray and its numbers
     Probe(Box<probe::ProbeArgs>),
     /// Opens an interactive page in the browser
     #[cfg(feature = "serve")]

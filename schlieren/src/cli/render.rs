@@ -16,17 +16,17 @@ use std::time::Instant;
 pub(super) struct RenderArgs {
     /// The flow: VTK (.vti .vtr .vts .vtu, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, raw
     file: Option<PathBuf>,
-    /// The picture as PNG
+    /// Image as PNG
     #[arg(long, short, value_name = "PNG")]
     out: Option<PathBuf>,
-    /// The picture as OpenEXR: colour, deflection, displacement, phase, transmission, samples,
-    /// error, what the medium does, and every parameter
+    /// Image as OpenEXR: colour, deflection, displacement, phase, transmission, samples, error,
+    /// absorption, emission and rotation of the medium, and every parameter
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
-    /// The deflection map as NumPy array (height, width, 2) in rad
+    /// Deflection map as NumPy array (height, width, 2) in rad
     #[arg(long, value_name = "NPY")]
     npy: Option<PathBuf>,
-    /// Print the scene in effect as TOML, and draw only if an output is named
+    /// Print the effective scene as TOML; render only if an output is given
     #[arg(long)]
     print_scene: bool,
     #[command(flatten)]

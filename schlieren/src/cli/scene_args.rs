@@ -34,41 +34,41 @@ struct OpticsArgs {
     /// x, y, z, or azimuth and elevation of the light in degrees
     #[arg(long, value_name = "x|y|z|AZ,EL", allow_hyphen_values = true)]
     view: Option<Direction>,
-    /// shadowgraph, schlieren, interferogram, bos; to compare with: volume, slice
+    /// shadowgraph, schlieren, interferogram or bos; for comparison: volume or slice
     #[arg(long, value_name = "NAME", value_parser = technique)]
     technique: Option<TechniqueSpec>,
-    /// Vacuum wavelength in nm; several, separated by commas, are traced each by itself
+    /// Vacuum wavelengths in nm, separated by commas; each is traced by itself
     #[arg(long, value_name = "NM", value_delimiter = ',')]
     wavelength: Vec<f64>,
     /// point, slit:WIDTH,LENGTH or circle:DIAMETER
     #[arg(long, value_name = "SHAPE", value_parser = units::source)]
     source: Option<SourceSpec>,
-    /// Of the schlieren lens, f2
+    /// Focal length of the schlieren lens (f2)
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     focal_length: Option<f64>,
-    /// Of the collimator, f1
+    /// Focal length of the collimator (f1)
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     collimator: Option<f64>,
-    /// schlieren: knife, circle, complemented-circle, color, or a picture (PNG)
+    /// schlieren: knife, circle, complemented-circle, color, or an image (PNG)
     #[arg(long, value_name = "KIND|PNG")]
     cutoff: Option<String>,
-    /// knife: direction that brightens; color: direction of red; degrees from the picture's right
+    /// knife: direction that brightens; color: direction of red; in degrees from the image's right
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
     cutoff_angle: Option<f64>,
-    /// knife: part of the source's image that stays open, 0 to 1
+    /// knife: open fraction of the source image, 0 to 1
     #[arg(long, value_name = "PART")]
     cutoff_open: Option<f64>,
-    /// knife: the same as a height in the cut-off plane
+    /// knife: open height of the source image in the cut-off plane
     #[arg(long, value_name = "LENGTH", value_parser = units::length, conflicts_with = "cutoff_open")]
     cutoff_height: Option<f64>,
-    /// circle, complemented-circle, color: radius in the cut-off plane; picture: half its width
+    /// circle, complemented-circle, color: radius in the cut-off plane; image: half its width
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     cutoff_radius: Option<f64>,
-    /// shadowgraph: distance of the film; bos: distance of the background; else the plane in focus.
-    /// From the middle of the field
+    /// Distance from the centre of the field; shadowgraph: of the film; bos: of the background;
+    /// else: of the plane in focus
     #[arg(long, value_name = "LENGTH", value_parser = units::length, allow_hyphen_values = true)]
     film_distance: Option<f64>,
-    /// interferogram: distance of the fringes without flow [default: infinite]
+    /// interferogram: spacing of the fringes without flow [default: infinite]
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     fringe_spacing: Option<f64>,
     /// interferogram: direction across the fringes
@@ -80,13 +80,13 @@ struct OpticsArgs {
     /// bos: diameter of the background's dots
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     dot_diameter: Option<f64>,
-    /// bos: mean distance of the background's dots
+    /// bos: mean spacing of the background's dots
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     dot_spacing: Option<f64>,
-    /// volume, slice: in the exponent
+    /// volume, slice: factor in the exponent
     #[arg(long, value_name = "NUMBER")]
     strength: Option<f64>,
-    /// slice: from the middle along the light
+    /// slice: distance from the centre of the field along the light
     #[arg(long, value_name = "LENGTH", value_parser = units::length, allow_hyphen_values = true)]
     slice_depth: Option<f64>,
 }
@@ -94,10 +94,10 @@ struct OpticsArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Film and accuracy")]
 struct FilmArgs {
-    /// Pixels per row and rows
+    /// Width and height in pixels
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<[u32; 2]>,
-    /// Width of what the picture shows [default: all of the field]
+    /// Width of the field of view [default: the whole field]
     #[arg(long, value_name = "LENGTH", value_parser = units::length)]
     field_of_view: Option<f64>,
     /// Brightness factor; 1 makes undisturbed light white
@@ -106,17 +106,17 @@ struct FilmArgs {
     /// Photons per pixel [default: 16; shadowgraphs are noise-free]
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
-    /// Cells of a lattice of rays instead of photons; the default of shadowgraphs
+    /// Beams between the rays of a lattice instead of photons; the default for shadowgraphs
     #[arg(long, conflicts_with_all = ["samples", "filter", "jitter", "seed", "tilted_beams"])]
     noise_free: bool,
-    /// Against noise, for 1 photon per pixel, narrower for more: none, gaussian:SIGMA, mean:RADIUS
-    /// (pixels), cone:NEAREST
+    /// Noise filter: none, gaussian:SIGMA, mean:RADIUS (pixels) or cone:NEAREST; its size is for 1
+    /// photon per pixel, and narrower for more
     #[arg(long, value_name = "FILTER", value_parser = filter)]
     filter: Option<FilterSpec>,
-    /// sobol or random
+    /// Positions of the photons: sobol or random
     #[arg(long, value_name = "NAME", value_parser = jitter)]
     jitter: Option<Jitter>,
-    /// Of the jitter
+    /// Seed of the jitter
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Trace every photon in the beam of its own point of the source
@@ -134,12 +134,11 @@ struct FilmArgs {
     /// Force a step, in voxels
     #[arg(long, value_name = "VOXELS")]
     step: Option<f64>,
-    /// Leave out gas so even that no ray's deflection changes by more than this in all: 1e-9rad.
+    /// Skip gas so uniform that no ray's deflection changes by more than this in total: 1e-9rad.
     /// For verlet on the CPU
     #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
     skip: Option<f64>,
-    /// Where to trace: gpu needs a Vulkan device; auto takes one if it can, and says why if it
-    /// cannot
+    /// Where to trace: gpu needs a Vulkan device; auto uses one if possible, else warns why
     #[arg(long, value_enum, value_name = "DEVICE")]
     device: Option<Device>,
 }

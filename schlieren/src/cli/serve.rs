@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 /// Options of `schlieren serve`.
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
-    /// The flow; of a time series (several files, or one .pvd) the page shows any step
+    /// The flow, or a time series (several files, or one .pvd) of which the page shows any step
     files: Vec<PathBuf>,
-    /// Where to listen; port 0 takes a free one. Other addresses than 127.0.0.1 let other machines
-    /// in that know the page's whole address
+    /// Address to listen on; port 0 selects a free port. With an address other than 127.0.0.1,
+    /// other machines that know the full URL have access
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:0")]
     listen: SocketAddr,
     #[command(flatten)]

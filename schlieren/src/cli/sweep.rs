@@ -18,13 +18,13 @@ pub(super) struct SweepArgs {
     /// A key of the scene with its values: technique.cutoff.angle_deg=0,45,90
     #[arg(long, value_name = "KEY=V1,V2,...", value_parser = setting)]
     set: Option<Setting>,
-    /// Pictures, numbered: out-0000.png for out.png
+    /// Numbered images: out-0000.png for out.png
     #[arg(long, short, value_name = "PNG")]
     out: Option<PathBuf>,
-    /// The same as OpenEXR
+    /// Numbered OpenEXR images
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
-    /// Deflection maps, numbered
+    /// Numbered deflection maps
     #[arg(long, value_name = "NPY")]
     npy: Option<PathBuf>,
     #[command(flatten)]

@@ -368,12 +368,13 @@ impl Default for MarchSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Device {
-    /// All cores.
+    /// Trace on all cores of the CPU.
     #[default]
     Cpu,
-    /// By compute shaders; an error where that cannot be.
+    /// Trace on a GPU by compute shaders; it is an error if that is impossible.
     Gpu,
-    /// On a GPU if there is one and it has a kernel for the march, else on the CPU, saying why.
+    /// Trace on a GPU if there is one and it has a kernel for the march; else on the CPU, with a
+    /// warning that says why.
     Auto,
 }
 
