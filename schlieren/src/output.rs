@@ -26,7 +26,7 @@ pub enum OutputError {
         source: std::io::Error,
     },
     /// The deflection map was not rendered.
-    #[error("the deflection map was not rendered; ask for Layers::map")]
+    #[error("the deflection map was not rendered; request Layers::map")]
     NoMap,
 }
 

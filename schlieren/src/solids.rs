@@ -35,7 +35,7 @@ pub enum SolidsError {
     #[error("the body cannot be read")]
     Read(#[from] ReadError),
     /// The file cannot be converted to a surface.
-    #[error("{path}: no surface can be made of it")]
+    #[error("{path}: it cannot be converted to a surface")]
     Surface {
         /// The file.
         path: std::path::PathBuf,
@@ -43,13 +43,13 @@ pub enum SolidsError {
         source: ModelError,
     },
     /// The file has no triangles.
-    #[error("{path}: it holds no triangles; a body needs a surface (OBJ, STL, PLY, glTF, VTP)")]
+    #[error("{path}: no triangles; a body needs a surface (OBJ, STL, PLY, glTF, VTP)")]
     Empty {
         /// The file.
         path: std::path::PathBuf,
     },
     /// The acceleration structure cannot be built.
-    #[error("the bodies cannot be built")]
+    #[error("the acceleration structure of the bodies cannot be built")]
     Build(#[from] BuildError),
 }
 

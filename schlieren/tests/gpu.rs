@@ -417,7 +417,7 @@ fn films_agree_with_the_cpu() {
         let rms = (sum / a.pixels.len() as f64).sqrt();
         assert!(rms < 1e-3, "{rest}: {rms:e}");
         let contrast = b.report.levels[1] - b.report.levels[0];
-        assert!(contrast > 0.05, "{rest}: an empty picture, {contrast}");
+        assert!(contrast > 0.05, "{rest}: an empty image, {contrast}");
         assert!(a.report.march.contains(&gpu.name()), "{}", a.report.march);
         assert!(!b.report.march.contains(" on "), "{}", b.report.march);
         let [a, b] = [a, b].map(|r| r.map.unwrap().deflection_rad);

@@ -115,10 +115,9 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_image() {
     let scene = Scene::from_toml(scene).unwrap();
     let centre_m = field.centre_m();
     let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
-    let picture =
-        render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
-            .unwrap();
-    let photograph = Photograph::from_render(&picture).unwrap();
+    let image = render(&scene, &section, Layers { map: true, ..Layers::NONE }, &Control::default())
+        .unwrap();
+    let photograph = Photograph::from_render(&image).unwrap();
     let framing = photograph.framing;
 
     // The edge of the fin's silhouette: the last dark pixel of the row, from the right.
@@ -148,10 +147,8 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_image() {
     stand_offs.sort_by(f64::total_cmp);
     let at = |share: f64| stand_offs[(share * (stand_offs.len() - 1) as f64) as usize];
     let (low, median, high) = (at(0.0), at(0.5), at(1.0));
-    let _ = writeln!(
-        std::io::stderr(),
-        "d/R in the picture: median {median:.3}, {low:.3} to {high:.3}"
-    );
+    let _ =
+        writeln!(std::io::stderr(), "d/R in the image: median {median:.3}, {low:.3} to {high:.3}");
     assert!((low - 0.66).abs() <= 0.15 && (high - 0.66).abs() <= 0.15, "{low} {median} {high}");
 }
 

@@ -16,7 +16,7 @@ use std::io::Write as _;
 
 /// A screenshot of the window.
 struct Window {
-    picture: LayeredImage,
+    image: LayeredImage,
     rgba: Vec<[f32; 4]>,
 }
 
@@ -37,8 +37,8 @@ fn look(b: &mut Browser, name: &str) -> Window {
     let keep = std::env::var_os("RTSV_SCREENSHOTS").map(std::path::PathBuf::from);
     let path = keep.unwrap_or_else(|| dir.path().to_path_buf()).join(format!("serve-{name}.png"));
     std::fs::write(&path, b.screenshot()).unwrap();
-    let picture = read_png(&path).unwrap();
-    Window { rgba: picture.rgba().unwrap(), picture }
+    let image = read_png(&path).unwrap();
+    Window { rgba: image.rgba().unwrap(), image }
 }
 
 /// Fraction of the pixels that differ visibly in the part `[left, top, right, bottom]` (as
@@ -46,7 +46,7 @@ fn look(b: &mut Browser, name: &str) -> Window {
 fn differs(a: &Window, b: &Window, r: Rect, part: [f64; 4]) -> f64 {
     let x = [0, 2].map(|i| (r[0] + part[i] * r[2]) as usize);
     let y = [1, 3].map(|i| (r[1] + part[i] * r[3]) as usize);
-    let width = a.picture.width as usize;
+    let width = a.image.width as usize;
     let (mut changed, mut all) = (0, 0);
     for j in y[0]..y[1] {
         for i in x[0]..x[1] {
@@ -95,8 +95,8 @@ fn looking_orbiting_painting_and_switching() {
     let mut b = Browser::open(&program, &s.url());
     b.wait_for("document.readyState === 'complete' && document.body.dataset.finished === 'true'");
     let first = look(&mut b, "first");
-    let (picture, filter) = (rect(&mut b, "picture"), rect(&mut b, "filter"));
-    assert!(picture[2] > 300.0 && (picture[2] / picture[3] - 2.0).abs() < 0.05, "{picture:?}");
+    let (image, filter) = (rect(&mut b, "picture"), rect(&mut b, "filter"));
+    assert!(image[2] > 300.0 && (image[2] / image[3] - 2.0).abs() < 0.05, "{image:?}");
     let text = b.evaluate("document.body.innerText").to_string();
     for word in [
         "orbit",
@@ -113,22 +113,22 @@ fn looking_orbiting_painting_and_switching() {
 
     // Orbit: the blob moves.
     b.drag(&[
-        inside(picture, 0.4, 0.5),
-        inside(picture, 0.45, 0.5),
-        inside(picture, 0.55, 0.55),
-        inside(picture, 0.6, 0.6),
+        inside(image, 0.4, 0.5),
+        inside(image, 0.45, 0.5),
+        inside(image, 0.55, 0.55),
+        inside(image, 0.6, 0.6),
     ]);
     wait_until_final(&mut b);
     let orbited = look(&mut b, "orbited");
     let direction = s.get("state").json()["scene"]["view"]["direction"].to_string();
     assert!(direction.contains(','), "{direction}");
-    assert!(differs(&first, &orbited, picture, [0.2, 0.2, 0.8, 0.8]) > 0.03);
+    assert!(differs(&first, &orbited, image, [0.2, 0.2, 0.8, 0.8]) > 0.03);
     b.evaluate("document.querySelector('[data-view=z]').click()");
     wait_until_final(&mut b);
     let back = look(&mut b, "back");
     assert!(
-        differs(&first, &back, picture, [0.0, 0.0, 1.0, 0.8]) < 1e-3,
-        "the same view is the same picture"
+        differs(&first, &back, image, [0.0, 0.0, 1.0, 0.8]) < 1e-3,
+        "the same view is the same image"
     );
 
     // Paint on the filter: a red dab in the middle colours undisturbed light in the image, and the
@@ -148,7 +148,7 @@ fn looking_orbiting_painting_and_switching() {
     wait_until_final(&mut b);
     let painted = look(&mut b, "painted-filter");
     let corner = [0.02, 0.05, 0.2, 0.4];
-    assert!(differs(&clear, &painted, picture, corner) > 0.9, "undisturbed light is painted on");
+    assert!(differs(&clear, &painted, image, corner) > 0.9, "undisturbed light is painted on");
     assert!(differs(&clear, &painted, filter, [0.45, 0.45, 0.55, 0.55]) > 0.3);
     assert!(
         differs(&clear, &painted, filter, [0.05, 0.05, 0.3, 0.3]) < 0.01,
@@ -163,16 +163,13 @@ fn looking_orbiting_painting_and_switching() {
                 document.getElementById('radius'); r.value = 0.05; r.dispatchEvent(new \
                 Event('input'))",
     );
-    b.drag(&[inside(picture, 0.59, 0.38), inside(picture, 0.6, 0.4), inside(picture, 0.61, 0.42)]);
+    b.drag(&[inside(image, 0.59, 0.38), inside(image, 0.6, 0.4), inside(image, 0.61, 0.42)]);
     b.wait_for(
         "fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)",
     );
     wait_until_final(&mut b);
     let on_picture = look(&mut b, "painted-picture");
-    assert!(
-        differs(&clear, &on_picture, picture, [0.59, 0.38, 0.61, 0.42]) > 0.8,
-        "under the brush"
-    );
+    assert!(differs(&clear, &on_picture, image, [0.59, 0.38, 0.61, 0.42]) > 0.8, "under the brush");
 
     // Switch the technique: the image and the settings change.
     b.evaluate(
@@ -182,7 +179,7 @@ fn looking_orbiting_painting_and_switching() {
     b.wait_for("document.body.innerText.includes('fringe spacing')");
     wait_until_final(&mut b);
     let switched = look(&mut b, "interferogram");
-    assert!(differs(&on_picture, &switched, picture, [0.3, 0.1, 0.9, 0.9]) > 0.2);
+    assert!(differs(&on_picture, &switched, image, [0.3, 0.1, 0.9, 0.9]) > 0.2);
     assert!(
         b.evaluate("document.querySelector('input[value=paint]').disabled") == true,
         "no filter to paint on"
@@ -196,7 +193,7 @@ fn looking_orbiting_painting_and_switching() {
     b.wait_for("document.getElementById('when').innerText.includes('4 of 4')");
     wait_until_final(&mut b);
     let later = look(&mut b, "later");
-    assert!(differs(&switched, &later, picture, [0.1, 0.1, 0.9, 0.9]) > 0.1);
+    assert!(differs(&switched, &later, image, [0.1, 0.1, 0.9, 0.9]) > 0.1);
 
     // An invalid value gives a message on the page, and the page continues.
     b.evaluate(

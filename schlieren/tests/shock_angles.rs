@@ -62,7 +62,7 @@ fn wedge(mach: f64, half_angle_deg: f64) -> Wedge {
 fn assert_angle(what: &str, line: &Line, exact_rad: f64, golden_deg: f64) {
     let (got, exact) = (line.angle_rad.to_degrees(), exact_rad.to_degrees());
     println!(
-        "{what}: {got:.4} degrees in the picture, exact {exact:.4}, rms {:.1e} m over {} points",
+        "{what}: {got:.4} degrees in the image, exact {exact:.4}, rms {:.1e} m over {} points",
         line.rms_m, line.points
     );
     // Compares the generator's own solution with the table that another program computed.

@@ -124,7 +124,7 @@ impl FlowArgs {
             let flag = if self.curve_rule.is_some() { "--curve-rule" } else { "--curve-weight" };
             return match self.curve_rule.is_some() || !self.curve_weight.is_empty() {
                 true => Err(UsageError(format!(
-                    "{flag} changes nothing without transfer functions; give --curve"
+                    "{flag} has no effect without transfer functions; give --curve"
                 ))),
                 false => Ok(()),
             };
@@ -143,8 +143,7 @@ impl FlowArgs {
             let Some(curve) = multifield.fields.get_mut(name) else {
                 let names: Vec<&str> = multifield.fields.keys().map(String::as_str).collect();
                 return Err(UsageError(format!(
-                    "--curve-weight {name}: this array has no transfer function; there are those \
-                     of: {}",
+                    "--curve-weight {name}: this array has no transfer function; known: {}",
                     names.join(", ")
                 )));
             };

@@ -63,7 +63,10 @@ pub(super) fn index(common: CommonArgs, args: &IndexArgs) -> anyhow::Result<()> 
     let species = args.species.iter().map(|(gas, part)| {
         let gas: Gas = gas.parse().map_err(|e| UsageError(format!("--species: {e}")))?;
         let part: f64 = part.parse().map_err(|_| {
-            UsageError(format!("--species {gas}={part}: `{part}` is no mass fraction; give 0 to 1"))
+            UsageError(format!(
+                "--species {gas}={part}: `{part}` is not a mass fraction; give a \
+                                number from 0 to 1"
+            ))
         })?;
         Ok((gas, part))
     });

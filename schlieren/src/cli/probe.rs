@@ -26,7 +26,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let scene = args.scene.scene(args.file.as_deref())?;
     if !scene.technique.follows_light() {
         return Err(UsageError(format!(
-            "technique `{}` follows no light; take another",
+            "technique `{}` does not trace light; use another",
             scene.technique.name()
         ))
         .into());
@@ -119,7 +119,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         let [dx, dy] = exit.deflection_rad;
         let skipped = skip_report.map_or(String::new(), |l| {
             format!(
-                "\nleft out         {:.0} % of the steps, at most {:.1e} rad",
+                "\nskipped          {:.0} % of the steps, at most {:.1e} rad",
                 100.0 * l.steps_part,
                 l.bound_rad
             )

@@ -172,9 +172,7 @@ fn filter(text: &str) -> Result<FilterSpec, String> {
 }
 
 fn no_effect(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
-    UsageError(format!(
-        "{flag} changes nothing with {what} `{name}`; leave it out, or take {belongs}"
-    ))
+    UsageError(format!("{flag} has no effect with {what} `{name}`; omit it or use {belongs}"))
 }
 
 impl SceneArgs {
@@ -284,7 +282,7 @@ impl OpticsArgs {
             Some(other) => {
                 return Err(UsageError(format!(
                     "there is no cut-off `{other}`; there are: knife, circle, complemented-circle, \
-                     color, or a picture that ends in .png"
+                     color, or an image file that ends in .png"
                 ))
                 .into());
             }

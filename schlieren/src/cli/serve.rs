@@ -26,8 +26,8 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     let mut scene = args.scene.scene(args.files.first().map(PathBuf::as_path))?;
     if !scene.media.is_empty() {
         return Err(UsageError(
-            "the page does not show absorption, emission or rotation; leave out [media] and its \
-             options, or take `schlieren render`"
+            "the page does not show absorption, emission or rotation; omit [media] and its \
+             options, or use `schlieren render`"
                 .into(),
         )
         .into());
@@ -61,8 +61,8 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     steps.iter_mut().for_each(|s| s.path = whole(&s.path));
     if !args.listen.ip().is_loopback() {
         common.warn(format_args!(
-            "listening on {}: everyone who can reach this machine and sees the address can use the \
-             page, and it is not encrypted",
+            "listening on {}: everyone who can reach this machine and knows the address can use \
+             the page, and the connection is not encrypted",
             args.listen
         ));
     }

@@ -85,9 +85,7 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
     match &args.set {
         Some(set) => {
             let [file] = &args.files[..] else {
-                return Err(
-                    UsageError("--set sweeps over one file; leave out the others".into()).into()
-                );
+                return Err(UsageError("--set varies one file; omit the others".into()).into());
             };
             let scene = args.scene.scene(Some(file))?;
             for value in &set.values {

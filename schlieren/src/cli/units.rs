@@ -19,7 +19,7 @@ const ANGLES: [(&str, f64); 6] = [
 
 /// Parses a number with one of the units; without a unit, the last of `units` applies.
 fn with_unit(text: &str, units: &[(&str, f64)], example: &str) -> Result<f64, String> {
-    let wrong = || format!("`{text}` is no such quantity; write for example {example}");
+    let wrong = || format!("`{text}` is not a quantity with a unit; write for example {example}");
     let text_trimmed = text.trim();
     // Take the longest matching unit, because "mm" also ends with "m".
     let unit = units.iter().filter(|u| text_trimmed.ends_with(u.0)).max_by_key(|u| u.0.len());
@@ -117,7 +117,7 @@ pub(super) fn role(text: &str) -> Result<Role, String> {
         "blank" => Ok(Role::Blank),
         "solid" => Ok(Role::Solid),
         "gas" => Ok(Role::Gas),
-        _ => Err(format!("`{text}` is nothing that can be there; there are: blank, solid, gas")),
+        _ => Err(format!("`{text}` is not a role; there are: blank, solid, gas")),
     }
 }
 

@@ -22,7 +22,7 @@ pub struct FilterImage {
 #[non_exhaustive]
 pub enum FilterError {
     /// The file cannot be read.
-    #[error("the filter's picture cannot be used")]
+    #[error("the filter image cannot be used")]
     File(#[from] ImageError),
     /// The dimensions or values do not describe a filter.
     #[error("a filter of {width}x{height} pixels and {} x {} m with {found} values: \

@@ -106,13 +106,13 @@ impl<'a> CpuFallback<'a> {
             },
             (true, false) => {
                 format!(
-                    "{}; it was opened again and traced once more what it had lost",
+                    "{}; it was reopened and the lost rays were traced again",
                     super::failure_message(cause)
                 )
             }
             (true, true) => format!(
-                "{}; it was opened again and traced once more what it had lost, until {}; what it \
-                 left then was computed on the CPU",
+                "{}; it was reopened and the lost rays were traced again, until {}; the CPU traced \
+                 the rest",
                 super::failure_message(cause),
                 reopen_error.unwrap_or(cause)
             ),
@@ -355,7 +355,7 @@ mod tests {
                     cpu_fallback_paths.repeated()
                 );
                 let warning = cpu_fallback_paths.device_warning().unwrap();
-                for word in ["Lamp 9", &format!("out of memory, call {}", at + 1), "opened again"] {
+                for word in ["Lamp 9", &format!("out of memory, call {}", at + 1), "reopened"] {
                     assert!(warning.contains(word), "{word}: {warning}");
                 }
                 assert!(!warning.contains("CPU"), "{warning}");
@@ -381,7 +381,7 @@ mod tests {
             assert_eq!(device.present.load(Ordering::Relaxed), 3);
             assert!(on_cpu > 0 && (at > 0) == (cpu_fallback_paths.repeated() > 0), "{on_cpu}");
             let warning = cpu_fallback_paths.device_warning().unwrap();
-            for word in ["Lamp 9", "opened again 3 times", "on the CPU"] {
+            for word in ["Lamp 9", "after 3 attempts to reopen it", "on the CPU"] {
                 assert!(warning.contains(word), "{word}: {warning}");
             }
         }

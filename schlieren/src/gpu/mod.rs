@@ -55,8 +55,8 @@ pub enum GpuError {
     },
     /// The field does not fit.
     #[error(
-        "{what} of {dims:?} nodes takes {need} and `{adapter}` has room for {available}; compute on the \
-         CPU (--device cpu), or resample the flow coarser"
+        "{what} of {dims:?} nodes needs {need}, and `{adapter}` has {available}; compute on the \
+         CPU (--device cpu), or resample the flow to fewer nodes"
     )]
     TooLarge {
         /// The part of the field that does not fit.
@@ -80,8 +80,8 @@ pub enum GpuError {
     },
     /// The GPU failed too often.
     #[error(
-        "`{adapter}` failed ({reason}) after it was opened again {times} times, and is left alone; \
-         look into its driver's log, or compute on the CPU (--device cpu)"
+        "`{adapter}` failed ({reason}) after {times} attempts to reopen it, and is not used; check \
+         the driver's log, or compute on the CPU (--device cpu)"
     )]
     GivenUp {
         /// The device.
@@ -97,7 +97,7 @@ pub enum GpuError {
 pub(crate) fn fallback_message(failure: &GpuError) -> String {
     match failure {
         GpuError::Failed { .. } => {
-            format!("{}; what it left was computed on the CPU", failure_message(failure))
+            format!("{}; the rest was computed on the CPU", failure_message(failure))
         }
         other => format!("computed on the CPU: {other}"),
     }

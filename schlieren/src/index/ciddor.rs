@@ -84,7 +84,7 @@ impl Ciddor {
                 quantity: "wavelength",
                 value: wavelength_um * 1000.0,
                 unit: "nm",
-                reason: "is not one that air lets through (from 185 nm)",
+                reason: "is below the range that air transmits (from 185 nm)",
                 cure: "give the vacuum wavelength in nm (columns: lambda_um in micrometres)",
             });
         }
@@ -250,7 +250,7 @@ fn vapour_mole_fraction(air: &MoistAir) -> Result<f64, IndexError> {
             "relative humidity",
             relative_humidity,
             "",
-            "would need more vapour pressure than the pressure is (the water boils)",
+            "would need a vapour pressure above the total pressure (the water boils)",
             "lower the humidity, or check temperature and pressure",
         );
     }

@@ -137,7 +137,7 @@ pub fn compute(conditions: &Conditions) -> Result<IndexResult, IndexError> {
                     unit: "species",
                     reason: "or a density is a contradiction: Ciddor's equation is for air by \
                              temperature and pressure",
-                    cure: "leave out the model, or say gladstone-dale",
+                    cure: "omit the model, or use gladstone-dale",
                 });
             }
             warnings.extend(outside.iter().map(ToString::to_string));

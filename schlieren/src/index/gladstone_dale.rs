@@ -331,7 +331,7 @@ impl Gas {
             quantity: "wavelength",
             value: wavelength_um * 1000.0,
             unit: "nm",
-            reason: "is not one that gases let through (from 185 nm)",
+            reason: "is below the range that gases transmit (from 185 nm)",
             cure: "give the vacuum wavelength in nm",
         })
     }

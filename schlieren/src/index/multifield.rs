@@ -34,7 +34,7 @@ impl TransferFunction {
             return Err(impossible(if v.is_finite() { *n } else { *v }, "is not finite"));
         }
         if let Some(w) = knots.windows(2).find(|w| w[0].0 >= w[1].0) {
-            return Err(impossible(w[1].0, "does not lie above the one before"));
+            return Err(impossible(w[1].0, "is not above the one before"));
         }
         Ok(TransferFunction { knots })
     }

@@ -98,12 +98,13 @@ fn warn_without_index(columns: &[Column], out: &[f64], options: &Options, report
         let why = match options.medium {
             Medium::Electrons(_) => "the electron density is negative or above the critical one",
             _ => {
-                "there is no such gas (temperature not above 0 K, negative pressure or density, or \
+                "no gas has these values (temperature not above 0 K, negative pressure or density, \
+                 or \
                  humidity beyond boiling)"
             }
         };
         report.warnings.push(format!(
-            "{without_index} of {} values of {} give no index: {why}; these places are blank",
+            "{without_index} of {} values of {} give no index: {why}; these points are blank",
             out.len(),
             options.medium.describe()
         ));
@@ -121,7 +122,7 @@ fn by_density(
     if options.model == Model::Ciddor {
         return Err(InputError::Option {
             what: "Ciddor's equation takes temperature and pressure, not a density".into(),
-            cure: "name those arrays, or leave out the model",
+            cure: "name those arrays, or omit the model",
         });
     }
     let (mixture, blends) = mix(&columns[1..], wavelength_um, options, report)?;
@@ -137,7 +138,7 @@ fn by_density(
             ));
         } else if (s.median - 1.0).abs() < NORMALISED && s.low < s.high {
             report.warnings.push(
-                "the density is 1 in most places, so it is probably normalised by the free stream; \
+                "the density is 1 at most points, so it is probably normalised by the free stream; \
                  give the free stream's density in kg/m^3 as its scale, such as 1.2".into(),
             );
         }
@@ -172,7 +173,7 @@ fn by_state(
         Model::Ciddor if !species.is_empty() => {
             return Err(InputError::Option {
                 what: "Ciddor's equation is for air, but species are given".into(),
-                cure: "leave out the model or the species",
+                cure: "omit the model or the species",
             });
         }
         Model::Ciddor => true,
@@ -213,7 +214,8 @@ fn by_state(
         && let Some(s) = &t
     {
         report.warnings.push(format!(
-            "temperatures from {:.1} to {:.1} K leave -40..100 C, where Ciddor's equation holds: \
+            "temperatures from {:.1} to {:.1} K are not all in -40..100 C, where Ciddor's equation \
+             holds: \
              Gladstone-Dale with the density of an ideal gas is used; for flames name the species",
             s.low, s.high
         ));
@@ -240,8 +242,8 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
         let [low, high] = PLAUSIBLE_TEMPERATURE;
         if (CELSIUS_SUSPECT[0]..CELSIUS_SUSPECT[1]).contains(&s.median) {
             report.warnings.push(format!(
-                "the temperature is {:.1} K in the middle: if it is in degrees Celsius, say so \
-                 (offset 273.15)",
+                "the temperature is {:.1} K at the median: if it is in degrees Celsius, set the \
+                 offset 273.15",
                 s.median
             ));
         } else if s.low < low || s.high > high {
@@ -309,14 +311,14 @@ fn mix<'a>(
     if let Some(s) = spread(len.unwrap_or(1), |i| blends.at(&mixture, i).sum) {
         if s.high > 1.0 + 10.0 * mixture::SUM_TOLERANCE {
             report.warnings.push(format!(
-                "mass fractions sum to as much as {:.4} and are scaled down to 1; are they mass \
-                 fractions, and not mole fractions or per cent?",
+                "mass fractions sum to up to {:.4} and are scaled down to 1; check that they are \
+                 not mole fractions or per cent",
                 s.high
             ));
         }
         if s.low < 1.0 - 10.0 * mixture::SUM_TOLERANCE {
             report.warnings.push(format!(
-                "mass fractions sum to as little as {:.4}; air fills them up to 1",
+                "mass fractions sum to only {:.4} at some points; the rest is taken as air",
                 s.low
             ));
         }

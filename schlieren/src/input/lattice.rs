@@ -160,7 +160,7 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
     let size = high - low;
     if size.is_nan() || size.min_element() <= 0.0 {
         return Err(InputError::Option {
-            what: format!("the bounds leave nothing of the mesh ({whole_low} to {whole_high})"),
+            what: format!("no part of the mesh ({whole_low} to {whole_high}) is within the bounds"),
             cure: "give the lower and the upper corner in the file's unit of length",
         });
     }

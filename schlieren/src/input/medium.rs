@@ -214,7 +214,7 @@ impl Medium {
                         value: q.scale,
                         unit: "",
                         reason: "is zero or not finite",
-                        cure: "give units of SI per unit of the file",
+                        cure: "give SI units per unit of the file",
                     }));
                 }
                 Ok(match &q.source {

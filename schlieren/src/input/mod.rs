@@ -38,7 +38,7 @@ pub enum InputError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The contents of the file cannot be used.
-    #[error("{}: no field can be made of it", path.display())]
+    #[error("{}: it cannot be converted to a field", path.display())]
     InFile {
         /// The file.
         path: PathBuf,
@@ -292,8 +292,8 @@ fn nodes_of(marks: &[Mark], options: &Options, report: &mut Report) -> Option<Ve
     let outside = share(Mark::Outside);
     if outside > 0.0 && options.outside == Role::Blank {
         report.warnings.push(format!(
-            "{outside:.1} % of the lattice lie outside the mesh and are blank; say that they are \
-             solid (a body) or gas (undisturbed flow)"
+            "{outside:.1} % of the lattice lie outside the mesh and are blank; set --outside solid \
+             (a body) or gas (undisturbed flow)"
         ));
     }
     let bad = share(Mark::NotFinite);

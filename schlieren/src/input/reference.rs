@@ -60,8 +60,8 @@ impl Reference {
                 if border.is_empty() {
                     report.warnings.push(
                         "no gas at the border of the lattice: the reference is the median of all \
-                         of it"
-                            .into(),
+                         gas"
+                        .into(),
                     );
                     return Ok(or_zero(median(&gas(&all))));
                 }

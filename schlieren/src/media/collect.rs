@@ -17,7 +17,7 @@ impl MediaIntegrator<'_> {
     /// # Panics
     /// If the slices differ in length.
     pub fn integrate(&self, starts: &[Start], ends_m: Option<&[f64]>, out: &mut [MediaIntegrals]) {
-        assert_eq!(starts.len(), out.len(), "one answer per start");
+        assert_eq!(starts.len(), out.len(), "one result per start");
         assert!(ends_m.is_none_or(|e| e.len() == starts.len()), "one end per start");
         let end_m = |i: usize| ends_m.map_or(f64::INFINITY, |e| e[i]);
         let rows = match &self.bend_field {
@@ -65,7 +65,7 @@ impl MediaIntegrator<'_> {
         out: &mut [MediaIntegrals],
     ) {
         use rayon::prelude::*;
-        assert_eq!(starts.len(), out.len(), "one answer per start");
+        assert_eq!(starts.len(), out.len(), "one result per start");
         // A multiple of the packet size, and a few milliseconds of work.
         const CHUNK: usize = 1024;
         starts.par_chunks(CHUNK).zip(out.par_chunks_mut(CHUNK)).enumerate().for_each(

@@ -51,8 +51,8 @@ pub(super) fn expose_lines<'a>(
         };
     if spread_px > 0.5 && !tilted_beams {
         r.report.warnings.push(format!(
-            "the source's extent would blur the picture by {spread_px:.1} pixels, which is left \
-             out; take photons with light.beams = \"auto\""
+            "the source's extent would blur the image by {spread_px:.1} pixels, which is ignored; \
+             use photons with light.beams = \"auto\""
         ));
     }
     r.report.effects.tilted_beams = tilted_beams;
@@ -279,8 +279,8 @@ fn margin_px(
     let limit = f64::from(framing.width.max(framing.height));
     if needed_px > limit {
         report.warnings.push(format!(
-            "light strays by {farthest:.0} pixels, more than the picture's size; what comes from \
-             farther away is left out. Bring the film nearer, or look at more"
+            "light is displaced by {farthest:.0} pixels, more than the image's size; light from \
+             farther away is ignored. Move the film nearer or enlarge the field of view"
         ));
     }
     let margin = needed_px.min(limit) as u32;

@@ -212,8 +212,9 @@ pub(super) fn add_map(
 pub(super) fn warn(scene: &Scene, layers: Layers, warnings: &mut Vec<String>) {
     if scene.media.rotation.is_some() && scene.media.analyser_deg.is_none() && !layers.map {
         warnings.push(
-            "media.rotation does not show in the picture without an analyser (media.analyser_deg); \
-             its angles are in the EXR's layer rotation.Y".into(),
+            "media.rotation is not visible in the image without an analyser (media.analyser_deg); \
+             its angles are in the EXR's layer rotation.Y"
+                .into(),
         );
     }
 }

@@ -284,7 +284,7 @@ pub fn render(
     if scene.march.skip_rad > 0.0 && !measured && !layers.map {
         let name = scene.technique.name();
         r.report.warnings.push(format!(
-            "march.skip_rad changes nothing with technique {name}, which follows no light"
+            "march.skip_rad has no effect with technique {name}, which does not trace light"
         ));
     }
     if layers.map {
@@ -392,9 +392,9 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
         report.silhouette_error_px = Some(error_px);
         if error_px > 0.5 {
             report.warnings.push(format!(
-                "rays are displaced by up to {error_px:.1} pixels and bodies see them straight: \
-                 silhouettes can be off by that much; mark the bodies' cells solid in the flow's \
-                 file"
+                "rays are displaced by up to {error_px:.1} pixels, but bodies are tested against \
+                 straight rays: silhouettes can be off by that much; mark the bodies' cells as \
+                 solid in the flow's file"
             ));
         }
     }
@@ -403,8 +403,8 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
         if pairs > 0 {
             report.warnings.push(format!(
                 "the phase changes by more than half a wave between {pairs} pairs of neighbouring \
-                 pixels: fringes there are finer than pixels and turn grey; take more pixels or \
-                 look at less"
+                 pixels: fringes there are finer than pixels and turn grey; use more pixels or a \
+                 smaller field of view"
             ));
         }
     }
@@ -433,19 +433,19 @@ fn warn_about_image(scene: &Scene, report: &mut Report) {
         };
         report
             .warnings
-            .push(format!("the picture is even ({low:.4} to {high:.4} of white): {cure}"));
+            .push(format!("the image is uniform ({low:.4} to {high:.4} of white): {cure}"));
     }
     if report.tally.blocked_in_field > 0 && report.largest_deflection_rad == Some(0.0) {
         report.warnings.push(
-            "no light passes the flow: every ray that enters it meets cells that are blank or \
-             solid; say what lies outside the mesh (flow.outside) and in hidden cells \
-             (flow.hidden), or look from another side"
+            "no light passes the flow: every ray that enters it meets blank or solid cells; set \
+             the role of nodes outside the mesh (flow.outside) and of hidden cells (flow.hidden), \
+             or view it from another side"
                 .into(),
         );
     }
     if report.tally.not_a_number > 0 {
         report.warnings.push(format!(
-            "{} photons came back with numbers that are none and were left out; please report this",
+            "{} photons returned NaN and were discarded; please report this",
             report.tally.not_a_number
         ));
     }

@@ -26,8 +26,7 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
 }
 
 #[cfg(feature = "gpu")]
-const CURE: &str =
-    "Leave out --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
+const CURE: &str = "Omit --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
 
 /// The error for options that a scene names but that have no kernel.
 #[cfg(feature = "gpu")]
@@ -35,7 +34,7 @@ fn unsupported(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
     let what = match (march.method.as_deref(), march.interpolant.as_deref()) {
         (Some(m), _) if m != "verlet" => format!("the march {m}"),
         (_, Some("trilinear-gradient")) => "the interpolant trilinear-gradient".into(),
-        _ if march.skip_rad > 0.0 => "leaving out even gas (march.skip_rad)".into(),
+        _ if march.skip_rad > 0.0 => "skipping uniform gas (march.skip_rad)".into(),
         _ => return None,
     };
     Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
@@ -116,7 +115,7 @@ pub(super) fn on_gpu<'a>(
             match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
                     warning.get_or_insert(format!(
-                        "{}; it was opened again",
+                        "{}; it was reopened",
                         crate::gpu::failure_message(&e)
                     ));
                     gpu = Gpu::shared()?;

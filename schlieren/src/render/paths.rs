@@ -90,7 +90,7 @@ impl TestSection {
                 if !scene.media.attenuating().is_empty() {
                     planned
                         .warnings
-                        .push("absorption and rotation are collected on the CPU".into());
+                        .push("absorption and rotation are integrated on the CPU".into());
                 }
                 return Ok(self
                     .attenuated(scene, line, view, planned)?
@@ -135,7 +135,7 @@ impl TestSection {
                         match plan.mode {
                             Mode::Paraxial => {
                                 description +=
-                                    &format!(", leaving out at most {:e} rad", march.skip_rad)
+                                    &format!(", skipping at most {:e} rad", march.skip_rad)
                             }
                             Mode::LineOfSight | Mode::Full => {
                                 skip_warning = Some(skipping_has_no_effect(name))
@@ -157,12 +157,12 @@ impl TestSection {
 fn skipping_has_no_effect(march: &str) -> String {
     let why = match march {
         "line-of-sight" => {
-            "the tolerance lets the plan take straight rays, which need no steps through the flow; \
+            "the tolerance lets the plan use straight rays, which need no steps through the flow; \
              force --march verlet to compare"
         }
         _ => "the index is so strong that the plan takes the full march, which samples every step",
     };
-    format!("march.skip_rad changes nothing: {why}")
+    format!("march.skip_rad has no effect: {why}")
 }
 
 /// A march for comparison.

@@ -244,7 +244,7 @@ impl LightPaths for Failed<'_> {
         self.0.difference_step_m()
     }
     fn device_warning(&self) -> Option<String> {
-        Some("the GPU `Lamp 9` failed (out of memory); what it left was computed on the CPU".into())
+        Some("the GPU `Lamp 9` failed (out of memory); the rest was computed on the CPU".into())
     }
 }
 

@@ -64,8 +64,7 @@ impl Scene {
                 "march.skip_rad",
                 skip,
                 format!(
-                    "it changes nothing with march.method = \"{m}\": only verlet can leave out \
-                     even gas"
+                    "it has no effect with march.method = \"{m}\": only verlet can skip uniform gas"
                 ),
             )),
             None => Ok(()),
@@ -129,7 +128,7 @@ impl Scene {
                         return Err(wrong(
                             "technique.cutoff.open",
                             open,
-                            "leave it out where open_m is given",
+                            "omit it if open_m is given",
                         ));
                     }
                     within("technique.cutoff.open", *open, 0.0, 1.0)
@@ -238,7 +237,7 @@ impl Scene {
                 return no_effect(
                     ", because with a knife that leaves a fraction of the source open the image \
                      and its shift grow alike; give the open height technique.cutoff.open_m, or \
-                     take lenses.collimator_m",
+                     use lenses.collimator_m",
                 );
             }
             if !matches!(self.technique, TechniqueSpec::Schlieren { .. }) {
@@ -249,7 +248,8 @@ impl Scene {
         if self.lenses.collimator_m != defaults.collimator_m
             && (point || !self.technique.uses_source())
         {
-            let hint = "; it sets how large the source looks, and there is a point or none";
+            let hint = "; it sets the size of the source's image, and the source is a point or \
+                        unused";
             return Err(SceneError::NoEffect { key: "lenses.collimator_m", technique, hint });
         }
         Ok(())
@@ -268,25 +268,25 @@ impl Scene {
         if self.light.beams == BeamsSpec::Tilted
             && matches!(self.sampling(), SamplingSpec::Beams { .. })
         {
-            return no_effect("light.beams = \"tilted\"", " with sampling by beams; take photons");
+            return no_effect("light.beams = \"tilted\"", " with sampling by beams; use photons");
         }
         self.check_lenses()?;
         if !self.technique.follows_light() {
             if self.film.focus_m.is_some() {
-                return no_effect("film.focus_m", "; it knows no optics");
+                return no_effect("film.focus_m", "; it has no optics");
             }
             if self.sampling.is_some() {
-                return no_effect("sampling", "; it takes one ray per pixel");
+                return no_effect("sampling", "; it traces one ray per pixel");
             }
             if !self.solids.files.is_empty() {
-                return no_effect("solids", "; it knows no light to block");
+                return no_effect("solids", "; it traces no light");
             }
             if self.light.wavelengths_nm.len() > 1 {
                 return no_effect("light.wavelengths_nm (several)", "; give one");
             }
         }
         if matches!(self.technique, TechniqueSpec::Shadowgraph {}) && self.focus_m() == 0.0 {
-            let cure = "focused into the middle of the flow there is no shadowgraph; give the \
+            let cure = "a film in focus at the middle of the flow shows no shadowgraph; give the \
                         film's distance";
             return Err(wrong("film.focus_m", 0.0, cure));
         }

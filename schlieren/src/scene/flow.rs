@@ -199,7 +199,7 @@ impl FlowSpec {
         let named: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
         let [only] = named[..] else {
             return Err(wrong(match named.len() {
-                0 => "nothing says what the index depends on; name the array of the density, or \
+                0 => "no quantity sets the index; name the array of the density, or \
                       those of temperature and pressure"
                     .into(),
                 _ => format!("{} are alternatives; keep one", named.join(" and ")),
@@ -221,7 +221,7 @@ impl FlowSpec {
         ] {
             if present && !belongs {
                 return Err(wrong(format!(
-                    "`{key}` changes nothing with `{only}`; leave one of them out"
+                    "`{key}` has no effect with `{only}`; omit one of them"
                 )));
             }
         }
@@ -237,8 +237,9 @@ impl FlowSpec {
             "temperature" => {
                 let Some(pressure) = text(&self.pressure) else {
                     return Err(wrong(
-                        "a temperature needs a pressure; name its array, or give Pa for all of the \
-                         field, such as pressure = \"101325\"".into(),
+                        "a temperature needs a pressure; name its array, or give one value in Pa \
+                         for the whole field, such as pressure = \"101325\""
+                            .into(),
                     ));
                 };
                 Medium::TemperaturePressure {
@@ -320,11 +321,11 @@ mod tests {
     #[test]
     fn alternatives_and_lacks_are_named() {
         for (text, word) in [
-            ("", "nothing says"),
+            ("", "no quantity sets the index"),
             ("density = \"rho\"\ntemperature = \"T\"", "density and temperature are alternatives"),
             ("temperature = \"T\"", "needs a pressure"),
-            ("density = \"rho\"\nhumidity = \"0.5\"", "`humidity` changes nothing"),
-            ("n_minus_1 = \"n\"\nspecies = { Y = \"He\" }", "`species` changes nothing"),
+            ("density = \"rho\"\nhumidity = \"0.5\"", "`humidity` has no effect"),
+            ("n_minus_1 = \"n\"\nspecies = { Y = \"He\" }", "`species` has no effect"),
             ("density = \"rho\"\nspecies = { Y = \"unobtainium\" }", "unobtainium"),
             ("multifield = { fields = {} }", "no array has a weight"),
             ("multifield = { fields = { T = { knots = [[2, 0], [1, 0]] } } }", "multifield `T`"),

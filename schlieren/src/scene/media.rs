@@ -90,7 +90,7 @@ impl Scene {
         let technique = self.technique.name();
         let no_effect = |key, hint| Err(SceneError::NoEffect { key, technique, hint });
         if !self.technique.follows_light() {
-            return no_effect("media", "; it knows no light to absorb, add or turn");
+            return no_effect("media", "; it traces no light");
         }
         for (property, quantity) in m.quantities() {
             let key = match property {
@@ -112,14 +112,14 @@ impl Scene {
         if m.rotation.is_some() && matches!(self.technique, TechniqueSpec::Interferogram { .. }) {
             return no_effect(
                 "media.rotation",
-                ", whose reference beam is not polarised; take another technique",
+                ", whose reference beam is not polarised; use another technique",
             );
         }
         if let Some(angle) = m.analyser_deg {
             if m.rotation.is_none() {
                 return no_effect(
                     "media.analyser_deg",
-                    ", or give media.rotation: only a rotation makes it show the flow",
+                    ", or give media.rotation: only a rotation makes the flow visible through it",
                 );
             }
             super::check::finite("media.analyser_deg", &[angle])?;

@@ -422,7 +422,7 @@ pub enum SceneError {
         cure: String,
     },
     /// A value that changes no pixel.
-    #[error("{key} changes nothing with technique `{technique}`; leave it out{hint}")]
+    #[error("{key} has no effect with technique `{technique}`; omit it{hint}")]
     NoEffect {
         /// Path of the key.
         key: &'static str,

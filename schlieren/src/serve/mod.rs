@@ -42,7 +42,10 @@ pub enum ServeError {
     #[error(transparent)]
     Refused(#[from] RefusedChange),
     /// The server cannot listen on the address.
-    #[error("cannot listen on {address}; give another address or port (port 0 takes a free one)")]
+    #[error(
+        "cannot listen on {address}; give another address or port (port 0 selects a free \
+             port)"
+    )]
     Listen {
         /// The address.
         address: SocketAddr,

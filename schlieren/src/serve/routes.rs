@@ -75,7 +75,8 @@ async fn guarded(State(app): State<App>, request: Request, next: Next) -> Respon
     let mut response = if constant_time_eq(given, &app.token) {
         next.run(request).await
     } else {
-        let text = "This address lacks the token: open the one that `schlieren serve` printed.\n";
+        let text = "This address lacks the token: open the address that `schlieren serve` \
+                    printed.\n";
         (StatusCode::FORBIDDEN, text).into_response()
     };
     let headers = response.headers_mut();
@@ -111,9 +112,8 @@ fn error(status: StatusCode, text: &str) -> Response {
 
 /// Parses a body as JSON, whatever its content type.
 fn json<T: DeserializeOwned>(body: &Bytes) -> Result<T, Box<Response>> {
-    serde_json::from_slice(body).map_err(|e| {
-        Box::new(error(StatusCode::BAD_REQUEST, &format!("the request makes no sense: {e}")))
-    })
+    serde_json::from_slice(body)
+        .map_err(|e| Box::new(error(StatusCode::BAD_REQUEST, &format!("invalid request: {e}"))))
 }
 
 async fn index() -> Response {

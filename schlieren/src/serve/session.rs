@@ -209,7 +209,7 @@ impl Session {
                 }
                 _ => {
                     return Err(refused(
-                        "this step is not read yet; save the scene when its picture is there",
+                        "this step is not read yet; save the scene when its image is shown",
                     ));
                 }
             }
@@ -383,13 +383,15 @@ impl Session {
         }
         if paint.points.len() > MAX_POINTS {
             return Err(refused(format!(
-                "{} points are more than {MAX_POINTS}; paint in pieces",
+                "{} points are more than {MAX_POINTS}; split the stroke",
                 paint.points.len()
             )));
         }
         let mut shared = self.lock();
         let TechniqueSpec::Schlieren { cutoff } = shared.scene.technique.clone() else {
-            return Err(refused("only schlieren has a filter; take technique schlieren to paint"));
+            return Err(refused(
+                "only schlieren has a filter; select technique schlieren to paint",
+            ));
         };
 
         // The points on the filter.
@@ -398,9 +400,7 @@ impl Session {
             Canvas::Filter => (paint.points.clone(), 0),
             Canvas::Picture => {
                 let Some(view) = &traced_view else {
-                    return Err(refused(
-                        "the picture is not drawn yet; paint when it stands still",
-                    ));
+                    return Err(refused("the image is not rendered yet; paint when it is shown"));
                 };
                 let f2 = shared.scene.optics().schlieren_focal_length_m;
                 let on_filter = |p: &[f64; 2]| {
@@ -446,11 +446,11 @@ impl Session {
     /// light.
     pub fn trace(&self, at: [f64; 2]) -> Result<Option<(PlaneVector, PlaneVector)>, RefusedChange> {
         if !at.iter().all(|c| (0.0..=1.0).contains(c)) {
-            return Err(refused("places of the picture are 0 to 1 from its upper left corner"));
+            return Err(refused("points on the image are 0 to 1 from its upper left corner"));
         }
         let shared = self.lock();
         let view: Option<Arc<DeflectionMap>> = shared.frame.as_ref().and_then(|f| f.traced.clone());
-        let view = view.ok_or_else(|| refused("the picture is not drawn yet"))?;
+        let view = view.ok_or_else(|| refused("the image is not rendered yet"))?;
         let f2 = shared.scene.optics().schlieren_focal_length_m;
         Ok(traced(&view.map, &view.framing, f2, at))
     }
@@ -465,7 +465,7 @@ impl Session {
         let mut shared = self.lock();
         if shared.saves.len() >= QUEUE {
             return Err(refused(format!(
-                "{QUEUE} files are being made already; try again when they are done"
+                "{QUEUE} files are being written already; try again when they are done"
             )));
         }
         let (reply, receiver) = tokio::sync::oneshot::channel();
@@ -570,14 +570,14 @@ fn check_limits(scene: &Scene) -> Result<(), RefusedChange> {
     let [w, h] = scene.film.size;
     if w > MAX_SIDE || h > MAX_SIDE {
         return Err(refused(format!(
-            "film.size is {w}x{h}; the page draws at most {MAX_SIDE} pixels along a side: save the \
-             scene and draw it with `schlieren render --scene`"
+            "film.size is {w}x{h}; the page renders at most {MAX_SIDE} pixels along a side: save \
+             the scene and render it with `schlieren render --scene`"
         )));
     }
     match scene.sampling() {
         SamplingSpec::Photons { samples, .. } if samples > MAX_SAMPLES => Err(refused(format!(
-            "sampling.samples is {samples}; the page takes at most {MAX_SAMPLES}: save the scene \
-             and draw it with `schlieren render --scene`"
+            "sampling.samples is {samples}; the page traces at most {MAX_SAMPLES}: save the scene \
+             and render it with `schlieren render --scene`"
         ))),
         _ => Ok(()),
     }

@@ -168,7 +168,7 @@ impl Worker {
                 let text = panic.downcast_ref::<String>().cloned();
                 let text = text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
                 format!(
-                    "drawing this scene panicked ({}); please report it with the saved scene",
+                    "rendering this scene panicked ({}); please report it with the saved scene",
                     text.unwrap_or_default()
                 )
             }
@@ -420,7 +420,7 @@ impl Worker {
     fn save(&mut self, save: Save) {
         let outcome = catch_unwind(AssertUnwindSafe(|| self.file(&save)));
         let result = outcome.unwrap_or_else(|_| {
-            Err("drawing this scene panicked; please report it with the saved scene".into())
+            Err("rendering this scene panicked; please report it with the saved scene".into())
         });
         // The request may have ended.
         let _ = save.reply.send(result);
@@ -442,7 +442,7 @@ impl Worker {
             .and_then(|r| r)
             .map_err(|e| text(&e))?;
         let folder = tempfile::tempdir().map_err(|e| text(&e))?;
-        let path = folder.path().join("picture");
+        let path = folder.path().join("image");
         match save.kind {
             SaveKind::Png => output::write_png(&path, &rendered).map(|_| ()),
             SaveKind::Exr => {

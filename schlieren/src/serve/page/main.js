@@ -44,7 +44,7 @@ const canPaint = () => kind() === "schlieren";
 function onFrame(frame) {
   info = frame.info;
   $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.draft ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
-  if (info.error) { say(info.error); $("done").textContent = "no picture"; return; }
+  if (info.error) { say(info.error); $("done").textContent = "no image"; return; }
   picture.show(frame, state?.effective.film.size);
   filter.show(frame);
   if (state) state.half = filter.half();
@@ -87,7 +87,7 @@ function say(text, note = false) {
 }
 
 function onLost(lost) {
-  if (lost) { lostSince ??= Date.now(); if (Date.now() - lostSince > 1000) say("The program does not answer: it was ended, or the connection is lost. This page goes on when it is back."); }
+  if (lost) { lostSince ??= Date.now(); if (Date.now() - lostSince > 1000) say("The program does not respond: it has ended, or the connection is lost. This page continues when it is back."); }
   else { lostSince = null; say(null); }
 }
 
@@ -130,7 +130,7 @@ $("clear-white").addEventListener("click", () => ground([1, 1, 1]));
 $("clear-black").addEventListener("click", () => ground([0, 0, 0]));
 $("undo").addEventListener("click", () => {
   const cutoff = state.scene.technique.cutoff;
-  if (cutoff?.kind !== "painted" || !cutoff.strokes.length) return say("nothing is painted that could be undone", true);
+  if (cutoff?.kind !== "painted" || !cutoff.strokes.length) return say("there is no stroke to undo", true);
   return server.change({ technique: { kind: "schlieren", cutoff: { ...cutoff, strokes: cutoff.strokes.slice(0, -1) } } });
 });
 for (const color of ["#ffffff", "#808080", "#000000", "#ff2020", "#ffd020", "#20c040", "#20a0ff", "#a040ff"]) {

@@ -51,7 +51,7 @@ function cutoffRows(state) {
       rows.push(number("width", "mm", 1e3, s => of(s).width_m, (v, s) => set({ width_m: v })(s)));
       break;
     case "painted":
-      rows.push({ kind: "hint", get: s => `${of(s).strokes.length} strokes. Paint on the filter plane, or choose “paint” above and paint on the picture: each pixel is traced to its place on the filter. The smaller the light source, the finer the picture tells directions apart.` });
+      rows.push({ kind: "hint", get: s => `${of(s).strokes.length} strokes. Paint on the filter plane, or choose “paint” above and paint on the image: each pixel is traced to its point on the filter. The smaller the light source, the better the directions are resolved.` });
   }
   return rows;
 }
@@ -126,7 +126,7 @@ function filmRows(state) {
   }));
   if (sampling.method === "photons") {
     const filters = { none: { kind: "none" }, gaussian: { kind: "gaussian", sigma_px: 0.8 }, mean: { kind: "mean", radius_px: 1 }, cone: { kind: "cone", nearest: 16 } };
-    rows.push(choice("against noise", Object.keys(filters), s => e(s).sampling.filter.kind, (v, s) => ({ sampling: { ...e(s).sampling, filter: filters[v] } })));
+    rows.push(choice("noise filter", Object.keys(filters), s => e(s).sampling.filter.kind, (v, s) => ({ sampling: { ...e(s).sampling, filter: filters[v] } })));
   }
   rows.push(text("tolerance", "rad", s => e(s).march.tolerance_rad.toExponential().replace("e+0", ""), v => ({ march: { tolerance_rad: Number(v) } })));
   return rows;

@@ -114,7 +114,7 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
     assert!(Scene::from_toml(&s.toml().unwrap()).is_ok());
 
     let on_picture = Paint { on: Canvas::Picture, ..stroke(vec![[0.5, 0.5]], [1.0; 3]) };
-    assert!(s.paint(&on_picture).unwrap_err().0.contains("not drawn yet"));
+    assert!(s.paint(&on_picture).unwrap_err().0.contains("not rendered yet"));
     for (wrong, word) in [
         (stroke(vec![[f64::NAN, 0.0]], [1.0; 3]), "finite"),
         (stroke(vec![[0.0, 0.0]], [2.0, 0.0, 0.0]), "0 to 1"),
