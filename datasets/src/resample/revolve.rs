@@ -67,14 +67,14 @@ pub fn revolve(
             }
         },
     );
-    let back = report::resampling_error(mesh, samples, lattice, &values);
+    let resampling_error = report::resampling_error(mesh, samples, lattice, &values);
     let of = |m: Mark| marks.iter().filter(|x| **x == m).count();
     let report = Report {
         inside: of(Mark::Inside),
         outside: of(Mark::Outside),
         hidden: of(Mark::Hidden),
         not_finite: of(Mark::NotFinite),
-        back,
+        resampling_error,
         ..flat.report
     };
     Ok(ResampledField { lattice: *lattice, values, marks, report })

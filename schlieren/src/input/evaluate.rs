@@ -99,8 +99,7 @@ fn warn_without_index(columns: &[Column], out: &[f64], options: &Options, report
             Medium::Electrons(_) => "the electron density is negative or above the critical one",
             _ => {
                 "no gas has these values (temperature not above 0 K, negative pressure or density, \
-                 or \
-                 humidity beyond boiling)"
+                 or humidity beyond boiling)"
             }
         };
         report.warnings.push(format!(
@@ -215,8 +214,8 @@ fn by_state(
     {
         report.warnings.push(format!(
             "temperatures from {:.1} to {:.1} K are not all in -40..100 C, where Ciddor's equation \
-             holds: \
-             Gladstone-Dale with the density of an ideal gas is used; for flames name the species",
+             holds: Gladstone-Dale with the density of an ideal gas is used; for flames name the \
+             species",
             s.low, s.high
         ));
     }
