@@ -187,7 +187,7 @@ fn programs_appear_are_changed_live_and_show_what_it_costs() {
     look(&mut b, "two-programs");
 
     // Only the requests that were rejected on purpose may cause errors.
-    let others: Vec<&String> = b.complaints.iter().filter(|c| !c.contains("422")).collect();
+    let others: Vec<&String> = b.page_errors.iter().filter(|c| !c.contains("422")).collect();
     assert!(others.is_empty(), "{others:?}");
     drop(p);
     b.wait_for("!document.getElementById('lost').hidden");

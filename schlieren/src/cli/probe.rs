@@ -67,7 +67,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         Status::Turned => "turned back or aside",
     };
     let light = if blocked { 0.0 } else { exit.transmission };
-    let energy = if light > 0.0 { t.energy(&photon) } else { [0.0; 3] };
+    let energy = if light > 0.0 { t.attenuated_energy(&photon) } else { [0.0; 3] };
     let view = &section.view;
     let world = view.centre_m + view.right * position_m[0] + view.up * position_m[1];
     let waves = f64::from(optics.film_path_difference_m(&exit, section.fields[0].n0() as f32))

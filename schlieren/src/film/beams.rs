@@ -137,7 +137,9 @@ fn corners<const C: usize>(
             return LOST;
         }
         let shift_m = technique.optics().film_shift_m(start, exit);
-        let of = |image_point_m| technique.energy(&Photon { start, exit, image_point_m, shift_m });
+        let of = |image_point_m| {
+            technique.attenuated_energy(&Photon { start, exit, image_point_m, shift_m })
+        };
         let mut energy = [0.0f32; 3];
         match source_points {
             [] => energy = of([0.0; 2]),

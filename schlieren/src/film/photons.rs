@@ -171,8 +171,12 @@ fn expose_tile<const C: usize>(
                 continue;
             }
             let shift_m = optics.film_shift_m(start, exit);
-            let energy =
-                technique.energy(&Photon { start, exit, image_point_m: image_points[i], shift_m });
+            let energy = technique.attenuated_energy(&Photon {
+                start,
+                exit,
+                image_point_m: image_points[i],
+                shift_m,
+            });
             let shift = if technique.samples_from_film() { [0.0; 2] } else { shift_m };
             // A NaN or infinity in either becomes NaN here; comparisons with it are false.
             let check = (shift[0] + shift[1] + energy[0] + energy[1] + energy[2]) * 0.0;

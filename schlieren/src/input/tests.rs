@@ -255,7 +255,11 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
     assert!(r.outside > 0 && field.count(Node::Blank) == r.outside && r.hidden == 0, "{r:?}");
     // Linear interpolation between radii up to 0.17 apart, and back, has an error of half a per
     // cent of the range.
-    assert!(r.back.rms / r.back.range < 5e-3 && r.back.compared > 700, "{r:?}");
+    assert!(
+        r.resampling_error.rms / r.resampling_error.range < 5e-3
+            && r.resampling_error.compared > 700,
+        "{r:?}"
+    );
     assert!(report.warnings.iter().any(|w| w.contains("outside the mesh and are blank")));
     for (role, node) in [(Role::Solid, Node::Solid), (Role::Gas, Node::Gas)] {
         let other =

@@ -96,7 +96,7 @@ impl Technique {
     /// The energy that a photon leaves on the film, with [`Exit::transmission`]. Absorption dims
     /// only the object beam, so an interferogram loses contrast before it gets dark.
     #[inline]
-    pub fn energy(&self, photon: &Photon<'_>) -> Rgb {
+    pub fn attenuated_energy(&self, photon: &Photon<'_>) -> Rgb {
         let left = photon.exit.transmission;
         match self {
             Technique::Interferogram(i) if left < 1.0 => [i.dimmed(photon, left); 3],
