@@ -242,7 +242,7 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                         w.contains("lattice") && w.contains(&format!("{tolerance:.1e}"))
                     };
                     let is_warned = planned.warnings.iter().any(named);
-                    assert!(kept || is_warned, "nobody was told: {what}");
+                    assert!(kept || is_warned, "no warning: {what}");
                     got += usize::from(kept);
                     warned += usize::from(is_warned);
                     for_nothing += usize::from(is_warned && angle < 0.05 * tolerance);

@@ -23,7 +23,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "main.js",
         "server.js",
         "units.js",
-        "picture.js",
+        "image.js",
         "filter.js",
         "settings.js",
         "curves.js",
@@ -115,7 +115,7 @@ fn srgb(v: f32) -> u8 {
 }
 
 #[test]
-fn every_technique_and_cutoff_draws() {
+fn every_technique_and_cutoff_renders() {
     let s = Server::start(&SMALL);
     let mut last = s.finished().rgb;
     for technique in ["shadowgraph", "interferogram", "bos", "volume", "slice", "schlieren"] {
@@ -162,23 +162,23 @@ fn painting_changes_the_image_where_its_light_is() {
         assert_eq!(answer.status, 200, "{}", answer.text());
         s.finished()
     };
-    let by_picture = red("picture", json!([at]));
+    let by_image = red("picture", json!([at]));
     let pixel = |rgb: &[u8], at: [f64; 2]| {
         let i = 3 * ((at[1] * 48.0) as usize * 96 + (at[0] * 96.0) as usize);
         [rgb[i], rgb[i + 1], rgb[i + 2]]
     };
-    let p = pixel(&by_picture.rgb, at);
+    let p = pixel(&by_image.rgb, at);
     assert!(p[0] > 240 && p[1] < 80, "{p:?}");
     assert!(
-        pixel(&by_picture.rgb, [0.05, 0.9]).iter().all(|v| *v > 250),
+        pixel(&by_image.rgb, [0.05, 0.9]).iter().all(|v| *v > 250),
         "undisturbed light is not painted on"
     );
-    assert!(changed(&white.filter, &by_picture.filter) > 0.0);
+    assert!(changed(&white.filter, &by_image.filter) > 0.0);
 
     // Painting at the same point on the filter changes nothing more; painting on the axis makes the
     // background red.
     let by_filter = red("filter", json!([place]));
-    assert!(changed(&by_picture.rgb, &by_filter.rgb) < 0.01);
+    assert!(changed(&by_image.rgb, &by_filter.rgb) < 0.01);
     let axis = red("filter", json!([[0.0, 0.0]]));
     let p = pixel(&axis.rgb, [0.05, 0.9]);
     assert!(p[0] > 240 && p[1] < 80, "{p:?}");
@@ -353,7 +353,7 @@ fn dropped_and_idle_connections_are_left_behind() {
 
 #[cfg(unix)]
 #[test]
-fn ctrl_c_ends_it_soon_even_while_it_draws_and_someone_waits() {
+fn ctrl_c_ends_it_soon_even_while_it_renders_and_someone_waits() {
     let mut s = Server::start(&SMALL);
     s.change(&json!({"film": {"size": [2048, 2048]}, "sampling": {"method": "photons", "samples": 4096}}));
     let mut wait = s.connect();

@@ -95,7 +95,7 @@ fn looking_orbiting_painting_and_switching() {
     let mut b = Browser::open(&program, &s.url());
     b.wait_for("document.readyState === 'complete' && document.body.dataset.finished === 'true'");
     let first = look(&mut b, "first");
-    let (image, filter) = (rect(&mut b, "picture"), rect(&mut b, "filter"));
+    let (image, filter) = (rect(&mut b, "image"), rect(&mut b, "filter"));
     assert!(image[2] > 300.0 && (image[2] / image[3] - 2.0).abs() < 0.05, "{image:?}");
     let text = b.evaluate("document.body.innerText").to_string();
     for word in [
@@ -168,8 +168,8 @@ fn looking_orbiting_painting_and_switching() {
         "fetch('state').then(r => r.json()).then(s => s.scene.technique.cutoff.strokes.length > 0)",
     );
     wait_until_final(&mut b);
-    let on_picture = look(&mut b, "painted-picture");
-    assert!(differs(&clear, &on_picture, image, [0.59, 0.38, 0.61, 0.42]) > 0.8, "under the brush");
+    let on_image = look(&mut b, "painted-image");
+    assert!(differs(&clear, &on_image, image, [0.59, 0.38, 0.61, 0.42]) > 0.8, "under the brush");
 
     // Switch the technique: the image and the settings change.
     b.evaluate(
@@ -179,7 +179,7 @@ fn looking_orbiting_painting_and_switching() {
     b.wait_for("document.body.innerText.includes('fringe spacing')");
     wait_until_final(&mut b);
     let switched = look(&mut b, "interferogram");
-    assert!(differs(&on_picture, &switched, image, [0.3, 0.1, 0.9, 0.9]) > 0.2);
+    assert!(differs(&on_image, &switched, image, [0.3, 0.1, 0.9, 0.9]) > 0.2);
     assert!(
         b.evaluate("document.querySelector('input[value=paint]').disabled") == true,
         "no filter to paint on"

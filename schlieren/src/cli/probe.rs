@@ -128,7 +128,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
         format!(
             "pixel {x}, {y}: {status}\n\
              undisturbed ray  through ({:.6}, {:.6}, {:.6}) m along ({:.4}, {:.4}, {:.4})\n\
-             leaves the field {:.6} m behind the middle, displaced by ({:.4e}, {:.4e}) m\n\
+             leaves the field {:.6} m behind the centre, displaced by ({:.4e}, {:.4e}) m\n\
              deflection       right {dx:.6e}, up {dy:.6e} rad{error}\n\
              optical path     {:+.6e} m, {waves:+.4} waves of {} nm\n\
              film             shifted by ({:.4}, {:.4}) pixels\n\

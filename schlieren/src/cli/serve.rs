@@ -70,7 +70,7 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
     let mut printed = Ok(());
     let outcome = serve::serve(scene, steps, args.listen, cancel.flag(), |url| {
         printed = common.result(&json!({ "url": url }), || format!("open {url}"));
-        common.note(0, "Ctrl-C ends");
+        common.note(0, "Ctrl-C ends the program");
     });
     match outcome {
         Err(serve::ServeError::Refused(why)) => return Err(UsageError(why.to_string()).into()),

@@ -100,12 +100,12 @@ pub struct IndexResult {
 /// Computes n − 1 for `conditions`.
 ///
 /// ```
-/// use schlieren::index::conditions::{Conditions, compute};
+/// use schlieren::index::conditions::{Conditions, IndexResult, compute};
 /// // A row of NIST's table: 40 C, 120 kPa, 75 % humidity.
 /// let (temperature_c, pressure_pa) = (40.0, 120e3);
 /// let moist =
 ///     Conditions { temperature_c, pressure_pa, humidity: 0.75, ..Default::default() };
-/// let result = compute(&moist)?;
+/// let result: IndexResult = compute(&moist)?;
 /// assert!((result.n_minus_1 - 2.99418e-4).abs() < 1e-9 && result.warnings.is_empty());
 /// # Ok::<(), schlieren::index::IndexError>(())
 /// ```

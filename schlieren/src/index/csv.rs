@@ -28,9 +28,10 @@ pub fn compute(path: &Path) -> Result<IndexTable, ReadError> {
 /// Computes n − 1 by Ciddor's equation for every row of the table.
 ///
 /// ```
-/// use schlieren::index::csv::compute_table;
+/// use schlieren::index::csv::{IndexTable, compute_table};
 /// let text = b"T_C,p_Pa,lambda_um,RH_frac,CO2_ppm\n20,101325,0.633,0,450\n";
-/// let results = compute_table(datasets::read::csv::read_from_bytes("t.csv".as_ref(), text)?)?;
+/// let table = datasets::read::csv::read_from_bytes("t.csv".as_ref(), text)?;
+/// let results: IndexTable = compute_table(table)?;
 /// let mut out = Vec::new();
 /// results.write(&mut out).unwrap();
 /// assert_eq!(out, b"T_C,p_Pa,lambda_um,RH_frac,CO2_ppm,n_minus_1\n20,101325,0.633,0,450,2.71799831635e-4\n");

@@ -196,9 +196,9 @@ mod tests {
         let (k_he, k_air) = (m.blend(&[1.0]).k_m3_per_kg, m.blend(&[0.0]).k_m3_per_kg);
         let air = m.blend(&[0.0]);
         let background = air.n_minus_1(air.density_kg_m3(293.15, 101_325.0));
-        let (right, thesis) =
+        let (right, dissertation) =
             (background - b.n_minus_1(rho), background - (0.1 * k_he + 0.9 * k_air) * rho);
-        let error = thesis / right - 1.0;
+        let error = dissertation / right - 1.0;
         assert!((0.11..0.14).contains(&error), "{error}");
     }
 

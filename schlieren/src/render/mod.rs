@@ -65,7 +65,7 @@ pub enum RenderError {
     /// The view is invalid.
     #[error(transparent)]
     View(#[from] crate::view::ViewError),
-    /// An image for comparison cannot be drawn.
+    /// An image for comparison cannot be rendered.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
     /// The number of fields differs from the number of wavelengths.
@@ -78,7 +78,7 @@ pub enum RenderError {
     },
     /// The program is built without the GPU march.
     #[error(
-        "this program is built without the feature gpu; take --device cpu (march.device in a scene)"
+        "this program is built without the feature gpu; use --device cpu (march.device in a scene)"
     )]
     NoGpu,
     /// The GPU was requested but cannot compute this.
@@ -104,7 +104,7 @@ pub enum RenderError {
     /// A cone filter would have to keep too many photons.
     #[error(
         "the cone filter keeps every photon, and {photons} are more than the {limit} it may keep; \
-         take fewer samples or another filter"
+         use fewer samples or another filter"
     )]
     TooManyPhotons {
         /// Number of photons wanted.

@@ -160,7 +160,7 @@ fn skipping_has_no_effect(march: &str) -> String {
             "the tolerance lets the plan use straight rays, which need no steps through the flow; \
              force --march verlet to compare"
         }
-        _ => "the index is so strong that the plan takes the full march, which samples every step",
+        _ => "the index is so strong that the plan uses the full march, which samples every step",
     };
     format!("march.skip_rad has no effect: {why}")
 }

@@ -40,7 +40,7 @@ impl<'a> PlannedPaths<'a> {
             warnings.push(format!(
                 "deflections are off by up to {:.1e} rad, above the tolerance of \
                  {tolerance_rad:.1e} rad; the flow has structures that its lattice does not \
-                 resolve: smooth shocks (flow.smoothing_nodes) or take a finer lattice",
+                 resolve: smooth shocks (flow.smoothing_nodes) or use a finer lattice",
                 a.max_rad
             ));
         }
@@ -48,9 +48,9 @@ impl<'a> PlannedPaths<'a> {
             achieved.filter(|a| a.resolution_rad.is_finite() && a.resolution_rad > tolerance_rad)
         {
             warnings.push(format!(
-                "the flow's own lattice leaves deflections open by about {:.1e} rad, above the \
-                 tolerance of {tolerance_rad:.1e} rad, whatever march is taken: take a finer \
-                 lattice, smooth shocks (flow.smoothing_nodes), or ask for less \
+                "the flow's own lattice limits deflections to about {:.1e} rad, above the \
+                 tolerance of {tolerance_rad:.1e} rad, with any march: use a finer lattice, \
+                 smoother shocks (flow.smoothing_nodes) or a larger tolerance \
                  (march.tolerance_rad)",
                 a.resolution_rad
             ));

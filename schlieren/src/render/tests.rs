@@ -96,7 +96,8 @@ fn the_map_is_the_closed_form_with_row_0_at_the_top() {
         }
         worst_phase = worst_phase.max((f64::from(m.waves[i]) - n0 * path / 633e-9).abs());
     }
-    // σ is four voxels: the B-spline's error is far below 3e-3 of the deflections, which reach 3e-5.
+    // σ is four voxels, where the B-spline's relative error is far below 3e-3. Deflections reach
+    // 3e-5.
     assert!(
         m.largest_deflection_rad > 2e-5 && worst < 3e-3 * m.largest_deflection_rad,
         "{worst:e}"

@@ -36,7 +36,7 @@ const ASSETS: [(&str, &str, &str); 8] = [
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
     ("units.js", JAVASCRIPT, include_str!("page/units.js")),
-    ("picture.js", JAVASCRIPT, include_str!("page/picture.js")),
+    ("image.js", JAVASCRIPT, include_str!("page/image.js")),
     ("filter.js", JAVASCRIPT, include_str!("page/filter.js")),
     ("settings.js", JAVASCRIPT, include_str!("page/settings.js")),
     ("curves.js", JAVASCRIPT, include_str!("page/curves.js")),

@@ -123,7 +123,8 @@ pub enum Canvas {
     /// The filter itself.
     Filter,
     /// The image; each point is traced to the filter.
-    Picture,
+    #[serde(rename = "picture")]
+    Image,
 }
 
 /// The result of painting.
@@ -398,7 +399,7 @@ impl Session {
         let traced_view = shared.frame.as_ref().and_then(|f| f.traced.clone());
         let (points_m, dark) = match paint.on {
             Canvas::Filter => (paint.points.clone(), 0),
-            Canvas::Picture => {
+            Canvas::Image => {
                 let Some(view) = &traced_view else {
                     return Err(refused("the image is not rendered yet; paint when it is shown"));
                 };

@@ -145,7 +145,7 @@ impl Browser {
     /// A screenshot of the window as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let result = self.call("Page.captureScreenshot", json!({"format": "png"}));
-        base64::decode(result["data"].as_str().expect("a picture")).expect("base64")
+        base64::decode(result["data"].as_str().expect("an image")).expect("base64")
     }
 
     // ---- WebSocket (RFC 6455) -------------------------------------------------------------------

@@ -1,7 +1,7 @@
 // The page: turns the user's actions into changes of the scene, and shows the program's states and frames.
 
 import * as server from "./server.js";
-import * as picture from "./picture.js";
+import * as image from "./image.js";
 import * as filter from "./filter.js";
 import * as settings from "./settings.js";
 import * as curves from "./curves.js";
@@ -45,7 +45,7 @@ function onFrame(frame) {
   info = frame.info;
   $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.draft ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
   if (info.error) { say(info.error); $("done").textContent = "no image"; return; }
-  picture.show(frame, state?.effective.film.size);
+  image.show(frame, state?.effective.film.size);
   filter.show(frame);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
@@ -106,7 +106,7 @@ function orbit(azimuth, elevation) {
 const radius = () => Math.max(1e-9, Number($("radius").value) / 1e3 || 0);
 const paint = on => points => server.paint({ on, points, radius_m: radius(), rgb: linear($("color").value) });
 
-picture.interact({
+image.interact({
   angles: () => angles || [0, 0], orbit, paints: () => tool === "paint" && canPaint(), paint: paint("picture"), trace: server.trace, mark: filter.point,
 });
 filter.interact({ paints: canPaint, radius, paint: paint("filter") });
@@ -114,7 +114,7 @@ filter.interact({ paints: canPaint, radius, paint: paint("filter") });
 function setTool(next) {
   tool = next;
   document.querySelector(`input[name=tool][value=${next}]`).checked = true;
-  picture.setPainting(next === "paint");
+  image.setPainting(next === "paint");
 }
 for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
 for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view } }));

@@ -113,8 +113,8 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
     assert_eq!(scene(&s).light.source, source);
     assert!(Scene::from_toml(&s.toml().unwrap()).is_ok());
 
-    let on_picture = Paint { on: Canvas::Picture, ..stroke(vec![[0.5, 0.5]], [1.0; 3]) };
-    assert!(s.paint(&on_picture).unwrap_err().0.contains("not rendered yet"));
+    let on_image = Paint { on: Canvas::Image, ..stroke(vec![[0.5, 0.5]], [1.0; 3]) };
+    assert!(s.paint(&on_image).unwrap_err().0.contains("not rendered yet"));
     for (wrong, word) in [
         (stroke(vec![[f64::NAN, 0.0]], [1.0; 3]), "finite"),
         (stroke(vec![[0.0, 0.0]], [2.0, 0.0, 0.0]), "0 to 1"),
@@ -129,7 +129,7 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
 
 #[test]
 fn strokes_on_the_image_do_not_cross_a_shock() {
-    let paint = Paint { on: Canvas::Picture, points: vec![], radius_m: 1e-4, rgb: [0.0; 3] };
+    let paint = Paint { on: Canvas::Image, points: vec![], radius_m: 1e-4, rgb: [0.0; 3] };
     let made = strokes(&[[0.0, 0.0], [1e-4, 0.0], [5e-3, 0.0]], &paint);
     assert_eq!(made.len(), 3);
     assert_eq!((made[1].from_m, made[1].to_m), ([0.0, 0.0], [1e-4, 0.0]));

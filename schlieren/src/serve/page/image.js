@@ -2,7 +2,7 @@
 
 import { quantity, round125 } from "./units.js";
 
-const canvas = document.getElementById("picture"), stage = document.getElementById("stage");
+const canvas = document.getElementById("image"), stage = document.getElementById("stage");
 const context = canvas.getContext("2d");
 const scale = document.getElementById("scale"), here = document.getElementById("here");
 
