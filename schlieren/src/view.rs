@@ -44,8 +44,8 @@ pub enum ViewError {
     Direction(f64, f64, f64),
     /// An angle is not finite, or the elevation is beyond the poles.
     #[error(
-        "azimuth {azimuth_deg} and elevation {elevation_deg} degrees do not make a view; \
-         elevations are between -90 and 90"
+        "azimuth {azimuth_deg} and elevation {elevation_deg} degrees are not a view; elevations \
+         are between -90 and 90"
     )]
     Angles {
         /// Azimuth given.

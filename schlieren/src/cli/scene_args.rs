@@ -113,7 +113,7 @@ struct FilmArgs {
     /// photon per pixel, and narrower for more
     #[arg(long, value_name = "FILTER", value_parser = filter)]
     filter: Option<FilterSpec>,
-    /// Positions of the photons: sobol or random
+    /// Jitter of the photons: sobol or random
     #[arg(long, value_name = "NAME", value_parser = jitter)]
     jitter: Option<Jitter>,
     /// Seed of the jitter

@@ -142,7 +142,7 @@ impl Media {
             }
             if negative > 0 {
                 out.push(format!(
-                    "media.{name}: {negative} of {nodes} values are below 0; they are taken as 0"
+                    "media.{name}: {negative} of {nodes} values are below 0; they are treated as 0"
                 ));
             }
         }

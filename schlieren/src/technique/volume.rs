@@ -21,13 +21,13 @@ use rt_core::volume::{Volume, VolumeError, VolumeOptions, VolumeQuality};
 #[non_exhaustive]
 pub enum ComparisonError {
     /// No grid can be made of the field's gradient.
-    #[error("the gradient of the field makes no grid")]
+    #[error("the gradient of the field cannot be stored as a grid")]
     Grid(#[from] GridError),
     /// No volume can be made of the grid.
-    #[error("the gradient of the field makes no volume")]
+    #[error("the gradient of the field cannot be rendered as a volume")]
     Volume(#[from] VolumeError),
     /// No transfer function can be made of the strength.
-    #[error("the strength of the comparison makes no transfer function; give a number above 0")]
+    #[error("the strength gives no valid transfer function; give a number above 0")]
     Transfer(#[from] TransferFunctionError),
 }
 
