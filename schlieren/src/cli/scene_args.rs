@@ -106,7 +106,8 @@ struct FilmArgs {
     /// Photons per pixel [default: 16; shadowgraphs are noise-free]
     #[arg(long, value_name = "N")]
     samples: Option<u32>,
-    /// Beams between the rays of a lattice instead of photons; the default for shadowgraphs
+    /// Trace a lattice of rays and spread the light of its cells, in place of photons; the default
+    /// for shadowgraphs
     #[arg(long, conflicts_with_all = ["samples", "filter", "jitter", "seed", "tilted_beams"])]
     noise_free: bool,
     /// Noise filter: none, gaussian:SIGMA, mean:RADIUS (pixels) or cone:NEAREST; its size is for 1
