@@ -1,23 +1,20 @@
 //! Error against time of the sampled effects, for low-discrepancy and independent sample points.
 
 use super::Context;
-use crate::clock::{self, Clock, Sample};
+use super::image_error::{ImageCase, ImageError, measure_in_turns};
 use crate::image::framing::Framing;
 use crate::meshes;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
-use crate::runner::{Schedule, Variant, interleave};
-use datasets::cli::Interrupted;
+use crate::runner::Schedule;
 use glam::DVec3;
 use rt_core::bvh::{BuildOptions, World};
-use rt_core::camera::Camera;
-use rt_core::frame::Frame;
+use rt_core::camera::{Camera, ThinLens};
 use rt_core::light::Light;
 use rt_core::material::Material;
-use rt_core::render::{RenderOptions, StopReason, render};
+use rt_core::render::RenderOptions;
 use rt_core::sampler::Sampling;
 use rt_core::scene::{AmbientOcclusion, Scene};
-use std::cell::RefCell;
 
 /// Seed of the references, so that they share no points with any measured image.
 const REFERENCE_SEED: u64 = 0x5eed;
@@ -26,8 +23,17 @@ const REFERENCE_SEED: u64 = 0x5eed;
 struct Quantity {
     name: &'static str,
     scene: Scene,
+    camera: Camera,
     /// Returns the scene and the options for the given number of samples.
     with: fn(&Scene, &RenderOptions, u32) -> (Scene, RenderOptions),
+}
+
+impl Quantity {
+    fn case(&self, options: &RenderOptions, n: u32) -> ImageCase {
+        let (scene, options) = (self.with)(&self.scene, options, n);
+        let name = format!("{}, {}, {n}", self.name, options.sampling.name());
+        ImageCase { name, scene, camera: self.camera, options }
+    }
 }
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
@@ -51,12 +57,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          low-discrepancy samples with another \
          seed. Ambient occlusion and soft shadows are sampled at the pixel’s centre alone, so that \
          each curve shows one \
-         source of error; antialiasing is the pixel’s area."
+         source of error; antialiasing is the pixel’s area; depth of field is that area and a lens \
+         of 0.03 of the scene’s radius, focused on its middle."
     ));
     let mesh = meshes::coarse_wavelet(if context.quick { 41 } else { 101 })?;
     let world = World::from_mesh(mesh, &BuildOptions::default())?;
     let camera = Framing::Fitted.of(&world, [pixels, pixels])?;
-    for quantity in quantities(world, &camera) {
+    for quantity in quantities(world, &camera)? {
         let mut plot = Plot::lines(
             &format!("{}: error against time", quantity.name),
             Axis::log("time", "ms"),
@@ -66,53 +73,22 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let plain =
             RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
-        let (exact, _) = image(&quantity, &camera, &options, reference)?;
-        // All settings of a quantity alternate, so that a slow minute of the machine affects all of
-        // them.
+        let (exact, ..) = quantity.case(&options, reference).render()?;
         let counts: Vec<u32> = (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most).collect();
         let settings: Vec<(Sampling, u32)> =
             Sampling::ALL.into_iter().flat_map(|s| counts.iter().map(move |n| (s, *n))).collect();
         context.report_step(format!("{}: {} settings in turns", quantity.name, settings.len()))?;
-        let frames: RefCell<Vec<Option<Frame>>> = RefCell::new(vec![None; settings.len()]);
-        let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
-        let mut variants: Vec<Variant<'_>> = settings
+        let cases: Vec<ImageCase> = settings
             .iter()
-            .enumerate()
-            .map(|(i, &(sampling, n))| {
-                let options = RenderOptions { sampling, ..plain.clone() };
-                let (quantity, camera, frames, failed) = (&quantity, &camera, &frames, &failed);
-                Variant::timed(format!("{}, {n}", sampling.name()), move || {
-                    // After Ctrl-C, images end at once.
-                    match image(quantity, camera, &options, n) {
-                        Ok((frame, sample)) => {
-                            frames.borrow_mut()[i] = Some(frame);
-                            sample
-                        }
-                        Err(e) => {
-                            failed.borrow_mut().get_or_insert(e);
-                            Sample::default()
-                        }
-                    }
-                })
-            })
+            .map(|&(sampling, n)| quantity.case(&RenderOptions { sampling, ..plain.clone() }, n))
             .collect();
-        let timings = interleave(&context.schedule(Schedule::all_threads(), 5.0), &mut variants)?;
-        drop(variants);
-        if let Some(e) = failed.into_inner() {
-            return Err(e);
-        }
-        for ((timed, (sampling, n)), frame) in
-            timings.variants.iter().zip(&settings).zip(frames.into_inner())
-        {
-            let (Some(frame), time) = (frame, timed.summary(Clock::Wall)) else { continue };
-            let (rms, largest) = difference(&frame, &exact);
+        let images = measure_in_turns(&context.schedule(Schedule::all_threads(), 5.0), &cases)?;
+        for ((sampling, n), image) in settings.iter().zip(&images) {
+            let error = ImageError::of(&image.frame, &exact);
             let row = Row::new().with("quantity", quantity.name).with("sampling", sampling.name());
-            let row = row.with("samples", *n).with("time", time.median * 1e3);
-            let row = row.with("time_low", time.low * 1e3).with("time_high", time.high * 1e3);
-            let row = row.with("rounds", timed.samples.len()).with("rms_error", rms);
-            record
-                .rows
-                .push(row.with("largest_error", largest).with("reference_samples", reference));
+            let row = image.timed(row.with("samples", *n)).with("rms_error", error.rms);
+            let row = row.with("largest_error", error.largest);
+            record.rows.push(row.with("reference_samples", reference));
         }
         let mut words = vec![];
         for sampling in Sampling::ALL {
@@ -142,9 +118,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
+fn quantities(world: World, camera: &Camera) -> anyhow::Result<Vec<Quantity>> {
     let b = world.bounds();
     let radius = f64::from(b.radius());
+    let center = world.origin() + b.center().as_dvec3();
     let eye = camera.eye().unwrap_or(DVec3::ZERO);
     let mut plain = Scene::new(world);
     plain.materials = vec![Material::matte([0.8; 3])];
@@ -154,10 +131,13 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
     let mut soft = plain.clone();
     let place = eye + camera.world_from_view() * DVec3::new(radius, 1.5 * radius, 0.0);
     soft.lights = vec![Light::point(place).with_size(0.3 * radius).expect("a light with a size")];
-    vec![
+    let lens = ThinLens { aperture_radius: 0.03 * radius, focus_distance: (center - eye).length() };
+    let camera = *camera;
+    Ok(vec![
         Quantity {
             name: "ambient occlusion",
             scene: ao,
+            camera,
             with: |s, o, rays| {
                 let mut scene = s.clone();
                 scene.ambient_occlusion =
@@ -168,43 +148,22 @@ fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
         Quantity {
             name: "soft shadow",
             scene: soft,
+            camera,
             with: |s, o, light_rays| (s.clone(), RenderOptions { light_rays, ..o.clone() }),
         },
         Quantity {
             name: "antialiasing",
-            scene: plain,
+            scene: plain.clone(),
+            camera,
             with: |s, o, samples| (s.clone(), RenderOptions { samples, ..o.clone() }),
         },
-    ]
-}
-
-/// Renders the image; returns it with the time that the renderer took.
-fn image(
-    q: &Quantity,
-    camera: &Camera,
-    options: &RenderOptions,
-    n: u32,
-) -> anyhow::Result<(Frame, Sample)> {
-    let (scene, options) = (q.with)(&q.scene, options, n);
-    let (output, sample) = clock::measure(|| render(&scene, camera, &options));
-    let output = output?;
-    if output.report.stopped == StopReason::Cancelled {
-        return Err(Interrupted.into());
-    }
-    Ok((output.frame, sample))
-}
-
-/// Root mean square and largest difference of the colour channels, in grey levels.
-fn difference(a: &Frame, b: &Frame) -> (f64, f64) {
-    let (mut squares, mut largest) = (0.0, 0.0f64);
-    for (x, y) in a.color.iter().zip(&b.color) {
-        for c in 0..3 {
-            let d = f64::from(x[c] - y[c]) * 255.0;
-            squares += d * d;
-            largest = largest.max(d.abs());
-        }
-    }
-    ((squares / (3 * a.color.len().max(1)) as f64).sqrt(), largest)
+        Quantity {
+            name: "depth of field",
+            scene: plain,
+            camera: camera.with_lens(lens)?,
+            with: |s, o, samples| (s.clone(), RenderOptions { samples, ..o.clone() }),
+        },
+    ])
 }
 
 #[cfg(test)]
@@ -216,13 +175,13 @@ mod tests {
         let world = World::from_mesh(meshes::coarse_wavelet(21).unwrap(), &BuildOptions::default())
             .unwrap();
         let camera = Framing::Fitted.of(&world, [32, 32]).unwrap();
-        for q in quantities(world, &camera) {
+        for q in quantities(world, &camera).unwrap() {
             let draw = |sampling, seed, n| {
                 let options = RenderOptions { sampling, seed, ..RenderOptions::new(32, 32) };
-                image(&q, &camera, &options, n).unwrap().0
+                q.case(&options, n).render().unwrap().0
             };
             let exact = draw(Sampling::Sobol, REFERENCE_SEED, 1024);
-            let error = |sampling, n| difference(&draw(sampling, 0, n), &exact).0;
+            let error = |sampling, n| ImageError::of(&draw(sampling, 0, n), &exact).rms;
             let [few, many] = [4, 64].map(|n| error(Sampling::Sobol, n));
             let random = error(Sampling::Random, 64);
             assert!(many < 0.5 * few, "{}: {few} with 4 samples, {many} with 64", q.name);

@@ -2,9 +2,13 @@
 
 mod accuracy_build;
 mod accuracy_composite;
+mod accuracy_gpu;
+mod accuracy_paths;
+mod accuracy_resample;
 mod accuracy_robust;
 mod accuracy_sampling;
 mod accuracy_schlieren;
+mod accuracy_volume;
 mod baselines;
 mod baselines_schlieren;
 mod call_overhead;
@@ -20,6 +24,7 @@ mod fig5_11;
 mod fig5_12;
 mod fig5_13;
 mod fig5_14;
+mod image_error;
 mod installed_tracers;
 mod many_ranks;
 mod paraview;
@@ -160,9 +165,22 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "accuracy-sampling",
         chapter: 4,
-        title: "Error against time of ambient occlusion, soft shadows and antialiasing, by \
-                sampling",
+        title: "Error against time of ambient occlusion, soft shadows, antialiasing and depth of \
+                field, by sampling",
         run: accuracy_sampling::run,
+    },
+    Experiment {
+        id: "accuracy-paths",
+        chapter: 4,
+        title: "Error against time of path tracing by samples, and of the limits on bounces and on \
+                the share of a ray",
+        run: accuracy_paths::run,
+    },
+    Experiment {
+        id: "accuracy-volume",
+        chapter: 4,
+        title: "Error against time of volume rendering: tolerances and fixed steps",
+        run: accuracy_volume::run,
     },
     Experiment {
         id: "accuracy-build",
@@ -225,6 +243,20 @@ pub const ALL: &[Experiment] = &[
         title: "Error against time of light’s way through a gas, and the tolerance asked against \
                 the error got",
         run: accuracy_schlieren::run,
+    },
+    Experiment {
+        id: "accuracy-gpu",
+        chapter: 5,
+        title: "Error against time of light's way through a gas: CPU in double and single \
+                precision, and GPU",
+        run: accuracy_gpu::run,
+    },
+    Experiment {
+        id: "accuracy-resample",
+        chapter: 5,
+        title: "Error of deflections against the size of the lattice to which a mesh is resampled, \
+                and its time",
+        run: accuracy_resample::run,
     },
     Experiment {
         id: "shock-angles",
