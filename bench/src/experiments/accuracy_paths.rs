@@ -1,5 +1,6 @@
-//! Error against time of light that takes several bounces: samples of path tracing, the limit on
-//! bounces, and the smallest share of a mirror's or glass's ray.
+//! Error against time of light that takes several bounces or goes through a lens: samples of path
+//! tracing and of depth of field, the limit on bounces, and the smallest share of a mirror's or
+//! glass's ray.
 
 use super::Context;
 use super::image_error::{ImageCase, ImageError, VISIBLE_LEVELS, measure_in_turns};
@@ -9,7 +10,7 @@ use crate::runner::Schedule;
 use datasets::generate::shapes::cube;
 use glam::{DAffine3, DVec3, Vec3};
 use rt_core::bvh::Geometry;
-use rt_core::camera::Camera;
+use rt_core::camera::{Camera, ThinLens};
 use rt_core::environment::{Background, Environment};
 use rt_core::light::Light;
 use rt_core::material::Material;
@@ -88,7 +89,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ));
     record.notes.push(format!(
         "Mirrors and glass: nine balls above a floor that reflects a third, {p} x {p} pixels, one \
-         ray through the middle of each, so that there is no noise. In `share` the reference sends \
+         ray through the middle of each, so that there is no noise; depth of field sees them through a lens of radius 0.1 that is \
+         focused on the ball in the middle. In `share` the reference sends \
          every ray of at most eight bounces, the default; in `bounces` it has {} bounces and rays \
          of a share of 2^-16 or more.",
         TREE_LIMITS[TREE_LIMITS.len() - 1],
@@ -96,9 +98,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ));
     for (name, glossy) in [("diffuse room", false), ("glossy room", true)] {
         let (scene, camera) = room(glossy)?;
-        path_samples(context, record, name, &scene, &camera, &sizes)?;
+        sample_counts(context, record, name, &scene, &camera, &sizes, true)?;
         path_bounces(context, record, name, &scene, &camera, &sizes)?;
     }
+    let (scene, camera) = balls(1.0)?;
+    let focus_distance = camera.eye().map_or(1.0, |eye| eye.length());
+    let lens = camera.with_lens(ThinLens { aperture_radius: 0.1, focus_distance })?;
+    sample_counts(context, record, "depth of field", &scene, &lens, &sizes, false)?;
     shares(context, record, sizes.tree_pixels)?;
     tree_bounces(context, record, sizes.tree_pixels)
 }
@@ -130,13 +136,15 @@ fn curve(record: &Record, part: &str, scene: &str, is: impl Fn(&Row) -> bool) ->
     rows.filter_map(|r| r.number("time").zip(r.number("rms_error"))).collect()
 }
 
-fn path_samples(
+/// Samples per pixel, by sampling, with path tracing or without.
+fn sample_counts(
     context: &mut Context<'_>,
     record: &mut Record,
     name: &str,
     scene: &Scene,
     camera: &Camera,
     sizes: &Sizes,
+    path_tracing: bool,
 ) -> anyhow::Result<()> {
     let [most, of_reference] = sizes.samples;
     let case = |sampling: Sampling, seed, samples| ImageCase {
@@ -144,7 +152,7 @@ fn path_samples(
         scene: scene.clone(),
         camera: *camera,
         options: RenderOptions {
-            path_tracing: true,
+            path_tracing,
             light_rays: 1,
             sampling,
             seed,
@@ -165,13 +173,14 @@ fn path_samples(
         record.rows.push(
             image
                 .timed(row("samples", name, case, error))
-                .with("max_bounces", "roulette")
+                .with("max_bounces", if path_tracing { "roulette" } else { "8" })
                 .with("rays", image.rays.total())
-                .with("cut", 0),
+                .with("cut", image.rays.cut_at_max_bounces + image.rays.cut_at_min_contribution),
         );
     }
+    let subject = if path_tracing { format!("path tracing, {name}") } else { name.to_owned() };
     let mut plot = Plot::lines(
-        &format!("path tracing, {name}: error against time"),
+        &format!("{subject}: error against time"),
         Axis::log("time", "ms"),
         levels_axis(),
     );
@@ -185,7 +194,7 @@ fn path_samples(
         plot.series.push(Series::new(sampling.name(), points));
     }
     record.notes.push(format!(
-        "path tracing, {name}: from 1 sample to {most} the error fell: {}. Errors that fall with \
+        "{subject}: from 1 sample to {most} the error fell: {}. Errors that fall with \
          the square root would have fallen {:.1} times.",
         words.join(", "),
         f64::from(most).sqrt()
@@ -309,6 +318,17 @@ fn tree_bounces(context: &mut Context<'_>, record: &mut Record, pixels: u32) -> 
                 .with("rays", image.rays.total())
                 .with("cut", image.rays.cut_at_max_bounces),
         );
+    }
+    let default = record
+        .rows
+        .iter()
+        .find(|r| r.text("part") == Some("bounces") && r.text("max_bounces") == Some("8"))
+        .and_then(|r| r.number("rms_error").zip(r.number("largest_error")));
+    if let Some((rms, largest)) = default {
+        record.notes.push(format!(
+            "The default limit on bounces of mirrors and glass, 8, in grey levels: rms {rms:.2}, \
+             largest {largest:.0}."
+        ));
     }
     let title = "bounces of mirrors and glass";
     let mut plot = Plot::lines(title, Axis::log("time", "ms"), levels_axis());

@@ -9,7 +9,7 @@ use crate::record::{Record, Row};
 use crate::runner::Schedule;
 use glam::DVec3;
 use rt_core::bvh::{BuildOptions, World};
-use rt_core::camera::{Camera, ThinLens};
+use rt_core::camera::Camera;
 use rt_core::light::Light;
 use rt_core::material::Material;
 use rt_core::render::RenderOptions;
@@ -23,16 +23,15 @@ const REFERENCE_SEED: u64 = 0x5eed;
 struct Quantity {
     name: &'static str,
     scene: Scene,
-    camera: Camera,
     /// Returns the scene and the options for the given number of samples.
     with: fn(&Scene, &RenderOptions, u32) -> (Scene, RenderOptions),
 }
 
 impl Quantity {
-    fn case(&self, options: &RenderOptions, n: u32) -> ImageCase {
+    fn case(&self, camera: &Camera, options: &RenderOptions, n: u32) -> ImageCase {
         let (scene, options) = (self.with)(&self.scene, options, n);
         let name = format!("{}, {}, {n}", self.name, options.sampling.name());
-        ImageCase { name, scene, camera: self.camera, options }
+        ImageCase { name, scene, camera: *camera, options }
     }
 }
 
@@ -57,13 +56,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          low-discrepancy samples with another \
          seed. Ambient occlusion and soft shadows are sampled at the pixel’s centre alone, so that \
          each curve shows one \
-         source of error; antialiasing is the pixel’s area; depth of field is that area and a lens \
-         of 0.03 of the scene’s radius, focused on its middle."
+         source of error; antialiasing is the pixel’s area."
     ));
     let mesh = meshes::coarse_wavelet(if context.quick { 41 } else { 101 })?;
     let world = World::from_mesh(mesh, &BuildOptions::default())?;
     let camera = Framing::Fitted.of(&world, [pixels, pixels])?;
-    for quantity in quantities(world, &camera)? {
+    for quantity in quantities(world, &camera) {
         let mut plot = Plot::lines(
             &format!("{}: error against time", quantity.name),
             Axis::log("time", "ms"),
@@ -73,14 +71,16 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let plain =
             RenderOptions { cancel: context.cancel.clone(), ..RenderOptions::new(pixels, pixels) };
         let options = RenderOptions { seed: REFERENCE_SEED, ..plain.clone() };
-        let (exact, ..) = quantity.case(&options, reference).render()?;
+        let (exact, ..) = quantity.case(&camera, &options, reference).render()?;
         let counts: Vec<u32> = (0..).map(|k| 1u32 << (2 * k)).take_while(|n| *n <= most).collect();
         let settings: Vec<(Sampling, u32)> =
             Sampling::ALL.into_iter().flat_map(|s| counts.iter().map(move |n| (s, *n))).collect();
         context.report_step(format!("{}: {} settings in turns", quantity.name, settings.len()))?;
         let cases: Vec<ImageCase> = settings
             .iter()
-            .map(|&(sampling, n)| quantity.case(&RenderOptions { sampling, ..plain.clone() }, n))
+            .map(|&(sampling, n)| {
+                quantity.case(&camera, &RenderOptions { sampling, ..plain.clone() }, n)
+            })
             .collect();
         let images = measure_in_turns(&context.schedule(Schedule::all_threads(), 5.0), &cases)?;
         for ((sampling, n), image) in settings.iter().zip(&images) {
@@ -118,10 +118,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-fn quantities(world: World, camera: &Camera) -> anyhow::Result<Vec<Quantity>> {
+fn quantities(world: World, camera: &Camera) -> Vec<Quantity> {
     let b = world.bounds();
     let radius = f64::from(b.radius());
-    let center = world.origin() + b.center().as_dvec3();
     let eye = camera.eye().unwrap_or(DVec3::ZERO);
     let mut plain = Scene::new(world);
     plain.materials = vec![Material::matte([0.8; 3])];
@@ -131,13 +130,10 @@ fn quantities(world: World, camera: &Camera) -> anyhow::Result<Vec<Quantity>> {
     let mut soft = plain.clone();
     let place = eye + camera.world_from_view() * DVec3::new(radius, 1.5 * radius, 0.0);
     soft.lights = vec![Light::point(place).with_size(0.3 * radius).expect("a light with a size")];
-    let lens = ThinLens { aperture_radius: 0.03 * radius, focus_distance: (center - eye).length() };
-    let camera = *camera;
-    Ok(vec![
+    vec![
         Quantity {
             name: "ambient occlusion",
             scene: ao,
-            camera,
             with: |s, o, rays| {
                 let mut scene = s.clone();
                 scene.ambient_occlusion =
@@ -148,22 +144,14 @@ fn quantities(world: World, camera: &Camera) -> anyhow::Result<Vec<Quantity>> {
         Quantity {
             name: "soft shadow",
             scene: soft,
-            camera,
             with: |s, o, light_rays| (s.clone(), RenderOptions { light_rays, ..o.clone() }),
         },
         Quantity {
             name: "antialiasing",
-            scene: plain.clone(),
-            camera,
-            with: |s, o, samples| (s.clone(), RenderOptions { samples, ..o.clone() }),
-        },
-        Quantity {
-            name: "depth of field",
             scene: plain,
-            camera: camera.with_lens(lens)?,
             with: |s, o, samples| (s.clone(), RenderOptions { samples, ..o.clone() }),
         },
-    ])
+    ]
 }
 
 #[cfg(test)]
@@ -175,10 +163,10 @@ mod tests {
         let world = World::from_mesh(meshes::coarse_wavelet(21).unwrap(), &BuildOptions::default())
             .unwrap();
         let camera = Framing::Fitted.of(&world, [32, 32]).unwrap();
-        for q in quantities(world, &camera).unwrap() {
+        for q in quantities(world, &camera) {
             let draw = |sampling, seed, n| {
                 let options = RenderOptions { sampling, seed, ..RenderOptions::new(32, 32) };
-                q.case(&options, n).render().unwrap().0
+                q.case(&camera, &options, n).render().unwrap().0
             };
             let exact = draw(Sampling::Sobol, REFERENCE_SEED, 1024);
             let error = |sampling, n| ImageError::of(&draw(sampling, 0, n), &exact).rms;

@@ -165,15 +165,15 @@ pub const ALL: &[Experiment] = &[
     Experiment {
         id: "accuracy-sampling",
         chapter: 4,
-        title: "Error against time of ambient occlusion, soft shadows, antialiasing and depth of \
-                field, by sampling",
+        title: "Error against time of ambient occlusion, soft shadows and antialiasing, by \
+                sampling",
         run: accuracy_sampling::run,
     },
     Experiment {
         id: "accuracy-paths",
         chapter: 4,
-        title: "Error against time of path tracing by samples, and of the limits on bounces and on \
-                the share of a ray",
+        title: "Error against time of path tracing and depth of field by samples, and of the \
+                limits on bounces and on the share of a ray",
         run: accuracy_paths::run,
     },
     Experiment {
