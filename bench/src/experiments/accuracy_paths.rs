@@ -403,7 +403,7 @@ fn balls(window: f32) -> anyhow::Result<(Scene, Camera)> {
         *mirror = 1.0 / 3.0;
     }
     builder.mesh(floor, paint);
-    builder.light(Light::directional(DVec3::new(1.0, -1.0, 2.0)).with_color([0.6; 3]));
+    // A parallel light would make highlights on the mirrors that hardly a sample finds.
     // The window is a patch of two texels above the horizon, behind the viewer's left shoulder.
     const WIDTH: usize = 32;
     const HEIGHT: usize = 16;
