@@ -24,17 +24,19 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
         Ok(manifest) => members(&manifest),
         Err(e) => return Outcome::Failed(format!("Cargo.toml: {e}")),
     };
-    let (mut faults, mut arguments) = (Vec::new(), ARGUMENTS.to_vec());
+    let mut faults = Vec::new();
+    let mut arguments: Vec<String> = ARGUMENTS.iter().map(|a| (*a).to_owned()).collect();
     for member in &members {
-        match read(&format!("{member}/Cargo.toml")) {
-            Ok(manifest) if manifest.lines().any(|l| l == "publish = false") => {
-                arguments.extend(["--exclude", member]);
-                continue;
-            }
-            Ok(_) => {}
+        let manifest = match read(&format!("{member}/Cargo.toml")) {
+            Ok(manifest) => manifest,
             Err(e) => return Outcome::Failed(format!("{member}/Cargo.toml: {e}")),
+        };
+        let name = name(&manifest).to_owned();
+        if manifest.lines().any(|l| l == "publish = false") {
+            arguments.extend(["--exclude".to_owned(), name]);
+            continue;
         }
-        let files = match list(context.root, member) {
+        let files = match list(context.root, &name) {
             Ok(files) => files,
             Err(e) => return Outcome::Failed(e),
         };
@@ -50,16 +52,23 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
         return Outcome::Failed(format!("{} faults in packages", faults.len()));
     }
     println!("cargo {}", arguments.join(" "));
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     runner::cargo(context, &arguments, &[])
 }
 
-/// The names in `members = [...]` of the root's manifest, which is one line.
+/// The folders in `members = [...]` of the root's manifest.
 fn members(manifest: &str) -> Vec<String> {
-    let line = manifest.lines().find_map(|l| l.strip_prefix("members = "));
-    line.map_or(Vec::new(), |l| l.split('"').skip(1).step_by(2).map(str::to_owned).collect())
+    let list = manifest.split_once("\nmembers = [").and_then(|(_, rest)| rest.split_once(']'));
+    list.map_or(Vec::new(), |(l, _)| l.split('"').skip(1).step_by(2).map(str::to_owned).collect())
 }
 
-/// The files of a member's package, by path from the member's folder.
+/// The name of the package with this manifest.
+fn name(manifest: &str) -> &str {
+    let line = manifest.lines().find_map(|l| l.strip_prefix("name = \""));
+    line.map_or("", |l| l.trim_end_matches('"'))
+}
+
+/// The files of the package `member`, by path from its folder.
 fn list(root: &Path, member: &str) -> Result<Vec<String>, String> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .args(["package", "--list", "--allow-dirty", "-p", member])
@@ -128,9 +137,11 @@ mod tests {
         let root = crate::workspace_root();
         let manifest = std::fs::read_to_string(root.join("Cargo.toml")).expect("a manifest");
         let members = members(&manifest);
-        assert!(members.len() >= 7 && members.contains(&"bench".to_owned()), "{members:?}");
+        assert!(members.len() >= 8 && members.contains(&"bench".to_owned()), "{members:?}");
         for member in members {
-            assert!(root.join(&member).join("Cargo.toml").is_file(), "{member}");
+            let manifest = std::fs::read_to_string(root.join(&member).join("Cargo.toml"));
+            let name = name(&manifest.expect(&member)).to_owned();
+            assert_eq!(name, member.replace('/', "-"));
         }
     }
 

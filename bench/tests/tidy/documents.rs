@@ -241,17 +241,17 @@ fn architecture_names_every_room() {
 /// The sections of every member's README, in this order; others may stand between.
 const README_SECTIONS: &[&str] = &["## Use it", "## Read on", "## Invariants"];
 
-fn readme_faults(member: &str, text: &str) -> Vec<String> {
+fn readme_faults(member: &str, folder: &str, text: &str) -> Vec<String> {
     let mut faults = Vec::new();
     if text.lines().next() != Some(&format!("# {member}")) {
-        faults.push(format!("{member}/README.md: the first line is not `# {member}`"));
+        faults.push(format!("{folder}/README.md: the first line is not `# {member}`"));
     }
     let headings: Vec<&str> = text.lines().filter(|l| l.starts_with("## ")).collect();
     let mut from = 0;
     for section in README_SECTIONS {
         match headings[from..].iter().position(|h| h.starts_with(section)) {
             Some(at) => from += at + 1,
-            None => faults.push(format!("{member}/README.md: `{section}` is missing or misplaced")),
+            None => faults.push(format!("{folder}/README.md: `{section}` is missing or misplaced")),
         }
     }
     faults
@@ -259,9 +259,12 @@ fn readme_faults(member: &str, text: &str) -> Vec<String> {
 
 #[test]
 fn readmes_of_members_have_the_same_order() {
-    let readmes = crate::manifests::members().into_keys();
-    let faults: Vec<_> = readmes
-        .flat_map(|member| readme_faults(&member, &document(&format!("{member}/README.md")).text))
+    let faults: Vec<_> = crate::manifests::members()
+        .into_iter()
+        .flat_map(|(name, member)| {
+            let path = format!("{}/README.md", member.folder);
+            readme_faults(&name, &member.folder, &document(&path).text)
+        })
         .collect();
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
@@ -269,11 +272,11 @@ fn readmes_of_members_have_the_same_order() {
 #[test]
 fn planted_readmes_out_of_order_are_found() {
     let good = "# m\n\n## Use it\n\n## What it does\n\n## Read on\n\n## Invariants\n";
-    assert_eq!(readme_faults("m", good), Vec::<String>::new());
-    assert_eq!(readme_faults("n", good).len(), 1, "another name");
-    assert_eq!(readme_faults("m", &good.replace("## Read on", "## More")).len(), 1);
+    assert_eq!(readme_faults("m", "m", good), Vec::<String>::new());
+    assert_eq!(readme_faults("n", "m", good).len(), 1, "another name");
+    assert_eq!(readme_faults("m", "m", &good.replace("## Read on", "## More")).len(), 1);
     let swapped = "# m\n## Read on\n## Use it\n## Invariants\n";
-    assert_eq!(readme_faults("m", swapped).len(), 1);
+    assert_eq!(readme_faults("m", "m", swapped).len(), 1);
 }
 
 // ---- The map of the sources ---------------------------------------------------------------------

@@ -1,6 +1,7 @@
 //! Rules for the Cargo.toml files: dependencies between members, and the place of versions.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::process::Command;
 
 use crate::tree::{File, root};
@@ -21,6 +22,9 @@ const ALLOWED_DEPENDENCIES: &[(&str, May, &[&str])] = &[
     ("schlieren", May::Use, &["rt-core", "datasets"]),
     ("composite", May::UseBehindAFeature, &["rt-core", "datasets"]),
     ("gluray", May::Use, &["rt-core", "composite", "datasets"]),
+    // For the tests alone: they run programs with the shared library.
+    ("gluray", May::UseBehindAFeature, &["gluray-interposer"]),
+    ("gluray-interposer", May::Use, &["gluray"]),
     ("vtk-bridge", May::Use, &["rt-core"]),
     ("vtk-bridge", May::UseBehindAFeature, &["datasets"]),
     ("bench", May::Use, &["rt-core", "datasets", "schlieren", "composite", "gluray", "vtk-bridge"]),
@@ -35,8 +39,16 @@ pub(crate) struct Dependency {
     weak: bool,
 }
 
-/// The members with their dependencies on each other, according to cargo.
-pub(crate) fn members() -> BTreeMap<String, Vec<Dependency>> {
+/// A member of the workspace.
+#[derive(Debug, Clone)]
+pub(crate) struct Member {
+    /// Path from the workspace root.
+    pub(crate) folder: String,
+    dependencies: Vec<Dependency>,
+}
+
+/// The members by name, with their dependencies on each other, according to cargo.
+pub(crate) fn members() -> BTreeMap<String, Member> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
         .current_dir(root())
@@ -47,6 +59,7 @@ pub(crate) fn members() -> BTreeMap<String, Vec<Dependency>> {
         serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON");
     let packages = metadata["packages"].as_array().expect("packages");
     let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_owned();
+    let workspace = text(&metadata["workspace_root"]);
     let dependency = |from: &str, d: &serde_json::Value| Dependency {
         from: from.to_owned(),
         to: text(&d["name"]),
@@ -58,9 +71,12 @@ pub(crate) fn members() -> BTreeMap<String, Vec<Dependency>> {
         .map(|p| {
             let name = text(&p["name"]);
             let dependencies = p["dependencies"].as_array().expect("dependencies");
-            let own_dependencies =
+            let dependencies =
                 dependencies.iter().filter(own).map(|d| dependency(&name, d)).collect();
-            (name, own_dependencies)
+            let manifest = PathBuf::from(text(&p["manifest_path"]));
+            let folder = manifest.parent().and_then(|f| f.strip_prefix(&workspace).ok());
+            let folder = folder.expect("members lie in the workspace").display().to_string();
+            (name, Member { folder, dependencies })
         })
         .collect()
 }
@@ -91,10 +107,10 @@ fn dependencies_point_down() {
             "member {name} has no line in ALLOWED_DEPENDENCIES and none in ARCHITECTURE.md"
         );
     }
-    let faults: Vec<_> = members.values().flatten().filter_map(fault).collect();
+    let faults: Vec<_> = members.values().flat_map(|m| &m.dependencies).filter_map(fault).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     assert!(
-        members["bench"].iter().any(|a| a.to == "rt-core"),
+        members["bench"].dependencies.iter().any(|a| a.to == "rt-core"),
         "bench's dependencies were not read"
     );
 }
@@ -114,6 +130,7 @@ fn planted_dependencies_are_found() {
     );
     assert_eq!(fault(&dependency("composite", "rt-core", true)), None);
     assert_eq!(fault(&dependency("gluray", "composite", false)), None);
+    assert!(fault(&dependency("gluray", "gluray-interposer", false)).is_some(), "in tests alone");
 }
 
 // ---- Versions, lints and licences are defined once, in the root ---------------------------------
@@ -153,7 +170,7 @@ fn versions_stand_in_the_root() {
     let read = |path: &str| {
         std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
     };
-    let manifests = members().into_keys().map(|m| format!("{m}/Cargo.toml"));
+    let manifests = members().into_values().map(|m| format!("{}/Cargo.toml", m.folder));
     let faults: Vec<_> =
         manifests.flat_map(|path| not_inherited(&File::new(&path, &read(&path)))).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));

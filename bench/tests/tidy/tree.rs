@@ -3,6 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Members that lie in the folder of another.
+const INNER_MEMBERS: &[&str] = &["gluray/interposer"];
+
 /// A text file of the workspace.
 #[derive(Debug, Clone)]
 pub(crate) struct File {
@@ -25,9 +28,13 @@ impl File {
         self.path.ends_with(".rs")
     }
 
-    /// First folder of the path, which is the member.
+    /// The folder of the member that has the file: the first one of the path, unless a member lies
+    /// inside another.
     pub(crate) fn member(&self) -> &str {
-        self.path.split('/').next().unwrap_or_default()
+        let inner = INNER_MEMBERS
+            .iter()
+            .find(|m| self.path.strip_prefix(**m).is_some_and(|rest| rest.starts_with('/')));
+        inner.copied().unwrap_or_else(|| self.path.split('/').next().unwrap_or_default())
     }
 
     /// `path:line` of a byte offset in `text` or `code`.
