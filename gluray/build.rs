@@ -1,20 +1,9 @@
-//! Writes one trampoline per OpenGL, GLX and EGL entry point of `src/interpose/symbols/names.txt`,
-//! and the hooks of the calls that come per vertex. Nothing of OpenGL is needed on the machine that
-//! builds.
+//! Writes the tables of the OpenGL, GLX and EGL entry points of `src/interpose/symbols/names.txt`,
+//! the macro from which `gluray-interposer` makes one trampoline for each, and the hooks of the
+//! calls that come per vertex. Nothing of OpenGL is needed on the machine that builds.
 
 use std::fmt::Write as _;
 use std::path::Path;
-
-/// How a trampoline reaches its target.
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    /// Straight through the table: our own hooks, which look after themselves.
-    Direct,
-    /// Through the table unless `ARMED` is set: then we are told first.
-    Watched,
-    /// We are always told first.
-    Always,
-}
 
 /// What a call may change; see `interpose::calls::class`.
 fn class(name: &str) -> u32 {
@@ -463,15 +452,32 @@ fn table_of_calls(names: &[&str]) -> String {
     s + "}\n"
 }
 
+/// The macro by which the package `gluray-interposer` writes one trampoline per entry point: its
+/// kind, which says how the trampoline reaches its target, its number and its name.
+fn list_of_entry_points(names: &[&str], hooked: impl Fn(&str) -> bool) -> String {
+    let mut s = String::from(
+        "/// Calls the macro that it is given with the kind, the number and the name of every entry\n\
+         /// point.\n#[doc(hidden)]\n#[macro_export]\nmacro_rules! entry_points {\n\
+         ($with:ident) => { $with! {\n",
+    );
+    for (i, x) in names.iter().enumerate() {
+        let kind = match (hooked(x), flushes(x) || class(x) & (BUFFER | TEXTURE) != 0) {
+            // Our own hooks look after themselves.
+            (true, _) => "direct",
+            // We are always told first.
+            (_, true) => "always",
+            // We are told first while `ARMED` is set.
+            _ => "watched",
+        };
+        writeln!(s, "{kind} {i} {x};").unwrap();
+    }
+    s + "} };\n}\n"
+}
+
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=src/interpose/symbols/names.txt");
     println!("cargo:rerun-if-changed=src/interpose/symbols/hooks.rs");
-    // Without -Bsymbolic the addresses of our own functions bind to libGL's of the same name when
-    // we are a vendor library: an endless loop of jumps. nodelete: our threads must not lose their
-    // code.
-    println!("cargo:rustc-cdylib-link-arg=-Wl,-Bsymbolic");
-    println!("cargo:rustc-cdylib-link-arg=-Wl,-z,nodelete");
     let text = std::fs::read_to_string("src/interpose/symbols/names.txt")
         .expect("src/interpose/symbols/names.txt can be read");
     let names: Vec<&str> = text.split_whitespace().collect();
@@ -490,6 +496,7 @@ fn main() {
         std::fs::write(Path::new(&out).join(file), text).expect("OUT_DIR can be written");
     };
     write("calls.rs", table_of_calls(&names));
+    write("entry_points.rs", list_of_entry_points(&names, hooked));
     let mut s = String::new();
     writeln!(s, "static HOOKS: [Option<Target>; COUNT] = [").unwrap();
     for x in &names {
@@ -503,41 +510,7 @@ fn main() {
     }
     writeln!(
         s,
-        "];\n/// The trampolines' addresses.\npub(super) static TRAMPOLINES: [unsafe \
-                 extern \"C\" fn(); COUNT] = ["
-    )
-    .unwrap();
-    names.iter().for_each(|x| writeln!(s, "trampolines::{x},").unwrap());
-    writeln!(s, "];\nmod trampolines {{ use super::{{TABLE, ARMED, slow, CALLS}};").unwrap();
-    for (i, x) in names.iter().enumerate() {
-        let kind = match (hooked(x), flushes(x) || class(x) & (BUFFER | TEXTURE) != 0) {
-            (true, _) => Kind::Direct,
-            (_, true) => Kind::Always,
-            _ => Kind::Watched,
-        };
-        let at = 8 * i;
-        let code = match kind {
-            Kind::Direct => {
-                format!("\"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + {at}]\", t = sym TABLE")
-            }
-            Kind::Watched => format!(
-                "\"cmp dword ptr [rip + {{a}}], 0\", \"jne 2f\", \"inc qword ptr [rip + \
-                 {{c}}]\", \"mov r11d, {i}\", \"jmp qword ptr [rip + {{t}} + \
-                 {at}]\", \"2:\", \"mov r11d, {i}\", \"jmp {{s}}\", a = sym ARMED, c = sym CALLS, \
-                 t = sym TABLE, s = sym slow"
-            ),
-            Kind::Always => format!("\"mov r11d, {i}\", \"jmp {{s}}\", s = sym slow"),
-        };
-        writeln!(
-            s,
-            "#[unsafe(naked)] #[unsafe(no_mangle)] pub(in crate::interpose::symbols) \
-                     unsafe extern \"C\" fn {x}() {{ core::arch::naked_asm!({code}) }}"
-        )
-        .unwrap();
-    }
-    writeln!(
-        s,
-        "}}\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod \
+        "];\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod \
                  hot_hooks {{ use super::current_context; use \
                  crate::capture::immediate_mode::FastPathResult; use \
                  crate::interpose::driver::found; use super::forward_plainly;"
@@ -595,5 +568,5 @@ fn main() {
         .unwrap();
     }
     writeln!(s, "}}").unwrap();
-    write("trampolines.rs", s);
+    write("hooks.rs", s);
 }

@@ -1,10 +1,11 @@
 //! Ray tracing inside unmodified OpenGL programs (chapter 4 of the dissertation).
 //!
-//! The shared library is loaded between a program and its OpenGL driver. It handles a frame in
-//! five steps:
+//! The shared library is loaded between a program and its OpenGL driver: it is the package
+//! `gluray-interposer`, which has the entry points, and this library. It handles a frame in five
+//! steps:
 //!
-//! 1. The program's OpenGL call enters a trampoline (`interpose`). Most calls go straight on to
-//!    the driver, which keeps all state.
+//! 1. The program's OpenGL call enters a trampoline. Most calls go straight on to the driver, which
+//!    keeps all state; others come to a hook (`interpose`).
 //! 2. For a draw of filled primitives, the library reads the state (`state`) and decides whether
 //!    ray tracing can replace the draw (`classify`).
 //! 3. If it can, the draw becomes a mesh (`capture`). The mesh's hierarchy may already be cached
@@ -34,6 +35,8 @@ pub use classify::reasons;
 pub use cluster::RankStats;
 pub use host::{config, export, folders, panel, report, timeline};
 pub use interpose::glvnd;
+#[doc(hidden)]
+pub use interpose::symbols::interface as interposer;
 
 /// Checks whether ray tracing can replace a program with these shaders. Pass an empty text for a
 /// shader that the program lacks.

@@ -38,7 +38,8 @@ impl Tools {
                 }
                 if gluray.is_none() {
                     missing.push(
-                        "gluray: `cargo build --release -p gluray`, or name it in RTSV_GLURAY"
+                        "gluray: `cargo build --release -p gluray -p gluray-interposer`, or name \
+                         it in RTSV_GLURAY"
                             .to_string(),
                     );
                 }

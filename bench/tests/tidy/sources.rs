@@ -6,7 +6,11 @@ use crate::tree::{File, files, words};
 /// explains each.
 pub(crate) const UNSAFE_MODULES: &[(&str, &str)] = &[
     ("rt-core/src/simd", "vector loads and huge pages below the safe SIMD layer"),
-    ("gluray/src/interpose/symbols", "exported OpenGL symbols, called by programs we do not know"),
+    (
+        "gluray/interposer/src/entry_points",
+        "exported OpenGL symbols, called by programs we do not know",
+    ),
+    ("gluray/src/interpose/symbols", "OpenGL's hooks, called by programs we do not know"),
     ("gluray/src/interpose/driver", "calls into the real OpenGL library"),
     ("gluray/src/interpose/client_memory", "vertex arrays that live in the program's own memory"),
     ("vtk-bridge/src/capi", "the C ABI for VTK and ParaView"),

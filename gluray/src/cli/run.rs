@@ -196,8 +196,12 @@ fn vendors_in_front_of() -> Vec<(String, OsString)> {
 
 /// Runs the program; the result is its exit code.
 pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
+    anyhow::ensure!(
+        crate::interposer::HAS_ENTRY_POINTS,
+        "gluray runs in programs for x86-64 Linux alone"
+    );
     let library = library().context("libgluray.so is not beside this program").cure(
-        "build it with `cargo build --release -p gluray`, or name it in the variable \
+        "build it with `cargo build --release -p gluray-interposer`, or name it in the variable \
                GLURAY_LIBRARY",
     )?;
     let library = fs::canonicalize(&library)?;

@@ -22,9 +22,14 @@ pub fn findings(m: &Machine) -> Vec<Finding> {
     // Ours.
     out.push(match &m.library {
         Some(path) => finding("library", Good, path.display().to_string()),
-        None => finding("library", Bad, "libgluray.so is not beside this program")
-            .cure("build it with `cargo build --release -p gluray`, or name it in GLURAY_LIBRARY"),
+        None => finding("library", Bad, "libgluray.so is not beside this program").cure(
+            "build it with `cargo build --release -p gluray-interposer`, or name it in \
+                   GLURAY_LIBRARY",
+        ),
     });
+    if !crate::interposer::HAS_ENTRY_POINTS {
+        out.push(finding("processor", Bad, "gluray runs in programs for x86-64 Linux alone"));
+    }
 
     // OpenGL, and how programs are reached.
     out.push(match &m.lib_gl {

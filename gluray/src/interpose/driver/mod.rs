@@ -15,10 +15,12 @@ use core::ffi::{CStr, c_char, c_int, c_void};
 use std::ffi::CString;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::Relaxed};
 
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 unsafe extern "C" {
     fn dlvsym(handle: *mut c_void, name: *const c_char, version: *const c_char) -> *mut c_void;
 }
 
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 static DLSYM: AtomicUsize = AtomicUsize::new(0);
 static LIB_GL: AtomicPtr<c_void> = AtomicPtr::new(core::ptr::null_mut());
 static LIB_EGL: AtomicPtr<c_void> = AtomicPtr::new(core::ptr::null_mut());
@@ -31,7 +33,14 @@ pub(crate) extern "C" fn no_context() -> usize {
     0
 }
 
+/// libc's own `dlsym`: there is none of ours.
+#[cfg(not(all(target_arch = "x86_64", target_os = "linux")))]
+pub(crate) fn dlsym_address() -> *const () {
+    libc::dlsym as *const ()
+}
+
 /// libc's own `dlsym`.
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 pub(crate) fn dlsym_address() -> *const () {
     let mut p = DLSYM.load(Relaxed);
     if p == 0 {

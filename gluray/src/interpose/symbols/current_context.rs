@@ -60,7 +60,8 @@ impl Drop for ThreadSlot {
     }
 }
 
-/// The name of this thread; a multiple of 16.
+/// The name of this thread; a multiple of 8.
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 #[inline(always)]
 fn me() -> usize {
     let out: usize;
@@ -71,6 +72,13 @@ fn me() -> usize {
                           fs:[0]", out(reg) out, options(pure, nomem, nostack, preserves_flags));
     }
     out
+}
+
+/// The same where gluray has no entry points.
+#[cfg(not(all(target_arch = "x86_64", target_os = "linux")))]
+fn me() -> usize {
+    thread_local! { static NAME: u64 = const { 0 }; }
+    NAME.with(|name| core::ptr::from_ref(name) as usize)
 }
 
 /// This thread's name and address are no longer in the statics.

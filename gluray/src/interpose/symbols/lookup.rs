@@ -1,6 +1,7 @@
-//! How programs and GLVND find the trampolines: `dlsym`, `glXGetProcAddress`, `__glx_Main` and
-//! `__egl_Main`.
+//! How programs and GLVND find the trampolines: what is behind `dlsym`, `glXGetProcAddress`,
+//! `__glx_Main` and `__egl_Main`.
 
+use super::entry_points::{self, EntryPoints};
 use super::trampoline;
 use crate::interpose::calls::index_of;
 use crate::interpose::driver;
@@ -9,18 +10,29 @@ use core::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::Relaxed};
 
-/// libc's `dlsym`, the target of the jump below.
-static REAL_DLSYM: AtomicPtr<()> = AtomicPtr::new(core::ptr::null_mut());
+/// libc's `dlsym`, from the first look-up on.
+pub static REAL_DLSYM: AtomicPtr<()> = AtomicPtr::new(core::ptr::null_mut());
 
 /// Our address for a name that a program looks up itself, or null for libc's answer.
-unsafe extern "C" fn ours(handle: *mut c_void, name: *const c_char) -> *const () {
+///
+/// # Safety
+/// The arguments must be such as dlsym takes.
+pub unsafe fn looked_up(
+    entry_points: &'static EntryPoints,
+    handle: *mut c_void,
+    name: *const c_char,
+) -> *const () {
     // SAFETY: the program's own arguments of dlsym.
-    caught(|| unsafe { looked_up(handle, name) }).unwrap_or(core::ptr::null())
+    caught(|| unsafe { address_of_ours(entry_points, handle, name) }).unwrap_or(core::ptr::null())
 }
 
 /// # Safety
 /// The arguments must be such as dlsym takes.
-unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
+unsafe fn address_of_ours(
+    entry_points: &'static EntryPoints,
+    handle: *mut c_void,
+    name: *const c_char,
+) -> *const () {
     REAL_DLSYM.store(driver::dlsym_address().cast_mut(), Relaxed);
     if name.is_null() || driver::is_vendor() {
         return core::ptr::null();
@@ -32,33 +44,12 @@ unsafe fn looked_up(handle: *mut c_void, name: *const c_char) -> *const () {
         return core::ptr::null();
     }
     // Not earlier: allocators look up other names before anything can be allocated.
+    entry_points::register(entry_points);
     crate::interpose::panic_guard::injected("dlsym");
     // A name that the program's library lacks is not found here either.
     // SAFETY: the program's own arguments.
     let there = unsafe { driver::call_dlsym(handle, name) };
     if there.is_null() { there } else { trampoline(name).unwrap_or(core::ptr::null()) }
-}
-
-/// Programs see this only under LD_PRELOAD. It jumps to libc's function, so that libc sees the
-/// program's return address, on which RTLD_NEXT depends.
-#[unsafe(naked)]
-#[unsafe(no_mangle)]
-unsafe extern "C" fn dlsym() {
-    core::arch::naked_asm!(
-        "push rdi",
-        "push rsi",
-        "sub rsp, 8",
-        "call {ours}",
-        "add rsp, 8",
-        "pop rsi",
-        "pop rdi",
-        "test rax, rax",
-        "jne 2f",
-        "jmp qword ptr [rip + {real}]",
-        "2:",
-        "ret",
-        ours = sym ours, real = sym REAL_DLSYM
-    )
 }
 
 /// The driver's answer, replaced by our trampoline if there is one. A null answer stays null, for
@@ -73,7 +64,8 @@ pub(super) fn replaced(name: *const c_char, driver: *const ()) -> *const () {
 }
 
 // ---- GLVND --------------------------------------------------------------------------------------
-type Imports = [*const (); 10];
+/// The part that GLX and EGL have in common of the table of functions that a vendor library fills.
+pub type Imports = [*const (); 10];
 type VendorMain = unsafe extern "C" fn(u32, *const c_void, *mut c_void, *mut Imports) -> c_int;
 
 unsafe extern "C" fn glx_address(name: *const c_char) -> *const () {
@@ -109,14 +101,18 @@ unsafe extern "C" fn egl_address(name: *const c_char) -> *const () {
 }
 
 /// GLVND's entry into a GLX vendor library: the driver's, with our addresses.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn __glx_Main(
+///
+/// # Safety
+/// The arguments must be those that GLVND gives to `__glx_Main`.
+pub unsafe fn glx_main(
+    entry_points: &'static EntryPoints,
     version: u32,
     exports: *const c_void,
     vendor: *mut c_void,
     imports: *mut Imports,
 ) -> c_int {
     let find = || {
+        entry_points::register(entry_points);
         crate::interpose::panic_guard::in_program();
         crate::interpose::panic_guard::injected("__glx_Main");
         driver::put_glvnd_first();
@@ -140,14 +136,18 @@ unsafe extern "C" fn __glx_Main(
 }
 
 /// GLVND's entry into an EGL vendor library.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn __egl_Main(
+///
+/// # Safety
+/// The arguments must be those that GLVND gives to `__egl_Main`.
+pub unsafe fn egl_main(
+    entry_points: &'static EntryPoints,
     version: u32,
     exports: *const c_void,
     vendor: *mut c_void,
     imports: *mut Imports,
 ) -> c_int {
     let find = || {
+        entry_points::register(entry_points);
         crate::interpose::panic_guard::in_program();
         crate::interpose::panic_guard::injected("__egl_Main");
         driver::put_glvnd_first();

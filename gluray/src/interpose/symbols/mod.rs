@@ -1,20 +1,13 @@
-//! The OpenGL library that programs see: one trampoline per entry point, a table of their targets,
-//! and the hooks.
-//!
-//! A trampoline has no prototype: it jumps through [`TABLE`] and leaves all registers as the
-//! program set them. Calls that may change state are *watched*. While [`ARMED`] is set, they are
-//! reported before they run (`slow`), which costs some ten nanoseconds. As soon as no report is
-//! needed, they cost one comparison. So the driver can keep all state: it is asked at a draw, and
-//! again only after a watched call.
+//! What is behind the OpenGL library that programs see: the targets of its entry points, which are
+//! hooks of ours or the driver's functions. The entry points themselves are in the package
+//! `gluray-interposer`, which uses [`interface`].
 //!
 //! This is a room for unsafe code: programs that we do not know call everything here.
-#![allow(
-    unsafe_code,
-    reason = "a room: exported OpenGL symbols are called by programs we do not know"
-)]
+#![allow(unsafe_code, reason = "a room: hooks are called by programs we do not know")]
 #![allow(non_snake_case, reason = "the names of OpenGL")]
 
 mod current_context;
+mod entry_points;
 mod hooks;
 mod lookup;
 
@@ -23,25 +16,24 @@ pub(crate) use current_context::{install, take, with_context};
 use crate::capture::ImmediateModeTarget;
 use crate::interpose::calls::{COUNT, NAMES, at, index_of};
 use crate::interpose::driver;
+use entry_points::{ARMED, EntryPoints};
 use std::ffi::CStr;
-use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
+
+/// What the package `gluray-interposer` is written against: what its trampolines read and call, and
+/// what its functions call by which programs and GLVND look them up.
+pub mod interface {
+    pub use super::entry_points::{ARMED, CALLS, COUNT, EntryPoints, HAS_ENTRY_POINTS};
+    pub use super::lookup::{Imports, REAL_DLSYM, egl_main, glx_main, looked_up};
+    pub use super::{left, on_watched_call, resolve};
+}
 
 #[derive(Clone, Copy)]
 struct Target(*const ());
 // SAFETY: addresses of functions.
 unsafe impl Sync for Target {}
 
-include!(concat!(env!("OUT_DIR"), "/trampolines.rs"));
-
-/// The target of each trampoline: first `lazy`, then our hook or the driver's function.
-static TABLE: [AtomicPtr<()>; COUNT] = [const { AtomicPtr::new(lazy as *mut ()) }; COUNT];
-/// Zero while watched calls need not be reported: exactly one thread has a context, and no report
-/// was requested. Bit 0 is set by a request. The bits above it count the threads that have a
-/// context, less one. Both are in one word, so that neither can change unseen while the other is
-/// read.
-static ARMED: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
-/// Watched calls that went straight to the driver.
-static CALLS: AtomicU64 = AtomicU64::new(0);
+include!(concat!(env!("OUT_DIR"), "/hooks.rs"));
 
 /// Requests a report of the next watched call.
 #[inline]
@@ -89,18 +81,20 @@ fn stays_hooked(index: usize) -> bool {
     name.starts_with(b"glX") || name.starts_with(b"egl") || KEPT.contains(&index)
 }
 
-/// After a fault, every entry point becomes the driver's, thread by thread: see [`leaving`].
+/// After a fault, every entry point becomes the driver's, thread by thread: see [`left`].
 pub(crate) fn retire() {
-    for (i, slot) in TABLE.iter().enumerate() {
+    let Some(entry_points) = entry_points::registered() else { return };
+    for (i, slot) in entry_points.targets.iter().enumerate() {
         if HOOKS[i].is_some() && !stays_hooked(i) {
-            slot.store(leaving as *mut (), Relaxed);
+            slot.store(entry_points.leaving as *mut (), Relaxed);
         }
     }
 }
 
 /// The trampoline of an entry point.
 fn trampoline(name: &CStr) -> Option<*const ()> {
-    index_of(name.to_bytes()).map(|i| TRAMPOLINES[i] as *const ())
+    let trampolines = entry_points::registered()?.trampolines;
+    index_of(name.to_bytes()).map(|i| trampolines[i] as *const ())
 }
 
 /// Registers the last update of the report for a normal exit of the program.
@@ -112,7 +106,10 @@ pub(crate) fn at_exit() {
     unsafe { libc::atexit(at_exit) };
 }
 
-extern "C" fn resolve(index: usize) -> *const () {
+/// The target of entry `index`, which is called for the first time. From now on, its trampoline
+/// finds it in the table.
+pub fn resolve(entry_points: &'static EntryPoints, index: usize) -> *const () {
+    entry_points::register(entry_points);
     crate::interpose::panic_guard::in_program();
     // This also applies to entry points that are called for the first time after a fault.
     let hook =
@@ -125,7 +122,7 @@ extern "C" fn resolve(index: usize) -> *const () {
         }
     });
     let target = target.unwrap_or_else(|| forward_plainly(index));
-    TABLE[index].store(target.cast_mut(), Relaxed);
+    entry_points.targets[index].store(target.cast_mut(), Relaxed);
     target
 }
 
@@ -135,7 +132,8 @@ fn forward_plainly(index: usize) -> *const () {
         .unwrap_or(driver::no_context as *const ())
 }
 
-extern "C" fn on_state_call(index: usize) {
+/// A watched call of entry `index` is about to run.
+pub extern "C" fn on_watched_call(index: usize) {
     if crate::interpose::panic_guard::happened() {
         crate::interpose::panic_guard::hand_over_to_driver();
         return;
@@ -147,8 +145,8 @@ extern "C" fn on_state_call(index: usize) {
 }
 
 /// A call of entry `index`, which was ours before a fault: the thread's context draws what it has
-/// held back, then the driver's function is called.
-extern "C" fn left(index: usize) -> *const () {
+/// held back, then the driver's function, the result, is to be called.
+pub extern "C" fn left(index: usize) -> *const () {
     leave_at(index);
     forward_plainly(index)
 }
@@ -167,90 +165,14 @@ fn leave_at(index: usize) {
         });
         tracing_stopped == Some(true) && is_alone()
     });
-    if over == Some(true) && TABLE[index].load(Relaxed) == leaving as *mut () {
-        TABLE[index].store(forward_plainly(index).cast_mut(), Relaxed);
+    let entry = entry_points::registered().map(|e| (&e.targets[index], e.leaving as *mut ()));
+    if over == Some(true)
+        && let Some((target, leaving)) = entry
+        && target.load(Relaxed) == leaving
+    {
+        target.store(forward_plainly(index).cast_mut(), Relaxed);
         disarm();
     }
-}
-
-/// A naked function that runs the first instructions with all argument registers saved, restores
-/// these, and ends with the others: the registers of integers, the number of vector registers in
-/// `al` (variadic calls), those of vectors, and `r11`, the index of the entry.
-macro_rules! with_arguments_kept {
-    ([$($call:literal),*], [$($jump:literal),*], $($operands:tt)*) => {
-        core::arch::naked_asm!(
-            "push rbp",
-            "mov rbp, rsp",
-            "push rdi",
-            "push rsi",
-            "push rdx",
-            "push rcx",
-            "push r8",
-            "push r9",
-            "push rax",
-            "push r11",
-            "sub rsp, 128",
-            "movdqu [rsp], xmm0",
-            "movdqu [rsp+16], xmm1",
-            "movdqu [rsp+32], xmm2",
-            "movdqu [rsp+48], xmm3",
-            "movdqu [rsp+64], xmm4",
-            "movdqu [rsp+80], xmm5",
-            "movdqu [rsp+96], xmm6",
-            "movdqu [rsp+112], xmm7",
-            $($call,)*
-            "movdqu xmm0, [rsp]",
-            "movdqu xmm1, [rsp+16]",
-            "movdqu xmm2, [rsp+32]",
-            "movdqu xmm3, [rsp+48]",
-            "movdqu xmm4, [rsp+64]",
-            "movdqu xmm5, [rsp+80]",
-            "movdqu xmm6, [rsp+96]",
-            "movdqu xmm7, [rsp+112]",
-            "add rsp, 128",
-            "pop r11",
-            "pop rax",
-            "pop r9",
-            "pop r8",
-            "pop rcx",
-            "pop rdx",
-            "pop rsi",
-            "pop rdi",
-            "pop rbp",
-            $($jump,)*
-            $($operands)*
-        )
-    };
-}
-
-/// Finds the target of entry r11 and jumps to it, with all argument registers unchanged.
-#[unsafe(naked)]
-unsafe extern "C" fn lazy() {
-    with_arguments_kept!(
-        ["mov edi, r11d", "call {resolve}", "mov r10, rax"],
-        ["jmp r10"],
-        resolve = sym resolve
-    )
-}
-
-/// The target of former hooks after a fault: see [`left`].
-#[unsafe(naked)]
-unsafe extern "C" fn leaving() {
-    with_arguments_kept!(
-        ["mov edi, r11d", "call {left}", "mov r10, rax"],
-        ["jmp r10"],
-        left = sym left
-    )
-}
-
-/// Reports entry r11, then jumps to its target, with all argument registers unchanged.
-#[unsafe(naked)]
-unsafe extern "C" fn slow() {
-    with_arguments_kept!(
-        ["mov edi, r11d", "call {on_state_call}"],
-        ["lea r10, [rip + {table}]", "jmp qword ptr [r10 + 8*r11]"],
-        on_state_call = sym on_state_call, table = sym TABLE
-    )
 }
 
 #[cfg(test)]
