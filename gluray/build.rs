@@ -425,7 +425,7 @@ fn hand_written() -> Vec<String> {
 }
 
 /// The tables of `interpose::calls`.
-fn table_of_calls(names: &[&str]) -> String {
+fn table_of_calls(names: &[&str], hooked: impl Fn(&str) -> bool) -> String {
     let mut s = String::new();
     let n = names.len();
     writeln!(s, "/// The number of calls.\npub(crate) const COUNT: usize = {n};").unwrap();
@@ -433,13 +433,14 @@ fn table_of_calls(names: &[&str]) -> String {
     names.iter().for_each(|x| writeln!(s, "c\"{x}\",").unwrap());
     writeln!(s, "];\nstatic CLASSES: [u8; COUNT] = [").unwrap();
     names.iter().for_each(|x| write!(s, "{},", class(x)).unwrap());
-    let mut table = |name: &str, holds: fn(&str) -> bool| {
+    let mut table = |name: &str, holds: &dyn Fn(&str) -> bool| {
         writeln!(s, "];\nstatic {name}: [bool; COUNT] = [").unwrap();
         names.iter().for_each(|x| write!(s, "{},", holds(x)).unwrap());
     };
-    table("FLUSHES", flushes);
-    table("OTHER_DRAWS", is_other_draw);
-    table("READS_PIXELS", reads_pixels);
+    table("FLUSHES", &flushes);
+    table("OTHER_DRAWS", &is_other_draw);
+    table("READS_PIXELS", &reads_pixels);
+    table("HOOKED", &hooked);
     writeln!(
         s,
         "];\n/// The number of each call.\n#[allow(dead_code, non_upper_case_globals, reason = \
@@ -495,7 +496,7 @@ fn main() {
     let write = |file: &str, text: String| {
         std::fs::write(Path::new(&out).join(file), text).expect("OUT_DIR can be written");
     };
-    write("calls.rs", table_of_calls(&names));
+    write("calls.rs", table_of_calls(&names, hooked));
     write("entry_points.rs", list_of_entry_points(&names, hooked));
     let mut s = String::new();
     writeln!(s, "static HOOKS: [Option<Target>; COUNT] = [").unwrap();

@@ -63,6 +63,11 @@ pub(crate) fn reads_pixels(index: usize) -> bool {
     READS_PIXELS[index]
 }
 
+/// True for calls that come to a hook of ours.
+pub(crate) fn is_hooked(index: usize) -> bool {
+    HOOKED[index]
+}
+
 /// True for calls that end a frame on the screen.
 pub(crate) fn swaps_buffers(index: usize) -> bool {
     const SWAPS: [usize; 5] = [
