@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What a call may change; see `interpose::calls::class`.
+/// What a call may change; see `calls::class`.
 fn class(name: &str) -> u32 {
     const PURE: u32 = 0;
     if writes_buffers(name) {
@@ -424,7 +424,7 @@ fn hand_written() -> Vec<String> {
     functions.chain(addresses).filter(named).map(str::to_owned).collect()
 }
 
-/// The tables of `interpose::calls`.
+/// The tables of `calls`.
 fn table_of_calls(names: &[&str], hooked: impl Fn(&str) -> bool) -> String {
     let mut s = String::new();
     let n = names.len();
@@ -514,7 +514,7 @@ fn main() {
         "];\n#[allow(clippy::unnecessary_cast, reason = \"written by a program\")] mod \
                  hot_hooks {{ use super::current_context; use \
                  crate::capture::immediate_mode::FastPathResult; use \
-                 crate::interpose::driver::found; use super::forward_plainly;"
+                 crate::driver::found; use super::forward_plainly;"
     )
     .unwrap();
     for h in &hot {

@@ -17,19 +17,24 @@
 //!    (`present::framebuffer_pass`).
 //!
 //! The driver draws whatever the library does not understand, and the depth buffer combines the
-//! two. A fault in the library ends the tracing, not the program (`interpose::panic_guard`).
+//! two. A fault in the library ends the tracing, not the program (`faults`).
 #![deny(unsafe_code)]
 
+mod calls;
 mod capture;
 mod classify;
 pub mod cli;
 mod cluster;
 pub mod doctor;
+mod driver;
+mod enums;
+mod faults;
 mod host;
 mod interpose;
 mod present;
 mod state;
 mod trace;
+mod watched_calls;
 
 pub use classify::reasons;
 pub use cluster::RankStats;

@@ -60,7 +60,7 @@ fn said_of(code: &str) -> String {
     let file = folder.path().join("lib.rs");
     let path = |name: &str| format!("{:?}", sources.join(name));
     let rest = REST
-        .replace("ENUMS", &path("state/enums.rs"))
+        .replace("ENUMS", &path("enums.rs"))
         .replace("CLIENT_MEMORY", &path("interpose/client_memory.rs"));
     let safe = format!(
         "mod safe {{\n#![forbid(unsafe_code)]\nuse crate::interpose::client_memory::*;\nuse \

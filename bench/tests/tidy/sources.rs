@@ -11,7 +11,7 @@ pub(crate) const UNSAFE_MODULES: &[(&str, &str)] = &[
         "exported OpenGL symbols, called by programs we do not know",
     ),
     ("gluray/src/interpose/symbols", "OpenGL's hooks, called by programs we do not know"),
-    ("gluray/src/interpose/driver", "calls into the real OpenGL library"),
+    ("gluray/src/driver", "calls into the real OpenGL library"),
     ("gluray/src/interpose/client_memory", "vertex arrays that live in the program's own memory"),
     ("vtk-bridge/src/capi", "the C ABI for VTK and ParaView"),
     ("vtk-bridge/src/loader", "finds the VTK that is in the process and loads what fits it"),

@@ -56,7 +56,7 @@ impl AttributeCache {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::enums::BYTE;
+    use crate::enums::BYTE;
 
     #[test]
     fn the_same_bytes_are_copied_once_and_other_bytes_again() {

@@ -3,7 +3,7 @@
 use crate::capture::Capture;
 use crate::capture::draw::{Draw, Shading, TexturedDraw, Values};
 use crate::capture::primitives::QuadSplit;
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::matrix::{product, transform};
 use crate::state::snapshot::Snapshot;
 use crate::trace::lighting::LightingSetup;

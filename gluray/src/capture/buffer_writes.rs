@@ -1,11 +1,11 @@
 //! Counts writes to buffer objects. Geometry in buffers is read once, and again only after a write.
 
+use crate::calls::class;
 use crate::capture::ImmediateModeTarget;
-use crate::interpose::calls::class;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::interpose::client_memory::ArraySource;
 use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
 use std::collections::HashMap;
 
 /// The numbers of the writes to the buffers of a share group.

@@ -14,11 +14,11 @@ pub(crate) use recording::ListRecording;
 
 use crate::capture::ImmediateModeTarget;
 use crate::capture::evaluators::MapKind;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
-use crate::interpose::symbols;
 use crate::state::current_attributes::CurrentAttributes;
-use crate::state::enums::*;
+use crate::watched_calls;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ const DEEPEST: u32 = 64;
 
 impl Context {
     pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
-        if crate::interpose::panic_guard::happened() {
+        if crate::faults::happened() {
             // The name now belongs to the driver.
             self.shared.lists().lists.remove(&name);
             return false;
@@ -106,7 +106,7 @@ impl Context {
         let lists = self.shared.lists_of_group();
         self.capture.recording = Some(ListRecording::new(name, execute, lists));
         self.capture.immediate_target = ImmediateModeTarget::List;
-        symbols::arm();
+        watched_calls::arm();
         true
     }
 
@@ -150,7 +150,7 @@ impl Context {
         if self.capture.recording.is_some() {
             return self.capture.list_op(ListOp::Call(name));
         }
-        if crate::interpose::panic_guard::happened() {
+        if crate::faults::happened() {
             return self.execute_in_driver(name);
         }
         let known = self.shared.lists().lists.get(&name).cloned();
@@ -410,7 +410,7 @@ impl Context {
 
     pub(crate) fn call_lists(&mut self, kind: u32, names: &[u8]) -> bool {
         let Some(names) = names::decode(kind, names) else { return false };
-        if crate::interpose::panic_guard::happened() {
+        if crate::faults::happened() {
             let base = gl::word(LIST_BASE);
             names.into_iter().for_each(|n| self.execute_in_driver_or_call(base.wrapping_add(n)));
             return true;
@@ -452,7 +452,7 @@ impl Context {
         }
         if self.capture.immediate_target == ImmediateModeTarget::Pass
             || self.capabilities.core
-            || crate::interpose::panic_guard::happened()
+            || crate::faults::happened()
         {
             return None;
         }

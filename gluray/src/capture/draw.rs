@@ -2,8 +2,8 @@
 
 use crate::capture::geometry_cache::Geometry;
 use crate::classify::vtk::VtkProgram;
+use crate::enums::*;
 use crate::state::current_attributes::CurrentAttributes;
-use crate::state::enums::*;
 use crate::state::material::Materials;
 use crate::state::snapshot::Snapshot;
 use crate::trace::overrides::RayMaterial;

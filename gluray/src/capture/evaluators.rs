@@ -11,11 +11,11 @@ mod maps;
 
 use crate::capture::ImmediateModeTarget;
 use crate::classify::rules::Classification;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
 use crate::interpose::flush_reason::FlushReason;
-use crate::interpose::symbols;
-use crate::state::enums::*;
+use crate::watched_calls;
 pub(crate) use maps::MapKind;
 use maps::{EvaluatedVertex, EvaluatorMaps};
 
@@ -234,7 +234,7 @@ impl Context {
         if classification == Classification::TraceInOrder {
             self.flush(FlushReason::OrderedDraw);
         }
-        symbols::arm();
+        watched_calls::arm();
         self.trace_mesh(range);
         if classification == Classification::TraceInOrder {
             self.end_batch();

@@ -354,7 +354,7 @@ fn hash_chunk(bytes: &[u8]) -> u128 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::enums::TRIANGLES;
+    use crate::enums::TRIANGLES;
 
     fn grid(n: usize) -> Vec<[f32; 3]> {
         (0..n).map(|i| [i as f32, (i * i % 17) as f32, (i % 5) as f32]).collect()

@@ -1,15 +1,15 @@
 //! Immediate mode: Begin and End, vertices, and the attributes that vertices take.
 
+use crate::calls::class;
 use crate::capture::ImmediateModeTarget;
 use crate::classify::rules::Classification;
-use crate::interpose::calls::class;
+use crate::enums::*;
 use crate::interpose::context::Context;
 use crate::interpose::flush_reason::FlushReason;
-use crate::interpose::symbols;
 use crate::state::current_attributes::stale;
-use crate::state::enums::*;
 use crate::state::material::set_material;
 use crate::state::material_properties::MaterialProperties;
+use crate::watched_calls;
 
 /// The result of the fast path of a call. The fast path takes values and calls nothing, so that
 /// they stay in registers: a value that is stored in parts and loaded as a whole costs more than
@@ -97,7 +97,7 @@ impl Context {
                 self.capture.recorder.begin(mode, &self.attributes.current);
                 self.capture.immediate_target = ImmediateModeTarget::Trace;
                 self.capture.element_arrays = None;
-                symbols::arm();
+                watched_calls::arm();
                 true
             }
             _ => {

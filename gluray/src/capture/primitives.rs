@@ -2,7 +2,7 @@
 //! across a quad and the flat colour of a triangle depend on it (compatibility profile
 //! specification, section 10.1; Mesa's vertex order).
 
-use crate::state::enums::*;
+use crate::enums::*;
 
 /// Primitives of one kind and size that follow one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,7 +1,7 @@
 //! Reads texture images from the driver, when something is drawn with them.
 
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::trace::texturing::{BaseFormat, Filters, Image, Level, Mip, Texels};
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -9,14 +9,14 @@ use crate::capture::geometry_cache::hash;
 use crate::capture::primitives::{QuadSplit, is_filled, triangulate};
 use crate::classify::rules::Classification;
 use crate::classify::vtk::DrawCall;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::interpose::client_memory::{
     ActiveCall, ArraySource, ComponentCount, DrawArguments, Elements,
 };
 use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
 use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::kept_errors::KeptErrors;
-use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::overrides::RayMaterial;
 use std::borrow::Cow;

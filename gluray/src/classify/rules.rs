@@ -1,8 +1,8 @@
 //! Decides by the state which draws are traced and which the driver draws. The type of projection
 //! does not matter: an orthographic main view is common in scientific programs.
 
+use crate::enums::*;
 use crate::host::config::{Settings, Trace};
-use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 
 /// The classification of a draw.

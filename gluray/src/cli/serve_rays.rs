@@ -79,7 +79,7 @@ impl BoundSocket {
 
 pub(super) fn serve_rays(common: &CommonArgs, args: &ServeRaysArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
-    crate::interpose::panic_guard::silence();
+    crate::faults::silence();
     let over = Arc::new(AtomicBool::new(false));
     watch(cancel, args.until_input_ends, &over);
     if args.mpi {

@@ -306,7 +306,7 @@ impl Counters {
                     std::thread::sleep(time);
                     let behind = schedule().waited();
                     if behind {
-                        crate::interpose::panic_guard::guard(|| write(&dir));
+                        crate::faults::guard(|| write(&dir));
                     }
                 };
                 let spawned =
@@ -341,7 +341,7 @@ fn write(dir: &Path) {
     sum.program = crate::host::config::program_name();
     sum.pid = std::process::id();
     sum.mode = crate::host::config::current().settings.mode.name().to_owned();
-    sum.faults = crate::interpose::panic_guard::messages();
+    sum.faults = crate::faults::messages();
     sum.problems.extend(crate::host::config::current().problems.iter().cloned());
     sum.ranks = crate::cluster::rank_stats();
     if let Some(own) = sum.ranks.first_mut() {

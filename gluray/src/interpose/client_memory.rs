@@ -15,8 +15,8 @@
 
 use crate::capture::draw::{PackedArray, component_bytes};
 use crate::capture::vertex_arrays::VertexSelection;
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 use core::marker::PhantomData;
 use core::ops::Deref;
 use std::borrow::Cow;

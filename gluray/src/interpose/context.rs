@@ -7,11 +7,11 @@
 //! A context enters the register before the driver releases it, and leaves it after the driver has
 //! taken it. In between, another thread may make it current and must find it.
 
+use crate::calls::{self, class};
 use crate::capture::Capture;
 use crate::classify::Classifier;
 use crate::host::config::Config;
 use crate::host::report::Counters;
-use crate::interpose::calls::{self, class};
 use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::kept_errors::KeptErrors;
 use crate::interpose::share_group::{ShareGroup, SharedObjects, TextureWrites};
@@ -20,6 +20,7 @@ use crate::present::Presentation;
 use crate::state::StateCache;
 use crate::state::current_attributes::AttributeState;
 use crate::state::snapshot::DriverCapabilities;
+use crate::watched_calls;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -109,7 +110,7 @@ pub(crate) enum PreviousContext {
 /// Called before the current context changes: pending draws are presented, and the context enters
 /// the register for other threads.
 pub(crate) fn release_current() -> PreviousContext {
-    crate::interpose::panic_guard::hand_over_to_driver();
+    crate::faults::hand_over_to_driver();
     let wrote = symbols::with_context(|c| {
         c.flush(FlushReason::ContextSwitch);
         c.attributes.sync();
@@ -117,7 +118,7 @@ pub(crate) fn release_current() -> PreviousContext {
         c.publish_textures()
     });
     let Some(old) = symbols::take() else { return PreviousContext::Nothing };
-    symbols::thread_leaves();
+    watched_calls::thread_leaves();
     if old.destroyed_while_current {
         return PreviousContext::Doomed(old);
     }
@@ -153,7 +154,7 @@ pub(crate) fn make_current(handle: usize, left: PreviousContext) {
     drop(left);
     if let Some(old) = symbols::take() {
         // A fault kept it from being released properly.
-        symbols::thread_leaves();
+        watched_calls::thread_leaves();
         if !old.destroyed_while_current {
             let before = registry().idle.insert(old.handle, old);
             drop(before);
@@ -170,7 +171,7 @@ pub(crate) fn make_current(handle: usize, left: PreviousContext) {
     };
     // The register is kept after a fault, too, because only we can execute the lists that we
     // compiled.
-    if !crate::interpose::panic_guard::happened() {
+    if !crate::faults::happened() {
         context.on_made_current();
     }
     install_current(context);
@@ -178,13 +179,13 @@ pub(crate) fn make_current(handle: usize, left: PreviousContext) {
 
 fn install_current(context: Box<Context>) {
     // Called first, so that all calls of the thread are reported from the first one on.
-    symbols::thread_enters();
+    watched_calls::thread_enters();
     match symbols::install(context) {
-        Ok(()) => symbols::arm(),
+        Ok(()) => watched_calls::arm(),
         // Some programs change contexts in exit handlers, when the thread's storage is already
         // gone.
         Err(context) => {
-            symbols::thread_leaves();
+            watched_calls::thread_leaves();
             let before = registry().idle.insert(context.handle, context);
             drop(before);
         }
@@ -201,7 +202,7 @@ pub(crate) fn on_watched_call(index: usize) {
 impl Drop for Context {
     /// Also called when a thread or the program ends with its context current.
     fn drop(&mut self) {
-        crate::interpose::panic_guard::guard(|| self.counters.publish(true));
+        crate::faults::guard(|| self.counters.publish(true));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Why pending draws are presented.
 
-use crate::interpose::calls::{self, at};
+use crate::calls::{self, at};
 
 /// What comes next, so that the pending draws must be in the framebuffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

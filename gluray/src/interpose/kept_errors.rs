@@ -1,6 +1,6 @@
 //! Errors of OpenGL: those of our own calls must not be seen, the program's must not be lost.
 
-use crate::interpose::driver::gl;
+use crate::driver::gl;
 
 /// More errors than a driver keeps flags for.
 const MOST: usize = 8;

@@ -12,9 +12,9 @@
 //! Draws into a texture are not reported one by one. While a framebuffer object is bound, the same
 //! points count its writes.
 
+use crate::calls::{self, class};
 use crate::capture::buffer_writes::BufferWrites;
 use crate::capture::display_lists::DisplayLists;
-use crate::interpose::calls::{self, class};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 

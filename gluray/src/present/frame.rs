@@ -1,10 +1,10 @@
 //! The draws of a frame that wait until they must be in the framebuffer.
 
 use crate::capture::draw::{Draw, TexturedDraw};
+use crate::enums::*;
 use crate::host::panel_client::FrameTelemetry;
 use crate::present::frame_reuse::FrameReuse;
 use crate::present::pipelined::PipelinedPresent;
-use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::texturing::Image;
 use std::sync::Arc;

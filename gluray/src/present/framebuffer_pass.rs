@@ -5,8 +5,8 @@
 //! draws whose order matters). The driver therefore composites them with everything that it drew
 //! before and after, in any kind of framebuffer, without reading anything back.
 
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::state::snapshot::DriverCapabilities;
 use crate::trace::{Layer, Rect};
 
@@ -121,7 +121,7 @@ impl Presenter {
         self.support = PassSupport::Refused;
         let (vertex, mut fragment) =
             if core { (VERTEX_150, FRAGMENT_150) } else { (VERTEX_120, FRAGMENT_120) };
-        if crate::interpose::panic_guard::is_asked_for("shader") {
+        if crate::faults::is_asked_for("shader") {
             fragment = "#error refused, as GLURAY_INJECT_FAULT asks";
         }
         let program = gl::create_program();

@@ -7,7 +7,7 @@
 //! of a triangle.
 
 use crate::capture::draw::{Draw, Shading};
-use crate::interpose::driver::gl;
+use crate::driver::gl;
 use crate::state::snapshot::DriverCapabilities;
 use std::sync::Arc;
 

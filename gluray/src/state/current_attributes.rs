@@ -2,10 +2,10 @@
 
 use super::material::{Materials, set_material};
 use super::material_properties::MaterialProperties;
-use crate::interpose::driver::gl;
-use crate::interpose::symbols;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::state::snapshot::Snapshot;
+use crate::watched_calls;
 
 /// The values that the next vertex takes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,7 +45,7 @@ impl AttributeState {
     #[inline(always)]
     pub(crate) fn mark_stale(&mut self, bit: u8) {
         if self.stale == 0 {
-            symbols::arm();
+            watched_calls::arm();
         }
         self.stale |= bit;
     }

@@ -1,6 +1,6 @@
 //! Materials of the fixed-function lighting, front and back.
 
-use crate::state::enums::*;
+use crate::enums::*;
 
 /// The material of one side.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -8,8 +8,8 @@
 //! the program has set.
 
 use super::material::{Materials, sides};
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 
 /// The properties in the order of the bits. Those of the back follow those of the front.
 const NAMES: [u32; 5] = [AMBIENT, DIFFUSE, SPECULAR, EMISSION, SHININESS];

@@ -5,15 +5,14 @@
 //! vertex are kept here (`current_attributes`).
 
 pub(crate) mod current_attributes;
-pub(crate) mod enums;
 pub(crate) mod material;
 pub(crate) mod material_properties;
 pub(crate) mod matrix;
 pub(crate) mod snapshot;
 pub(crate) mod texture_sampling;
 
-use crate::interpose::calls::class;
-use enums::{BACK, BACK_LEFT};
+use crate::calls::class;
+use crate::enums::{BACK, BACK_LEFT};
 use snapshot::{DriverCapabilities, Snapshot};
 use std::sync::Arc;
 

@@ -1,8 +1,8 @@
 //! A snapshot of the state that decides how filled primitives look, as the driver reports it.
 
-use crate::interpose::calls::class;
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::calls::class;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::state::texture_sampling::unsupported_sampling;
 
 /// A light source. Positions and directions are in eye space, as OpenGL stores them.

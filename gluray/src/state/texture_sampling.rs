@@ -1,7 +1,7 @@
 //! Whether rays can reproduce how the driver samples a texture.
 
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 
 /// The number of texels of the largest texture that is read.
 const MOST_TEXELS: i64 = 1 << 26;

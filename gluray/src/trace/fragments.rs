@@ -5,7 +5,7 @@
 //! planes, corners behind the viewer, triangles that cover no pixel centre.
 
 use super::{DEPTH_STEPS, Fragment, Prepared, SLACK};
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::raster::{corner_depth, polygon_offset};
 use rt_core::ray::{HitBlock, LANES, NO_HIT};

@@ -6,7 +6,7 @@ mod powers;
 mod vertices;
 
 use crate::capture::draw::Attributes;
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::material::{Material, sides};
 use crate::state::matrix::transform;
 use crate::state::snapshot::{GlLight, Snapshot};

@@ -26,7 +26,7 @@ pub(crate) mod whitted;
 
 use crate::capture::draw::{Draw, Shading};
 use crate::capture::geometry_cache::BuildCounts;
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::matrix::transform;
 use crate::trace::lighting::{LightingSetup, VertexColors};
 use crate::trace::occlusion::{Eye, LightPosition};

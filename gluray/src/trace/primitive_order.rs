@@ -8,7 +8,7 @@
 
 use super::painters_stack::PaintersStack;
 use super::{Layer, MOST_STEPS, Prepared, Rect, TILE, UNCOVERED, slot, to_bytes};
-use crate::state::enums::ALWAYS;
+use crate::enums::ALWAYS;
 use crate::trace::occlusion::Visibility;
 use rayon::prelude::*;
 use rt_core::ray::{HitBlock, RayBlock};

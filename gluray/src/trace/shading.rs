@@ -3,8 +3,8 @@
 
 use crate::capture::draw::Shading;
 use crate::classify::vtk::FragmentSample;
+use crate::enums::*;
 use crate::host::config::Mode;
-use crate::state::enums::*;
 use crate::state::matrix::transform;
 use crate::state::snapshot::TextureUnit;
 use crate::trace::lighting::VertexColors;

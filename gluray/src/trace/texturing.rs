@@ -7,7 +7,7 @@ mod image;
 mod sampling;
 
 use crate::capture::draw::Attributes;
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::matrix::transform;
 use crate::state::snapshot::{Snapshot, TextureUnit};
 use crate::trace::lighting::{LightingSetup, normalized};

@@ -49,7 +49,7 @@ pub(crate) fn on_pool<R: Send>(f: impl FnOnce() -> R + Send) -> R {
 pub(crate) fn spawn(f: impl FnOnce() + Send + 'static) {
     match if forked() { None } else { pool() } {
         Some(pool) => pool.spawn(move || {
-            crate::interpose::panic_guard::guard(f);
+            crate::faults::guard(f);
         }),
         None => f(),
     }
@@ -63,7 +63,7 @@ pub(crate) fn in_background(f: impl FnOnce() + Send + 'static) {
     // A separate low-priority thread would be better still. A single builder thread keeps the pool
     // free.
     let spawned = std::thread::Builder::new().name("gluray build".to_owned()).spawn(move || {
-        crate::interpose::panic_guard::guard(f);
+        crate::faults::guard(f);
     });
     drop(spawned);
 }

@@ -6,8 +6,8 @@
 //! and occlusion. Each kind of ray is traced only where a material or a setting asks for it.
 
 use crate::cluster::row_share::{BAND, RowShare};
+use crate::enums::*;
 use crate::host::config::{Mode, Settings, Surface};
-use crate::state::enums::*;
 use crate::trace::occlusion::{PixelRng, RayScene, eye_from_object};
 use crate::trace::view::View;
 use crate::trace::{Fragment, Prepared, Rect};

@@ -2,7 +2,7 @@
 //! OpenGL's types.
 
 use super::{DisplayLists, FIRST_SEGMENT};
-use crate::state::enums::*;
+use crate::enums::*;
 
 /// The most names in one request. No program needs more.
 const MOST_NAMES: i32 = 1 << 20;

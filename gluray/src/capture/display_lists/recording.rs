@@ -1,11 +1,11 @@
 //! A display list while it is compiled.
 
 use super::{DisplayList, DisplayLists, FIRST_SEGMENT, ListOp};
+use crate::calls::class;
 use crate::capture::Capture;
 use crate::capture::evaluators::MapKind;
-use crate::interpose::calls::class;
-use crate::interpose::driver::gl;
-use crate::state::enums::COMPILE;
+use crate::driver::gl;
+use crate::enums::COMPILE;
 use std::sync::{Arc, Mutex};
 
 /// A list while it is compiled.

@@ -1,8 +1,8 @@
 //! The enabled maps of evaluators, as the driver has them, and their values at a point.
 
 use super::{bernstein, casteljau};
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 
 /// The number of parameters of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

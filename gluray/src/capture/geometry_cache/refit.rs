@@ -35,7 +35,7 @@ mod tests {
     use crate::capture::geometry_cache::{BuildCounts, GeometryCache};
     use crate::capture::primitives::PrimitiveRun;
     use crate::capture::primitives::QuadSplit;
-    use crate::state::enums::TRIANGLES;
+    use crate::enums::TRIANGLES;
     use rt_core::glam::Vec3;
     use rt_core::ray::Ray;
 

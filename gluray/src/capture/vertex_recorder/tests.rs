@@ -1,7 +1,7 @@
 use super::*;
 use crate::capture::geometry_cache::GeometryCache;
 use crate::capture::primitives::QuadSplit;
-use crate::state::enums::*;
+use crate::enums::*;
 
 fn geometry() -> Arc<Geometry> {
     GeometryCache::default().of_runs(&[[0.0; 3]; 3], &[], &QuadSplit::default())

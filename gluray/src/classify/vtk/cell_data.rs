@@ -1,8 +1,8 @@
 //! Reads buffer textures: VTK's data for each cell, by the number of the triangle.
 
+use crate::driver::gl;
+use crate::enums::*;
 use crate::interpose::client_memory::{ArrayLayout, ArraySource};
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
 use crate::trace::texturing::Image;
 use std::sync::Arc;
 

@@ -13,9 +13,9 @@
 use super::signature::TranslucencyPass;
 use crate::capture::draw::{Draw, TexturedDraw};
 use crate::classify::rules::{self, Classification, TraceFilter};
+use crate::driver::gl;
+use crate::enums::*;
 use crate::host::config::{Mode, Settings};
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::DepthLimits;
 

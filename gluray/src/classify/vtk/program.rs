@@ -3,7 +3,7 @@
 use super::color::Surface;
 use super::signature::{ActorTexture, ColorSource, VtkShaderSignature};
 use crate::capture::draw::Attributes;
-use crate::interpose::driver::gl;
+use crate::driver::gl;
 use crate::state::snapshot::GlLight;
 use crate::trace::lighting::normalized;
 use crate::trace::mixed;

@@ -8,8 +8,8 @@
 
 use super::VtkPrograms;
 use super::signature::SHADOW_MAP;
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::state::snapshot::Snapshot;
 
 /// The number of frames for which a shadow map counts as in use.

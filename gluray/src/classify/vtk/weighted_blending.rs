@@ -9,9 +9,9 @@
 use super::depth_peeling;
 use crate::capture::draw::{Draw, TexturedDraw};
 use crate::classify::rules::TraceFilter;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::host::config::{Mode, Settings};
-use crate::interpose::driver::gl;
-use crate::state::enums::*;
 use crate::state::snapshot::Snapshot;
 use crate::trace::WeightedSums;
 

@@ -1,13 +1,13 @@
 //! The end of a frame: a swap of buffers, a read of the framebuffer, or a clear of what was traced.
 
+use crate::calls::{at, class};
 use crate::capture::ImmediateModeTarget;
+use crate::enums::*;
 use crate::host::config::{self, Quality};
-use crate::interpose::calls::{at, class};
 use crate::interpose::context::Context;
 use crate::interpose::flush_reason::FlushReason;
-use crate::interpose::symbols;
-use crate::state::enums::*;
 use crate::trace::thread_pool;
+use crate::watched_calls;
 use std::sync::Arc;
 
 impl Context {
@@ -46,7 +46,7 @@ impl Context {
             self.config = config;
             // Classifications depend on settings.
             self.state.dirty = class::ALL;
-            symbols::arm();
+            watched_calls::arm();
         }
     }
 

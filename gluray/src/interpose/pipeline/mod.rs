@@ -26,22 +26,22 @@
 mod frame_end;
 mod presenting;
 
+use crate::calls::{self, class};
 use crate::capture::ImmediateModeTarget;
 use crate::capture::draw::{Draw, Values};
 use crate::classify::rules::{self, Classification, TraceFilter};
-use crate::interpose::calls::{self, class};
+use crate::driver::gl;
+use crate::enums::*;
+use crate::faults::attempt;
 use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
 use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::kept_errors::KeptErrors;
-use crate::interpose::panic_guard::attempt;
-use crate::interpose::symbols;
 use crate::present::framebuffer_pass::REFUSED;
 use crate::state::current_attributes::CurrentAttributes;
-use crate::state::enums::*;
 use crate::state::material_properties::MaterialProperties;
 use crate::state::snapshot::DriverCapabilities;
 use crate::trace;
+use crate::watched_calls;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -124,10 +124,10 @@ impl Context {
         self.attributes.sync();
         self.mark(classes);
         self.watched_calls += 1;
-        if watched_enough && !compiling && symbols::is_alone() {
+        if watched_enough && !compiling && watched_calls::is_alone() {
             // Writes to buffers and textures are reported all the same.
             self.mark(class::ALL & !(class::BUFFER | class::TEXTURE));
-            symbols::disarm();
+            watched_calls::disarm();
         }
     }
 
@@ -141,7 +141,7 @@ impl Context {
     /// state has changed.
     pub(crate) fn refresh(&mut self) {
         self.watched_calls = 0;
-        symbols::arm();
+        watched_calls::arm();
         self.classifier.programs.finish_redraw();
         let version = self.shared.texture_version();
         if self.state.snapshot.texture.as_ref().is_some_and(|t| t.version != version) {

@@ -3,9 +3,10 @@
 use crate::capture::draw::{Draw, TexturedDraw};
 use crate::capture::geometry_cache::BuildCounts;
 use crate::classify::affine_probe::factor_settings;
+use crate::driver::gl;
+use crate::enums::*;
 use crate::host::config::{Mode, Settings};
 use crate::interpose::context::Context;
-use crate::interpose::driver::gl;
 use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::kept_errors::KeptErrors;
 use crate::present::effect_image;
@@ -13,7 +14,6 @@ use crate::present::frame_reuse::DrawKey;
 use crate::present::framebuffer_pass::{self, CompositeMode};
 use crate::present::multisample;
 use crate::present::pipelined::{self, TracedFrame};
-use crate::state::enums::*;
 use crate::trace::texturing::Image;
 use crate::trace::view::assign_eye_spaces;
 use crate::trace::{self, Layer, Prepared, WeightedSums, thread_pool};
@@ -27,14 +27,14 @@ const LOST: &str = "the driver refuses our shader: what was traced is lost";
 impl Context {
     /// Draws the pending draws into the framebuffer.
     pub(crate) fn flush(&mut self, reason: FlushReason) {
-        if !crate::interpose::panic_guard::happened() {
+        if !crate::faults::happened() {
             self.flush_now(reason);
         }
     }
 
     /// The same also after a fault: what was kept from the driver before it.
     pub(crate) fn flush_now(&mut self, reason: FlushReason) {
-        crate::interpose::panic_guard::injected("flush");
+        crate::faults::injected("flush");
         self.end_batch();
         if self.classifier.programs.peeling.has_draws() && reason.may_gather_layers() {
             self.composite_peeled();

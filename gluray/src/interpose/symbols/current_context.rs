@@ -52,7 +52,7 @@ impl Drop for ThreadSlot {
         release();
         let context = self.context.replace(null_mut());
         if !context.is_null() {
-            super::thread_leaves();
+            crate::watched_calls::thread_leaves();
             // SAFETY: of `Box::into_raw` in `install`; the slot owned it, and nobody can ask the
             // slot any more.
             drop(unsafe { Box::from_raw(context) });
@@ -151,13 +151,13 @@ pub(super) fn fast_call(
     let call = || {
         if cfg!(debug_assertions) {
             // Only in test builds: here a load would be measurable.
-            crate::interpose::panic_guard::inject_at(index);
+            crate::faults::inject_at(index);
         }
         // SAFETY: this thread owns it and it is not lent, for that is what `OWNER` says (1 and 2
         // above).
         f(unsafe { &mut *hot })
     };
-    crate::interpose::panic_guard::caught(call).unwrap_or(FastPathResult::Slow)
+    crate::faults::caught(call).unwrap_or(FastPathResult::Slow)
 }
 
 /// The slow path of a call: runs `f` with the current context. `f` returns whether it has handled
@@ -165,15 +165,15 @@ pub(super) fn fast_call(
 /// called.
 #[inline(always)]
 pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
-    if crate::interpose::panic_guard::happened() {
+    if crate::faults::happened() {
         super::leave_at(index);
         return false;
     }
     let call = || {
-        crate::interpose::panic_guard::inject_at(index);
+        crate::faults::inject_at(index);
         with_context(f)
     };
-    match crate::interpose::panic_guard::caught(call) {
+    match crate::faults::caught(call) {
         Some(handled) => handled.unwrap_or(false),
         None => {
             super::leave_at(index);
@@ -186,14 +186,11 @@ pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
 #[inline(always)]
 pub(super) fn with_even_after_fault(index: usize, f: impl Fn(&mut Context) -> bool) -> bool {
     let call = || {
-        crate::interpose::panic_guard::inject_at(index);
+        crate::faults::inject_at(index);
         with_context(&f)
     };
-    crate::interpose::panic_guard::hand_over_to_driver();
-    crate::interpose::panic_guard::caught(call)
-        .or_else(|| crate::interpose::panic_guard::caught(call))
-        .flatten()
-        .unwrap_or(false)
+    crate::faults::hand_over_to_driver();
+    crate::faults::caught(call).or_else(|| crate::faults::caught(call)).flatten().unwrap_or(false)
 }
 
 /// A context is not lent any longer when this goes.
@@ -252,7 +249,7 @@ mod tests {
     use std::sync::Barrier;
 
     fn put(handle: usize) {
-        crate::interpose::symbols::thread_enters();
+        crate::watched_calls::thread_enters();
         assert!(install(Box::new(Context::for_tests(handle))).is_ok(), "the thread had none");
     }
 

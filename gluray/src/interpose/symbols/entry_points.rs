@@ -2,32 +2,21 @@
 //! package `gluray-interposer`, so that the program `gluray` and gluray's tests do not carry
 //! OpenGL's symbols.
 //!
-//! They jump through a table of targets. Calls that may change state are *watched*: while [`ARMED`]
-//! is set, they are reported before they run (`on_watched_call`), which costs some ten nanoseconds.
-//! As soon as no report is needed, they cost one comparison. So the driver can keep all state: it
-//! is asked at a draw, and again only after a watched call.
+//! They jump through a table of targets. Calls that may change state are reported before they run
+//! while that is asked for (`watched_calls`).
 //!
 //! Each function to which the program may come first is given the [`EntryPoints`].
 
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicPtr, AtomicU32, AtomicU64};
+use std::sync::atomic::AtomicPtr;
 
 include!(concat!(env!("OUT_DIR"), "/entry_points.rs"));
 
 /// The number of entry points. `gluray::entry_points` lists them.
-pub const COUNT: usize = crate::interpose::calls::COUNT;
+pub const COUNT: usize = crate::calls::COUNT;
 
 /// Whether the library has entry points for this processor and system.
 pub const HAS_ENTRY_POINTS: bool = cfg!(all(target_arch = "x86_64", target_os = "linux"));
-
-/// Zero while watched calls need not be reported: exactly one thread has a context, and no report
-/// was requested. Bit 0 is set by a request. The bits above it count the threads that have a
-/// context, less one. Both are in one word, so that neither can change unseen while the other is
-/// read.
-pub static ARMED: AtomicU32 = AtomicU32::new(0_u32.wrapping_sub(2));
-
-/// Watched calls that went straight to the driver.
-pub static CALLS: AtomicU64 = AtomicU64::new(0);
 
 /// The entry points of the library that runs in the program.
 #[derive(Debug)]

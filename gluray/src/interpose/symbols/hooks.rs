@@ -5,15 +5,15 @@
 
 use super::lookup::replaced;
 use super::{current_context, with_context};
+use crate::calls::at;
 use crate::capture::display_lists::names::width;
 use crate::capture::evaluators::MapKind;
 use crate::capture::immediate_mode::FastPathResult;
-use crate::interpose::calls::at;
+use crate::driver::Int;
+use crate::enums::{COLOR_INDEXES, SHININESS};
+use crate::faults::caught;
 use crate::interpose::client_memory::{self, ActiveCall, DrawArguments};
 use crate::interpose::context;
-use crate::interpose::driver::Int;
-use crate::interpose::panic_guard::caught;
-use crate::state::enums::{COLOR_INDEXES, SHININESS};
 use core::ffi::{c_char, c_void};
 
 /// Calls the driver's function of the same name.
@@ -267,7 +267,7 @@ publishing_hooks! {
 
 pub(in crate::interpose::symbols) unsafe extern "C" fn glGetError() -> u32 {
     let take = || {
-        crate::interpose::panic_guard::inject_at(at::glGetError);
+        crate::faults::inject_at(at::glGetError);
         with_context(context::Context::take_error)
     };
     let kept = caught(take).flatten().flatten();
@@ -276,7 +276,7 @@ pub(in crate::interpose::symbols) unsafe extern "C" fn glGetError() -> u32 {
 
 pub(in crate::interpose::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32 {
     let give = || {
-        crate::interpose::panic_guard::inject_at(at::glGenLists);
+        crate::faults::inject_at(at::glGenLists);
         with_context(|c| c.gen_lists(n))
     };
     let given = caught(give).flatten().flatten();
@@ -289,7 +289,7 @@ macro_rules! get_proc_address {
         pub(in crate::interpose::symbols) unsafe extern "C" fn $name(name: *const c_char) -> *const () {
             let address = driver!($name(name): (*const c_char) -> *const ());
             let ours = || {
-                crate::interpose::panic_guard::inject_at(at::$name);
+                crate::faults::inject_at(at::$name);
                 replaced(name, address)
             };
             caught(ours).unwrap_or(address)
@@ -305,7 +305,7 @@ type Handle = *mut c_void;
 /// register is updated.
 fn making_current(index: usize, context: Handle, real: impl FnOnce() -> u32) -> u32 {
     let leave = || {
-        crate::interpose::panic_guard::inject_at(index);
+        crate::faults::inject_at(index);
         context::release_current()
     };
     // Tried again after a fault, because the register must know whose context is current.
@@ -371,14 +371,14 @@ pub(in crate::interpose::symbols) unsafe extern "C" fn eglMakeCurrent(
 
 fn destroyed(index: usize, context: Handle) {
     caught(|| {
-        crate::interpose::panic_guard::inject_at(index);
+        crate::faults::inject_at(index);
         context::destroyed(context as usize);
     });
 }
 
 fn created(index: usize, context: Handle, share: Handle) -> Handle {
     caught(|| {
-        crate::interpose::panic_guard::inject_at(index);
+        crate::faults::inject_at(index);
         context::created(context as usize, share as usize);
     });
     context

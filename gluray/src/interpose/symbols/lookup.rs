@@ -1,11 +1,12 @@
 //! How programs and GLVND find the trampolines: what is behind `dlsym`, `glXGetProcAddress`,
 //! `__glx_Main` and `__egl_Main`.
 
-use super::entry_points::{self, EntryPoints};
-use super::trampoline;
-use crate::interpose::calls::index_of;
-use crate::interpose::driver;
-use crate::interpose::panic_guard::caught;
+use super::entry_points::EntryPoints;
+use super::{in_program, register, trampoline};
+use crate::calls::index_of;
+use crate::driver;
+use crate::faults::caught;
+use crate::interpose::glvnd;
 use core::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::Relaxed};
@@ -44,8 +45,8 @@ unsafe fn address_of_ours(
         return core::ptr::null();
     }
     // Not earlier: allocators look up other names before anything can be allocated.
-    entry_points::register(entry_points);
-    crate::interpose::panic_guard::injected("dlsym");
+    register(entry_points);
+    crate::faults::injected("dlsym");
     // A name that the program's library lacks is not found here either.
     // SAFETY: the program's own arguments.
     let there = unsafe { driver::call_dlsym(handle, name) };
@@ -68,12 +69,30 @@ pub(super) fn replaced(name: *const c_char, driver: *const ()) -> *const () {
 pub type Imports = [*const (); 10];
 type VendorMain = unsafe extern "C" fn(u32, *const c_void, *mut c_void, *mut Imports) -> c_int;
 
+/// `__glx_Main` or `__egl_Main` of the vendors that GLVND would have taken without us, in its
+/// order. GLX has only one.
+fn vendor_mains(egl: bool) -> Vec<*const ()> {
+    let get = crate::host::folders::variable;
+    let (libraries, main, most): (Vec<String>, _, _) = match egl {
+        true => {
+            let vendors = glvnd::egl_vendors(get);
+            let libraries = vendors.iter().map(|v| glvnd::egl_library(&v.name)).collect();
+            (libraries, c"__egl_Main", usize::MAX)
+        }
+        false => {
+            let vendors = glvnd::glx_vendors(get);
+            (vendors.iter().map(|v| format!("libGLX_{}.so.0", v.name)).collect(), c"__glx_Main", 1)
+        }
+    };
+    driver::mains_of(libraries, main).take(most).collect()
+}
+
 unsafe extern "C" fn glx_address(name: *const c_char) -> *const () {
     // SAFETY: GLVND's own string.
     let text = unsafe { CStr::from_ptr(name) };
     let driver = driver::vendor_address(text, false);
     let ours = || {
-        crate::interpose::panic_guard::injected("address");
+        crate::faults::injected("address");
         if text.to_bytes().starts_with(b"glXGetProcAddress") {
             driver
         } else {
@@ -88,7 +107,7 @@ unsafe extern "C" fn egl_address(name: *const c_char) -> *const () {
     let text = unsafe { CStr::from_ptr(name) };
     let mut driver = driver::vendor_address(text, true);
     let ours = || {
-        crate::interpose::panic_guard::injected("address");
+        crate::faults::injected("address");
         if driver.is_null() && EGL_CHOSEN.load(Relaxed) == NOBODY {
             // GLVND asks before there is a display. Our trampoline then finds the function of the
             // driver that has it.
@@ -112,14 +131,14 @@ pub unsafe fn glx_main(
     imports: *mut Imports,
 ) -> c_int {
     let find = || {
-        entry_points::register(entry_points);
-        crate::interpose::panic_guard::in_program();
-        crate::interpose::panic_guard::injected("__glx_Main");
+        register(entry_points);
+        in_program();
+        crate::faults::injected("__glx_Main");
         driver::put_glvnd_first();
     };
     // After a fault, the vendor that GLVND would take without us is still found.
     caught(find);
-    let mains = caught(|| driver::vendor_mains(false)).unwrap_or_default();
+    let mains = caught(|| vendor_mains(false)).unwrap_or_default();
     let Some(main) = mains.into_iter().next() else { return 0 };
     // SAFETY: `__glx_Main` of the driver, with the arguments GLVND gives to it.
     unsafe {
@@ -147,15 +166,15 @@ pub unsafe fn egl_main(
     imports: *mut Imports,
 ) -> c_int {
     let find = || {
-        entry_points::register(entry_points);
-        crate::interpose::panic_guard::in_program();
-        crate::interpose::panic_guard::injected("__egl_Main");
+        register(entry_points);
+        in_program();
+        crate::faults::injected("__egl_Main");
         driver::put_glvnd_first();
     };
     // After a fault, the vendors that GLVND would take without us are still found.
     caught(find);
     let mut all = Vec::new();
-    for main in caught(|| driver::vendor_mains(true)).unwrap_or_default() {
+    for main in caught(|| vendor_mains(true)).unwrap_or_default() {
         // GLVND gives a cleared table.
         let mut own: EglImports = [core::ptr::null(); 16];
         // SAFETY: `__egl_Main` of a driver, with the arguments GLVND gives to it and a table of its

@@ -13,19 +13,23 @@ mod lookup;
 
 pub(crate) use current_context::{install, take, with_context};
 
+use crate::calls::{COUNT, NAMES, at, index_of, is_hooked};
 use crate::capture::ImmediateModeTarget;
-use crate::interpose::calls::{COUNT, NAMES, at, index_of, is_hooked};
-use crate::interpose::driver;
-use entry_points::{ARMED, EntryPoints};
+use crate::driver;
+use crate::faults;
+use crate::watched_calls::{disarm, is_alone};
+use entry_points::EntryPoints;
 use std::ffi::CStr;
+use std::sync::Once;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// What the package `gluray-interposer` is written against: what its trampolines read and call, and
 /// what its functions call by which programs and GLVND look them up.
 pub mod interface {
-    pub use super::entry_points::{ARMED, CALLS, COUNT, EntryPoints, HAS_ENTRY_POINTS};
+    pub use super::entry_points::{COUNT, EntryPoints, HAS_ENTRY_POINTS};
     pub use super::lookup::{Imports, REAL_DLSYM, egl_main, glx_main, looked_up};
     pub use super::{left, on_watched_call, resolve};
+    pub use crate::watched_calls::{ARMED, CALLS};
 }
 
 #[derive(Clone, Copy)]
@@ -34,36 +38,6 @@ struct Target(*const ());
 unsafe impl Sync for Target {}
 
 include!(concat!(env!("OUT_DIR"), "/hooks.rs"));
-
-/// Requests a report of the next watched call.
-#[inline]
-pub(crate) fn arm() {
-    if ARMED.load(Relaxed) & 1 == 0 {
-        ARMED.fetch_or(1, Relaxed);
-    }
-}
-
-/// Ends the reports of watched calls, unless another thread has a context, too.
-pub(crate) fn disarm() {
-    // This fails when a second thread has got a context since the caller checked.
-    ARMED.compare_exchange(1, 0, Relaxed, Relaxed).ok();
-}
-
-/// True when only one thread has a context.
-pub(crate) fn is_alone() -> bool {
-    ARMED.load(Relaxed) & !1 == 0
-}
-
-/// A thread gets a context. Until as many threads have left, all watched calls are reported when it
-/// is not the only one.
-pub(crate) fn thread_enters() {
-    ARMED.fetch_add(2, Relaxed);
-}
-
-/// A thread has no context any longer.
-pub(crate) fn thread_leaves() {
-    ARMED.fetch_sub(2, Relaxed);
-}
 
 /// Entry points that we keep after a fault: contexts, addresses, errors that we kept, and lists,
 /// because only we can execute those that we compiled.
@@ -82,7 +56,7 @@ fn stays_hooked(index: usize) -> bool {
 }
 
 /// After a fault, every entry point becomes the driver's, thread by thread: see [`left`].
-pub(crate) fn retire() {
+fn retire() {
     let Some(entry_points) = entry_points::registered() else { return };
     for (i, slot) in entry_points.targets.iter().enumerate() {
         if is_hooked(i) && !stays_hooked(i) {
@@ -97,27 +71,47 @@ fn trampoline(name: &CStr) -> Option<*const ()> {
     index_of(name.to_bytes()).map(|i| trampolines[i] as *const ())
 }
 
+/// The program calls the library for the first time.
+#[cold]
+fn in_program() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        faults::in_program();
+        at_exit();
+    });
+}
+
 /// Registers the last update of the report for a normal exit of the program.
-pub(crate) fn at_exit() {
+fn at_exit() {
     extern "C" fn at_exit() {
-        crate::interpose::panic_guard::guard(crate::host::report::write_final_report);
+        faults::guard(crate::host::report::write_final_report);
     }
     // SAFETY: a function of ours, and the library is never unloaded (`-z nodelete`).
     unsafe { libc::atexit(at_exit) };
 }
 
+/// The program may call us from now on, by these entry points. What a fault ends is theirs.
+fn register(entry_points: &'static EntryPoints) {
+    entry_points::register(entry_points);
+    faults::when_one_happens(faults::Handlers {
+        first: retire,
+        each: || {
+            with_context(|context| context.stop_tracing());
+        },
+    });
+}
+
 /// The target of entry `index`, which is called for the first time. From now on, its trampoline
 /// finds it in the table.
 pub fn resolve(entry_points: &'static EntryPoints, index: usize) -> *const () {
-    entry_points::register(entry_points);
-    crate::interpose::panic_guard::in_program();
+    register(entry_points);
+    in_program();
     // This also applies to entry points that are called for the first time after a fault.
-    let hook =
-        HOOKS[index].filter(|_| !crate::interpose::panic_guard::happened() || stays_hooked(index));
-    let target = crate::interpose::panic_guard::caught(|| match hook {
+    let hook = HOOKS[index].filter(|_| !faults::happened() || stays_hooked(index));
+    let target = faults::caught(|| match hook {
         Some(hook) => hook.0,
         None => {
-            crate::interpose::panic_guard::inject_at(index);
+            faults::inject_at(index);
             driver::forward(index)
         }
     });
@@ -128,18 +122,17 @@ pub fn resolve(entry_points: &'static EntryPoints, index: usize) -> *const () {
 
 /// The driver's function, or one that does nothing when the search for it fails.
 fn forward_plainly(index: usize) -> *const () {
-    crate::interpose::panic_guard::caught(|| driver::forward(index))
-        .unwrap_or(driver::no_context as *const ())
+    faults::caught(|| driver::forward(index)).unwrap_or(driver::no_context as *const ())
 }
 
 /// A watched call of entry `index` is about to run.
 pub extern "C" fn on_watched_call(index: usize) {
-    if crate::interpose::panic_guard::happened() {
-        crate::interpose::panic_guard::hand_over_to_driver();
+    if faults::happened() {
+        faults::hand_over_to_driver();
         return;
     }
-    crate::interpose::panic_guard::caught(|| {
-        crate::interpose::panic_guard::inject_at(index);
+    faults::caught(|| {
+        faults::inject_at(index);
         crate::interpose::context::on_watched_call(index);
     });
 }
@@ -153,8 +146,8 @@ pub extern "C" fn left(index: usize) -> *const () {
 
 /// The same without the call.
 fn leave_at(index: usize) {
-    crate::interpose::panic_guard::hand_over_to_driver();
-    let over = crate::interpose::panic_guard::caught(|| {
+    faults::hand_over_to_driver();
+    let over = faults::caught(|| {
         let tracing_stopped = with_context(|c| {
             if index == at::glEnd && c.capture.immediate_target == ImmediateModeTarget::Pass {
                 // The driver's primitive ends now. With the next call, the context draws what it
@@ -178,7 +171,7 @@ fn leave_at(index: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interpose::calls::{class, class_of};
+    use crate::calls::{class, class_of};
 
     #[test]
     fn calls_that_come_with_each_vertex_are_not_told_of_for_the_sake_of_textures() {

@@ -8,7 +8,7 @@
 use super::LightingSetup;
 use super::powers::powers;
 use crate::capture::draw::{Attributes, PackedArray, Values};
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::material::{Material, sides};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x16, mask32x16};
 use rt_core::ray::LANES;

@@ -3,8 +3,8 @@
 use super::clip;
 use crate::capture::draw::{Shading, Values};
 use crate::capture::geometry_cache::hash;
+use crate::enums::*;
 use crate::host::config::{Settings, Surface};
-use crate::state::enums::*;
 use crate::trace::Prepared;
 use crate::trace::occlusion::eye_from_object;
 use crate::trace::view::View;

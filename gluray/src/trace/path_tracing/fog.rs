@@ -3,7 +3,7 @@
 //!
 //! Surfaces seen in mirrors or through glass get the fog of the mirror or the glass.
 
-use crate::state::enums::*;
+use crate::enums::*;
 use crate::state::snapshot::Fog;
 use crate::trace::Layer;
 use crate::trace::view::View;

@@ -99,9 +99,8 @@ pub(super) fn of(
                 std::array::from_fn(|k| sum[k] + a[k])
             });
             let m = &first.draw.attributes.materials_at(0)[0];
-            let tracked = s
-                .color_material
-                .is_some_and(|(_, what)| what == crate::state::enums::AMBIENT_AND_DIFFUSE);
+            let tracked =
+                s.color_material.is_some_and(|(_, what)| what == crate::enums::AMBIENT_AND_DIFFUSE);
             let sum = |c: [f32; 4]| c[0] + c[1] + c[2];
             let share = if tracked {
                 1.0

@@ -2,7 +2,7 @@
 
 use super::filters::Filters;
 use crate::cluster::codec::{MalformedMessage, Reader, Wire, put_pods};
-use crate::state::enums::*;
+use crate::enums::*;
 use rt_core::texture::{Filter, Texture, Wrap};
 
 /// The meaning of a texture's components.

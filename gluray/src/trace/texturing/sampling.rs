@@ -6,7 +6,7 @@
 
 use super::filters::Mip;
 use super::image::{Image, Level};
-use crate::state::enums::*;
+use crate::enums::*;
 
 impl Image {
     /// True when the footprint of a pixel affects sampling.

@@ -2,7 +2,7 @@
 //! of pointers.
 
 use super::driver;
-use crate::state::enums::{ACTIVE_ATTRIBUTES, ACTIVE_UNIFORMS, INTERLEAVED_ATTRIBS, STREAM_READ};
+use crate::enums::{ACTIVE_ATTRIBUTES, ACTIVE_UNIFORMS, INTERLEAVED_ATTRIBS, STREAM_READ};
 use core::ffi::{CStr, c_char, c_void};
 use std::ffi::CString;
 use std::sync::atomic::AtomicPtr;

@@ -10,7 +10,7 @@
 pub(crate) mod feedback;
 pub(crate) mod gl;
 
-use crate::interpose::calls::{COUNT, NAMES, index_of};
+use crate::calls::{COUNT, NAMES, index_of};
 use core::ffi::{CStr, c_char, c_int, c_void};
 use std::ffi::CString;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::Relaxed};
@@ -119,24 +119,9 @@ pub(crate) fn put_glvnd_first() {
     .any(|(library, how)| open(library, how));
 }
 
-/// `__glx_Main` or `__egl_Main` of the vendors that GLVND would have taken without us, in its
-/// order. GLX has only one.
-pub(crate) fn vendor_mains(egl: bool) -> Vec<*const ()> {
-    let get = crate::host::folders::variable;
-    let (libraries, main): (Vec<String>, _) = match egl {
-        true => {
-            let vendors = crate::interpose::glvnd::egl_vendors(get);
-            (
-                vendors.iter().map(|v| crate::interpose::glvnd::egl_library(&v.name)).collect(),
-                c"__egl_Main",
-            )
-        }
-        false => {
-            let vendors = crate::interpose::glvnd::glx_vendors(get);
-            (vendors.iter().map(|v| format!("libGLX_{}.so.0", v.name)).collect(), c"__glx_Main")
-        }
-    };
-    let main_of = |library: String| {
+/// The function `main` of each vendor library that can be opened and has it.
+pub(crate) fn mains_of(libraries: Vec<String>, main: &CStr) -> impl Iterator<Item = *const ()> {
+    libraries.into_iter().filter_map(move |library| {
         let handle = open(&CString::new(library).ok()?);
         if handle.is_null() {
             return None;
@@ -144,8 +129,7 @@ pub(crate) fn vendor_mains(egl: bool) -> Vec<*const ()> {
         // SAFETY: a handle of dlopen.
         let address = unsafe { call_dlsym(handle, main) };
         (!address.is_null()).then_some(address)
-    };
-    libraries.into_iter().filter_map(main_of).take(if egl { usize::MAX } else { 1 }).collect()
+    })
 }
 
 fn library(slot: &AtomicPtr<c_void>, name: &CStr) -> *mut c_void {
@@ -240,7 +224,7 @@ macro_rules! driver {
         #[inline]
         $vis fn $name($($a: $t),*) $(-> $r)? {
             static SLOT: AtomicPtr<()> = AtomicPtr::new(core::ptr::null_mut());
-            let p = $crate::interpose::driver::cached(&SLOT, $gl);
+            let p = $crate::driver::cached(&SLOT, $gl);
             // SAFETY: the signature that OpenGL (GLX, EGL) gives this name; pointers come from
             // slices in `gl` or from the program.
             unsafe {

@@ -3,7 +3,7 @@
 //! Like all of OpenGL, they act on the context that is current on the thread.
 
 use super::driver;
-use crate::state::enums::*;
+use crate::enums::*;
 use core::ffi::{c_char, c_void};
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering::Relaxed};
 
@@ -513,7 +513,7 @@ pub(super) mod tests {
     const SIZE: [i32; 2] = [16, 8];
 
     /// A driver that writes its complete answer, whatever size the caller expects.
-    pub(in crate::interpose::driver) fn fake(name: &str) -> Option<*const ()> {
+    pub(in crate::driver) fn fake(name: &str) -> Option<*const ()> {
         if !IS_FAKED.get() {
             return None;
         }

@@ -5,11 +5,10 @@
 //! After a fault, each thread draws what its context has held back (`Context::stop_tracing`), at
 //! once or at its next call.
 
-use crate::interpose::calls;
-use crate::interpose::symbols;
+use crate::calls;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering::Relaxed};
-use std::sync::{Mutex, Once, OnceLock};
+use std::sync::{Mutex, OnceLock};
 
 static HAPPENED: AtomicBool = AtomicBool::new(false);
 /// The library runs inside a program, so all panics of its own standard library are ours.
@@ -32,7 +31,8 @@ pub(crate) fn messages() -> Vec<String> {
 // ---- Faults that tests ask for ------------------------------------------------------------------
 fn asked_for() -> Option<&'static str> {
     static PLACE: OnceLock<Option<String>> = OnceLock::new();
-    PLACE.get_or_init(|| crate::host::folders::variable("GLURAY_INJECT_FAULT")).as_deref()
+    let variable = || std::env::var("GLURAY_INJECT_FAULT").ok().filter(|v| !v.is_empty());
+    PLACE.get_or_init(variable).as_deref()
 }
 
 /// Panics when `GLURAY_INJECT_FAULT` names this place. Tests check what the program gets when
@@ -79,16 +79,27 @@ fn inject_now(index: usize) {
 }
 
 // ---- Catching -----------------------------------------------------------------------------------
+/// What ends the tracing.
+pub(crate) struct Handlers {
+    /// Called after the first fault.
+    pub(crate) first: fn(),
+    /// Called after each fault, on its thread: the context draws what it has held back, unless it
+    /// has done so.
+    pub(crate) each: fn(),
+}
+
+static HANDLERS: OnceLock<Handlers> = OnceLock::new();
+
+/// Sets what ends the tracing, once. Without it a fault ends nothing: there is no tracing.
+pub(crate) fn when_one_happens(handlers: Handlers) {
+    HANDLERS.get_or_init(|| handlers);
+}
+
 /// The program calls the library for the first time.
-#[cold]
 pub(crate) fn in_program() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        IN_PROGRAM.store(true, Relaxed);
-        silence();
-        plan_injection();
-        symbols::at_exit();
-    });
+    IN_PROGRAM.store(true, Relaxed);
+    silence();
+    plan_injection();
 }
 
 /// Keeps Rust's panic message from stderr.
@@ -132,22 +143,26 @@ pub(crate) fn guard<R>(f: impl FnOnce() -> R) -> Option<R> {
 }
 
 /// Runs `f` after a fault. Returns `None` when it panics as well.
-pub(super) fn attempt<R>(f: impl FnOnce() -> R) -> Option<R> {
+pub(crate) fn attempt<R>(f: impl FnOnce() -> R) -> Option<R> {
     catch_unwind(AssertUnwindSafe(f)).map_err(std::mem::forget).ok()
 }
 
 #[cold]
 #[inline(never)]
 fn end() {
-    if !HAPPENED.swap(true, Relaxed) {
-        attempt(symbols::retire);
+    if !HAPPENED.swap(true, Relaxed)
+        && let Some(handlers) = HANDLERS.get()
+    {
+        attempt(handlers.first);
     }
     hand_over_to_driver();
 }
 
 /// After a fault, the context of this thread draws what it has held back, unless it has done so.
 pub(crate) fn hand_over_to_driver() {
-    if happened() {
-        attempt(|| symbols::with_context(|context| context.stop_tracing()));
+    if happened()
+        && let Some(handlers) = HANDLERS.get()
+    {
+        attempt(handlers.each);
     }
 }
