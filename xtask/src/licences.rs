@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
-use crate::runner::{Context, Outcome};
+use crate::step::{Context, Outcome};
 
 /// Runs the step `licences`.
 pub(crate) fn check(context: &Context<'_>) -> Outcome {

@@ -1,15 +1,18 @@
 //! Set-up and checks of the workspace, as one small program without dependencies.
 //!
-//! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`peers`] finds
-//! and installs the third-party software that some tests compare with; [`licences`] checks what we
-//! link against; [`package`] checks what we publish.
+//! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`tools`] checks
+//! the machine; [`peers`] finds and installs the third-party software that some tests compare with;
+//! [`licences`] checks what we link against; [`package`] checks what we publish.
 
+mod command;
 mod licences;
 mod main_job;
 mod package;
 mod peers;
 mod plan;
 mod runner;
+mod step;
+mod tools;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -5,7 +5,7 @@
 //! two cores. The dev profile optimises all members but keeps their checks, so the measured times
 //! are meaningless. The step checks that every experiment runs to its end.
 
-use crate::runner::{self, Context, Outcome};
+use crate::step::{Context, Outcome};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -16,7 +16,7 @@ pub(crate) const ARGUMENTS: &[&str] = &[];
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
     // A no-op after `build-tests`. When run alone, this step builds what it needs, with the
     // features of the tests.
-    let built = runner::cargo(context, &["test", "--workspace", "--no-run", "--quiet"], &[]);
+    let built = context.cargo(&["test", "--workspace", "--no-run", "--quiet"], &[]);
     if built != Outcome::Passed {
         return built;
     }

@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::runner::{self, Context, Outcome};
+use crate::step::{Context, Outcome};
 
 /// The registry's limit, in bytes. Cargo compares the compressed package; this check compares its
 /// contents.
@@ -53,7 +53,7 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
     }
     println!("cargo {}", arguments.join(" "));
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    runner::cargo(context, &arguments, &[])
+    context.cargo(&arguments, &[])
 }
 
 /// The folders in `members = [...]` of the root's manifest.

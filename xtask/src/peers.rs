@@ -11,7 +11,7 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::runner::first_line_of;
+use crate::command::first_line_of;
 
 /// Debian 12 packages, and the purpose of each.
 const PACKAGES: &[(&str, &str)] = &[

@@ -5,33 +5,8 @@
 //! without need. `clippy` and `api-docs` check; all others, including `main-job`, build with the
 //! dev profile, whose members are optimised.
 
-use crate::runner::{Context, Outcome};
-use crate::{licences, main_job, package, runner};
-
-/// One check.
-#[derive(Debug)]
-pub(crate) struct Step {
-    /// Name in the summary and for `--only`.
-    pub(crate) name: &'static str,
-    /// What a passed step shows.
-    pub(crate) tells: &'static str,
-    /// The action.
-    pub(crate) action: Action,
-}
-
-/// What a step does.
-#[derive(Debug)]
-pub(crate) enum Action {
-    /// Runs cargo in the workspace root; passes when it exits with 0.
-    Cargo {
-        /// Arguments of cargo.
-        args: &'static [&'static str],
-        /// Environment variables set for this command only.
-        env: &'static [(&'static str, &'static str)],
-    },
-    /// Calls a function of this program.
-    Call(fn(&Context<'_>) -> Outcome),
-}
+use crate::step::{Action, Step};
+use crate::{licences, main_job, package, tools};
 
 const fn cargo(args: &'static [&'static str]) -> Action {
     Action::Cargo { args, env: &[] }
@@ -42,12 +17,12 @@ pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "tools",
         tells: "the compiler is new enough; rustfmt and clippy are there",
-        action: Action::Call(runner::check_tools),
+        action: Action::Call(tools::check_tools),
     },
     Step {
         name: "peers",
         tells: "the software that tests compare with is installed",
-        action: Action::Call(runner::report_peers),
+        action: Action::Call(tools::report_peers),
     },
     Step {
         name: "fmt",
@@ -74,7 +49,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "deny",
         tells: "cargo-deny agrees, also about sources, duplicates and other platforms; needs \
                 cargo-deny",
-        action: Action::Call(runner::cargo_deny),
+        action: Action::Call(tools::cargo_deny),
     },
     Step {
         name: "package",
