@@ -11,7 +11,8 @@ pub type Rgba = [f32; 4];
 /// A colour map: linear interpolation between evenly spaced colours over `range`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorMap {
-    /// At least one colour, evenly spaced over `range`; linear RGB, alpha is opacity.
+    /// The colours, evenly spaced over `range`; linear RGB, alpha is opacity. A
+    /// scene takes no map without colours; [`ColorMap::lookup`] of an empty list is opaque white.
     pub colors: Vec<Rgba>,
     /// Scalars at the first and the last colour. Values outside get the end colours.
     pub range: [f32; 2],
@@ -62,9 +63,10 @@ impl ColorMap {
         let t = if self.log { (scalar / a).ln() / (b / a).ln() } else { (scalar - a) / (b - a) };
         // A range of zero width gives NaN or infinity here. The map then is a step at that value.
         let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) };
-        let x = t * (self.colors.len() - 1) as f32;
-        let i = (x as usize).min(self.colors.len() - 1);
-        let j = (i + 1).min(self.colors.len() - 1);
+        let Some(last) = self.colors.len().checked_sub(1) else { return [1.0; 4] };
+        let x = t * last as f32;
+        let i = (x as usize).min(last);
+        let j = (i + 1).min(last);
         let f = x - i as f32;
         std::array::from_fn(|c| self.colors[i][c] + (self.colors[j][c] - self.colors[i][c]) * f)
     }
@@ -83,10 +85,13 @@ impl ColorMap {
             }
             return;
         }
+        let Some(last) = self.colors.len().checked_sub(1) else {
+            *out = [[1.0; LANES]; 4];
+            return;
+        };
         let [a, b] = self.range;
         let t = (scalars - v(a)) / v(b - a);
         let t = t.simd_eq(t).select(t.max(v(0.0)).min(v(1.0)), v(0.5));
-        let last = self.colors.len() - 1;
         let x = t * v(last as f32);
         // Not negative, so truncation rounds down.
         let i = x.floor();

@@ -1,10 +1,11 @@
 //! Decides which effects run, from the request and from what the scene needs, and writes a warning
 //! for every difference.
 
-use super::{RenderError, RenderOptions};
 use crate::camera::Camera;
 use crate::effects::Effects;
 use crate::ray_stats::RayStats;
+use crate::render_error::RenderError;
+use crate::render_options::RenderOptions;
 use crate::scene::Scene;
 
 /// The effects that will run.
@@ -15,7 +16,7 @@ pub(crate) struct Plan {
     pub(crate) warnings: Vec<String>,
 }
 
-pub(super) fn plan(
+pub(crate) fn plan(
     scene: &Scene,
     camera: &Camera,
     options: &RenderOptions,
@@ -112,7 +113,7 @@ fn why_not_needed(effect: Effects, path: bool) -> &'static str {
 }
 
 /// Warnings about effects that ran without changing anything, after the frame is finished.
-pub(super) fn warn_without_effect(
+pub(crate) fn warn_without_effect(
     asked: Option<Effects>,
     ran: Effects,
     left_out: Effects,

@@ -66,6 +66,8 @@ pub mod camera;
 #[cfg(feature = "render")]
 pub mod colormap;
 #[cfg(feature = "render")]
+mod effect_plan;
+#[cfg(feature = "render")]
 pub mod effects;
 #[cfg(feature = "render")]
 pub mod environment;
@@ -82,6 +84,10 @@ pub mod ray_stats;
 #[cfg(feature = "render")]
 pub mod render;
 #[cfg(feature = "render")]
+mod render_error;
+#[cfg(feature = "render")]
+mod render_options;
+#[cfg(feature = "render")]
 pub mod sampler;
 #[cfg(feature = "render")]
 pub mod scene;
@@ -89,6 +95,8 @@ pub mod scene;
 mod shade;
 #[cfg(feature = "render")]
 mod surface;
+#[cfg(feature = "render")]
+mod surface_model;
 #[cfg(feature = "render")]
 pub mod texture;
 #[cfg(feature = "render")]

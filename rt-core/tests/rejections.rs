@@ -17,6 +17,7 @@ use rt_core::shapes::{Radii, Spheres};
 use rt_core::simd::SimdLevel;
 use rt_core::texture::Texture;
 use rt_core::transfer_function::{TransferFunction, TransferFunctionError};
+use rt_core::volume::GradientOpacity;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -188,6 +189,21 @@ fn colors_that_are_nan_are_refused_wherever_they_come_from() {
     let mut colors = ColorMap::new(vec![], [0.0, 1.0]);
     colors.colors.clear();
     assert!(TransferFunction::new(colors, vec![[0.0, 1.0]]).is_err());
+}
+
+#[test]
+fn lists_that_were_emptied_after_their_making_have_a_defined_value() {
+    for log in [false, true] {
+        let mut map = ColorMap { log, ..ColorMap::new(vec![], [1.0, 2.0]) };
+        assert_eq!(map.lookup(1.5), [1.0; 4], "as made");
+        map.colors.clear();
+        let looked_up = [f32::NEG_INFINITY, 1.0, 1.5, 7.0].map(|v| map.lookup(v));
+        assert_eq!(looked_up, [[1.0; 4]; 4], "log {log}: white, as `new` makes of no colours");
+        assert_eq!(map.lookup(f32::NAN), map.nan_color);
+    }
+    let opacity = GradientOpacity { factors: [].into(), steepest: 2.0 };
+    let factors = [0.0, 1.0, 9.0, f64::NAN].map(|steepness| opacity.at(steepness));
+    assert_eq!(factors, [1.0; 4], "no factors change nothing");
 }
 
 #[test]

@@ -21,7 +21,7 @@ mod world;
 pub use error::BuildError;
 pub(crate) use layout::wide::{Unit, WideBvh};
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, UnknownQuality};
-pub use partition::{GlobalLayout, ShapePart};
+pub use partition::GlobalLayout;
 pub use refit::{RefitError, RefitReport};
 pub(crate) use streams::Coherence;
 pub use streams::StreamError;

@@ -9,8 +9,8 @@ mod texture_maps;
 
 pub use texture_maps::{MapConvention, TextureMaps};
 
-use crate::material::{Material, SurfaceModel};
 use crate::mesh::TriMesh;
+use crate::surface_model::SurfaceModel;
 use glam::{DMat3, DVec3, Vec2, Vec3};
 
 /// Surface parameters at one point.
@@ -204,16 +204,15 @@ pub(crate) struct SurfaceParameters {
 }
 
 impl BsdfParameters {
-    /// The material's own parameters, with a normal.
-    pub(crate) fn of(material: &Material, normal: Vec3) -> BsdfParameters {
-        let (metallic, roughness, specular) = match material.model {
+    /// The parameters of a model, with a material's emission and a normal.
+    pub(crate) fn of(model: &SurfaceModel, emission: Vec3, normal: Vec3) -> BsdfParameters {
+        let (metallic, roughness, specular) = match *model {
             SurfaceModel::Pbr { metallic, roughness, specular, .. } => {
                 (metallic, roughness, specular)
             }
             SurfaceModel::Metal { roughness } => (1.0, roughness, 0.0),
             _ => (0.0, 1.0, 0.0),
         };
-        let emission = material.emission.into();
         BsdfParameters {
             normal,
             metallic,

@@ -6,18 +6,15 @@
 
 mod assemble;
 mod asynchronous;
-mod error;
-mod options;
-mod plan;
 mod progressive;
 mod renderer;
 
 pub use asynchronous::AsyncRenderer;
-pub use error::RenderError;
-pub use options::{Crop, RenderOptions};
-pub(crate) use plan::plan_for;
 pub use progressive::{ProgressiveRenderer, RenderReport, StopReason};
 pub use renderer::Renderer;
+
+pub use crate::render_error::RenderError;
+pub use crate::render_options::{Crop, RenderOptions};
 
 use crate::camera::Camera;
 use crate::frame::Frame;

@@ -1,9 +1,9 @@
 //! Renders one sample per pixel at a time, with an image after each.
 
 use super::assemble::{FrameSlices, Tile, assemble, bands, blank_frame, tiles};
-use super::plan::{plan, warn_without_effect};
 use super::{RenderError, RenderOptions, RenderOutput};
 use crate::camera::Camera;
+use crate::effect_plan::{plan, warn_without_effect};
 use crate::effects::Effects;
 use crate::frame::{Frame, Layers};
 use crate::ray_stats::RayStats;

@@ -1,8 +1,9 @@
 //! Makes scenes with some of the primitives of a larger one.
 
 use super::{Appearance, Scene, SceneError};
-use crate::bvh::{BuildOptions, Geometry, ShapePart, World};
+use crate::bvh::{BuildOptions, Geometry, World};
 use crate::mesh::{Attribute, PerElement};
+use crate::shapes::ShapePart;
 use std::sync::Arc;
 
 impl Scene {

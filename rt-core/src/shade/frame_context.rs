@@ -9,7 +9,7 @@ use crate::environment::{Background, IrradianceCoefficients};
 use crate::light::{LightKind, ResolvedLight};
 use crate::math::Aabb;
 use crate::ray::{Hit, Ray};
-use crate::render::RenderOptions;
+use crate::render_options::RenderOptions;
 use crate::sampler::Sampler;
 use crate::scene::{Scene, transmits_light};
 use crate::surface::{ResolvedInstance, SurfacePoint};

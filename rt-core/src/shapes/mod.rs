@@ -5,6 +5,7 @@ mod cylinder;
 mod error;
 mod frustum;
 mod isosurface;
+mod part;
 mod rounded_cone;
 mod sphere;
 mod tube;
@@ -12,6 +13,7 @@ mod tube;
 pub use cylinder::Cylinders;
 pub use error::{ShapeError, ShapeReport};
 pub use isosurface::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, IsosurfaceReport};
+pub use part::ShapePart;
 pub use sphere::Spheres;
 pub use tube::Tubes;
 

@@ -12,10 +12,9 @@
 use super::error::{check_count, check_length};
 use super::rounded_cone::{Part, RoundedCone};
 use super::{
-    Radii, Shape, ShapeError, ShapeHit, ShapeReport, ShapeSurface, any_alpha, in_range,
+    Radii, Shape, ShapeError, ShapeHit, ShapePart, ShapeReport, ShapeSurface, any_alpha, in_range,
     outward_box, picked, rounded_point,
 };
-use crate::bvh::ShapePart;
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};

@@ -64,7 +64,9 @@ impl ResolvedInstance<'_> {
             face_normal: if face_normal.dot(ray.dir) > 0.0 { -face_normal } else { face_normal },
             outward: if flipped { -*normal } else { *normal },
         };
-        let bsdf = maps.evaluate(BsdfParameters::of(self.material, *normal), &place);
+        let emission = self.material.emission.into();
+        let bsdf =
+            maps.evaluate(BsdfParameters::of(&self.material.model, emission, *normal), &place);
         if bsdf.normal.is_finite() && bsdf.normal != Vec3::ZERO {
             *normal = bsdf.normal;
         }

@@ -98,10 +98,10 @@ pub struct GradientOpacity {
 }
 
 impl GradientOpacity {
-    /// The factor at a gradient of this length.
+    /// The factor at a gradient of this length; 1 without factors, which no volume takes.
     #[inline]
     pub fn at(&self, steepness: f64) -> f64 {
-        let last = self.factors.len() - 1;
+        let Some(last) = self.factors.len().checked_sub(1) else { return 1.0 };
         let x = (steepness / f64::from(self.steepest)).clamp(0.0, 1.0) * last as f64;
         // `clamp` keeps NaN, which `as` maps to the first entry.
         let i = (x as usize).min(last.saturating_sub(1));

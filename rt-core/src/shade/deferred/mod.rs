@@ -82,9 +82,11 @@ use super::frame_context::FrameContext;
 use super::tile::{TILE, TileArea};
 use super::{Layers, local, volumes};
 use crate::camera::Camera;
+use crate::effect_plan::plan_for;
 use crate::effects::Effects;
 use crate::ray::Ray;
-use crate::render::{Crop, RenderError, RenderOptions, plan_for};
+use crate::render_error::RenderError;
+use crate::render_options::{Crop, RenderOptions};
 use crate::scene::Scene;
 use crate::volume::Volume;
 

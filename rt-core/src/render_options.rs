@@ -1,8 +1,8 @@
 //! What to compute and when to stop.
 
-use super::RenderError;
 use crate::effects::Effects;
 use crate::frame::Layers;
+use crate::render_error::RenderError;
 use crate::sampler::Sampling;
 use crate::volume::VolumeQuality;
 use std::sync::Arc;
