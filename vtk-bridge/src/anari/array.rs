@@ -5,8 +5,8 @@
 //! Captured memory comes with a deleter. Managed memory belongs to the device, and the program
 //! fills it by mapping it.
 
-use super::abi::memory::{AppMemory, OwnMemory};
 use super::data_type::DataType;
+use super::memory::{AppMemory, OwnMemory};
 use super::object::Object;
 use std::sync::Arc;
 
@@ -184,5 +184,18 @@ impl Array {
                 std::array::from_fn(|i| f64::from(f(i)))
             })
             .collect()
+    }
+}
+
+impl Object {
+    /// Reads the data of an array; `None` for other objects.
+    pub(crate) fn with_array<T>(&self, f: impl FnOnce(&mut Array) -> T) -> Option<T> {
+        self.with_state(f)
+    }
+
+    /// The objects in an array parameter, in order and without nulls.
+    pub(crate) fn objects(&self, name: &str) -> Vec<Arc<Object>> {
+        let listed = |a: &mut Array| a.objects().iter().flatten().cloned().collect();
+        self.object(name).and_then(|a| a.with_array(listed)).unwrap_or_default()
     }
 }

@@ -3,15 +3,17 @@
 
 mod frames;
 
-use super::abi::memory::{AppMemory, OwnMemory};
 use super::array::{Array, Storage, byte_size};
 use super::data_type::DataType;
 use super::frame::{self, Accumulated, FrameState};
-use super::object::{Extra, Handle, Object, Value};
+use super::handle::Handle;
+use super::memory::{AppMemory, OwnMemory};
+use super::object::{Object, Value};
 use super::scene::Diagnostics;
 use super::scene::world::{CompiledWorld, WorldCache};
 use super::schema;
 use super::status::{Code, Listener, Message, Severity, Status, lock};
+use std::any::Any;
 use std::collections::HashMap;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, Weak};
@@ -140,14 +142,14 @@ impl Device {
             );
             self.tell(Handle::NULL, kind, Severity::Error, text);
         }
-        let extra = match kind {
-            DataType::FRAME => Extra::Frame(Box::<FrameState>::default()),
-            DataType::WORLD => Extra::World(Box::<WorldCache>::default()),
-            _ => Extra::None,
+        let state: Box<dyn Any + Send> = match kind {
+            DataType::FRAME => Box::<FrameState>::default(),
+            DataType::WORLD => Box::<WorldCache>::default(),
+            _ => Box::new(()),
         };
         // Programs written for other devices use other names for renderers. All of them get the
         // default renderer.
-        self.keep(Object::new(kind, subtype, known, extra))
+        self.keep(Object::new(kind, subtype, known, state))
     }
 
     /// Whether an array of these elements can be made. If not, the reason is reported.
@@ -195,7 +197,7 @@ impl Device {
             None => Storage::Own(OwnMemory::zeroed(byte_size(element, dims).unwrap_or(0))),
         };
         let array = Array::new(storage, element, dims);
-        let object = Object::new(kind, "", true, Extra::Array(Box::new(array)));
+        let object = Object::new(kind, "", true, Box::new(array));
         self.resolve(&object);
         object
     }

@@ -7,7 +7,6 @@ pub use channels::{Channel, Pixels};
 pub(crate) use job::{Job, Order, start};
 
 use super::object::Object;
-use super::status::lock;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -41,42 +40,35 @@ pub struct FrameState {
     mapped: BTreeMap<String, Arc<FrameImage>>,
 }
 
-/// Passes the frame's state to `f`; `None` for objects that are not frames.
-fn with_state<T>(frame: &Object, f: impl FnOnce(&mut FrameState) -> T) -> Option<T> {
-    match &mut *lock(&frame.extra) {
-        super::object::Extra::Frame(state) => Some(f(state)),
-        _ => None,
-    }
-}
-
 /// The running or finished job, if any.
 pub(crate) fn current_job(frame: &Object) -> Option<Arc<Job>> {
-    with_state(frame, |s| s.job.clone()).flatten()
+    frame.with_state(|s: &mut FrameState| s.job.clone()).flatten()
 }
 
 pub(crate) fn set_job(frame: &Object, job: Arc<Job>) {
-    with_state(frame, |s| s.job = Some(job));
+    frame.with_state(|s: &mut FrameState| s.job = Some(job));
 }
 
 /// Waits for the frame and returns its image; `None` if it was never rendered.
 pub fn finish(frame: &Object) -> Option<Arc<FrameImage>> {
     // Waiting while holding the lock would block `discard`.
     let picture = current_job(frame).map(|job| job.wait());
-    with_state(frame, |s| {
-        if picture.is_some() {
-            s.latest = picture;
-        }
-        s.latest.clone()
-    })
-    .flatten()
+    frame
+        .with_state(|s: &mut FrameState| {
+            if picture.is_some() {
+                s.latest = picture;
+            }
+            s.latest.clone()
+        })
+        .flatten()
 }
 
 /// Keeps the image alive until the channel is unmapped.
 pub(crate) fn hold(frame: &Object, channel: &str, picture: Arc<FrameImage>) {
-    with_state(frame, |s| s.mapped.insert(channel.to_owned(), picture));
+    frame.with_state(|s: &mut FrameState| s.mapped.insert(channel.to_owned(), picture));
 }
 
 /// Removes a mapping; false if there was none.
 pub(crate) fn unhold(frame: &Object, channel: &str) -> bool {
-    with_state(frame, |s| s.mapped.remove(channel).is_some()).unwrap_or(false)
+    frame.with_state(|s: &mut FrameState| s.mapped.remove(channel).is_some()).unwrap_or(false)
 }

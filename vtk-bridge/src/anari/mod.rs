@@ -3,8 +3,9 @@
 //! Blender).
 //!
 //! ANARI's loader opens `libanari_library_rtv.so` and calls C++ virtual functions of the objects it
-//! returns. [`abi`] defines these function tables and is the only module with unsafe code; behind
-//! it, a [`device::Device`] is ordinary Rust. A frame passes through these modules:
+//! returns. [`abi`] defines these function tables, and `memory` holds the elements of arrays where
+//! the program has them; behind these two, a [`device::Device`] is ordinary Rust without unsafe
+//! code. A frame passes through these modules:
 //!
 //! 1. [`device`]: the program makes [`object`]s and sets parameters, which [`schema`] checks.
 //!    Commits make them effective.
@@ -18,6 +19,8 @@ pub mod array;
 pub mod data_type;
 pub mod device;
 pub mod frame;
+pub mod handle;
+mod memory;
 pub mod object;
 pub mod scene;
 pub mod schema;

@@ -5,31 +5,13 @@
 //! that belongs to another device. Parameters hold [`Arc`]s, so an object stays alive after its
 //! release while other objects refer to it.
 
-use super::array::Array;
 use super::data_type::DataType;
-use super::frame::FrameState;
-use super::scene::world::WorldCache;
+use super::handle::Handle;
 use super::status::lock;
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-
-/// The program's name for an object; 0 means no object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Handle(pub u64);
-
-impl Handle {
-    /// No object.
-    pub const NULL: Handle = Handle(0);
-
-    /// A handle that no device of this process has used before.
-    pub(crate) fn fresh() -> Handle {
-        // Steps of 16 from a number that is not a small integer, so that programs that treat
-        // handles as pointers see aligned ones.
-        static NEXT: AtomicU64 = AtomicU64::new(0x1000);
-        Handle(NEXT.fetch_add(16, Ordering::Relaxed))
-    }
-}
 
 /// The value of a parameter.
 #[derive(Clone)]
@@ -74,20 +56,6 @@ impl Value {
 /// Committed parameters by name.
 pub type Parameters = BTreeMap<String, Value>;
 
-/// State that only some kinds of objects have.
-#[derive(Default)]
-pub enum Extra {
-    /// Nothing.
-    #[default]
-    None,
-    /// An array's data.
-    Array(Box<Array>),
-    /// A frame's images.
-    Frame(Box<FrameState>),
-    /// Cached results of a world.
-    World(Box<WorldCache>),
-}
-
 /// An object of a device.
 pub struct Object {
     /// The program's handle for it.
@@ -103,11 +71,18 @@ pub struct Object {
     staged: Mutex<Parameters>,
     committed: Mutex<Arc<Parameters>>,
     version: AtomicU64,
-    pub(crate) extra: Mutex<Extra>,
+    /// What only some kinds of objects have, by their own modules' types: an array's data, a
+    /// frame's images, a world's cached results.
+    state: Mutex<Box<dyn Any + Send>>,
 }
 
 impl Object {
-    pub(crate) fn new(kind: DataType, subtype: &str, known: bool, extra: Extra) -> Object {
+    pub(crate) fn new(
+        kind: DataType,
+        subtype: &str,
+        known: bool,
+        state: Box<dyn Any + Send>,
+    ) -> Object {
         Object {
             handle: Handle::fresh(),
             kind,
@@ -116,7 +91,7 @@ impl Object {
             staged: Mutex::default(),
             committed: Mutex::default(),
             version: AtomicU64::new(0),
-            extra: Mutex::new(extra),
+            state: Mutex::new(state),
         }
     }
 
@@ -219,21 +194,8 @@ impl Object {
         }
     }
 
-    /// The objects in an array parameter, in order and without nulls.
-    pub(crate) fn objects(&self, name: &str) -> Vec<Arc<Object>> {
-        self.object(name)
-            .map(|a| {
-                a.with_array(|a| a.objects().iter().flatten().cloned().collect())
-                    .unwrap_or_default()
-            })
-            .unwrap_or_default()
-    }
-
-    /// Reads the data of an array; `None` for other objects.
-    pub(crate) fn with_array<T>(&self, f: impl FnOnce(&mut Array) -> T) -> Option<T> {
-        match &mut *lock(&self.extra) {
-            Extra::Array(a) => Some(f(a)),
-            _ => None,
-        }
+    /// Passes the object's state to `f` while nobody else has it; `None` if it has no `T`.
+    pub(crate) fn with_state<T: 'static, R>(&self, f: impl FnOnce(&mut T) -> R) -> Option<R> {
+        lock(&self.state).downcast_mut().map(f)
     }
 }

@@ -1,7 +1,7 @@
 //! Messages to the program: what failed or was ignored, and how to fix it.
 
 use super::data_type::DataType;
-use super::object::Handle;
+use super::handle::Handle;
 use std::collections::HashSet;
 use std::sync::Mutex;
 

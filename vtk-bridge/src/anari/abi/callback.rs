@@ -1,7 +1,7 @@
 //! Calls the program's callback functions.
 
 use crate::anari::device::Hooks;
-use crate::anari::object::Handle;
+use crate::anari::handle::Handle;
 use crate::anari::status::{Listener, Message};
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::Arc;

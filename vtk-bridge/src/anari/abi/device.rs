@@ -4,11 +4,11 @@
 mod answers;
 
 use super::callback::{Callback, Callbacks, Own, StatusCallback};
-use super::memory::{AppMemory, Deleter};
 use super::text::text;
 use crate::anari::data_type::DataType;
 use crate::anari::device::{Device, Raw};
-use crate::anari::object::Handle;
+use crate::anari::handle::Handle;
+use crate::anari::memory::{AppMemory, Deleter};
 use crate::anari::status::{Severity, lock};
 use std::ffi::{c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};

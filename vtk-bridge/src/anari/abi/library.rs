@@ -6,7 +6,7 @@ use super::frontend::has_initialized_devices;
 use super::introspection::Introspection;
 use super::text::text;
 use crate::anari::status::{Code, Listener, Message, Severity};
-use crate::anari::{data_type::DataType, object::Handle};
+use crate::anari::{data_type::DataType, handle::Handle};
 use crate::capi::guarded;
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;

@@ -7,7 +7,7 @@
 //! offset to top, the type information (null, because it is never read), then the functions. The
 //! destructor has two entries: one destroys the object in place, the other also frees its memory.
 //! All handles except those of the library and the device are opaque numbers: see
-//! [`Handle`](super::object::Handle).
+//! [`Handle`](super::handle::Handle).
 //!
 //! Panics never cross this interface: every function catches them and reports an error.
 #![allow(
@@ -20,7 +20,6 @@ mod device;
 mod frontend;
 mod introspection;
 mod library;
-pub(crate) mod memory;
 mod text;
 
 pub use library::{anari_library_rtv_new_library, new_library};

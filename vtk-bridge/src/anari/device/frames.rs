@@ -4,7 +4,8 @@
 use super::Device;
 use crate::anari::data_type::DataType;
 use crate::anari::frame::{self, Order, start};
-use crate::anari::object::{Handle, Object, Value};
+use crate::anari::handle::Handle;
+use crate::anari::object::{Object, Value};
 use crate::anari::scene::world::{CompiledWorld, fingerprint};
 use crate::anari::scene::{Diagnostics, camera_of, renderer_settings};
 use crate::anari::schema;
@@ -226,7 +227,7 @@ impl Device {
 mod tests {
     use super::*;
     use crate::anari::device::{Hooks, Raw};
-    use crate::anari::object::Extra;
+    use crate::anari::scene::world::WorldCache;
     use crate::anari::status::Listener;
     use rt_core::bvh::World;
 
@@ -299,9 +300,8 @@ mod tests {
             d.render_frame(frame);
             assert!(d.frame_ready(frame, true));
             let object = lock(&d.objects).get(&world).map(|e| e.object.clone()).expect("the world");
-            let extra = lock(&object.extra);
-            let Extra::World(cache) = &*extra else { panic!("a world") };
-            lock(&cache.built).clone().expect("it was drawn")
+            let built = object.with_state(|c: &mut WorldCache| lock(&c.built).clone());
+            built.expect("a world").expect("it was drawn")
         };
         let first = draw();
         assert_eq!(first.instances().len(), 1);

@@ -8,19 +8,6 @@ use crate::anari::object::{Object, Value};
 use rt_core::glam::{DAffine3, DMat3, DVec3};
 use std::sync::Arc;
 
-/// Names that a material or sampler may refer to.
-pub const NAMES: &[&str] = &[
-    "color",
-    "attribute0",
-    "attribute1",
-    "attribute2",
-    "attribute3",
-    "worldPosition",
-    "worldNormal",
-    "objectPosition",
-    "objectNormal",
-];
-
 /// Names of the attributes that geometries and instances carry.
 pub(crate) const SLOTS: &[&str] =
     &["color", "attribute0", "attribute1", "attribute2", "attribute3"];

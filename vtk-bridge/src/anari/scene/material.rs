@@ -2,11 +2,12 @@
 //! opacity.
 
 use super::Diagnostics;
-use super::attribute::{NAMES, Source};
+use super::attribute::Source;
 use super::material_inputs::MaterialInputs;
 use super::sampler::Sampler;
 use super::surface_color::{AlphaMode, Input, SurfaceColor};
 use crate::anari::object::{Object, Value};
+use crate::anari::schema::ATTRIBUTES;
 use rt_core::material::{Material, PbrForm, SurfaceModel};
 
 /// A material without its colour: model and emission.
@@ -104,7 +105,7 @@ fn varying(
                 diagnostics.error(
                     material,
                     format!(
-                        "`{name}` is \"{attribute}\", which is no attribute; use one of {NAMES:?}"
+                        "`{name}` is \"{attribute}\", which is no attribute; use one of {ATTRIBUTES:?}"
                     ),
                 );
             }

@@ -3,6 +3,7 @@
 use super::Diagnostics;
 use super::attribute::{Domain, HitPoint, Source};
 use crate::anari::object::Object;
+use crate::anari::schema::ATTRIBUTES;
 use rt_core::glam::{DMat4, DVec4, Vec2};
 use rt_core::texture::{Filter, Texture, Wrap};
 use std::sync::Arc;
@@ -68,7 +69,7 @@ impl Sampler {
                     sampler,
                     format!(
                         "`inAttribute` is \"{name}\", which is no attribute; use one of {:?}",
-                        super::attribute::NAMES
+                        ATTRIBUTES
                     ),
                 );
             }

@@ -13,8 +13,7 @@ use super::material::{material_inputs_of, model_of, surface_color_of, uses_world
 use super::surface::{CompiledSurface, compile_surface};
 use super::volume::volume_of;
 use crate::anari::data_type::DataType;
-use crate::anari::object::{Extra, Object, Value};
-use crate::anari::status::lock;
+use crate::anari::object::{Object, Value};
 use rt_core::bvh::{Geometry, Instance, World};
 use rt_core::environment::Environment;
 use rt_core::glam::{DAffine3, DMat4, DVec3};
@@ -102,16 +101,28 @@ impl CompiledWorld {
     /// Converts everything in `world` (or a group or instance, for bounds). Faults become
     /// diagnostics.
     pub(crate) fn of(world: &Object, diagnostics: &mut Diagnostics) -> CompiledWorld {
-        let mut guard = lock(&world.extra);
-        let mut none = WorldCache::default();
-        let cache = match &mut *guard {
-            Extra::World(cache) => cache,
-            _ => &mut none,
-        };
-        let old = std::mem::take(cache);
+        // Dropped after the world's state is unlocked: it may have the last reference to an array.
+        let mut old = WorldCache::default();
+        let compiled = world.with_state(|cache: &mut WorldCache| {
+            old = std::mem::take(cache);
+            CompiledWorld::compile(world, &old, cache, diagnostics)
+        });
+        compiled.unwrap_or_else(|| {
+            let mut new = WorldCache::default();
+            CompiledWorld::compile(world, &old, &mut new, diagnostics)
+        })
+    }
+
+    /// Takes what has not changed from the last frame's cache and puts everything into the new one.
+    fn compile(
+        world: &Object,
+        old: &WorldCache,
+        cache: &mut WorldCache,
+        diagnostics: &mut Diagnostics,
+    ) -> CompiledWorld {
         cache.built = old.built.clone();
         let mut compiler = WorldCompiler {
-            old: &old,
+            old,
             cache,
             out: CompiledWorld::default(),
             known: HashMap::new(),
@@ -130,10 +141,7 @@ impl CompiledWorld {
                 compiler.content(world, here);
             }
         }
-        let out = compiler.out;
-        drop(guard);
-        drop(old);
-        out
+        compiler.out
     }
 }
 

@@ -192,6 +192,19 @@ pub const EXTENSIONS: &[&str] = &[
     "KHR_VOLUME_TRANSFER_FUNCTION1D",
 ];
 
+/// Names of attributes that a material or sampler may refer to.
+pub const ATTRIBUTES: &[&str] = &[
+    "color",
+    "attribute0",
+    "attribute1",
+    "attribute2",
+    "attribute3",
+    "worldPosition",
+    "worldNormal",
+    "objectPosition",
+    "objectNormal",
+];
+
 /// Element types of colour arrays and images.
 const COLORS: &[DataType] = &[
     DataType::UFIXED8,

@@ -1,6 +1,6 @@
 //! Materials, samplers and lights.
 
-use super::{COLORS, DataType, ObjectSchema, Parameter};
+use super::{ATTRIBUTES, COLORS, DataType, ObjectSchema, Parameter};
 
 const IDENTITY: &[f32] =
     &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
@@ -118,7 +118,7 @@ const IN_OUT: &[Parameter] = &[
 ];
 const OUT: &[Parameter] = &[
     Parameter::new("inAttribute", STRING, "the attribute to look up")
-        .text("attribute0", super::super::scene::attribute::NAMES),
+        .text("attribute0", ATTRIBUTES),
     Parameter::new("outTransform", &[DataType::FLOAT32_MAT4], "matrix on the result")
         .floats(IDENTITY),
     Parameter::new("outOffset", &[DataType::FLOAT32_VEC4], "added to the result after the matrix")

@@ -1,4 +1,5 @@
 //! Memory that both the program and the device access.
+#![allow(unsafe_code, reason = "the elements of arrays lie where the program says")]
 
 use std::cell::UnsafeCell;
 use std::ffi::c_void;
