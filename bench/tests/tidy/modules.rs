@@ -18,12 +18,9 @@ const CYCLES: &[(&str, usize)] = &[
     ("gluray/src/cluster", 2),
     ("gluray/src/interpose", 2),
     ("gluray/src/trace", 2),
-    ("rt-core/src", 6),
     ("rt-core/src/bvh", 2),
     ("schlieren/src", 4),
     ("vtk-bridge/src", 4),
-    ("vtk-bridge/src/anari", 24),
-    ("xtask/src", 10),
 ];
 
 /// The source files of one member, by module path: `[]` is main.rs, or lib.rs without one.

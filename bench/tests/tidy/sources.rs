@@ -16,6 +16,7 @@ pub(crate) const UNSAFE_MODULES: &[(&str, &str)] = &[
     ("vtk-bridge/src/capi", "the C ABI for VTK and ParaView"),
     ("vtk-bridge/src/loader", "finds the VTK that is in the process and loads what fits it"),
     ("vtk-bridge/src/anari/abi", "the C++ vtables through which ANARI programs call a device"),
+    ("vtk-bridge/src/anari/memory", "elements of arrays that ANARI programs read and write"),
     (
         "composite/examples/composite_smpi",
         "the function `main` of a shared library, which SimGrid's smpirun calls",
