@@ -24,6 +24,37 @@ pub enum ColorSource {
     Texture(Arc<Texture>),
 }
 
+/// How the numbers of a geometry's own colours, and of colour maps, become linear RGB.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
+pub enum ColorTransfer {
+    /// They are linear RGB.
+    #[default]
+    Linear,
+    /// (`factor` · c)^`exponent` for each number c of the colour at a point, after interpolation;
+    /// VTK decodes colours of its physically based surfaces with an exponent of 2.2.
+    Power {
+        /// Finite and not negative.
+        factor: f32,
+        /// Finite and positive.
+        exponent: f32,
+    },
+}
+
+impl ColorTransfer {
+    /// Linear RGB of a colour; opacity stays.
+    #[inline]
+    pub(crate) fn apply(self, color: [f32; 4]) -> [f32; 4] {
+        let ColorTransfer::Power { factor, exponent } = self else { return color };
+        let [r, g, b, alpha] = color;
+        let [r, g, b] = [r, g, b].map(|c| {
+            let scaled = (factor * c).max(0.0);
+            if exponent == 1.0 { scaled } else { scaled.powf(exponent) }
+        });
+        [r, g, b, alpha]
+    }
+}
+
 /// Which sides of a surface are drawn and lit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
@@ -51,6 +82,9 @@ pub struct Material {
     pub color: [f32; 3],
     /// What replaces or modulates `color`.
     pub color_source: ColorSource,
+    /// Of the geometry's colours ([`ColorSource::Attribute`], [`ColorSource::Scalars`]); `color` and
+    /// textures are linear RGB.
+    pub color_transfer: ColorTransfer,
     /// 1 opaque to 0 invisible; times the alpha of the colour source.
     pub opacity: f32,
     /// Emitted radiance, linear RGB.
@@ -71,7 +105,9 @@ impl PartialEq for Material {
             (a, b) => a.is_none() && b.is_none(),
         };
         let key = |m: &Material| (m.model, m.color, m.opacity, m.emission, m.sides, m.flat);
-        same && key(self) == key(o) && self.color_source == o.color_source
+        same && key(self) == key(o)
+            && self.color_source == o.color_source
+            && self.color_transfer == o.color_transfer
     }
 }
 
@@ -81,6 +117,7 @@ impl Material {
             model,
             color,
             color_source: ColorSource::Attribute,
+            color_transfer: ColorTransfer::Linear,
             opacity: 1.0,
             emission: [0.0; 3],
             sides: Sides::Both,
@@ -205,6 +242,13 @@ impl Material {
             ColorSource::Attribute | ColorSource::Constant => {}
             ColorSource::Scalars(map) => map.check()?,
             ColorSource::Texture(texture) => texels("texture", texture)?,
+        }
+        if let ColorTransfer::Power { factor, exponent } = self.color_transfer {
+            light("color transfer's factor", [factor; 3])?;
+            if !(exponent > 0.0 && exponent.is_finite()) {
+                let field = "color transfer's exponent";
+                return Err((field, exponent.to_string(), "finite and positive"));
+            }
         }
         unit("opacity", self.opacity)?;
         light("color", self.color)?;

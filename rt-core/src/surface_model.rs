@@ -9,12 +9,14 @@ pub enum PhongForm {
     HalfVector,
     /// (R·V)^s with the mirrored light direction R: VTK (Phong 1975).
     Mirrored,
+    /// (max(R·V, 10⁻⁵))^s: VTK since 9.3. Exponents below 1 light also what R·V leaves dark.
+    MirroredAboveZero,
     /// (N·L)^s, for any viewing direction: VTK's shader where a headlight is the only light.
     TowardsLight,
 }
 
 /// Formula of [`SurfaceModel::Pbr`] for lights.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub enum PbrForm {
     /// glTF 2.0, appendix B: the matte layer receives the light that the coat transmits at the
@@ -23,8 +25,12 @@ pub enum PbrForm {
     Gltf,
     /// VTK 9's shader: the matte layer gets 1 - F at the half vector, and F includes the metal's
     /// colour; shadowing and masking use α = roughness, but the distribution uses α = roughness²;
-    /// reflectance at grazing angles is min(1, 49.5·F₀).
-    Vtk,
+    /// reflectance at grazing angles is min(1, 49.5·F₀). See [`crate::vtk_pbr`].
+    Vtk {
+        /// Least divisor of the distribution term, which bounds the highlights of nearly smooth
+        /// surfaces: 10⁻⁸ since VTK 9.7, 0 before.
+        min_divisor: f32,
+    },
 }
 
 /// The reflection model of a surface.

@@ -567,7 +567,7 @@ int32_t rtv_set_bridge_option(RtvBridge* bridge, char const* name, char const* v
 double rtv_option(char const* name);
 /* As rtv_option, with the bridge's own options over those of the process: in a frame those that it began with, else those that one begun now would have; -1 also without a bridge. */
 double rtv_bridge_option(RtvBridge* bridge, char const* name);
-/* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES) take it from here, unless the environment or the program says otherwise. For all bridges of the process. */
+/* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES, RTV_VTK) take it from here, unless the environment or the program says otherwise. For all bridges of the process. */
 void rtv_host(uint32_t vtk_major, uint32_t vtk_minor);
 /* Begins a frame. Returns 0 if OpenGL should draw everything (RTV_OFF). */
 int32_t rtv_begin(RtvBridge* bridge);

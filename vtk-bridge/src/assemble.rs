@@ -5,12 +5,14 @@ use crate::bridge::FrameSurface;
 use crate::colors::MeshColors;
 use crate::edges::Edges;
 use crate::input::Property;
-use crate::materials::{Encoding, MaterialContext, ambient_as_emission, material};
+use crate::materials::{
+    Encoding, MaterialContext, ambient_as_emission, glyph_factor, material, under_line,
+};
 use crate::options::{MaterialChoice, Options};
 use rt_core::bvh::{Geometry, Instance};
 use rt_core::glam::DAffine3;
 use rt_core::material::{ColorSource, Material, SurfaceModel};
-use rt_core::scene::Appearance;
+use rt_core::scene::{Appearance, Scene};
 use std::collections::HashMap;
 
 /// The assembled lists. Appearances and encodings have one entry per instance.
@@ -93,8 +95,9 @@ impl Assembled {
             return;
         };
         self.edges.resize_with(first, || None);
-        for i in self.instances[first..].iter().filter(|_| is_mesh || d.back.is_some()) {
-            self.edges.push(Some(Edges::new(mesh, i.world_from_object, &d.property, reach)));
+        for k in (first..self.instances.len()).filter(|_| is_mesh || d.back.is_some()) {
+            let place = self.instances[k].world_from_object;
+            self.edges.push(Some(Edges::new(mesh, place, &d.property, self.encodings[k], reach)));
         }
     }
 
@@ -118,12 +121,13 @@ impl Assembled {
                 self.place(geometry, d.world_from_data, m, colors, encoding);
             }
             Some(copies) => {
+                let factor = glyph_factor(property, context) / 255.0;
                 let mut by_color: HashMap<Option<[u8; 4]>, usize> = HashMap::new();
                 for (place, rgba) in copies {
                     let m = *by_color.entry(*rgba).or_insert_with(|| match rgba {
                         None => self.dressed(base.clone(), colors, d),
                         Some([r, g, b, a]) => {
-                            let color = [*r, *g, *b].map(|c| f32::from(c) / 255.0);
+                            let color = [*r, *g, *b].map(|c| f32::from(c) * factor);
                             let opacity = base.opacity * f32::from(*a) / 255.0;
                             let source = ColorSource::Constant;
                             self.material(Material {
@@ -172,6 +176,26 @@ impl Assembled {
         self.instances.push(Instance { geometry, world_from_object });
         self.encodings.push(encoding);
     }
+}
+
+/// The scene with each surface as the lines along its edges would cover it, where lines are lit;
+/// `None` where none are.
+pub(crate) fn lit_lines(
+    scene: &Scene,
+    edges: &mut [Option<Edges>],
+    encodings: &[Encoding],
+) -> Option<Scene> {
+    let mut lines: Option<Scene> = None;
+    for (i, e) in edges.iter_mut().enumerate() {
+        let Some(e) = e else { continue };
+        let surface = &scene.materials[scene.appearances[i].material];
+        let Some(line) = under_line(surface, e.color(), encodings[i]) else { continue };
+        let lines = lines.get_or_insert_with(|| scene.clone());
+        e.lit = true;
+        lines.appearances[i].material = lines.materials.len();
+        lines.materials.push(line);
+    }
+    lines
 }
 
 /// Whether ambient light would be visible.

@@ -342,7 +342,7 @@ impl Bridge {
         let shadows = options.shadows || view.shadows;
         let headlight_only = matches!(self.lights.as_slice(), [only] if only.headlight);
         let start = Instant::now();
-        let Assembled { geometries, instances, appearances, materials, encodings, edges } =
+        let Assembled { geometries, instances, appearances, materials, encodings, mut edges } =
             assemble(&self.surfaces, &options, headlight_only, self.lights.is_empty());
         let world = self.world(geometries, instances)?;
         self.report.ms.build += ms(start);
@@ -358,7 +358,9 @@ impl Bridge {
         }
         scene.materials = materials;
         scene.volumes = self.volume_cache.placed().to_vec();
-        if !scene.volumes.is_empty() && encodings.contains(&crate::materials::Encoding::Pbr) {
+        if !scene.volumes.is_empty()
+            && encodings.iter().any(|e| *e != crate::materials::Encoding::Direct)
+        {
             self.warn(
                 "volumes in front of physically based surfaces: these encode their colours (power \
                  1/2.2), and what the volume adds there is encoded with them"
@@ -412,8 +414,10 @@ impl Bridge {
         render.max_bounces = options.max_bounces;
         render.seed = options.seed.wrapping_add(u64::from(mean_of) << 32);
         render.effects = Some(effects);
+        let lines = crate::assemble::lit_lines(&scene, &mut edges, &encodings);
         let inputs = RenderInputs {
             scene: &scene,
+            lines: lines.as_ref(),
             camera: &camera,
             options: render,
             averaged: options.progressive > 1,
@@ -552,6 +556,8 @@ impl Bridge {
 /// All inputs of an image.
 pub(crate) struct RenderInputs<'a> {
     pub(crate) scene: &'a Scene,
+    /// See [`crate::assemble::lit_lines`].
+    pub(crate) lines: Option<&'a Scene>,
     pub(crate) camera: &'a Camera,
     pub(crate) options: RenderOptions,
     /// Later images will be averaged with this one.

@@ -4,6 +4,7 @@
 
 use crate::geometry::PolygonMesh;
 use crate::input::{Property, View};
+use crate::materials::Encoding;
 use rayon::prelude::*;
 use rt_core::frame::Frame;
 use rt_core::glam::{DAffine3, DVec2, DVec4};
@@ -22,6 +23,10 @@ pub(crate) struct Edges {
     sides: Option<Arc<Vec<u8>>>,
     world_from_object: DAffine3,
     color: [f32; 3],
+    /// Colour outside the surface.
+    outline: [f32; 3],
+    /// Whether the colour on the surface is that of the image of lit lines.
+    pub(crate) lit: bool,
     width_px: f64,
     /// Whether triangles of each winding in the window are culled: index 0 for winding −1, index 1
     /// for winding 1 (rows counted from the top).
@@ -57,6 +62,7 @@ impl Edges {
         mesh: &PolygonMesh,
         world_from_object: DAffine3,
         property: &Property,
+        encoding: Encoding,
         reach: f64,
     ) -> Edges {
         Edges {
@@ -64,10 +70,21 @@ impl Edges {
             sides: mesh.edges.clone(),
             world_from_object,
             color: property.edge_color,
+            outline: match encoding {
+                // Neither lit nor given an ambient part.
+                Encoding::Pbr => [0.0; 3],
+                other => property.edge_color.map(|c| other.encoded(c)),
+            },
+            lit: false,
             width_px: f64::from(property.edge_width),
             culled: [property.cull_front, property.cull_back],
             reach,
         }
+    }
+
+    /// The colour of the lines.
+    pub(crate) fn color(&self) -> [f32; 3] {
+        self.color
     }
 
     /// Returns `None` for triangles with a corner behind the eye, which has no window position, and
@@ -173,8 +190,15 @@ impl ProjectedTriangle {
 
 /// Draws the edges of all instances into `frame`, which has its identity layers. `edges` has one
 /// entry per instance, or is empty. `first_depth` is the depth of the first surface in front of the
-/// opaque ones, or empty.
-pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges>], view: &View) {
+/// opaque ones, or empty. `lit_lines` has the colours of pixels as lines would cover them, for the
+/// edges that are [`Edges::lit`], or is empty.
+pub(crate) fn draw(
+    frame: &mut Frame,
+    lit_lines: &[[f32; 4]],
+    first_depth: &[f32],
+    edges: &[Option<Edges>],
+    view: &View,
+) {
     if edges.is_empty() {
         return;
     }
@@ -193,8 +217,12 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
         let p = DVec2::new((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
         let coverage = e.coverage(&t, &t.distances(p));
         let alpha = color[3];
-        for (c, edge) in color.iter_mut().zip(e.color) {
-            *c += (edge * alpha - *c) * coverage;
+        let line = match lit_lines.get(at) {
+            Some([r, g, b, _]) if e.lit => [*r, *g, *b],
+            _ => e.color.map(|c| c * alpha),
+        };
+        for (c, line) in color.iter_mut().zip(line) {
+            *c += (line - *c) * coverage;
         }
         if e.reach > 0.0 && *depth < 1.0 {
             *depth = (t.depth(p) as f32).clamp(0.0, 1.0f32.next_down());
@@ -214,7 +242,7 @@ pub(crate) fn draw(frame: &mut Frame, first_depth: &[f32], edges: &[Option<Edges
             let at = f.pixel as usize;
             let hidden = veiled.get(at) == Some(&true) && first_depth[at] < f.depth;
             if f.depth <= frame.depth[at] && !hidden {
-                let [r, g, b] = e.color;
+                let [r, g, b] = e.outline;
                 (frame.depth[at], frame.color[at]) = (f.depth, [r, g, b, 1.0]);
             }
         }
@@ -236,6 +264,8 @@ mod tests {
             sides: Some(Arc::new(vec![3, 6])),
             world_from_object: DAffine3::IDENTITY,
             color: [1.0, 0.0, 0.0],
+            outline: [1.0, 0.0, 0.0],
+            lit: false,
             width_px: 4.0,
             culled: [false; 2],
             reach: 0.25,
@@ -279,7 +309,7 @@ mod tests {
                 primitive: vec![u32::MAX; 10_000],
                 ..Frame::default()
             };
-            super::draw(&mut frame, &[], &[Some(edges)], &view);
+            super::draw(&mut frame, &[], &[], &[Some(edges)], &view);
             frame
         };
         let shown = |f: &Frame, x: usize, y: usize| f.depth[y * 100 + x] < 1.0;

@@ -8,9 +8,12 @@
 
 use crate::input::{Image, Maps, Property};
 use crate::options::{MaterialChoice, Options};
-use rt_core::material::{ColorSource, Material, PbrForm, PhongForm, Sides, SurfaceModel};
+use rt_core::material::{
+    ColorSource, ColorTransfer, Material, PbrForm, PhongForm, Sides, SurfaceModel,
+};
 use rt_core::material_maps::{MapConvention, MaterialMaps, TextureMaps};
 use rt_core::texture::Texture;
+use rt_core::vtk_pbr::GAMMA;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -21,6 +24,19 @@ pub enum Encoding {
     Direct,
     /// Divided by π, then raised to the power 1/2.2.
     Pbr,
+    /// Raised to the power 1/2.2: physically based surfaces without lighting since VTK 9.6.
+    Gamma,
+}
+
+impl Encoding {
+    /// The number in the image for radiance `v`.
+    pub(crate) fn encoded(self, v: f32) -> f32 {
+        match self {
+            Encoding::Direct => v,
+            Encoding::Pbr => (v / PI).max(0.0).powf(1.0 / GAMMA),
+            Encoding::Gamma => v.max(0.0).powf(1.0 / GAMMA),
+        }
+    }
 }
 
 /// Settings that affect all materials of a frame.
@@ -58,6 +74,7 @@ pub fn material(
         model: SurfaceModel::Matte,
         color: p.diffuse_color.map(non_negative),
         color_source: ColorSource::Attribute,
+        color_transfer: ColorTransfer::Linear,
         opacity,
         emission: [0.0; 3],
         sides,
@@ -96,17 +113,17 @@ pub fn material(
     let base = Material { opacity, ..base };
     if !p.lighting || context.dark {
         // Complexity 0 of VTK's shader: ambient and diffuse are used unchanged.
-        let color = if from_values {
-            [p.ambient + p.diffuse; 3]
-        } else {
-            std::array::from_fn(|c| {
-                non_negative(p.ambient * p.ambient_color[c] + p.diffuse * p.diffuse_color[c])
-            })
-        };
-        return (Material { model: SurfaceModel::Unlit, color, ..base }, Encoding::Direct);
+        let color = std::array::from_fn(|c| {
+            non_negative(p.ambient * p.ambient_color[c] + p.diffuse * p.diffuse_color[c])
+        });
+        let color_transfer = transfer(&[p.ambient, p.diffuse], p.pbr, options);
+        let encoding =
+            if p.pbr && options.vtk >= (9, 6) { Encoding::Gamma } else { Encoding::Direct };
+        let model = SurfaceModel::Unlit;
+        return (Material { model, color, color_transfer, ..base }, encoding);
     }
     if p.pbr {
-        return pbr(p, base);
+        return pbr(p, base, options);
     }
     let share = ambient_share(options);
     let same = from_values || p.ambient_color == p.diffuse_color;
@@ -118,6 +135,8 @@ pub fn material(
         shininess: non_negative(p.specular_power),
         highlight: if context.only_headlight {
             PhongForm::TowardsLight
+        } else if options.vtk >= (9, 3) {
+            PhongForm::MirroredAboveZero
         } else {
             PhongForm::Mirrored
         },
@@ -128,7 +147,58 @@ pub fn material(
     (Material { model, emission, ..base }, Encoding::Direct)
 }
 
-fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
+/// Colours of points, cells and maps, multiplied by each of `coefficients` and added. Since VTK 9.7,
+/// the shader of physically based surfaces raises each product to the power 2.2.
+fn transfer(coefficients: &[f32], pbr: bool, options: &Options) -> ColorTransfer {
+    let exponent = if pbr && options.vtk >= (9, 7) { GAMMA } else { 1.0 };
+    let sum: f32 = coefficients.iter().map(|c| non_negative(*c).powf(exponent)).sum();
+    let factor = sum.powf(1.0 / exponent);
+    if factor == 1.0 && exponent == 1.0 {
+        ColorTransfer::Linear
+    } else {
+        ColorTransfer::Power { factor, exponent }
+    }
+}
+
+/// Factor on the colours of single glyphs, which VTK's shader never decodes.
+pub(crate) fn glyph_factor(p: &Property, context: &MaterialContext<'_>) -> f32 {
+    let of_scene = [MaterialChoice::Scene, MaterialChoice::Transparent];
+    match (of_scene.contains(&context.options.material), !p.lighting || context.dark, p.pbr) {
+        (true, true, _) => non_negative(p.ambient + p.diffuse),
+        (true, false, true) => non_negative(p.diffuse),
+        _ => 1.0,
+    }
+}
+
+/// What a fragment becomes that the line along an edge covers, where that is not the line's own
+/// colour: VTK's shader replaces the diffuse part by 0 and the ambient part by the line's colour,
+/// and then lights them. Highlights therefore lie on lines, and lines on physically based surfaces,
+/// which have no ambient part, are black.
+pub(crate) fn under_line(m: &Material, line: [f32; 3], encoding: Encoding) -> Option<Material> {
+    let base = Material { color_source: ColorSource::Constant, ..m.clone() };
+    match m.model {
+        SurfaceModel::Phong { specular, shininess, highlight, .. } if specular != [0.0; 3] => {
+            let model = SurfaceModel::Phong {
+                ambient: 0.0,
+                diffuse: 0.0,
+                specular,
+                shininess,
+                highlight,
+                mirror: 0.0,
+            };
+            Some(Material { model, emission: line, ..base })
+        }
+        SurfaceModel::Pbr { form: PbrForm::Vtk { .. }, .. } => {
+            Some(Material { color: [0.0; 3], ..base })
+        }
+        SurfaceModel::Unlit if encoding != Encoding::Direct => {
+            Some(Material { color: line, ..base })
+        }
+        _ => None,
+    }
+}
+
+fn pbr(p: &Property, base: Material, options: &Options) -> (Material, Encoding) {
     let f0 = {
         let r = (p.base_ior - 1.0) / (p.base_ior + 1.0);
         non_negative(r * r).min(1.0)
@@ -137,10 +207,12 @@ fn pbr(p: &Property, base: Material) -> (Material, Encoding) {
         metallic: non_negative(p.metallic).min(1.0),
         roughness: non_negative(p.roughness).min(1.0),
         specular: f0,
-        form: PbrForm::Vtk,
+        form: PbrForm::Vtk { min_divisor: if options.vtk >= (9, 7) { 1e-8 } else { 0.0 } },
     };
-    // VTK 9 treats the colour as linear here, although it encodes the result.
-    (Material { model, ..base }, Encoding::Pbr)
+    // VTK 9 treats the property's colour as linear here, although it encodes the result.
+    let color = base.color.map(|c| c * non_negative(p.diffuse));
+    let color_transfer = transfer(&[p.diffuse], true, options);
+    (Material { model, color, color_transfer, ..base }, Encoding::Pbr)
 }
 
 /// Further textures of a physically based property.

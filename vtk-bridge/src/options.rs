@@ -75,6 +75,8 @@ pub struct Options {
     /// How far corners of triangles with edges move outwards, line widths: the geometry shader of
     /// VTK 9.0 to 9.2 moves them by a quarter. 0: edges end at the outline.
     pub edge_reach: f64,
+    /// Version of VTK, major and minor, whose shaders the image follows.
+    pub vtk: (u32, u32),
     /// Seed of the random numbers.
     pub seed: u64,
     /// File to which the report is written after each frame.
@@ -109,6 +111,7 @@ impl Default for Options {
             point_radius: 0.0,
             line_radius: 0.0,
             edge_reach: 0.25,
+            vtk: (9, 1),
             seed: 0,
             report: None,
             quiet: false,
@@ -157,6 +160,11 @@ pub const NAMES: &[(&str, &str, &str)] = &[
         "RTV_EDGES",
         "how far edges of surfaces reach beyond the outline, line widths (VTK up to 9.2: 0.25)",
         "0 to 4",
+    ),
+    (
+        "RTV_VTK",
+        "version of VTK whose shaders the image follows",
+        "as in 9.1; the host's by default",
     ),
     ("RTV_SEED", "seed of the noise", "a whole number"),
     (
@@ -267,6 +275,10 @@ impl Options {
             "RTV_POINT_RADIUS" => self.point_radius = within(value, 0.0, f64::MAX)?,
             "RTV_LINE_RADIUS" => self.line_radius = within(value, 0.0, f64::MAX)?,
             "RTV_EDGES" => self.edge_reach = within(value, 0.0, 4.0)?,
+            "RTV_VTK" => {
+                let (major, minor) = value.split_once('.')?;
+                self.vtk = (major.parse().ok()?, minor.parse().ok()?);
+            }
             "RTV_SEED" => self.seed = value.parse().ok()?,
             "RTV_REPORT" => self.report = (!value.is_empty()).then(|| value.to_owned()),
             "RTV_QUIET" => self.quiet = switch(value)?,

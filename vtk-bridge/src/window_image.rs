@@ -10,7 +10,6 @@ use rt_core::environment::Background;
 use rt_core::frame::{Frame, Layers};
 use rt_core::ray_stats::RayStats;
 use rt_core::render::{RenderOptions, Renderer};
-use std::f32::consts::PI;
 use std::time::Instant;
 
 /// An image; rows start at the top.
@@ -78,6 +77,14 @@ impl WindowImage {
         let output = renderer.render(inputs.scene, inputs.camera, &options)?;
         let mut frame = output.frame;
         let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
+        let mut lit_lines = match inputs.lines {
+            Some(lines) => {
+                let wanted = if mixed { Layers::COLOR | Layers::IDS } else { Layers::COLOR };
+                let options = RenderOptions { layers: wanted, ..options.clone() };
+                renderer.render(lines, inputs.camera, &options)?.frame
+            }
+            None => Frame::default(),
+        };
         let mut first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
             let depth_only =
                 RenderOptions { layers: Layers::DEPTH, samples: 1, ..inputs.options.clone() };
@@ -98,7 +105,8 @@ impl WindowImage {
             clear_background(&mut frame, &first_depth);
         }
         encode(&mut frame, inputs.encodings, mixed);
-        crate::edges::draw(&mut frame, &first_depth, inputs.edges, view);
+        encode(&mut lit_lines, inputs.encodings, mixed);
+        crate::edges::draw(&mut frame, &lit_lines.color, &first_depth, inputs.edges, view);
         (self.width, self.height) = (view.width, view.height);
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {
@@ -146,22 +154,22 @@ fn clear_background(frame: &mut Frame, first_depth: &[f32]) {
 
 /// See [`Encoding`].
 fn encode(frame: &mut Frame, encodings: &[Encoding], mixed: bool) {
-    let pbr = |c: &mut [f32; 4]| {
+    let encoded = |c: &mut [f32; 4], encoding: Encoding| {
         let a = c[3];
-        if a > 0.0 {
+        if a > 0.0 && encoding != Encoding::Direct {
             for v in &mut c[..3] {
-                *v = a * (*v / (a * PI)).max(0.0).powf(1.0 / 2.2);
+                *v = a * encoding.encoded(*v / a);
             }
         }
     };
+    let colors = frame.color.par_iter_mut().with_min_len(CHUNK);
     if mixed {
-        let choose = |(c, i): (&mut [f32; 4], &u32)| {
-            if encodings.get(*i as usize) == Some(&Encoding::Pbr) {
-                pbr(c);
+        colors.zip(&frame.instance).for_each(|(c, i)| {
+            if let Some(encoding) = encodings.get(*i as usize) {
+                encoded(c, *encoding);
             }
-        };
-        frame.color.par_iter_mut().with_min_len(CHUNK).zip(&frame.instance).for_each(choose);
-    } else if encodings.first() == Some(&Encoding::Pbr) {
-        frame.color.par_iter_mut().with_min_len(CHUNK).for_each(pbr);
+        });
+    } else if let Some(encoding) = encodings.first().filter(|e| **e != Encoding::Direct) {
+        colors.for_each(|c| encoded(c, *encoding));
     }
 }

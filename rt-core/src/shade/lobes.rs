@@ -1,7 +1,7 @@
 //! The reflection of light from one direction, and of ambient light, by a material.
 
 use super::microfacet::{ggx, schlick};
-use super::vtk_pbr;
+use super::vtk_pbr::{Cosines, VtkPbr};
 use crate::effects::{Effects, reflection_of};
 use crate::material::{PbrForm, PhongForm, SurfaceModel};
 use glam::Vec3;
@@ -41,14 +41,23 @@ pub(crate) fn response(
             }
             let base = match form {
                 PhongForm::HalfVector => normal.dot((l + view).normalize_or_zero()),
-                PhongForm::Mirrored => (normal * (2.0 * cos) - l).dot(view),
+                PhongForm::Mirrored | PhongForm::MirroredAboveZero => {
+                    (normal * (2.0 * cos) - l).dot(view)
+                }
                 PhongForm::TowardsLight => cos,
             };
+            let least = least_cosine(form);
             // 0^0 is 1 in OpenGL: shininess 0 lights the whole side.
-            matte + specular * highlight * power(base.max(0.0), shininess)
+            matte + specular * highlight * power(base.max(least), shininess)
         }
         _ => microfacet_response(model, normal, surface_color, view, l, color) * cos,
     }
+}
+
+/// Least base of a highlight's power.
+#[inline]
+pub(crate) fn least_cosine(form: PhongForm) -> f32 {
+    if form == PhongForm::MirroredAboveZero { 1e-5 } else { 0.0 }
 }
 
 /// [`response`] of the microfacet models, without the cosine.
@@ -65,10 +74,15 @@ fn microfacet_response(
         SurfaceModel::Metal { roughness } => {
             microfacets(surface_color, roughness, normal, view, l) * color
         }
-        SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Vtk } => {
-            let [matte, lobe] =
-                vtk_pbr([metallic, roughness, specular], surface_color, normal, view, l);
-            (matte + lobe) * color
+        SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Vtk { min_divisor } } => {
+            let model = VtkPbr {
+                metallic,
+                roughness,
+                base_reflectance: specular,
+                edge_tint: Vec3::ONE,
+                min_divisor,
+            };
+            model.brdf(surface_color, Cosines::new(normal, view, l)) * PI * color
         }
         SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Gltf } => {
             let f0 = Vec3::splat(specular).lerp(surface_color, metallic);
@@ -118,28 +132,6 @@ fn microfacets(f0: Vec3, roughness: f32, n: Vec3, v: Vec3, l: Vec3) -> Vec3 {
     schlick(f0, h.dot(v)) * (ggx(n, v, l, alpha) * PI)
 }
 
-/// [`PbrForm::Vtk`], times π: matte layer and highlight (`vtkOpenGLPolyDataMapper`'s shader, VTK
-/// 9.1).
-fn vtk_pbr(
-    [metallic, roughness, specular]: [f32; 3],
-    albedo: Vec3,
-    n: Vec3,
-    v: Vec3,
-    l: Vec3,
-) -> [Vec3; 2] {
-    // As in the shader: never 0.
-    let cosine = |a: Vec3, b: Vec3| a.dot(b).clamp(1e-5, 1.0);
-    let h = (v + l).normalize_or_zero();
-    let (nv, nl, nh, hl) = (cosine(n, v), cosine(n, l), cosine(n, h), cosine(h, l));
-    let f0 = Vec3::splat(specular).lerp(albedo, metallic);
-    let grazing = (f0.element_sum() * (50.0 * 0.33)).clamp(0.0, 1.0);
-    let f90 = Vec3::splat(grazing).lerp(Vec3::ONE, metallic);
-    let f = vtk_pbr::fresnel(f0, f90, hl);
-    // A mirror's highlight is a point that no pixel would hit; the shader divides 0 by 0 there.
-    let lobe = vtk_pbr::specular_isotropic([nh, nv, nl], roughness, f32::MIN_POSITIVE);
-    [albedo * (Vec3::ONE - f) * (1.0 - metallic), f * (lobe * PI)]
-}
-
 /// Light reflected to the viewer per unit of ambient radiance. Where a reflector's own reflection
 /// rays are left out, it uses its share of ambient light instead of turning black.
 #[inline]
@@ -158,7 +150,7 @@ pub(crate) fn ambient_albedo(model: &SurfaceModel, color: Vec3, effects: Effects
         }
         // VTK's physically based shader has no ambient light; where ambient occlusion is requested,
         // there must be light to occlude.
-        SurfaceModel::Pbr { form: PbrForm::Vtk, .. }
+        SurfaceModel::Pbr { form: PbrForm::Vtk { .. }, .. }
             if !effects.contains(Effects::AMBIENT_OCCLUSION) =>
         {
             Vec3::ZERO

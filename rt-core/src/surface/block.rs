@@ -7,7 +7,7 @@
 //! cannot be normalised) are left to `shading_point` itself.
 
 use super::{HitPoint, ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
-use crate::material::{ColorSource, Sides};
+use crate::material::{ColorSource, ColorTransfer, Sides};
 use crate::mesh::{Attribute, PerElement, TriMesh};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::prefetch_item;
@@ -337,6 +337,14 @@ impl ResolvedInstance<'_> {
                 true
             }
         };
+        let by_texture = matches!(self.material.color_source, ColorSource::Texture(_));
+        if colored && !by_texture && self.material.color_transfer != ColorTransfer::Linear {
+            for lane in 0..LANES {
+                let color = rgba.map(|row| row[lane]);
+                let linear = self.material.color_transfer.apply(color);
+                (0..4).for_each(|c| rgba[c][lane] = linear[c]);
+            }
+        }
         let alpha = if colored {
             out.color.0 = [rgba[0], rgba[1], rgba[2]];
             f32x16::from_slice(simd, &rgba[3])

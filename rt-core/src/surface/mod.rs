@@ -299,7 +299,9 @@ impl<'a> ResolvedInstance<'a> {
         [w, u, v]: [f32; 3],
     ) -> [f32; 4] {
         match &self.material.color_source {
-            ColorSource::Attribute => self.colors.map(|c| interpolate4(c, corner, prim, [w, u, v])),
+            ColorSource::Attribute => self.colors.map(|c| {
+                self.material.color_transfer.apply(interpolate4(c, corner, prim, [w, u, v]))
+            }),
             ColorSource::Constant => None,
             ColorSource::Scalars(map) => self.scalars.map(|s| {
                 let value = match s.per {
@@ -309,7 +311,7 @@ impl<'a> ResolvedInstance<'a> {
                     }
                     PerElement::Face => s.values[prim as usize],
                 };
-                map.lookup(value)
+                self.material.color_transfer.apply(map.lookup(value))
             }),
             ColorSource::Texture(texture) => mesh.texcoords.as_ref().map(|uv| {
                 let [x, y, z] = corner.map(|k| uv[k]);
@@ -357,6 +359,7 @@ impl<'a> ResolvedInstance<'a> {
             // Shapes have no texture coordinates.
             ColorSource::Constant | ColorSource::Texture(_) => None,
         };
+        let from_attribute = from_attribute.map(|c| self.material.color_transfer.apply(c));
         let [r, g, b, alpha] = from_attribute.unwrap_or_else(|| self.constant());
         self.finish(
             ray,

@@ -108,7 +108,7 @@ pub unsafe extern "C" fn rtv_bridge_option(bridge: *mut RtvBridge, name: *const 
 }
 
 /// Tells which VTK the library is inside of: options whose default follows VTK's version
-/// (`RTV_EDGES`) take it from here, unless the environment or the program says otherwise. For all
+/// (`RTV_EDGES`, `RTV_VTK`) take it from here, unless the environment or the program says otherwise. For all
 /// bridges of the process.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {

@@ -43,10 +43,18 @@ pub(super) fn set_host(major: u32, minor: u32) {
     HOST.store(u64::from(major) << 32 | u64::from(minor), Ordering::Relaxed);
 }
 
-/// Options that follow VTK's version. Shaders of versions after 9.2 draw edges only on the surface
-/// itself.
-fn host_options(host: u64) -> Option<(String, String)> {
-    ((host >> 32, host & 0xffff_ffff) > (9, 2)).then(|| ("RTV_EDGES".to_owned(), "0".to_owned()))
+/// Options that follow VTK's version, if it is known. Shaders of versions after 9.2 draw edges only
+/// on the surface itself.
+fn host_options(host: u64) -> Vec<(String, String)> {
+    let (major, minor) = (host >> 32, host & 0xffff_ffff);
+    let mut options = Vec::new();
+    if (major, minor) > (0, 0) {
+        options.push(("RTV_VTK".to_owned(), format!("{major}.{minor}")));
+    }
+    if (major, minor) > (9, 2) {
+        options.push(("RTV_EDGES".to_owned(), "0".to_owned()));
+    }
+    options
 }
 
 /// All sources of options; later ones take precedence over earlier ones.
@@ -292,13 +300,16 @@ mod tests {
     #[test]
     fn edges_follow_the_version_of_vtk_unless_set() {
         let of = |major: u64, minor: u64| {
-            host_options(major << 32 | minor).map(|(name, value)| format!("{name}={value}"))
+            let (options, faults) = Options::parse(host_options(major << 32 | minor));
+            assert!(faults.is_empty(), "{faults:?}");
+            (options.vtk, options.edge_reach)
         };
-        for (major, minor) in [(0, 0), (9, 0), (9, 1), (9, 2)] {
-            assert_eq!(of(major, minor), None, "{major}.{minor}");
+        assert_eq!(of(0, 0), (Options::default().vtk, 0.25), "unknown");
+        for minor in 0..3 {
+            assert_eq!(of(9, minor.into()), ((9, minor), 0.25));
         }
         for (major, minor) in [(9, 3), (9, 7), (10, 0)] {
-            assert_eq!(of(major, minor).as_deref(), Some("RTV_EDGES=0"), "{major}.{minor}");
+            assert_eq!(of(major.into(), minor.into()), ((major, minor), 0.0));
         }
         let said = ("RTV_EDGES".to_owned(), "0.5".to_owned());
         assert_eq!(

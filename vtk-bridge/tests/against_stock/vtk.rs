@@ -153,6 +153,7 @@ scripts! {
     opacity_is_as_with_depth_peeling: "opacity",
     physically_based_surfaces_are_as_in_stock_vtk: "pbr",
     textures_of_physically_based_surfaces_are_as_in_stock_vtk: "pbr_maps",
+    coefficients_scalars_lines_and_smooth_metals_are_lit_as_by_vtks_shader_of_this_version: "pbr_terms",
     projections_of_all_kinds_are_exact: "projections",
     blocks_beside_a_refused_one_are_not_drawn_twice: "refused_blocks",
     props_of_every_reason_are_as_in_stock_vtk: "reasons",

@@ -8,8 +8,9 @@ use crate::state::matrix::transform;
 use crate::trace::lighting::normalized;
 use crate::trace::mixed;
 use crate::trace::occlusion::Visibility;
+use rt_core::glam::Vec3;
 use rt_core::mesh::TriMesh;
-use rt_core::vtk_pbr;
+use rt_core::vtk_pbr::{Cosines, GAMMA, VtkPbr};
 
 type V3 = [f32; 3];
 
@@ -67,18 +68,14 @@ impl ProgramLight {
 }
 
 impl PbrMaterial {
-    /// The light reflected towards the view, as in VTK: Lambert's term and an isotropic GGX lobe
-    /// with the height-correlated Smith term and Schlick's Fresnel factor. `cosines` are those of
-    /// the half vector with the normal, the view and the light, and of the half vector and the
-    /// light.
-    fn reflected(&self, albedo: V3, [n_h, n_v, n_l, h_l]: [f32; 4]) -> V3 {
-        use std::f32::consts::PI;
-        let f0 = mix([self.base; 3], albedo, self.metallic);
-        let grazing = (f0.iter().sum::<f32>() * 50.0 * 0.33).clamp(0.0, 1.0);
-        let f90 = mix([grazing; 3], self.tint, self.metallic);
-        let f = vtk_pbr::fresnel(f0.into(), f90.into(), h_l).to_array();
-        let lobe = vtk_pbr::specular_isotropic([n_h, n_v, n_l], self.roughness, self.least_divisor);
-        std::array::from_fn(|k| (1.0 - self.metallic) * (1.0 - f[k]) * albedo[k] / PI + lobe * f[k])
+    fn model(&self) -> VtkPbr {
+        VtkPbr {
+            metallic: self.metallic,
+            roughness: self.roughness,
+            base_reflectance: self.base,
+            edge_tint: self.tint.into(),
+            min_divisor: self.least_divisor,
+        }
     }
 }
 
@@ -154,7 +151,7 @@ impl VtkProgram {
             Some(back) if !at.front => back,
             _ => {
                 let (own, alpha) = self.own_color(a, mesh, at.prim, at.weights);
-                let plain = |v: f32| if self.signature.linear { v.powf(2.2) } else { v };
+                let plain = |v: f32| if self.signature.linear { v.powf(GAMMA) } else { v };
                 Surface {
                     ambient: own.unwrap_or(self.ambient).map(|v| plain(v * self.ambient_intensity)),
                     diffuse: own.unwrap_or(self.diffuse).map(|v| plain(v * self.diffuse_intensity)),
@@ -287,25 +284,23 @@ impl VtkProgram {
         normal: V3,
         reaches: &Visibility,
     ) -> V3 {
-        let cosine = |a: V3, b: V3| dot(a, b).clamp(1e-5, 1.0);
+        let (model, albedo) = (p.model(), Vec3::from(s.diffuse));
         let to_eye = normalized(point.map(|v| -v));
-        let n_v = cosine(normal, to_eye);
-        let mut sum = [0.0_f32; 3];
+        let cosines = |l: V3| Cosines::new(normal.into(), to_eye.into(), l.into());
+        let mut sum = Vec3::ZERO;
         for (i, (light, visible)) in self.lights.iter().zip(&reaches.lights).enumerate() {
             let (cosines, share) = if self.signature.headlight && i == 0 {
-                ([n_v, n_v, n_v, 1.0], 1.0)
+                // Light, viewer and half vector are one.
+                let n_v = cosines(to_eye).n_v;
+                (Cosines { n_h: n_v, n_v, n_l: n_v, h_l: 1.0 }, 1.0)
             } else {
                 let (direction, share) = light.reaching(point);
-                let l = normalized(direction.map(|v| -v));
-                let h = normalized(std::array::from_fn(|k| to_eye[k] + l[k]));
-                ([cosine(normal, h), n_v, cosine(normal, l), cosine(h, l)], share)
+                (cosines(normalized(direction.map(|v| -v))), share)
             };
-            let reflected = p.reflected(s.diffuse, cosines);
-            for k in 0..3 {
-                sum[k] += light.color[k] * share * visible * reflected[k] * cosines[2];
-            }
+            let reflected = model.brdf(albedo, cosines);
+            sum += Vec3::from(light.color) * (share * visible) * reflected * cosines.n_l;
         }
-        sum.map(|v| v.powf(1.0 / 2.2))
+        sum.to_array().map(|v| v.powf(1.0 / GAMMA))
     }
 }
 
@@ -332,24 +327,6 @@ mod tests {
         assert_eq!(light.reaching([3.0, 0.0, -2.0]).1, 0.0, "outside of the cone");
         let far = ProgramLight { lamp: None, ..light };
         assert_eq!(far.reaching([3.0, 0.0, -2.0]), ([0.0, 0.0, -1.0], 1.0));
-    }
-
-    #[test]
-    fn a_rough_metal_reflects_less_along_the_normal_than_a_smooth_one_and_has_no_diffuse_part() {
-        let p = PbrMaterial {
-            metallic: 1.0,
-            roughness: 0.9,
-            base: 0.04,
-            tint: [1.0; 3],
-            least_divisor: 1e-8,
-        };
-        let smooth = PbrMaterial { roughness: 0.2, ..p };
-        let along = [1.0, 1.0, 1.0, 1.0];
-        let (rough, shiny) = (p.reflected([0.5; 3], along), smooth.reflected([0.5; 3], along));
-        assert!(rough[0] < shiny[0], "{rough:?} {shiny:?}");
-        // D V F with N = V = L = H: 1 / (pi a²) 1/4 F0, where V is 0.5 / (1 + 1).
-        let a2 = 0.9_f32.powi(4);
-        assert!((rough[0] - 0.5 * 0.25 / (std::f32::consts::PI * a2)).abs() < 1e-5, "{rough:?}");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::environment::IrradianceCoefficients;
 use crate::light::{ResolvedLight, ResolvedLightKind, cone_share};
 use crate::material::{Material, PhongForm, SurfaceModel};
 use crate::ray::{LANES, RayBlock};
-use crate::shade::lobes::power;
+use crate::shade::lobes::{least_cosine, power};
 use crate::simd::vectors::{Row, Rows3, Vec3x16};
 use crate::surface::ShadingPointBlock;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdNarrow, SimdWiden, f32x16, mask32x16};
@@ -115,10 +115,13 @@ fn respond<S: Simd>(
                         let (h, ok) = l.add(view).try_normalize(simd);
                         normal.dot(h.or_else(ok, Vec3x16::splat(simd, Vec3::ZERO)))
                     }
-                    PhongForm::Mirrored => normal.scale(v(2.0) * cos).sub(l).dot(view),
+                    PhongForm::Mirrored | PhongForm::MirroredAboveZero => {
+                        normal.scale(v(2.0) * cos).sub(l).dot(view)
+                    }
                     PhongForm::TowardsLight => cos,
                 };
-                let direct_lighting = power_block(simd, base.max(v(0.0)), shininess);
+                let direct_lighting =
+                    power_block(simd, base.max(v(least_cosine(highlight))), shininess);
                 matte.add(Vec3x16::splat(simd, specular * light.highlight).scale(direct_lighting))
             }
         }
