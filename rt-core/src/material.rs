@@ -25,6 +25,14 @@ pub enum ColorSource {
 }
 
 /// How the numbers of a geometry's own colours, and of colour maps, become linear RGB.
+///
+/// ```
+/// use rt_core::material::{ColorTransfer, Material};
+/// use rt_core::vtk_pbr::GAMMA;
+/// let color_transfer = ColorTransfer::Power { factor: 1.0, exponent: GAMMA };
+/// let decoded = Material { color_transfer, ..Material::pbr([1.0; 3], 0.0, 0.5) };
+/// assert_ne!(decoded, Material::pbr([1.0; 3], 0.0, 0.5));
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub enum ColorTransfer {
@@ -82,8 +90,8 @@ pub struct Material {
     pub color: [f32; 3],
     /// What replaces or modulates `color`.
     pub color_source: ColorSource,
-    /// Of the geometry's colours ([`ColorSource::Attribute`], [`ColorSource::Scalars`]); `color` and
-    /// textures are linear RGB.
+    /// Of the geometry's colours ([`ColorSource::Attribute`], [`ColorSource::Scalars`]); `color`
+    /// and textures are linear RGB.
     pub color_transfer: ColorTransfer,
     /// 1 opaque to 0 invisible; times the alpha of the colour source.
     pub opacity: f32,

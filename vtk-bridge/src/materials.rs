@@ -147,8 +147,8 @@ pub fn material(
     (Material { model, emission, ..base }, Encoding::Direct)
 }
 
-/// Colours of points, cells and maps, multiplied by each of `coefficients` and added. Since VTK 9.7,
-/// the shader of physically based surfaces raises each product to the power 2.2.
+/// Colours of points, cells and maps, multiplied by each of `coefficients` and added. Since VTK
+/// 9.7, the shader of physically based surfaces raises each product to the power 2.2.
 fn transfer(coefficients: &[f32], pbr: bool, options: &Options) -> ColorTransfer {
     let exponent = if pbr && options.vtk >= (9, 7) { GAMMA } else { 1.0 };
     let sum: f32 = coefficients.iter().map(|c| non_negative(*c).powf(exponent)).sum();

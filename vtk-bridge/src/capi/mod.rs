@@ -108,8 +108,8 @@ pub unsafe extern "C" fn rtv_bridge_option(bridge: *mut RtvBridge, name: *const 
 }
 
 /// Tells which VTK the library is inside of: options whose default follows VTK's version
-/// (`RTV_EDGES`, `RTV_VTK`) take it from here, unless the environment or the program says otherwise. For all
-/// bridges of the process.
+/// (`RTV_EDGES`, `RTV_VTK`) take it from here, unless the environment or the program says
+/// otherwise. For all bridges of the process.
 #[unsafe(no_mangle)]
 pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {
     guarded((), || state::set_host(vtk_major, vtk_minor));
