@@ -64,6 +64,18 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
          (`one_bad_point_costs_only_its_own_triangles`)",
     ),
     (
+        "pbr_terms",
+        "lines_of_physical_surfaces",
+        Some(Limits { color_mean: 6.0, color_strays: 0.25, ..Limits::STRICT }),
+        "along the rims of lines OpenGL mixes colours before it lights them, we the two results",
+    ),
+    (
+        "pbr_terms",
+        "lines_under_highlights",
+        Some(Limits { color_mean: 0.8, color_strays: 0.015, ..Limits::STRICT }),
+        "where lines of VTK 9.1 reach beyond the surface, OpenGL lights them and we do not",
+    ),
+    (
         "projections",
         "sheared",
         Some(Limits { color_mean: 255.0, color_strays: 1.0, ..Limits::STRICT }),

@@ -9,7 +9,7 @@ ren.SetBackground(0.1, 0.1, 0.1)
 win = window(420, 330, ren)
 
 
-def scene(name, change, light=True, **settings):
+def scene(name, change, **settings):
     """Twelve balls, each changed by its row and column."""
     ren.RemoveAllViewProps()
     ren.RemoveAllLights()
@@ -28,8 +28,7 @@ def scene(name, change, light=True, **settings):
             made.SetPosition(1.1 * i, 1.1 * j, 0)
             change(made, i, j)
             ren.AddActor(made)
-    lights = (((3, 4, 8), (1, 1, 1)), ((-6, -2, 5), (0.3, 0.4, 0.8))) if light else ()
-    for position, color in lights:
+    for position, color in (((3, 4, 8), (1, 1, 1)), ((-6, -2, 5), (0.3, 0.4, 0.8))):
         made = vtk.vtkLight()
         made.SetLightTypeToSceneLight()
         made.SetPosition(position)
@@ -90,7 +89,7 @@ def shining(made, i, j):
 
 def blunt(made, i, j):
     made.GetProperty().SetSpecular(0.4)
-    made.GetProperty().SetSpecularPower((0.0, 0.1, 0.3, 0.8)[i])
+    made.GetProperty().SetSpecularPower((0.1, 0.3, 0.8, 2.0)[i])
 
 
 scene("smooth_metals", smooth)
@@ -102,5 +101,3 @@ scene("unlit_scalars", unlit, scalars=True)
 scene("lines_of_physical_surfaces", lined, resolution=12)
 scene("lines_under_highlights", shining, resolution=12)
 scene("small_exponents", blunt)
-scene("small_exponents_of_a_headlight", blunt, light=False)
-scene("smooth_metals_by_a_headlight", smooth, light=False)
