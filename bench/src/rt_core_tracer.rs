@@ -2,9 +2,9 @@
 
 use crate::baselines::{BuildCost, Tracer};
 use crate::{clock, memory, rays};
-use glam::Vec3;
+use glam::{DAffine3, Vec3};
 use rays::{HitBlock, LANES, RayBlock};
-use rt_core::bvh::{BuildError, BuildOptions, World};
+use rt_core::bvh::{BuildError, BuildOptions, Geometry, Instance, World};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -44,8 +44,19 @@ pub struct RtCoreTracer {
 impl RtCoreTracer {
     /// Builds on rayon's current pool.
     pub fn build(mesh: &Arc<TriMesh>, options: &BuildOptions) -> Result<RtCoreTracer, BuildError> {
+        RtCoreTracer::build_many(std::slice::from_ref(mesh), options)
+    }
+
+    /// Builds a world of `meshes`, which have one origin, each as a geometry of its own.
+    pub fn build_many(
+        meshes: &[Arc<TriMesh>],
+        options: &BuildOptions,
+    ) -> Result<RtCoreTracer, BuildError> {
+        let geometries: Vec<Geometry> = meshes.iter().cloned().map(Geometry::Mesh).collect();
+        let place = |geometry| Instance { geometry, world_from_object: DAffine3::IDENTITY };
+        let instances: Vec<Instance> = (0..meshes.len()).map(place).collect();
         let ((world, time), peak_bytes) =
-            memory::peak(|| clock::measure(|| World::from_mesh(mesh.clone(), options)));
+            memory::peak(|| clock::measure(|| World::build(geometries, instances, options)));
         let world = world?;
         let cost = BuildCost {
             wall_secs: time.wall_secs,
@@ -53,7 +64,8 @@ impl RtCoreTracer {
             bytes: world.report().bytes as u64,
             peak_bytes: Some(peak_bytes),
         };
-        let shift = (mesh.origin - world.origin()).as_vec3();
+        let origin = meshes.first().map_or(world.origin(), |m| m.origin);
+        let shift = (origin - world.origin()).as_vec3();
         Ok(RtCoreTracer { world, options: *options, cost, shift })
     }
 

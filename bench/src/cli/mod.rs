@@ -1,6 +1,7 @@
 //! The command line: converts arguments to calls of the library.
 
 mod list;
+mod mesh_file;
 mod peers;
 mod quote;
 mod render;
@@ -65,6 +66,10 @@ struct RunArgs {
     /// Like --record, but despite objections, which records and reports then state
     #[arg(long)]
     record_despite_doubts: bool,
+    /// With `peers`: measures on the triangles of this file, in any format that `bench render`
+    /// reads, instead of the built-in meshes. Meshes of the file stay apart
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
     /// Folder for the records and the report [default: bench-report in the build folder]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

@@ -1,5 +1,6 @@
 //! `bench run`, and `bench` alone.
 
+use super::mesh_file::read_mesh;
 use super::report::write_page;
 use super::{RunArgs, default_dir};
 use crate::doubts::{Admission, Gate};
@@ -14,6 +15,16 @@ use std::time::Instant;
 
 pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     let chosen = args.ids.iter().map(|id| find(id)).collect::<Result<Vec<_>, _>>()?;
+    if let (Some(file), Some(other)) = (&args.mesh, chosen.iter().find(|e| e.id != "peers")) {
+        let (file, id) = (file.display(), other.id);
+        let text = format!("--mesh {file} is for `peers`; `{id}` has data of its own, omit --mesh");
+        return Err(UsageError(text).into());
+    }
+    if args.mesh.is_some() && (args.record || args.record_despite_doubts) {
+        let text = "records in bench/runs are of meshes that anyone can make again; give --out DIR \
+                    instead of --record to keep what --mesh measures";
+        return Err(UsageError(text.into()).into());
+    }
     let dir = args.out.clone().unwrap_or_else(default_dir);
     let mut dirs = vec![dir.clone()];
     let recording = args.record || args.record_despite_doubts;
@@ -25,6 +36,7 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     let steps = Steps::new(common, cancel, chosen.len());
     let mut progress = |what: &str, share: Option<f64>| steps.next(what, share);
     let mut context = Context::new(args.quick, Some(cancel.flag().clone()), &mut progress);
+    context.mesh = args.mesh.as_deref().map(|file| read_mesh(common, file)).transpose()?;
     let mut written = false;
     for (i, experiment) in chosen.into_iter().enumerate() {
         steps.begin(i, experiment.id);

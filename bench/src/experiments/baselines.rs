@@ -1,5 +1,5 @@
-//! Compares rt-core with Embree 3, Embree 4 and obvhs on the same mesh and rays, in one process, in
-//! alternation.
+//! Compares rt-core with Embree 3, Embree 4 and obvhs on the same meshes and rays, in one process,
+//! in alternation.
 //!
 //! rt-core's watertight mode is compared with every mode of the baselines, even those that are not
 //! robust. Each baseline uses the packet width that is fastest for it.
@@ -7,20 +7,19 @@
 use super::Context;
 use super::compare::{self, Kind};
 use super::installed_tracers::{InstalledBaselines, Isa, TracerSet};
-use crate::meshes;
+use crate::meshes::{self, MeshScene};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::rays::View;
 use crate::record::{Record, Row};
 use crate::runner::{Ratio, Schedule};
 use datasets::generate::nested_wavelet::Size;
-use rt_core::mesh::TriMesh;
-use std::sync::Arc;
 
 const OURS: &str = "rt-core watertight";
 const OURS_FAST: &str = "rt-core fast";
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     compare::explain_columns(record);
+    record.column("meshes", "", "meshes of the scene, each a geometry of its own");
     record.column("build", "s", "build on all threads, wall time");
     record.column("build_cpu", "s", "build, CPU time of all threads");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
@@ -42,44 +41,72 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             .into(),
     );
 
-    let scenes: Vec<(&str, Arc<TriMesh>, Isa)> = if context.quick {
-        let w1 = context.wavelet(Size::M1)?;
-        vec![("wavelet 1M", w1, Isa::Best), ("pipes", meshes::pipes(600), Isa::Best)]
-    } else {
-        let (w1, w16, pipes) =
-            (context.wavelet(Size::M1)?, context.wavelet(Size::M16)?, meshes::pipes(2600));
-        vec![
-            ("wavelet 1M", w1.clone(), Isa::Best),
-            ("wavelet 1M", w1.clone(), Isa::Avx2),
-            ("wavelet 1M", w1, Isa::Sse42),
-            ("wavelet 16M", w16, Isa::Best),
-            ("pipes", pipes.clone(), Isa::Best),
-            ("pipes", pipes, Isa::Avx2),
-        ]
-    };
-    for (name, mesh, isa) in scenes {
-        scene(context, record, &installed, name, &mesh, isa)?;
+    if let Some(scene) = context.mesh.clone() {
+        // What this page's reader asked for, and nothing else.
+        for isa in if context.quick { &[Isa::Best][..] } else { &[Isa::Best, Isa::Avx2] } {
+            measure(context, record, &installed, &scene, *isa)?;
+        }
+        plots(record);
+        return Ok(());
+    }
+    for &(name, isas) in if context.quick { QUICK } else { FULL } {
+        context.report_step(format!("making {name}"))?;
+        let scene = scene(context, name)?;
+        for &isa in isas {
+            measure(context, record, &installed, &scene, isa)?;
+        }
     }
     plots(record);
     Ok(())
 }
 
-fn scene(
+/// The scenes, and the instruction sets on which each is measured.
+const FULL: &[(&str, &[Isa])] = &[
+    ("wavelet 1M", &[Isa::Best, Isa::Avx2, Isa::Sse42]),
+    ("wavelet 16M", &[Isa::Best]),
+    ("pipes", &[Isa::Best, Isa::Avx2]),
+    ("cells", &[Isa::Best, Isa::Avx2]),
+    ("terrain", &[Isa::Best, Isa::Avx2]),
+    ("city", &[Isa::Best, Isa::Avx2]),
+    ("slivers", &[Isa::Best, Isa::Avx2]),
+];
+const QUICK: &[(&str, &[Isa])] =
+    &[("wavelet 1M", &[Isa::Best]), ("pipes", &[Isa::Best]), ("city", &[Isa::Best])];
+
+/// Makes a scene of [`FULL`], smaller for quick runs.
+fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
+    let quick = context.quick;
+    let size = |full: u32, short: u32| if quick { short } else { full };
+    let mesh = match name {
+        "wavelet 1M" => context.wavelet(Size::M1)?,
+        "wavelet 16M" => context.wavelet(Size::M16)?,
+        "pipes" => meshes::pipes(size(2600, 600)),
+        "cells" => meshes::cells(size(69, 25)),
+        "terrain" => meshes::terrain(size(4_000_000, 200_000)),
+        "slivers" => meshes::slivers(size(500_000, 50_000)),
+        "city" => return Ok(meshes::city(size(3000, 300))),
+        _ => anyhow::bail!("there is no scene `{name}`"),
+    };
+    Ok(MeshScene::one(name, mesh))
+}
+
+fn measure(
     context: &mut Context<'_>,
     record: &mut Record,
     installed: &InstalledBaselines,
-    name: &str,
-    mesh: &Arc<TriMesh>,
+    scene: &MeshScene,
     isa: Isa,
 ) -> anyhow::Result<()> {
+    let (name, mesh) = (scene.name.as_str(), &scene.merged);
     let full_name =
         if isa == Isa::Best { name.to_string() } else { format!("{name}, {}", isa.name()) };
-    let tracers = TracerSet::build(mesh, installed, isa, &mut |s| {
+    let tracers = TracerSet::build(scene, installed, isa, &mut |s| {
         context.report_step(format!("{full_name}: {s}"))
     })?;
     let base = Row::new()
         .with("mesh", name)
         .with("triangles", mesh.num_triangles())
+        .with("meshes", scene.meshes().len())
         .with("simd", isa.name());
 
     // ---- Builds. Each was built once; fig4.7 measures build times in alternation.

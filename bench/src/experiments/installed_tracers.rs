@@ -1,14 +1,13 @@
-//! All available tracers, built for one mesh.
+//! All available tracers, built for one scene.
 
 use super::compare::{Contender, Kind};
 use crate::baselines::BuildCost;
 use crate::baselines::embree::{Embree, EmbreeScene, Options, Version};
 use crate::baselines::obvhs::{Obvhs, Preset};
+use crate::meshes::MeshScene;
 use crate::rt_core_tracer::{Mode, RtCoreTracer};
 use rt_core::bvh::{BuildOptions, Robustness};
-use rt_core::mesh::TriMesh;
 use rt_core::simd::SimdLevel;
-use std::sync::Arc;
 
 /// The widest instruction set that all tracers may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +52,7 @@ impl Isa {
     }
 }
 
-/// All tracers of one mesh.
+/// All tracers of one scene.
 pub(super) struct TracerSet {
     isa: Isa,
     pub(super) ours: Vec<(String, RtCoreTracer)>,
@@ -81,10 +80,10 @@ impl InstalledBaselines {
 }
 
 impl TracerSet {
-    /// Builds each tracer, fast and watertight or robust. obvhs, whose instruction set is fixed at
-    /// compile time, takes part at the best level only.
+    /// Builds each tracer, fast and watertight or robust, from the same meshes. obvhs, whose
+    /// instruction set is fixed at compile time, takes part at the best level only.
     pub(super) fn build(
-        mesh: &Arc<TriMesh>,
+        scene: &MeshScene,
         installed: &InstalledBaselines,
         isa: Isa,
         report_step: &mut dyn FnMut(&str) -> anyhow::Result<()>,
@@ -95,7 +94,7 @@ impl TracerSet {
             let options = BuildOptions { robustness, simd: isa.ours(), ..Default::default() };
             tracers.ours.push((
                 format!("rt-core {}", robustness.name()),
-                RtCoreTracer::build(mesh, &options)?,
+                RtCoreTracer::build_many(scene.meshes(), &options)?,
             ));
         }
         for e in &installed.embree {
@@ -103,14 +102,17 @@ impl TracerSet {
             for robust in [true, false] {
                 let options = Options { robust, max_isa: isa.embree(), ..Options::default() };
                 let kind = if robust { "robust" } else { "fast" };
-                tracers
-                    .embree
-                    .push((format!("{} {kind}", e.name()), EmbreeScene::build(e, mesh, &options)?));
+                tracers.embree.push((
+                    format!("{} {kind}", e.name()),
+                    EmbreeScene::build_many(e, scene.meshes(), &options)?,
+                ));
             }
         }
-        if isa == Isa::Best {
+        // obvhs has no scenes of many meshes.
+        if isa == Isa::Best && scene.parts.is_empty() {
             report_step("building obvhs")?;
-            tracers.obvhs = Some(("obvhs CWBVH".into(), Obvhs::build(mesh, Preset::Medium)?));
+            tracers.obvhs =
+                Some(("obvhs CWBVH".into(), Obvhs::build(&scene.merged, Preset::Medium)?));
         }
         Ok(tracers)
     }

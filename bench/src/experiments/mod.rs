@@ -40,6 +40,7 @@ mod table5_1;
 mod test_section;
 
 use crate::machine::Machine;
+use crate::meshes::MeshScene;
 use crate::record::Record;
 use crate::{meshes, runner};
 use datasets::cli::Interrupted;
@@ -293,6 +294,8 @@ pub struct Context<'a> {
     pub progress: &'a mut Progress<'a>,
     /// Set to true to stop long renderings between two tiles.
     pub cancel: Option<Arc<AtomicBool>>,
+    /// The mesh to measure on instead of the built-in ones.
+    pub mesh: Option<MeshScene>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
@@ -306,7 +309,7 @@ impl<'a> Context<'a> {
         cancel: Option<Arc<AtomicBool>>,
         progress: &'a mut Progress<'a>,
     ) -> Context<'a> {
-        Context { quick, progress, cancel, wavelets: BTreeMap::new() }
+        Context { quick, progress, cancel, mesh: None, wavelets: BTreeMap::new() }
     }
 
     fn report_step(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {

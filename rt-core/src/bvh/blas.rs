@@ -12,8 +12,9 @@ use super::layout::triangles::widened;
 use super::layout::wide::{ChildRef, LeafWriter, Unit, WideBvh, write_id_leaf};
 use super::options::BuildOptions;
 use super::query::{AnyHit, ClosestHit, TriangleTest};
+use super::traverse::tree_view::TreeView;
 use super::traverse::triangle_leaf::ClosestTri;
-use super::triangle_bvh::TriBvh;
+use super::triangle_bvh::{self, TriBvh};
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::math::Aabb;
 use crate::mesh::TriMesh;
@@ -27,7 +28,15 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub(crate) enum Content {
     Triangles(TriBvh),
-    Shape { bvh: WideBvh, shape: Arc<dyn Shape> },
+    /// A member of the world's mesh group, whose tree holds the triangles.
+    Member {
+        bounds: Aabb,
+        depth: usize,
+    },
+    Shape {
+        bvh: WideBvh,
+        shape: Arc<dyn Shape>,
+    },
 }
 
 /// The structure of one geometry.
@@ -70,7 +79,7 @@ impl Blas {
         let frame = given
             .map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
         let whole = given.map(|(_, bounds)| bounds);
-        let mut tris = TriBvh::build(mesh, &frame, options.quality);
+        let mut tris = TriBvh::build(mesh, &frame, 0, options.quality);
         let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
         let primitives = mesh.indices.len() - skipped;
         Blas {
@@ -126,16 +135,58 @@ impl Blas {
         }
     }
 
-    pub(crate) fn bvh(&self) -> &WideBvh {
+    /// The part of a group's tree that holds one mesh. `reach`: local bounds of the mesh that this
+    /// is a part of.
+    pub(crate) fn member(
+        mesh: &TriMesh,
+        frame: LocalFrame,
+        reach: Option<Aabb>,
+        tree: TriBvh,
+    ) -> (Blas, WideBvh) {
+        let TriBvh { bvh, skipped, notes } = tree;
+        let primitives = mesh.indices.len() - skipped;
+        let content = Content::Member { bounds: bvh.bounds, depth: bvh.depth };
+        let blas =
+            Blas { frame, whole: reach, primitives, skipped, cost_growth: 1.0, notes, content };
+        (blas, bvh)
+    }
+
+    /// This mesh as a member of a group, which holds a copy of the tree.
+    pub(crate) fn without_tree(&self) -> Blas {
+        let content = Content::Member { bounds: self.bounds(), depth: self.depth() };
+        Blas { content, notes: self.notes.clone(), ..*self }
+    }
+
+    /// The tree of its own; `None` for a member of a group.
+    pub(crate) fn bvh(&self) -> Option<&WideBvh> {
         match &self.content {
-            Content::Triangles(t) => &t.bvh,
-            Content::Shape { bvh, .. } => bvh,
+            Content::Triangles(t) => Some(&t.bvh),
+            Content::Shape { bvh, .. } => Some(bvh),
+            Content::Member { .. } => None,
+        }
+    }
+
+    /// Local bounds of the primitives held here.
+    pub(crate) fn bounds(&self) -> Aabb {
+        match &self.content {
+            Content::Triangles(t) => t.bvh.bounds,
+            Content::Shape { bvh, .. } => bvh.bounds,
+            Content::Member { bounds, .. } => *bounds,
+        }
+    }
+
+    /// Nodes on the longest path from the root to a leaf.
+    pub(crate) fn depth(&self) -> usize {
+        match &self.content {
+            Content::Triangles(t) => t.bvh.depth,
+            Content::Shape { bvh, .. } => bvh.depth,
+            Content::Member { depth, .. } => *depth,
         }
     }
 
     /// Bounds that decide how rays are transformed to local space: those of the whole geometry.
     pub(crate) fn reach(&self) -> Aabb {
-        self.whole.unwrap_or(self.bvh().bounds)
+        self.whole.unwrap_or(self.bounds())
     }
 
     pub(crate) fn is_part(&self) -> bool {
@@ -146,12 +197,15 @@ impl Blas {
     #[inline]
     pub(crate) fn closest<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> ClosestTri {
         match &self.content {
-            Content::Triangles(tris) => tris.closest::<S, T>(simd, ray),
+            Content::Triangles(tris) => {
+                triangle_bvh::closest::<S, T>(simd, &TreeView::all(&tris.bvh), ray)
+            }
+            Content::Member { .. } => unreachable!("rays reach a member through its group"),
             Content::Shape { bvh, shape } => {
                 let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
                 let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
                 let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
-                traverse(simd, bvh, &setup, t_max, &mut leaves);
+                traverse(simd, &TreeView::all(bvh), &setup, t_max, &mut leaves);
                 leaves.best
             }
         }
@@ -161,10 +215,13 @@ impl Blas {
     #[inline]
     pub(crate) fn occluded<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> bool {
         match &self.content {
-            Content::Triangles(tris) => tris.occluded::<S, T>(simd, ray),
+            Content::Triangles(tris) => {
+                triangle_bvh::occluded::<S, T>(simd, &TreeView::all(&tris.bvh), ray)
+            }
+            Content::Member { .. } => unreachable!("rays reach a member through its group"),
             Content::Shape { bvh, shape } => {
                 let mut leaves = ShapeAny { shape: &**shape, ray: *ray, found: false };
-                traverse(simd, bvh, &RaySetup::new(ray), ray.t_max, &mut leaves);
+                traverse(simd, &TreeView::all(bvh), &RaySetup::new(ray), ray.t_max, &mut leaves);
                 leaves.found
             }
         }

@@ -36,6 +36,16 @@ pub enum BuildError {
         /// Geometries given.
         found: usize,
     },
+    /// An instance of a part differs from the same instance of the whole scene.
+    #[error(
+        "instance {instance} is a mesh without a transform in the whole scene, and something else \
+         in this part: give the part the instances of the whole, and meshes where the whole has \
+         meshes"
+    )]
+    NotAMember {
+        /// Index of the instance.
+        instance: usize,
+    },
     /// The machine lacks the requested instruction set.
     #[error(transparent)]
     Level(#[from] UnavailableLevel),

@@ -4,30 +4,36 @@ mod blas;
 #[cfg(test)]
 mod brute_force;
 mod build;
+mod entry;
 mod error;
+mod geometry;
+mod instance_filter;
 pub(crate) mod intersect;
 pub(crate) mod layout;
+mod mesh_group;
 mod options;
 mod partition;
 mod placement;
 mod query;
 mod refit;
 mod streams;
+mod top_level;
 pub(crate) mod traverse;
 mod triangle_bvh;
 mod validate;
 mod world;
 
 pub use error::BuildError;
-pub(crate) use layout::wide::{Unit, WideBvh};
+pub use geometry::{Geometry, Instance};
+pub(crate) use instance_filter::InstanceFilter;
+pub(crate) use layout::wide::Unit;
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, UnknownQuality};
 pub use partition::GlobalLayout;
 pub use refit::{RefitError, RefitReport};
 pub(crate) use streams::Coherence;
 pub use streams::StreamError;
 pub use validate::{InvalidTree, TreeStats};
-pub(crate) use world::InstanceFilter;
-pub use world::{Geometry, Instance, World};
+pub use world::World;
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Options of a build, and the report on it.
 
-use super::build::{BuilderConfig, Method, SahConfig};
+use super::build::{BuilderConfig, LeafCapacity, Method, SahConfig};
 use std::time::Duration;
 
 /// Build effort, which trades build time for ray time (thesis section 4.1.2: approximate builds for
@@ -36,8 +36,9 @@ impl BuildQuality {
 
     /// Builder settings of this preset.
     pub(crate) fn config(self) -> BuilderConfig {
-        let quick = SahConfig { bins: 8, longest_axis_only: true };
-        let thorough = SahConfig { bins: 16, longest_axis_only: false };
+        let leaves = LeafCapacity::Four;
+        let quick = SahConfig { bins: 8, longest_axis_only: true, leaves };
+        let thorough = SahConfig { bins: 16, longest_axis_only: false, leaves };
         match self {
             BuildQuality::Fast => BuilderConfig { method: Method::Sah, sah: quick },
             BuildQuality::Balanced => BuilderConfig { method: Method::Sah, sah: thorough },

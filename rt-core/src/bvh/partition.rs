@@ -9,11 +9,13 @@
 
 use super::blas::Blas;
 use super::error::BuildError;
+use super::geometry::{Geometry, Instance};
 use super::layout::local_frame::LocalFrame;
+use super::mesh_group::GroupLayout;
 use super::options::BuildOptions;
-use super::world::{Geometry, Instance, World};
+use super::world::World;
 use crate::math::Aabb;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// What a world has chosen from the bounds of all its geometry; see [`World::build_part`].
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +24,8 @@ pub struct GlobalLayout {
     pub(super) bounds: Aabb,
     /// Local space of each geometry, and its bounds there.
     pub(super) geometries: Vec<(LocalFrame, Aabb)>,
+    /// The meshes that share one tree.
+    pub(super) group: Option<GroupLayout>,
 }
 
 impl World {
@@ -31,6 +35,11 @@ impl World {
             origin: self.origin(),
             bounds: self.bounds(),
             geometries: self.blas.iter().map(|b| (b.frame, b.reach())).collect(),
+            group: self.group.as_ref().map(|g| GroupLayout {
+                instances: g.members.iter().map(|m| m.instance).collect(),
+                frame: g.frame,
+                reach: g.reach,
+            }),
         }
     }
 
@@ -64,7 +73,8 @@ impl World {
     /// ```
     ///
     /// # Errors
-    /// As [`World::build`], and [`BuildError::NotAPart`] when the numbers of geometries differ.
+    /// As [`World::build`], [`BuildError::NotAPart`] when the numbers of geometries differ, and
+    /// [`BuildError::NotAMember`] when an instance differs from that of the whole world.
     pub fn build_part(
         geometries: Vec<Geometry>,
         instances: Vec<Instance>,
@@ -76,6 +86,16 @@ impl World {
                 expected: whole.geometries.len(),
                 found: geometries.len(),
             });
+        }
+        let is_member = |&&i: &&u32| {
+            instances.get(i as usize).is_some_and(|instance| {
+                instance.world_from_object == DAffine3::IDENTITY
+                    && matches!(geometries.get(instance.geometry), Some(Geometry::Mesh(_)))
+            })
+        };
+        let members = whole.group.iter().flat_map(|g| &g.instances);
+        if let Some(&instance) = members.clone().find(|i| !is_member(i)) {
+            return Err(BuildError::NotAMember { instance: instance as usize });
         }
         World::build_in_layout(geometries, instances, options, Some(whole), None)
     }

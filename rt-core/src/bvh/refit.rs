@@ -6,12 +6,15 @@
 //! built: the report estimates by how much.
 
 use super::blas::{Blas, Content};
+use super::geometry::Geometry;
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::{TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids};
 use super::layout::wide::{
     CHILD_ROW, ChildRef, LeafWriter, NODE_UNITS, Unit, WIDTH, get_box, set_box,
 };
-use super::world::{Geometry, World};
+use super::mesh_group::{MeshGroup, choose_members};
+use super::top_level::choose_origin;
+use super::world::World;
 use crate::math::Aabb;
 use crate::mesh::{MeshError, TriMesh};
 use rayon::prelude::*;
@@ -148,10 +151,42 @@ impl World {
 
         // Copies a tree that another world also uses.
         let blas = Arc::make_mut(&mut self.blas[geometry]);
-        let absent = refit_blas(blas, &mesh);
-        let (unusable, cost_growth) = (blas.skipped - absent, blas.cost_growth);
+        let absent = match &mut self.group {
+            Some(group) if blas.bvh().is_none() => {
+                refit_member(Arc::make_mut(group), geometry, blas, &mesh)
+            }
+            _ => refit_blas(blas, &mesh),
+        };
+        let (unusable, mut cost_growth) = (blas.skipped - absent, blas.cost_growth);
         self.geometries[geometry] = Geometry::Mesh(mesh);
-        self.rebuild_top_level();
+        let choice = if self.group_is_impossible {
+            None
+        } else {
+            choose_members(&self.geometries, &self.instances)
+        };
+        let alone: Vec<_> =
+            self.blas.iter().map(|b| b.bvh().is_some().then(|| Arc::clone(b))).collect();
+        let origin = choose_origin(&self.instances, &alone, choice.as_ref());
+        let keeps_group = match (&self.group, &choice) {
+            (Some(group), Some(choice)) => {
+                let members = group.members.iter().map(|m| m.instance);
+                choice.frame(origin) == group.frame && members.eq(choice.instances.iter().copied())
+            }
+            (None, None) => true,
+            (Some(_), None) | (None, Some(_)) => false,
+        };
+        if keeps_group {
+            if let Some(group) = &mut self.group {
+                Arc::make_mut(group).place(origin);
+            }
+            self.rebuild_top_level(origin);
+        } else {
+            // Other meshes share a tree now, or the same ones in another space.
+            let (geometries, instances) = (self.geometries.clone(), self.instances.clone());
+            *self = World::build(geometries, instances, &self.options)
+                .expect("the same transforms, and the new mesh was checked");
+            cost_growth = 1.0;
+        }
         Ok(RefitReport { elapsed: start.elapsed(), unusable, absent, cost_growth })
     }
 }
@@ -160,14 +195,37 @@ impl World {
 fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
     let Content::Triangles(tris) = &mut blas.content else { return 0 };
     let frame = LocalFrame::choose(mesh.origin, mesh.bounds());
-    let writer = TriWriter::new(mesh, &frame);
-    let before = tris.bvh.bounds.half_area() as f64;
+    let writer = TriWriter::new(mesh, &frame, 0);
+    let before = tris.bvh.bounds;
     let root = refit_node(&mut tris.bvh.units, 0, &writer);
     tris.bvh.bounds = root.bounds;
-    let after = root.bounds.half_area() as f64;
+    blas.frame = frame;
+    record_refit(blas, mesh, before, &root)
+}
 
+/// As [`refit_blas`], in the subtree of a group's member.
+fn refit_member(group: &mut MeshGroup, geometry: usize, blas: &mut Blas, mesh: &TriMesh) -> usize {
+    let Some(member) = group.members.iter().find(|m| m.geometry == geometry).cloned() else {
+        return 0;
+    };
+    let frame = group.frame;
+    let writer = TriWriter::new(mesh, &frame, member.first);
+    let before = blas.bounds();
+    let units = &mut group.bvh.units[member.units.clone()];
+    let root = refit_node(units, member.units.start, &writer);
+    group.update_upper_boxes(member.instance, &writer);
+    if let Content::Member { bounds, .. } = &mut blas.content {
+        *bounds = root.bounds;
+    }
+    record_refit(blas, mesh, before, &root)
+}
+
+/// Updates the counts and the cost of a mesh whose tree had the bounds `before`; returns how many
+/// usable triangles are not in the tree.
+fn record_refit(blas: &mut Blas, mesh: &TriMesh, before: Aabb, root: &RefitTotals) -> usize {
     // Both sums are relative to the area of the whole: their quotient is the ratio of expected
     // tests per ray.
+    let (before, after) = (before.half_area() as f64, root.bounds.half_area() as f64);
     let growth = (root.new_area / after) / (root.old_area / before);
     blas.cost_growth *= if growth.is_finite() && growth > 0.0 { growth } else { 1.0 };
     let usable = (0..mesh.indices.len())
@@ -175,7 +233,6 @@ fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
         .with_min_len(1 << 14)
         .filter(|&i| mesh.is_renderable(i));
     let absent = usable.count() - root.usable;
-    blas.frame = frame;
     blas.primitives = root.usable;
     blas.skipped = mesh.indices.len() - root.usable;
     absent
@@ -257,7 +314,7 @@ fn refit_node(units: &mut [Unit], base: usize, writer: &TriWriter<'_>) -> RefitT
 fn refit_leaf(units: &mut [Unit], leaf: ChildRef, writer: &TriWriter<'_>) -> RefitTotals {
     debug_assert_eq!(units.len(), TRI_LEAF_UNITS, "a leaf's piece is the leaf");
     let ids = leaf_triangle_ids(leaf_floats(units, ChildRef::leaf(0, leaf.count())));
-    let ids = &ids[..leaf.count()];
+    let ids = &writer.in_mesh(ids)[..leaf.count()];
     let mut r = RefitTotals::NOTHING;
     for b in ids.iter().map(|&i| writer.bounds(i)).filter(|b| !b.is_empty()) {
         r.usable += 1;

@@ -1,17 +1,19 @@
 //! Traces many rays in one call: in packets for coherent rays, and with a shared start of the
 //! traversal for incoherent ones.
 
-use super::blas::{Blas, Content, leaf_primitive_ids};
+use super::blas::leaf_primitive_ids;
+use super::entry::Entry;
+use super::instance_filter::InstanceFilter;
 use super::layout::wide::ChildRef;
 use super::options::Robustness;
 use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
-use super::triangle_bvh::TriBvh;
-use super::world::{InstanceFilter, World, with_ordinary_length};
+use super::world::{World, with_ordinary_length};
 use crate::bvh::traverse::hybrid;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
 use crate::bvh::traverse::single::inflate_t;
+use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
@@ -156,7 +158,10 @@ impl World {
 
     /// Whether there is only one instance, and `filter` excludes it.
     fn excludes_all(&self, filter: InstanceFilter<'_>) -> bool {
-        self.placements.len() == 1 && !filter.has(0)
+        match self.only_entry() {
+            Some(Entry::Instance { number, .. }) => !filter.has(number as usize),
+            Some(Entry::Group(_)) | None => false,
+        }
     }
 
     fn occluded_blocks<S: Simd, T: TriangleTest>(
@@ -168,14 +173,14 @@ impl World {
         filter: InstanceFilter<'_>,
     ) {
         SCRATCH.with_borrow_mut(|scratch| {
-            let single = self.single_mesh().filter(|_| coherence == Coherence::Coherent);
+            let single = self.single_tree(filter).filter(|_| coherence == Coherence::Coherent);
             let mut hits = [HitBlock::MISS; GROUPS];
             for (r, out) in rays.chunks(GROUPS).zip(out.chunks_mut(GROUPS)) {
                 let n = r.len();
-                if let Some((tris, limits)) = &single
+                if let Some((_, tree, limits)) = &single
                     && scratch.inner.load(simd, r, limits)
                 {
-                    scratch.inner.trace::<S, T, AnyHit>(simd, &tris.bvh);
+                    scratch.inner.trace::<S, T, AnyHit>(simd, tree);
                     out.copy_from_slice(&scratch.inner.hit[..n]);
                     continue;
                 }
@@ -188,14 +193,14 @@ impl World {
         });
     }
 
-    /// The only geometry, when it is a mesh whose local space is render space: packets then skip
-    /// the upper level.
-    fn single_mesh(&self) -> Option<(&TriBvh, PacketLimits)> {
-        let [only] = self.placements.as_slice() else { return None };
-        match &self.blas[only.geometry].content {
-            Content::Triangles(tris) => Some((tris, only.limits()?)),
-            _ => None,
-        }
+    /// The only entry of the upper level, when it is a hierarchy of triangles whose local space is
+    /// render space: packets then skip the upper level.
+    fn single_tree<'a>(
+        &'a self,
+        filter: InstanceFilter<'a>,
+    ) -> Option<(Entry<'a>, TreeView<'a>, PacketLimits)> {
+        let only = self.only_entry()?;
+        Some((only, only.triangles(filter)?, only.placement().limits()?))
     }
 
     /// The closest hit of each ray with an instance of `filter`. All slices have the same length.
@@ -230,13 +235,14 @@ impl World {
         filter: InstanceFilter<'_>,
     ) {
         SCRATCH.with_borrow_mut(|scratch| {
-            let single = self.single_mesh().filter(|_| coherence == Coherence::Coherent);
+            let single = self.single_tree(filter).filter(|_| coherence == Coherence::Coherent);
             for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
-                if let Some((tris, limits)) = &single
+                if let Some((entry, tree, limits)) = &single
                     && scratch.inner.load(simd, r, limits)
                 {
-                    scratch.inner.trace::<S, T, ClosestHit>(simd, &tris.bvh);
-                    scratch.inner.store_all(simd, h, 0);
+                    scratch.inner.trace::<S, T, ClosestHit>(simd, tree);
+                    scratch.inner.store_all(simd, h, entry.number());
+                    entry.resolve(h);
                     continue;
                 }
                 self.trace_group::<S, T, ClosestHit>(simd, r, h, coherence, filter, scratch);
@@ -278,27 +284,30 @@ impl World {
         filter: InstanceFilter<'_>,
         scratch: &mut TraversalScratch,
     ) {
-        match self.placements.as_slice() {
-            [only] => {
-                if let Content::Triangles(tris) = &self.blas[only.geometry].content
-                    && only.accepts_blocks(simd, rays)
-                {
-                    for (r, h) in rays.iter().zip(hits) {
-                        let active = hybrid::active_lanes(r);
-                        hybrid::trace::<S, T, Q>(simd, &tris.bvh, r, active, h, 0);
-                    }
-                } else {
-                    self.trace_instance::<S, T, Q>(
-                        simd,
-                        0,
-                        rays,
-                        hits,
-                        scratch,
-                        Coherence::Incoherent,
-                    );
+        let Some(only) = self.only_entry() else {
+            if self.few.is_empty() {
+                self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
+            }
+            for &id in self.few.iter().filter(|&&id| self.allows(filter, id)) {
+                let (entry, coherence) = (self.entry(id), Coherence::Incoherent);
+                self.trace_entry::<S, T, Q>(simd, entry, rays, hits, filter, scratch, coherence);
+            }
+            return;
+        };
+        match only.triangles(filter) {
+            Some(tree) if only.placement().accepts_blocks(simd, rays) => {
+                for (r, h) in rays.iter().zip(hits.iter_mut()) {
+                    let active = hybrid::active_lanes(r);
+                    hybrid::trace::<S, T, Q>(simd, &tree, r, active, h, only.number());
+                }
+                if !Q::ANY {
+                    only.resolve(hits);
                 }
             }
-            _ => self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter),
+            _ => {
+                let coherence = Coherence::Incoherent;
+                self.trace_entry::<S, T, Q>(simd, only, rays, hits, filter, scratch, coherence)
+            }
         }
     }
 
@@ -311,38 +320,34 @@ impl World {
         filter: InstanceFilter<'_>,
         scratch: &mut TraversalScratch,
     ) {
-        if let [only] = self.placements.as_slice() {
-            let blas = &self.blas[only.geometry];
-            if let Content::Triangles(_) = blas.content {
-                self.trace_instance::<S, T, Q>(simd, 0, rays, hits, scratch, Coherence::Coherent);
-                return;
-            }
+        if let Some(only) = self.only_entry()
+            && only.triangles(filter).is_some()
+        {
+            let coherence = Coherence::Coherent;
+            self.trace_entry::<S, T, Q>(simd, only, rays, hits, filter, scratch, coherence);
+            return;
         }
-        // ---- Several instances: those whose boxes the packet intersects, nearest first.
+        // ---- Several entries: those whose boxes the packet intersects, nearest first.
         scratch.candidates.clear();
-        if self.placements.len() > 1 && scratch.outer.load(simd, rays, &PacketLimits::NONE) {
-            scratch.outer.collect(simd, &self.tlas, &mut scratch.candidates);
+        if self.only.is_none() && scratch.outer.load(simd, rays, &PacketLimits::NONE) {
+            scratch.outer.collect(simd, &TreeView::all(&self.tlas), &mut scratch.candidates);
             let mut order = std::mem::take(&mut scratch.order);
             order.clear();
             for &(distance, leaf) in &scratch.candidates {
                 let met = leaf_primitive_ids(&self.tlas.units, leaf).iter();
-                let met = met.filter(|&&i| filter.has(i as usize));
+                let met = met.filter(|&&id| self.allows(filter, id));
                 order.extend(met.map(|&i| (distance, i)));
             }
             let use_packets = order.len() <= MOST_CANDIDATES;
             if use_packets {
                 order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                for &(distance, instance) in &order {
+                for &(distance, id) in &order {
                     if all_resolved::<Q>(rays, hits, distance) {
                         break;
                     }
-                    self.trace_instance::<S, T, Q>(
-                        simd,
-                        instance,
-                        rays,
-                        hits,
-                        scratch,
-                        Coherence::Coherent,
+                    let (entry, coherence) = (self.entry(id), Coherence::Coherent);
+                    self.trace_entry::<S, T, Q>(
+                        simd, entry, rays, hits, filter, scratch, coherence,
                     );
                 }
             }
@@ -381,21 +386,22 @@ impl World {
         }
     }
 
-    /// One instance against blocks whose closest hits so far are in `hits`; merges the nearer ones.
-    fn trace_instance<S: Simd, T: TriangleTest, Q: HitQuery>(
+    /// One entry against blocks whose closest hits so far are in `hits`; merges the nearer ones.
+    #[allow(clippy::too_many_arguments, reason = "the state of one call of the loop above")]
+    fn trace_entry<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
-        instance: u32,
+        entry: Entry<'_>,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
+        filter: InstanceFilter<'_>,
         scratch: &mut TraversalScratch,
         coherence: Coherence,
     ) {
-        let placement = &self.placements[instance as usize];
-        let blas = &self.blas[placement.geometry];
-        let single = self.placements.len() == 1;
+        let placement = entry.placement();
+        let single = self.only.is_some();
         if coherence == Coherence::Coherent && single && placement.accepts_blocks(simd, rays) {
-            trace_blas::<S, T, Q>(simd, blas, rays, hits, instance, &mut scratch.inner);
+            trace_tree::<S, T, Q>(simd, entry, rays, hits, filter, &mut scratch.inner);
             return;
         }
         let n = rays.len();
@@ -405,22 +411,16 @@ impl World {
         to_local_space(placement, rays, hits, Q::ANY, &mut scratch.local, &mut scratch.moved);
         let local_hits = &mut scratch.local_hits[..n];
         local_hits.fill(HitBlock::MISS);
-        trace_blas::<S, T, Q>(
-            simd,
-            blas,
-            &scratch.local[..n],
-            local_hits,
-            instance,
-            &mut scratch.inner,
-        );
+        let local = &scratch.local[..n];
+        trace_tree::<S, T, Q>(simd, entry, local, local_hits, filter, &mut scratch.inner);
         for ((h, new), moved) in hits.iter_mut().zip(local_hits).zip(&scratch.moved) {
             for lane in 0..LANES {
                 let Some(mut c) = new.get(lane) else { continue };
                 if moved[lane] != 0.0 {
                     c.t = (c.t as f64 + moved[lane]) as f32;
                 }
-                let better = c.t < h.t[lane] || (c.t == h.t[lane] && instance < h.instance[lane]);
-                if Q::ANY || better {
+                let tie = c.t == h.t[lane] && c.instance < h.instance[lane];
+                if Q::ANY || c.t < h.t[lane] || tie {
                     h.set(lane, Some(c));
                 }
             }
@@ -490,46 +490,50 @@ fn to_local_space(
     }
 }
 
-/// Blocks in local space against one geometry: as one packet when the rays agree in octant and
+/// Blocks in local space against one entry: as one packet when the rays agree in octant and
 /// dominant axis, else in smaller packets, else one by one.
-fn trace_blas<S: Simd, T: TriangleTest, Q: HitQuery>(
+fn trace_tree<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
-    blas: &Blas,
+    entry: Entry<'_>,
     rays: &[RayBlock],
     hits: &mut [HitBlock],
-    instance: u32,
+    filter: InstanceFilter<'_>,
     packet: &mut Packet,
 ) {
-    let Content::Triangles(tris) = &blas.content else {
-        trace_blas_single_rays::<S, T, Q>(simd, blas, rays, hits, instance);
+    let Some(tree) = entry.triangles(filter) else {
+        trace_tree_by_single_rays::<S, T, Q>(simd, entry, rays, hits, filter);
         return;
     };
+    let number = entry.number();
     // Packets of 16 blocks, then of 4; blocks whose rays diverge share the start of the traversal.
     for (r, h) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         if packet.load(simd, r, &PacketLimits::NONE) {
-            packet.trace::<S, T, Q>(simd, &tris.bvh);
-            packet.store::<Q>(h, instance);
+            packet.trace::<S, T, Q>(simd, &tree);
+            packet.store::<Q>(h, number);
             continue;
         }
         for (r, h) in r.chunks(4).zip(h.chunks_mut(4)) {
             if packet.load(simd, r, &PacketLimits::NONE) {
-                packet.trace::<S, T, Q>(simd, &tris.bvh);
-                packet.store::<Q>(h, instance);
+                packet.trace::<S, T, Q>(simd, &tree);
+                packet.store::<Q>(h, number);
                 continue;
             }
             for (r, h) in r.iter().zip(h) {
-                hybrid::trace::<S, T, Q>(simd, &tris.bvh, r, hybrid::active_lanes(r), h, instance);
+                hybrid::trace::<S, T, Q>(simd, &tree, r, hybrid::active_lanes(r), h, number);
             }
         }
     }
+    if !Q::ANY {
+        entry.resolve(hits);
+    }
 }
 
-fn trace_blas_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
+fn trace_tree_by_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
-    blas: &Blas,
+    entry: Entry<'_>,
     rays: &[RayBlock],
     hits: &mut [HitBlock],
-    instance: u32,
+    filter: InstanceFilter<'_>,
 ) {
     for (r, h) in rays.iter().zip(hits) {
         for lane in 0..LANES {
@@ -539,15 +543,11 @@ fn trace_blas_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
             }
             count(Counter::Fallbacks, 1);
             if Q::ANY {
-                if blas.occluded::<S, T>(simd, &ray) {
+                if entry.occluded::<S, T>(simd, &ray, filter) {
                     h.prim[lane] = 0;
                 }
-            } else {
-                let c = blas.closest::<S, T>(simd, &ray);
-                if c.found {
-                    (h.t[lane], h.u[lane], h.v[lane]) = (c.t, c.u, c.v);
-                    (h.prim[lane], h.instance[lane]) = (c.prim, instance);
-                }
+            } else if let Some(hit) = entry.closest::<S, T>(simd, &ray, filter) {
+                h.set(lane, Some(hit));
             }
         }
     }

@@ -249,9 +249,6 @@ fn check_among(world: &World, marked: &[bool], rays: &[Ray], what: &str) {
         let found = (0..marked.len()).filter(|&i| marked[i] == wanted).filter_map(|i| {
             let only: Vec<bool> = (0..marked.len()).map(|k| k == i).collect();
             let filter = InstanceFilter::Marked(&only);
-            if marked.len() == 1 {
-                return world.closest(ray);
-            }
             fearless_simd::dispatch!(
                 level,
                 simd => world.closest_in::<_, WatertightTest>(simd, ray, filter)

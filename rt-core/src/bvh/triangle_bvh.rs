@@ -7,6 +7,7 @@ use super::layout::wide::WideBvh;
 use super::options::BuildQuality;
 use super::query::TriangleTest;
 use super::traverse::single::{RaySetup, traverse_body};
+use super::traverse::tree_view::TreeView;
 use super::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::mesh::TriMesh;
 use crate::ray::Ray;
@@ -22,9 +23,15 @@ pub(crate) struct TriBvh {
 }
 
 impl TriBvh {
-    pub(crate) fn build(mesh: &TriMesh, frame: &LocalFrame, quality: BuildQuality) -> TriBvh {
+    /// Triangle `i` of the mesh gets the number `first + i`.
+    pub(crate) fn build(
+        mesh: &TriMesh,
+        frame: &LocalFrame,
+        first: u32,
+        quality: BuildQuality,
+    ) -> TriBvh {
         debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
-        let writer = TriWriter::new(mesh, frame);
+        let writer = TriWriter::new(mesh, frame, first);
         // Nearly always every triangle is usable: collect in place and remove the few others
         // afterwards.
         let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
@@ -37,33 +44,37 @@ impl TriBvh {
         let mut notes = Vec::new();
         TriBvh { bvh: build_wide(refs, &writer, quality.config(), &mut notes), skipped, notes }
     }
+}
 
-    /// The closest hit of a local-space ray. Set-up and traversal are one function body: called
-    /// once per ray, the call chain around a traversal used to take two fifths of the time.
-    #[inline(never)]
-    pub(crate) fn closest<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> ClosestTri {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let setup = RaySetup::new(ray);
-                let mut leaves = ClosestLeaf::<T>::new(&setup, ray.t_max);
-                traverse_body(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
-                leaves.best
-            },
-        )
-    }
+/// The closest hit of a local-space ray. Set-up and traversal are one function body: called once
+/// per ray, the call chain around a traversal used to take two fifths of the time.
+#[inline(never)]
+pub(crate) fn closest<S: Simd, T: TriangleTest>(
+    simd: S,
+    tree: &TreeView<'_>,
+    ray: &Ray,
+) -> ClosestTri {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let setup = RaySetup::new(ray);
+            let mut leaves = ClosestLeaf::<T>::new(&setup, ray.t_max);
+            traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
+            leaves.best
+        },
+    )
+}
 
-    /// Whether anything blocks a local-space ray.
-    #[inline(never)]
-    pub(crate) fn occluded<S: Simd, T: TriangleTest>(&self, simd: S, ray: &Ray) -> bool {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let setup = RaySetup::new(ray);
-                let mut leaves = AnyLeaf::<T>::new(&setup, ray.t_max);
-                traverse_body(simd, &self.bvh, &setup, ray.t_max, &mut leaves);
-                leaves.found
-            },
-        )
-    }
+/// Whether anything blocks a local-space ray.
+#[inline(never)]
+pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, ray: &Ray) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let setup = RaySetup::new(ray);
+            let mut leaves = AnyLeaf::<T>::new(&setup, ray.t_max);
+            traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
+            leaves.found
+        },
+    )
 }

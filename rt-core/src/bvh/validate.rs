@@ -1,12 +1,16 @@
 //! Checks finished trees, for tests and debugging: slow, and not needed by correct programs.
 
 use super::blas::{Blas, Content, leaf_primitive_ids};
-use super::layout::triangles::{TriWriter, leaf_floats, leaf_triangle_ids};
+use super::geometry::Geometry;
+use super::layout::triangles::{TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids};
 use super::layout::wide::{
     CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, get_box,
 };
-use super::world::{Geometry, World};
+use super::mesh_group::MeshGroup;
+use super::traverse::tree_view::NO_OWNER;
+use super::world::World;
 use crate::math::Aabb;
+use crate::mesh::TriMesh;
 
 /// Counts of [`World::validate`] over all geometries' trees.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -44,13 +48,18 @@ impl World {
             let fail = |fault| InvalidTree { tree: format!("geometry {i}"), fault };
             stats = stats.and(validate_blas(blas, geometry).map_err(fail)?);
         }
-        let mut seen = vec![false; self.placements.len()];
-        let instances = TreeWalker { bvh: &self.tlas, leaf_units: 1 };
+        if let Some(group) = &self.group {
+            let fail = |fault| InvalidTree { tree: "mesh group".into(), fault };
+            stats = stats.and(validate_group(group, &self.geometries).map_err(fail)?);
+        }
+        let entries = self.placements.len() + usize::from(self.group.is_some());
+        let mut seen = vec![false; entries];
+        let instances = TreeWalker::new(&self.tlas, 1);
         instances
             .run(|leaf| {
                 let ids = leaf_primitive_ids(&self.tlas.units, leaf).to_vec();
                 mark(&mut seen, &ids)?;
-                Ok(ids.iter().map(|&i| self.placements[i as usize].bounds).collect())
+                Ok(ids.iter().map(|&id| self.entry(id).placement().bounds).collect())
             })
             .map_err(|fault| InvalidTree { tree: "instances".into(), fault })?;
         Ok(stats)
@@ -72,16 +81,13 @@ impl TreeStats {
 fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> {
     let stats = match (&blas.content, geometry) {
         (Content::Triangles(tris), Geometry::Mesh(mesh)) => {
-            let writer = TriWriter::new(mesh, &blas.frame);
+            let writer = TriWriter::new(mesh, &blas.frame, 0);
             let mut seen = vec![false; mesh.indices.len()];
-            let stats =
-                TreeWalker { bvh: &tris.bvh, leaf_units: super::layout::triangles::TRI_LEAF_UNITS }
-                    .run(|leaf| {
-                        let ids =
-                            &leaf_triangle_ids(leaf_floats(&tris.bvh.units, leaf))[..leaf.count()];
-                        mark(&mut seen, ids)?;
-                        Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
-                    })?;
+            let stats = TreeWalker::new(&tris.bvh, TRI_LEAF_UNITS).run(|leaf| {
+                let ids = &leaf_triangle_ids(leaf_floats(&tris.bvh.units, leaf))[..leaf.count()];
+                mark(&mut seen, ids)?;
+                Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
+            })?;
             let lost = (0..seen.len()).find(|&i| !seen[i] && mesh.is_renderable(i));
             // A refit can make a triangle usable that the build left out; it counts as skipped.
             if let Some(i) = lost
@@ -93,13 +99,15 @@ fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> 
         }
         (Content::Shape { bvh, shape }, _) => {
             let mut seen = vec![false; shape.num_primitives()];
-            TreeWalker { bvh, leaf_units: 1 }.run(|leaf| {
+            TreeWalker::new(bvh, 1).run(|leaf| {
                 let ids = leaf_primitive_ids(&bvh.units, leaf).to_vec();
                 mark(&mut seen, &ids)?;
                 Ok(ids.iter().map(|&i| shape.bounds(i)).collect())
             })?
         }
-        (Content::Triangles(_), Geometry::Shape(_)) => {
+        // Checked with its group.
+        (Content::Member { .. }, Geometry::Mesh(_)) => return Ok(TreeStats::default()),
+        (Content::Triangles(_) | Content::Member { .. }, Geometry::Shape(_)) => {
             return Err("a tree of triangles for a shape".into());
         }
     };
@@ -123,12 +131,65 @@ fn mark(seen: &mut [bool], ids: &[u32]) -> Result<(), String> {
     Ok(())
 }
 
+/// Checks the tree of a mesh group: as any tree, and that the children of the upper part belong to
+/// whom they say.
+fn validate_group(group: &MeshGroup, geometries: &[Geometry]) -> Result<TreeStats, String> {
+    let meshes: Vec<&TriMesh> = group
+        .members
+        .iter()
+        .map(|m| match &geometries[m.geometry] {
+            Geometry::Mesh(mesh) => Ok(&**mesh),
+            Geometry::Shape(_) => Err(format!("geometry {} is no mesh", m.geometry)),
+        })
+        .collect::<Result<_, _>>()?;
+    let all: usize = meshes.iter().map(|m| m.indices.len()).sum();
+    let mut seen = vec![false; all];
+    let units = &group.bvh.units;
+    let walker = TreeWalker {
+        unused_units: group.replaced_units,
+        ..TreeWalker::new(&group.bvh, TRI_LEAF_UNITS)
+    };
+    let stats = walker.run(|leaf| {
+        let ids = &leaf_triangle_ids(leaf_floats(units, leaf))[..leaf.count()];
+        mark(&mut seen, ids)?;
+        ids.iter()
+            .map(|&id| {
+                let (instance, prim) = group.owner(id);
+                let k = group.members.iter().position(|m| m.instance == instance);
+                let k = k.ok_or_else(|| format!("triangle {id} has no member"))?;
+                let first = group.members[k].first;
+                if first + prim != id {
+                    return Err(format!("triangle {id} is not number {prim} from {first}"));
+                }
+                Ok(TriWriter::new(meshes[k], &group.frame, first).bounds(prim))
+            })
+            .collect()
+    })?;
+    for (n, owners) in group.owners().iter().enumerate() {
+        let children = units[n * NODE_UNITS + CHILD_ROW].bits();
+        for (&child, &owner) in children.iter().zip(owners).filter(|(_, o)| **o != NO_OWNER) {
+            let unit = ChildRef(child).unit();
+            let member = group.members.iter().find(|m| m.units.contains(&unit));
+            if member.map(|m| m.instance) != Some(owner) {
+                return Err(format!("unit {unit} does not belong to instance {owner}"));
+            }
+        }
+    }
+    Ok(stats)
+}
+
 struct TreeWalker<'b> {
     bvh: &'b WideBvh,
     leaf_units: usize,
+    /// Units that no reference leads to.
+    unused_units: usize,
 }
 
-impl TreeWalker<'_> {
+impl<'b> TreeWalker<'b> {
+    fn new(bvh: &'b WideBvh, leaf_units: usize) -> Self {
+        TreeWalker { bvh, leaf_units, unused_units: 0 }
+    }
+
     /// Visits every leaf; `contents` gives the boxes of its primitives (empty boxes for those that
     /// cannot be hit).
     fn run(
@@ -181,12 +242,17 @@ impl TreeWalker<'_> {
                 todo.push((c, b, depth + 1));
             }
         }
-        if stats.depth > MAX_DEPTH || stats.depth != self.bvh.depth {
+        // The depth of a group is a bound: the deepest subtree may hang under a shorter path.
+        let exact = self.unused_units == 0;
+        let wrong =
+            if exact { stats.depth != self.bvh.depth } else { stats.depth > self.bvh.depth };
+        if self.bvh.depth > MAX_DEPTH || wrong {
             return Err(format!(
                 "depth {}, recorded {}, at most {MAX_DEPTH} allowed",
                 stats.depth, self.bvh.depth
             ));
         }
+        let used = used + self.unused_units;
         if used != units.len() {
             return Err(format!("{used} units in use of {}", units.len()));
         }

@@ -1,109 +1,36 @@
 //! The two-level acceleration structure for tracing rays: instances of geometries.
 
-use super::blas::{Blas, IdWriter, leaf_primitive_ids};
-use super::build::{MAX_PRIMS, PrimRef, build_wide};
+use super::blas::{Blas, leaf_primitive_ids};
+use super::build::build_in_parallel;
+use super::entry::Entry;
 use super::error::BuildError;
+use super::geometry::{Geometry, Instance};
+use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit, WideBvh};
-use super::options::{BuildOptions, BuildQuality, BuildReport, Robustness};
+use super::mesh_group::{
+    GroupChoice, GroupInput, KnownTree, KnownTrees, MeshGroup, build_group, choose_members,
+};
+use super::options::{BuildOptions, BuildReport, Robustness};
 use super::partition::{GlobalLayout, blas_of};
 use super::placement::{ORDINARY_LENGTHS, Placement, distance_to_sphere};
 use super::query::{AnyHit, ClosestHit, FastTest, TriangleTest, WatertightTest};
+use super::top_level::{TopLevel, build_top_level, choose_origin};
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
+use crate::bvh::traverse::tree_view::TreeView;
 use crate::math::{Aabb, exp2i, max_abs};
-use crate::mesh::{MeshError, TriMesh};
+use crate::mesh::TriMesh;
 use crate::ray::{Hit, Ray};
-use crate::shapes::Shape;
 use crate::simd::SimdLevel;
 use fearless_simd::{Level, Simd, dispatch};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
-use rayon::prelude::*;
-use std::collections::HashMap;
+use glam::{DAffine3, DVec3, Vec3};
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Geometry that rays can hit, shared between instances.
-#[derive(Clone)]
-pub enum Geometry {
-    /// Triangles.
-    Mesh(Arc<TriMesh>),
-    /// Spheres, tubes, isosurfaces, user-defined geometry.
-    Shape(Arc<dyn Shape>),
-}
-
-impl Geometry {
-    /// Address of the shared data. It is the same for two clones of one geometry and for two
-    /// appearances of one shape, and different for any two others that are both alive.
-    fn address(&self) -> usize {
-        let of_shape = |s: &Arc<dyn Shape>| Arc::as_ptr(s) as *const () as usize;
-        match self {
-            Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
-            Geometry::Shape(s) => s.tree_of().as_ref().map_or_else(|| of_shape(s), of_shape),
-        }
-    }
-
-    /// Number of triangles of a mesh, or of primitives of a shape.
-    pub fn num_primitives(&self) -> usize {
-        match self {
-            Geometry::Mesh(m) => m.indices.len(),
-            Geometry::Shape(s) => s.num_primitives(),
-        }
-    }
-
-    /// Whether geometry `index` can be built.
-    fn check(&self, index: usize) -> Result<(), BuildError> {
-        let Geometry::Mesh(mesh) = self else { return Ok(()) };
-        let error = |source| BuildError::Mesh { geometry: index, source };
-        mesh.check().map_err(error)?;
-        if mesh.indices.len() >= MAX_PRIMS {
-            let found = mesh.indices.len();
-            return Err(error(MeshError::TooLarge {
-                what: "triangles",
-                found,
-                limit: MAX_PRIMS - 1,
-            }));
-        }
-        Ok(())
-    }
-}
-
-/// A geometry placed in the world.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instance {
-    /// Index of the geometry.
-    pub geometry: usize,
-    /// Object to world; may mirror and scale unevenly, must be invertible.
-    pub world_from_object: DAffine3,
-}
-
-/// Which instances rays can hit.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum InstanceFilter<'a> {
-    /// All instances.
-    All,
-    /// Marked instances. A missing mark counts as not set.
-    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
-    Marked(&'a [bool]),
-    /// Unmarked instances.
-    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
-    Unmarked(&'a [bool]),
-}
-
-impl InstanceFilter<'_> {
-    #[inline(always)]
-    pub(super) fn has(self, instance: usize) -> bool {
-        match self {
-            InstanceFilter::All => true,
-            InstanceFilter::Marked(marks) => marks.get(instance).is_some_and(|m| *m),
-            InstanceFilter::Unmarked(marks) => !marks.get(instance).is_some_and(|m| *m),
-        }
-    }
-}
-
 /// Instances of geometries with their acceleration structures.
 pub struct World {
     pub(super) geometries: Vec<Geometry>,
-    instances: Vec<Instance>,
+    pub(super) instances: Vec<Instance>,
     origin: DVec3,
     bounds: Aabb,
     report: BuildReport,
@@ -111,7 +38,16 @@ pub struct World {
     pub(super) blas: Vec<Arc<Blas>>,
     pub(super) options: BuildOptions,
     pub(super) placements: Vec<Placement>,
+    /// The meshes that share one tree.
+    pub(super) group: Option<Arc<MeshGroup>>,
+    /// Whether meshes could share a tree, but it would be too deep or too large.
+    pub(super) group_is_impossible: bool,
+    /// The upper level: instances by number, the group by the number after the last instance.
     pub(super) tlas: WideBvh,
+    /// The entry of the upper level when it has only one.
+    pub(super) only: Option<u32>,
+    /// All entries when they are few.
+    pub(super) few: Vec<u32>,
     pub(super) robustness: Robustness,
     pub(super) level: Level,
 }
@@ -127,8 +63,9 @@ impl World {
     }
 
     /// As [`World::build`], but reuses the acceleration structure of every geometry that `previous`
-    /// also has (the same [`Arc`], at any index). When one of five hundred meshes changes, or only
-    /// transforms do, the others cost nothing. If the options differ from those of `previous`,
+    /// also has (the same [`Arc`], at any index). When one of five hundred meshes changes, the
+    /// trees of the others are copied, which takes a small part of the time of building them. When only
+    /// transforms change, nothing is copied. If the options differ from those of `previous`,
     /// everything is rebuilt. The hits equal those of a world built from scratch (after a
     /// [`World::refit`] of `previous`: those of the refitted world).
     pub fn build_sharing(
@@ -162,36 +99,77 @@ impl World {
                 });
             }
         }
-        let known = previous.filter(|w| w.options == *options).map(World::trees_by_address);
         for (i, g) in geometries.iter().enumerate() {
             g.check(i)?;
         }
-        let build = |i: usize| {
+        let previous = previous.filter(|w| w.options == *options);
+        let known = previous.map(World::trees_by_address);
+        let earlier = previous.and_then(|w| w.group.as_ref());
+        let choice = match whole {
+            None => choose_members(&geometries, &instances),
+            Some(whole) => whole.group.as_ref().map(GroupChoice::of_layout),
+        };
+
+        // ---- Geometries with a tree of their own.
+        let build_alone = |i: usize| {
             let g = &geometries[i];
             match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
-                (Some(tree), Geometry::Mesh(_)) => Arc::clone(tree),
-                (Some(tree), Geometry::Shape(s)) => Blas::with_shape(tree, s),
-                (None, _) => Arc::new(blas_of(i, g, options, whole)),
+                (Some(old), Geometry::Mesh(_)) if old.blas.bvh().is_some() => Arc::clone(old.blas),
+                (Some(old), Geometry::Shape(s)) => Blas::with_shape(old.blas, s),
+                _ => Arc::new(blas_of(i, g, options, whole)),
             }
         };
-        let blas = build_in_parallel(&geometries, build);
+        let mut blas: Vec<Option<Arc<Blas>>> = vec![None; geometries.len()];
+        let members = choice.iter().flat_map(|c| &c.instances);
+        let members: Vec<usize> = members.map(|&i| instances[i as usize].geometry).collect();
+        build_missing(&geometries, &mut blas, &members, build_alone);
+
+        // ---- The meshes that share one tree, in render space.
+        let origin = whole.map_or_else(
+            || choose_origin(&instances, &blas, choice.as_ref()),
+            |whole| whole.origin,
+        );
+        let mut notes = Vec::new();
+        let layout = whole.and_then(|whole| whole.group.as_ref());
+        let group = choice.as_ref().and_then(|choice| {
+            let input = GroupInput {
+                geometries: &geometries,
+                instances: &instances,
+                members: &choice.instances,
+                frame: layout.map_or_else(|| choice.frame(origin), |l| l.frame),
+                origin,
+                reach: layout.map(|l| l.reach),
+                options,
+            };
+            build_group(&input, known.as_ref(), earlier, &mut notes)
+        });
+        let group = group.map(|(group, of_members)| {
+            for (&geometry, b) in members.iter().zip(of_members) {
+                blas[geometry] = Some(b);
+            }
+            group
+        });
+        // Without a group, its members get trees of their own.
+        build_missing(&geometries, &mut blas, &[], build_alone);
+        let blas: Vec<Arc<Blas>> = blas.into_iter().flatten().collect();
         phases.push(("geometries", start.elapsed()));
 
-        let mut notes: Vec<String> = blas
-            .iter()
-            .enumerate()
-            .flat_map(|(i, b)| b.notes.iter().map(move |n| format!("geometry {i}: {n}")))
-            .collect();
-        let TopLevel { origin, placements, tlas } =
-            build_top_level(&instances, &blas, whole, &mut notes)?;
+        let of_geometry = |(i, b): (usize, &Arc<Blas>)| {
+            b.notes.iter().map(|n| format!("geometry {i}: {n}")).collect::<Vec<_>>()
+        };
+        notes.extend(blas.iter().enumerate().flat_map(of_geometry));
+        let TopLevel { placements, tlas, only, few } =
+            build_top_level(&instances, &blas, group.as_deref(), origin, &mut notes)?;
         phases.push(("instances", start.elapsed() - phases[0].1));
+        let group_tree = group.as_ref().map(|g| &g.bvh);
+        let trees = || blas.iter().filter_map(|b| b.bvh()).chain(group_tree);
         let report = BuildReport {
             total: start.elapsed(),
             phases,
-            depth: blas.iter().map(|b| b.bvh().depth).max().unwrap_or(0),
+            depth: trees().map(|t| t.depth).max().unwrap_or(0),
             primitives: blas.iter().map(|b| b.primitives).sum(),
             skipped: blas.iter().map(|b| b.skipped).sum(),
-            bytes: (tlas.units.len() + blas.iter().map(|b| b.bvh().units.len()).sum::<usize>())
+            bytes: (tlas.units.len() + trees().map(|t| t.units.len()).sum::<usize>())
                 * size_of::<Unit>(),
             notes,
         };
@@ -203,7 +181,11 @@ impl World {
             report,
             blas,
             placements,
+            group_is_impossible: choice.is_some() && group.is_none(),
+            group,
             tlas,
+            only,
+            few,
             options: *options,
             robustness: options.robustness,
             level,
@@ -219,19 +201,53 @@ impl World {
         World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
     }
 
-    fn trees_by_address(&self) -> HashMap<usize, &Arc<Blas>> {
-        self.geometries.iter().map(Geometry::address).zip(&self.blas).collect()
+    fn trees_by_address(&self) -> KnownTrees<'_> {
+        let mut members = vec![None; self.geometries.len()];
+        for (k, m) in self.group.iter().flat_map(|g| g.members.iter().enumerate()) {
+            members[m.geometry] = Some(k);
+        }
+        let known = |(geometry, blas)| KnownTree { geometry, member: members[geometry], blas };
+        let addresses = self.geometries.iter().map(Geometry::address);
+        addresses.zip(self.blas.iter().enumerate().map(known)).collect()
     }
 
-    /// Rebuilds the upper level after a geometry has changed.
-    pub(super) fn rebuild_top_level(&mut self) {
-        let placed = build_top_level(&self.instances, &self.blas, None, &mut self.report.notes);
-        let TopLevel { origin, placements, tlas } =
+    /// Rebuilds the upper level after a geometry has changed. Render space may have another origin.
+    pub(super) fn rebuild_top_level(&mut self, origin: DVec3) {
+        let notes = &mut self.report.notes;
+        let group = self.group.as_deref();
+        let placed = build_top_level(&self.instances, &self.blas, group, origin, notes);
+        let TopLevel { placements, tlas, only, few } =
             placed.expect("the build accepted these transforms");
         self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
         self.report.skipped = self.blas.iter().map(|b| b.skipped).sum();
         (self.origin, self.bounds) = (origin, tlas.bounds);
         (self.placements, self.tlas) = (placements, tlas);
+        (self.only, self.few) = (only, few);
+    }
+
+    /// Entry `id` of the upper level.
+    #[inline]
+    pub(super) fn entry(&self, id: u32) -> Entry<'_> {
+        match (self.placements.get(id as usize), &self.group) {
+            (None, Some(group)) => Entry::Group(group),
+            _ => {
+                let placement = &self.placements[id as usize];
+                let blas = &self.blas[placement.geometry];
+                Entry::Instance { number: id, placement, blas }
+            }
+        }
+    }
+
+    /// The entry of the upper level when it has only one.
+    #[inline]
+    pub(super) fn only_entry(&self) -> Option<Entry<'_>> {
+        self.only.map(|id| self.entry(id))
+    }
+
+    /// Whether `filter` allows entry `id` of the upper level. The group filters its own members.
+    #[inline]
+    pub(super) fn allows(&self, filter: InstanceFilter<'_>, id: u32) -> bool {
+        id as usize >= self.placements.len() || filter.has(id as usize)
     }
 
     /// World position of render space's origin: `world = origin + render`.
@@ -331,68 +347,58 @@ impl World {
         }
     }
 
-    /// The closest hit with an instance of `filter`. With only one instance, the filter is ignored.
+    /// The closest hit with an instance of `filter`.
     pub(crate) fn closest_in<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         ray: &Ray,
         filter: InstanceFilter<'_>,
     ) -> Option<Hit> {
-        if let [only] = self.placements.as_slice()
-            && only.accepts(ray)
-        {
-            let c = self.blas[only.geometry].closest::<S, T>(simd, ray);
-            return c.found.then_some(Hit { t: c.t, u: c.u, v: c.v, prim: c.prim, instance: 0 });
-        }
         let mut leaves = InstanceClosest::<T>::new(self, *ray, filter);
-        match self.placements.len() {
-            0 => return None,
-            1 => {
+        match self.only {
+            Some(id) if !self.allows(filter, id) => return None,
+            Some(id) => {
+                let only = self.entry(id);
+                if only.placement().accepts(ray) {
+                    return only.closest::<S, T>(simd, ray, filter);
+                }
                 let mut t_max = ray.t_max;
-                leaves.try_instance(simd, 0, &mut t_max);
+                leaves.try_entry(simd, id, &mut t_max);
             }
-            _ => {
+            None => {
                 let setup = RaySetup::new(ray);
-                traverse(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
+                traverse(simd, &TreeView::all(&self.tlas), &setup, ray.t_max, &mut leaves);
             }
         }
         leaves.best
     }
 
-    /// Whether an instance of `filter` blocks the ray. With only one instance, the filter is
-    /// ignored.
+    /// Whether an instance of `filter` blocks the ray.
     pub(crate) fn occluded_in<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
         ray: &Ray,
         filter: InstanceFilter<'_>,
     ) -> bool {
-        if let [only] = self.placements.as_slice()
-            && only.accepts(ray)
-        {
-            return self.blas[only.geometry].occluded::<S, T>(simd, ray);
+        if let Some(id) = self.only {
+            return self.allows(filter, id) && self.entry_occluded::<S, T>(simd, id, ray, filter);
         }
         let mut leaves = InstanceAny::<T>::new(self, *ray, filter);
-        match self.placements.len() {
-            0 => return false,
-            1 => leaves.found = self.instance_occluded::<S, T>(simd, 0, ray),
-            _ => {
-                let setup = RaySetup::new(ray);
-                traverse(simd, &self.tlas, &setup, ray.t_max, &mut leaves);
-            }
-        }
+        let setup = RaySetup::new(ray);
+        traverse(simd, &TreeView::all(&self.tlas), &setup, ray.t_max, &mut leaves);
         leaves.found
     }
 
-    fn instance_occluded<S: Simd, T: TriangleTest>(
+    fn entry_occluded<S: Simd, T: TriangleTest>(
         &self,
         simd: S,
-        instance: usize,
+        id: u32,
         ray: &Ray,
+        filter: InstanceFilter<'_>,
     ) -> bool {
-        let p = &self.placements[instance];
-        let (local, _) = p.enter(ray);
-        local.t_max > local.t_min && self.blas[p.geometry].occluded::<S, T>(simd, &local)
+        let entry = self.entry(id);
+        let (local, _) = entry.placement().enter(ray);
+        local.t_max > local.t_min && entry.occluded::<S, T>(simd, &local, filter)
     }
 }
 
@@ -422,106 +428,21 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
     )
 }
 
-/// Geometries with more primitives are built one after the other, each by all threads. Their cuts
-/// give enough tasks, and the builder's boxes (64 bytes a primitive) are in memory for one geometry
-/// at a time.
-const LARGE_GEOMETRY: usize = 1 << 17;
-
-/// `build(i)` for every geometry, in order. The results do not depend on the scheduling.
-fn build_in_parallel<T: Send>(
+/// Builds the structures that are missing in `blas`, but for those of the geometries in `except`.
+fn build_missing(
     geometries: &[Geometry],
-    build: impl Fn(usize) -> T + Sync,
-) -> Vec<T> {
-    let (large, small): (Vec<usize>, Vec<usize>) =
-        (0..geometries.len()).partition(|&i| geometries[i].num_primitives() > LARGE_GEOMETRY);
-    // Small geometries fill the gaps that the first, serial cut of a large one leaves. Each is a
-    // separate task, so that threads share them evenly.
-    let (of_large, of_small): (Vec<T>, Vec<T>) = rayon::join(
-        || large.iter().map(|&i| build(i)).collect(),
-        || small.par_iter().with_max_len(1).map(|&i| build(i)).collect(),
-    );
-    let mut built: Vec<(usize, T)> = large.into_iter().zip(of_large).collect();
-    built.extend(small.into_iter().zip(of_small));
-    built.sort_unstable_by_key(|(i, _)| *i);
-    built.into_iter().map(|(_, t)| t).collect()
-}
-
-/// The upper level.
-struct TopLevel {
-    origin: DVec3,
-    placements: Vec<Placement>,
-    tlas: WideBvh,
-}
-
-/// Chooses render space (world space, translated when everything is far from zero) and places the
-/// instances in it.
-fn build_top_level(
-    instances: &[Instance],
-    blas: &[Arc<Blas>],
-    whole: Option<&GlobalLayout>,
-    notes: &mut Vec<String>,
-) -> Result<TopLevel, BuildError> {
-    let origin = whole.map_or_else(|| choose_origin(instances, blas), |w| w.origin);
-    let place_one = |(i, inst): (usize, &Instance)| {
-        let b = &blas[inst.geometry];
-        let bounds = [b.reach(), b.bvh().bounds];
-        Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
-            BuildError::SingularTransform {
-                instance: i,
-                determinant: inst.world_from_object.matrix3.determinant(),
-            },
-        )
-    };
-    // Of several errors, the first in order is returned, whichever thread finds its error first.
-    let placed: Vec<_> =
-        instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
-    let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let refs = placements
-        .iter()
-        .enumerate()
-        .filter(|(_, p)| {
-            !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite()
-        })
-        .map(|(i, p)| PrimRef::new(p.bounds, i as u32))
-        .collect();
-    let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.config(), notes);
-    Ok(TopLevel { origin, placements, tlas })
-}
-
-/// Zero, or the centre of the world's bounds when they are more than four times their size away
-/// from zero. A single geometry without rotation gets its own centre, so that its local space and
-/// render space coincide.
-fn choose_origin(instances: &[Instance], blas: &[Arc<Blas>]) -> DVec3 {
-    if let [only] = instances
-        && only.world_from_object.matrix3 == DMat3::IDENTITY
-        && only.world_from_object.is_finite()
-    {
-        return blas[only.geometry].frame.center + only.world_from_object.translation;
+    blas: &mut [Option<Arc<Blas>>],
+    except: &[usize],
+    build: impl Fn(usize) -> Arc<Blas> + Sync,
+) {
+    let mut wanted: Vec<bool> = blas.iter().map(Option::is_none).collect();
+    except.iter().for_each(|&i| wanted[i] = false);
+    let missing: Vec<usize> = (0..blas.len()).filter(|&i| wanted[i]).collect();
+    let sizes: Vec<usize> = missing.iter().map(|&i| geometries[i].num_primitives()).collect();
+    let built = build_in_parallel(&sizes, |k| build(missing[k]));
+    for (i, b) in missing.into_iter().zip(built) {
+        blas[i] = Some(b);
     }
-    let join = |(lo, hi): (DVec3, DVec3), (a, b): (DVec3, DVec3)| (lo.min(a), hi.max(b));
-    let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let of_instance = |inst: &Instance| {
-        let b = &blas[inst.geometry];
-        let bounds = b.bvh().bounds;
-        if bounds.is_empty() {
-            return nothing();
-        }
-        let of_corner = |c: Vec3| {
-            let object = c.as_dvec3() / b.frame.scale + b.frame.center;
-            let p = inst.world_from_object.transform_point3(object);
-            (p, p)
-        };
-        bounds.corners().map(of_corner).into_iter().fold(nothing(), join)
-    };
-    // Chunks of a fixed size, merged in order: the sign of a zero does not depend on the threads.
-    let pieces: Vec<_> = instances
-        .par_chunks(1024)
-        .map(|piece| piece.iter().map(of_instance).fold(nothing(), join))
-        .collect();
-    let (lo, hi) = pieces.into_iter().fold(nothing(), join);
-    let center = 0.5 * lo + 0.5 * hi;
-    let far = center.abs().max_element() > 4.0 * (hi - lo).max_element();
-    if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO }
 }
 
 struct InstanceClosest<'w, T: TriangleTest> {
@@ -537,22 +458,19 @@ impl<'w, T: TriangleTest> InstanceClosest<'w, T> {
         InstanceClosest { world, ray, filter, best: None, test: PhantomData }
     }
 
-    fn try_instance<S: Simd>(&mut self, simd: S, instance: u32, skip_t: &mut f32) {
-        let p = &self.world.placements[instance as usize];
-        // One ulp past the best so far: a tie may go to this instance.
+    fn try_entry<S: Simd>(&mut self, simd: S, id: u32, skip_t: &mut f32) {
+        let entry = self.world.entry(id);
+        // One ulp past the best so far: a tie may go to this entry.
         let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
-        let (local, moved) = p.enter(&Ray { t_max: limit, ..self.ray });
+        let (local, moved) = entry.placement().enter(&Ray { t_max: limit, ..self.ray });
         if local.t_max <= local.t_min {
             return;
         }
-        let c = self.world.blas[p.geometry].closest::<S, T>(simd, &local);
-        if !c.found {
-            return;
-        }
-        let t = if moved == 0.0 { c.t } else { (c.t as f64 + moved) as f32 };
-        let better = self.best.is_none_or(|b| t < b.t || (t == b.t && instance < b.instance));
+        let Some(hit) = entry.closest::<S, T>(simd, &local, self.filter) else { return };
+        let t = if moved == 0.0 { hit.t } else { (hit.t as f64 + moved) as f32 };
+        let better = self.best.is_none_or(|b| t < b.t || (t == b.t && hit.instance < b.instance));
         if better {
-            self.best = Some(Hit { t, u: c.u, v: c.v, prim: c.prim, instance });
+            self.best = Some(Hit { t, ..hit });
             *skip_t = inflate_t(t);
         }
     }
@@ -562,9 +480,10 @@ impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceClosest<'_, T> {
     type Query = ClosestHit;
 
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
-        let filter = self.filter;
-        for &i in leaf_primitive_ids(units, leaf).iter().filter(|&&i| filter.has(i as usize)) {
-            self.try_instance(simd, i, skip_t);
+        let (world, filter) = (self.world, self.filter);
+        let ids = leaf_primitive_ids(units, leaf).iter();
+        for &id in ids.filter(|&&id| world.allows(filter, id)) {
+            self.try_entry(simd, id, skip_t);
         }
         false
     }
@@ -591,8 +510,8 @@ impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceAny<'_, T> {
         let (world, ray, filter) = (self.world, self.ray, self.filter);
         self.found = leaf_primitive_ids(units, leaf)
             .iter()
-            .filter(|&&i| filter.has(i as usize))
-            .any(|&i| world.instance_occluded::<S, T>(simd, i as usize, &ray));
+            .filter(|&&id| world.allows(filter, id))
+            .any(|&id| world.entry_occluded::<S, T>(simd, id, &ray, filter));
         self.found
     }
 }

@@ -9,6 +9,7 @@ use crate::clock;
 use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use core::ffi::{c_int, c_void};
 use rt_core::mesh::TriMesh;
+use std::borrow::Borrow;
 use std::ffi::CString;
 use std::sync::atomic::{AtomicI64, Ordering};
 
@@ -116,8 +117,7 @@ pub struct EmbreeScene {
     pub cost: BuildCost,
     /// Shared with Embree until the scene is released. Padded, because Embree reads 16 bytes at the
     /// last vertex.
-    _positions: Vec<f32>,
-    _indices: Vec<u32>,
+    _arrays: Vec<(Vec<f32>, Vec<u32>)>,
     _memory: Box<Memory>,
 }
 
@@ -135,7 +135,18 @@ impl EmbreeScene {
         mesh: &TriMesh,
         options: &Options,
     ) -> Result<EmbreeScene, BaselineError> {
-        require_clean(mesh)?;
+        EmbreeScene::build_many(embree, &[mesh], options)
+    }
+
+    /// Builds a scene of `meshes`, each a geometry of its own. Hits tell the triangle's number in
+    /// its mesh.
+    pub fn build_many(
+        embree: &Embree,
+        meshes: &[impl Borrow<TriMesh>],
+        options: &Options,
+    ) -> Result<EmbreeScene, BaselineError> {
+        let meshes: Vec<&TriMesh> = meshes.iter().map(Borrow::borrow).collect();
+        meshes.iter().try_for_each(|m| require_clean(m))?;
         let calls = embree.calls;
         let failed = |code: c_int, doing: &'static str| BaselineError::Failed {
             name: embree.name(),
@@ -144,10 +155,13 @@ impl EmbreeScene {
         };
         let config =
             CString::new(options.device_configuration()).map_err(|_| failed(2, "configuring"))?;
-        let mut positions: Vec<f32> = Vec::with_capacity(mesh.positions.len() * 3 + 4);
-        positions.extend(mesh.positions.iter().flat_map(|p| p.to_array()));
-        positions.extend([0.0; 4]);
-        let indices: Vec<u32> = mesh.indices.iter().flatten().copied().collect();
+        let of_mesh = |mesh: &&TriMesh| {
+            let mut positions: Vec<f32> = Vec::with_capacity(mesh.positions.len() * 3 + 4);
+            positions.extend(mesh.positions.iter().flat_map(|p| p.to_array()));
+            positions.extend([0.0; 4]);
+            (positions, mesh.indices.iter().flatten().copied().collect())
+        };
+        let arrays: Vec<(Vec<f32>, Vec<u32>)> = meshes.iter().map(of_mesh).collect();
         let memory = Box::<Memory>::default();
 
         // SAFETY: functions are called as the headers say. The configuration outlives the call; the
@@ -168,16 +182,18 @@ impl EmbreeScene {
             (calls.set_scene_flags)(scene, flags);
             let quality = options.quality as c_int;
             (calls.set_scene_build_quality)(scene, quality);
-            let geometry = (calls.new_geometry)(device, abi::GEOMETRY_TYPE_TRIANGLE);
-            (calls.set_geometry_build_quality)(geometry, quality);
             let share = calls.set_shared_geometry_buffer;
-            let (vertices, triangles) = (mesh.positions.len(), mesh.indices.len());
-            let (v, i) = (positions.as_ptr().cast(), indices.as_ptr().cast());
-            share(geometry, abi::BUFFER_TYPE_VERTEX, 0, abi::FORMAT_FLOAT3, v, 0, 12, vertices);
-            share(geometry, abi::BUFFER_TYPE_INDEX, 0, abi::FORMAT_UINT3, i, 0, 12, triangles);
-            (calls.commit_geometry)(geometry);
-            (calls.attach_geometry)(scene, geometry);
-            (calls.release_geometry)(geometry);
+            for (mesh, (positions, indices)) in meshes.iter().zip(&arrays) {
+                let geometry = (calls.new_geometry)(device, abi::GEOMETRY_TYPE_TRIANGLE);
+                (calls.set_geometry_build_quality)(geometry, quality);
+                let (vertices, triangles) = (mesh.positions.len(), mesh.indices.len());
+                let (v, i) = (positions.as_ptr().cast(), indices.as_ptr().cast());
+                share(geometry, abi::BUFFER_TYPE_VERTEX, 0, abi::FORMAT_FLOAT3, v, 0, 12, vertices);
+                share(geometry, abi::BUFFER_TYPE_INDEX, 0, abi::FORMAT_UINT3, i, 0, 12, triangles);
+                (calls.commit_geometry)(geometry);
+                (calls.attach_geometry)(scene, geometry);
+                (calls.release_geometry)(geometry);
+            }
             let ((), time) = clock::measure(|| (calls.commit_scene)(scene));
             let error = (calls.get_device_error)(device);
             if error != 0 {
@@ -200,8 +216,7 @@ impl EmbreeScene {
             scene,
             options: options.clone(),
             cost,
-            _positions: positions,
-            _indices: indices,
+            _arrays: arrays,
             _memory: memory,
         })
     }

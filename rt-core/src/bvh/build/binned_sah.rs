@@ -3,7 +3,6 @@
 //! primitives costing one test.
 
 use super::prim_ref::{Box4, PrimRef, SetBounds};
-use crate::bvh::layout::wide::LEAF_SIZE;
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use rayon::prelude::*;
@@ -18,12 +17,6 @@ const PARALLEL_CHUNK: usize = 1 << 16;
 /// Sets at least this large fill two sets of bins in turn: neighbours often fall into the same bin,
 /// and the second would wait for what the first has just stored (6 % of a build).
 const TWO_SETS: usize = 96;
-
-/// Leaf tests that `n` primitives cost.
-#[inline(always)]
-pub(crate) fn leaf_tests(n: usize) -> f32 {
-    n.div_ceil(LEAF_SIZE) as f32
-}
 
 /// A cut of a set in two.
 #[derive(Debug, Clone, Copy)]
@@ -121,8 +114,14 @@ impl Bins {
     /// The cut with the smallest cost area(left)·tests(left) + area(right)·tests(right); `None`
     /// when all primitives share one bin in every axis.
     #[inline(always)]
-    fn best_cut<S: Simd>(&self, simd: S, bins: usize, axes: Range<usize>) -> Option<Cut> {
-        let tests = |n: u32| leaf_tests(n as usize);
+    fn best_cut<S: Simd>(
+        &self,
+        simd: S,
+        bins: usize,
+        axes: Range<usize>,
+        leaves: LeafCapacity,
+    ) -> Option<Cut> {
+        let tests = |n: u32| leaves.tests(n as usize);
         let mut best: Option<(f32, Cut)> = None;
         for axis in axes {
             let (boxes, counts) = (&self.boxes[axis], &self.counts[axis]);
@@ -157,8 +156,9 @@ impl Bins {
         map: BinMap,
         bins: usize,
         axes: Range<usize>,
+        leaves: LeafCapacity,
     ) -> Option<SplitPlane> {
-        let cut = self.best_cut(simd, bins, axes)?;
+        let cut = self.best_cut(simd, bins, axes, leaves)?;
         let (left, right) = self.boxes[cut.axis][..bins].split_at(cut.bin as usize + 1);
         let boxes = [left, right].map(|side| {
             let mut b = Box4::EMPTY;
@@ -184,6 +184,36 @@ pub(crate) struct SahConfig {
     pub(crate) bins: usize,
     /// Looks at the longest axis alone: a third of the work.
     pub(crate) longest_axis_only: bool,
+    /// Largest number of primitives in a leaf.
+    pub(crate) leaves: LeafCapacity,
+}
+
+/// How many primitives one leaf test covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LeafCapacity {
+    /// One: a reference to a subtree.
+    One,
+    /// Four, tested by one vector.
+    Four,
+}
+
+impl LeafCapacity {
+    #[inline(always)]
+    pub(crate) fn size(self) -> usize {
+        match self {
+            LeafCapacity::One => 1,
+            LeafCapacity::Four => 4,
+        }
+    }
+
+    /// Leaf tests that `n` primitives cost.
+    #[inline(always)]
+    pub(crate) fn tests(self, n: usize) -> f32 {
+        match self {
+            LeafCapacity::One => n as f32,
+            LeafCapacity::Four => n.div_ceil(4) as f32,
+        }
+    }
 }
 
 /// A cut and how to apply it.
@@ -285,7 +315,7 @@ fn find_plane_of_few<S: Simd>(
                 (_, 1) => space.fill(simd, refs, &map, bins, 1..2),
                 _ => space.fill(simd, refs, &map, bins, 2..3),
             }
-            space.even.best_plane(simd, map, bins, axes)
+            space.even.best_plane(simd, map, bins, axes, sah.leaves)
         },
     )
 }
@@ -310,7 +340,7 @@ fn find_plane_of_many<S: Simd>(
         a.even.add_bins(simd, &b.even, bins, axes.clone());
         a
     })?;
-    all.even.best_plane(simd, map, bins, axes)
+    all.even.best_plane(simd, map, bins, axes, sah.leaves)
 }
 
 /// Cuts `from` (at least two) at the best place: the two sides are the parts of `to`, which is as

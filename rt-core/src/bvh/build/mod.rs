@@ -11,10 +11,12 @@ mod collapse;
 mod obvhs_tree;
 mod prim_ref;
 mod sah_tree;
+mod schedule;
 mod wide_builder;
 
-pub(crate) use binned_sah::SahConfig;
+pub(crate) use binned_sah::{LeafCapacity, SahConfig};
 pub(crate) use prim_ref::{MAX_PRIMS, PrimRef};
+pub(crate) use schedule::build_in_parallel;
 pub(crate) use wide_builder::{BuilderConfig, Method, build_wide};
 
 #[cfg(test)]

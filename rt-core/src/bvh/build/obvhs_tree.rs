@@ -12,6 +12,7 @@
 //! [`super::sah_tree`] with few bins, and rays through its trees took longer, too.
 
 use super::binary_tree::BinaryTree;
+use super::binned_sah::LeafCapacity;
 use crate::bvh::layout::wide::LEAF_SIZE;
 use crate::math::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -30,7 +31,11 @@ fn is_ordinary(b: Aabb) -> bool {
 
 /// `tree` with subtrees moved to where they cost less; `None` when obvhs cannot handle it. Each
 /// pass tries the given share of the nodes, those with the largest surface.
-pub(crate) fn reinsert(tree: &BinaryTree, passes: &[f32]) -> Option<BinaryTree> {
+pub(crate) fn reinsert(
+    tree: &BinaryTree,
+    passes: &[f32],
+    leaves: LeafCapacity,
+) -> Option<BinaryTree> {
     if !is_ordinary(tree.nodes[0].bounds) {
         return None;
     }
@@ -40,7 +45,7 @@ pub(crate) fn reinsert(tree: &BinaryTree, passes: &[f32]) -> Option<BinaryTree> 
         bvh.max_depth = depth_of(&bvh.nodes).max(obvhs::bvh2::DEFAULT_MAX_STACK_DEPTH);
         optimizer.run(&mut bvh, part, Some(vec![1.0]));
     }
-    to_binary_tree(&bvh, &tree.ids, |leaf| {
+    to_binary_tree(&bvh, &tree.ids, leaves, |leaf| {
         Aabb::new(leaf.aabb().min.into(), leaf.aabb().max.into())
     })
 }
@@ -86,6 +91,7 @@ fn depth_of(nodes: &[Bvh2Node]) -> usize {
 fn to_binary_tree(
     bvh: &Bvh2,
     ids: &[u32],
+    leaves: LeafCapacity,
     leaf_bounds: impl Fn(&Bvh2Node) -> Aabb,
 ) -> Option<BinaryTree> {
     // ---- Primitives below each node. The optimiser does not number parents before children.
@@ -127,7 +133,7 @@ fn to_binary_tree(
     let (mut next, mut below) = (0, Vec::new());
     while let Some((i, node, depth)) = todo.pop() {
         tree.depth = tree.depth.max(depth);
-        if counts[i as usize] as usize > LEAF_SIZE {
+        if counts[i as usize] as usize > leaves.size() {
             let left = tree.open(node);
             let first = bvh.nodes[i as usize].first_index;
             todo.extend([(first + 1, left + 1, depth + 1), (first, left, depth + 1)]);

@@ -120,7 +120,8 @@ fn worlds_of_many_geometries_do_not_depend_on_the_number_of_threads() {
         })
     };
     let words = |w: &World| -> Vec<Vec<u32>> {
-        let trees = w.blas.iter().map(|b| b.bvh()).chain([&w.tlas]);
+        let group = w.group.as_ref().map(|g| &g.bvh);
+        let trees = w.blas.iter().filter_map(|b| b.bvh()).chain(group).chain([&w.tlas]);
         trees.map(|t| bytemuck::cast_slice::<_, u32>(&t.units).to_vec()).collect()
     };
     let one = build(1);

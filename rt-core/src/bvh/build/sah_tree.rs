@@ -2,9 +2,8 @@
 //! sets, by a full sweep for small ones.
 
 use super::binary_tree::BinaryTree;
-use super::binned_sah::{SahConfig, SearchSpace, halve, leaf_tests, split_into};
+use super::binned_sah::{LeafCapacity, SahConfig, SearchSpace, halve, split_into};
 use super::prim_ref::{Box4, PrimRef, SetBounds};
-use crate::bvh::layout::wide::LEAF_SIZE;
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use std::ops::Range;
@@ -54,7 +53,7 @@ impl SahTree {
         self.tree.nodes[node].bounds = bounds.aabb();
         self.tree.depth = self.tree.depth.max(depth);
         let n = refs.len();
-        if n <= LEAF_SIZE {
+        if n <= self.sah.leaves.size() {
             self.tree.make_leaf(node, first, refs.iter().map(PrimRef::id));
             return;
         }
@@ -64,7 +63,8 @@ impl SahTree {
             // Each side becomes a leaf or is swept again, so the boxes of the centres are not
             // needed.
             let axes = if self.sah.longest_axis_only { longest_axis(bounds) } else { 0..3 };
-            let (at, bounds) = dispatch!(self.level, simd => sweep(simd, refs, axes));
+            let (at, bounds) =
+                dispatch!(self.level, simd => sweep(simd, refs, axes, self.sah.leaves));
             let (left, right) = refs.split_at_mut(at);
             self.build(child, left, spare, &bounds[0], first, depth + 1);
             self.build(child + 1, right, spare, &bounds[1], first + at, depth + 1);
@@ -93,10 +93,15 @@ fn longest_axis(bounds: &SetBounds) -> Range<usize> {
 /// Sorts `refs` (two to eight) along the axis with the cheapest split. Returns the number of
 /// primitives on the left and the bounds of both sides.
 #[inline(always)]
-fn sweep<S: Simd>(simd: S, refs: &mut [PrimRef], axes: Range<usize>) -> (usize, [SetBounds; 2]) {
+fn sweep<S: Simd>(
+    simd: S,
+    refs: &mut [PrimRef],
+    axes: Range<usize>,
+    leaves: LeafCapacity,
+) -> (usize, [SetBounds; 2]) {
     simd.vectorize(
         #[inline(always)]
-        || sweep_body(simd, refs, axes),
+        || sweep_body(simd, refs, axes, leaves),
     )
 }
 
@@ -105,6 +110,7 @@ fn sweep_body<S: Simd>(
     simd: S,
     refs: &mut [PrimRef],
     axes: Range<usize>,
+    leaves: LeafCapacity,
 ) -> (usize, [SetBounds; 2]) {
     let n = refs.len();
     let mut copy = [refs[0]; SWEEP];
@@ -117,12 +123,12 @@ fn sweep_body<S: Simd>(
         let mut acc = Box4::EMPTY;
         for i in (1..n).rev() {
             acc.grow(simd, at(i));
-            right_cost[i] = acc.half_area() * leaf_tests(n - i);
+            right_cost[i] = acc.half_area() * leaves.tests(n - i);
         }
         let mut acc = Box4::EMPTY;
         for i in 1..n {
             acc.grow(simd, at(i - 1));
-            let cost = acc.half_area() * leaf_tests(i) + right_cost[i];
+            let cost = acc.half_area() * leaves.tests(i) + right_cost[i];
             if cost < best.0 {
                 best = (cost, i, axis);
             }

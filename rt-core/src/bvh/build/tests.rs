@@ -1,6 +1,6 @@
 //! Input that breaks builders, for every preset.
 
-use super::binned_sah::SahConfig;
+use super::binned_sah::{LeafCapacity, SahConfig};
 use super::obvhs_tree::reinsert;
 use super::prim_ref::SetBounds;
 use super::sah_tree::sah_tree;
@@ -17,7 +17,8 @@ use glam::Vec3;
 use std::sync::Arc;
 use std::time::Instant;
 
-const THOROUGH: SahConfig = SahConfig { bins: 16, longest_axis_only: false };
+const THOROUGH: SahConfig =
+    SahConfig { bins: 16, longest_axis_only: false, leaves: LeafCapacity::Four };
 
 fn soup_of(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> TriMesh {
     let mut mesh = TriMesh::default();
@@ -197,7 +198,9 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
             let options = BuildOptions { quality, ..Default::default() };
             pool.install(|| World::from_mesh(mesh.clone(), &options).expect("a valid mesh"))
         });
-        let units = |w: &World| bytemuck::cast_slice::<_, u32>(&w.blas[0].bvh().units).to_vec();
+        let units = |w: &World| {
+            bytemuck::cast_slice::<_, u32>(&w.blas[0].bvh().expect("of its own").units).to_vec()
+        };
         let first = units(&trees[0]);
         assert!(first == units(&trees[1]) && first == units(&trees[2]), "{quality:?}");
     }
@@ -231,7 +234,7 @@ fn refs_of(mesh: &TriMesh) -> (Vec<PrimRef>, SetBounds) {
 fn reinsertion_lowers_the_cost() {
     let (mut refs, bounds) = refs_of(&noise_soup(5000, 6));
     let sah = sah_tree(&mut refs.clone(), &mut refs, &bounds, THOROUGH, Level::new());
-    let better = reinsert(&sah, &[1.0, 0.5, 0.5]).expect("ordinary boxes");
+    let better = reinsert(&sah, &[1.0, 0.5, 0.5], LeafCapacity::Four).expect("ordinary boxes");
     assert!(better.cost() < 0.98 * sah.cost(), "{} from {}", better.cost(), sah.cost());
     let mut ids = better.ids.clone();
     ids.sort_unstable();
@@ -251,7 +254,8 @@ fn what_obvhs_cannot_take_is_built_by_sah_and_noted() {
     assert!(
         reinsert(
             &sah_tree(&mut refs.clone(), &mut refs.clone(), &bounds, THOROUGH, Level::new()),
-            &[1.0]
+            &[1.0],
+            LeafCapacity::Four
         )
         .is_none()
     );

@@ -12,7 +12,7 @@ use super::obvhs_tree::{MAX_BINARY_DEPTH, reinsert};
 use super::prim_ref::{PrimRef, SetBounds};
 use super::sah_tree::{MAX_COST_DEPTH, sah_tree};
 use crate::bvh::layout::wide::{
-    ChildRef, LEAF_SIZE, LeafWriter, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node,
+    ChildRef, LeafWriter, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node,
 };
 use crate::math::Aabb;
 use crate::simd::huge_pages;
@@ -88,7 +88,7 @@ impl Fragment {
             Method::Sah => sah_tree(refs, spare, bounds, config.sah, level),
             Method::Reinsertion => {
                 let tree = sah_tree(refs, spare, bounds, config.sah, level);
-                reinsert(&tree, &REINSERTION_PASSES).unwrap_or_else(|| {
+                reinsert(&tree, &REINSERTION_PASSES, config.sah.leaves).unwrap_or_else(|| {
                     fell_back = true;
                     tree
                 })
@@ -120,6 +120,7 @@ pub(crate) fn build_wide<W: LeafWriter>(
     }
     let bounds =
         refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
+    debug_assert_eq!(config.sah.leaves.size(), W::CAPACITY, "leaves that the writer can hold");
     let level = Level::new();
     let mut spare = refs.clone();
     let root = collapse_cuts(fragments(&mut refs, &mut spare, &bounds, config, level, 0));
@@ -309,10 +310,10 @@ impl<W: LeafWriter> FragmentWriter<'_, W> {
         let tree = &self.fragment.tree;
         let node = &tree.nodes[id];
         let prims = &tree.ids[node.first as usize..][..node.count as usize];
-        debug_assert!((1..=LEAF_SIZE).contains(&prims.len()), "a leaf of {}", prims.len());
+        debug_assert!((1..=W::CAPACITY).contains(&prims.len()), "a leaf of {}", prims.len());
         let at = self.next_unit;
         self.next_unit += W::UNITS;
         self.writer.write(prims, &mut self.out[at..at + W::UNITS]);
-        ChildRef::leaf(self.base + at, prims.len())
+        self.writer.reference(self.base + at, prims)
     }
 }

@@ -22,6 +22,11 @@ impl LocalFrame {
         let far = center.abs().max_element() > 4.0 * size;
         let shift = if far { center.as_dvec3() } else { DVec3::ZERO };
         let reach = if far { size } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
+        LocalFrame::around(origin + shift, reach)
+    }
+
+    /// The frame with `center` for positions within `reach` of it along each axis.
+    pub(crate) fn around(center: DVec3, reach: f32) -> Self {
         // The triangle test multiplies three lengths. With these limits the product stays between
         // 1e-27 and 1e27.
         let scale = if reach > 0.0 && !(1e-6..=1e9).contains(&reach) {
@@ -29,7 +34,7 @@ impl LocalFrame {
         } else {
             1.0
         };
-        LocalFrame { center: origin + shift, scale }
+        LocalFrame { center, scale }
     }
 
     /// Converts a position relative to `origin` to local space.

@@ -37,11 +37,15 @@ pub(crate) struct TriWriter<'m> {
     frame: &'m LocalFrame,
     /// Positions are stored unchanged.
     plain: bool,
+    /// Number of the first triangle in leaves.
+    first: u32,
 }
 
 impl<'m> TriWriter<'m> {
-    pub(crate) fn new(mesh: &'m TriMesh, frame: &'m LocalFrame) -> Self {
-        TriWriter { mesh, frame, plain: frame.center == mesh.origin && frame.scale == 1.0 }
+    /// Triangle `i` of the mesh has the number `first + i` in leaves.
+    pub(crate) fn new(mesh: &'m TriMesh, frame: &'m LocalFrame, first: u32) -> Self {
+        let plain = frame.center == mesh.origin && frame.scale == 1.0;
+        TriWriter { mesh, frame, plain, first }
     }
 }
 
@@ -56,7 +60,12 @@ impl TriWriter<'_> {
 }
 
 impl TriWriter<'_> {
-    /// The box of a triangle, [`widened`]; empty when it cannot be built.
+    /// The numbers of a leaf's triangles in the mesh.
+    pub(crate) fn in_mesh(&self, ids: [u32; 4]) -> [u32; 4] {
+        ids.map(|id| id - self.first)
+    }
+
+    /// The box of triangle `i` of the mesh, [`widened`]; empty when it cannot be built.
     #[inline(always)]
     pub(crate) fn bounds(&self, i: u32) -> Aabb {
         if !self.mesh.is_renderable(i as usize) {
@@ -90,7 +99,7 @@ impl LeafWriter for TriWriter<'_> {
                     floats[4 * (3 * vertex + axis) + slot] = corner[axis];
                 }
             }
-            floats[36 + slot] = f32::from_bits(id);
+            floats[36 + slot] = f32::from_bits(self.first + id);
         }
     }
 }

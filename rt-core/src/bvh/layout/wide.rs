@@ -73,6 +73,14 @@ impl ChildRef {
         ChildRef(Self::LEAF | ((count as u32 - 1) << 29) | unit as u32)
     }
 
+    /// The reference to the same node or leaf `units` further on; sums wrap around.
+    #[inline]
+    pub(crate) fn moved(self, units: usize) -> Self {
+        let unit = self.unit().wrapping_add(units);
+        debug_assert!(unit < Self::MAX_UNITS, "unit {unit} does not fit a child reference");
+        ChildRef(self.0 & !Self::OFFSET | unit as u32)
+    }
+
     #[inline(always)]
     pub(crate) fn is_leaf(self) -> bool {
         self.0 & Self::LEAF != 0
@@ -147,6 +155,12 @@ pub(crate) fn get_box(node: &[Unit], slot: usize) -> Aabb {
 pub(crate) trait LeafWriter: Sync {
     /// Number of units of a leaf.
     const UNITS: usize;
+    /// Largest number of primitives of a leaf.
+    const CAPACITY: usize = LEAF_SIZE;
     /// Writes up to four primitives into a leaf's units.
     fn write(&self, prims: &[u32], out: &mut [Unit]);
+    /// The reference that the leaf's parent holds. The leaf starts at `unit`.
+    fn reference(&self, unit: usize, prims: &[u32]) -> ChildRef {
+        ChildRef::leaf(unit, prims.len())
+    }
 }

@@ -12,10 +12,11 @@
 use super::pair::{RayQueue, RayTask, traverse_pairs};
 use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, inflate_t};
 use super::three;
+use super::tree_view::TreeView;
+use crate::bvh::Unit;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
-use crate::bvh::{Unit, WideBvh};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
@@ -43,7 +44,7 @@ struct Entry {
 #[inline(never)]
 pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
-    bvh: &WideBvh,
+    tree: &TreeView<'_>,
     rays: &RayBlock,
     active: u16,
     hits: &mut HitBlock,
@@ -51,20 +52,20 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
 ) {
     simd.vectorize(
         #[inline(always)]
-        || trace_body::<S, T, Q>(simd, bvh, rays, active, hits, instance),
+        || trace_body::<S, T, Q>(simd, tree, rays, active, hits, instance),
     );
 }
 
 #[inline(always)]
 fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
-    bvh: &WideBvh,
+    tree: &TreeView<'_>,
     rays: &RayBlock,
     mut active: u16,
     hits: &mut HitBlock,
     instance: u32,
 ) {
-    let units = bvh.units.as_slice();
+    let units = tree.units;
     let directions = [&rays.dx, &rays.dy, &rays.dz];
     let origins = [&rays.ox, &rays.oy, &rays.oz];
     let d: [f32x16<S>; 3] = three!(|a| f32x16::from_slice(simd, directions[a]));
@@ -101,11 +102,11 @@ fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
             if Q::ANY {
                 let (t, active, test) = (&t, &mut active, PhantomData::<T>);
                 let mut queue = AnyQueue { setups, t, start, met, hits, active, test };
-                traverse_pairs(simd, bvh, &mut queue);
+                traverse_pairs(simd, tree, &mut queue);
             } else {
                 let (t, test) = (&mut t, PhantomData::<T>);
                 let mut queue = ClosestQueue { setups, t, start, met, hits, instance, test };
-                traverse_pairs(simd, bvh, &mut queue);
+                traverse_pairs(simd, tree, &mut queue);
             }
             continue;
         }
@@ -119,10 +120,14 @@ fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
         let refs = node[CHILD_ROW].bits();
         let limit = f32x16::from_slice(simd, &t) * skip;
         let base = stack.len();
+        let visible = tree.visible(at, 0xff);
         for slot in 0..8 {
             if refs[slot] == ChildRef::NONE.0 {
                 // A node fills its slots in order.
                 break;
+            }
+            if visible >> slot & 1 == 0 {
+                continue;
             }
             count(Counter::GroupBoxes, 1);
             let lo: [f32x16<S>; 3] =

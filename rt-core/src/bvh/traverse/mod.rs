@@ -4,6 +4,7 @@ pub(crate) mod hybrid;
 pub(crate) mod packet;
 pub(crate) mod pair;
 pub(crate) mod single;
+pub(crate) mod tree_view;
 pub(crate) mod triangle_leaf;
 
 /// `[f(0), f(1), f(2)]` written out. Closures handed to library functions such as `array::from_fn`

@@ -10,8 +10,9 @@
 
 use super::single::{BOX_SLACK, LeafTest, RaySetup, inflate_t, push_children};
 use super::three;
+use super::tree_view::TreeView;
+use crate::bvh::Unit;
 use crate::bvh::layout::wide::{ChildRef, NODE_UNITS, STACK_SIZE};
-use crate::bvh::{Unit, WideBvh};
 use crate::simd::{Stack, StackMemory};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
@@ -106,12 +107,14 @@ impl<'m, S: Simd, L: LeafTest<S>> Traversal<'m, S, L> {
     fn advance(
         &mut self,
         simd: S,
-        units: &[Unit],
+        tree: &TreeView<'_>,
         node: &[Unit; NODE_UNITS],
         near: f32x8<S>,
         mask: u32,
     ) -> bool {
         count(Counter::Nodes, 1);
+        let units = tree.units;
+        let mask = tree.visible(self.current.unit(), mask);
         let child = push_children::<S, L::Query>(units, node, near, mask, &mut self.stack);
         self.current = child.unwrap_or(self.current);
         self.pop_to_node(simd, units, child.is_none())
@@ -166,15 +169,15 @@ fn next_traversal<'r, S: Simd, Q: RayQueue<'r, S>>(
 #[inline(always)]
 pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>>(
     simd: S,
-    bvh: &WideBvh,
+    tree: &TreeView<'_>,
     queue: &mut Q,
 ) {
-    let units = bvh.units.as_slice();
+    let units = tree.units;
     let (mut memory_a, mut memory_b) = (StackMemory::new(), StackMemory::new());
     let Some(first) = next_traversal(simd, units, queue) else { return };
     let mut a = Traversal::new(simd, first, &mut memory_a);
     let Some(second) = next_traversal(simd, units, queue) else {
-        finish_last(simd, units, &mut a);
+        finish_last(simd, tree, &mut a);
         queue.done(a.number, a.leaf);
         return;
     };
@@ -183,13 +186,13 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>>(
         let (node_a, node_b) = (a.node(units), b.node(units));
         let (near_a, mask_a) = a.boxes(simd, node_a);
         let (near_b, mask_b) = b.boxes(simd, node_b);
-        let a_goes_on = a.advance(simd, units, node_a, near_a, mask_a);
-        let b_goes_on = b.advance(simd, units, node_b, near_b, mask_b);
+        let a_goes_on = a.advance(simd, tree, node_a, near_a, mask_a);
+        let b_goes_on = b.advance(simd, tree, node_b, near_b, mask_b);
         if !a_goes_on {
             queue.done(a.number, a.leaf);
             let Some(next) = next_traversal(simd, units, queue) else {
                 if b_goes_on {
-                    finish_last(simd, units, &mut b);
+                    finish_last(simd, tree, &mut b);
                 }
                 queue.done(b.number, b.leaf);
                 return;
@@ -199,7 +202,7 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>>(
         if !b_goes_on {
             queue.done(b.number, b.leaf);
             let Some(next) = next_traversal(simd, units, queue) else {
-                finish_last(simd, units, &mut a);
+                finish_last(simd, tree, &mut a);
                 queue.done(a.number, a.leaf);
                 return;
             };
@@ -210,13 +213,17 @@ pub(crate) fn traverse_pairs<'r, S: Simd, Q: RayQueue<'r, S>>(
 
 /// Finishes the last ray alone.
 #[inline(never)]
-fn finish_last<S: Simd, L: LeafTest<S>>(simd: S, units: &[Unit], walk: &mut Traversal<'_, S, L>) {
+fn finish_last<S: Simd, L: LeafTest<S>>(
+    simd: S,
+    tree: &TreeView<'_>,
+    walk: &mut Traversal<'_, S, L>,
+) {
     simd.vectorize(
         #[inline(always)]
         || loop {
-            let node = walk.node(units);
+            let node = walk.node(tree.units);
             let (near, mask) = walk.boxes(simd, node);
-            if !walk.advance(simd, units, node, near, mask) {
+            if !walk.advance(simd, tree, node, near, mask) {
                 return;
             }
         },

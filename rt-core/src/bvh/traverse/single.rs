@@ -1,10 +1,11 @@
 //! Traversal by one ray at a time: eight boxes per step, nearest child first.
 
 use super::three;
+use super::tree_view::TreeView;
+use crate::bvh::Unit;
 use crate::bvh::intersect::watertight::Shear;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::query::HitQuery;
-use crate::bvh::{Unit, WideBvh};
 use crate::ray::Ray;
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
@@ -88,14 +89,14 @@ pub(crate) trait LeafTest<S: Simd> {
 #[inline(never)]
 pub(crate) fn traverse<S: Simd, L: LeafTest<S>>(
     simd: S,
-    bvh: &WideBvh,
+    tree: &TreeView<'_>,
     ray: &RaySetup,
     t_max: f32,
     leaves: &mut L,
 ) {
     simd.vectorize(
         #[inline(always)]
-        || traverse_body(simd, bvh, ray, t_max, leaves),
+        || traverse_body(simd, tree, ray, t_max, leaves),
     );
 }
 
@@ -104,25 +105,25 @@ pub(crate) fn traverse<S: Simd, L: LeafTest<S>>(
 #[inline(always)]
 pub(crate) fn traverse_body<S: Simd, L: LeafTest<S>>(
     simd: S,
-    bvh: &WideBvh,
+    tree: &TreeView<'_>,
     ray: &RaySetup,
     t_max: f32,
     leaves: &mut L,
 ) {
-    traverse_from(simd, bvh, ray, t_max, ChildRef::node(0), leaves);
+    traverse_from(simd, tree, ray, t_max, ChildRef::node(0), leaves);
 }
 
 /// Traverses the subtree at `start`.
 #[inline(always)]
 pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
     simd: S,
-    bvh: &WideBvh,
+    tree: &TreeView<'_>,
     ray: &RaySetup,
     t_max: f32,
     start: ChildRef,
     leaves: &mut L,
 ) {
-    let units = bvh.units.as_slice();
+    let units = tree.units;
     let mut skip_t = inflate_t(t_max);
     let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
@@ -159,9 +160,8 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
                 rcp_far[2],
             ));
             let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
-            if let Some(child) =
-                push_children::<S, L::Query>(units, node, near, hit.to_bitmask() as u32, &mut stack)
-            {
+            let hit = tree.visible(at, hit.to_bitmask() as u32);
+            if let Some(child) = push_children::<S, L::Query>(units, node, near, hit, &mut stack) {
                 current = child;
                 continue;
             }

@@ -17,9 +17,10 @@ mod switch_to_single;
 mod triangles;
 mod walk;
 
+use crate::bvh::Unit;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
-use crate::bvh::{Unit, WideBvh};
+use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::{HitBlock, LANES, NO_HIT};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u32x16};
 pub(crate) use load::PacketLimits;
@@ -199,22 +200,26 @@ impl Packet {
     }
 
     /// Traces the loaded rays against a triangle hierarchy.
-    pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(&mut self, simd: S, bvh: &WideBvh) {
+    pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
+        &mut self,
+        simd: S,
+        tree: &TreeView<'_>,
+    ) {
         if !self.common_origin {
             // Combined intervals of origins and directions are weak bounds: measured seven times
             // slower without per-ray tests.
             self.walk::<S, _, IntervalsAndRays>(
                 simd,
-                bvh,
+                tree,
                 &mut Triangles::<T, Q, SeparateOrigins>::new(),
             );
         } else if self.slabs[Q::ANY as usize].next() {
             let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
-            let slabs = self.walk::<S, _, IntervalsAndRays>(simd, bvh, &mut leaves);
+            let slabs = self.walk::<S, _, IntervalsAndRays>(simd, tree, &mut leaves);
             self.slabs[Q::ANY as usize].learn(slabs);
         } else {
             let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
-            self.walk::<S, _, IntervalsOnly>(simd, bvh, &mut leaves);
+            self.walk::<S, _, IntervalsOnly>(simd, tree, &mut leaves);
         }
     }
 
@@ -223,10 +228,10 @@ impl Packet {
     pub(crate) fn collect<S: Simd>(
         &mut self,
         simd: S,
-        bvh: &WideBvh,
+        tree: &TreeView<'_>,
         out: &mut Vec<(f32, ChildRef)>,
     ) {
-        self.walk::<S, _, IntervalsOnly>(simd, bvh, &mut CollectLeaves(out));
+        self.walk::<S, _, IntervalsOnly>(simd, tree, &mut CollectLeaves(out));
     }
 }
 
@@ -293,7 +298,7 @@ trait PacketLeaf<S: Simd> {
         &mut self,
         packet: &mut Packet,
         simd: S,
-        bvh: &WideBvh,
+        tree: &TreeView<'_>,
         node: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
@@ -323,7 +328,7 @@ impl<S: Simd> PacketLeaf<S> for CollectLeaves<'_> {
         &mut self,
         _: &mut Packet,
         _: S,
-        _: &WideBvh,
+        _: &TreeView<'_>,
         _: ChildRef,
         _: u16,
         _: &[u16; LANES],

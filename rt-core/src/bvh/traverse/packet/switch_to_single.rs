@@ -5,12 +5,12 @@
 //! triangle would still be tested against sixteen.
 
 use super::Packet;
-use crate::bvh::WideBvh;
 use crate::bvh::intersect::watertight::Shear;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::pair::{RayQueue, RayTask, traverse_pairs};
 use crate::bvh::traverse::single::RaySetup;
+use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::LANES;
 use crate::stats::{Counter, count};
@@ -45,7 +45,7 @@ impl Packet {
     pub(super) fn switch_to_single<S: Simd, T: TriangleTest, Q: HitQuery>(
         &mut self,
         simd: S,
-        bvh: &WideBvh,
+        tree: &TreeView<'_>,
         start: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
@@ -82,11 +82,11 @@ impl Packet {
                 };
                 if Q::ANY {
                     let mut queue = AnyRays::<T>(rays, PhantomData);
-                    traverse_pairs(simd, bvh, &mut queue);
+                    traverse_pairs(simd, tree, &mut queue);
                     queue.0.changed
                 } else {
                     let mut queue = ClosestRays::<T>(rays, PhantomData);
-                    traverse_pairs(simd, bvh, &mut queue);
+                    traverse_pairs(simd, tree, &mut queue);
                     queue.0.changed
                 }
             },

@@ -5,7 +5,8 @@ use crate::bvh::intersect::watertight::test;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::three;
-use crate::bvh::{Unit, WideBvh, layout::triangles};
+use crate::bvh::traverse::tree_view::TreeView;
+use crate::bvh::{Unit, layout::triangles};
 use crate::ray::LANES;
 use crate::stats::{Counter, count};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x4, f32x16, mask32x16, u32x16};
@@ -41,12 +42,12 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin> PacketLeaf<S> for T
         &mut self,
         packet: &mut Packet,
         simd: S,
-        bvh: &WideBvh,
+        tree: &TreeView<'_>,
         node: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
     ) -> u16 {
-        packet.switch_to_single::<S, T, Q>(simd, bvh, node, reached, lanes)
+        packet.switch_to_single::<S, T, Q>(simd, tree, node, reached, lanes)
     }
 }
 

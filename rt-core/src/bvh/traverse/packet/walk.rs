@@ -2,10 +2,11 @@
 
 use super::switch_to_single::MAX_SINGLE_RAYS;
 use super::{BoxTest, Packet, PacketLeaf, PacketOrigin, SlabCounts, load_row};
+use crate::bvh::Unit;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::traverse::single::{BOX_SLACK, inflate_t};
 use crate::bvh::traverse::three;
-use crate::bvh::{Unit, WideBvh};
+use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::LANES;
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
@@ -88,12 +89,12 @@ impl Packet {
     pub(super) fn walk<S: Simd, L: PacketLeaf<S>, B: BoxTest>(
         &mut self,
         simd: S,
-        bvh: &WideBvh,
+        tree: &TreeView<'_>,
         leaves: &mut L,
     ) -> SlabCounts {
         simd.vectorize(
             #[inline(always)]
-            || self.walk_body::<S, L, B>(simd, bvh, leaves),
+            || self.walk_body::<S, L, B>(simd, tree, leaves),
         )
     }
 
@@ -101,14 +102,14 @@ impl Packet {
     fn walk_body<S: Simd, L: PacketLeaf<S>, B: BoxTest>(
         &mut self,
         simd: S,
-        bvh: &WideBvh,
+        tree: &TreeView<'_>,
         leaves: &mut L,
     ) -> SlabCounts {
         let mut slabs = SlabCounts::default();
         if self.groups == 0 {
             return slabs;
         }
-        let units = bvh.units.as_slice();
+        let units = tree.units;
         let v8 = |x: f32| f32x8::splat(simd, x);
         let near_rows = self.near;
         let [nx, ny, nz] = near_rows;
@@ -153,7 +154,8 @@ impl Packet {
             let f2 = farthest(row(nz ^ 1), all_far[2], all_lo[2], all_hi[2]);
             let near = n0.max(n1).max(n2.max(all_t_min));
             let far = f0.min(f1).min(f2) * slack8;
-            let mut mask = near.simd_le(far.min(v8(all_t))).to_bitmask() as u32;
+            let mask = near.simd_le(far.min(v8(all_t))).to_bitmask() as u32;
+            let mut mask = tree.visible(node_at, mask);
             if mask != 0 {
                 let near: [f32; 8] = near.to_array();
                 let refs = node[CHILD_ROW].bits();
@@ -228,7 +230,7 @@ impl Packet {
                     }
                 }
                 let changed = if B::PER_RAY && !child.is_leaf() {
-                    leaves.switch_to_single(self, simd, bvh, child, reached, &lanes)
+                    leaves.switch_to_single(self, simd, tree, child, reached, &lanes)
                 } else {
                     leaves.leaf(self, simd, units, child, reached, distance)
                 };

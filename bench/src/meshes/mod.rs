@@ -1,5 +1,15 @@
-//! Meshes that several experiments use: the dissertation's nested wavelet surfaces, and two of
-//! other kinds.
+//! Meshes that several experiments use: the dissertation's nested wavelet surfaces, and others of
+//! the kinds that users bring.
+
+mod anisotropic;
+mod cells;
+mod city;
+mod scene;
+
+pub use anisotropic::{slivers, terrain};
+pub use cells::cells;
+pub use city::city;
+pub use scene::MeshScene;
 
 use anyhow::Context as _;
 use datasets::generate::nested_wavelet::Size;

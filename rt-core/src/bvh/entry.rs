@@ -1,0 +1,98 @@
+//! What the leaves of the upper level refer to: an instance, or the group of all meshes that are
+//! not instanced.
+
+use super::blas::{Blas, Content};
+use super::instance_filter::InstanceFilter;
+use super::mesh_group::MeshGroup;
+use super::placement::Placement;
+use super::query::TriangleTest;
+use super::traverse::tree_view::TreeView;
+use super::triangle_bvh;
+use crate::ray::{Hit, HitBlock, Ray};
+use fearless_simd::Simd;
+
+#[derive(Clone, Copy)]
+pub(super) enum Entry<'w> {
+    /// One instance of a geometry with a tree of its own.
+    Instance { number: u32, placement: &'w Placement, blas: &'w Blas },
+    /// Many instances that share a tree.
+    Group(&'w MeshGroup),
+}
+
+impl<'w> Entry<'w> {
+    pub(super) fn placement(self) -> &'w Placement {
+        match self {
+            Entry::Instance { placement, .. } => placement,
+            Entry::Group(group) => &group.placement,
+        }
+    }
+
+    /// The hierarchy of triangles, with what `filter` allows; `None` for shapes. Whether an
+    /// instance is allowed as a whole is for the caller to check.
+    #[inline]
+    pub(super) fn triangles<'a>(self, filter: InstanceFilter<'a>) -> Option<TreeView<'a>>
+    where
+        'w: 'a,
+    {
+        match self {
+            Entry::Instance { blas, .. } => match &blas.content {
+                Content::Triangles(tris) => Some(TreeView::all(&tris.bvh)),
+                Content::Shape { .. } | Content::Member { .. } => None,
+            },
+            Entry::Group(group) => Some(group.tree(filter)),
+        }
+    }
+
+    /// The number that hits in this entry's tree are stored with until [`Entry::resolve`].
+    pub(super) fn number(self) -> u32 {
+        match self {
+            Entry::Instance { number, .. } => number,
+            Entry::Group(_) => 0,
+        }
+    }
+
+    /// Replaces the tree's own numbers in hits by those of instances and their primitives.
+    #[inline]
+    pub(super) fn resolve(self, hits: &mut [HitBlock]) {
+        if let Entry::Group(group) = self {
+            group.resolve(hits);
+        }
+    }
+
+    /// The closest hit of a ray in local space.
+    #[inline]
+    pub(super) fn closest<S: Simd, T: TriangleTest>(
+        self,
+        simd: S,
+        ray: &Ray,
+        filter: InstanceFilter<'_>,
+    ) -> Option<Hit> {
+        match self {
+            Entry::Instance { number, blas, .. } => {
+                let c = blas.closest::<S, T>(simd, ray);
+                c.found.then_some(Hit { t: c.t, u: c.u, v: c.v, prim: c.prim, instance: number })
+            }
+            Entry::Group(group) => {
+                let c = triangle_bvh::closest::<S, T>(simd, &group.tree(filter), ray);
+                c.found.then(|| {
+                    let (instance, prim) = group.owner(c.prim);
+                    Hit { t: c.t, u: c.u, v: c.v, prim, instance }
+                })
+            }
+        }
+    }
+
+    /// Whether anything blocks a ray in local space.
+    #[inline]
+    pub(super) fn occluded<S: Simd, T: TriangleTest>(
+        self,
+        simd: S,
+        ray: &Ray,
+        filter: InstanceFilter<'_>,
+    ) -> bool {
+        match self {
+            Entry::Instance { blas, .. } => blas.occluded::<S, T>(simd, ray),
+            Entry::Group(group) => triangle_bvh::occluded::<S, T>(simd, &group.tree(filter), ray),
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Chooses the instances that a query may hit.
+
+/// Which instances rays can hit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum InstanceFilter<'a> {
+    /// All instances.
+    All,
+    /// Marked instances. A missing mark counts as not set.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
+    Marked(&'a [bool]),
+    /// Unmarked instances.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
+    Unmarked(&'a [bool]),
+}
+
+impl InstanceFilter<'_> {
+    #[inline(always)]
+    pub(crate) fn has(self, instance: usize) -> bool {
+        match self {
+            InstanceFilter::All => true,
+            InstanceFilter::Marked(marks) => marks.get(instance).is_some_and(|m| *m),
+            InstanceFilter::Unmarked(marks) => !marks.get(instance).is_some_and(|m| *m),
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The upper level of a world: where the instances are in render space, and a tree over them.
+
+use super::blas::{Blas, IdWriter};
+use super::build::{PrimRef, build_wide};
+use super::error::BuildError;
+use super::geometry::Instance;
+use super::layout::wide::WideBvh;
+use super::mesh_group::{GroupChoice, MeshGroup};
+use super::options::BuildQuality;
+use super::placement::Placement;
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The upper level.
+pub(super) struct TopLevel {
+    pub(super) placements: Vec<Placement>,
+    /// Instances by number, and the group by the number after the last instance.
+    pub(super) tlas: WideBvh,
+    /// The entry when there is only one.
+    pub(super) only: Option<u32>,
+    /// All entries when there are at most [`MOST_IN_TURN`].
+    pub(super) few: Vec<u32>,
+}
+
+/// Blocks of rays in any direction try at most this many entries one after the other. Ray by ray
+/// through the upper level, they would share no work.
+const MOST_IN_TURN: usize = 4;
+
+/// Places the instances in render space, whose zero is at `origin` in the world.
+pub(super) fn build_top_level(
+    instances: &[Instance],
+    blas: &[Arc<Blas>],
+    group: Option<&MeshGroup>,
+    origin: DVec3,
+    notes: &mut Vec<String>,
+) -> Result<TopLevel, BuildError> {
+    let place_one = |(i, inst): (usize, &Instance)| {
+        let b = &blas[inst.geometry];
+        let bounds = [b.reach(), b.bounds()];
+        Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
+            BuildError::SingularTransform {
+                instance: i,
+                determinant: inst.world_from_object.matrix3.determinant(),
+            },
+        )
+    };
+    // Of several errors, the first in order is returned, whichever thread finds its error first.
+    let placed: Vec<_> =
+        instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
+    let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let alone = |p: &Placement| blas[p.geometry].bvh().is_some();
+    let entries = placements.iter().enumerate().filter(|(_, p)| alone(p));
+    let entries = entries.chain(group.map(|g| (placements.len(), &g.placement)));
+    let refs: Vec<PrimRef> = entries
+        .filter(|(_, p)| {
+            !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite()
+        })
+        .map(|(id, p)| PrimRef::new(p.bounds, id as u32))
+        .collect();
+    let only = match (instances, refs.as_slice()) {
+        ([_], _) => Some(0),
+        (_, [only]) => Some(only.id()),
+        _ => None,
+    };
+    let few = if refs.len() <= MOST_IN_TURN {
+        refs.iter().map(PrimRef::id).collect()
+    } else {
+        Vec::new()
+    };
+    let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.config(), notes);
+    Ok(TopLevel { placements, tlas, only, few })
+}
+
+/// The origin of render space: zero, or the centre of the world's bounds when they are more than
+/// four times their size away from zero. A single geometry without rotation gets its own centre, so
+/// that its local space and render space coincide.
+pub(super) fn choose_origin(
+    instances: &[Instance],
+    blas: &[Option<Arc<Blas>>],
+    group: Option<&GroupChoice>,
+) -> DVec3 {
+    if let [only] = instances
+        && let Some(blas) = &blas[only.geometry]
+        && only.world_from_object.matrix3 == DMat3::IDENTITY
+        && only.world_from_object.is_finite()
+    {
+        return blas.frame.center + only.world_from_object.translation;
+    }
+    let join = |(lo, hi): (DVec3, DVec3), (a, b): (DVec3, DVec3)| (lo.min(a), hi.max(b));
+    let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let of_instance = |inst: &Instance| {
+        let Some(b) = &blas[inst.geometry] else { return nothing() };
+        let bounds = b.bounds();
+        if bounds.is_empty() {
+            return nothing();
+        }
+        let of_corner = |c: Vec3| {
+            let object = c.as_dvec3() / b.frame.scale + b.frame.center;
+            let p = inst.world_from_object.transform_point3(object);
+            (p, p)
+        };
+        bounds.corners().map(of_corner).into_iter().fold(nothing(), join)
+    };
+    // Chunks of a fixed size, merged in order: the sign of a zero does not depend on the threads.
+    let pieces: Vec<_> = instances
+        .par_chunks(1024)
+        .map(|piece| piece.iter().map(of_instance).fold(nothing(), join))
+        .collect();
+    let members = group.iter().flat_map(|g| &g.bounds).map(|&[lo, hi]| (lo, hi));
+    let (lo, hi) = pieces.into_iter().chain(members).fold(nothing(), join);
+    let center = 0.5 * lo + 0.5 * hi;
+    let far = center.abs().max_element() > 4.0 * (hi - lo).max_element();
+    if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO }
+}

@@ -1,0 +1,64 @@
+//! A hierarchy as a ray query sees it: all of it, or only the subtrees of some instances.
+//!
+//! In a tree over many meshes, a node of the upper part has children of which each is the subtree
+//! of one instance (or a further node of the upper part). A query for some instances leaves out the
+//! other children there, so it never descends into geometry that it does not ask for. Below the
+//! upper part, and in trees of one geometry, nothing is left out and nothing is looked up.
+
+use crate::bvh::instance_filter::InstanceFilter;
+use crate::bvh::layout::wide::{NODE_UNITS, Unit, WIDTH, WideBvh};
+
+/// The instance that each child of a node of the upper part belongs to.
+pub(crate) type ChildOwners = [u32; WIDTH];
+
+/// The owner of a child that is a node of the upper part itself, or an empty slot.
+pub(crate) const NO_OWNER: u32 = u32::MAX;
+
+/// A borrowed tree. The root node is at unit 0.
+#[derive(Clone, Copy)]
+pub(crate) struct TreeView<'a> {
+    pub(crate) units: &'a [Unit],
+    /// Nodes that start before this unit are filtered; 0 when nothing is.
+    filtered_units: usize,
+    owners: &'a [ChildOwners],
+    filter: InstanceFilter<'a>,
+}
+
+impl<'a> TreeView<'a> {
+    /// All of a tree.
+    #[inline]
+    pub(crate) fn all(bvh: &'a WideBvh) -> Self {
+        TreeView { units: &bvh.units, filtered_units: 0, owners: &[], filter: InstanceFilter::All }
+    }
+
+    /// The subtrees of `filter`'s instances. `owners` belong to the nodes of the upper part, which
+    /// fill the start of the tree without gaps.
+    #[inline]
+    pub(crate) fn among(
+        bvh: &'a WideBvh,
+        owners: &'a [ChildOwners],
+        filter: InstanceFilter<'a>,
+    ) -> Self {
+        let filtered_units = match filter {
+            InstanceFilter::All => 0,
+            InstanceFilter::Marked(_) | InstanceFilter::Unmarked(_) => owners.len() * NODE_UNITS,
+        };
+        TreeView { units: &bvh.units, filtered_units, owners, filter }
+    }
+
+    /// Those of the `children` of the node at unit `node` that belong to the query.
+    #[inline(always)]
+    pub(crate) fn visible(&self, node: usize, children: u32) -> u32 {
+        if node < self.filtered_units { children & self.owned_children(node) } else { children }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn owned_children(&self, node: usize) -> u32 {
+        let owners = &self.owners[node / NODE_UNITS];
+        (0..WIDTH).fold(0, |mask, slot| {
+            let owner = owners[slot];
+            mask | u32::from(owner == NO_OWNER || self.filter.has(owner as usize)) << slot
+        })
+    }
+}
