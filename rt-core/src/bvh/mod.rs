@@ -5,6 +5,7 @@ mod blas;
 mod brute_force;
 mod build;
 mod entry;
+mod entry_blocks;
 mod error;
 mod geometry;
 mod instance_filter;

@@ -3,6 +3,7 @@
 
 use super::blas::leaf_primitive_ids;
 use super::entry::Entry;
+use super::entry_blocks::EntryBlocks;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::ChildRef;
 use super::options::Robustness;
@@ -10,6 +11,7 @@ use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
 use super::world::{World, with_ordinary_length};
+use crate::bvh::traverse::block_entries::traverse_block;
 use crate::bvh::traverse::hybrid;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
 use crate::bvh::traverse::single::inflate_t;
@@ -286,7 +288,7 @@ impl World {
     ) {
         let Some(only) = self.only_entry() else {
             if self.few.is_empty() {
-                self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
+                self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
             }
             for &id in self.few.iter().filter(|&&id| self.allows(filter, id)) {
                 let (entry, coherence) = (self.entry(id), Coherence::Incoherent);
@@ -356,7 +358,22 @@ impl World {
                 return;
             }
         }
-        self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
+        self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
+    }
+
+    /// Blocks of rays that meet many entries, sixteen rays together.
+    fn trace_blocks<S: Simd, T: TriangleTest, Q: HitQuery>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        filter: InstanceFilter<'_>,
+    ) {
+        for (rays, hits) in rays.iter().zip(hits) {
+            let active = hybrid::active_lanes(rays);
+            let mut entries = EntryBlocks::<T, Q>::new(self, rays, hits, filter);
+            traverse_block(simd, &self.tlas, rays, active, &mut entries);
+        }
     }
 
     fn trace_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(

@@ -9,9 +9,9 @@
 //! Single and Packet-Ray Tracing for Arbitrary Ray Distributions on the Intel MIC Architecture",
 //! 2012.)
 
+use super::block_boxes::BlockSetup;
 use super::pair::{RayQueue, RayTask, traverse_pairs};
-use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup, inflate_t};
-use super::three;
+use super::single::{RaySetup, inflate_t};
 use super::tree_view::TreeView;
 use crate::bvh::Unit;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
@@ -20,7 +20,7 @@ use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+use fearless_simd::{Simd, SimdBase, f32x16};
 use std::marker::PhantomData;
 
 /// With this many rays or fewer, each ray traverses the subtree by itself. Chosen on ambient
@@ -66,23 +66,13 @@ fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
     instance: u32,
 ) {
     let units = tree.units;
-    let directions = [&rays.dx, &rays.dy, &rays.dz];
-    let origins = [&rays.ox, &rays.oy, &rays.oz];
-    let d: [f32x16<S>; 3] = three!(|a| f32x16::from_slice(simd, directions[a]));
-    let o: [f32x16<S>; 3] = three!(|a| f32x16::from_slice(simd, origins[a]));
-    let (one, smallest) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, MIN_COMPONENT));
-    let rcp: [f32x16<S>; 3] = three!(|a| one / d[a].abs().max(smallest).copysign(d[a]));
-    let t_min = f32x16::from_slice(simd, &rays.t_min);
-    let slack = f32x16::splat(simd, BOX_SLACK);
+    let block = BlockSetup::new(simd, rays);
     let skip = f32x16::splat(simd, inflate_t(1.0));
     // Distances of the closest hits so far. The limits of finished rays are nearer than every box.
     let mut t = rays.t_max;
 
     // Every ray enters about five subtrees, so it pays to keep its constants.
-    let mut setups = [RaySetup::new(&rays.get(0)); LANES];
-    for lane in 1..LANES {
-        setups[lane] = RaySetup::new(&rays.get(lane));
-    }
+    let setups = block.rays(rays);
 
     let mut memory = StackMemory::<Entry, STACK_SIZE>::new();
     let mut stack = Stack::empty(&mut memory);
@@ -111,8 +101,7 @@ fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
             continue;
         }
 
-        // ---- A node for many rays: each child's box against all of them. The rays differ in
-        // octant, so both planes of an axis are sorted per ray.
+        // ---- A node for many rays: each child's box against all of them.
         count(Counter::Nodes, 1);
         let at = child.unit();
         let node: &[Unit; NODE_UNITS] =
@@ -130,13 +119,8 @@ fn trace_body<S: Simd, T: TriangleTest, Q: HitQuery>(
                 continue;
             }
             count(Counter::GroupBoxes, 1);
-            let lo: [f32x16<S>; 3] =
-                three!(|a| (f32x16::splat(simd, node[2 * a].0[slot]) - o[a]) * rcp[a]);
-            let hi: [f32x16<S>; 3] =
-                three!(|a| (f32x16::splat(simd, node[2 * a + 1].0[slot]) - o[a]) * rcp[a]);
-            let near = lo[0].min(hi[0]).max(lo[1].min(hi[1])).max(lo[2].min(hi[2]).max(t_min));
-            let far = lo[0].max(hi[0]).min(lo[1].max(hi[1])).min(lo[2].max(hi[2])) * slack;
-            let hit = near.simd_le(far.min(limit)).to_bitmask() as u16 & met;
+            let (near, hit) = block.enter(simd, node, slot, limit);
+            let hit = hit & met;
             if hit == 0 {
                 continue;
             }

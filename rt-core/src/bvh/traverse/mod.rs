@@ -1,5 +1,7 @@
 //! Traversal of the 8-wide hierarchy.
 
+mod block_boxes;
+pub(crate) mod block_entries;
 pub(crate) mod hybrid;
 pub(crate) mod packet;
 pub(crate) mod pair;

@@ -1,0 +1,134 @@
+//! Sixteen rays through the entries of the upper level that they meet.
+
+use super::blas::leaf_primitive_ids;
+use super::entry::Entry;
+use super::instance_filter::InstanceFilter;
+use super::layout::wide::{ChildRef, Unit};
+use super::query::{HitQuery, TriangleTest};
+use super::world::World;
+use crate::bvh::traverse::block_entries::BlockEntries;
+use crate::bvh::traverse::hybrid;
+use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
+use fearless_simd::Simd;
+use std::marker::PhantomData;
+
+/// With this many rays or fewer, each ray enters an instance by itself.
+const MAX_SINGLE_RAYS: u32 = 3;
+
+/// A block on its way through the upper level.
+pub(super) struct EntryBlocks<'a, T, Q> {
+    world: &'a World,
+    rays: &'a RayBlock,
+    hits: &'a mut HitBlock,
+    filter: InstanceFilter<'a>,
+    kind: PhantomData<(T, Q)>,
+}
+
+impl<'a, T, Q> EntryBlocks<'a, T, Q> {
+    pub(super) fn new(
+        world: &'a World,
+        rays: &'a RayBlock,
+        hits: &'a mut HitBlock,
+        filter: InstanceFilter<'a>,
+    ) -> Self {
+        EntryBlocks { world, rays, hits, filter, kind: PhantomData }
+    }
+}
+
+impl<S: Simd, T: TriangleTest, Q: HitQuery> BlockEntries<S> for EntryBlocks<'_, T, Q> {
+    type Query = Q;
+
+    fn leaf(
+        &mut self,
+        simd: S,
+        units: &[Unit],
+        leaf: ChildRef,
+        lanes: u16,
+        t: &mut [f32; LANES],
+        active: &mut u16,
+    ) {
+        for &id in leaf_primitive_ids(units, leaf) {
+            if self.world.allows(self.filter, id) {
+                self.enter(simd, self.world.entry(id), lanes & *active, t, active);
+            }
+        }
+    }
+}
+
+impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
+    /// The rays of `lanes` through one entry.
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        entry: Entry<'_>,
+        lanes: u16,
+        t: &mut [f32; LANES],
+        active: &mut u16,
+    ) {
+        let (mut local, mut moved, mut inside) = (RayBlock::INACTIVE, [0.0; LANES], 0u16);
+        for lane in lanes_of(lanes) {
+            let mut ray = self.rays.get(lane);
+            if !Q::ANY && self.hits.prim[lane] != NO_HIT {
+                // One ulp past the best: a tie may go to this entry.
+                ray.t_max = self.hits.t[lane].next_up().min(ray.t_max);
+            }
+            let (ray, by) = entry.placement().enter(&ray);
+            if ray.t_max > ray.t_min {
+                local.set(lane, &ray);
+                moved[lane] = by;
+                inside |= 1 << lane;
+            }
+        }
+        let mut found = HitBlock::MISS;
+        match entry.triangles(self.filter) {
+            Some(tree) if inside.count_ones() > MAX_SINGLE_RAYS => {
+                hybrid::trace::<S, T, Q>(simd, &tree, &local, inside, &mut found, entry.number());
+                if !Q::ANY {
+                    entry.resolve(std::slice::from_mut(&mut found));
+                }
+            }
+            _ => {
+                for lane in lanes_of(inside) {
+                    let ray = local.get(lane);
+                    if Q::ANY {
+                        let hit = entry.occluded::<S, T>(simd, &ray, self.filter);
+                        found.prim[lane] = if hit { 0 } else { NO_HIT };
+                    } else {
+                        found.set(lane, entry.closest::<S, T>(simd, &ray, self.filter));
+                    }
+                }
+            }
+        }
+        for lane in lanes_of(inside) {
+            if found.prim[lane] == NO_HIT {
+                continue;
+            }
+            if Q::ANY {
+                self.hits.prim[lane] = 0;
+                *active &= !(1 << lane);
+                continue;
+            }
+            let Some(mut hit) = found.get(lane) else { continue };
+            if moved[lane] != 0.0 {
+                hit.t = (hit.t as f64 + moved[lane]) as f32;
+            }
+            let h = &mut *self.hits;
+            let tie = hit.t == h.t[lane] && hit.instance < h.instance[lane];
+            if hit.t < h.t[lane] || tie {
+                h.set(lane, Some(hit));
+                t[lane] = hit.t;
+            }
+        }
+    }
+}
+
+/// The numbers of the lanes in a mask.
+fn lanes_of(mut mask: u16) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        (mask != 0).then(|| {
+            let lane = mask.trailing_zeros() as usize & 15;
+            mask &= mask - 1;
+            lane
+        })
+    })
+}

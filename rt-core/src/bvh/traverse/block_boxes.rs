@@ -1,0 +1,85 @@
+//! Sixteen rays in any direction against one box of a node.
+
+use super::single::{BOX_SLACK, MIN_COMPONENT, RaySetup};
+use super::three;
+use crate::bvh::intersect::watertight::{Shear, dominant_axis};
+use crate::bvh::layout::wide::{NODE_UNITS, Unit};
+use crate::ray::{LANES, RayBlock};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
+
+/// What the box tests of a block need, computed once.
+pub(super) struct BlockSetup<S: Simd> {
+    origin: [f32x16<S>; 3],
+    rcp: [f32x16<S>; 3],
+    t_min: f32x16<S>,
+    slack: f32x16<S>,
+}
+
+impl<S: Simd> BlockSetup<S> {
+    #[inline(always)]
+    pub(super) fn new(simd: S, rays: &RayBlock) -> Self {
+        let directions = [&rays.dx, &rays.dy, &rays.dz];
+        let origins = [&rays.ox, &rays.oy, &rays.oz];
+        let d: [f32x16<S>; 3] = three!(|a| f32x16::from_slice(simd, directions[a]));
+        let (one, smallest) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, MIN_COMPONENT));
+        BlockSetup {
+            origin: three!(|a| f32x16::from_slice(simd, origins[a])),
+            rcp: three!(|a| one / d[a].abs().max(smallest).copysign(d[a])),
+            t_min: f32x16::from_slice(simd, &rays.t_min),
+            slack: f32x16::splat(simd, BOX_SLACK),
+        }
+    }
+
+    /// Distances to the box of child `slot`, and the rays that enter it before `limit`. The rays
+    /// differ in octant, so both planes of an axis are sorted per ray.
+    #[inline(always)]
+    pub(super) fn enter(
+        &self,
+        simd: S,
+        node: &[Unit; NODE_UNITS],
+        slot: usize,
+        limit: f32x16<S>,
+    ) -> (f32x16<S>, u16) {
+        let (o, rcp) = (&self.origin, &self.rcp);
+        let lo: [f32x16<S>; 3] =
+            three!(|a| (f32x16::splat(simd, node[2 * a].0[slot & 7]) - o[a]) * rcp[a]);
+        let hi: [f32x16<S>; 3] =
+            three!(|a| (f32x16::splat(simd, node[2 * a + 1].0[slot & 7]) - o[a]) * rcp[a]);
+        let near = lo[0].min(hi[0]).max(lo[1].min(hi[1])).max(lo[2].min(hi[2]).max(self.t_min));
+        let far = lo[0].max(hi[0]).min(lo[1].max(hi[1])).min(lo[2].max(hi[2])) * self.slack;
+        (near, near.simd_le(far.min(limit)).to_bitmask() as u16)
+    }
+
+    /// The constants of each ray for its own traversal, from the reciprocals of the block: the bits
+    /// of [`RaySetup::new`] without its divisions.
+    #[inline(always)]
+    pub(super) fn rays(&self, rays: &RayBlock) -> [RaySetup; LANES] {
+        let rcp: [[f32; LANES]; 3] = three!(|a| self.rcp[a].to_array());
+        let ray = |lane: usize| {
+            let lane = lane & 15;
+            let d = [rays.dx[lane], rays.dy[lane], rays.dz[lane]];
+            let rcp = [rcp[0][lane], rcp[1][lane], rcp[2][lane]];
+            let kz = dominant_axis(d);
+            let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+            // The dominant component is far above the smallest magnitude, so its reciprocal is
+            // that of the shear.
+            let sz = rcp[kz];
+            RaySetup {
+                origin: [rays.ox[lane], rays.oy[lane], rays.oz[lane]],
+                rcp,
+                near: [
+                    (rcp[0] < 0.0) as usize,
+                    2 + (rcp[1] < 0.0) as usize,
+                    4 + (rcp[2] < 0.0) as usize,
+                ],
+                shear: Shear { kx, ky, kz, sx: d[kx] * sz, sy: d[ky] * sz, sz },
+                t_min: rays.t_min[lane],
+            }
+        };
+        let mut setups = [ray(0); LANES];
+        for lane in 1..LANES {
+            setups[lane] = ray(lane);
+        }
+        setups
+    }
+}
