@@ -64,8 +64,8 @@ impl World {
 
     /// As [`World::build`], but reuses the acceleration structure of every geometry that `previous`
     /// also has (the same [`Arc`], at any index). When one of five hundred meshes changes, the
-    /// trees of the others are copied, which takes a small part of the time of building them. When only
-    /// transforms change, nothing is copied. If the options differ from those of `previous`,
+    /// trees of the others are copied, which takes a small part of the time of building them. When
+    /// only transforms change, nothing is copied. If the options differ from those of `previous`,
     /// everything is rebuilt. The hits equal those of a world built from scratch (after a
     /// [`World::refit`] of `previous`: those of the refitted world).
     pub fn build_sharing(
