@@ -288,7 +288,9 @@ impl World {
     ) {
         let Some(only) = self.only_entry() else {
             if self.few.is_empty() {
-                self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
+                // As blocks through the upper level, 20,000 instances took 1.1 (rays of one origin)
+                // to 2.8 times as long: the rays part before they reach an instance.
+                self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
             }
             for &id in self.few.iter().filter(|&&id| self.allows(filter, id)) {
                 let (entry, coherence) = (self.entry(id), Coherence::Incoherent);
@@ -361,7 +363,7 @@ impl World {
         self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
     }
 
-    /// Blocks of rays that meet many entries, sixteen rays together.
+    /// Blocks of similar rays that meet many entries, sixteen rays together.
     fn trace_blocks<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,

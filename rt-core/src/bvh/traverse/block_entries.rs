@@ -1,8 +1,8 @@
-//! Traversal of the upper level by sixteen rays in any direction.
+//! Traversal of the upper level by sixteen similar rays.
 //!
-//! Neighbouring rays meet mostly the same instances. Together they visit a node of the upper level
-//! once, and enter an instance as one block that goes on together inside it. One by one, each ray
-//! would do all of that alone (measured: see the chapter on performance).
+//! Rays of similar directions meet mostly the same instances. Together they visit a node of the
+//! upper level once, and enter an instance as one block that goes on together inside it. (Measured
+//! on 300 to 20,000 spheres: primary rays take 0.81 to 0.88 of the time of single rays.)
 
 use super::block_boxes::BlockSetup;
 use super::single::inflate_t;
