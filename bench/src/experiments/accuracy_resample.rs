@@ -62,7 +62,7 @@ impl Case<'_> {
             self.lattice.len() - on.report.inside,
             self.lattice.len()
         );
-        let reported = on.report.resampling_error.rms / on.report.back.range;
+        let reported = on.report.resampling_error.rms / on.report.resampling_error.range;
         Ok((Field::new(dims, spacing.to_array(), origin, on.values, 1.0, None)?, Some(reported)))
     }
 }
