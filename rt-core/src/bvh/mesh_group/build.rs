@@ -98,7 +98,7 @@ pub(in crate::bvh) fn build_group(
 
     let (mut members, mut subtrees) = (Vec::new(), Vec::new());
     for (k, (blas, source)) in built.into_iter().enumerate() {
-        let (bounds, depth) = (blas.bounds(), blas.depth());
+        let depth = blas.depth();
         let (units, base, first) = match source {
             Source::Built(bvh) => (Cow::Owned(bvh.units), 0, firsts[k]),
             Source::Alone(bvh) => (Cow::Borrowed(bvh.units.as_slice()), 0, 0),
@@ -115,7 +115,6 @@ pub(in crate::bvh) fn build_group(
             units,
             base,
             first,
-            bounds,
             depth,
         });
     }

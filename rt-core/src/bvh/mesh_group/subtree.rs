@@ -1,7 +1,6 @@
 //! The tree of one mesh, on its way into a group's.
 
 use crate::bvh::layout::wide::Unit;
-use crate::math::Aabb;
 use std::borrow::Cow;
 
 /// The tree of one mesh, to be copied into the group's.
@@ -14,6 +13,5 @@ pub(super) struct Subtree<'a> {
     pub(super) units: Cow<'a, [Unit]>,
     pub(super) base: usize,
     pub(super) first: u32,
-    pub(super) bounds: Aabb,
     pub(super) depth: usize,
 }
