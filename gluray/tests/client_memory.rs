@@ -31,24 +31,22 @@ mod capture {
         }
     }
 }
-mod state {
-    #[path = ENUMS]
-    pub(crate) mod enums;
-}
+#[path = ENUMS]
+mod enums;
 mod interpose {
     #[path = CLIENT_MEMORY]
     pub(crate) mod client_memory;
-    pub(crate) mod driver {
-        pub(crate) mod gl {
-            pub(crate) fn int(_: u32) -> i32 { 0 }
-            pub(crate) fn word(_: u32) -> u32 { 0 }
-            pub(crate) fn pointer(_: u32) -> usize { 0 }
-            pub(crate) fn vertex_attrib_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
-            pub(crate) fn vertex_attrib_address(_: u32) -> usize { 0 }
-            pub(crate) fn bind_buffer(_: u32, _: u32) {}
-            pub(crate) fn buffer_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
-            pub(crate) fn buffer_bytes(_: u32, _: usize, n: usize) -> Vec<u8> { vec![0; n] }
-        }
+}
+mod driver {
+    pub(crate) mod gl {
+        pub(crate) fn int(_: u32) -> i32 { 0 }
+        pub(crate) fn word(_: u32) -> u32 { 0 }
+        pub(crate) fn pointer(_: u32) -> usize { 0 }
+        pub(crate) fn vertex_attrib_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
+        pub(crate) fn vertex_attrib_address(_: u32) -> usize { 0 }
+        pub(crate) fn bind_buffer(_: u32, _: u32) {}
+        pub(crate) fn buffer_i<const N: usize>(_: u32, _: u32) -> [i32; N] { [0; N] }
+        pub(crate) fn buffer_bytes(_: u32, _: usize, n: usize) -> Vec<u8> { vec![0; n] }
     }
 }
 "#;

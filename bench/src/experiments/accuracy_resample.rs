@@ -67,7 +67,7 @@ impl Case<'_> {
     }
 }
 
-pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+fn explain_columns(record: &mut Record) {
     record.column("mesh", "", "points of the mesh of tetrahedra; `none` for the closed form");
     record.column("cells", "", "tetrahedra");
     record.column("samples_per_axis", "", "samples per axis and node of the lattice");
@@ -87,6 +87,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "error that the resampling reports: the lattice against the values of the mesh, rms, as \
          part of their range",
     );
+}
+
+pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+    explain_columns(record);
     let (meshes, lattices): (&[usize], &[usize]) = if context.quick {
         (&[17, 33], &[17, 25, 33, 49])
     } else {
@@ -382,6 +386,7 @@ mod tests {
     #[test]
     fn a_finer_lattice_helps_until_the_mesh_decides() {
         let mut record = Record::new("accuracy-resample", "", 5, true, Machine::describe());
+        explain_columns(&mut record);
         let mut progress = |_: &str, _: Option<f64>| Ok(());
         let mut context = Context::new(true, None, &mut progress);
         compare(&mut context, &mut record, &[17, 25], &[13, 33]).unwrap();
