@@ -363,7 +363,7 @@ mod tests {
     fn every_name_has_a_rule_that_some_value_obeys() {
         for (name, what, rule) in NAMES {
             assert!(!what.is_empty() && !rule.is_empty(), "{name}");
-            let examples = ["1", "matte", "path", "fast"];
+            let examples = ["1", "matte", "path", "fast", "9.4"];
             assert!(examples.iter().any(|v| Options::default().set(name, v).is_ok()), "{name}");
         }
     }

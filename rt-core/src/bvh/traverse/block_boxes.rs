@@ -61,9 +61,9 @@ impl<S: Simd> BlockSetup<S> {
             let rcp = [rcp[0][lane], rcp[1][lane], rcp[2][lane]];
             let kz = dominant_axis(d);
             let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
-            // The dominant component is far above the smallest magnitude, so its reciprocal is
-            // that of the shear.
-            let sz = rcp[kz];
+            // In the local space of a huge mesh, even the dominant component may be smaller than
+            // what the box tests replace it by.
+            let sz = if d[kz].abs() >= MIN_COMPONENT { rcp[kz] } else { 1.0 / d[kz] };
             RaySetup {
                 origin: [rays.ox[lane], rays.oy[lane], rays.oz[lane]],
                 rcp,
@@ -81,5 +81,43 @@ impl<S: Simd> BlockSetup<S> {
             setups[lane] = ray(lane);
         }
         setups
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::exp2i;
+    use crate::ray::Ray;
+    use crate::test_shapes::Random;
+    use fearless_simd::{Level, dispatch};
+
+    #[test]
+    fn rays_of_a_block_have_the_constants_of_single_rays_for_any_length_of_direction() {
+        let mut r = Random::new(3);
+        for exponent in [-126, -125, -124, -123, -100, -13, 0, 13, 100] {
+            let rays: Vec<Ray> = (0..LANES)
+                .map(|lane| {
+                    let mut d = r.direction();
+                    if lane % 4 == 0 {
+                        d[lane / 4 % 3] = if lane % 8 == 0 { 0.0 } else { -0.0 };
+                    }
+                    Ray::new(r.direction(), d * exp2i(exponent)).with_t_max(lane as f32)
+                })
+                .collect();
+            let block = RayBlock::from_rays(&rays)[0];
+            dispatch!(Level::new(), simd => {
+                let together = BlockSetup::new(simd, &block).rays(&block);
+                for (a, ray) in together.iter().zip(&rays) {
+                    let b = RaySetup::new(ray);
+                    let words = |s: &RaySetup| {
+                        let shear = [s.shear.sx, s.shear.sy, s.shear.sz].map(f32::to_bits);
+                        let axes = [s.shear.kx, s.shear.ky, s.shear.kz];
+                        (s.origin.map(f32::to_bits), s.rcp.map(f32::to_bits), s.near, shear, axes)
+                    };
+                    assert_eq!(words(a), words(&b), "2^{exponent}: {ray:?}");
+                }
+            });
+        }
     }
 }

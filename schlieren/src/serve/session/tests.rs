@@ -118,7 +118,7 @@ fn the_first_stroke_keeps_the_knife_and_its_source() {
     for (wrong, word) in [
         (stroke(vec![[f64::NAN, 0.0]], [1.0; 3]), "finite"),
         (stroke(vec![[0.0, 0.0]], [2.0, 0.0, 0.0]), "0 to 1"),
-        (stroke(vec![[0.0, 0.0]; MAX_POINTS + 1], [1.0; 3]), "pieces"),
+        (stroke(vec![[0.0, 0.0]; MAX_POINTS + 1], [1.0; 3]), "split the stroke"),
         (Paint { radius_m: 0.0, ..stroke(vec![], [1.0; 3]) }, "brush"),
     ] {
         assert!(s.paint(&wrong).unwrap_err().0.contains(word), "{wrong:?}");
