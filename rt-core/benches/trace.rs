@@ -4,9 +4,10 @@
 mod common;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rt_core::bvh::{BuildOptions, Robustness, World};
-use rt_core::glam::Vec3;
+use rt_core::bvh::{BuildOptions, Geometry, Instance, Robustness, World};
+use rt_core::glam::{DAffine3, Vec3};
 use rt_core::math::orthonormal_basis;
+use rt_core::mesh::TriMesh;
 use rt_core::ray::{HitBlock, LANES, Ray, RayBlock};
 use rt_core::sampler::{Sampler, Sampling, cosine_hemisphere};
 use std::hint::black_box;
@@ -70,9 +71,54 @@ fn trace(c: &mut Criterion) {
     }
 }
 
+/// A thousand meshes, each a geometry of its own, and the same triangles in one mesh: the times
+/// should be the same.
+fn many_meshes(c: &mut Criterion) {
+    let parts: Vec<TriMesh> = (0..1000)
+        .map(|k| {
+            let mut mesh = common::bumpy(k);
+            // The plates tile a square of 32 x 32; the camera looks at the unit cube.
+            mesh.positions.iter_mut().for_each(|p| *p = *p / 16.0 - Vec3::new(1.0, 1.0, 0.0));
+            mesh
+        })
+        .collect();
+    let mut one = TriMesh::default();
+    for part in &parts {
+        let first = one.positions.len() as u32;
+        one.positions.extend_from_slice(&part.positions);
+        one.indices.extend(part.indices.iter().map(|t| t.map(|i| i + first)));
+    }
+    let options = BuildOptions::default();
+    let geometries: Vec<Geometry> =
+        parts.into_iter().map(|m| Geometry::Mesh(Arc::new(m))).collect();
+    let place = |geometry| Instance { geometry, world_from_object: DAffine3::IDENTITY };
+    let instances = (0..geometries.len()).map(place).collect();
+    let apart = World::build(geometries, instances, &options).expect("sound meshes");
+    let merged = World::from_mesh(one, &options).expect("a sound mesh");
+    let primary = common::primary_rays(&merged, SIZE);
+    let mut group = c.benchmark_group("trace 1000 meshes");
+    group.throughput(Throughput::Elements((primary.len() * LANES) as u64));
+    for (name, world) in [("apart", &apart), ("merged", &merged)] {
+        let mut hits = vec![HitBlock::MISS; primary.len()];
+        group.bench_function(format!("primary, packets, {name}"), |b| {
+            b.iter(|| world.closest_coherent(black_box(&primary), &mut hits).expect("one each"));
+        });
+        group.bench_function(format!("primary, blocks, {name}"), |b| {
+            b.iter(|| world.closest_incoherent(black_box(&primary), &mut hits).expect("one each"));
+        });
+        group.bench_function(format!("primary, single rays, {name}"), |b| {
+            b.iter(|| {
+                let rays = primary.iter().flat_map(|r| (0..LANES).map(|l| r.get(l)));
+                rays.filter_map(|r| world.closest(&r)).count()
+            });
+        });
+    }
+    group.finish();
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = trace
+    targets = trace, many_meshes
 }
 criterion_main!(benches);
