@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 /// Measures every table and figure of the dissertation, and error against time.
 ///
-/// Without a command, the quick form of every experiment runs (within five minutes on two cores,
+/// Without a command, the quick form of every experiment runs (within six minutes on two cores,
 /// after the build) and the path of the report is printed.
 #[derive(Debug, Parser)]
 #[command(name = "bench", version)]
