@@ -82,15 +82,13 @@ impl LeafWriter for TriWriter<'_> {
     fn write(&self, prims: &[u32], out: &mut [Unit]) {
         let floats: &mut [f32] = bytemuck::cast_slice_mut(out);
         let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
-        // Unused slots, and triangles that a refit made invalid, are stored as points: they have no
-        // area and are never hit.
+        // Unused slots repeat the last triangle. As points, they would pass the edge test of every
+        // ray, with three zeros, and be decided by the slow exact products. Triangles that a refit
+        // made invalid are stored as points: they have no area and are never hit.
         let last = prims.len() - 1;
         for slot in 0..LEAF_SIZE {
             let id = prims[slot.min(last)];
             let mut corners = self.triangle(id);
-            if slot > last {
-                corners = [corners[0]; 3];
-            }
             if !corners.iter().all(|p| p.is_finite()) {
                 corners = [Vec3::ZERO; 3];
             }
