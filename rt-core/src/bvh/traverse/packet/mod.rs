@@ -77,12 +77,15 @@ pub(crate) struct Packet {
 /// Decides whether per-ray box tests reject enough of the groups whose intervals intersect a box.
 /// They do so for shadow rays from points at many depths, but not for tiles of pixels. No measure
 /// of the intervals predicted this as well as trying. Results do not depend on it.
+///
+/// It keeps means of shares, not sums of counts. With sums, packets with much work outweighed later
+/// ones for a thousand packets: rays from a light over 3,000 meshes took 30 times as long after
+/// another view than without it.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlabHeuristic {
-    /// Groups tested and groups kept recently.
-    tested: f32,
+    /// Mean share of the tested groups that were kept.
     kept: f32,
-    /// Rays in the kept groups that intersect the boxes.
+    /// Mean number of rays in a tested group that intersect the box.
     rays: f32,
     /// Packets since the last trial.
     since: u8,
@@ -110,18 +113,29 @@ impl SlabHeuristic {
     /// among pipes took 94 instead of 133 ms; among isosurfaces nothing changed.
     const RAYS: f32 = 5.0;
 
+    /// Weights of a packet in the means: tests that would have paid count more, because without
+    /// them a packet of diverging rays takes many times as long, and with them any packet takes at
+    /// most a quarter longer.
+    const PAYS: f32 = 0.5;
+    const DOES_NOT_PAY: f32 = 0.1;
+
     fn next(&mut self) -> bool {
         self.since = if self.since >= Self::TRIAL { 0 } else { self.since + 1 };
-        self.kept <= Self::KEPT * self.tested
-            || self.rays <= Self::RAYS * self.tested
-            || self.since == 0
+        Self::pays(self.kept, self.rays) || self.since == 0
+    }
+
+    fn pays(kept: f32, rays: f32) -> bool {
+        kept <= Self::KEPT || rays <= Self::RAYS
     }
 
     fn learn(&mut self, SlabCounts { tested, kept, rays }: SlabCounts) {
-        const FADE: f32 = 0.9;
-        self.tested = FADE * self.tested + tested as f32;
-        self.kept = FADE * self.kept + kept as f32;
-        self.rays = FADE * self.rays + rays as f32;
+        if tested == 0 {
+            return;
+        }
+        let (kept, rays) = (kept as f32 / tested as f32, rays as f32 / tested as f32);
+        let weight = if Self::pays(kept, rays) { Self::PAYS } else { Self::DOES_NOT_PAY };
+        self.kept += weight * (kept - self.kept);
+        self.rays += weight * (rays - self.rays);
     }
 }
 
@@ -341,4 +355,38 @@ impl<S: Simd> PacketLeaf<S> for CollectLeaves<'_> {
 #[inline(always)]
 fn load_row<S: Simd>(simd: S, row: &Row) -> f32x16<S> {
     f32x16::from_slice(simd, row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_of_another_scene_are_learned_within_a_hundred_packets() {
+        let mut slabs = SlabHeuristic::default();
+        assert!(slabs.next(), "untried tests are tried");
+        // Tiles of pixels: much work, no gain.
+        for _ in 0..1000 {
+            if slabs.next() {
+                slabs.learn(SlabCounts { tested: 3000, kept: 2850, rays: 40_000 });
+            }
+        }
+        assert!((0..16).filter(|_| slabs.next()).count() <= 1);
+        // Diverging rays: little work, because the rays soon leave the packet.
+        let mut packets = 0;
+        while packets < 1000 && !SlabHeuristic::pays(slabs.kept, slabs.rays) {
+            packets += 1;
+            if slabs.next() {
+                slabs.learn(SlabCounts { tested: 40, kept: 30, rays: 60 });
+            }
+        }
+        assert!(packets <= 100, "{packets} packets without the tests");
+    }
+
+    #[test]
+    fn a_packet_that_tested_nothing_teaches_nothing() {
+        let mut slabs = SlabHeuristic { kept: 0.9, rays: 12.0, since: 3 };
+        slabs.learn(SlabCounts::default());
+        assert_eq!((slabs.kept, slabs.rays), (0.9, 12.0));
+    }
 }
