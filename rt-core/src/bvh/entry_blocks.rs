@@ -7,7 +7,7 @@ use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
 use super::world::World;
 use crate::bvh::traverse::block_entries::BlockEntries;
-use crate::bvh::traverse::hybrid;
+use crate::bvh::traverse::incoherent;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
@@ -82,9 +82,11 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
         let mut found = HitBlock::MISS;
         match entry.triangles(self.filter) {
             Some(tree) if inside.count_ones() > MAX_SINGLE_RAYS => {
-                hybrid::trace::<S, T, Q>(simd, &tree, &local, inside, &mut found, entry.number());
+                let (local, found) =
+                    (std::slice::from_ref(&local), std::slice::from_mut(&mut found));
+                incoherent::trace::<S, T, Q>(simd, &tree, local, found, entry.number());
                 if !Q::ANY {
-                    entry.resolve(std::slice::from_mut(&mut found));
+                    entry.resolve(found);
                 }
             }
             _ => {

@@ -12,7 +12,7 @@ use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
 use super::world::{World, with_ordinary_length};
 use crate::bvh::traverse::block_entries::traverse_block;
-use crate::bvh::traverse::hybrid;
+use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
 use crate::bvh::traverse::single::inflate_t;
 use crate::bvh::traverse::tree_view::TreeView;
@@ -300,10 +300,7 @@ impl World {
         };
         match only.triangles(filter) {
             Some(tree) if only.placement().accepts_blocks(simd, rays) => {
-                for (r, h) in rays.iter().zip(hits.iter_mut()) {
-                    let active = hybrid::active_lanes(r);
-                    hybrid::trace::<S, T, Q>(simd, &tree, r, active, h, only.number());
-                }
+                incoherent::trace::<S, T, Q>(simd, &tree, rays, hits, only.number());
                 if !Q::ANY {
                     only.resolve(hits);
                 }
@@ -372,7 +369,7 @@ impl World {
         filter: InstanceFilter<'_>,
     ) {
         for (rays, hits) in rays.iter().zip(hits) {
-            let active = hybrid::active_lanes(rays);
+            let active = incoherent::active_lanes(rays);
             let mut entries = EntryBlocks::<T, Q>::new(self, rays, hits, filter);
             traverse_block(simd, &self.tlas, rays, active, &mut entries);
         }
@@ -537,9 +534,7 @@ fn trace_tree<S: Simd, T: TriangleTest, Q: HitQuery>(
                 packet.store::<Q>(h, number);
                 continue;
             }
-            for (r, h) in r.iter().zip(h) {
-                hybrid::trace::<S, T, Q>(simd, &tree, r, hybrid::active_lanes(r), h, number);
-            }
+            incoherent::trace::<S, T, Q>(simd, &tree, r, h, number);
         }
     }
     if !Q::ANY {

@@ -87,6 +87,63 @@ fn ray_sets() -> Vec<(&'static str, Vec<Ray>)> {
     vec![("camera", camera), ("reversed", reversed), ("all directions", random_rays(2000, 11, 1.2))]
 }
 
+/// Blocks of every kind that the entry points for rays in any direction distinguish: rays that
+/// start together, rays that start far apart, blocks of one ray and blocks without rays; some lanes
+/// are idle, some rays are short.
+fn mixed_blocks() -> Vec<RayBlock> {
+    let mut r = Random::new(23);
+    let block = |k: usize| {
+        let together = r.direction() * 0.6;
+        let mut block = RayBlock::INACTIVE;
+        for lane in 0..LANES {
+            let origin = if k.is_multiple_of(2) { together } else { r.direction() * 1.5 };
+            let dir = if k % 6 == 0 { r.direction() } else { r.direction() * 0.5 - origin };
+            let t_max = if r.unit() < 0.3 { r.unit() } else { f32::INFINITY };
+            let ray = Ray { origin, dir, t_min: 0.1 * r.unit(), t_max };
+            let idle = match k % 5 {
+                0 => lane % 3 == 1,
+                1 => lane != 7,
+                2 => k % 10 == 2,
+                _ => false,
+            };
+            if !idle {
+                block.set(lane, &ray);
+            }
+        }
+        block
+    };
+    (0..150).map(block).collect()
+}
+
+#[test]
+fn blocks_of_rays_that_start_together_and_apart_get_the_answers_of_single_rays() {
+    let blocks = mixed_blocks();
+    // A tree of one leaf, one of a single node, and deep ones.
+    for (triangles, seed) in [(2, 1), (20, 2), (600, 3), (20_000, 4)] {
+        let mesh = noise_soup(triangles, seed);
+        for options in all_options() {
+            let world = World::from_mesh(mesh.clone(), &options).expect("a valid mesh");
+            // Calls of every number of blocks up to more than two groups.
+            for n in [1, 2, 16, 17, 40, 150] {
+                let mut hits = vec![HitBlock::MISS; n];
+                let mut blocked = vec![0u16; n];
+                world.closest_incoherent(&blocks[..n], &mut hits).expect("one each");
+                world.occluded_incoherent(&blocks[..n], &mut blocked).expect("one each");
+                for (b, (rays, found)) in blocks.iter().zip(&hits).enumerate() {
+                    for lane in 0..LANES {
+                        let ray = rays.get(lane);
+                        let expected = ray.is_valid().then(|| world.closest(&ray)).flatten();
+                        let what = format!("{options:?}: {triangles} triangles, block {b} of {n}");
+                        assert_eq!(found.get(lane), expected, "{what}, lane {lane}: {ray:?}");
+                        let any = blocked[b] >> lane & 1 == 1;
+                        assert_eq!(any, expected.is_some(), "{what}, lane {lane}: occlusion");
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn packets_equal_single_rays_bit_for_bit_at_every_level() {
     let mesh = sphere(4);

@@ -8,7 +8,7 @@ pub(crate) struct StackMemory<T, const N: usize>([MaybeUninit<T>; N]);
 
 impl<T, const N: usize> StackMemory<T, N> {
     #[inline(always)]
-    pub(crate) fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         StackMemory([const { MaybeUninit::uninit() }; N])
     }
 }
@@ -34,6 +34,19 @@ impl<'m, T: Copy, const N: usize> Stack<'m, T, N> {
     pub(crate) fn push(&mut self, value: T) {
         self.data[self.len].write(value);
         self.len += 1;
+    }
+
+    /// Pushes the values whose bit is set in `which`, without a branch on any bit.
+    #[inline(always)]
+    pub(crate) fn push_some(&mut self, values: [T; 8], which: u32) {
+        let room: &mut [MaybeUninit<T>; 8] =
+            self.data[self.len..].first_chunk_mut().expect("room for eight");
+        let mut n = 0;
+        for (i, value) in values.into_iter().enumerate() {
+            room[n & 7].write(value);
+            n += (which >> i & 1) as usize;
+        }
+        self.len += n;
     }
 
     #[inline(always)]

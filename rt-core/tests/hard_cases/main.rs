@@ -11,4 +11,5 @@ mod random;
 mod scales;
 #[cfg(feature = "render")]
 mod secondary;
+mod slivers;
 mod ties;

@@ -147,4 +147,4 @@ macro_rules! lanes {
         }
     )*};
 }
-lanes!(f32x4 4, f32x16 16);
+lanes!(f32x4 4, f32x8 8, f32x16 16);

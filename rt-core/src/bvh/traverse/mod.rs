@@ -2,9 +2,11 @@
 
 mod block_boxes;
 pub(crate) mod block_entries;
-pub(crate) mod hybrid;
+mod hybrid;
+pub(crate) mod incoherent;
+pub(crate) mod interleaved;
 pub(crate) mod packet;
-pub(crate) mod pair;
+mod scattered;
 pub(crate) mod single;
 pub(crate) mod tree_view;
 pub(crate) mod triangle_leaf;

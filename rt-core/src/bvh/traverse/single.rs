@@ -4,12 +4,12 @@ use super::three;
 use super::tree_view::TreeView;
 use crate::bvh::Unit;
 use crate::bvh::intersect::watertight::Shear;
-use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE, WIDTH};
 use crate::bvh::query::HitQuery;
 use crate::ray::Ray;
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
-use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8, u32x8};
 
 /// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴. With it, the box test never
 /// rejects a box whose triangle the triangle test hits.
@@ -54,6 +54,14 @@ pub(crate) fn safe_reciprocal(d: f32) -> f32 {
 }
 
 impl RaySetup {
+    pub(crate) const ZERO: RaySetup = RaySetup {
+        origin: [0.0; 3],
+        rcp: [0.0; 3],
+        near: [0; 3],
+        shear: Shear { kx: 0, ky: 0, kz: 0, sx: 0.0, sy: 0.0, sz: 0.0 },
+        t_min: 0.0,
+    };
+
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.dir.to_array();
@@ -79,6 +87,36 @@ pub(crate) trait LeafTest<S: Simd> {
     /// Tests the primitives of `leaf`. Lowers `skip_t`, the distance from which boxes are skipped,
     /// to [`inflate_t`] of the closest hit so far. Returns true when the search is over.
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
+
+    /// Whether the leaves among a node's children are tested together, as soon as the ray has
+    /// entered their boxes.
+    const TOGETHER: bool = false;
+
+    /// Tests the primitives of the leaves in `leaves`, a set of slots in a row of references.
+    #[inline(always)]
+    fn test_many(
+        &mut self,
+        simd: S,
+        units: &[Unit],
+        refs: &[u32; WIDTH],
+        mut leaves: u32,
+        skip_t: &mut f32,
+    ) -> bool {
+        while leaves != 0 {
+            let leaf = ChildRef(refs[leaves.trailing_zeros() as usize & 7]);
+            leaves &= leaves - 1;
+            if self.test(simd, units, leaf, skip_t) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// The slots of a row of references that hold leaves, or nothing.
+#[inline(always)]
+pub(super) fn leaf_slots<S: Simd>(simd: S, refs: &[u32; WIDTH]) -> u32 {
+    u32x8::from_slice(simd, refs).simd_ge(u32x8::splat(simd, 1 << 31)).to_bitmask() as u32
 }
 
 /// Visits the leaves whose boxes the ray enters before `t_max`. Boxes are widened for rounding
@@ -161,7 +199,17 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
             ));
             let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
             let hit = tree.visible(at, hit.to_bitmask() as u32);
-            if let Some(child) = push_children::<S, L::Query>(units, node, near, hit, &mut stack) {
+            let refs = node[CHILD_ROW].bits();
+            let now = if L::TOGETHER { hit & leaf_slots(simd, refs) } else { 0 };
+            let next =
+                push_children::<S, L::Query, true>(units, node, near, hit & !now, &mut stack);
+            if now != 0 {
+                count(Counter::Leaves, now.count_ones() as u64);
+                if leaves.test_many(simd, units, refs, now, &mut skip_t) {
+                    return;
+                }
+            }
+            if let Some(child) = next {
                 current = child;
                 continue;
             }
@@ -179,9 +227,10 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
 
 /// Selects the next child of a node, given the boxes in `mask` that the ray hits at the distances
 /// `near`. Returns the nearest child for closest-hit queries, any child for any-hit queries, and
-/// pushes the others on the stack. `None` means that the next entry is on the stack.
+/// pushes the others on the stack. `None` means that the next entry is on the stack. With
+/// `PREFETCH`, the children are requested from memory; without, the caller does it.
 #[inline(always)]
-pub(super) fn push_children<S: Simd, Q: HitQuery>(
+pub(super) fn push_children<S: Simd, Q: HitQuery, const PREFETCH: bool>(
     units: &[Unit],
     node: &[Unit; NODE_UNITS],
     near: f32x8<S>,
@@ -192,17 +241,25 @@ pub(super) fn push_children<S: Simd, Q: HitQuery>(
         return None;
     }
     let refs = node[CHILD_ROW].bits();
+    if Q::ANY && !PREFETCH {
+        stack.push_some(refs.map(u64::from), mask);
+        return None;
+    }
     let first = mask.trailing_zeros() as usize;
     mask &= mask - 1;
     if mask == 0 {
         let child = ChildRef(refs[first & 7]);
-        prefetch::<4, _>(units, child.unit());
+        if PREFETCH {
+            prefetch::<4, _>(units, child.unit());
+        }
         return Some(child);
     }
     let near: [f32; 8] = near.to_array();
     let entry = |i: usize| {
         let child = refs[i & 7];
-        prefetch::<4, _>(units, ChildRef(child).unit());
+        if PREFETCH {
+            prefetch::<4, _>(units, ChildRef(child).unit());
+        }
         ((near[i & 7].to_bits() as u64) << 32) | child as u64
     };
     if Q::ANY {

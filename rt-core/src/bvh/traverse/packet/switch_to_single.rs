@@ -1,5 +1,5 @@
-//! Traverses a subtree that only a few rays of a packet reach: the rays are traced individually,
-//! two at a time.
+//! Traverses a subtree that only a few rays of a packet reach: the rays are traced individually, in
+//! turns.
 //!
 //! Rays that diverge are spread over the groups, a lane here and one there, and every box and
 //! triangle would still be tested against sixteen.
@@ -8,7 +8,7 @@ use super::Packet;
 use crate::bvh::intersect::watertight::Shear;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
-use crate::bvh::traverse::pair::{RayQueue, RayTask, traverse_pairs};
+use crate::bvh::traverse::interleaved::{RayQueue, RayStack, RayTask, traverse_interleaved};
 use crate::bvh::traverse::single::RaySetup;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
@@ -17,7 +17,7 @@ use crate::stats::{Counter, count};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
 
-/// With this many rays or fewer: two pairs. Not tuned; with it, shadow rays from a surface gained 6
+/// With this many rays or fewer. Not tuned; with it, shadow rays from a surface gained 6
 /// % in the whole view of one million triangles (records `peers` before and after).
 pub(super) const MAX_SINGLE_RAYS: usize = 4;
 
@@ -82,11 +82,11 @@ impl Packet {
                 };
                 if Q::ANY {
                     let mut queue = AnyRays::<T>(rays, PhantomData);
-                    traverse_pairs(simd, tree, &mut queue);
+                    traverse_interleaved::<MAX_SINGLE_RAYS, _, _>(simd, tree, &mut queue);
                     queue.0.changed
                 } else {
                     let mut queue = ClosestRays::<T>(rays, PhantomData);
-                    traverse_pairs(simd, tree, &mut queue);
+                    traverse_interleaved::<MAX_SINGLE_RAYS, _, _>(simd, tree, &mut queue);
                     queue.0.changed
                 }
             },
@@ -124,10 +124,11 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyRays<'_, 'r, T> {
     type Leaf = AnyLeaf<'r, T>;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>> {
+    fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
         let (number, ray, g, lane) = self.0.take()?;
         let t_max = self.0.packet.t[g][lane];
-        Some(RayTask { number, ray, t_max, start: self.0.start, leaf: AnyLeaf::new(ray, t_max) })
+        stack.push(self.0.start.0 as u64);
+        Some(RayTask { number, ray, t_max, leaf: AnyLeaf::new(ray, t_max) })
     }
 
     #[inline(always)]
@@ -149,7 +150,7 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
     type Leaf = ClosestLeaf<'r, T>;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<RayTask<'r, Self::Leaf>> {
+    fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
         let (number, ray, g, lane) = self.0.take()?;
         let p = &self.0.packet;
         let found = p.hit[g] >> lane & 1 == 1;
@@ -161,7 +162,8 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
             found,
         };
         let leaf = ClosestLeaf::continuing(ray, best);
-        Some(RayTask { number, ray, t_max: best.t, start: self.0.start, leaf })
+        stack.push(self.0.start.0 as u64);
+        Some(RayTask { number, ray, t_max: best.t, leaf })
     }
 
     #[inline(always)]

@@ -1,0 +1,78 @@
+//! Traces blocks of rays in any direction through a triangle hierarchy.
+
+use super::tree_view::TreeView;
+use super::{hybrid, scattered};
+use crate::bvh::Unit;
+use crate::bvh::layout::wide::NODE_UNITS;
+use crate::bvh::query::{HitQuery, TriangleTest};
+use crate::bvh::traverse::packet::GROUPS;
+use crate::ray::{HitBlock, LANES, RayBlock};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, f32x16, mask32x16};
+
+/// Rays of a block share the start of the traversal when their origins lie within this part of the
+/// tree's box, along every axis.
+const CLOSE: f32 = 0.125;
+
+/// Traces blocks of rays and writes the results into `hits`, as long as `rays` (for occlusion,
+/// `prim` is 0 where something blocks the ray).
+#[inline(never)]
+pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
+    simd: S,
+    tree: &TreeView<'_>,
+    rays: &[RayBlock],
+    hits: &mut [HitBlock],
+    instance: u32,
+) {
+    for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let reach = close_reach(simd, tree);
+                let mut apart = 0u16;
+                for (b, (r, h)) in rays.iter().zip(&mut *hits).enumerate() {
+                    if start_together(simd, r, reach) {
+                        hybrid::trace::<S, T, Q>(simd, tree, r, h, instance);
+                    } else {
+                        apart |= 1 << b;
+                    }
+                }
+                if apart != 0 {
+                    scattered::trace::<S, T, Q>(simd, tree, rays, apart, hits, instance);
+                }
+            },
+        );
+    }
+}
+
+/// How far apart rays may start to be traced together, per axis.
+#[inline(always)]
+fn close_reach<S: Simd>(simd: S, tree: &TreeView<'_>) -> [f32; 3] {
+    let root: &[Unit; NODE_UNITS] =
+        tree.units[..NODE_UNITS].try_into().expect("a slice of that length");
+    std::array::from_fn(|axis| {
+        let lo = f32x8::from_slice(simd, &root[2 * axis].0).reduce_min();
+        let hi = f32x8::from_slice(simd, &root[2 * axis + 1].0).reduce_max();
+        CLOSE * (hi - lo)
+    })
+}
+
+/// Whether the rays of a block start within `reach` of one another.
+#[inline(always)]
+fn start_together<S: Simd>(simd: S, rays: &RayBlock, reach: [f32; 3]) -> bool {
+    let active = mask32x16::from_bitmask(simd, active_lanes(rays) as u64);
+    let splat = |x: f32| f32x16::splat(simd, x);
+    for (row, reach) in [&rays.ox, &rays.oy, &rays.oz].into_iter().zip(reach) {
+        let row = f32x16::from_slice(simd, row);
+        let lo = active.select(row, splat(f32::INFINITY)).reduce_min();
+        let hi = active.select(row, splat(f32::NEG_INFINITY)).reduce_max();
+        if hi - lo > reach {
+            return false;
+        }
+    }
+    true
+}
+
+/// Lanes of a block that hold a ray.
+pub(crate) fn active_lanes(rays: &RayBlock) -> u16 {
+    (0..LANES).fold(0, |m, lane| m | (rays.get(lane).is_valid() as u16) << lane)
+}
