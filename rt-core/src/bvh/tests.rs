@@ -97,7 +97,8 @@ fn mixed_blocks() -> Vec<RayBlock> {
         let mut block = RayBlock::INACTIVE;
         for lane in 0..LANES {
             let origin = if k.is_multiple_of(2) { together } else { r.direction() * 1.5 };
-            let dir = if k % 6 == 0 { r.direction() } else { r.direction() * 0.5 - origin };
+            let dir =
+                if k.is_multiple_of(6) { r.direction() } else { r.direction() * 0.5 - origin };
             let t_max = if r.unit() < 0.3 { r.unit() } else { f32::INFINITY };
             let ray = Ray { origin, dir, t_min: 0.1 * r.unit(), t_max };
             let idle = match k % 5 {

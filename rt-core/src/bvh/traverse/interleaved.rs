@@ -162,7 +162,7 @@ pub(crate) fn traverse_interleaved<'r, const N: usize, S: Simd, Q: RayQueue<'r, 
 ) {
     let units = tree.units;
     let mut memory = [const { StackMemory::new() }; N];
-    let mut stacks = memory.each_mut().map(|m| Stack::empty(m));
+    let mut stacks = memory.each_mut().map(Stack::empty);
     let mut lanes: [Option<Lane<'r, Q::Leaf>>; N] = [const { None }; N];
     let mut under_way = 0;
     for (lane, stack) in lanes.iter_mut().zip(&mut stacks) {
