@@ -73,7 +73,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("largest_error", "grey level", "largest difference of a channel of a pixel");
     record.column("mean_error", "grey level", "mean difference: below 0 where light is missing");
     let sizes = if context.quick {
-        Sizes { pixels: 48, samples: [16, 512], bounce_samples: 16, tree_pixels: 128 }
+        Sizes { pixels: 32, samples: [16, 256], bounce_samples: 16, tree_pixels: 96 }
     } else {
         Sizes { pixels: 128, samples: [256, 4096], bounce_samples: 256, tree_pixels: 512 }
     };
