@@ -6,6 +6,7 @@ use crate::record::{Record, Row};
 use crate::runner::{Schedule, Timings, Unstable, Variant, interleave};
 use rt_core::mesh::TriMesh;
 use std::cell::RefCell;
+use std::time::Instant;
 
 /// Purpose of rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,6 +111,27 @@ pub(super) fn time(
         })
         .collect();
     interleave(schedule, &mut variants)
+}
+
+/// About 2^-k of the rays, for the smallest k with which `contender` needs at most `seconds`. Among
+/// slivers a ray takes a hundred times as long as elsewhere.
+pub(super) fn limited(rays: RaySet, kind: Kind, contender: &Contender<'_>, seconds: f64) -> RaySet {
+    const SAMPLE: usize = 1 << 13;
+    let sample = rays.clone().thinned(SAMPLE);
+    let mut hits = vec![HitBlock::MISS; sample.blocks.len()];
+    let mut masks = vec![0u16; sample.blocks.len()];
+    let start = Instant::now();
+    if kind.occlusion() {
+        occluded_all(&*contender.tracer, &sample, &mut masks, 1);
+    } else {
+        closest_all(&*contender.tracer, &sample, &mut hits, 1);
+    }
+    let per_ray = start.elapsed().as_secs_f64() / sample.len.max(1) as f64;
+    let mut limit = rays.len;
+    while limit > SAMPLE && per_ray * limit as f64 > seconds {
+        limit /= 2;
+    }
+    rays.thinned(limit)
 }
 
 /// Describes the columns that [`rows`] fills.
