@@ -1,9 +1,11 @@
 //! Acceleration structures for finding the primitives that rays hit.
 
+mod all_hits;
 mod blas;
 #[cfg(test)]
 mod brute_force;
 mod build;
+mod closest_point;
 mod entry;
 mod entry_blocks;
 mod error;
@@ -24,6 +26,8 @@ mod triangle_bvh;
 mod validate;
 mod world;
 
+pub use all_hits::{HitLists, TooManyHits};
+pub use closest_point::{ClosestPoint, NoDistance};
 pub use error::BuildError;
 pub use geometry::{Geometry, Instance};
 pub(crate) use instance_filter::InstanceFilter;

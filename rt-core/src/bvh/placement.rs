@@ -97,6 +97,11 @@ impl Placement {
         })
     }
 
+    /// The transform from render space to local space.
+    pub(crate) fn local_from_render(&self) -> DAffine3 {
+        self.local_from_render
+    }
+
     /// True when this ray needs no transformation.
     #[inline]
     pub(crate) fn accepts(&self, ray: &Ray) -> bool {

@@ -2,8 +2,10 @@
 
 mod agreement;
 mod common;
+mod crossings;
 mod degenerate;
 mod directions;
+mod distances;
 mod leaks;
 mod limits;
 mod oracle;

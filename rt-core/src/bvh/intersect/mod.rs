@@ -1,3 +1,4 @@
 //! Ray-triangle tests.
 
+pub(crate) mod crossing;
 pub(crate) mod watertight;

@@ -24,7 +24,7 @@ type LeafFloats = [f32; 8 * TRI_LEAF_UNITS];
 
 /// Tests the four triangles of a leaf against a ray. Returns the candidate lanes, if any.
 #[inline(always)]
-fn test_leaf<S: Simd, T: TriangleTest>(
+pub(crate) fn test_leaf<S: Simd, T: TriangleTest>(
     simd: S,
     leaf: &LeafFloats,
     ray: &RaySetup,

@@ -1,0 +1,149 @@
+//! All surfaces that a ray crosses, not the nearest alone: lengths inside a body, thickness, parity.
+
+mod collect;
+mod inside;
+
+use super::world::{World, with_ordinary_length};
+use crate::ray::{Hit, LANES, Ray, RayBlock};
+use collect::Crossings;
+use fearless_simd::dispatch;
+
+/// A list would have become longer than its caller allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "ray {ray} and those before it have more than {limit} hits: allow more, trace fewer rays in one \
+     call, or count the hits with World::count_hits"
+)]
+pub struct TooManyHits {
+    /// The ray at which the limit was reached: its number in the call.
+    pub ray: usize,
+    /// Most hits that were allowed.
+    pub limit: usize,
+}
+
+/// The hits of many rays, one list after the other.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HitLists {
+    /// Where each ray's list starts, and the number of all hits.
+    starts: Vec<usize>,
+    hits: Vec<Hit>,
+}
+
+impl HitLists {
+    /// Number of rays.
+    pub fn num_rays(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// The hits of a ray, nearest first; empty for rays that the call did not have.
+    pub fn of_ray(&self, ray: usize) -> &[Hit] {
+        match (self.starts.get(ray), self.starts.get(ray + 1)) {
+            (Some(&from), Some(&to)) => &self.hits[from..to],
+            _ => &[],
+        }
+    }
+
+    /// Where each ray's list starts in [`HitLists::hits`], and one more entry: their number.
+    pub fn starts(&self) -> &[usize] {
+        &self.starts
+    }
+
+    /// The hits of all rays.
+    pub fn hits(&self) -> &[Hit] {
+        &self.hits
+    }
+}
+
+impl World {
+    /// All hits with `t_min <= t < t_max`, nearest first; of equal distances, the lowest instance,
+    /// then the lowest primitive comes first.
+    ///
+    /// A surface counts once where the ray meets an edge or a vertex that triangles share, so a ray
+    /// enters and leaves a closed mesh equally often. The test is the watertight one in either
+    /// [`super::Robustness`]. Meshes count triangle by triangle, other shapes surface by surface.
+    ///
+    /// ```
+    /// use rt_core::prelude::*;
+    ///
+    /// // Two layers that share nothing.
+    /// let layer = |z: f32| [Vec3::new(-9.0, -9.0, z), Vec3::new(9.0, -9.0, z), Vec3::new(0.0, 9.0, z)];
+    /// let mesh = TriMesh::new([layer(0.0), layer(1.0)].concat(), vec![[0, 1, 2], [3, 4, 5]]);
+    /// let world = World::from_mesh(mesh, &BuildOptions::default())?;
+    /// let hits = world.all_hits(&Ray::new(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z), 100).unwrap();
+    /// assert_eq!(hits.iter().map(|h| (h.prim, h.t)).collect::<Vec<_>>(), [(1, 3.0), (0, 4.0)]);
+    /// # Ok::<(), rt_core::bvh::BuildError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When there are more than `limit` hits.
+    pub fn all_hits(&self, ray: &Ray, limit: usize) -> Result<Vec<Hit>, TooManyHits> {
+        let mut hits = Vec::new();
+        self.append_hits(ray, 0, limit, &mut hits)?;
+        Ok(hits)
+    }
+
+    /// The hits of each ray of `rays`, as [`World::all_hits`] gives them. Ray `i` is lane `i % 16`
+    /// of block `i / 16`; idle lanes have none. The calling thread does the work.
+    ///
+    /// # Errors
+    /// When all rays together have more than `limit` hits. One hit takes 20 bytes.
+    pub fn all_hits_of_blocks(
+        &self,
+        rays: &[RayBlock],
+        limit: usize,
+    ) -> Result<HitLists, TooManyHits> {
+        let mut lists = HitLists { starts: vec![0], hits: Vec::new() };
+        for (b, block) in rays.iter().enumerate() {
+            for lane in 0..LANES {
+                self.append_hits(&block.get(lane), b * LANES + lane, limit, &mut lists.hits)?;
+                lists.starts.push(lists.hits.len());
+            }
+        }
+        Ok(lists)
+    }
+
+    /// Number of hits that [`World::all_hits`] would find. Needs no memory for them.
+    pub fn count_hits(&self, ray: &Ray) -> usize {
+        let mut count = 0;
+        self.visit_hits(ray, |_| {
+            count += 1;
+            false
+        });
+        count
+    }
+
+    fn append_hits(
+        &self,
+        ray: &Ray,
+        number: usize,
+        limit: usize,
+        hits: &mut Vec<Hit>,
+    ) -> Result<(), TooManyHits> {
+        let first = hits.len();
+        let mut full = false;
+        self.visit_hits(ray, |hit| {
+            full = hits.len() >= limit;
+            if !full {
+                hits.push(hit);
+            }
+            full
+        });
+        if full {
+            return Err(TooManyHits { ray: number, limit });
+        }
+        hits[first..].sort_by(|a, b| {
+            a.t.total_cmp(&b.t).then((a.instance, a.prim).cmp(&(b.instance, b.prim)))
+        });
+        Ok(())
+    }
+
+    /// Passes each hit to `found`, in no order, until it returns true.
+    fn visit_hits(&self, ray: &Ray, mut found: impl FnMut(Hit) -> bool) {
+        if !ray.is_valid() {
+            return;
+        }
+        let (ray, unit) = with_ordinary_length(ray);
+        let found = |hit: Hit| found(Hit { t: hit.t * unit, ..hit });
+        dispatch!(self.level, simd => Crossings::new(self, ray, found).find(simd));
+    }
+}
