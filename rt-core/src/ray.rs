@@ -107,6 +107,12 @@ impl RayBlock {
         self.t_max[lane] = ray.t_max;
     }
 
+    /// The lanes that hold a ray that can hit anything.
+    #[inline]
+    pub(crate) fn active_lanes(&self) -> u16 {
+        (0..LANES).fold(0, |m, lane| m | (self.get(lane).is_valid() as u16) << lane)
+    }
+
     /// The ray in lane `lane`.
     #[inline]
     pub fn get(&self, lane: usize) -> Ray {

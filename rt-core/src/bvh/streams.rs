@@ -369,7 +369,7 @@ impl World {
         filter: InstanceFilter<'_>,
     ) {
         for (rays, hits) in rays.iter().zip(hits) {
-            let active = incoherent::active_lanes(rays);
+            let active = rays.active_lanes();
             let mut entries = EntryBlocks::<T, Q>::new(self, rays, hits, filter);
             traverse_block(simd, &self.tlas, rays, active, &mut entries);
         }

@@ -13,8 +13,8 @@ fn integer(random: &mut SplitMix64, range: i32) -> f32 {
     ((random.unit() * f64::from(2 * range + 1)).floor() as i32 - range) as f32
 }
 
-/// The surface of the box from zero to `n`, with vertices at all integers: closed, and full of edges
-/// and vertices that rays along the lattice meet.
+/// The surface of the box from zero to `n`, with vertices at all integers: closed, and full of
+/// edges and vertices that rays along the lattice meet.
 fn lattice_box(n: u32) -> TriMesh {
     let mut mesh = TriMesh::default();
     for axis in 0..3 {

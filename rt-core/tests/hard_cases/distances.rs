@@ -8,8 +8,8 @@ use rt_core::mesh::TriMesh;
 use rt_core::shapes::{Radii, Spheres};
 use std::sync::Arc;
 
-/// The distance of `p` to a triangle by ternary search over its weights: slow, and without the cases
-/// of the formula under test.
+/// The distance of `p` to a triangle by ternary search over its weights: slow, and without the
+/// cases of the formula under test.
 fn distance_by_search(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let least = |f: &dyn Fn(f64) -> f64| {
         let (mut lo, mut hi) = (0.0, 1.0);

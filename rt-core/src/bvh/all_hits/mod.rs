@@ -1,4 +1,4 @@
-//! All surfaces that a ray crosses, not the nearest alone: lengths inside a body, thickness, parity.
+//! All surfaces that a ray crosses, not the nearest alone: thickness, parity, lengths inside bodies.
 
 mod collect;
 mod inside;
@@ -9,10 +9,17 @@ use collect::Crossings;
 use fearless_simd::dispatch;
 
 /// A list would have become longer than its caller allows.
+///
+/// ```
+/// use rt_core::bvh::TooManyHits;
+///
+/// let error = TooManyHits { ray: 3, limit: 100 };
+/// assert!(error.to_string().starts_with("ray 3 and those before it have more than 100 hits"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "ray {ray} and those before it have more than {limit} hits: allow more, trace fewer rays in one \
-     call, or count the hits with World::count_hits"
+    "ray {ray} and those before it have more than {limit} hits: allow more, trace fewer rays in \
+     one call, or count the hits with World::count_hits"
 )]
 pub struct TooManyHits {
     /// The ray at which the limit was reached: its number in the call.
@@ -22,6 +29,23 @@ pub struct TooManyHits {
 }
 
 /// The hits of many rays, one list after the other.
+///
+/// ```
+/// use rt_core::bvh::HitLists;
+/// use rt_core::prelude::*;
+/// use rt_core::ray::RayBlock;
+///
+/// let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+/// let world =
+///     World::from_mesh(TriMesh::new(corners, vec![[0, 1, 2]]), &BuildOptions::default())?;
+/// let ray = |x: f32| Ray::new(Vec3::new(x, 0.25, 1.0), Vec3::NEG_Z);
+/// let blocks = RayBlock::from_rays(&[ray(5.0), ray(0.25)]);
+/// let lists: HitLists = world.all_hits_of_blocks(&blocks, 1000).unwrap();
+/// assert!(lists.of_ray(0).is_empty());
+/// assert_eq!(lists.of_ray(1)[0].t, 1.0);
+/// assert_eq!(lists.starts()[..3], [0, 0, 1]);
+/// # Ok::<(), rt_core::bvh::BuildError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HitLists {
     /// Where each ray's list starts, and the number of all hits.
@@ -66,7 +90,8 @@ impl World {
     /// use rt_core::prelude::*;
     ///
     /// // Two layers that share nothing.
-    /// let layer = |z: f32| [Vec3::new(-9.0, -9.0, z), Vec3::new(9.0, -9.0, z), Vec3::new(0.0, 9.0, z)];
+    /// let corners = [Vec3::new(-9.0, -9.0, 0.0), Vec3::new(9.0, -9.0, 0.0), Vec3::Y * 9.0];
+    /// let layer = |z: f32| corners.map(|c| c + Vec3::Z * z);
     /// let mesh = TriMesh::new([layer(0.0), layer(1.0)].concat(), vec![[0, 1, 2], [3, 4, 5]]);
     /// let world = World::from_mesh(mesh, &BuildOptions::default())?;
     /// let hits = world.all_hits(&Ray::new(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z), 100).unwrap();

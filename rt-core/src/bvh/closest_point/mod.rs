@@ -1,8 +1,8 @@
 //! The point of all surfaces that is closest to a given one, and signed distances.
 //!
 //! The tree of the rays serves: boxes are visited nearest first, and left out when they are farther
-//! away than the best point so far. All distances are computed in f64, from the f32 coordinates that
-//! rays see too.
+//! away than the best point so far. All distances are computed in f64, from the f32 coordinates
+//! that rays see too.
 
 mod search;
 mod triangle;
@@ -30,6 +30,12 @@ pub struct ClosestPoint {
 }
 
 /// The world has other shapes than meshes.
+///
+/// ```
+/// use rt_core::bvh::NoDistance;
+///
+/// assert!(NoDistance { instance: 2 }.to_string().starts_with("instance 2 is a shape"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "instance {instance} is a shape, and only meshes know the distance to a point: ask a world of \
@@ -46,12 +52,14 @@ impl World {
     /// lowest one is named.
     ///
     /// ```
+    /// use rt_core::bvh::ClosestPoint;
     /// use rt_core::prelude::*;
     ///
     /// let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
     /// let mesh = TriMesh::new(corners, vec![[0, 1, 2]]);
     /// let world = World::from_mesh(mesh, &BuildOptions::default())?;
-    /// let found = world.closest_point(Vec3::new(0.25, 0.25, 2.0), f32::INFINITY).unwrap().unwrap();
+    /// let above = Vec3::new(0.25, 0.25, 2.0);
+    /// let found: ClosestPoint = world.closest_point(above, f32::INFINITY).unwrap().unwrap();
     /// assert_eq!((found.point, found.distance), (Vec3::new(0.25, 0.25, 0.0), 2.0));
     /// assert_eq!(world.closest_point(Vec3::Z * 2.0, 1.0), Ok(None));
     /// # Ok::<(), rt_core::bvh::BuildError>(())

@@ -1,12 +1,12 @@
-//! Decides which triangle a ray crosses where it meets an edge or a vertex, so that each crossing of
-//! a surface counts once.
+//! Decides which triangle a ray crosses where it meets an edge or a vertex, so that each crossing
+//! of a surface counts once.
 //!
 //! The watertight test accepts a ray on an edge for both triangles. Here the ray is moved, in the
 //! sheared plane of that test, by (ε, ε²) for an infinitely small ε: then it meets no edge and no
 //! vertex (Edelsbrunner and Mücke, "Simulation of Simplicity", ACM Transactions on Graphics 1990).
-//! The edge function of p and q, p.x·q.y − p.y·q.x, becomes
-//! p.x·q.y − p.y·q.x + ε·(p.y − q.y) + ε²·(q.x − p.x), so its sign is that of the first term that is
-//! not zero. Two triangles that share an edge compute the same terms with opposite signs.
+//! The edge function of p and q becomes
+//! p.x·q.y − p.y·q.x + ε·(p.y − q.y) + ε²·(q.x − p.x), and its sign is that of the first term that
+//! is not zero. Two triangles that share an edge compute the same terms with opposite signs.
 
 use super::watertight::Shear;
 

@@ -13,7 +13,6 @@
 //! rays are answered before most of them are needed.
 
 use super::block_boxes::BlockSetup;
-use super::incoherent::active_lanes;
 use super::interleaved::{RayQueue, RayStack, RayTask, traverse_interleaved};
 use super::single::{RaySetup, inflate_t};
 use super::tree_view::TreeView;
@@ -57,7 +56,7 @@ pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     instance: u32,
 ) {
     let units = tree.units;
-    let mut active = active_lanes(rays);
+    let mut active = rays.active_lanes();
     let block = BlockSetup::new(simd, rays);
     // Every ray enters about five subtrees, so it pays to keep its constants.
     let setups = &block.rays(rays);

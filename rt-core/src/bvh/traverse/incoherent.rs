@@ -6,7 +6,7 @@ use crate::bvh::Unit;
 use crate::bvh::layout::wide::NODE_UNITS;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::packet::GROUPS;
-use crate::ray::{HitBlock, LANES, RayBlock};
+use crate::ray::{HitBlock, RayBlock};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, f32x16, mask32x16};
 
 /// Rays of a block share the start of the traversal when their origins lie within this part of the
@@ -59,7 +59,7 @@ fn close_reach<S: Simd>(simd: S, tree: &TreeView<'_>) -> [f32; 3] {
 /// Whether the rays of a block start within `reach` of one another.
 #[inline(always)]
 fn start_together<S: Simd>(simd: S, rays: &RayBlock, reach: [f32; 3]) -> bool {
-    let active = mask32x16::from_bitmask(simd, active_lanes(rays) as u64);
+    let active = mask32x16::from_bitmask(simd, rays.active_lanes() as u64);
     let splat = |x: f32| f32x16::splat(simd, x);
     for (row, reach) in [&rays.ox, &rays.oy, &rays.oz].into_iter().zip(reach) {
         let row = f32x16::from_slice(simd, row);
@@ -70,9 +70,4 @@ fn start_together<S: Simd>(simd: S, rays: &RayBlock, reach: [f32; 3]) -> bool {
         }
     }
     true
-}
-
-/// Lanes of a block that hold a ray.
-pub(crate) fn active_lanes(rays: &RayBlock) -> u16 {
-    (0..LANES).fold(0, |m, lane| m | (rays.get(lane).is_valid() as u16) << lane)
 }

@@ -6,7 +6,6 @@
 //! with a common start of the traversal.)
 
 use super::block_boxes::BlockSetup;
-use super::incoherent::active_lanes;
 use super::interleaved::{RayQueue, RayStack, RayTask, traverse_interleaved};
 use super::packet::GROUPS;
 use super::single::RaySetup;
@@ -35,7 +34,7 @@ pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     let mut setups = [[RaySetup::ZERO; LANES]; GROUPS];
     let mut active = [0; GROUPS];
     for (b, rays) in rays.iter().enumerate().take(GROUPS).filter(|(b, _)| blocks >> b & 1 == 1) {
-        active[b] = active_lanes(rays);
+        active[b] = rays.active_lanes();
         setups[b] = BlockSetup::new(simd, rays).rays(rays);
     }
     let queue = Scattered { rays, setups: &setups, hits, active, blocks, instance };
