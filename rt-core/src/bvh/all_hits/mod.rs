@@ -1,4 +1,4 @@
-//! All surfaces that a ray crosses, not the nearest alone: thickness, parity, lengths inside bodies.
+//! All surfaces that a ray crosses, not the nearest alone: thickness, parity, lengths in bodies.
 
 mod collect;
 mod inside;
